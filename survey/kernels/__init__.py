@@ -1,0 +1,1 @@
+"""Numbers only: no labels, files, threads or units (`.ci/imports.py` keeps it so)."""

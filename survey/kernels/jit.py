@@ -1,0 +1,65 @@
+"""The one decorator, its flags, and a kernel cache that cannot go stale.
+
+nogil: dask's threads run kernels side by side. error_model="numpy": a division by zero gives inf, which is checked,
+and loops vectorise. No fastmath and no contraction: compiled code and plain Python (NUMBA_DISABLE_JIT=1) give the
+same bits, and NaN checks stay. No signatures: importing compiles nothing.
+
+numba's own cache returns stale results when an imported module changes; here its directory is named by a hash of
+every source that can reach a kernel, of the versions and of the CPU, so that any edit starts an empty one.
+"""
+
+import hashlib
+import os
+from pathlib import Path
+
+import llvmlite
+import llvmlite.binding as llvm
+import numba
+import platformdirs
+
+SOURCES = ("kernels", "methods", "measures", "scenes")
+
+
+def source_hash():
+    """Hash of all sources that can reach a kernel, the compiler versions and the CPU (16 hex digits)."""
+    root = Path(__file__).parent.parent
+    digest = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__} {llvm.get_host_cpu_name()}".encode())
+    digest.update(llvm.get_host_cpu_features().flatten().encode())
+    for folder in SOURCES:
+        for path in sorted((root / folder).glob("*.py")):
+            digest.update(f"{folder}/{path.name}\0".encode() + path.read_bytes() + b"\0")
+    return digest.hexdigest()[:16]
+
+
+KERNEL_HASH = source_hash()
+
+
+def _cache_directory():
+    """A writable directory for compiled kernels, or None (a read-only home compiles anew in each process)."""
+    base = os.environ.get("NUMBA_CACHE_DIR") or platformdirs.user_cache_dir("survey")
+    path = Path(base) / KERNEL_HASH
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return None
+    return path if os.access(path, os.W_OK) else None
+
+
+_DIRECTORY = _cache_directory()
+_FLAGS = {"nogil": True, "error_model": "numpy"}
+
+
+def kernel(function):
+    """Compile `function` on its first call and keep the result on disk; call it with contiguous float64 arrays."""
+    if _DIRECTORY is None:
+        return numba.njit(**_FLAGS)(function)
+    previous, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(_DIRECTORY)
+    try:
+        return numba.njit(cache=True, **_FLAGS)(function)
+    finally:
+        numba.config.CACHE_DIR = previous
+
+
+def inline(function):
+    """Compile `function` as part of the kernels that call it (always inlined by LLVM, never cached alone)."""
+    return numba.njit(forceinline=True, **_FLAGS)(function)

@@ -1,0 +1,1 @@
+"""The measures: one question each, shared by the scenes that ask it."""

@@ -1,0 +1,29 @@
+"""Names resolve to modules: a scene or a method is found by its file name, and no list is kept by hand."""
+
+from difflib import get_close_matches
+from importlib import import_module
+from pkgutil import iter_modules
+
+
+class UnknownName(ValueError):
+    """No scene, method or variable has this name; the message suggests the nearest."""
+
+
+def names(package):
+    """Sorted names of the modules in `package` (an imported package)."""
+    return sorted(module.name for module in iter_modules(package.__path__))
+
+
+def load(package, name, what):
+    """The module `name` of `package`; raises UnknownName, naming the nearest, if there is none."""
+    known = names(package)
+    if name not in known:
+        raise UnknownName(unknown(what, name, known))
+    return import_module(f"{package.__name__}.{name}")
+
+
+def unknown(what, name, known):
+    """One line for an unknown name: what it is, the nearest known one, and all that are allowed."""
+    near = get_close_matches(str(name), known, n=1, cutoff=0.5)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    return f"unknown {what} {name!r}{hint} (allowed: {', '.join(known)})"

@@ -1,0 +1,103 @@
+"""The words in which a scene describes itself: parameters, options, outputs, and what is asked of it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import inf
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A real number of the system: an axis of a survey or one fixed value.
+
+    `default=None` says that it must be given. `excluded` and the open ends are not part of the domain.
+    `instead_of` names the parameter that this one replaces when it is given. `when` holds the option
+    values for which the parameter exists. An axis of a `whole` parameter is never cut into blocks.
+    """
+
+    name: str
+    long_name: str
+    symbol: str
+    units: str = "1"
+    default: float | None = None
+    minimum: float = -inf
+    maximum: float = inf
+    open_minimum: bool = False
+    open_maximum: bool = False
+    excluded: tuple[float, ...] = ()
+    instead_of: str | None = None
+    when: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    whole: bool = False
+
+    def holds(self, values):
+        """True where `values` (any shape) lie in the domain; NaN and infinities do not."""
+        values = np.asarray(values, dtype=float)
+        above = values > self.minimum if self.open_minimum else values >= self.minimum
+        below = values < self.maximum if self.open_maximum else values <= self.maximum
+        return np.isfinite(values) & above & below & ~np.isin(values, self.excluded)
+
+    @property
+    def domain(self):
+        """The domain in words, such as `0 <= k, k != 1`."""
+        words = []
+        if self.minimum > -inf:
+            words.append(f"{self.minimum:g} {'<' if self.open_minimum else '<='} {self.name}")
+        if self.maximum < inf:
+            words.append(f"{self.name} {'<' if self.open_maximum else '<='} {self.maximum:g}")
+        words += [f"{self.name} != {value:g}" for value in self.excluded]
+        return ", ".join(words) or "any finite number"
+
+
+@dataclass(frozen=True)
+class Option:
+    """A switch of the scene; the first choice is the default unless `default` says otherwise."""
+
+    name: str
+    choices: tuple[str, ...]
+    long_name: str
+    default: str = ""
+
+    def __post_init__(self):
+        object.__setattr__(self, "default", self.default or self.choices[0])
+
+
+@dataclass(frozen=True)
+class Output:
+    """A result per point. A float comes with `NAME_error`; one with `flags` is an int8 code, else an int32 count.
+
+    `applies` says in a sentence when the output applies; where it does not, a float is NaN and an integer is
+    `fill`. `dims` names extra (padded) dimensions, whose coordinates are the scene's `DIMENSIONS`.
+    """
+
+    name: str
+    long_name: str
+    symbol: str = ""
+    units: str = "1"
+    flags: Mapping[str, int] | None = None
+    integer: bool = False
+    fill: int = -1
+    applies: str = ""
+    when: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    dims: tuple[str, ...] = ()
+
+    @property
+    def dtype(self):
+        if self.flags is not None:
+            return np.dtype("int8")
+        return np.dtype("int32") if self.integer else np.dtype("float64")
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is asked at every point of a survey: option values, method, accuracy, and the outputs wanted."""
+
+    options: Mapping[str, str]
+    method: str = "auto"
+    rtol: float = 1e-10
+    variables: frozenset[str] = frozenset()
+
+
+def exists(item, options):
+    """Does this parameter or output exist under these option values?"""
+    return all(options.get(name) in allowed for name, allowed in item.when.items())

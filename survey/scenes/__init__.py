@@ -1,0 +1,16 @@
+"""The scenes: one physical system per file. See `survey/scene.py` for the words they use.
+
+A scene module holds TITLE (one line), PARAMETERS, OPTIONS, OUTPUTS (tuples), STATUS (its own status names and
+sentences), FAMILY (the methods that serve it: those whose SERVES names that family), REFERENCES (tuple of
+strings), and two functions:
+
+    cost(options) -> seconds per point, a rough figure for cutting blocks and for the plan
+    solve(point, request) -> {output: array}
+
+`point` maps each parameter that exists to a float64 array; all have the same number of dimensions and
+broadcast to the block's shape (an axis of the block is long in one array and 1 in the others, so what depends on
+one axis is computed once). A parameter outside its domain arrives as NaN: such points get the status
+`invalid_parameters`. `solve` returns, in the block's shape (plus an output's extra dimensions), every output in
+`request.variables` or all of them, `X_error` (float64) for each float output `X`, and `status` (int8). It is pure,
+thread-safe, and gives a point the same bits in any block.
+"""

@@ -1,0 +1,23 @@
+"""Why a point has no answer: one code, one sentence. A scene adds its own from 16 on (its `STATUS`)."""
+
+SENTENCES = {
+    "ok": "every output that applies to the point is finite",
+    "invalid_parameters": "the parameters lie outside the scene's domain: see `survey scenes NAME`",
+    "overflow": "a value left the range of binary64: the solution grows too fast for this method",
+    "no_convergence": "the iteration did not converge: try another method or a larger rtol",
+    "step_limit": "the step budget was used up: try a larger rtol or another method",
+    "worker_died": "the worker that solved this block died more than once: run the command again",
+    "pending": "not computed yet: run the command again to finish",
+}
+CODES = {name: code for code, name in enumerate(SENTENCES)}
+OK, INVALID_PARAMETERS, OVERFLOW, NO_CONVERGENCE, STEP_LIMIT, WORKER_DIED, PENDING = CODES.values()
+FIRST_OF_SCENE = 16
+FAILURES = frozenset({OVERFLOW, NO_CONVERGENCE, STEP_LIMIT, WORKER_DIED, PENDING})
+
+
+def table(scene):
+    """All codes that `scene` (a module of `survey.scenes`) may give: {name: (code, sentence)}."""
+    own = getattr(scene, "STATUS", {})
+    return {name: (CODES[name], SENTENCES[name]) for name in CODES} | {
+        name: (FIRST_OF_SCENE + i, sentence) for i, (name, sentence) in enumerate(own.items())
+    }
