@@ -1,0 +1,1 @@
+"""Parameter surveys of mechanical systems whose stability decides everything."""
