@@ -1,0 +1,132 @@
+"""The flow on the cylinder phi' = w, w' = f(phi) w + g(phi): coefficients, Taylor series, variational equation.
+
+f = b12 cos phi - b31 sin phi = F',  F = b12 sin phi + b31 cos phi,
+g = -d cos phi sin phi - c23 cos 2phi + s2 cos phi - s3 sin phi = -V'            (57), corrected reading.
+
+A step keeps its work in one table T[n, row]: the coefficient of (t - t_n)^n of each quantity (rows below), and in
+the last line T[LAST] what a method notes about the step (its truncation error, its step size).
+"""
+
+import math
+
+import numpy as np
+
+from survey.kernels.jit import inline
+
+ORDER = 20  # of the Taylor series in t; near -ln(eps)/2 + 1 = 19 the work per unit of time is least (Jorba & Zou)
+LOW = 8  # order of the series of the variational equation, which only carries error bars
+LAST = ORDER + 1
+ROWS = 14
+PHI, W, SIN, COS, SIN2, COS2, E, Y, U1, Z1, U2, Z2, F_, DG = range(ROWS)
+# E = integral of f (exp E is the area factor), Y = integral of g (the change of w - F), U, Z the variations of phi
+# and of y = w - F for unit changes of phi (1) and w (2), F_ = f, DG = g'.
+
+TRUNC_PHI, TRUNC_W, STEP, NOTE = range(4)  # places in T[LAST]
+
+B12, B31, D, C23, S2, S3, BOUND_F, BOUND_G, BOUND_DG, BOUND_DDG = range(10)
+UNIT = 1.2e-16  # one rounding, relative
+TWO_PI = 2.0 * math.pi
+TWO_PI_LOW = 2.4492935982947064e-16  # 2 pi - TWO_PI
+
+
+def coefficients(b12, b31, d, c23, s2, s3):
+    """Rows of the six parameters (arrays of one shape) and bounds of |f|, |g|, |g'|, |g''| over the circle."""
+    b, c, s = np.hypot(b12, b31), np.hypot(0.5 * np.asarray(d), c23), np.hypot(s2, s3)
+    return np.stack([b12, b31, d, c23, s2, s3, b, c + s, 2.0 * c + s, 4.0 * c + s], axis=-1)
+
+
+@inline
+def values(p, phi):
+    """f, g, g' at phi."""
+    s, c = math.sin(phi), math.cos(phi)
+    s2, c2 = 2.0 * s * c, (c - s) * (c + s)
+    f = p[B12] * c - p[B31] * s
+    g = -0.5 * p[D] * s2 - p[C23] * c2 + p[S2] * c - p[S3] * s
+    dg = -p[D] * c2 + 2.0 * p[C23] * s2 - p[S2] * s - p[S3] * c
+    return f, g, dg
+
+
+@inline
+def potential(p, phi):
+    """V = (d/2) sin^2 phi + (c23/2) sin 2phi - s2 sin phi - s3 cos phi, g = -V'."""
+    s, c = math.sin(phi), math.cos(phi)
+    return 0.5 * p[D] * s * s + p[C23] * s * c - p[S2] * s - p[S3] * c
+
+
+@inline
+def series(p, phi, w, T, order):
+    """Fill rows PHI..Y of T with the series through (phi, w) up to t^order."""
+    s, c = math.sin(phi), math.cos(phi)
+    T[0, PHI], T[0, W], T[0, SIN], T[0, COS] = phi, w, s, c
+    T[0, SIN2], T[0, COS2] = 2.0 * s * c, (c - s) * (c + s)
+    T[0, E] = T[0, Y] = 0.0
+    for n in range(order):
+        a0 = a1 = a2 = a3 = 0.0
+        for k in range(n + 1):  # (sin phi)' = w cos phi and its kin, Cauchy products
+            wk = T[k, W]
+            a0 += wk * T[n - k, SIN]
+            a1 += wk * T[n - k, COS]
+            a2 += wk * T[n - k, SIN2]
+            a3 += wk * T[n - k, COS2]
+        r = 1.0 / (n + 1)
+        sn, cn = T[n, SIN], T[n, COS]
+        T[n + 1, E] = (p[B12] * cn - p[B31] * sn) * r
+        y = (-0.5 * p[D] * T[n, SIN2] - p[C23] * T[n, COS2] + p[S2] * cn - p[S3] * sn) * r
+        s, c = a1 * r, -a0 * r
+        T[n + 1, PHI], T[n + 1, Y] = T[n, W] * r, y
+        T[n + 1, SIN], T[n + 1, COS], T[n + 1, SIN2], T[n + 1, COS2] = s, c, 2.0 * a3 * r, -2.0 * a2 * r
+        T[n + 1, W] = p[B12] * s + p[B31] * c + y  # w = F + y
+
+
+@inline
+def variation(p, T):
+    """Fill rows U1..DG up to t^LOW: u' = f u + z, z' = g' u, from the series of sin and cos in T."""
+    for n in range(LOW):
+        T[n, F_] = p[B12] * T[n, COS] - p[B31] * T[n, SIN]
+        T[n, DG] = -p[D] * T[n, COS2] + 2.0 * p[C23] * T[n, SIN2] - p[S2] * T[n, SIN] - p[S3] * T[n, COS]
+    T[LOW, F_] = p[B12] * T[LOW, COS] - p[B31] * T[LOW, SIN]
+    T[0, U1], T[0, Z1], T[0, U2], T[0, Z2] = 1.0, -T[0, F_], 0.0, 1.0
+    for n in range(LOW):
+        a0 = a1 = a2 = a3 = 0.0
+        for k in range(n + 1):
+            u1, u2 = T[n - k, U1], T[n - k, U2]
+            a0 += T[k, F_] * u1
+            a1 += T[k, DG] * u1
+            a2 += T[k, F_] * u2
+            a3 += T[k, DG] * u2
+        r = 1.0 / (n + 1)
+        T[n + 1, U1], T[n + 1, Z1] = (a0 + T[n, Z1]) * r, a1 * r
+        T[n + 1, U2], T[n + 1, Z2] = (a2 + T[n, Z2]) * r, a3 * r
+
+
+@inline
+def jacobian(T, dt):
+    """d(phi, w)(dt) / d(phi, w)(0) as (phi_phi, phi_w, w_phi, w_w)."""
+    u1, z1, u2, z2, f = T[LOW, U1], T[LOW, Z1], T[LOW, U2], T[LOW, Z2], T[LOW, F_]
+    for n in range(LOW - 1, -1, -1):
+        u1, z1, u2 = u1 * dt + T[n, U1], z1 * dt + T[n, Z1], u2 * dt + T[n, U2]
+        z2, f = z2 * dt + T[n, Z2], f * dt + T[n, F_]
+    return u1, u2, z1 + f * u1, z2 + f * u2
+
+
+@inline
+def table():
+    """An empty table for the steps of one trajectory."""
+    return np.zeros((LAST + 1, ROWS))
+
+
+@inline
+def reduced(phi):
+    """phi in [-pi, pi] and the number of turns taken out of it."""
+    turns = math.floor(phi / TWO_PI + 0.5)
+    return (phi - turns * TWO_PI) - turns * TWO_PI_LOW, turns
+
+
+@inline
+def longest_step(p, w):
+    """A step within which w has at most one zero.
+
+    w'' - f w' - (f' w + g') w = 0; without its damping the restoring force is Q = -g' - f^2/4 - f' w/2, so by Sturm
+    zeros of w are pi / sqrt(max Q) apart at least. Here a third of that.
+    """
+    return 1.0 / math.sqrt(p[BOUND_DG] + p[BOUND_F] * (abs(w) + 0.25 * p[BOUND_F]) + 1e-300)

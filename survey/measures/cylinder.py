@@ -1,0 +1,157 @@
+"""Single solutions of a flow on the cylinder phi' = w, w' = f(phi) w + g(phi): in time, and w and t over phi (57).
+
+Arrays in, arrays out; a row is one solution, its columns are the times or places asked for. A row that misses the
+asked accuracy is solved again with smaller steps, and the better answer is kept.
+"""
+
+import numpy as np
+
+from survey.kernels.along import OK, TURNING, UNTOLD
+from survey.kernels.flow import coefficients
+
+STEPS = 200_000  # budget of one solution; about 0.1 s with the Taylor method
+SHARE = 1e-3  # of the asked accuracy, for the truncation error of one step
+FINEST = 1e-17
+
+
+def reverse(rows):
+    """S1: (b, w, t) -> -(b, w, t). `rows` is six parameters, phi, w in columns."""
+    return rows * np.array([-1, -1, 1, 1, 1, 1, 1, -1.0])
+
+
+def mirror(rows):
+    """S2: (phi, w, b31, c23, s2) -> -(phi, w, b31, c23, s2)."""
+    return rows * np.array([1, -1, 1, -1, -1, 1, -1, -1.0])
+
+
+def tolerances(rtol):
+    """Truncation per step, for the first attempt and for the second."""
+    first = min(max(SHARE * rtol, FINEST), 1e-3)
+    return first, max(1e-4 * first, FINEST)
+
+
+def split(rows):
+    """Rows of eight numbers as the kernels take them: coefficients and initial states."""
+    return np.ascontiguousarray(coefficients(*rows[:, :6].T)), np.ascontiguousarray(rows[:, 6:])
+
+
+def trajectories(method, rows, times, rtol):
+    """phi, w, their bars (last axis), turnings and status at `times` (rows, columns), of either sign.
+
+    turnings counts the sign changes of w between 0 and t; it is -2 where the error bar cannot tell.
+    """
+    floats = np.full((*times.shape, 4), np.nan)
+    turnings = np.full(times.shape, UNTOLD, dtype=np.int64)
+    status = np.zeros(times.shape, dtype=np.int64)
+    for past in (False, True):
+        mine = times < 0 if past else times >= 0
+        picked = mine.any(axis=1)
+        if not picked.any():
+            continue
+        places = np.where(mine, np.abs(times), np.inf)[picked]
+        f, n, s = _in_time(method, reverse(rows[picked]) if past else rows[picked], places, rtol)
+        if past:
+            f[..., 1] *= -1.0
+        take = mine[picked]
+        for whole, part in ((floats, f), (turnings, n), (status, s)):
+            held = whole[picked]
+            held[take] = part[take]
+            whole[picked] = held
+    return floats, turnings, status
+
+
+def _in_time(method, rows, places, rtol):
+    order = np.argsort(places, axis=1, kind="stable")
+    places = np.ascontiguousarray(np.take_along_axis(places, order, axis=1))
+
+    def run(pick, tolerance):
+        P, starts = split(rows[pick])
+        floats = np.full((*places[pick].shape, 4), np.nan)
+        turnings = np.full(places[pick].shape, UNTOLD, dtype=np.int64)
+        ends = np.zeros(len(P), dtype=np.int64)
+        at = np.ascontiguousarray(places[pick])
+        method.flow_trajectories(P, starts, at, tolerance, STEPS, floats, turnings, ends)
+        status = np.where(np.isfinite(floats[..., 0]), OK, ends[:, None])
+        return floats, turnings, status
+
+    return _unsorted(order, _twice(run, np.isfinite(places), rtol))
+
+
+def abel(method, rows, targets, rtol):
+    """w, t and their bars, or those of the turning point (status TURNING), at phi = `targets` (rows, columns).
+
+    Where w0 = 0 and g != 0 the solution starts at its turning point; it is followed forward in time, to the side of
+    g, and at targets on the other side it has turned at t = 0.
+    """
+    floats = np.full((*targets.shape, 4), np.nan)
+    status = np.zeros(targets.shape, dtype=np.int64)
+    for side in (1.0, -1.0):
+        ahead = targets >= rows[:, 6:7] if side > 0 else targets < rows[:, 6:7]
+        for past in (False, True):
+            picked = ahead.any(axis=1) & ((rows[:, 7] * side < 0) == past)
+            if not picked.any():
+                continue
+            part = reverse(rows[picked]) if past else rows[picked]
+            part = mirror(part) if side < 0 else part
+            part[:, 7] = np.abs(part[:, 7])
+            f, s = _in_phi(method, part, np.where(ahead[picked], side * targets[picked], np.inf), rtol)
+            first = np.where(s == TURNING, side, side * (-1.0 if past else 1.0))
+            f[..., 0] *= first
+            f[..., 1] *= -1.0 if past else 1.0
+            f += 0.0  # no negative zeros
+            for whole, new in ((floats, f), (status, s)):
+                held = whole[picked]
+                held[ahead[picked]] = new[ahead[picked]]
+                whole[picked] = held
+    return floats, status
+
+
+def _in_phi(method, rows, targets, rtol):
+    order = np.argsort(targets, axis=1, kind="stable")
+    targets = np.ascontiguousarray(np.take_along_axis(targets, order, axis=1))
+
+    def run(pick, tolerance):
+        P, starts = split(rows[pick])
+        floats = np.full((*targets[pick].shape, 4), np.nan)
+        status = np.zeros(targets[pick].shape, dtype=np.int64)
+        at = np.ascontiguousarray(targets[pick])
+        method.flow_abels(P, starts, at, tolerance, STEPS, floats, status)
+        return floats, status
+
+    return _unsorted(order, _twice(run, np.isfinite(targets), rtol))
+
+
+def _twice(run, asked, rtol):
+    """Solve all rows, then once more, finer, those that miss the asked accuracy; keep the better of the two."""
+    first, second = tolerances(rtol)
+    results = run(np.ones(len(asked), dtype=bool), first)
+    again = (_missed(results, rtol) & asked).any(axis=1)
+    if again.any():
+        finer = run(again, second)
+        kept = [result[again] for result in results]
+        better = _badness(finer) <= _badness(kept)
+        for result, old, new in zip(results, kept, finer, strict=True):
+            old[better] = new[better]
+            result[again] = old
+    return results
+
+
+def _missed(results, rtol):
+    floats, status = results[0], results[-1]
+    values, bars = floats[..., :2], floats[..., 2:]
+    met = (bars <= rtol * (1.0 + np.abs(values))).all(axis=-1)
+    return ~(met & (status >= 0)) & ((status == OK) | (status == TURNING)) | (status > OK) & (status != TURNING)
+
+
+def _badness(results):
+    floats, status = results[0], results[-1]
+    worst = np.where(np.isnan(floats[..., 2]), 0.0, np.nanmax(floats[..., 2:], axis=-1, initial=0.0))
+    return worst + np.where((status == OK) | (status == TURNING), 0.0, 1e300)
+
+
+def _unsorted(order, results):
+    """Undo the sorting of the columns."""
+    back = np.argsort(order, axis=1)
+    return tuple(
+        np.take_along_axis(result, back[..., None] if result.ndim == 3 else back, axis=1) for result in results
+    )

@@ -1,0 +1,53 @@
+"""Taylor series in t with variable steps and dense output, for flows on the cylinder: the default.
+
+Order 20; the coefficients come from recurrences (`kernels/flow.py`). Step size after A. Jorba and M. Zou, "A
+software package for the numerical integration of ODEs by means of high-order Taylor methods", Experimental
+Mathematics 14 (2005) 99-117. Domain: every parameter value; explicit, so steps shrink as 1/|b| on stiff systems.
+"""
+
+from survey.kernels import along
+from survey.kernels.flow import LAST, ORDER as _ORDER, PHI, TRUNC_PHI, TRUNC_W, W, E, Y, series
+from survey.kernels.jit import inline, kernel
+
+ORDER = 20
+SERVES = ("cylinder",)
+
+
+@inline
+def setting(p, w, tolerance):
+    """What steers the steps: the tolerance of one step."""
+    return tolerance
+
+
+@inline
+def begin(p, phi, w, tolerance, T):
+    """Expand at (phi, w); returns the step that keeps the last two terms below the tolerance."""
+    series(p, phi, w, T, _ORDER)
+    scale = 1.0 / (1.0 + abs(w))
+    last = max(abs(T[_ORDER, PHI]), scale * abs(T[_ORDER, W])) + 1e-300
+    before = max(abs(T[_ORDER - 1, PHI]), scale * abs(T[_ORDER - 1, W])) + 1e-300
+    h = min((tolerance / last) ** (1.0 / _ORDER), (tolerance / before) ** (1.0 / (_ORDER - 1)))
+    T[LAST, TRUNC_PHI] = tolerance
+    T[LAST, TRUNC_W] = tolerance / scale
+    return h
+
+
+@inline
+def at(p, T, dt):
+    """(phi, w, integral of f, integral of g) at dt after the start of the step."""
+    phi, w, e, y = T[_ORDER, PHI], T[_ORDER, W], T[_ORDER, E], T[_ORDER, Y]
+    for n in range(_ORDER - 1, -1, -1):
+        phi, w, e, y = phi * dt + T[n, PHI], w * dt + T[n, W], e * dt + T[n, E], y * dt + T[n, Y]
+    return phi, w, e, y
+
+
+@kernel
+def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
+    """See `along.trajectories`."""
+    along.trajectories(setting, begin, at, P, starts, times, tolerance, limit, floats, turnings, status)
+
+
+@kernel
+def flow_abels(P, starts, targets, tolerance, limit, floats, status):
+    """See `along.abels`."""
+    along.abels(setting, begin, at, P, starts, targets, tolerance, limit, floats, status)

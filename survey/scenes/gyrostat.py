@@ -1,0 +1,136 @@
+"""A gyrostat with Barnett-London effect turning about axis 1: phi' = w, w' = f(phi) w + g(phi), on the cylinder.
+
+    f = b12 cos phi - b31 sin phi,
+    g = -d cos phi sin phi - c23 cos 2phi + s2 cos phi - s3 sin phi                              (57)
+
+Parameters, in order: b12, b31 (components of B over A11), d = c22 - c33 and c23 (of C), s2, s3 (of s), any finite
+numbers; phi0 (rad) and w0, the initial angle and velocity. In (57) phi is the independent variable and
+w w_phi = f w + g; here the system is solved in time, so turning points (w = 0) are passed.
+
+What is known. H = w^2/2 + V, V' = -g: dH/dt = f w^2. K = b12 s3 - b31 s2 decides the ends w -> +-inf: both attract
+for K > 0 (spin-up, w^2 ~ K t), both repel for K < 0; at K = 0 L = (pi/2)(c23 (b12^2 - b31^2) - d b12 b31) decides.
+Integrable strata: I0 (g = 0), I1 (b = 0, H conserved), I2 (K = L = 0). Symmetries: (b, w, t) -> -(b, w, t);
+(phi, w, b31, c23, s2) -> -(...); phi -> phi + pi, (b, s) -> -(b, s); rotations of axes 2 and 3.
+
+Source: M. E. Lesina, Ya. V. Zinovyeva, "The gyrostat with Barnett-London effect" (2004), checked and corrected in
+`physics/gyrostat.md` (whose section 5 is the classification that the fates follow).
+
+Questions: `trajectory` (phi and w at t), `abel` (w and t at phi) and `fate` (where the solution ends).
+"""
+
+import numpy as np
+
+from survey import methods
+from survey.measures import cylinder
+from survey.modules import load
+from survey.scene import Option, Output, Parameter
+from survey.status import INVALID_PARAMETERS, OK
+
+TITLE = "Gyrostat with Barnett-London effect, rotation about axis 1"
+FAMILY = "cylinder"
+REFERENCES = (
+    "M. E. Lesina, Ya. V. Zinovyeva (2004): Integration of the equations of a gyrostat with Barnett-London effect",
+)
+
+_SYSTEM = ("b12", "b31", "d", "c23", "s2", "s3")
+_TIME, _ABEL, _FATE = ({"question": (name,)} for name in ("trajectory", "abel", "fate"))
+
+PARAMETERS = (
+    Parameter("b12", "Barnett-London coefficient B12 / A11", "b_12", default=0.0),
+    Parameter("b31", "Barnett-London coefficient B31 / A11", "b_31", default=0.0),
+    Parameter("d", "difference (C22 - C33) / A11 of the potential matrix", "d", default=0.0),
+    Parameter("c23", "potential matrix element C23 / A11", "c_23", default=0.0),
+    Parameter("s2", "component s2 / A11 of the centre of mass vector", "s_2", default=0.0),
+    Parameter("s3", "component s3 / A11 of the centre of mass vector", "s_3", default=0.0),
+    Parameter("phi0", "initial angle of rotation", "phi_0", units="rad", default=0.0),
+    Parameter("w0", "initial angular velocity", "w_0", default=0.0),
+    Parameter("t", "time from the initial state (negative: before it)", "t", when=_TIME, whole=True),
+    Parameter("phi", "angle of rotation at which w and t are asked, unwrapped", "phi", units="rad", when=_ABEL,
+              whole=True),
+)  # fmt: skip
+OPTIONS = (Option("question", ("fate", "trajectory", "abel"), "what is asked of the solution"),)
+STATUS = {
+    "turning": "the solution turns back before it reaches phi: phi_turning and t_turning say where and when",
+    "equilibrium": "the solution runs into an equilibrium, in infinite time, before it reaches phi",
+    "separatrix": "the error bar cannot tell on which side of a separatrix the solution passes",
+}
+_TURNING = 16
+
+OUTPUTS = (
+    Output("phi", "angle of rotation at t, unwrapped", "phi", units="rad", when=_TIME),
+    Output("w", "angular velocity", "w", when={"question": ("trajectory", "abel")},
+           applies="at a place that the solution reaches"),
+    Output("turnings", "number of turning points (sign changes of w)", "n_T", integer=True, fill=-2,
+           applies="where the error bar can tell the number; -1 means infinitely many",
+           when={"question": ("trajectory", "fate")}),
+    Output("t", "time at which the solution reaches phi", "t", when=_ABEL,
+           applies="at a place that the solution reaches"),
+    Output("phi_turning", "turning point on the way to phi, unwrapped", "phi_T", units="rad", when=_ABEL,
+           applies="where the solution turns before it reaches phi"),
+    Output("t_turning", "time of the turning point", "t_T", when=_ABEL,
+           applies="where the solution turns before it reaches phi"),
+)  # fmt: skip
+
+
+def cost(options):
+    """Seconds per point, rough: one dense output, or one fate."""
+    return {"trajectory": 5e-5, "abel": 5e-5, "fate": 1e-3}[options.get("question", "fate")]
+
+
+def solve(point, request):
+    """Every output at every point of the block."""
+    method = load(methods, "taylor" if request.method == "auto" else request.method, "method")
+    question = request.options.get("question", "fate")
+    return {"trajectory": _trajectory, "abel": _abel}[question](point, method, request.rtol)
+
+
+def _dense(point, name):
+    """(rows of eight numbers, values of `name`, function that brings results back into the block's shape).
+
+    The dimensions along which only `name` varies become columns: one solution serves them all.
+    """
+    arrays = [np.asarray(point[key], dtype=float) for key in (*_SYSTEM, "phi0", "w0", name)]
+    shape = np.broadcast_shapes(*(array.shape for array in arrays))
+    dense = [i for i in range(len(shape)) if all(array.shape[i] == 1 for array in arrays[:-1])]
+    points = [i for i in range(len(shape)) if i not in dense]
+    order = points + dense
+    columns = int(np.prod([shape[i] for i in dense], dtype=int))
+    last = np.broadcast_to(arrays[-1], shape).transpose(order).reshape(-1, columns)
+    small = [shape[i] if i in points else 1 for i in range(len(shape))]
+    rows = np.stack([np.broadcast_to(array, small).ravel() for array in arrays[:-1]], axis=-1)
+
+    def back(values):
+        return values.reshape([shape[i] for i in order]).transpose(np.argsort(order))
+
+    return rows, last, back
+
+
+def _valid(rows, places):
+    """Rows and places with NaN made harmless, and where all are numbers."""
+    good = np.isfinite(rows).all(axis=1)[:, None] & np.isfinite(places)
+    return np.where(np.isfinite(rows).all(axis=1)[:, None], rows, 0.0), np.where(good, places, 0.0), good
+
+
+def _trajectory(point, method, rtol):
+    rows, times, back = _dense(point, "t")
+    rows, times, good = _valid(rows, times)
+    floats, turnings, status = cylinder.trajectories(method, rows, times, rtol)
+    status = np.where(good, status, INVALID_PARAMETERS)
+    floats[status != OK] = np.nan
+    turnings[status != OK] = -2
+    names = ("phi", "w", "phi_error", "w_error")
+    results = {name: back(floats[..., i]) for i, name in enumerate(names)}
+    return results | {"turnings": back(turnings), "status": back(status)}
+
+
+def _abel(point, method, rtol):
+    rows, places, back = _dense(point, "phi")
+    rows, places, good = _valid(rows, places)
+    floats, status = cylinder.abel(method, rows, places, rtol)
+    status = np.where(good, status, INVALID_PARAMETERS)
+    results = {"status": back(status)}
+    for names, code in ((("w", "t"), OK), (("phi_turning", "t_turning"), _TURNING)):
+        here = np.where((status == code)[..., None], floats, np.nan)
+        for i, name in enumerate(names):
+            results[name], results[f"{name}_error"] = back(here[..., i]), back(here[..., 2 + i])
+    return results
