@@ -4,9 +4,7 @@ from difflib import get_close_matches
 from importlib import import_module
 from pkgutil import iter_modules
 
-
-class UnknownName(ValueError):
-    """No scene, method or variable has this name; the message suggests the nearest."""
+from survey.errors import BadInput
 
 
 def names(package):
@@ -15,10 +13,10 @@ def names(package):
 
 
 def load(package, name, what):
-    """The module `name` of `package`; raises UnknownName, naming the nearest, if there is none."""
+    """The module `name` of `package`; raises BadInput, naming the nearest, if there is none."""
     known = names(package)
     if name not in known:
-        raise UnknownName(unknown(what, name, known))
+        raise BadInput(unknown(what, name, known))
     return import_module(f"{package.__name__}.{name}")
 
 
@@ -26,4 +24,4 @@ def unknown(what, name, known):
     """One line for an unknown name: what it is, the nearest known one, and all that are allowed."""
     near = get_close_matches(str(name), known, n=1, cutoff=0.5)
     hint = f"; did you mean {near[0]!r}?" if near else ""
-    return f"unknown {what} {name!r}{hint} (allowed: {', '.join(known)})"
+    return f"unknown {what} {name!r}{hint} (allowed: {', '.join(known) or 'none'})"

@@ -1,0 +1,288 @@
+"""What users call from Python: run, evaluate, open, scenes."""
+
+import inspect
+
+import numpy as np
+import xarray as xr
+
+import survey.methods as method_folder
+import survey.scenes as scene_folder
+from survey import engine, modules, status, store
+from survey import workflow as workflows
+from survey.dataset import count, counts, describe, error_bars, layout
+from survey.errors import BadInput
+from survey.grid import Grid
+
+
+def run(workflow, output=None, workers=None, scheduler=None, fresh=False):
+    """Run, or resume, the survey in the TOML file `workflow`: the same as the command `survey run`.
+
+    Parameters
+    ----------
+    workflow : path of a workflow file, or a mapping with the same tables.
+    output : path of the netCDF file, instead of the workflow's.
+    workers : number of worker processes; by default threads of this process.
+    scheduler : address or scheduler file of a dask.distributed cluster.
+    fresh : drop the finished blocks of an earlier, interrupted run.
+
+    Returns
+    -------
+    xarray.Dataset, loaded; the file (and its figures) are written and closed.
+
+    Raises
+    ------
+    survey.BadInput, survey.Stopped (resumable): one line each.
+    """
+    read = workflows.check if isinstance(workflow, dict) else workflows.read
+    checked = read(workflow, output=output)
+    ds = engine.run(checked, workers, scheduler, fresh)
+    draw(ds, checked)
+    return ds
+
+
+def draw(ds, workflow):
+    """Draw the workflow's figures beside its output; returns their paths (`OUT.png`, further ones `OUT_NAME.png`)."""
+    if not workflow.figures:
+        return []
+    from survey import figures
+
+    first = workflow.figures[0]
+    paths = {
+        name: workflow.path.with_suffix(".png")
+        if name == first
+        else workflow.path.with_name(f"{workflow.path.stem}_{name}.png")
+        for name in workflow.figures
+    }
+    for name, path in paths.items():
+        figures.save(ds, path, name)
+    return list(paths.values())
+
+
+def evaluate(scene, *, method="auto", rtol=1e-10, variables=None, **parameters):
+    """Solve a scene at the given parameters.
+
+    Parameters
+    ----------
+    scene : name of a scene, such as "satellite" (`survey.scenes()` lists them, `survey scenes NAME` explains one).
+    method : "auto" or the name of a method.
+    rtol : asked accuracy, |error| <= rtol (1 + |value|); the `X_error` variables say what was reached.
+    variables : names of the outputs wanted; all by default. Errors and status come along.
+    **parameters : the scene's parameters (numbers, sequences, numpy 1-D arrays, DataArrays) and options (strings).
+        A number becomes a scalar coordinate, a 1-D array a dimension named after its parameter; DataArrays keep
+        their dimensions, so those that share one are taken point by point and others multiply.
+
+    Returns
+    -------
+    xarray.Dataset with every output, its error bar `X_error`, `status` and (where the scene decides stability)
+    `verdict`; lazy if an input is dask-backed, else loaded. Values are the same bits as those of `survey run`.
+
+    Raises
+    ------
+    survey.BadInput (a ValueError) for an unknown name, a missing parameter, or a lone value outside its domain. A point
+    outside the domain within an array gets `status = invalid_parameters` and costs itself alone.
+
+    Examples
+    --------
+    >>> import survey
+    >>> ds = survey.evaluate("satellite", k=[0.3, 0.5], rho=1.0, body="prolate")
+    >>> ds.verdict.dims
+    ('k',)
+    """
+    module = modules.load(scene_folder, scene, "scene")
+    names = {option.name for option in module.OPTIONS}
+    options = workflows.check_options(module, {key: value for key, value in parameters.items() if key in names})
+    given = {key: _labelled(key, value) for key, value in parameters.items() if key not in names}
+    used = workflows.check_parameters(module, scene, options, given)
+    request = workflows.check_request(module, options, method, rtol, variables)
+    given |= {key: xr.DataArray(float(p.default)) for key, p in used.items() if key not in given}
+    _check_lone_values(used, given)
+    if any(array.chunks for array in given.values()):
+        return _lazy(module, scene, request, given)
+    grid = _grid(used, given)
+    ds = describe(grid, module, scene, request, engine.compute(grid, module, request))
+    return count(ds.assign_coords(_own_coordinates(given)))
+
+
+def open(path):
+    """The dataset in the netCDF file `path`, in memory and the file closed.
+
+    Raises survey.BadInput if there is no such file or survey did not write it, survey.Damaged if it is incomplete.
+    """
+    return store.load(path)
+
+
+def scenes():
+    """{name: title} of the scenes."""
+    return {name: modules.load(scene_folder, name, "scene").TITLE for name in modules.names(scene_folder)}
+
+
+def _labelled(key, value):
+    """The parameter as a float64 DataArray."""
+    if isinstance(value, xr.Variable):
+        value = xr.DataArray(value)
+    if not isinstance(value, xr.DataArray):
+        array = value if hasattr(value, "dask") else np.asarray(value)
+        if array.ndim > 1:
+            raise BadInput(f"{key}: an array of {array.ndim} dimensions has no names for them; give a DataArray")
+        value = xr.DataArray(array, dims=(key,) if array.ndim else ())
+    if value.dtype.kind not in "iuf":
+        raise BadInput(f"{key} = {value.values!r}: it must be a real number or an array of real numbers")
+    if value.size == 0:
+        raise BadInput(f"{key}: an empty array has no points; give at least one value")
+    return value.astype(float)
+
+
+def _check_lone_values(used, given):
+    for key, array in given.items():
+        if array.ndim == 0 and not array.chunks and not used[key].holds(array.values):
+            raise BadInput(f"{key} = {float(array):g} is outside its domain; allowed: {used[key].domain}")
+
+
+def _grid(used, given):
+    sizes = {}
+    for key, array in given.items():
+        for dim, size in array.sizes.items():
+            if sizes.setdefault(dim, size) != size:
+                raise BadInput(f"{key}: dimension {dim!r} has {size} values here and {sizes[dim]} in another parameter")
+    return Grid(
+        sizes=sizes,
+        parameters={key: (array.dims, array.values) for key, array in given.items()},
+        whole=frozenset(dim for key, array in given.items() if used[key].whole for dim in array.dims),
+    )
+
+
+def _own_coordinates(given):
+    """Coordinates that the caller's DataArrays bring along."""
+    own = {}
+    for array in given.values():
+        own |= {name: coord for name, coord in array.coords.items() if name not in given}
+    return own
+
+
+def _lazy(module, scene, request, given):
+    """The same dataset, its values computed block by block when they are asked for."""
+    table = layout(module, request)
+    names = list(given)
+
+    def solve(*arrays):
+        shape = np.broadcast_shapes(*(array.shape for array in arrays))
+        wide = [array.reshape((1,) * (len(shape) - array.ndim) + array.shape) for array in arrays]
+        solved = engine.solve_point(module, request, dict(zip(names, wide, strict=True)), shape)
+        return tuple(solved[name] for name in table)
+
+    outputs = {o.name: o for o in module.OUTPUTS}
+    extra = [outputs.get(name.removesuffix("_error")) for name in table]
+    results = xr.apply_ufunc(
+        solve,
+        *given.values(),
+        dask="parallelized",
+        output_dtypes=[dtype for dtype, _, _ in table.values()],
+        output_core_dims=[o.dims if o else () for o in extra],
+        dask_gufunc_kwargs={"output_sizes": {d: len(module.DIMENSIONS[d]) for o in extra if o for d in o.dims}},
+    )
+    arrays = dict(zip(table, results, strict=True))
+    sizes = dict(zip(results[-1].dims, results[-1].shape, strict=True))
+    values = {key: (array.dims, array.data) for key, array in given.items()}
+    data = {name: array.data for name, array in arrays.items()}
+    return describe(Grid(sizes, values), module, scene, request, data).assign_coords(_own_coordinates(given))
+
+
+def scene(name):
+    """Everything a user needs of one scene: equations, parameters, options, outputs, status, methods, sources."""
+    module = modules.load(scene_folder, name, "scene")
+    return {
+        "name": name,
+        "title": module.TITLE,
+        "about": inspect.cleandoc(module.__doc__),
+        "parameters": {p.name: _parameter_line(p) for p in module.PARAMETERS},
+        "options": {o.name: f"{o.long_name}: {' | '.join(o.choices)} (default {o.default})" for o in module.OPTIONS},
+        "outputs": {o.name: _output_line(o) for o in module.OUTPUTS},
+        "status": {key: sentence for key, (_, sentence) in status.table(module).items()},
+        "methods": {m: _method_line(m) for m in workflows.methods_of(module)},
+        "references": list(module.REFERENCES),
+    }
+
+
+def summary(ds):
+    """What is in a survey's dataset: axes, fixed numbers, variables, counts, provenance."""
+    axes = {
+        dim: f"{ds.sizes[dim]} values from {ds[dim].values[0]!s} to {ds[dim].values[-1]!s}"
+        for dim in ds.status.dims
+        if dim in ds.coords
+    }
+    return {
+        "title": ds.attrs["title"],
+        "scene": ds.attrs["scene"],
+        "options": ds.attrs["options"],
+        "axes": axes,
+        "fixed": {name: float(c) for name, c in ds.coords.items() if c.ndim == 0 and c.dtype.kind == "f"},
+        "variables": {
+            name: v.attrs.get("long_name", "") for name, v in ds.data_vars.items() if not name.endswith("_error")
+        },
+        "counts": {name: counts(ds[name]) for name in ("verdict", "status") if name in ds},
+        "provenance": {
+            k: v for k, v in ds.attrs.items() if k not in ("title", "scene", "options", "workflow", "summary")
+        },
+    }
+
+
+def audit(ds, points, seed=0):
+    """Solve random points of `ds` again by another method at higher accuracy; each difference against the error bars.
+
+    Returns {"points", "method", "outside", "complaints"}.
+    """
+    module = modules.load(scene_folder, ds.attrs["scene"], "scene")
+    options = dict(pair.split("=") for pair in ds.attrs["options"].split(", ") if pair)
+    others = [m for m in workflows.methods_of(module) if m != ds.attrs["method"]]
+    method = next((m for m in others if m == getattr(module, "AUDIT", None)), others[0])
+    flat = ds.stack(_point=ds.status.dims) if ds.status.dims else ds.expand_dims("_point")
+    chosen = np.random.default_rng(seed).permutation(flat.sizes["_point"])[:points]
+    flat = flat.isel(_point=np.sort(chosen)).reset_index("_point", drop=True)
+    names = [p.name for p in module.PARAMETERS if p.name in ds.coords]
+    given = {key: ("_point", np.broadcast_to(_along(ds, key, chosen), chosen.size).copy()) for key in names}
+    again = evaluate(
+        ds.attrs["scene"],
+        method=method,
+        rtol=max(ds.attrs["rtol"] / 100, 1e-13),
+        **options,
+        **{key: xr.DataArray(values, dims=dim) for key, (dim, values) in given.items()},
+    )
+    complaints = []
+    for name in error_bars(ds):
+        bar = flat[f"{name}_error"].values.astype(float) + again[f"{name}_error"].transpose("_point", ...).values
+        off = np.abs(flat[name].transpose("_point", ...).values - again[name].transpose("_point", ...).values)
+        for i in np.unique(np.argwhere(off > bar)[:, :1]):
+            where = ", ".join(f"{key} = {values[i]!r}" for key, (_, values) in given.items())
+            complaints.append(f"{name} at {where}: off by {np.nanmax(off[i]):.3g}, error bars {np.nanmax(bar[i]):.3g}")
+    return {"points": chosen.size, "method": method, "outside": len(complaints), "complaints": complaints}
+
+
+def _along(ds, key, chosen):
+    """The parameter `key` at the flat point numbers `chosen` (sorted)."""
+    return ds[key].broadcast_like(ds.status).values.reshape(-1)[np.sort(chosen)]
+
+
+def _parameter_line(p):
+    unit = "" if p.units == "1" else f" ({p.units})"
+    need = (
+        f"default {p.default:g}"
+        if p.default is not None
+        else f"instead of {p.instead_of}"
+        if p.instead_of
+        else "required"
+    )
+    return f"{p.long_name}{unit}; {p.domain}; {need}{_only(p)}"
+
+
+def _output_line(o):
+    what = ", ".join(f"{name} {code}" for name, code in o.flags.items()) if o.flags is not None else ""
+    unit = "" if o.units == "1" else f" ({o.units})"
+    return "; ".join(part for part in (f"{o.long_name}{unit}", what, o.applies) if part) + _only(o)
+
+
+def _only(item):
+    return "".join(f"; only when {key} = {' | '.join(allowed)}" for key, allowed in item.when.items())
+
+
+def _method_line(name):
+    return inspect.cleandoc(modules.load(method_folder, name, "method").__doc__).splitlines()[0]

@@ -1,0 +1,225 @@
+"""The commands. This file prints, and nothing else does: data to stdout, messages and progress to stderr."""
+
+import json
+import os
+import signal
+import sys
+
+import click
+from rich.console import Console
+from rich.table import Table
+
+from survey.errors import BadInput, SurveyError
+
+out = Console(highlight=False, soft_wrap=True)
+err = Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+def main(arguments=None):
+    """Run the program and exit: 0 done, 1 points failed, 2 bad input, 3 damaged, 4 stopped, 130/143 interrupted."""
+    try:
+        code = program.main(arguments, prog_name="survey", standalone_mode=False)
+    except SurveyError as error:
+        code = complain(error, error.exit_code)
+    except click.Abort:
+        code = complain("interrupted", 130)
+    except click.ClickException as error:
+        code = complain(error.format_message().replace("\n", " "), 2)
+    except BrokenPipeError:  # the reader of a pipe went away
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = 0
+    sys.exit(code or 0)
+
+
+def complain(message, code):
+    """One line on stderr; returns the exit code."""
+    err.print(f"survey: {message}", markup=False)
+    return code
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="survey")
+def program():
+    """Stability maps of mechanical systems: every point with its error bar and a verdict that respects it."""
+
+
+@program.command()
+@click.argument("workflow")
+@click.option("-o", "--output", metavar="OUT.nc", help="The netCDF file, instead of the workflow's output.path.")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Replace a key, such as axes.k.num=40.")
+@click.option("--workers", type=click.IntRange(1), help="Worker processes; by default threads of this process.")
+@click.option("--scheduler", metavar="ADDRESS", help="A dask.distributed scheduler, or its scheduler file.")
+@click.option("--fresh", is_flag=True, help="Drop the finished blocks of an earlier, interrupted run.")
+@click.option("--quiet", is_flag=True, help="No progress and no closing lines.")
+def run(workflow, output, overrides, workers, scheduler, fresh, quiet):
+    """Run, or resume, a sweep; write OUT.nc and the pictures that the workflow asks for."""
+    from survey import api, engine
+    from survey import workflow as workflows
+    from survey.progress import Progress
+
+    checked = workflows.read(workflow, overrides, output)
+    _stop_on_sigterm()
+    try:
+        with Progress(err, checked, silent=quiet) as progress:
+            ds = engine.run(checked, workers, scheduler, fresh, progress)
+            pictures = api.draw(ds, checked)
+    except KeyboardInterrupt as stop:
+        code = stop.args[0] if stop.args else 130
+        again = " ".join(["survey", *sys.argv[1:]]).replace(" --fresh", "")
+        complain(f"interrupted; finished blocks are in {checked.path}.blocks; go on with: {again}", code)
+        sys.stderr.flush()
+        os._exit(code)  # threads inside a kernel cannot be interrupted, and need not be waited for
+    if not quiet:
+        _closing(ds, [checked.path, *pictures])
+    return 1 if _failed(ds) else 0
+
+
+@program.command()
+@click.argument("workflow")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Replace a key, such as axes.k.num=40.")
+@click.option("-o", "--output", metavar="OUT.nc", help="The netCDF file, instead of the workflow's output.path.")
+@click.option("--json", "as_json", is_flag=True, help="For a program to read.")
+def plan(workflow, overrides, output, as_json):
+    """Points, blocks, bytes, method and estimated time; no kernel is called."""
+    from survey import engine
+    from survey import workflow as workflows
+
+    _show(engine.plan(workflows.read(workflow, overrides, output)), as_json)
+
+
+@program.command()
+@click.argument("path", metavar="OUT.nc")
+@click.option("--points", type=click.IntRange(0), default=20, show_default=True, help="Points to solve again.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Which random points.")
+def verify(path, points, seed):
+    """Check digest, completeness and counts; solve N random points again by another method."""
+    from survey import api, store
+
+    complaints = store.check(path)
+    for complaint in complaints:
+        complain(complaint, 3)
+    if complaints:
+        return 3
+    audit = api.audit(api.open(path), points, seed)
+    for complaint in audit["complaints"]:
+        complain(f"{path}: {complaint}", 3)
+    if not audit["complaints"]:
+        out.print(
+            f"{path}: sound; {audit['points']} points solved again by {audit['method']}, all within the error bars"
+        )
+    return 3 if audit["complaints"] else 0
+
+
+@program.command()
+@click.argument("path", metavar="OUT.nc")
+@click.option("--json", "as_json", is_flag=True, help="For a program to read.")
+def info(path, as_json):
+    """What is in the file: axes, variables, counts by verdict and status, provenance."""
+    from survey import api
+
+    _show(api.summary(api.open(path)), as_json)
+
+
+@program.command()
+@click.argument("path", metavar="OUT.nc")
+@click.option("-o", "--output", metavar="OUT.png", help="The picture; by default beside the file.")
+@click.option("--var", metavar="NAME", help="The variable; by default the verdict.")
+def plot(path, output, var):
+    """Draw the stability map, or the named variable."""
+    from pathlib import Path
+
+    from survey import api, figures
+
+    ds = api.open(path)
+    target = Path(output or (Path(path).with_suffix(".png") if not var else f"{path.removesuffix('.nc')}_{var}.png"))
+    try:
+        figures.save(ds, target, var)
+    except (OSError, ValueError) as error:
+        raise BadInput(f"{target}: cannot draw to it ({error}); name a .png, .pdf or .svg file with -o") from None
+    out.print(str(target), markup=False)
+
+
+@program.command()
+@click.argument("name", required=False)
+@click.option("--json", "as_json", is_flag=True, help="For a program to read.")
+def scenes(name, as_json):
+    """List the scenes; or one scene's equations, parameters, outputs and sources."""
+    from survey import api
+
+    if name is None:
+        _show(api.scenes(), as_json)
+    elif as_json:
+        _show(api.scene(name), True)
+    else:
+        _describe(api.scene(name))
+
+
+@program.command()
+@click.argument("scene")
+@click.option("--peers", is_flag=True, help="Measure the best other programs too, where they are installed.")
+@click.option("-o", "--output", metavar="DIR", default=".", show_default=True, help="Where CSV, JSON and PNG go.")
+def precision(scene, peers, output):
+    """The work-precision chart: error against time for every method that applies."""
+    from survey import precision as chart
+
+    for path in chart.write(scene, output, peers, say=lambda line: err.print(line, markup=False)):
+        out.print(str(path), markup=False)
+
+
+def _show(table, as_json):
+    """A mapping as JSON or as two columns."""
+    if as_json:
+        return click.echo(json.dumps(table, indent=1, default=str))
+    grid = Table.grid(padding=(0, 2))
+    for key, value in _rows(table):
+        grid.add_row(key, value)
+    out.print(grid, markup=False)
+
+
+def _rows(table, prefix=""):
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from _rows(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", str(value).rstrip()
+
+
+def _describe(scene):
+    """A scene for a reader."""
+    click.echo(f"{scene['name']}: {scene['title']}\n\n{scene['about']}\n")
+    for heading in ("parameters", "options", "outputs", "status", "methods", "references"):
+        if not scene[heading]:
+            continue
+        out.print(heading, style="bold")
+        rows = scene[heading] if isinstance(scene[heading], dict) else {item: "" for item in scene[heading]}
+        width = max(map(len, rows))
+        for key, words in rows.items():
+            click.echo(f"  {key:<{width}}  {words}".rstrip())
+        click.echo()
+
+
+def _closing(ds, paths):
+    """What was found and where it lies."""
+    for path in paths:
+        err.print(f"wrote {path}", markup=False)
+    attributes = ds.attrs
+    for key in ("verdict_counts", "status_counts"):
+        if key in attributes:
+            err.print(f"{key.removesuffix('_counts')}: {attributes[key]}", markup=False)
+    if attributes["accuracy_missed"]:
+        err.print(f"accuracy_missed: {attributes['accuracy_missed']} points have an error bar above rtol")
+
+
+def _failed(ds):
+    from survey import status
+
+    return int(ds.status.isin(list(status.FAILURES)).sum())
+
+
+def _stop_on_sigterm():
+    """SIGTERM ends the run as Ctrl-C does, with exit code 143."""
+
+    def stop(*_):
+        raise KeyboardInterrupt(143)
+
+    signal.signal(signal.SIGTERM, stop)

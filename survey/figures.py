@@ -1,0 +1,181 @@
+"""Dataset -> figure: the stability map, a variable with its colour bar, or a curve with its error band."""
+
+import matplotlib
+import numpy as np
+
+matplotlib.use("Agg", force=False)
+
+import matplotlib.pyplot as plt
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from survey import modules, status
+from survey.dataset import counts
+from survey.errors import BadInput
+
+# Okabe and Ito's colours, safe for the colour-blind; black is kept for undecided, white with hatching for failed
+COLOURS = ("#E69F00", "#56B4E9", "#0072B2", "#F0E442", "#D55E00", "#CC79A7", "#009E73", "#999999", "#B8E0D2", "#5D3A9B")
+UNDECIDED = "#000000"
+MARK_BELOW = 0.002  # a share of the map: rarer points are also marked with a ring, or nobody would see them
+
+
+def save(ds, path, name=None):
+    """Draw variable `name` (the verdict, or the first output) of `ds` to `path` (PNG, PDF or SVG)."""
+    figure = draw(ds, name)
+    figure.savefig(path, dpi=150)
+    plt.close(figure)
+
+
+def draw(ds, name=None):
+    """The matplotlib figure of one variable over the survey's axes; raises BadInput for an unknown variable."""
+    drawable = [key for key in ds.data_vars if not key.endswith("_error")]
+    name = name or ("verdict" if "verdict" in ds else drawable[0])
+    if name not in drawable:
+        raise BadInput(modules.unknown("variable", name, drawable))
+    variable, state = _flat(ds, name)
+    figure, axes = plt.subplots(figsize=(7.2, 5.2), layout="constrained")
+    if variable.ndim == 2:
+        _map(axes, ds, variable, state)
+    elif variable.ndim == 1:
+        _curve(axes, ds, variable, state)
+    else:
+        raise BadInput(f"{name} is a single number; a figure needs at least one axis")
+    axes.set_title(_title(ds, variable), fontsize=10)
+    return figure
+
+
+def _flat(ds, name):
+    """The variable and the status on at most two of the survey's dimensions (the first place of any other)."""
+    keep = list(ds.status.dims)[:2]
+    first = {dim: 0 for dim in ds[name].dims if dim not in keep}
+    return ds[name].isel(first), ds.status.isel({dim: 0 for dim in ds.status.dims if dim not in keep})
+
+
+def _map(axes, ds, variable, state):
+    x, y = (variable[dim] for dim in variable.dims)
+    failed = np.isin(state.values, list(status.FAILURES))
+    outside = state.values == status.INVALID_PARAMETERS
+    if "flag_values" in variable.attrs:
+        _verdicts(axes, x, y, variable, failed, outside)
+    else:
+        shown = np.ma.masked_invalid(np.where(failed | outside, np.nan, variable.values.astype(float)))
+        drawn = axes.pcolormesh(x, y, shown.T, cmap="viridis", shading="nearest", rasterized=True, **_limits(shown))
+        axes.figure.colorbar(drawn, ax=axes, label=_label(variable))
+        axes.set_facecolor("#dddddd")
+        handles = _marks(axes, x, y, failed, "failed") + _marks(axes, x, y, outside, "outside the domain")
+        handles += [Patch(color="#dddddd", label="does not apply")] if shown.mask.any() else []
+        if handles:
+            _legend(axes, handles)
+    for axis, coord in ((axes.xaxis, x), (axes.yaxis, y)):
+        axis.set_label_text(_label(coord))
+        if _logarithmic(coord):
+            (axes.set_xscale if axis is axes.xaxis else axes.set_yscale)("log")
+
+
+def _verdicts(axes, x, y, variable, failed, outside):
+    """A colour per flag; failed and outside points white and hatched; rare points ringed, so that they are seen."""
+    table = dict(
+        zip(variable.attrs["flag_meanings"].split(), np.atleast_1d(variable.attrs["flag_values"]), strict=True)
+    )
+    number = counts(variable)
+    palette = dict(zip([name for name in table if name != "undecided"], COLOURS, strict=False)) | {
+        "undecided": UNDECIDED
+    }
+    codes = sorted(table.values())
+    names = {code: name for name, code in table.items()}
+    cmap = ListedColormap([palette.get(names[code], "#444444") for code in codes])
+    edges = np.append(np.array(codes) - 0.5, codes[-1] + 0.5)
+    shown = np.ma.masked_array(variable.values, failed | outside)
+    axes.pcolormesh(x, y, shown.T, cmap=cmap, norm=BoundaryNorm(edges, cmap.N), shading="nearest", rasterized=True)
+    number["undecided"] = int((shown == table.get("undecided", -1)).sum())
+    handles = [
+        Patch(
+            facecolor=palette.get(names[code], "#444444"),
+            edgecolor="black",
+            linewidth=0.5,
+            label=_counted(names[code], number),
+        )
+        for code in codes
+        if number[names[code]] and names[code] != "undecided"
+    ]
+    handles += _marks(axes, x, y, (shown == table.get("undecided", -1)).filled(False), "undecided", UNDECIDED)
+    handles += _marks(axes, x, y, failed, "failed") + _marks(axes, x, y, outside, "outside the domain")
+    _legend(axes, handles)
+
+
+def _marks(axes, x, y, where, label, colour="white"):
+    """Show the points `where`: hatched where they fill an area, ringed where they are rare; their legend handle."""
+    total = int(where.sum())
+    label = f"{label} ({total:,})"
+    if total == 0:
+        return []
+    if total <= MARK_BELOW * where.size:
+        i, j = np.nonzero(where)
+        ring = {"marker": "o", "markeredgecolor": "#D40000", "markerfacecolor": colour, "linestyle": "none"}
+        axes.plot(x.values[i], y.values[j], markersize=4, **ring)
+        return [Line2D([], [], markersize=6, label=label, **ring)]
+    if colour == "white":
+        if min(where.shape) > 1:
+            axes.contourf(x, y, where.T.astype(float), levels=[0.5, 1.5], colors="none", hatches=["xxx"])
+        return [Patch(facecolor="white", edgecolor="grey", hatch="xxx", label=label)]
+    return [Patch(facecolor=colour, label=label)]
+
+
+def _curve(axes, ds, variable, state):
+    x = variable[variable.dims[0]]
+    axes.plot(x, variable, lw=1.2, color="#0072B2", label=variable.attrs.get("long_name", variable.name))
+    if f"{variable.name}_error" in ds:
+        bar = ds[f"{variable.name}_error"].isel({d: 0 for d in ds[variable.name].dims if d not in variable.dims})
+        axes.fill_between(x, variable - bar, variable + bar, color="#56B4E9", alpha=0.5, lw=0, label="error bar")
+    bad = np.isin(state.values, [*status.FAILURES, status.INVALID_PARAMETERS])
+    if bad.any():
+        axes.plot(x.values[bad], np.full(bad.sum(), axes.get_ylim()[0]), "x", color="#D55E00", label="no answer")
+    axes.set(xlabel=_label(x), ylabel=_label(variable))
+    axes.legend(fontsize=8)
+    if _logarithmic(x):
+        axes.set_xscale("log")
+
+
+def _legend(axes, handles):
+    below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.13), "ncols": min(4, len(handles))}
+    axes.legend(handles=handles, frameon=False, fontsize=8, **below)
+
+
+def _limits(shown):
+    """Colour limits that a few far values do not spoil."""
+    values = shown.compressed()
+    if values.size == 0:
+        return {}
+    low, high = np.percentile(values, [1, 99])
+    return {"vmin": low, "vmax": high} if high > low else {}
+
+
+def _label(variable):
+    """`long name, symbol (unit)`."""
+    symbol, units = variable.attrs.get("symbol", ""), variable.attrs.get("units", "1")
+    text = variable.attrs.get("long_name", variable.name)
+    text += f", ${symbol}$" if symbol and symbol not in ("", text) else ""
+    return text if units in ("1", "") else f"{text} ({units})"
+
+
+def _title(ds, variable):
+    """The survey's title, what is drawn, and the numbers that are fixed and not zero."""
+    lines = [ds.attrs.get("title", ""), variable.attrs.get("long_name", variable.name)]
+    fixed = [c for c in ds.coords.values() if c.ndim == 0 and c.dtype.kind == "f" and float(c) != 0]
+    numbers = ", ".join(f"${c.attrs.get('symbol') or c.name} = {float(c):.6g}$" for c in fixed)
+    lines[1] += f" ({ds.attrs['options']})" if ds.attrs.get("options") else ""
+    return "\n".join([*lines, numbers] if numbers else lines)
+
+
+def _logarithmic(coord):
+    """Are the coordinates spaced evenly in the logarithm, and not evenly?"""
+    values = coord.values
+    if values.size < 3 or values.min() <= 0:
+        return False
+    ratio, step = values[1:] / values[:-1], np.diff(values)
+    return np.allclose(ratio, ratio[0]) and not np.allclose(step, step[0])
+
+
+def _counted(name, number):
+    return f"{name.replace('_', ' ')} ({number[name]:,})"

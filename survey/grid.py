@@ -1,0 +1,86 @@
+"""Axes -> exact coordinates -> blocks. A block reaches a scene as its axes, not as a list of points."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise, product
+from math import ceil, prod
+
+import numpy as np
+
+from survey.errors import BadInput
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Parameters on named dimensions: {name: (its dimensions, float64 values)}; a fixed number has no dimension.
+
+    `sizes` holds the dimensions in order. Dimensions in `whole` are never cut.
+    """
+
+    sizes: Mapping[str, int]
+    parameters: Mapping[str, tuple[tuple[str, ...], np.ndarray]]
+    whole: frozenset[str] = frozenset()
+
+    @property
+    def shape(self):
+        return tuple(self.sizes.values())
+
+    @property
+    def points(self):
+        return prod(self.shape)
+
+    def blocks(self, points_per_block):
+        """Slices per dimension, row by row: the first dimensions are cut first, to at most `points_per_block`."""
+        lengths, size = dict(self.sizes), self.points
+        for name, length in self.sizes.items():
+            if size <= points_per_block:
+                break
+            if name not in self.whole:
+                rest = size // length
+                lengths[name] = max(1, points_per_block // rest)
+                size = rest * lengths[name]
+        cuts = [_even_cuts(self.sizes[name], lengths[name]) for name in self.sizes]
+        return list(product(*cuts))
+
+    def point(self, block):
+        """{name: array} for `block` (a tuple of slices): every array has one axis per dimension (length 1 or long)."""
+        where = dict(zip(self.sizes, block, strict=True))
+        aligned = {}
+        for name, (dims, values) in self.parameters.items():
+            part = values[tuple(where[dim] for dim in dims)]
+            order = [dims.index(dim) for dim in self.sizes if dim in dims]
+            part = part.transpose(order)
+            part = part.reshape([part.shape[order.index(dims.index(dim))] if dim in dims else 1 for dim in where])
+            aligned[name] = np.ascontiguousarray(part)
+        return aligned
+
+
+def _even_cuts(length, piece):
+    """Slices of nearly equal length, none longer than `piece`, that cover range(length)."""
+    pieces = max(1, ceil(length / piece))
+    edges = [length * i // pieces for i in range(pieces + 1)]
+    return [slice(a, b) for a, b in pairwise(edges)]
+
+
+def coordinates(start, stop, num, spacing="linear"):
+    """`num` float64 coordinates from `start` to `stop`, both ends exact; `spacing` is "linear" or "log"."""
+    if spacing == "log":
+        if not (start > 0 and stop > 0):
+            raise BadInput(f"start = {start:g}, stop = {stop:g} with spacing = 'log': both must be positive")
+        return np.geomspace(start, stop, num)
+    return np.linspace(start, stop, num)
+
+
+def check_axis(key, values):
+    """Raise BadInput, naming `key`, unless `values` is non-empty, finite and strictly monotonic."""
+    if values.size == 0:
+        raise BadInput(f"{key}: an axis needs at least one value; give values or num >= 1")
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        raise BadInput(f"{key}: value {bad[0] + 1} is {values[bad[0]]}; every value must be a finite number")
+    steps = np.diff(values)
+    same = np.flatnonzero(steps == 0)
+    if same.size:
+        raise BadInput(f"{key}: {values[same[0]]!r} occurs twice; give each value once")
+    if steps.size and not (np.all(steps > 0) or np.all(steps < 0)):
+        raise BadInput(f"{key}: the values go up and down; sort them")

@@ -1,0 +1,49 @@
+"""Progress and ETA on stderr: a bar on a terminal, a line now and then in a log."""
+
+import time
+
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import Progress as Bar
+
+LOG_SECONDS = 60
+
+
+class Progress:
+    """Called with (blocks done, blocks in all, blocks reused); a context manager around the run."""
+
+    def __init__(self, console, workflow, silent=False):
+        self.console, self.workflow, self.silent = console, workflow, silent
+        self.started = self.logged = time.monotonic()
+        self.bar = None
+
+    def __enter__(self):
+        if self.console.is_terminal and not self.silent:
+            columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("blocks"))
+            self.bar = Bar(
+                *columns, TimeElapsedColumn(), TextColumn("ETA"), TimeRemainingColumn(), console=self.console
+            )
+            self.task = self.bar.add_task(self.workflow.name, total=None)
+            self.bar.start()
+        return self
+
+    def __exit__(self, *_):
+        if self.bar:
+            self.bar.stop()
+
+    def __call__(self, done, total, reused):
+        if self.silent:
+            return
+        if self.bar:
+            self.bar.update(self.task, completed=done, total=total)
+        if done == reused:
+            self._line(f"{self.workflow.grid.points:,} points in {total} blocks, {reused} already done")
+        elif not self.bar and (done == total or time.monotonic() - self.logged > LOG_SECONDS):
+            self.logged = time.monotonic()
+            elapsed = self.logged - self.started
+            left = elapsed / (done - reused) * (total - done)
+            self._line(f"{done} of {total} blocks, {elapsed:.0f} s elapsed, ETA {left:.0f} s")
+        if done == total:
+            self._line(f"computed {done - reused}, reused {reused} of {total} blocks")
+
+    def _line(self, text):
+        self.console.print(f"{self.workflow.name}: {text}", markup=False)

@@ -1,0 +1,273 @@
+"""TOML -> a checked Workflow. Everything that can be refused is refused here, by name, before any work."""
+
+import os
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError
+
+import survey.methods
+import survey.scenes
+from survey import modules
+from survey.errors import BadInput
+from survey.grid import Grid, check_axis, coordinates
+from survey.scene import Request, exists
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class Spread(Table):
+    start: Number
+    stop: Number
+    num: Annotated[int, Field(ge=1, le=10**9)]
+    spacing: Literal["linear", "log"] = "linear"
+
+
+class Listed(Table):
+    values: list[Number]
+
+
+def _axis_kind(value):
+    if isinstance(value, dict):
+        return "values" if "values" in value else "spread"
+    return "number"
+
+
+Axis = Annotated[
+    Annotated[Number, Tag("number")] | Annotated[Spread, Tag("spread")] | Annotated[Listed, Tag("values")],
+    Discriminator(_axis_kind),
+]
+
+
+class Solver(Table):
+    method: str = "auto"
+    rtol: Annotated[float, Field(gt=0, lt=1)] = 1e-10
+
+
+class Output(Table):
+    path: str | None = None
+    figures: list[str] = []
+    variables: list[str] | None = None
+
+
+class File(Table):
+    title: str = ""
+    scene: str
+    options: dict[str, Any] = {}
+    axes: dict[str, Axis]
+    solver: Solver = Solver()
+    output: Output = Output()
+
+
+@dataclass(frozen=True)
+class Workflow:
+    """A checked survey: `scene` is the scene's module; `text` is the workflow as it was run."""
+
+    name: str
+    title: str
+    scene: Any
+    grid: Grid
+    request: Request
+    path: Path
+    figures: tuple[str, ...]
+    text: str
+
+
+def read(path, overrides=(), output=None):
+    """The checked Workflow in the TOML file `path`, with `KEY=VALUE` overrides; raises BadInput in one line."""
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise BadInput(f"{path}: cannot read this workflow file ({_reason(error)})") from None
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise BadInput(f"{path}: this is not TOML ({error})") from None
+    for override in overrides:
+        _apply(data, override)
+        text += f"\n# --set {override}"
+    return check(data, text, output, default_path=path.with_suffix(".nc").name)
+
+
+def check(data, text="", output=None, default_path="survey.nc"):
+    """The checked Workflow of the mapping `data` (a parsed workflow file)."""
+    try:
+        file = File.model_validate(data)
+    except ValidationError as error:
+        raise BadInput(_one_line(error)) from None
+    scene = modules.load(survey.scenes, file.scene, "scene")
+    name = file.scene
+    options = check_options(scene, file.options)
+    given = {key: _values(f"axes.{key}", axis) for key, axis in file.axes.items()}
+    parameters = check_parameters(scene, name, options, given)
+    for key, values in given.items():
+        _check_domain(parameters[key], values)
+    request = check_request(scene, options, file.solver.method, file.solver.rtol, file.output.variables)
+    for figure in file.output.figures:
+        if figure not in request.variables:
+            raise BadInput(f"output.figures: {modules.unknown('variable', figure, sorted(request.variables))}")
+    return Workflow(
+        name=name,
+        title=file.title or scene.TITLE,
+        scene=scene,
+        grid=_grid(parameters, given),
+        request=request,
+        path=check_path(output or file.output.path or default_path),
+        figures=tuple(file.output.figures),
+        text=text,
+    )
+
+
+def check_options(scene, given):
+    """Every option of the scene with its value; raises BadInput for an unknown option or value."""
+    known = {option.name: option for option in scene.OPTIONS}
+    for key, value in given.items():
+        if key not in known:
+            raise BadInput(modules.unknown("option", key, sorted(known)))
+        if str(value) not in known[key].choices:
+            raise BadInput(modules.unknown(f"value of option {key}:", str(value), list(known[key].choices)))
+    return {name: str(given.get(name, option.default)) for name, option in known.items()}
+
+
+def check_parameters(scene, name, options, given):
+    """{name: Parameter} in use, given ones first; raises BadInput for one that is unknown, missing or said twice."""
+    known = {p.name: p for p in scene.PARAMETERS if exists(p, options)}
+    replaced = {}
+    for key in given:
+        if key not in known:
+            raise BadInput(modules.unknown(f"parameter of {name}", key, list(known)))
+        original = known[key].instead_of or key
+        if original in replaced:
+            raise BadInput(f"{replaced[original]} and {key} say the same thing; give only one of them")
+        replaced[original] = key
+    used = {key: known[key] for key in given}
+    for key, parameter in known.items():
+        if key in replaced or parameter.instead_of:
+            continue
+        if parameter.default is None:
+            others = [p.name for p in known.values() if p.instead_of == key]
+            instead = f" (or {', '.join(others)} instead)" if others else ""
+            raise BadInput(
+                f"axes.{key} is missing: {name} needs {parameter.long_name}{instead}; add an axis or a number"
+            )
+        used[key] = parameter
+    return used
+
+
+def check_request(scene, options, method, rtol, variables):
+    """The Request; raises BadInput for an unknown method or variable, or an rtol outside (0, 1)."""
+    serving = methods_of(scene)
+    if method != "auto" and method not in serving:
+        raise BadInput(f"solver.method: {modules.unknown('method', method, ['auto', *serving])}")
+    if not 0 < rtol < 1:
+        raise BadInput(f"solver.rtol = {rtol!r}: it must lie between 0 and 1, such as 1e-10")
+    outputs = [output.name for output in scene.OUTPUTS if exists(output, options)]
+    for variable in variables or ():
+        if variable not in outputs:
+            raise BadInput(f"output.variables: {modules.unknown('variable', variable, outputs)}")
+    return Request(options, method, float(rtol), frozenset(outputs if variables is None else variables))
+
+
+def methods_of(scene):
+    """Names of the methods that serve the scene's family, found by walking the folder of methods."""
+    found = modules.names(survey.methods)
+    return [m for m in found if scene.FAMILY in modules.load(survey.methods, m, "method").SERVES]
+
+
+def check_path(path):
+    """The output path; raises BadInput unless a file can be made there."""
+    path = Path(path)
+    folder = path.parent
+    if path.is_dir():
+        raise BadInput(f"output.path = {str(path)!r} is a folder; name a file, such as {str(path / 'map.nc')!r}")
+    if not folder.is_dir():
+        raise BadInput(
+            f"output.path = {str(path)!r}: there is no folder {str(folder)!r}; make it first, or use -o OUT.nc"
+        )
+    if not os.access(folder, os.W_OK | os.X_OK) or str(folder.resolve()).startswith(("/proc", "/sys")):
+        raise BadInput(f"output.path = {str(path)!r}: the folder {str(folder)!r} cannot be written to; use -o OUT.nc")
+    return path
+
+
+def _grid(parameters, given):
+    """The grid of the workflow's axes (their order is that of the dimensions), fixed numbers and defaults."""
+    axes = {key: values for key, values in given.items() if np.ndim(values)}
+    fixed = {key: given.get(key, parameter.default) for key, parameter in parameters.items() if key not in axes}
+    return Grid(
+        sizes={key: values.size for key, values in axes.items()},
+        parameters={key: ((key,), values) for key, values in axes.items()}
+        | {key: ((), np.float64(value)) for key, value in fixed.items()},
+        whole=frozenset(key for key in axes if parameters[key].whole),
+    )
+
+
+def _values(key, axis):
+    """The coordinates of an axis, or the bare number."""
+    if isinstance(axis, Spread):
+        try:
+            values = coordinates(axis.start, axis.stop, axis.num, axis.spacing)
+        except BadInput as error:
+            raise BadInput(f"{key}: {error}") from None
+    elif isinstance(axis, Listed):
+        values = np.array(axis.values, dtype=float)
+    else:
+        return np.float64(axis)
+    check_axis(key, values)
+    return values
+
+
+def _check_domain(parameter, values):
+    """Raise BadInput if a lone value or an end of an axis lies outside the parameter's domain."""
+    ends = np.atleast_1d(values)[[0, -1]]
+    for value in ends[~parameter.holds(ends)]:
+        what = "is" if np.ndim(values) == 0 else "has an end"
+        raise BadInput(f"axes.{parameter.name} {what} {value:g}, outside its domain; allowed: {parameter.domain}")
+
+
+def _apply(data, override):
+    """Set `KEY=VALUE` in the parsed workflow; VALUE is TOML, or else a string."""
+    key, equals, value = override.partition("=")
+    if not equals or not key.strip():
+        raise BadInput(f"--set {override!r}: write it as KEY=VALUE, such as --set axes.k.num=40")
+    try:
+        value = tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        value = value.strip()
+    *tables, last = key.strip().split(".")
+    for table in tables:
+        data = data.setdefault(table, {})
+        if not isinstance(data, dict):
+            raise BadInput(f"--set {override!r}: {table} is a value, not a table, so it has no key below it")
+    data[last] = value
+
+
+def _one_line(error):
+    """The first complaint of pydantic as one line: key, value, what is allowed."""
+    first = error.errors()[0]
+    key = ".".join(str(part) for part in first["loc"] if part not in ("number", "spread"))
+    key = key.removesuffix(".values") if first["loc"][-2:] == ("values", "values") else key
+    more = "" if error.error_count() == 1 else f" (and {error.error_count() - 1} more)"
+    if first["type"] == "extra_forbidden":
+        return f"unknown key {key}{_nearest(first['loc'])}{more}"
+    if first["type"] == "missing":
+        return f"{key} is missing; add it to the workflow{more}"
+    return f"{key} = {first['input']!r}: {first['msg'][0].lower()}{first['msg'][1:]}{more}"
+
+
+def _nearest(loc):
+    """The keys that are allowed beside an unknown one, the nearest first named."""
+    table = {"solver": Solver, "output": Output, "axes": Spread}.get(loc[0], File) if len(loc) > 1 else File
+    known = list(table.model_fields) + (["values"] if table is Spread else [])
+    return modules.unknown("", str(loc[-1]), known).removeprefix(f"unknown  {str(loc[-1])!r}")
+
+
+def _reason(error):
+    return getattr(error, "strerror", None) or "it is not UTF-8 text"
