@@ -5,7 +5,7 @@ software package for the numerical integration of ODEs by means of high-order Ta
 Mathematics 14 (2005) 99-117. Domain: every parameter value; explicit, so steps shrink as 1/|b| on stiff systems.
 """
 
-from survey.kernels import along
+from survey.kernels import along, fate, returns
 from survey.kernels.flow import LAST, ORDER as _ORDER, PHI, TRUNC_PHI, TRUNC_W, W, E, Y, series
 from survey.kernels.jit import inline, kernel
 
@@ -51,3 +51,22 @@ def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, stat
 def flow_abels(P, starts, targets, tolerance, limit, floats, status):
     """See `along.abels`."""
     along.abels(setting, begin, at, P, starts, targets, tolerance, limit, floats, status)
+
+
+@kernel
+def flow_image(kind, p, eqs, count, place, x, tolerance, node):
+    """See `returns.image`."""
+    returns.image(setting, begin, at, kind, p, eqs, count, place, x, tolerance, node)
+
+
+@kernel
+def flow_cycles(kind, p, eqs, count, place, interval, xs, tolerance, cycles, found, edges):
+    """See `returns.fixed_points`."""
+    return returns.fixed_points(flow_image, kind, p, eqs, count, place, interval, xs, tolerance, cycles, found, edges)
+
+
+@kernel
+def flow_fates(p, eqs, section, sizes, ends, plus, minus, lib, starts, tolerance, limit, out):
+    """See `fate.fates`; sizes = numbers of rows of eqs, plus, minus, lib, then the stratum and whether weak foci attract."""
+    fate.fates(setting, begin, at, p, eqs, sizes[0], section, sizes[4], ends, sizes[5] > 0, plus, sizes[1], minus,
+               sizes[2], lib, sizes[3], starts, tolerance, limit, out)  # fmt: skip

@@ -1,0 +1,208 @@
+"""Fates of the flow phi' = w, w' = f w + g on the cylinder: the skeleton of a parameter point, then each initial state.
+
+The skeleton holds what decides fates: stratum, ends, equilibria, cycles of the return maps. It depends on the six
+parameters alone and is computed once for all initial states.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from survey.kernels import equilibria as eq
+from survey.kernels import fate as kf
+from survey.kernels import returns as rt
+from survey.kernels.along import SEPARATRIX
+from survey.kernels.flow import BOUND_DG, BOUND_F, coefficients
+
+I0, I1, I2, G = 0, 1, 2, 3  # strata
+EXACT = 1e-14  # K and L are 0 within the rounding of the parameters
+STEPS = 20_000  # budget of one fate: about 15 ms
+BATCH = 50  # fates per kernel call, so that a call stays below a second
+FINE = 1e-16  # truncation per step for cycles
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """What decides the fates at one parameter point. Tables have the columns of `kernels/equilibria.py`, `returns.py`."""
+
+    p: np.ndarray
+    stratum: int
+    K: float
+    L: float
+    ends: np.ndarray  # 1 attracting, 0 neutral, -1 repelling, for w -> +inf and w -> -inf
+    section: float
+    equilibria: np.ndarray
+    plus: np.ndarray
+    minus: np.ndarray
+    librations: np.ndarray
+    thresholds: np.ndarray  # (w_c, w_d) of the two rotation maps; NaN where every turn from w > 0 is completed
+
+
+def constants(b12, b31, d, c23, s2, s3):
+    """K and L, which decide the ends; 0 where they vanish within rounding."""
+    b = math.hypot(b12, b31)
+    K = b12 * s3 - b31 * s2
+    L = 0.5 * math.pi * (c23 * (b12 * b12 - b31 * b31) - d * b12 * b31)
+    K = 0.0 if abs(K) <= EXACT * b * math.hypot(s2, s3) else K
+    L = 0.0 if abs(L) <= EXACT * b * b * math.hypot(d, 2.0 * c23) * 2.0 else L
+    return K, L
+
+
+def stratum_of(b12, b31, d, c23, s2, s3):
+    """I0: g = 0, I1: b = 0, I2: K = L = 0, and the rest G."""
+    if d == c23 == s2 == s3 == 0.0:
+        return I0
+    if b12 == b31 == 0.0:
+        return I1
+    return I2 if constants(b12, b31, d, c23, s2, s3) == (0.0, 0.0) else G
+
+
+def skeleton(method, six):
+    """The skeleton of one parameter point (six numbers)."""
+    six = [float(value) for value in six]
+    p = np.ascontiguousarray(coefficients(*six))
+    K, L = constants(*six)
+    stratum = stratum_of(*six)
+    sign = np.sign(K) if K != 0.0 else np.sign(L)
+    ends = np.array([sign, sign if K != 0.0 else -sign])
+    table = np.zeros((eq.MOST, 10))
+    eqs = table[: eq.equilibria(p, table)] if stratum != I0 else table[:0]
+    section = _section(p, eqs)
+    none, thresholds = np.zeros((0, 10)), np.full((2, 2), np.nan)
+    if stratum != G:
+        return Skeleton(p, stratum, K, L, ends, section, eqs, none, none, none, thresholds)
+    plus, thresholds[0] = _rotations(method, six, eqs, section, K, L)
+    mirrored = [six[0], -six[1], six[2], -six[3], -six[4], six[5]]
+    minus, thresholds[1] = _rotations(method, mirrored, eqs, -section, K, -L)
+    return Skeleton(p, stratum, K, L, ends, section, eqs, plus, minus, _librations(method, p, eqs), thresholds)
+
+
+def _section(p, eqs):
+    """The saddle of highest V, in [-pi, pi]; 0 where there is none."""
+    saddles = eqs[eqs[:, eq.KIND] == eq.SADDLE, eq.ANGLE] if len(eqs) else ()
+    if not len(saddles):
+        return 0.0
+    b12, b31, d, c23, s2, s3 = p[:6]
+    s, c = np.sin(saddles), np.cos(saddles)
+    highest = saddles[np.argmax(0.5 * d * s * s + c23 * s * c - s2 * s - s3 * c)]
+    return float(highest - 2.0 * math.pi if highest > math.pi else highest)
+
+
+def _rotations(method, six, eqs, section, K, L):
+    """Cycles with w > 0 of the system `six`, ascending in w, and (w_c, w_d)."""
+    p = np.ascontiguousarray(coefficients(*six))
+    scale = p[BOUND_F] + math.sqrt(p[BOUND_DG])
+    table, edges = np.zeros((rt.MOST_CYCLES, 10)), np.zeros(4)
+    xs = scale * np.geomspace(1e-6, 30.0, 80)
+    found = method.flow_cycles(rt.ROTATION, p, eqs, len(eqs), section, 0, xs, FINE, table, 0, edges)
+    border = edges[:2].copy()
+    end = np.sign(K) if K != 0.0 else np.sign(L)
+    top, change, error = xs[-1], edges[2], edges[3]
+    while change * end < 0.0 and abs(change) > 4.0 * error and top < 1e5 * scale and found < len(table) - 1:
+        xs = top * np.array([1.0, 1.3, 1.7, 2.2, 3.0])
+        before = found
+        found = method.flow_cycles(rt.ROTATION, p, eqs, len(eqs), section, 0, xs, FINE, table, found, edges)
+        if found > before and (found - before) % 2:
+            break
+        top, change, error = xs[-1], edges[2], edges[3]
+    cycles = table[:found]
+    last = cycles[-1, rt.ABOVE] if found else np.sign(change)
+    if last * end < 0.0 and K != 0.0:
+        cycles = np.vstack([cycles, _far_cycle(p, section, K, L, scale)])
+    return cycles, border
+
+
+def _far_cycle(p, section, K, L, scale):
+    """The large cycle w(0) = -L/(pi K) - 2 b31 where the return map cannot tell it: D = pi K/w^2 + C3/w^3."""
+    b12, b31 = p[0], p[1]
+    w = -L / (math.pi * K) - 2.0 * b31 + b12 * math.sin(section) + b31 * math.cos(section) - b31
+    w = max(w, 30.0 * scale)
+    slope = math.pi * K / w**3
+    side = np.sign(K)
+    return np.array([w, 1.0 + slope, 2 * math.pi / w, 0.1 * w + 5.0 * scale, abs(slope) + 1e-15, 0.0, 1.0, 0, -side, side])
+
+
+def _librations(method, p, eqs):
+    """Libration cycles, by their right turning point, of every interval where g < 0."""
+    table, edges, found = np.zeros((rt.MOST_CYCLES, 10)), np.zeros(4), 0
+    share = 1.0 / (1.0 + np.exp(-np.linspace(-11.0, 11.0, 56)))
+    for i, row in enumerate(eqs):
+        if row[eq.DG] < 0.0 and row[eq.KIND] != eq.DEGENERATE:
+            high = eqs[i + 1, eq.ANGLE] if i + 1 < len(eqs) else eqs[0, eq.ANGLE] + 2.0 * math.pi
+            xs = row[eq.ANGLE] + share * (high - row[eq.ANGLE])
+            found = method.flow_cycles(rt.LIBRATION, p, eqs, len(eqs), high, i, xs, FINE, table, found, edges)
+    return table[:found]
+
+
+def fates(method, skeleton, starts, tolerance):
+    """Verdict, row of the limit, turning points, turns of the limit, status, for rows (phi0, w0) of `starts`."""
+    if skeleton.stratum in (I0, I1):
+        return (_free if skeleton.stratum == I0 else _conservative)(skeleton, starts)
+    out = np.zeros((len(starts), 5))
+    s = skeleton
+    section = s.section if s.stratum == G else math.atan2(s.p[0], s.p[1])
+    sizes = np.array([len(s.equilibria), len(s.plus), len(s.minus), len(s.librations),
+                      kf.GENERIC if s.stratum == G else kf.REVERSIBLE, int(s.K < 0.0)])  # fmt: skip
+    tables = [np.ascontiguousarray(np.vstack([t, np.zeros((1, 10))])) for t in (s.plus, s.minus, s.librations)]
+    eqs = np.ascontiguousarray(s.equilibria)
+    for i in range(0, len(starts), BATCH):
+        part = np.ascontiguousarray(starts[i : i + BATCH])
+        method.flow_fates(s.p, eqs, section, sizes, s.ends, *tables, part, tolerance, STEPS, out[i : i + BATCH])
+    return out
+
+
+def _free(s, starts):
+    """g = 0: w - F is conserved and phi' = w on a line; every state with w = 0 is an equilibrium.
+
+    The row of the limit is replaced by its unwrapped angle, given in a sixth column, its bar in a seventh.
+    """
+    b12, b31 = s.p[:2]
+    b, axis = math.hypot(b12, b31), math.atan2(b12, b31)
+    out = np.zeros((len(starts), 7))
+    for row, (phi, w) in zip(out, starts, strict=True):
+        y = w - b12 * math.sin(phi) - b31 * math.cos(phi)
+        noise = 4e-16 * (abs(w) + b * (1.0 + abs(phi)))
+        row[:] = kf.EQUILIBRIUM, -1, 0, kf.NO_TURNS, 0, np.nan, np.nan
+        if w == 0.0:
+            row[0], row[5], row[6] = kf.EQUILIBRIUM_START, phi, 0.0
+        elif abs(abs(y) - b) <= noise:
+            row[0], row[2], row[4] = kf.UNDECIDED, kf.UNTOLD, SEPARATRIX
+        elif abs(y) > b:
+            row[0] = kf.PERIODIC_ROTATION
+        else:  # the next root of y + b cos(phi - axis) ahead
+            half = math.acos(-y / b)
+            ahead = [((axis + side * half - phi) * np.sign(w)) % (2.0 * math.pi) for side in (1, -1)]
+            row[5] = phi + np.sign(w) * min(ahead)
+            row[6] = 2.0 * noise / math.sqrt(b * b - y * y) + 1e-15 * (1.0 + abs(row[5]))
+            row[3] = math.trunc((row[5] - phi) / (2.0 * math.pi))
+    return out
+
+
+def _conservative(s, starts):
+    """b = 0: H = w^2/2 + V is conserved; rotation above the highest V, libration below, but for separatrices."""
+    _b12, _b31, d, c23, s2, s3 = s.p[:6]
+
+    def potential(phi):
+        sin, cos = np.sin(phi), np.cos(phi)
+        return 0.5 * d * sin * sin + c23 * sin * cos - s2 * sin - s3 * cos
+
+    phi, w = starts.T
+    energy = 0.5 * w * w + potential(phi)
+    rest = s.equilibria[(s.equilibria[:, eq.KIND] == eq.SADDLE) | (s.equilibria[:, eq.KIND] == eq.DEGENERATE)]
+    levels = potential(rest[:, eq.ANGLE])
+    noise = 4e-16 * (np.abs(energy) + w * w + (abs(d) + abs(c23) + abs(s2) + abs(s3)) * (1.0 + np.abs(phi)))
+    near = (np.abs(energy[:, None] - levels) <= noise[:, None] + 1e-15).any(axis=1)
+    rotates = energy > levels.max()
+    out = np.zeros((len(starts), 5))
+    out[:, 0] = np.where(rotates, kf.PERIODIC_ROTATION, kf.PERIODIC_LIBRATION)
+    out[:, 1] = -1
+    out[:, 2] = np.where(rotates, 0, kf.INFINITE)
+    out[:, 3] = np.where(rotates, kf.NO_TURNS, 0)
+    out[near, 0], out[near, 2], out[near, 3], out[near, 4] = kf.UNDECIDED, kf.UNTOLD, kf.NO_TURNS, SEPARATRIX
+    for i in np.flatnonzero(w == 0.0):
+        for j, row in enumerate(s.equilibria):
+            turns = round((phi[i] - row[eq.ANGLE]) / (2 * math.pi))
+            if abs(phi[i] - row[eq.ANGLE] - 2 * math.pi * turns) <= row[eq.BAR] + 4e-16 * (1 + abs(phi[i])):
+                out[i] = kf.EQUILIBRIUM_START, j, 0, turns, 0
+    return out
