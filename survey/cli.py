@@ -190,7 +190,7 @@ def _describe(scene):
     for heading in ("parameters", "options", "outputs", "status", "methods", "references"):
         if not scene[heading]:
             continue
-        out.print(heading, style="bold")
+        click.echo(f"{heading}:")
         rows = scene[heading] if isinstance(scene[heading], dict) else {item: "" for item in scene[heading]}
         width = max(map(len, rows))
         for key, words in rows.items():

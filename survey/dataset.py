@@ -56,6 +56,7 @@ def describe(grid, scene, name, request, arrays):
         variables[output.name] = (own, arrays[output.name], _attributes(output))
         if output.dtype.kind == "f":
             bar = {"long_name": f"error bound of the {output.long_name}", "units": output.units}
+            bar["coverage_content_type"] = "qualityInformation"
             variables[f"{output.name}_error"] = (own, arrays[f"{output.name}_error"], bar)
     variables["status"] = (dims, arrays["status"], _status_attributes(scene))
     ds = xr.Dataset(variables, coords)
@@ -188,7 +189,7 @@ def _meaning(parameter):
 
 
 def _attributes(output):
-    attributes = {"long_name": output.long_name}
+    attributes = {"long_name": output.long_name, "coverage_content_type": "modelResult"}
     if output.symbol:
         attributes["symbol"] = output.symbol
     if output.flags is not None:
@@ -210,6 +211,7 @@ def _status_attributes(scene):
     table = status.table(scene)
     return {
         "long_name": "why the point has or has not an answer",
+        "coverage_content_type": "qualityInformation",
         **_flags({name: code for name, (code, _) in table.items()}),
         "comment": "; ".join(f"{name}: {sentence}" for name, (_, sentence) in table.items()),
     }

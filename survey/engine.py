@@ -52,7 +52,7 @@ def stored(scene, request, solved, shape):
     arrays = {}
     for name, (dtype, _, extra) in layout(scene, request).items():
         values = round_up(solved[name]) if name.endswith("_error") else np.asarray(solved[name])
-        arrays[name] = np.ascontiguousarray(values.astype(dtype, copy=False).reshape(shape + extra))
+        arrays[name] = values.astype(dtype, copy=False).reshape(shape + extra)
     return arrays
 
 

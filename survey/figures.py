@@ -14,8 +14,9 @@ from survey import modules, status
 from survey.dataset import counts
 from survey.errors import BadInput
 
-# Okabe and Ito's colours, safe for the colour-blind; black is kept for undecided, white with hatching for failed
-COLOURS = ("#E69F00", "#56B4E9", "#0072B2", "#F0E442", "#D55E00", "#CC79A7", "#009E73", "#999999", "#B8E0D2", "#5D3A9B")
+# after Okabe and Ito, safe for the colour-blind, the first two far apart in grey print too;
+# black is kept for undecided, white with hatching for failed
+COLOURS = ("#D55E00", "#A6D8F5", "#0072B2", "#F0E442", "#009E73", "#CC79A7", "#E69F00", "#999999", "#B8E0D2", "#5D3A9B")
 UNDECIDED = "#000000"
 MARK_BELOW = 0.002  # a share of the map: rarer points are also marked with a ring, or nobody would see them
 

@@ -51,7 +51,7 @@ class Grid:
             order = [dims.index(dim) for dim in self.sizes if dim in dims]
             part = part.transpose(order)
             part = part.reshape([part.shape[order.index(dims.index(dim))] if dim in dims else 1 for dim in where])
-            aligned[name] = np.ascontiguousarray(part)
+            aligned[name] = part.copy()
         return aligned
 
 

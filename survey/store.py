@@ -10,6 +10,7 @@ import zipfile
 from pathlib import Path
 
 import filelock
+import netCDF4
 import numpy as np
 import xarray as xr
 
@@ -142,7 +143,9 @@ def write(ds, path):
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     with refused(path):
         try:
-            ds.assign_attrs(complete=np.int8(1)).to_netcdf(part, engine="netcdf4", encoding=encoding(ds))
+            ds.to_netcdf(part, engine="netcdf4", encoding=encoding(ds))
+            with netCDF4.Dataset(part, "a") as file:
+                file.complete = np.int8(1)
             with open(part, "rb+") as file:
                 os.fsync(file.fileno())
                 digest = hashlib.file_digest(file, "sha256").hexdigest()

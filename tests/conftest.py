@@ -1,0 +1,59 @@
+"""A small real survey that several tests look at, and the program as a user runs it."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+SMALL = """
+title  = "A small survey"
+scene  = "gyrostat"
+[options]
+question = "trajectory"
+[axes]
+w0  = { start = 0.5, stop = 2.0, num = 6 }
+t   = { start = 0.0, stop = 3.0, num = 4 }
+phi0 = 1.5
+b12 = 0.7
+b31 = -0.4
+d   = 1.1
+s2  = 0.5
+[solver]
+rtol = 1e-9
+[output]
+path    = "small.nc"
+figures = ["w"]
+"""
+
+
+@pytest.fixture
+def program(tmp_path):
+    """Run `survey` in an empty folder; returns the finished process with its output as text."""
+
+    def run(*arguments, **keywords):
+        command = [sys.executable, "-m", "survey", *map(str, arguments)]
+        environment = os.environ | keywords.pop("env", {})
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, env=environment, **keywords)
+
+    run.folder = tmp_path
+    return run
+
+
+@pytest.fixture
+def small(tmp_path):
+    """The path of a small workflow."""
+    path = tmp_path / "small.toml"
+    path.write_text(SMALL)
+    return path
+
+
+@pytest.fixture(scope="session")
+def surveyed(tmp_path_factory):
+    """The path of the small survey's netCDF file, run once."""
+    import survey
+
+    folder = tmp_path_factory.mktemp("surveyed")
+    (folder / "small.toml").write_text(SMALL)
+    survey.run(folder / "small.toml", output=folder / "small.nc")
+    return folder / "small.nc"

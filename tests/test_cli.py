@@ -1,0 +1,144 @@
+"""The program as a user runs it: outputs, messages, exit codes, and no file touched by bad input."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import netCDF4
+import pytest
+
+
+def test_run_ends_with_a_file_a_digest_and_a_picture(program, small):
+    done = program("run", "small.toml")
+    assert done.returncode == 0 and done.stdout == "", done.stderr
+    assert sorted(f.name for f in program.folder.iterdir()) == [
+        "small.nc",
+        "small.nc.sha256",
+        "small.png",
+        "small.toml",
+    ]
+    for words in ("24 points in", "computed 1, reused 0", "ETA", "wrote small.nc", "status: ok: 24"):
+        assert words in done.stderr
+    subprocess.run(["sha256sum", "-c", "small.nc.sha256"], cwd=program.folder, check=True, capture_output=True)
+
+
+def test_quiet_says_nothing_and_o_chooses_the_file(program, small):
+    done = program("run", "small.toml", "--quiet", "-o", "other.nc", "--set", "axes.t.num=2")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    with netCDF4.Dataset(program.folder / "other.nc") as file:
+        assert file["w"].shape == (6, 2) and file["w"].dimensions == ("w0", "t")
+
+
+def test_worker_processes_give_the_same_file(program, small):
+    for name, words in (("a.nc", ()), ("b.nc", ("--workers", "2"))):
+        assert program("run", "small.toml", "--quiet", "-o", name, *words).returncode == 0
+    with netCDF4.Dataset(program.folder / "a.nc") as a, netCDF4.Dataset(program.folder / "b.nc") as b:
+        assert all((a[name][:] == b[name][:]).all() for name in a.variables)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["run", "absent.toml"], "absent.toml: cannot read this workflow file"),
+        (["run", "small.toml", "--set", "axes.w0.num=many"], "axes.w0.num = 'many'"),
+        (["run", "small.toml", "--set", "scene=gyrostats"], "did you mean 'gyrostat'"),
+        (["run", "small.toml", "-o", "nowhere/out.nc"], "there is no folder 'nowhere'"),
+        (["run", "small.toml", "-o", "."], "is a folder"),
+        (["run", "small.toml", "--workers", "none"], "--workers"),
+        (["run"], "Missing argument"),
+        (["runn"], "runn"),
+        (["info", "absent.nc"], "absent.nc: there is no such file"),
+        (["verify", "absent.nc"], "absent.nc: there is no such file"),
+        (["plot", "absent.nc"], "absent.nc: there is no such file"),
+        (["scenes", "gyroscope"], "did you mean 'gyrostat'"),
+        (["precision", "gyroscope"], "did you mean 'gyrostat'"),
+    ],
+)
+def test_bad_input_is_one_line_exit_2_and_no_file(program, small, words, message):
+    done = program(*words)
+    assert done.returncode == 2, done.stderr
+    assert message in done.stderr and done.stderr.count("\n") == 1 and done.stdout == ""
+    assert [f.name for f in program.folder.iterdir()] == ["small.toml"]
+
+
+def test_plan_counts_what_run_does_and_calls_no_kernel(program, small):
+    planned = json.loads(program("plan", "small.toml", "--json", env={"NUMBA_DISABLE_JIT": "1"}).stdout)
+    assert (planned["points"], planned["blocks"]) == (24, 1)
+    assert planned["bytes"] == 24 * (2 * 8 + 2 * 4 + 4 + 1)
+    assert [f.name for f in program.folder.iterdir()] == ["small.toml"]
+
+
+def test_info_verify_and_plot(program, small):
+    program("run", "small.toml", "--quiet")
+    told = json.loads(program("info", "small.nc", "--json").stdout)
+    assert told["counts"]["status"]["ok"] == 24 and told["provenance"]["kernel_hash"]
+    assert "phi0" in program("info", "small.nc").stdout
+    verified = program("verify", "small.nc")
+    assert verified.returncode == 0 and "20 points solved again by" in verified.stdout, verified.stderr
+    plotted = program("plot", "small.nc", "--var", "turnings", "-o", "t.pdf")
+    assert plotted.returncode == 0 and (program.folder / "t.pdf").read_bytes()[:4] == b"%PDF"
+    assert "did you mean 'turnings'" in program("plot", "small.nc", "--var", "turning").stderr
+    assert program("plot", "small.nc", "-o", "t.docx").returncode == 2
+
+
+def test_verify_finds_a_flipped_bit(program, small):
+    program("run", "small.toml", "--quiet")
+    path = program.folder / "small.nc"
+    bits = bytearray(path.read_bytes())
+    bits[len(bits) // 2] ^= 1
+    path.write_bytes(bits)
+    found = program("verify", "small.nc")
+    assert found.returncode == 3 and "digest" in found.stderr and found.stderr.count("\n") == 1
+
+
+def test_verify_finds_a_wrong_value_by_solving_again(program, small):
+    program("run", "small.toml", "--quiet")
+    (program.folder / "small.nc.sha256").unlink()
+    with netCDF4.Dataset(program.folder / "small.nc", "a") as file:
+        file["w"][3, 2] += 1e-6
+    (program.folder / "small.nc.sha256").write_text("")
+    subprocess.run("sha256sum small.nc > small.nc.sha256", shell=True, cwd=program.folder, check=True)
+    found = program("verify", "small.nc", "--points", "24")
+    assert found.returncode == 3 and "w at " in found.stderr, found.stderr
+
+
+def test_scenes_tell_all_that_is_needed(program):
+    assert "satellite" in program("scenes").stdout
+    told = program("scenes", "satellite").stdout
+    for words in ("k != 1", "body", "prolate | oblate", "discriminant", "taylor16", "undecided -1", "Astakhova"):
+        assert words in told
+    assert json.loads(program("scenes", "gyrostat", "--json").stdout)["name"] == "gyrostat"
+
+
+def test_no_color_is_honoured(program, small):
+    program("run", "small.toml", "--quiet")
+    assert "\x1b" not in program("info", "small.nc", env={"NO_COLOR": "1", "FORCE_COLOR": "1"}).stdout
+
+
+@pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143)])
+def test_an_interrupted_run_can_be_resumed(program, small, name, code):
+    many = ("axes.w0.num=4000", "axes.t.num=40", "axes.t.stop=40")
+    command = ["run", "small.toml", *[word for text in many for word in ("--set", text)]]
+    running = subprocess.Popen(
+        [sys.executable, "-m", "survey", *command], cwd=program.folder, stderr=subprocess.PIPE, text=True
+    )
+    blocks = program.folder / "small.nc.blocks"
+    deadline = time.time() + 60
+    while not list(blocks.glob("*.npz")) and time.time() < deadline:
+        time.sleep(0.005)
+    running.send_signal(getattr(signal, name))
+    told = running.communicate(timeout=30)[1]
+    assert running.returncode == code and "go on with: survey run small.toml" in told, told
+    finished = len(list(blocks.glob("*.npz")))
+    assert finished and not (program.folder / "small.nc").exists()
+    resumed = program(*command)
+    assert resumed.returncode == 0 and f", reused {finished} of" in resumed.stderr, resumed.stderr
+    assert not blocks.exists() and not os.path.exists(program.folder / "small.nc.lock")
+
+
+def test_failed_points_exit_1(program, small):
+    done = program("run", "small.toml", "--set", "axes.t.stop=1e12")
+    assert done.returncode == 1 and "step_limit" in done.stderr, done.stderr

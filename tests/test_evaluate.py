@@ -1,0 +1,89 @@
+"""survey.evaluate follows xarray's broadcasting and gives the command's bits."""
+
+import dask.array as da
+import numpy as np
+import pytest
+import xarray as xr
+
+import survey
+
+SYSTEM = {"question": "trajectory", "b12": 0.7, "b31": -0.4, "d": 1.1, "s2": 0.5, "phi0": 1.5, "rtol": 1e-9}
+W0, T = np.linspace(0.5, 2.0, 6), np.linspace(0.0, 3.0, 4)
+
+
+def evaluate(**given):
+    return survey.evaluate("gyrostat", **(SYSTEM | given))
+
+
+def test_arrays_become_dimensions_and_equal_the_command(surveyed):
+    ds, file = evaluate(w0=W0, t=T), survey.open(surveyed)
+    assert ds.w.dims == ("w0", "t")
+    for name in file.data_vars:
+        xr.testing.assert_equal(ds[name].drop_attrs(), file[name].drop_attrs())
+
+
+def test_numbers_become_scalar_coordinates(surveyed):
+    ds = evaluate(w0=W0[2], t=T[3])
+    assert ds.w.ndim == 0 and float(ds.w0) == W0[2] and float(ds.c23) == 0
+    assert float(ds.w) == float(survey.open(surveyed).w[2, 3])
+
+
+def test_arrays_that_share_a_dimension_go_point_by_point(surveyed):
+    w0 = xr.DataArray(W0[:4], dims="point", coords={"point": list("abcd")})
+    ds = evaluate(w0=w0, t=xr.DataArray(T, dims="point"))
+    assert ds.w.dims == ("point",) and list(ds.point.values) == list("abcd")
+    np.testing.assert_array_equal(ds.w, np.diag(survey.open(surveyed).w[:4]))
+
+
+def test_dask_input_stays_lazy_and_gives_the_same_bits(surveyed):
+    w0 = xr.DataArray(da.from_array(W0, chunks=2), dims="w0")
+    ds = evaluate(w0=w0, t=T)
+    assert ds.w.chunks
+    file = survey.open(surveyed)
+    for name in file.data_vars:
+        np.testing.assert_array_equal(ds[name].compute(), file[name])
+
+
+def test_variables_are_chosen():
+    ds = evaluate(w0=W0, t=T, variables=["w"])
+    assert set(ds.data_vars) == {"w", "w_error", "status"}
+
+
+def test_integers_and_lists_are_taken():
+    assert evaluate(w0=[1, 2], t=1).w.sizes == {"w0": 2}
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"w0": np.nan}, "w0 = nan is outside"),
+        ({"w0": "fast"}, "w0 .*real number"),
+        ({"w0": np.ones((2, 2))}, "w0: .*DataArray"),
+        ({"w0": []}, "w0: an empty array"),
+        ({"w1": 1.0}, "'w1'; did you mean 'w0'"),
+        ({"question": "fates"}, "'fates'; did you mean 'fate'"),
+        ({"method": "tailor"}, "'tailor'; did you mean 'taylor"),
+        ({"variables": ["phy"]}, "'phy'; did you mean 'phi'"),
+        ({"rtol": 0.0}, "rtol = 0.0"),
+    ],
+)
+def test_bad_input_is_refused_in_one_line(given, words):
+    with pytest.raises(survey.BadInput, match=words) as refusal:
+        evaluate(**({"w0": 1.0, "t": 1.0} | given))
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_missing_parameter_and_unequal_dimensions_are_named():
+    with pytest.raises(ValueError, match="t is missing"):
+        evaluate(w0=1.0)
+    with pytest.raises(ValueError, match="dimension 'point'"):
+        evaluate(w0=xr.DataArray(W0, dims="point"), t=xr.DataArray(T, dims="point"))
+    with pytest.raises(ValueError, match="'gyrostatt'; did you mean 'gyrostat'"):
+        survey.evaluate("gyrostatt", t=1.0)
+
+
+def test_a_point_outside_the_domain_costs_itself_alone():
+    good, mixed = evaluate(w0=[1.0, 2.0], t=1.0), evaluate(w0=[1.0, np.nan, 2.0], t=1.0)
+    assert mixed.status.values.tolist() == [0, 1, 0]
+    assert np.isnan(mixed.w[1])
+    np.testing.assert_array_equal(mixed.w[[0, 2]], good.w)

@@ -1,0 +1,66 @@
+"""Pictures: titled, labelled, with a legend; undecided and failed points are visible as such."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+import xarray as xr
+
+import survey
+from survey import figures, status
+from survey.errors import BadInput
+
+
+@pytest.fixture
+def toy():
+    """A 40 x 50 map with all kinds of points."""
+    verdict = np.ones((40, 50), np.int8)
+    verdict[:10] = 0
+    verdict[20, 20] = -1
+    state = np.zeros((40, 50), np.int8)
+    state[30:, 40:] = status.STEP_LIMIT
+    state[0, 0] = status.INVALID_PARAMETERS
+    flags = {"flag_values": np.array([-1, 0, 1, 2], np.int8), "flag_meanings": "undecided unstable stable marginal"}
+    return xr.Dataset(
+        {"verdict": (("k", "rho"), verdict, flags | {"long_name": "verdict"}), "status": (("k", "rho"), state)},
+        {"k": ("k", np.linspace(0, 1, 40), {"symbol": "k", "long_name": "modulus", "units": "1"}),
+         "rho": ("rho", np.geomspace(1, 10, 50), {"symbol": r"\rho", "long_name": "ratio", "units": "rad"})},
+        {"title": "A toy map", "options": "body=prolate"},
+    )  # fmt: skip
+
+
+def test_the_legend_counts_every_kind_of_point(toy):
+    figure = figures.draw(toy)
+    axes = figure.axes[0]
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert labels == ["unstable (500)", "stable (1,499)", "undecided (1)", "failed (100)", "outside the domain (1)"]
+    assert axes.get_xlabel() == "modulus, $k$" and axes.get_ylabel() == r"ratio, $\rho$ (rad)"
+    assert axes.get_title().startswith("A toy map") and axes.get_yscale() == "log"
+    assert [line.get_xydata().shape[0] for line in axes.lines] == [1, 1]  # rare points are ringed
+    plt.close(figure)
+
+
+def test_undecided_is_not_counted_where_the_point_failed(toy):
+    toy.verdict[30:, 40:] = -1
+    labels = [text.get_text() for text in figures.draw(toy).axes[0].get_legend().get_texts()]
+    assert "undecided (1)" in labels
+    plt.close("all")
+
+
+def test_the_colours_differ_for_the_colour_blind_and_in_grey():
+    from matplotlib.colors import to_rgb
+
+    grey = [np.dot(to_rgb(colour), (0.299, 0.587, 0.114)) for colour in (*figures.COLOURS[:2], figures.UNDECIDED)]
+    assert min(abs(a - b) for i, a in enumerate(grey) for b in grey[:i]) > 0.25
+
+
+@pytest.mark.parametrize("name", ["w", "turnings", "status"])
+def test_any_variable_can_be_drawn(surveyed, tmp_path, name):
+    ds = survey.open(surveyed)
+    figures.save(ds, tmp_path / "map.png", name)
+    figures.save(ds.isel(t=-1), tmp_path / "curve.png", name)
+    assert all((tmp_path / file).read_bytes()[:4] == b"\x89PNG" for file in ("map.png", "curve.png"))
+
+
+def test_a_single_number_has_no_figure(surveyed):
+    with pytest.raises(BadInput, match="at least one axis"):
+        figures.draw(survey.open(surveyed).isel(t=0, w0=0), "w")

@@ -1,0 +1,26 @@
+"""Importing is light, and no arrow of the house plan runs backwards."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+
+def loaded_by(code):
+    report = f"import sys; {code}; print(*sorted(sys.modules))"
+    return subprocess.run([sys.executable, "-c", report], capture_output=True, text=True, check=True).stdout.split()
+
+
+def test_importing_survey_loads_nothing_heavy():
+    assert not {"numba", "numpy", "xarray", "dask", "matplotlib", "netCDF4"} & set(loaded_by("import survey"))
+
+
+def test_importing_a_scene_compiles_nothing():
+    code = "import survey.scenes.satellite, survey.scenes.gyrostat; from numba.core.dispatcher import Dispatcher; import gc; "
+    code += "assert not any(d.signatures for d in gc.get_objects() if isinstance(d, Dispatcher) and 'survey' in d.py_func.__module__)"
+    assert "numba" in loaded_by(code)
+
+
+def test_the_import_rule_holds():
+    linter = Path(sys.executable).with_name("lint-imports")
+    checked = subprocess.run([linter], cwd=Path(__file__).parent.parent, capture_output=True, text=True)
+    assert checked.returncode == 0, checked.stdout

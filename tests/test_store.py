@@ -1,0 +1,135 @@
+"""Nothing finished is lost, nothing partial is published, and every flipped bit is found."""
+
+import multiprocessing
+import os
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import survey
+from survey import engine, store, workflow
+from survey.errors import BadInput, Damaged, Stopped
+
+
+@pytest.fixture
+def copy(surveyed, tmp_path):
+    """A copy of the small survey with its digest."""
+    path = tmp_path / "copy.nc"
+    path.write_bytes(surveyed.read_bytes())
+    digest = surveyed.with_name(f"{surveyed.name}.sha256").read_text()
+    (tmp_path / "copy.nc.sha256").write_text(digest)
+    return path
+
+
+def test_a_sound_file_has_no_complaints(copy):
+    assert store.check(copy) == []
+
+
+@pytest.mark.parametrize("where", [0.01, 0.3, 0.5, 0.8, 0.99])
+def test_a_flipped_bit_is_found_anywhere(copy, where):
+    bits = bytearray(copy.read_bytes())
+    bits[int(len(bits) * where)] ^= 4
+    copy.write_bytes(bits)
+    assert "digest" in store.check(copy)[0]
+
+
+def test_a_cut_tail_is_found_without_the_digest_too(copy):
+    copy.write_bytes(copy.read_bytes()[:-2000])
+    os.remove(f"{copy}.sha256")
+    with pytest.raises(Damaged):
+        store.check(copy)
+
+
+def test_counts_that_do_not_match_the_data_are_found(copy):
+    os.remove(f"{copy}.sha256")
+    ds = xr.load_dataset(copy)
+    ds.attrs["status_counts"] = "ok: 23, overflow: 1"
+    ds.to_netcdf(copy)
+    assert any("status_counts" in complaint for complaint in store.check(copy))
+
+
+def test_an_incomplete_or_foreign_file_is_refused(copy, tmp_path):
+    ds = xr.load_dataset(copy)
+    ds.attrs["complete"] = 0
+    ds.to_netcdf(copy)
+    with pytest.raises(Damaged, match="incomplete"):
+        survey.open(copy)
+    xr.Dataset({"x": 1}).to_netcdf(tmp_path / "foreign.nc")
+    with pytest.raises(BadInput, match="not written by survey"):
+        survey.open(tmp_path / "foreign.nc")
+    with pytest.raises(BadInput, match="no such file"):
+        survey.open(tmp_path / "absent.nc")
+
+
+def test_finished_blocks_are_used_again_and_give_the_same_bits(small, tmp_path, monkeypatch):
+    monkeypatch.setattr(engine, "BLOCK_POINTS", (1, 4))
+    whole = survey.run(small, output=tmp_path / "whole.nc")
+    checked = workflow.read(small, output=tmp_path / "again.nc")
+    blocks = engine.blocks_of(checked)
+    assert len(blocks) == 6
+    with store.Blocks(checked.path, engine.fingerprint(checked)) as kept:
+        for number in (1, 4):
+            kept.save(number, engine.solve_block(checked.scene, checked.request, checked.grid, blocks[number]))
+    seen = []
+    again = engine.run(checked, progress=lambda done, total, reused: seen.append((done, total, reused)))
+    assert seen[0] == (2, 6, 2) and seen[-1] == (6, 6, 2)
+    xr.testing.assert_equal(whole.drop_attrs(), again.drop_attrs())
+    assert not checked.path.with_name("again.nc.blocks").exists()
+
+
+def test_blocks_of_another_survey_are_refused_unless_fresh(small, tmp_path):
+    checked = workflow.read(small, output=tmp_path / "o.nc")
+    with store.Blocks(checked.path, engine.fingerprint(checked)):
+        pass
+    changed = workflow.read(small, ["solver.rtol=1e-6"], tmp_path / "o.nc")
+    with pytest.raises(BadInput, match=r"rtol changed: 1e-09 -> 1e-06\); --fresh"):
+        engine.run(changed)
+    engine.run(changed, fresh=True)
+
+
+def test_a_damaged_block_is_found_and_dropped(small, tmp_path):
+    checked = workflow.read(small, output=tmp_path / "o.nc")
+    with store.Blocks(checked.path, engine.fingerprint(checked)) as kept:
+        kept.save(0, {"w": np.arange(100.0)})
+        file = kept._file(0)
+        bits = bytearray(file.read_bytes())
+        bits[len(bits) // 2] ^= 1
+        file.write_bytes(bits)
+        with pytest.raises(Damaged, match="run the command again"):
+            kept.load(0)
+        assert kept.done() == set()
+
+
+def _hold(path, ready, leave):
+    with store.Blocks(path, {}):
+        ready.set()
+        leave.wait(30)
+
+
+def test_a_second_writer_is_told_who_holds_the_output_and_a_killed_holder_frees_it(tmp_path):
+    context = multiprocessing.get_context("spawn")
+    ready, leave = context.Event(), context.Event()
+    holder = context.Process(target=_hold, args=(tmp_path / "o.nc", ready, leave))
+    holder.start()
+    assert ready.wait(60)
+    with pytest.raises(BadInput, match=f"pid {holder.pid}"), store.Blocks(tmp_path / "o.nc", {}):
+        pass
+    holder.kill()
+    holder.join()
+    with store.Blocks(tmp_path / "o.nc", {}):
+        pass
+
+
+def test_a_disk_that_refuses_leaves_the_old_file(copy, monkeypatch):
+    before = copy.read_bytes()
+    ds = survey.open(copy)
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(Stopped, match=r"copy\.nc.*No space left"):
+        store.write(ds, copy)
+    assert copy.read_bytes() == before
+    assert [file.name for file in copy.parent.iterdir() if file.name.endswith(".part")] == []
