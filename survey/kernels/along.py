@@ -29,7 +29,7 @@ from survey.kernels.flow import (
     values,
     variation,
 )
-from survey.kernels.jit import inline
+from survey.kernels.jit import inline, kernel
 
 OK, OVERFLOW, NO_CONVERGENCE, STEP_LIMIT = 0, 2, 3, 4  # as in survey/status.py
 TURNING, EQUILIBRIUM, SEPARATRIX = 16, 17, 18  # as in the STATUS of scenes/gyrostat.py
@@ -38,7 +38,7 @@ MANY = -1
 UNTOLD = -2  # a count that the error bar cannot tell
 
 
-@inline
+@kernel
 def local_error(p, T, w, dt):
     """Error bars (phi, w) that one step adds: truncation as the method notes it, and rounding."""
     rate = p[BOUND_F] * abs(w) + p[BOUND_G]
@@ -46,7 +46,7 @@ def local_error(p, T, w, dt):
     return phi, T[LAST, TRUNC_W] + UNIT * (1.5 * abs(w) + 4.0 * dt * rate)
 
 
-@inline
+@kernel
 def carried(p, T, dt, w, saa, sab, sbb):
     """The error ellipse S after dt of the current step."""
     a, b, c, d = jacobian(T, dt)
@@ -105,7 +105,7 @@ def trajectory(setting, begin, at, p, phi0, w0, times, tolerance, limit, floats,
             passed = sign != 0 and v * sign < 0.0
             turnings[j] = count + passed if unsure < 3 and count >= 0 else UNTOLD
             if not (bar_phi < TRUST and bar_w < TRUST * (1.0 + abs(v))):
-                floats[j, :] = math.nan
+                floats[j, 0] = floats[j, 1] = floats[j, 2] = floats[j, 3] = math.nan
                 turnings[j] = UNTOLD
                 return NO_CONVERGENCE
             j += 1
@@ -213,14 +213,14 @@ def time_of_turning(at, p, T, h):
     return dt
 
 
-@inline
+@kernel
 def clean_turning(p, phi, bar_phi, bar_w):
     """Is a zero of w certain at phi: does g keep its sign over the error bars?"""
     g = abs(values(p, phi)[1])
     return g > 0.0 and 10.0 * (p[BOUND_DG] * bar_phi + p[BOUND_F] * bar_w) < g
 
 
-@inline
+@kernel
 def node_ahead(p, phi, w):
     """Distance to a stable node ahead of (phi, w > 0) that the solution is certain to run into without turning, or -1.
 
@@ -272,7 +272,7 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
     if w0 == 0.0 and start_sign(p, phi, w0) <= 0:
         ending = TURNING if start_sign(p, phi, w0) < 0 else EQUILIBRIUM
         while j < size and targets[j] == phi0:
-            floats[j, :] = 0.0
+            floats[j, 0] = floats[j, 1] = floats[j, 2] = floats[j, 3] = 0.0
             status[j] = OK
             j += 1
         for i in range(j, size):

@@ -41,16 +41,19 @@ def equilibria(p, table):
             top += 2
         if count >= MOST:
             break
-    for i in range(count):
-        if found[i] >= TWO_PI:
-            found[i] = max(found[i] - TWO_PI, 0.0)
-    found[:count] = np.sort(found[:count])
+    for i in range(count):  # into [0, 2 pi), by insertion
+        x = max(found[i] - TWO_PI, 0.0) if found[i] >= TWO_PI else found[i]
+        k = i
+        while k > 0 and found[k - 1] > x:
+            found[k] = found[k - 1]
+            k -= 1
+        found[k] = x
     for i in range(count):
         describe(p, found[i], table[i])
     return count
 
 
-@inline
+@kernel
 def root(p, low, high):
     """The root of g between low and high, where g is monotone and changes sign."""
     sign = values(p, high)[1] >= 0.0
@@ -70,7 +73,7 @@ def root(p, low, high):
     return x
 
 
-@inline
+@kernel
 def describe(p, x, row):
     """Type, error bar and region of attraction of the equilibrium at x."""
     f, _g, dg = values(p, x)
@@ -114,7 +117,7 @@ def offset(phi, angle):
     return x - turns * TWO_PI, turns
 
 
-@inline
+@kernel
 def captured(table, count, phi, w, bar):
     """The row of the equilibrium that certainly attracts every state within `bar` of (phi, w), or -1."""
     for i in range(count):
@@ -128,7 +131,7 @@ def captured(table, count, phi, w, bar):
     return -1
 
 
-@inline
+@kernel
 def settled(p, row, x, w):
     """Is it certain that w keeps its sign from here to the stable node at distance x?
 

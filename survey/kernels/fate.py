@@ -12,7 +12,7 @@ from survey.kernels.along import NO_CONVERGENCE, OK, SEPARATRIX, STEP_LIMIT, bar
 from survey.kernels.along import start_sign, time_at, time_of_turning
 from survey.kernels.equilibria import ANGLE, BAR, DG, FOCUS, KIND, NODE, STABLE, captured, offset, settled
 from survey.kernels.flow import TWO_PI, TWO_PI_LOW, UNIT, reduced, table, values
-from survey.kernels.jit import inline
+from survey.kernels.jit import inline, kernel
 from survey.kernels.returns import (
     ABOVE,
     BELOW,
@@ -49,7 +49,7 @@ def attracts(cycle):
     return cycle[BELOW] > 0.0 and cycle[ABOVE] < 0.0
 
 
-@inline
+@kernel
 def rotation_decides(cycles, size, end, w, error, before, before_error):
     """(decided, index of the cycle or -1 for spin-up) at a passage with |w|; before = |w| one turn ago or -1.
 
@@ -76,7 +76,7 @@ def rotation_decides(cycles, size, end, w, error, before, before_error):
     return 1, reached
 
 
-@inline
+@kernel
 def libration_decides(cycles, size, interval, inside, x, error, before, before_error):
     """(decided, index of the cycle, or -1 for what lies inside) from two right turning points x and `before`."""
     if abs(x - before) <= error + before_error:
@@ -106,7 +106,7 @@ def libration_decides(cycles, size, interval, inside, x, error, before, before_e
     return 1, best
 
 
-@inline
+@kernel
 def interval_of(eqs, count, x):
     """The equilibrium next below the angle x (any real), and x brought to the turn that starts there."""
     best, least = 0, 1e9
@@ -118,7 +118,7 @@ def interval_of(eqs, count, x):
     return best, eqs[best, ANGLE] + least
 
 
-@inline
+@kernel
 def section_ahead(phi, w, section, spacing):
     """The next section (section + a multiple of spacing) in the direction of w, strictly ahead of phi."""
     k = (phi - section) / spacing
@@ -289,5 +289,7 @@ def fates(setting, begin, at, p, eqs, count, section, stratum, ends, weak, plus,
     for i in range(len(starts)):
         fate(setting, begin, at, p, eqs, count, section, stratum, ends, weak, plus, n_plus, minus, n_minus, lib,
              n_lib, starts[i, 0], starts[i, 1], tolerance, limit, out[i])  # fmt: skip
+        if out[i, 0] != UNDECIDED:
+            out[i, 4] = OK
 
 

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from survey.kernels.jit import inline
+from survey.kernels.jit import inline, kernel
 
 ORDER = 20  # of the Taylor series in t; near -ln(eps)/2 + 1 = 19 the work per unit of time is least (Jorba & Zou)
 LOW = 8  # order of the series of the variational equation, which only carries error bars
@@ -35,7 +35,7 @@ def coefficients(b12, b31, d, c23, s2, s3):
     return np.stack([b12, b31, d, c23, s2, s3, b, c + s, 2.0 * c + s, 4.0 * c + s], axis=-1)
 
 
-@inline
+@kernel
 def values(p, phi):
     """f, g, g' at phi."""
     s, c = math.sin(phi), math.cos(phi)
@@ -53,7 +53,7 @@ def potential(p, phi):
     return 0.5 * p[D] * s * s + p[C23] * s * c - p[S2] * s - p[S3] * c
 
 
-@inline
+@kernel
 def series(p, phi, w, T, order):
     """Fill rows PHI..Y of T with the series through (phi, w) up to t^order."""
     s, c = math.sin(phi), math.cos(phi)
@@ -78,7 +78,7 @@ def series(p, phi, w, T, order):
         T[n + 1, W] = p[B12] * s + p[B31] * c + y  # w = F + y
 
 
-@inline
+@kernel
 def variation(p, T):
     """Fill rows U1..DG up to t^LOW: u' = f u + z, z' = g' u, from the series of sin and cos in T."""
     for n in range(LOW):
@@ -99,7 +99,7 @@ def variation(p, T):
         T[n + 1, U2], T[n + 1, Z2] = (a2 + T[n, Z2]) * r, a3 * r
 
 
-@inline
+@kernel
 def jacobian(T, dt):
     """d(phi, w)(dt) / d(phi, w)(0) as (phi_phi, phi_w, w_phi, w_w)."""
     u1, z1, u2, z2, f = T[LOW, U1], T[LOW, Z1], T[LOW, U2], T[LOW, Z2], T[LOW, F_]
@@ -118,8 +118,13 @@ def table():
 @inline
 def reduced(phi):
     """phi in [-pi, pi] and the number of turns taken out of it."""
-    turns = math.floor(phi / TWO_PI + 0.5)
-    return (phi - turns * TWO_PI) - turns * TWO_PI_LOW, turns
+    rest = math.copysign(abs(phi) % TWO_PI, phi)  # exact
+    turns = math.floor((phi - rest) / TWO_PI + 0.5)
+    rest -= turns * TWO_PI_LOW
+    if abs(rest) > math.pi:
+        k = 1.0 if rest > 0.0 else -1.0
+        return (rest - k * TWO_PI) - k * TWO_PI_LOW, turns + k
+    return rest, turns
 
 
 @inline

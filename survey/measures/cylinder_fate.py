@@ -5,21 +5,94 @@ parameters alone and is computed once for all initial states.
 """
 
 import math
+import sys
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from survey.kernels import equilibria as eq
 from survey.kernels import fate as kf
 from survey.kernels import returns as rt
-from survey.kernels.along import SEPARATRIX
+from survey.kernels.along import SEPARATRIX, STEP_LIMIT
 from survey.kernels.flow import BOUND_DG, BOUND_F, coefficients
+from survey.measures.cylinder import tolerances
 
+NO_TURNS = kf.NO_TURNS
 I0, I1, I2, G = 0, 1, 2, 3  # strata
 EXACT = 1e-14  # K and L are 0 within the rounding of the parameters
 STEPS = 20_000  # budget of one fate: about 15 ms
+MORE = 10  # times the budget for those that use it up
 BATCH = 50  # fates per kernel call, so that a call stays below a second
 FINE = 1e-16  # truncation per step for cycles
+
+
+def empty(size, status):
+    """The outputs of `solve` for `size` states, filled with what does not apply."""
+    floats = ("limit_phi", "limit_w", "multiplier")
+    result = {name + end: np.full(size, np.nan) for name in floats for end in ("", "_error")}
+    for name, fill in (("verdict", -1), ("turnings", kf.UNTOLD), ("net_turns", NO_TURNS), ("status", status)):
+        result[name] = np.full(size, fill, dtype=np.int64)
+    return result
+
+
+def solve(method, six, starts, rtol, result, where):
+    """Fates at one parameter point, written into `result` (see `empty`) at the indices `where`."""
+    s = _remembered(method.__name__, tuple(float(value) for value in six))
+    first, second = tolerances(rtol)
+    out = fates(method, s, starts, first)
+    for code, tolerance, more in ((STEP_LIMIT, first, MORE), (SEPARATRIX, second, MORE)):
+        again = out[:, 4] == code
+        if again.any():
+            out[again] = fates(method, s, starts[again], tolerance, more)
+    result["verdict"][where], result["turnings"][where], result["status"][where] = out[:, 0], out[:, 2], out[:, 4]
+    result["net_turns"][where] = out[:, 3]
+    for i, row in zip(where, out, strict=True):
+        _limits(s, row, result, i)
+    middle = np.where(out[:, 3] != NO_TURNS, 0.0, np.nan) + _middles(s, out)
+    turns = np.trunc((middle + 2.0 * math.pi * out[:, 3] - starts[:, 0]) / (2.0 * math.pi))
+    told = np.isfinite(turns) & (out[:, 0] != kf.PERIODIC_LIBRATION)
+    result["net_turns"][where[told]] = turns[told]
+
+
+def _middles(s, out):
+    """Angle that counts for net_turns: the equilibrium, or the middle of a libration cycle."""
+    angles = np.full(len(out), np.nan)
+    for i, row in enumerate(out):
+        if row[0] in (kf.EQUILIBRIUM, kf.EQUILIBRIUM_START) and row[1] >= 0:
+            angles[i] = s.equilibria[int(row[1]), eq.ANGLE]
+        elif row[0] == kf.LIBRATION:
+            cycle = s.librations[int(row[1])]
+            angles[i] = 0.5 * (cycle[rt.CYCLE_X] + cycle[rt.CYCLE_LEFT])
+    return angles
+
+
+def _limits(s, row, result, i):
+    """limit_phi, limit_w and multiplier of one fate."""
+    verdict, index = int(row[0]), int(row[1])
+    phi = w = cycle = None
+    if verdict in (kf.EQUILIBRIUM, kf.EQUILIBRIUM_START):
+        phi = (s.equilibria[index, eq.ANGLE], s.equilibria[index, eq.BAR]) if index >= 0 else row[5:7]
+    elif verdict == kf.LIBRATION:
+        cycle = s.librations[index]
+        phi = cycle[rt.CYCLE_X], cycle[rt.CYCLE_BAR]
+    elif verdict in (kf.ROTATION_PLUS, kf.ROTATION_MINUS):
+        sign = 1.0 if verdict == kf.ROTATION_PLUS else -1.0
+        cycle = (s.plus if sign > 0 else s.minus)[index]
+        w = sign * cycle[rt.CYCLE_X], cycle[rt.CYCLE_BAR]
+    if phi is not None:
+        result["limit_phi"][i], result["limit_phi_error"][i] = phi[0] % (2.0 * math.pi), phi[1] + 1e-15
+    if w is not None:
+        result["limit_w"][i], result["limit_w_error"][i] = w
+    if cycle is not None:
+        result["multiplier"][i] = cycle[rt.MULTIPLIER]
+        result["multiplier_error"][i] = cycle[rt.MULTIPLIER_BAR]
+
+
+@lru_cache(maxsize=256)
+def _remembered(method, six):
+    """The skeleton of the parameter point `six`, by the method of that name; blocks of one survey share it."""
+    return skeleton(sys.modules[method], six)
 
 
 @dataclass(frozen=True)
@@ -135,7 +208,7 @@ def _librations(method, p, eqs):
     return table[:found]
 
 
-def fates(method, skeleton, starts, tolerance):
+def fates(method, skeleton, starts, tolerance, more=1):
     """Verdict, row of the limit, turning points, turns of the limit, status, for rows (phi0, w0) of `starts`."""
     if skeleton.stratum in (I0, I1):
         return (_free if skeleton.stratum == I0 else _conservative)(skeleton, starts)
@@ -146,9 +219,11 @@ def fates(method, skeleton, starts, tolerance):
                       kf.GENERIC if s.stratum == G else kf.REVERSIBLE, int(s.K < 0.0)])  # fmt: skip
     tables = [np.ascontiguousarray(np.vstack([t, np.zeros((1, 10))])) for t in (s.plus, s.minus, s.librations)]
     eqs = np.ascontiguousarray(s.equilibria)
-    for i in range(0, len(starts), BATCH):
-        part = np.ascontiguousarray(starts[i : i + BATCH])
-        method.flow_fates(s.p, eqs, section, sizes, s.ends, *tables, part, tolerance, STEPS, out[i : i + BATCH])
+    size = BATCH // more
+    for i in range(0, len(starts), size):
+        part = np.ascontiguousarray(starts[i : i + size])
+        limit = more * STEPS
+        method.flow_fates(s.p, eqs, section, sizes, s.ends, *tables, part, tolerance, limit, out[i : i + size])
     return out
 
 
@@ -165,7 +240,7 @@ def _free(s, starts):
         noise = 4e-16 * (abs(w) + b * (1.0 + abs(phi)))
         row[:] = kf.EQUILIBRIUM, -1, 0, kf.NO_TURNS, 0, np.nan, np.nan
         if w == 0.0:
-            row[0], row[5], row[6] = kf.EQUILIBRIUM_START, phi, 0.0
+            row[0], row[3], row[5], row[6] = kf.EQUILIBRIUM_START, 0, phi, 0.0
         elif abs(abs(y) - b) <= noise:
             row[0], row[2], row[4] = kf.UNDECIDED, kf.UNTOLD, SEPARATRIX
         elif abs(y) > b:

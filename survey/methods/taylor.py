@@ -19,7 +19,7 @@ def setting(p, w, tolerance):
     return tolerance
 
 
-@inline
+@kernel
 def begin(p, phi, w, tolerance, T):
     """Expand at (phi, w); returns the step that keeps the last two terms below the tolerance."""
     series(p, phi, w, T, _ORDER)
@@ -32,7 +32,7 @@ def begin(p, phi, w, tolerance, T):
     return h
 
 
-@inline
+@kernel
 def at(p, T, dt):
     """(phi, w, integral of f, integral of g) at dt after the start of the step."""
     phi, w, e, y = T[_ORDER, PHI], T[_ORDER, W], T[_ORDER, E], T[_ORDER, Y]

@@ -15,13 +15,19 @@ Integrable strata: I0 (g = 0), I1 (b = 0, H conserved), I2 (K = L = 0). Symmetri
 Source: M. E. Lesina, Ya. V. Zinovyeva, "The gyrostat with Barnett-London effect" (2004), checked and corrected in
 `physics/gyrostat.md` (whose section 5 is the classification that the fates follow).
 
+A fate is decided by the monotone return maps and by proven regions of attraction, never by a limit of steps; the
+cycles are those that a lattice of return maps shows, with dips followed down to folds. b = 0 and g = 0 are taken
+exactly, K = 0 and L = 0 within the rounding of the parameters. `multiplier` and cycles carry error bars; verdicts near
+a stable separatrix are -1 (status `separatrix`).
+
 Questions: `trajectory` (phi and w at t), `abel` (w and t at phi) and `fate` (where the solution ends).
 """
 
 import numpy as np
 
 from survey import methods
-from survey.measures import cylinder
+from survey.measures import cylinder, cylinder_fate
+from survey.measures.cylinder_fate import NO_TURNS
 from survey.modules import load
 from survey.scene import Option, Output, Parameter
 from survey.status import INVALID_PARAMETERS, OK
@@ -55,6 +61,10 @@ STATUS = {
     "separatrix": "the error bar cannot tell on which side of a separatrix the solution passes",
 }
 _TURNING = 16
+_FATES = {
+    "undecided": -1, "focus_or_node": 0, "saddle": 1, "rotation_plus": 2, "rotation_minus": 3, "libration": 4,
+    "spin_up_plus": 5, "spin_up_minus": 6, "periodic_rotation": 7, "periodic_libration": 8, "equilibrium_start": 9,
+}  # fmt: skip
 
 OUTPUTS = (
     Output("phi", "angle of rotation at t, unwrapped", "phi", units="rad", when=_TIME),
@@ -63,6 +73,15 @@ OUTPUTS = (
     Output("turnings", "number of turning points (sign changes of w)", "n_T", integer=True, fill=-2,
            applies="where the error bar can tell the number; -1 means infinitely many",
            when={"question": ("trajectory", "fate")}),
+    Output("verdict", "where the solution ends as t -> +inf", flags=_FATES, when=_FATE),
+    Output("limit_phi", "equilibrium that is reached, or right turning point of the libration cycle, in [0, 2 pi)",
+           "phi_inf", units="rad", when=_FATE, applies="at verdicts 0, 1, 4 and 9"),
+    Output("limit_w", "velocity of the rotation cycle where it passes the saddle of highest V (phi = 0 if no saddle)",
+           "w_inf", when=_FATE, applies="at verdicts 2 and 3"),
+    Output("multiplier", "Floquet multiplier of the limit cycle", "m", when=_FATE, applies="at verdicts 2, 3 and 4"),
+    Output("net_turns", "full turns made by the limit (towards zero; a libration counts by the middle of its cycle)",
+           "n", integer=True, fill=NO_TURNS, when=_FATE,
+           applies="at verdicts 0, 1, 4, 8 and 9; the number is infinite at the others"),
     Output("t", "time at which the solution reaches phi", "t", when=_ABEL,
            applies="at a place that the solution reaches"),
     Output("phi_turning", "turning point on the way to phi, unwrapped", "phi_T", units="rad", when=_ABEL,
@@ -81,7 +100,7 @@ def solve(point, request):
     """Every output at every point of the block."""
     method = load(methods, "taylor" if request.method == "auto" else request.method, "method")
     question = request.options.get("question", "fate")
-    return {"trajectory": _trajectory, "abel": _abel}[question](point, method, request.rtol)
+    return {"trajectory": _trajectory, "abel": _abel, "fate": _fate}[question](point, method, request.rtol)
 
 
 def _dense(point, name):
@@ -134,3 +153,22 @@ def _abel(point, method, rtol):
         for i, name in enumerate(names):
             results[name], results[f"{name}_error"] = back(here[..., i]), back(here[..., 2 + i])
     return results
+
+
+def _fate(point, method, rtol):
+    """One skeleton for each set of the six parameters, then its initial states."""
+    arrays = [np.asarray(point[key], dtype=float) for key in (*_SYSTEM, "phi0", "w0")]
+    shape = np.broadcast_shapes(*(array.shape for array in arrays))
+    systems = np.stack(np.broadcast_arrays(*arrays[:6]), axis=-1)
+    group = np.arange(systems[..., 0].size).reshape(systems.shape[:-1])
+    group = np.broadcast_to(group, shape).ravel()
+    starts = np.stack([np.broadcast_to(array, shape).ravel() for array in arrays[6:]], axis=-1)
+    result = cylinder_fate.empty(len(starts), INVALID_PARAMETERS)
+    order = np.argsort(group, kind="stable")
+    cuts = np.flatnonzero(np.diff(group[order])) + 1
+    for members in np.split(order, cuts):
+        six = systems.reshape(-1, 6)[group[members[0]]]
+        good = members[np.isfinite(starts[members]).all(axis=1)]
+        if np.isfinite(six).all() and len(good):
+            cylinder_fate.solve(method, six, starts[good], rtol, result, good)
+    return {name: values.reshape(shape) for name, values in result.items()}
