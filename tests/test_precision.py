@@ -1,0 +1,63 @@
+"""The work-precision chart: real measurements, errors against the references, the same records in all three files."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+import survey.precision as folder
+from survey import modules, precision
+from survey.errors import BadInput
+
+FIELDS = ["work", "method", "peer", "setting", "error", "seconds_per_point", "wrong_verdicts", "compile_seconds"]
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Two settings and tiny works instead of ten and the real ones."""
+    case = modules.load(folder, "satellite", "scene")
+    monkeypatch.setattr(precision, "SETTINGS", (1e-4, 1e-8))
+    monkeypatch.setattr(precision, "REPEATS", 1)
+    row = {"k": np.array([[0.5]]), "rho": np.linspace(0.6, 4.0, 8)[None, :]}
+    monkeypatch.setattr(case, "works", lambda: {"row": (row, {})})
+    return case
+
+
+def test_records_hold_what_was_measured(quick, tmp_path):
+    said = []
+    paths = precision.write("satellite", tmp_path, peers=True, say=said.append)
+    assert [path.name for path in paths] == [f"precision_satellite.{kind}" for kind in ("json", "csv", "png")]
+    told = json.loads(paths[0].read_text())
+    records = told["records"]
+    assert list(records[0]) == FIELDS and told["machine"]["cpu"]
+    methods = {record["method"] for record in records if not record["peer"]}
+    assert {"auto", "rk4", "magnus6", "taylor16"} <= methods
+    assert "scipy" in {record["peer"] for record in records}
+    assert all(record["seconds_per_point"] > 0 and record["error"] >= 0 for record in records)
+    assert sum(record["wrong_verdicts"] for record in records if not record["peer"]) == 0
+    with open(paths[1], newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["error"]) for row in rows] == [record["error"] for record in records]
+    assert paths[2].read_bytes()[:4] == b"\x89PNG"
+    assert any("measured" in line for line in said)
+
+
+def test_the_asked_accuracy_is_reached_on_the_references(quick):
+    for record in precision.measure("satellite", quick):
+        assert record.error <= record.setting, record
+
+
+def test_a_wrong_value_or_verdict_shows_in_the_chart(quick):
+    def broken(point, options, rtol):
+        return {"discriminant": np.array([0.0]), "verdict": np.array([1])}
+
+    error, wrong = precision._against(broken, quick.references(), "discriminant", 1e-8)
+    assert error > 0.9 and wrong >= 4
+
+
+def test_a_missing_folder_or_chart_is_refused(tmp_path):
+    with pytest.raises(BadInput, match="no such folder"):
+        precision.write("satellite", tmp_path / "nowhere")
+    with pytest.raises(BadInput, match="unknown scene 'satelite'"):
+        precision.write("satelite", tmp_path)

@@ -1,0 +1,84 @@
+"""Every command and snippet in the README is run as it stands."""
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text()
+BIN = Path(sys.executable).parent
+
+
+def fenced(language):
+    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+
+
+def small(code):
+    """The same snippet on a small map in another folder."""
+    return code.replace("workflows/satellite_prolate.toml", "small.toml")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """An empty folder with a small copy of the main workflow in it."""
+    text = (ROOT / "workflows/satellite_prolate.toml").read_text()
+    text = text.replace("num = 400", "num = 8").replace("num = 600", "num = 9").replace("results/", "")
+    (tmp_path / "small.toml").write_text(text)
+    return tmp_path
+
+
+def run(command, folder):
+    return subprocess.run(command, cwd=folder, shell=True, capture_output=True, text=True, executable="/bin/bash")
+
+
+def test_the_main_command_is_the_documented_job():
+    (main, test) = fenced("sh")
+    assert main.startswith("python3 -m venv .venv && .venv/bin/pip install -e . && ") and main.count("&&") == 2
+    assert test.endswith("&& .venv/bin/python -m pytest\n")
+    assert "README.md" in (ROOT / ".ci/run").read_text()
+
+
+def test_the_main_command_runs(folder):
+    command = small(fenced("sh")[0].split("&&")[-1]).replace(".venv/bin/", f"{shlex.quote(str(BIN))}/")
+    done = run(command, folder)
+    assert done.returncode == 0, done.stderr
+    assert (folder / "satellite_prolate.nc").exists() and (folder / "satellite_prolate.png").exists()
+
+
+def test_the_notebook_example_runs(folder):
+    (code,) = fenced("python")
+    done = subprocess.run([sys.executable, "-c", small(code)], cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("undecided unstable stable marginal\n") and "+-" in done.stdout
+
+
+def test_every_command_in_the_table_runs(folder):
+    commands = re.findall(r"^\| `(survey [^`]*)`", README, re.MULTILINE)
+    assert len(commands) == 7
+    names = {"WORKFLOW.toml": "small.toml", "OUT.nc": "satellite_prolate.nc", "[NAME]": "satellite"}
+    for command in commands:
+        for word, name in names.items():
+            command = command.replace(word, name)
+        if "precision" in command:
+            continue  # takes minutes: see tests/test_precision.py
+        done = run(f"{shlex.quote(str(BIN))}/{command}", folder)
+        assert done.returncode == 0, (command, done.stderr)
+
+
+def test_the_override_on_the_command_line_runs(folder):
+    (command,) = re.findall(r"`(survey run [^`]*--set[^`]*)`", README)
+    done = run(f"{shlex.quote(str(BIN))}/{small(command)}".replace("num=40", "num=4"), folder)
+    assert done.returncode == 0 and (folder / "quick.nc").exists(), done.stderr
+
+
+def test_the_map_of_the_folders_is_the_tree():
+    listed = re.findall(r"^(?:  )?([a-z_]+(?:\.py|/))(?:  ([a-z_]+\.py))?", fenced("")[0], re.MULTILINE)
+    for name in {name for pair in listed for name in pair if name}:
+        assert (ROOT / name).exists() or (ROOT / "survey" / name).exists(), name
+    for path in (ROOT / "survey").iterdir():
+        if path.is_dir() and path.name != "__pycache__":
+            assert f"  {path.name}/" in README, path
