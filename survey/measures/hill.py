@@ -1,0 +1,147 @@
+"""Hill's question: is y'' + z(t) y = 0, z even and of period T, stable? Half-period factors, verdict, Floquet data.
+
+With y1, y2 the solutions with y1(0) = y2'(0) = 1, y1'(0) = y2(0) = 0, and everything at T/2 (digest section 5):
+
+    discriminant D = trace of the monodromy;  D - 2 = 4 y1' y2,  D + 2 = 4 y1 y2'
+    unstable  <=>  y1' y2 > 0  or  y1 y2' < 0          (signs of four numbers: nothing cancels)
+    sinh^2(exponent / 2) = y1' y2 or -y1 y2';  sin^2(theta / 2) = -y1' y2,  cos^2(theta / 2) = y1 y2'
+
+det M = 1 is no check: it fails by 1e3 where |D| is 1e19. A verdict is given only where the bars leave no other.
+Source: W. Magnus, S. Winkler, Hill's Equation (1966), 1.3 and 2.1; symmetric z: theorem 1.1 there.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from survey import status
+from survey.measures import hill_effort
+
+UNDECIDED, UNSTABLE, STABLE, MARGINAL = -1, 0, 1, 2
+VERDICTS = {"undecided": UNDECIDED, "unstable": UNSTABLE, "stable": STABLE, "marginal": MARGINAL}
+FLOATS = ("discriminant", "y1", "y2", "dy1", "dy2", "exponent", "rotation_number")
+EPS = 2.3e-16
+
+
+@dataclass(frozen=True)
+class Problem:
+    """R rows of L points: y'' + (c0(t) + p c1(t) + p^2 c2) y = 0 on half a period, p varying along the row.
+
+    `sample(rows, nodes, steps)` gives c0, c1 of the rows at `nodes` (fractions) of each step as an array
+    (rows, steps, 2, nodes); `walk(rows, points, tolerance)`, for adaptive methods, gives the results of a chain for
+    points p[rows[i], points[i]]. `frequency` bounds sqrt(|z|); `rate` is 1 / distance to z's nearest singularity.
+    Points that are `closed` have no unstable side, those `marginal` have |D| = 2, both by exact rules.
+    """
+
+    p: np.ndarray
+    span: np.ndarray
+    frequency: np.ndarray
+    rate: np.ndarray
+    c2: float
+    sample: Callable
+    closed: np.ndarray
+    marginal: np.ndarray
+    walk: Callable | None = None
+
+
+def solve(problem, method, rtol, wanted=()):
+    """All outputs (R, L) with `_error` each, `verdict`, `status`; effort grows until `rtol` is met or useless."""
+    wanted = [name for name in FLOATS if name in wanted or not wanted]
+
+    def missed(points, results):
+        out = measure(results, problem.closed[points], problem.marginal[points])
+        late = [out[f"{name}_error"] > rtol * (1 + abs(out[name])) for name in wanted]
+        return np.any([out["verdict"] == UNDECIDED, *late], axis=0)
+
+    results, code = hill_effort.solve(problem, method, rtol, missed)
+    out = measure(results, problem.closed, problem.marginal)
+    finite = np.all([np.isfinite(out[name]) for name in FLOATS], axis=0)
+    out["status"] = np.where((code == status.OK) & ~finite, status.OVERFLOW, code).astype(np.int8)
+    failed = out["status"] != status.OK
+    for name in FLOATS:
+        out[name] = np.where(failed, np.nan, out[name])
+        out[f"{name}_error"] = np.where(failed, np.nan, out[f"{name}_error"])
+    out["verdict"] = np.where(failed, UNDECIDED, out["verdict"]).astype(np.int8)
+    return out
+
+
+def measure(results, closed, marginal):
+    """Everything from the results of a chain (..., 10): y1, y1', y2, y2', their bars, and the zeros of y1, y2."""
+    y1, dy1, y2, dy2, e1, de1, e2, de2, m, d = np.moveaxis(results, -1, 0)
+    with np.errstate(all="ignore"):
+        sine, sine_error = _product(-dy1, y2, de1, e2)
+        cosine, cosine_error = _product(y1, dy2, e1, de2)
+        verdict = _verdict(sine, sine_error, cosine, cosine_error, closed, marginal)
+        discriminant, discriminant_error = _discriminant(sine, sine_error, cosine, cosine_error)
+        exponent = _exponent(sine, sine_error, cosine, cosine_error, verdict)
+        rotation = _rotation(sine, sine_error, cosine, cosine_error, verdict, m + d)
+    return {
+        "discriminant": discriminant, "discriminant_error": discriminant_error,
+        "y1": y1, "y1_error": e1, "y2": y2, "y2_error": e2,
+        "dy1": dy1, "dy1_error": de1, "dy2": dy2, "dy2_error": de2,
+        "exponent": exponent[0], "exponent_error": exponent[1],
+        "rotation_number": rotation[0], "rotation_number_error": rotation[1],
+        "verdict": verdict,
+    }  # fmt: skip
+
+
+def _product(a, b, ea, eb):
+    """a b and its error bound, the rounding of the product included."""
+    return a * b, ea * abs(b) + eb * abs(a) + ea * eb + EPS * abs(a * b)
+
+
+def _discriminant(sine, sine_error, cosine, cosine_error):
+    """D from 2 - 4 sin^2 or 4 cos^2 - 2, whichever has the smaller bar."""
+    by_sine = sine_error <= cosine_error
+    value = np.where(by_sine, 2 - 4 * sine, 4 * cosine - 2)
+    return value, 4 * np.minimum(sine_error, cosine_error) + 2 * EPS * (2 + abs(value))
+
+
+def _verdict(sine, sine_error, cosine, cosine_error, closed, marginal):
+    """Certain only when the bars exclude the other answer."""
+    unstable = (sine < -sine_error) | (cosine < -cosine_error)
+    stable = (sine > sine_error) & (cosine > cosine_error)
+    verdict = np.where(unstable, UNSTABLE, np.where(stable | closed, STABLE, UNDECIDED))
+    return np.where(marginal, MARGINAL, verdict).astype(np.int8)
+
+
+def _exponent(sine, sine_error, cosine, cosine_error, verdict):
+    """2 asinh sqrt(g), g = -sin^2 or -cos^2 of half the angle, and how far the bar of g can move it."""
+    by_sine = sine < cosine
+    growth = -np.where(by_sine, sine, cosine)
+    bar = np.where(by_sine, sine_error, cosine_error)
+    value = _asinh(growth)
+    error = np.maximum(_asinh(growth + bar) - value, value - _asinh(growth - bar)) + 8 * EPS * value
+    bounded = (verdict == STABLE) | (verdict == MARGINAL)
+    return np.where(bounded, 0.0, value), np.where(bounded, 0.0, error)
+
+
+def _asinh(growth):
+    return 2 * np.arcsinh(np.sqrt(np.maximum(growth, 0.0)))
+
+
+def _rotation(sine, sine_error, cosine, cosine_error, verdict, zeros):
+    """theta_total / (2 pi): `zeros` of y1, y2 in (0, T/2) give the band (digest section 5); n / 2 exactly in gaps."""
+    odd = zeros % 2 == 1
+    gap = (sine < 0) | (cosine < 0)
+    negative = cosine < sine
+    half = np.arctan2(np.sqrt(np.maximum(sine, 0)), np.sqrt(np.maximum(cosine, 0))) / np.pi
+    inside = 0.5 * (zeros + np.where(odd, 1 - 2 * half, 2 * half))
+    value = np.where(gap, 0.5 * (zeros + (odd != negative)), inside)
+    error = np.maximum(_angle(sine, sine_error, cosine, cosine_error), 4 * EPS * (1 + value))
+    certain_gap = (verdict == UNSTABLE) | (verdict == MARGINAL)
+    return np.where(verdict == MARGINAL, 0.5 * np.rint(2 * value), value), np.where(certain_gap, 0.0, error)
+
+
+def _angle(sine, sine_error, cosine, cosine_error):
+    """How far the bars can move theta / (2 pi), from the better of sin^2 and cos^2 of theta / 2."""
+
+    def spread(square, bar):
+        place = np.arcsin(np.sqrt(np.clip(square, 0, 1)))
+        low = np.arcsin(np.sqrt(np.clip(square - bar, 0, 1)))
+        high = np.arcsin(np.sqrt(np.clip(square + bar, 0, 1)))
+        return np.maximum(high - place, place - low) / np.pi
+
+    # arctan2 of both is as good as the better one, up to a factor of 2 where they do not add up to 1.
+    return np.maximum(spread(sine, sine_error), spread(cosine, cosine_error))

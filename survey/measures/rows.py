@@ -1,0 +1,37 @@
+"""A block as rows and lanes: what depends on some axes alone is computed once for each place along those."""
+
+from math import prod
+
+import numpy as np
+
+
+class Rows:
+    """Axes along which any of `shared` is long make the rows, the others the lanes; `shape` is the block's."""
+
+    def __init__(self, shared, *others):
+        self.shape = np.broadcast_shapes(*(np.shape(a) for a in (*shared, *others)))
+        of_rows = [axis for axis in range(len(self.shape)) if any(self._size(a, axis) > 1 for a in shared)]
+        of_lanes = [axis for axis in range(len(self.shape)) if axis not in of_rows]
+        self.order = of_rows + of_lanes
+        self.rows = prod(self.shape[axis] for axis in of_rows)
+        self.lanes = prod(self.shape[axis] for axis in of_lanes)
+
+    def _size(self, array, axis):
+        """Length of `array` along an axis of the block (arrays with fewer dimensions broadcast from the right)."""
+        axis -= len(self.shape) - np.ndim(array)
+        return np.shape(array)[axis] if axis >= 0 else 1
+
+    def per_row(self, array):
+        """One value per row, of an array that is constant along the lanes."""
+        return np.ascontiguousarray(self.per_point(array)[:, 0])
+
+    def per_point(self, array):
+        """All values, as (rows, lanes), contiguous float64."""
+        whole = np.broadcast_to(np.asarray(array, dtype=float), self.shape).transpose(self.order)
+        return np.ascontiguousarray(whole.reshape(self.rows, self.lanes))
+
+    def back(self, array):
+        """(rows, lanes), or (rows, 1), in the block's shape."""
+        whole = np.broadcast_to(array, (self.rows, self.lanes))
+        sorted_shape = [self.shape[axis] for axis in self.order]
+        return np.ascontiguousarray(whole.reshape(sorted_shape).transpose(np.argsort(self.order)))

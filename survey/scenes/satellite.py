@@ -1,0 +1,202 @@
+"""Out-of-plane stability of the planar motions of an axisymmetric satellite on a circular orbit.
+
+The axis librates in the orbital plane (k < 1, amplitude asin k) or rotates (k > 1). Small motions out of the plane
+obey Hill's equation, in u = omega_p t, omega_p^2 = 3 omega_0^2 |I - Iz| / I, with rho = omega_0 / omega_p:
+
+    y'' + z y = 0,    z = 2 w^2 + 2 rho w + rho^2 + c,    w = dx/du = k cn(u, k)   (k < 1)
+                                                                   = k dn(k u, 1/k)  (k > 1)
+    c = 1 - k^2   prolate, alpha = Iz/I < 1   (printed + k^2 in Astakhova's eq. 3: see the errata of the digest)
+    c = -k^2      oblate,  alpha > 1;         T = 4 K(k), or 2 K(1/k) / k for rotations
+
+Parameters, in order: k >= 0, k != 1; or one_minus_k = 1 - k <= 1, != 0, where 1 - k is small (negative: rotations);
+rho, any sign: rho^2 = 1 / (3 |1 - alpha|), so rho >= 1/sqrt(3) is a body; rho < 0 is a retrograde rotation.
+
+Known: at k = 0 every gap is closed and D = 2 cos(2 pi sqrt(1 + rho^2)) (prolate), 2 cos(2 pi rho) (oblate); rho = 0 is
+an edge of Lame's equation, |D| = 2; D is even in rho for librations; tongue n opens as k^n; k = 1 is a scattering
+problem that has no verdict, and tongues accumulate there.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import pi
+
+import numpy as np
+
+from survey import methods, modules, status
+from survey.kernels.elliptic import MEANS
+from survey.kernels.jit import kernel
+from survey.kernels.satellite import complete_integrals, potential, sample, tabulate
+from survey.measures import hill
+from survey.measures.rows import Rows
+from survey.methods import dop853
+from survey.scene import Option, Output, Parameter
+
+TITLE = "Out-of-plane stability of a satellite's planar librations and rotations"
+FAMILY = "hill"
+STATUS = {}
+DEFAULT_METHOD = "taylor16"
+REFERENCES = (
+    "I. S. Astakhova, Transformation of satellite equations to Hill's equation (with errata: physics/satellite.md)",
+    "H. M. Yehia, S. Z. Nabih (2013), AJIS 2(6), 127: the same problem, a chart by inertia ratio and amplitude",
+    "W. Magnus, S. Winkler, Hill's Equation, Interscience 1966",
+)
+
+PARAMETERS = (
+    Parameter("k", "modulus: energy of the planar motion (librations k < 1, rotations k > 1)", "k",
+              minimum=0.0, excluded=(1.0,)),
+    Parameter("one_minus_k", "1 - k, where k is close to 1", "1-k", maximum=1.0, excluded=(0.0,), instead_of="k"),
+    Parameter("rho", "ratio of the orbital rate to that of small librations; negative for retrograde rotations", "rho"),
+)  # fmt: skip
+OPTIONS = (Option("body", ("prolate", "oblate"), "shape of the body: Iz < I or Iz > I"),)
+OUTPUTS = (
+    Output("discriminant", "trace of the monodromy matrix over one period T", "D"),
+    Output("y1", "y1(T/2), where y1(0) = 1, y1'(0) = 0", "y_1(T/2)"),
+    Output("y2", "y2(T/2), where y2(0) = 0, y2'(0) = 1", "y_2(T/2)"),
+    Output("dy1", "derivative of y1 at T/2", "y_1'(T/2)"),
+    Output("dy2", "derivative of y2 at T/2", "y_2'(T/2)"),
+    Output("exponent", "growth of the logarithm of the amplitude per period T", "mu T"),
+    Output("exponent_per_orbit", "growth of the logarithm of the amplitude per orbital revolution", "mu",
+           applies="where rho is not 0"),
+    Output("rotation_number", "rotation number per period T", "theta / 2 pi"),
+    Output("period", "period T of the planar motion, in u", "T"),
+    Output("verdict", "out-of-plane stability of the planar motion, to first order", flags=hill.VERDICTS),
+    Output("lyapunov", "Lyapunov's criterion: z >= 0 and T times the integral of z over T <= 4",
+           flags={"silent": 0, "certifies_stability": 1}),
+)  # fmt: skip
+
+EPS = 2.3e-16
+# K and E by the arithmetic-geometric mean, k' from k, and the rounding of one division.
+PERIOD_ULPS = 6
+
+
+def cost(options):
+    """Seconds per point, roughly: a point of a dense row, its share of the outputs included."""
+    return 1e-6
+
+
+def solve(point, request):
+    """All outputs of a block (see `survey.scenes`)."""
+    shared, rho = moduli(point), point["rho"]
+    block = Rows(shared, rho)
+    row = Motion(*(block.per_row(values) for values in shared), request.options["body"] == "oblate")
+    rho = block.per_point(rho)
+    method = modules.load(methods, DEFAULT_METHOD if request.method == "auto" else request.method, "method")
+    out = hill.solve(_problem(row, rho), method, request.rtol, request.variables)
+    ok = out["status"] == status.OK
+    out["period"] = np.where(ok, row.period[:, None], np.nan)
+    out["period_error"] = PERIOD_ULPS * EPS * out["period"]
+    orbits = abs(rho) * out["period"] / (2 * pi)
+    for name in ("exponent", "exponent_error"):
+        with np.errstate(all="ignore"):
+            out[name.replace("exponent", "exponent_per_orbit")] = np.where(rho != 0, out[name] / orbits, np.nan)
+    out["exponent_per_orbit_error"] += (PERIOD_ULPS + 4) * EPS * out["exponent_per_orbit"]
+    out["lyapunov"] = (row.lyapunov(rho) & ok).astype(np.int8)
+    return {name: block.back(values) for name, values in out.items()}
+
+
+def moduli(point):
+    """k, the complement (of 1/k for rotations) and 1 - |k|, from k or from 1 - k: no digit is lost near k = 1."""
+    if "one_minus_k" in point:
+        short = np.asarray(point["one_minus_k"], dtype=float)
+        k = 1 - short
+    else:
+        k = np.asarray(point["k"], dtype=float)
+        short = 1 - k
+    with np.errstate(all="ignore"):
+        complement = np.sqrt(abs(short) * (1 + k)) / np.maximum(k, 1)
+    return k, np.where(k == np.inf, np.nan, complement)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """The planar motions of the rows: k, the complement, and what follows from them."""
+
+    k: np.ndarray
+    kc: np.ndarray
+    oblate: bool
+
+    @cached_property
+    def integrals(self):
+        """K and E of the smaller of k and 1/k."""
+        return complete_integrals(np.minimum(self.k, 1 / np.maximum(self.k, 1)), self.kc)
+
+    @cached_property
+    def rotates(self):
+        return self.k > 1
+
+    @cached_property
+    def period(self):
+        first, _ = self.integrals
+        return np.where(self.rotates, 2 * first / self.k, 4 * first)
+
+    @cached_property
+    def rate(self):
+        """1 / distance of the poles of w from the real axis: K' or K'/k."""
+        conjugate, _ = complete_integrals(self.kc, np.minimum(self.k, 1 / np.maximum(self.k, 1)))
+        return np.maximum(self.k, 1) / conjugate
+
+    def lyapunov(self, rho):
+        """Does Lyapunov's criterion (corrected: T int z <= 4, and z >= 0) certify stability, rounding aside?"""
+        k, period, rotates = self.k[:, None], self.period[:, None], self.rotates[:, None]
+        first, second = (values[:, None] for values in self.integrals)
+        squares = np.where(rotates, 2 * k * second, 8 * (second - self.kc[:, None] ** 2 * first))
+        drift = np.where(rotates, 2 * pi * rho, 0.0)
+        c = -k * k if self.oblate else (1 - k) * (1 + k)
+        size = period * (2 * squares + 2 * abs(drift) + (rho * rho + k * k + 1) * period)
+        total = period * (2 * squares + 2 * drift + (rho * rho + c) * period)
+        return (total <= 4 - 100 * EPS * size) & (self._nonnegative(rho) if self.oblate else True)
+
+    def _nonnegative(self, rho):
+        """z >= 0 all along an oblate body's motion: the least of 2 w^2 + 2 rho w + rho^2 - k^2 over the range of w."""
+        k = self.k[:, None]
+        low = np.where(self.rotates[:, None], k * self.kc[:, None], -k)
+        w = np.clip(-rho / 2, low, k)
+        least = 2 * w * w + 2 * rho * w + rho * rho - k * k
+        return least >= 16 * EPS * (rho * rho + k * k)
+
+
+def _problem(row, rho):
+    k = row.k[:, None]
+    rows = np.column_stack([row.k, row.kc, row.period / 2, np.full(row.k.size, float(row.oblate))])
+
+    def samples(used, nodes, steps):
+        out = np.empty((used.size, steps, 2, nodes.size))
+        sample(rows[used], nodes, out)
+        return out
+
+    def walk(used, lanes, tolerance):
+        out = np.full((used.size, 10), np.nan)
+        reached = np.zeros(used.size, dtype=np.bool_)
+        walk_points(rows[used], rho[used, lanes], tolerance, out, reached)
+        return out, reached
+
+    return hill.Problem(
+        p=rho,
+        span=row.period / 2,
+        frequency=np.sqrt((abs(rho) + k) ** 2 + 1),
+        rate=row.rate,
+        c2=1.0,
+        sample=samples,
+        walk=walk,
+        closed=np.broadcast_to(k == 0, rho.shape),
+        marginal=_marginal(row, rho),
+    )
+
+
+def _marginal(row, rho):
+    """|D| = 2 exactly: rho = 0; or k = 0 and 2 rho an integer (oblate).
+
+    For the prolate body 2 sqrt(1 + rho^2) = n asks for (2 rho)^2 = n^2 - 4, two squares of integers (a binary
+    fraction whose square is an integer is one) that differ by 4: only rho = 0.
+    """
+    whole = (2 * rho == np.rint(2 * rho)) if row.oblate else False
+    return (rho == 0) | ((row.k[:, None] == 0) & whole)
+
+
+@kernel
+def walk_points(rows, rho, tolerance, out, reached):
+    """Points of their own, by DOP853."""
+    table = np.empty((2, MEANS + 1))
+    for i in range(len(rho)):
+        tabulate(rows[i], table)
+        reached[i] = dop853.hill_walk(potential, rho[i], rows[i], table, rows[i, 2], tolerance[i], out[i])
