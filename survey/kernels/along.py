@@ -302,7 +302,7 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
             x, v, _e, _y = at(p, T, dt)
             a, b, c = carried(p, T, dt, v, saa, sab, sbb)
             a += (3e-16 * abs(targets[j])) ** 2 + (2e-16 * h * v) ** 2
-            f, g, dg = values(p, x)
+            f, g, _dg = values(p, x)
             fill_crossing(floats, j, n, v, t + (dt + t_low), a, b, c, f, g)
             usable = bar(n, a) < TRUST and floats[j, 2] < TRUST * (1.0 + abs(v))
             usable = usable and floats[j, 3] < TRUST * (1.0 + floats[j, 1])

@@ -6,11 +6,19 @@ along the flow, since an error along an orbit does not change its fate. Nothing 
 
 import math
 
-import numpy as np
-
-from survey.kernels.along import NO_CONVERGENCE, OK, SEPARATRIX, STEP_LIMIT, bar, carried, clean_turning, expand
-from survey.kernels.along import start_sign, time_at, time_of_turning
-from survey.kernels.equilibria import ANGLE, BAR, DG, FOCUS, KIND, NODE, STABLE, captured, offset, settled
+from survey.kernels.along import (
+    NO_CONVERGENCE,
+    OK,
+    SEPARATRIX,
+    STEP_LIMIT,
+    bar,
+    carried,
+    clean_turning,
+    expand,
+    start_sign,
+    time_of_turning,
+)
+from survey.kernels.equilibria import ANGLE, BAR, FOCUS, KIND, NODE, STABLE, captured, offset, settled
 from survey.kernels.flow import TWO_PI, TWO_PI_LOW, UNIT, reduced, table, values
 from survey.kernels.jit import inline, kernel
 from survey.kernels.returns import (
@@ -18,7 +26,6 @@ from survey.kernels.returns import (
     BELOW,
     CYCLE_BAR,
     CYCLE_CLASS,
-    CYCLE_LEFT,
     CYCLE_X,
     INTERVAL,
     between,
@@ -150,12 +157,13 @@ def crossing_time(at, p, T, target, h):
 
 
 @inline
-def fate(setting, begin, at, p, eqs, count, section, stratum, ends, weak, plus, n_plus, minus, n_minus, lib, n_lib,
-         phi0, w0, tolerance, limit, out):  # fmt: skip
+def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, phi0, w0, tolerance, limit, out):
     """Fill out = verdict, index of the limit, turnings, unwrapped turns of the limit, status.
 
-    The index is a row of eqs (verdicts 0, 9), of plus or minus (2, 3) or of lib (4).
+    The index is a row of eqs (verdicts 0, 9), of plus or minus (2, 3) or of lib (4). sizes = numbers of rows of
+    these, then the stratum and whether weak foci attract.
     """
+    count, n_plus, n_minus, n_lib, stratum, weak = sizes[0], sizes[1], sizes[2], sizes[3], sizes[4], sizes[5] > 0
     out[0], out[1], out[2], out[3], out[4] = UNDECIDED, -1, UNTOLD, NO_TURNS, OK
     phi, turns = reduced(phi0)
     w, slip = w0, 4.0 * UNIT * (turns != 0.0)
@@ -283,13 +291,10 @@ def fate(setting, begin, at, p, eqs, count, section, stratum, ends, weak, plus, 
 
 
 @inline
-def fates(setting, begin, at, p, eqs, count, section, stratum, ends, weak, plus, n_plus, minus, n_minus, lib, n_lib,
-          starts, tolerance, limit, out):  # fmt: skip
+def fates(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out):
     """`fate` for each row (phi0, w0) of starts."""
     for i in range(len(starts)):
-        fate(setting, begin, at, p, eqs, count, section, stratum, ends, weak, plus, n_plus, minus, n_minus, lib,
-             n_lib, starts[i, 0], starts[i, 1], tolerance, limit, out[i])  # fmt: skip
+        phi, w = starts[i, 0], starts[i, 1]
+        fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, phi, w, tolerance, limit, out[i])
         if out[i, 0] != UNDECIDED:
             out[i, 4] = OK
-
-

@@ -21,11 +21,11 @@ X, CLASS, CHANGE, SLOPE, ERROR, TIME, LEFT = range(7)  # a node of a scan: x, cl
 CYCLE_X, MULTIPLIER, PERIOD, CYCLE_BAR, MULTIPLIER_BAR, CYCLE_LEFT, CYCLE_CLASS, INTERVAL, BELOW, ABOVE = range(10)
 MOST_CYCLES = 16
 MOST_NODES = 400
-LIMIT = 4000
+LIMIT = 40_000
 
 
 @inline
-def rotation(setting, begin, at, p, section, w0, tolerance, node):
+def rotation(setting, begin, at, p, eqs, count, section, w0, tolerance, node):
     """One turn from (section, w0 > 0)."""
     T = table()
     how = setting(p, w0, tolerance)
@@ -59,6 +59,9 @@ def rotation(setting, begin, at, p, section, w0, tolerance, node):
             node[CLASS], node[CHANGE], node[SLOPE], node[TIME] = 1.0, y, math.exp(e) * w0 / (w0 + y), t
             node[ERROR] = min(own, other) if fast else own
             return
+        if n % 4 == 0 and captured(eqs, count, phi, w, bar(n, saa) + bar(n, sbb)) >= 0:
+            node[CLASS] = NO_IMAGE
+            return
 
 
 @inline
@@ -83,6 +86,9 @@ def libration(setting, begin, at, p, eqs, count, high, x0, tolerance, node):
         if phi < x0 - TWO_PI or phi > high:
             node[CLASS] = NO_IMAGE
             return
+        if n % 4 == 0 and captured(eqs, count, phi, w, bar(n, saa) + bar(n, sbb)) >= 0:
+            node[CLASS] = NO_IMAGE
+            return
         if turned and right:
             inside = between(eqs, count, node[LEFT], phi)
             node[CHANGE], node[TIME], node[ERROR] = phi - x0, t, bar(n, saa)
@@ -91,9 +97,6 @@ def libration(setting, begin, at, p, eqs, count, high, x0, tolerance, node):
             return
         if turned:
             node[LEFT], right = phi, True
-        elif captured(eqs, count, phi, w, bar(n, saa) + bar(n, sbb)) >= 0 and n % 4 == 0 and n > 200:
-            node[CLASS] = NO_IMAGE
-            return
 
 
 @kernel
@@ -109,7 +112,7 @@ def between(eqs, count, low, high):
 def image(setting, begin, at, kind, p, eqs, count, place, x, tolerance, node):
     """The map of `kind` at x: place is the section (rotations) or the right end of the interval (librations)."""
     if kind == ROTATION:
-        rotation(setting, begin, at, p, place, x, tolerance, node)
+        rotation(setting, begin, at, p, eqs, count, place, x, tolerance, node)
     else:
         libration(setting, begin, at, p, eqs, count, place, x, tolerance, node)
 

@@ -11,7 +11,6 @@ from survey.kernels.flow import coefficients
 
 STEPS = 200_000  # budget of one solution; about 0.1 s with the Taylor method
 SHARE = 1e-3  # of the asked accuracy, for the truncation error of one step
-FINEST = 1e-17
 
 
 def reverse(rows):
@@ -24,10 +23,10 @@ def mirror(rows):
     return rows * np.array([1, -1, 1, -1, -1, 1, -1, -1.0])
 
 
-def tolerances(rtol):
+def tolerances(method, rtol):
     """Truncation per step, for the first attempt and for the second."""
-    first = min(max(SHARE * rtol, FINEST), 1e-3)
-    return first, max(1e-4 * first, FINEST)
+    first = min(max(SHARE * rtol, method.FLOW_FINEST), 1e-3)
+    return first, max(1e-4 * first, method.FLOW_FINEST)
 
 
 def split(rows):
@@ -64,17 +63,19 @@ def _in_time(method, rows, places, rtol):
     order = np.argsort(places, axis=1, kind="stable")
     places = np.ascontiguousarray(np.take_along_axis(places, order, axis=1))
 
+    budget = STEPS * min(method.FLOW_WORK, 10)
+
     def run(pick, tolerance):
         P, starts = split(rows[pick])
         floats = np.full((*places[pick].shape, 4), np.nan)
         turnings = np.full(places[pick].shape, UNTOLD, dtype=np.int64)
         ends = np.zeros(len(P), dtype=np.int64)
         at = np.ascontiguousarray(places[pick])
-        method.flow_trajectories(P, starts, at, tolerance, STEPS, floats, turnings, ends)
+        method.flow_trajectories(P, starts, at, tolerance, budget, floats, turnings, ends)
         status = np.where(np.isfinite(floats[..., 0]), OK, ends[:, None])
         return floats, turnings, status
 
-    return _unsorted(order, _twice(run, np.isfinite(places), rtol))
+    return _unsorted(order, _twice(run, np.isfinite(places), method, rtol))
 
 
 def abel(method, rows, targets, rtol):
@@ -110,23 +111,25 @@ def _in_phi(method, rows, targets, rtol):
     order = np.argsort(targets, axis=1, kind="stable")
     targets = np.ascontiguousarray(np.take_along_axis(targets, order, axis=1))
 
+    budget = STEPS * min(method.FLOW_WORK, 10)
+
     def run(pick, tolerance):
         P, starts = split(rows[pick])
         floats = np.full((*targets[pick].shape, 4), np.nan)
         status = np.zeros(targets[pick].shape, dtype=np.int64)
         at = np.ascontiguousarray(targets[pick])
-        method.flow_abels(P, starts, at, tolerance, STEPS, floats, status)
+        method.flow_abels(P, starts, at, tolerance, budget, floats, status)
         return floats, status
 
-    return _unsorted(order, _twice(run, np.isfinite(targets), rtol))
+    return _unsorted(order, _twice(run, np.isfinite(targets), method, rtol))
 
 
-def _twice(run, asked, rtol):
+def _twice(run, asked, method, rtol):
     """Solve all rows, then once more, finer, those that miss the asked accuracy; keep the better of the two."""
-    first, second = tolerances(rtol)
+    first, second = tolerances(method, rtol)
     results = run(np.ones(len(asked), dtype=bool), first)
     again = (_missed(results, rtol) & asked).any(axis=1)
-    if again.any():
+    if again.any() and second < first:
         finer = run(again, second)
         kept = [result[again] for result in results]
         better = _badness(finer) <= _badness(kept)

@@ -24,7 +24,7 @@ EXACT = 1e-14  # K and L are 0 within the rounding of the parameters
 STEPS = 20_000  # budget of one fate: about 15 ms
 MORE = 10  # times the budget for those that use it up
 BATCH = 50  # fates per kernel call, so that a call stays below a second
-FINE = 1e-16  # truncation per step for cycles
+FINE = 1e-16  # truncation per step for cycles, or the finest of the method
 
 
 def empty(size, status):
@@ -39,7 +39,7 @@ def empty(size, status):
 def solve(method, six, starts, rtol, result, where):
     """Fates at one parameter point, written into `result` (see `empty`) at the indices `where`."""
     s = _remembered(method.__name__, tuple(float(value) for value in six))
-    first, second = tolerances(rtol)
+    first, second = tolerances(method, rtol)
     out = fates(method, s, starts, first)
     for code, tolerance, more in ((STEP_LIMIT, first, MORE), (SEPARATRIX, second, MORE)):
         again = out[:, 4] == code
@@ -97,7 +97,7 @@ def _remembered(method, six):
 
 @dataclass(frozen=True)
 class Skeleton:
-    """What decides the fates at one parameter point. Tables have the columns of `kernels/equilibria.py`, `returns.py`."""
+    """What decides the fates at one parameter point; tables with the columns of `kernels/equilibria`, `returns`."""
 
     p: np.ndarray
     stratum: int
@@ -156,7 +156,7 @@ def _section(p, eqs):
     saddles = eqs[eqs[:, eq.KIND] == eq.SADDLE, eq.ANGLE] if len(eqs) else ()
     if not len(saddles):
         return 0.0
-    b12, b31, d, c23, s2, s3 = p[:6]
+    d, c23, s2, s3 = p[2:6]
     s, c = np.sin(saddles), np.cos(saddles)
     highest = saddles[np.argmax(0.5 * d * s * s + c23 * s * c - s2 * s - s3 * c)]
     return float(highest - 2.0 * math.pi if highest > math.pi else highest)
@@ -166,16 +166,16 @@ def _rotations(method, six, eqs, section, K, L):
     """Cycles with w > 0 of the system `six`, ascending in w, and (w_c, w_d)."""
     p = np.ascontiguousarray(coefficients(*six))
     scale = p[BOUND_F] + math.sqrt(p[BOUND_DG])
-    table, edges = np.zeros((rt.MOST_CYCLES, 10)), np.zeros(4)
+    table, edges, fine = np.zeros((rt.MOST_CYCLES, 10)), np.zeros(4), max(FINE, method.FLOW_FINEST)
     xs = scale * np.geomspace(1e-6, 30.0, 80)
-    found = method.flow_cycles(rt.ROTATION, p, eqs, len(eqs), section, 0, xs, FINE, table, 0, edges)
+    found = method.flow_cycles(rt.ROTATION, p, eqs, len(eqs), section, 0, xs, fine, table, 0, edges)
     border = edges[:2].copy()
     end = np.sign(K) if K != 0.0 else np.sign(L)
     top, change, error = xs[-1], edges[2], edges[3]
     while change * end < 0.0 and abs(change) > 4.0 * error and top < 1e5 * scale and found < len(table) - 1:
         xs = top * np.array([1.0, 1.3, 1.7, 2.2, 3.0])
         before = found
-        found = method.flow_cycles(rt.ROTATION, p, eqs, len(eqs), section, 0, xs, FINE, table, found, edges)
+        found = method.flow_cycles(rt.ROTATION, p, eqs, len(eqs), section, 0, xs, fine, table, found, edges)
         if found > before and (found - before) % 2:
             break
         top, change, error = xs[-1], edges[2], edges[3]
@@ -193,18 +193,20 @@ def _far_cycle(p, section, K, L, scale):
     w = max(w, 30.0 * scale)
     slope = math.pi * K / w**3
     side = np.sign(K)
-    return np.array([w, 1.0 + slope, 2 * math.pi / w, 0.1 * w + 5.0 * scale, abs(slope) + 1e-15, 0.0, 1.0, 0, -side, side])
+    return np.array(
+        [w, 1.0 + slope, 2 * math.pi / w, 0.1 * w + 5.0 * scale, abs(slope) + 1e-15, 0.0, 1.0, 0, -side, side]
+    )
 
 
 def _librations(method, p, eqs):
     """Libration cycles, by their right turning point, of every interval where g < 0."""
-    table, edges, found = np.zeros((rt.MOST_CYCLES, 10)), np.zeros(4), 0
+    table, edges, fine, found = np.zeros((rt.MOST_CYCLES, 10)), np.zeros(4), max(FINE, method.FLOW_FINEST), 0
     share = 1.0 / (1.0 + np.exp(-np.linspace(-11.0, 11.0, 56)))
     for i, row in enumerate(eqs):
         if row[eq.DG] < 0.0 and row[eq.KIND] != eq.DEGENERATE:
             high = eqs[i + 1, eq.ANGLE] if i + 1 < len(eqs) else eqs[0, eq.ANGLE] + 2.0 * math.pi
             xs = row[eq.ANGLE] + share * (high - row[eq.ANGLE])
-            found = method.flow_cycles(rt.LIBRATION, p, eqs, len(eqs), high, i, xs, FINE, table, found, edges)
+            found = method.flow_cycles(rt.LIBRATION, p, eqs, len(eqs), high, i, xs, fine, table, found, edges)
     return table[:found]
 
 
@@ -217,13 +219,12 @@ def fates(method, skeleton, starts, tolerance, more=1):
     section = s.section if s.stratum == G else math.atan2(s.p[0], s.p[1])
     sizes = np.array([len(s.equilibria), len(s.plus), len(s.minus), len(s.librations),
                       kf.GENERIC if s.stratum == G else kf.REVERSIBLE, int(s.K < 0.0)])  # fmt: skip
-    tables = [np.ascontiguousarray(np.vstack([t, np.zeros((1, 10))])) for t in (s.plus, s.minus, s.librations)]
-    eqs = np.ascontiguousarray(s.equilibria)
-    size = BATCH // more
+    tables = [np.ascontiguousarray(table) for table in (s.equilibria, s.plus, s.minus, s.librations)]
+    size = max(1, BATCH // (more * method.FLOW_WORK))
     for i in range(0, len(starts), size):
         part = np.ascontiguousarray(starts[i : i + size])
-        limit = more * STEPS
-        method.flow_fates(s.p, eqs, section, sizes, s.ends, *tables, part, tolerance, limit, out[i : i + size])
+        limit = more * STEPS * method.FLOW_WORK
+        method.flow_fates(s.p, section, s.ends, sizes, *tables, part, tolerance, limit, out[i : i + size])
     return out
 
 

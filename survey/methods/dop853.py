@@ -7,15 +7,22 @@ in `survey.kernels.lanes`. Domain: piecewise smooth z, hard points; slower than 
 Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.5 and dop853.f.
 """
 
+import math
+
 import numpy as np
 
+from survey.kernels import along, fate, returns
 from survey.kernels.dop853 import E3, E5, STAGES, A, B, C
-from survey.kernels.jit import inline
+from survey.kernels.flow import BOUND_DG, BOUND_F, LAST, LOW, PHI, STEP, TRUNC_PHI, TRUNC_W, W, series, values
+from survey.kernels.jit import inline, kernel
 from survey.kernels.lanes import column
 from survey.kernels.matrix import rounding
 
 ORDER = 8
-SERVES = ("hill",)
+SERVES = ("cylinder", "hill")
+FLOW_FINEST = 1e-16  # useful tolerance for flows on the cylinder
+FLOW_WORK = 4  # steps, relative to the Taylor method
+_FIRST = LOW + 1  # stages lie in the lines of the table after the low series
 ADAPTIVE = True
 NODES = tuple(C[:STAGES])
 SMALLEST, LARGEST = 0.2, 5.0
@@ -98,3 +105,91 @@ def hill_walk(potential, p, row, table, span, tolerance, out):
         h *= min(LARGEST, max(SMALLEST, 0.9 * (tolerance / (error + 1e-300)) ** 0.125))
         h = min(h, LONGEST / wave)
     return False
+
+
+@inline
+def flow_setting(p, w, tolerance):
+    """What steers the steps: the tolerance of one step."""
+    return tolerance
+
+
+@kernel
+def flow_at(p, T, dt):
+    """(phi, w, integral of f, integral of g) at dt after the start of the step: one step of size dt."""
+    phi, w = T[0, PHI], T[0, W]
+    x, v, e, y = phi, w, 0.0, 0.0
+    for i in range(STAGES):
+        dx = dv = 0.0
+        for k in range(i):
+            dx += A[i, k] * T[_FIRST + k, PHI]
+            dv += A[i, k] * T[_FIRST + k, W]
+        wi = w + dt * dv
+        f, g, _dg = values(p, phi + dt * dx)
+        ai = f * wi + g
+        T[_FIRST + i, PHI], T[_FIRST + i, W] = wi, ai
+        x += dt * B[i] * wi
+        v += dt * B[i] * ai
+        e += dt * B[i] * f
+        y += dt * B[i] * g
+    return x, v, e, y
+
+
+@inline
+def _flow_estimate(T, h, row):
+    """The error estimate of dop853.f for one component, from the stages in T."""
+    e5 = e3 = 0.0
+    for i in range(STAGES):
+        e5 += E5[i] * T[_FIRST + i, row]
+        e3 += E3[i] * T[_FIRST + i, row]
+    size = math.sqrt(e5 * e5 + 0.01 * e3 * e3)
+    return abs(h) * e5 * e5 / size if size > 0.0 else 0.0
+
+
+@kernel
+def flow_begin(p, phi, w, tolerance, T):
+    """Start a step at (phi, w) and find its size, from that of the step before."""
+    series(p, phi, w, T, LOW)
+    rate = p[BOUND_F] + math.sqrt(p[BOUND_DG]) + abs(w) + 1e-300
+    h = T[LAST, STEP] if T[LAST, STEP] > 0.0 else 0.1 / rate
+    for _ in range(50):
+        _x, w1, _e, _y = flow_at(p, T, h)
+        dphi, dw = _flow_estimate(T, h, PHI), _flow_estimate(T, h, W)
+        error = max(dphi, dw / (1.0 + abs(w))) / tolerance
+        factor = min(max(0.9 * (error + 1e-30) ** -0.125, 0.2), 4.0)
+        if error <= 1.0:
+            break
+        h *= factor
+    T[LAST, STEP] = h * factor
+    T[LAST, TRUNC_PHI], T[LAST, TRUNC_W] = dphi, dw
+    return h if math.isfinite(w1) else math.nan
+
+
+@kernel
+def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
+    """See `along.trajectories`."""
+    along.trajectories(flow_setting, flow_begin, flow_at, P, starts, times, tolerance, limit, floats, turnings, status)
+
+
+@kernel
+def flow_abels(P, starts, targets, tolerance, limit, floats, status):
+    """See `along.abels`."""
+    along.abels(flow_setting, flow_begin, flow_at, P, starts, targets, tolerance, limit, floats, status)
+
+
+@kernel
+def flow_image(kind, p, eqs, count, place, x, tolerance, node):
+    """See `returns.image`."""
+    returns.image(flow_setting, flow_begin, flow_at, kind, p, eqs, count, place, x, tolerance, node)
+
+
+@kernel
+def flow_cycles(kind, p, eqs, count, place, interval, xs, tolerance, cycles, found, edges):
+    """See `returns.fixed_points`."""
+    return returns.fixed_points(flow_image, kind, p, eqs, count, place, interval, xs, tolerance, cycles, found, edges)
+
+
+@kernel
+def flow_fates(p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out):
+    """See `fate.fates`."""
+    how = flow_setting, flow_begin, flow_at
+    fate.fates(*how, p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out)

@@ -6,12 +6,18 @@ difference from the full step divided by 2^4 - 1 (Richardson).
 Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.1 and II.4.
 """
 
+import math
+
+from survey.kernels import along, fate, returns
+from survey.kernels.flow import BOUND_DG, BOUND_F, LAST, LOW, PHI, TRUNC_PHI, TRUNC_W, W, series, values
 from survey.kernels.jit import inline, kernel
 from survey.kernels.lanes import chain
 from survey.kernels.matrix import doubled, samples_only
 
 ORDER = 4
-SERVES = ("hill",)
+SERVES = ("cylinder", "hill")
+FLOW_FINEST = 1e-13  # useful tolerance for flows on the cylinder
+FLOW_WORK = 50  # steps, relative to the Taylor method
 NODES = (0.0, 0.25, 0.5, 0.75, 1.0)
 WIDTH = len(NODES) + 1
 
@@ -57,3 +63,82 @@ def hill_step(f, c2, p, h):
 @kernel
 def hill_chain(samples, c2, h, p, ends, out):
     chain(samples_only, hill_step, WIDTH, samples, c2, h, p, ends, out)
+
+
+@inline
+def flow_setting(p, w, tolerance):
+    """The step, kept along the whole solution: its fourth power follows the tolerance."""
+    return (100.0 * tolerance) ** 0.25 / (p[BOUND_F] + math.sqrt(p[BOUND_DG]) + abs(w) + 1e-300)
+
+
+@kernel
+def _flow_classical(p, phi, w, h):
+    """One classical step of phi' = w, w' = f w + g, and the integrals of f and g over it."""
+    half = 0.5 * h
+    f1, g1, _dg = values(p, phi)
+    a1 = f1 * w + g1
+    w2 = w + half * a1
+    f2, g2, _dg = values(p, phi + half * w)
+    a2 = f2 * w2 + g2
+    w3 = w + half * a2
+    f3, g3, _dg = values(p, phi + half * w2)
+    a3 = f3 * w3 + g3
+    w4 = w + h * a3
+    f4, g4, _dg = values(p, phi + h * w3)
+    a4 = f4 * w4 + g4
+    sixth = h / 6.0
+    return (
+        phi + sixth * (w + 2.0 * (w2 + w3) + w4),
+        w + sixth * (a1 + 2.0 * (a2 + a3) + a4),
+        sixth * (f1 + 2.0 * (f2 + f3) + f4),
+        sixth * (g1 + 2.0 * (g2 + g3) + g4),
+    )
+
+
+@kernel
+def flow_at(p, T, dt):
+    """(phi, w, integral of f, integral of g) at dt after the start of the step: two half steps."""
+    x, w, e, y = _flow_classical(p, T[0, PHI], T[0, W], 0.5 * dt)
+    x, w, de, dy = _flow_classical(p, x, w, 0.5 * dt)
+    return x, w, e + de, y + dy
+
+
+@kernel
+def flow_begin(p, phi, w, h, T):
+    """Start a step; its error is that of two half steps, by Richardson, with a margin of 2."""
+    series(p, phi, w, T, LOW)
+    x1, w1, _e, _y = _flow_classical(p, phi, w, h)
+    x2, w2, _e, _y = flow_at(p, T, h)
+    T[LAST, TRUNC_PHI], T[LAST, TRUNC_W] = abs(x2 - x1) / 7.5, abs(w2 - w1) / 7.5
+    return h
+
+
+@kernel
+def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
+    """See `along.trajectories`."""
+    along.trajectories(flow_setting, flow_begin, flow_at, P, starts, times, tolerance, limit, floats, turnings, status)
+
+
+@kernel
+def flow_abels(P, starts, targets, tolerance, limit, floats, status):
+    """See `along.abels`."""
+    along.abels(flow_setting, flow_begin, flow_at, P, starts, targets, tolerance, limit, floats, status)
+
+
+@kernel
+def flow_image(kind, p, eqs, count, place, x, tolerance, node):
+    """See `returns.image`."""
+    returns.image(flow_setting, flow_begin, flow_at, kind, p, eqs, count, place, x, tolerance, node)
+
+
+@kernel
+def flow_cycles(kind, p, eqs, count, place, interval, xs, tolerance, cycles, found, edges):
+    """See `returns.fixed_points`."""
+    return returns.fixed_points(flow_image, kind, p, eqs, count, place, interval, xs, tolerance, cycles, found, edges)
+
+
+@kernel
+def flow_fates(p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out):
+    """See `fate.fates`."""
+    how = flow_setting, flow_begin, flow_at
+    fate.fates(*how, p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out)

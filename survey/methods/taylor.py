@@ -6,21 +6,24 @@ Mathematics 14 (2005) 99-117. Domain: every parameter value; explicit, so steps 
 """
 
 from survey.kernels import along, fate, returns
-from survey.kernels.flow import LAST, ORDER as _ORDER, PHI, TRUNC_PHI, TRUNC_W, W, E, Y, series
+from survey.kernels.flow import LAST, PHI, TRUNC_PHI, TRUNC_W, E, W, Y, series
+from survey.kernels.flow import ORDER as _ORDER
 from survey.kernels.jit import inline, kernel
 
 ORDER = 20
 SERVES = ("cylinder",)
+FLOW_FINEST = 1e-17  # useful truncation error of a step
+FLOW_WORK = 1  # steps, relative to this method
 
 
 @inline
-def setting(p, w, tolerance):
+def flow_setting(p, w, tolerance):
     """What steers the steps: the tolerance of one step."""
     return tolerance
 
 
 @kernel
-def begin(p, phi, w, tolerance, T):
+def flow_begin(p, phi, w, tolerance, T):
     """Expand at (phi, w); returns the step that keeps the last two terms below the tolerance."""
     series(p, phi, w, T, _ORDER)
     scale = 1.0 / (1.0 + abs(w))
@@ -33,7 +36,7 @@ def begin(p, phi, w, tolerance, T):
 
 
 @kernel
-def at(p, T, dt):
+def flow_at(p, T, dt):
     """(phi, w, integral of f, integral of g) at dt after the start of the step."""
     phi, w, e, y = T[_ORDER, PHI], T[_ORDER, W], T[_ORDER, E], T[_ORDER, Y]
     for n in range(_ORDER - 1, -1, -1):
@@ -44,19 +47,19 @@ def at(p, T, dt):
 @kernel
 def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
     """See `along.trajectories`."""
-    along.trajectories(setting, begin, at, P, starts, times, tolerance, limit, floats, turnings, status)
+    along.trajectories(flow_setting, flow_begin, flow_at, P, starts, times, tolerance, limit, floats, turnings, status)
 
 
 @kernel
 def flow_abels(P, starts, targets, tolerance, limit, floats, status):
     """See `along.abels`."""
-    along.abels(setting, begin, at, P, starts, targets, tolerance, limit, floats, status)
+    along.abels(flow_setting, flow_begin, flow_at, P, starts, targets, tolerance, limit, floats, status)
 
 
 @kernel
 def flow_image(kind, p, eqs, count, place, x, tolerance, node):
     """See `returns.image`."""
-    returns.image(setting, begin, at, kind, p, eqs, count, place, x, tolerance, node)
+    returns.image(flow_setting, flow_begin, flow_at, kind, p, eqs, count, place, x, tolerance, node)
 
 
 @kernel
@@ -66,7 +69,7 @@ def flow_cycles(kind, p, eqs, count, place, interval, xs, tolerance, cycles, fou
 
 
 @kernel
-def flow_fates(p, eqs, section, sizes, ends, plus, minus, lib, starts, tolerance, limit, out):
-    """See `fate.fates`; sizes = numbers of rows of eqs, plus, minus, lib, then the stratum and whether weak foci attract."""
-    fate.fates(setting, begin, at, p, eqs, sizes[0], section, sizes[4], ends, sizes[5] > 0, plus, sizes[1], minus,
-               sizes[2], lib, sizes[3], starts, tolerance, limit, out)  # fmt: skip
+def flow_fates(p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out):
+    """See `fate.fates`."""
+    how = flow_setting, flow_begin, flow_at
+    fate.fates(*how, p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out)
