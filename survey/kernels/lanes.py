@@ -6,7 +6,9 @@ into vector code; a lane's operations do not depend on its neighbours, nor its b
 
 Beside the two columns of the fundamental matrix goes, for each, the 2x2 matrix S of its error ellipse:
 S <- P S P^T + diag(d^2) with d = D |column| the step's local error bound. To first order the error after n steps
-is a sum of n propagated local errors, hence |error_i| <= sqrt(n S_ii) (Cauchy-Schwarz), whatever their signs.
+is a sum of n propagated local errors, hence |error_i| <= sqrt(n S_ii) (Cauchy-Schwarz), whatever their signs. The
+first order is trusted as far as the local errors are small: with M their sum, relative to the step's own matrix,
+the bounds are multiplied by exp(M), else a step so long that the method damps would damp its errors too.
 """
 
 import numpy as np
@@ -14,9 +16,10 @@ import numpy as np
 from survey.kernels.jit import inline
 
 TILE = 64
-STATE = 12
+STATE = 13
 # What a chain gives per point: y1, y1', y2, y2' at the end, their error bounds, and the zeros of y1 and y2.
 RESULTS = 10
+WORST = 300.0
 
 
 @inline
@@ -54,7 +57,7 @@ def _start(state, count):
 
 @inline
 def _advance(step, coefficients, c2, p, h, state, count):
-    """One step of all lanes. State: y1, y1', y2, y2', S of column 1 (3), S of column 2 (3), zeros of y1, of y2."""
+    """One step of all lanes. State: y1, y1', y2, y2', S of column 1 (3), S of column 2 (3), zeros of y1, y2, M."""
     for i in range(count):
         matrix = step(coefficients, c2, p[i], h)
         y, v, s, t, w = column(matrix, state[0, i], state[1, i], state[4, i], state[5, i], state[6, i])
@@ -65,6 +68,13 @@ def _advance(step, coefficients, c2, p, h, state, count):
         state[11, i] += 1.0 if (y < 0.0) != (state[2, i] < 0.0) else 0.0
         state[2, i], state[3, i] = y, v
         state[7, i], state[8, i], state[9, i] = s, t, w
+        state[12, i] += relative(matrix, h)
+
+
+@inline
+def relative(matrix, h):
+    """The local error bounds of a step as one number without units."""
+    return matrix[4] + (matrix[5] / h + matrix[6] * h)
 
 
 @inline
@@ -84,11 +94,14 @@ def column(matrix, y, v, s, t, w):
 @inline
 def _finish(state, count, steps, out):
     for i in range(count):
-        for k in range(4):
-            out[i, k] = state[k, i]
-        out[i, 4] = np.sqrt(steps * state[4, i])
-        out[i, 5] = np.sqrt(steps * state[6, i])
-        out[i, 6] = np.sqrt(steps * state[7, i])
-        out[i, 7] = np.sqrt(steps * state[9, i])
-        out[i, 8] = state[10, i]
-        out[i, 9] = state[11, i]
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = state[0, i], state[1, i], state[2, i], state[3, i]
+        bars(state[4, i], state[6, i], state[7, i], state[9, i], steps, state[12, i], out[i])
+        out[i, 8], out[i, 9] = state[10, i], state[11, i]
+
+
+@inline
+def bars(s1, w1, s2, w2, steps, total, out):
+    """The four error bounds from the diagonals of the ellipses, the number of steps and M."""
+    doubt = np.exp(min(total, WORST))
+    out[4], out[5] = doubt * np.sqrt(steps * s1), doubt * np.sqrt(steps * w1)
+    out[6], out[7] = doubt * np.sqrt(steps * s2), doubt * np.sqrt(steps * w2)

@@ -49,12 +49,15 @@ def solve(problem, method, rtol, wanted=()):
     """All outputs (R, L) with `_error` each, `verdict`, `status`; effort grows until `rtol` is met or useless."""
     wanted = [name for name in FLOATS if name in wanted or not wanted]
 
-    def missed(points, results):
+    def judge(points, results):
+        """All outputs of these points, and which of the points miss what was asked."""
         out = measure(results, problem.closed[points], problem.marginal[points])
-        late = [out[f"{name}_error"] > rtol * (1 + abs(out[name])) for name in wanted]
-        return np.any([out["verdict"] == UNDECIDED, *late], axis=0)
+        late = out["verdict"] == UNDECIDED
+        for name in wanted:
+            late |= ~(out[f"{name}_error"] <= rtol * (1 + abs(out[name])))
+        return out, late
 
-    results, code = hill_effort.solve(problem, method, rtol, missed)
+    results, code = hill_effort.solve(problem, method, rtol, lambda *these: judge(*these)[1])
     out = measure(results, problem.closed, problem.marginal)
     finite = np.all([np.isfinite(out[name]) for name in FLOATS], axis=0)
     out["status"] = np.where((code == status.OK) & ~finite, status.OVERFLOW, code).astype(np.int8)

@@ -15,7 +15,7 @@ from survey.kernels import along, fate, returns
 from survey.kernels.dop853 import E3, E5, STAGES, A, B, C
 from survey.kernels.flow import BOUND_DG, BOUND_F, LAST, LOW, PHI, STEP, TRUNC_PHI, TRUNC_W, W, series, values
 from survey.kernels.jit import inline, kernel
-from survey.kernels.lanes import column
+from survey.kernels.lanes import bars, column, relative
 from survey.kernels.matrix import rounding
 
 ORDER = 8
@@ -71,7 +71,7 @@ def hill_walk(potential, p, row, table, span, tolerance, out):
     t, steps, h = 0.0, 0, min(span, 0.1)
     y1, v1, s1, t1, w1 = 1.0, 0.0, 0.0, 0.0, 0.0
     y2, v2, s2, t2, w2 = 0.0, 1.0, 0.0, 0.0, 0.0
-    zeros1, zeros2 = 0.0, 0.0
+    zeros1, zeros2, total = 0.0, 0.0, 0.0
     for _ in range(STEP_LIMIT):
         final = t + 1.01 * h >= span
         if final:
@@ -92,12 +92,12 @@ def hill_walk(potential, p, row, table, span, tolerance, out):
             y2, v2, s2, t2, w2 = column(matrix, y2, v2, s2, t2, w2)
             zeros1 += 1.0 if (y1 < 0.0) != (old1 < 0.0) else 0.0
             zeros2 += 1.0 if (y2 < 0.0) != (old2 < 0.0) else 0.0
+            total += relative(matrix, h)
             steps += 1
             t += h
             if final:
                 out[0], out[1], out[2], out[3] = y1, v1, y2, v2
-                out[4], out[5] = np.sqrt(steps * s1), np.sqrt(steps * w1)
-                out[6], out[7] = np.sqrt(steps * s2), np.sqrt(steps * w2)
+                bars(s1, w1, s2, w2, steps, total, out)
                 out[8], out[9] = zeros1, zeros2
                 return True
         elif not error >= 0.0:
@@ -191,5 +191,6 @@ def flow_cycles(kind, p, eqs, count, place, interval, xs, tolerance, cycles, fou
 @kernel
 def flow_fates(p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out):
     """See `fate.fates`."""
-    how = flow_setting, flow_begin, flow_at
-    fate.fates(*how, p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out)
+    fate.fates(
+        flow_setting, flow_begin, flow_at, p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out
+    )

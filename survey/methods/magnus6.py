@@ -24,7 +24,7 @@ _SLOPE = sqrt(15.0) / 3.0
 def hill_density(rtol):
     """Steps per radian of the fastest phase, and per distance to the nearest singularity of z, for accuracy rtol."""
     scale = max(rtol, 1e-13) ** (-1 / ORDER)
-    return 0.1 * scale, 0.3 * scale
+    return 0.15 * scale, 0.55 * scale
 
 
 @inline
@@ -35,11 +35,11 @@ def exponential(x, y, z):
     in e = cosh - 1 and s = sinh(r)/r, which lose no digits.
     """
     delta = x * x + y * z
-    d = delta / 16.0
-    e = 1 + d / 90 * (1 + d / 132 * (1 + d / 182 * (1 + d / 240)))
-    e = d / 2 * (1 + d / 12 * (1 + d / 30 * (1 + d / 56 * e)))
-    s = 1 + d / 110 * (1 + d / 156 * (1 + d / 210 * (1 + d / 272)))
-    s = 1 + d / 6 * (1 + d / 20 * (1 + d / 42 * (1 + d / 72 * s)))
+    d = delta * 0.0625
+    e = 1 + d * (1 / 90) * (1 + d * (1 / 132) * (1 + d * (1 / 182) * (1 + d * (1 / 240))))
+    e = d * (1 / 2) * (1 + d * (1 / 12) * (1 + d * (1 / 30) * (1 + d * (1 / 56) * e)))
+    s = 1 + d * (1 / 110) * (1 + d * (1 / 156) * (1 + d * (1 / 210) * (1 + d * (1 / 272))))
+    s = 1 + d * (1 / 6) * (1 + d * (1 / 20) * (1 + d * (1 / 42) * (1 + d * (1 / 72) * s)))
     s, e = s * (1 + e), 2 * e * (e + 2)
     s, e = s * (1 + e), 2 * e * (e + 2)
     return 1 + e + s * x, s * y, s * z, 1 + e - s * x
@@ -61,8 +61,8 @@ def _matrix(z1, z2, z3, h):
     x1, y1, w1 = _bracket(0.0, h, a, 0.0, 0.0, b)
     x2, y2, w2 = _bracket(0.0, h, a, x1, y1, 2.0 * c + w1)
     # Omega = alpha_1 + alpha_3 / 12 + [-20 alpha_1 - alpha_3 + C1, alpha_2 + C2] / 240
-    x, y, w = _bracket(x1, y1 - 20.0 * h, w1 - 20.0 * a - c, -x2 / 60.0, -y2 / 60.0, b - w2 / 60.0)
-    return exponential(x / 240.0, h + y / 240.0, a + c / 12.0 + w / 240.0)
+    x, y, w = _bracket(x1, y1 - 20.0 * h, w1 - 20.0 * a - c, -x2 * (1 / 60), -y2 * (1 / 60), b - w2 * (1 / 60))
+    return exponential(x * (1 / 240), h + y * (1 / 240), a + c * (1 / 12) + w * (1 / 240))
 
 
 @inline

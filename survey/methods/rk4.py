@@ -25,7 +25,7 @@ WIDTH = len(NODES) + 1
 def hill_density(rtol):
     """Steps per radian of the fastest phase, and per distance to the nearest singularity of z, for accuracy rtol."""
     scale = max(rtol, 1e-13) ** (-1 / ORDER)
-    return 0.35 * scale, 0.35 * scale
+    return 0.4 * scale, 1.0 * scale
 
 
 @inline
@@ -140,5 +140,6 @@ def flow_cycles(kind, p, eqs, count, place, interval, xs, tolerance, cycles, fou
 @kernel
 def flow_fates(p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out):
     """See `fate.fates`."""
-    how = flow_setting, flow_begin, flow_at
-    fate.fates(*how, p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out)
+    fate.fates(
+        flow_setting, flow_begin, flow_at, p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out
+    )

@@ -127,7 +127,7 @@ class Motion:
     @cached_property
     def period(self):
         first, _ = self.integrals
-        return np.where(self.rotates, 2 * first / self.k, 4 * first)
+        return np.where(self.rotates, 2 * first / np.maximum(self.k, 1), 4 * first)
 
     @cached_property
     def rate(self):
