@@ -71,5 +71,6 @@ def flow_cycles(kind, p, eqs, count, place, interval, xs, tolerance, cycles, fou
 @kernel
 def flow_fates(p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out):
     """See `fate.fates`."""
-    how = flow_setting, flow_begin, flow_at
-    fate.fates(*how, p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out)
+    fate.fates(
+        flow_setting, flow_begin, flow_at, p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out
+    )
