@@ -1,5 +1,7 @@
 """Dataset -> figure: the stability map, a variable with its colour bar, or a curve with its error band."""
 
+import textwrap
+
 import matplotlib
 import numpy as np
 
@@ -16,7 +18,7 @@ from survey.errors import BadInput
 
 # after Okabe and Ito, safe for the colour-blind, the first two far apart in grey print too;
 # black is kept for undecided, white with hatching for failed
-COLOURS = ("#D55E00", "#A6D8F5", "#0072B2", "#F0E442", "#009E73", "#CC79A7", "#E69F00", "#999999", "#B8E0D2", "#5D3A9B")
+COLOURS = ("#D55E00", "#A6D8F5", "#E69F00", "#F0E442", "#009E73", "#CC79A7", "#0072B2", "#999999", "#B8E0D2", "#5D3A9B")
 UNDECIDED = "#000000"
 MARK_BELOW = 0.002  # a share of the map: rarer points are also marked with a ring, or nobody would see them
 
@@ -144,11 +146,13 @@ def _legend(axes, handles):
 
 
 def _limits(shown):
-    """Colour limits that a few far values do not spoil."""
+    """Colour limits that a few far values, or a plain of zeros, do not spoil."""
     values = shown.compressed()
+    values = values[values != 0] if (values == 0).any() and (values >= 0).all() else values
     if values.size == 0:
         return {}
     low, high = np.percentile(values, [1, 99])
+    low = 0.0 if shown.min() == 0 else low
     return {"vmin": low, "vmax": high} if high > low else {}
 
 
@@ -157,7 +161,8 @@ def _label(variable):
     symbol, units = variable.attrs.get("symbol", ""), variable.attrs.get("units", "1")
     text = variable.attrs.get("long_name", variable.name)
     text += f", ${symbol}$" if symbol and symbol not in ("", text) else ""
-    return text if units in ("1", "") else f"{text} ({units})"
+    text += "" if units in ("1", "") else f" ({units})"
+    return "\n".join(textwrap.wrap(text, 48, break_long_words=False))
 
 
 def _title(ds, variable):
