@@ -10,6 +10,7 @@ sqrt(2 n S_ii), for any correlation of the delta_k. Steps never depend on the ti
 
 import math
 
+from survey.kernels.equilibria import settled
 from survey.kernels.flow import (
     BOUND_DG,
     BOUND_F,
@@ -222,35 +223,20 @@ def clean_turning(p, phi, bar_phi, bar_w):
 
 @kernel
 def node_ahead(p, phi, w):
-    """Distance to a stable node ahead of (phi, w > 0) that the solution is certain to run into without turning, or -1.
-
-    With x = phi - node and m = w/x, m' = -(m - fast)(m - slow) + O(r): between the eigenvalues fast < slow < 0 m tends
-    to slow, so w keeps its sign. The O(r) is c r (1 + m^2), c bounding the quadratic terms.
-    """
+    """Distance to a stable node ahead that the solution at (phi, w > 0) certainly runs into without turning, or -1."""
     x = phi
     for _ in range(40):
-        f, g, dg = values(p, x)
+        _f, g, dg = values(p, x)
         if dg >= 0.0:
             return -1.0
-        move = g / dg
-        x -= move
-        if abs(move) < 1e-15:
+        x -= g / dg
+        if abs(g / dg) < 1e-15:
             break
     f, g, dg = values(p, x)
-    root = f * f + 4.0 * dg
     gap = x - phi
-    if not (f < 0.0 and dg < 0.0 and root > 0.0 and abs(g) < 1e-13 * p[BOUND_G]) or not 1e-11 < gap < 0.3:
+    if not (dg < 0.0 and f < 0.0 and abs(g) < 1e-13 * p[BOUND_G] and 1e-11 < gap < 0.3):
         return -1.0
-    fast, slow = 0.5 * (f - math.sqrt(root)), 2.0 * dg / -(f - math.sqrt(root)) * -1.0
-    m = -w / gap
-    c = p[BOUND_F] + p[BOUND_DG]
-    reach = gap * (1.0 + fast * fast)
-    low, high = fast + 0.25 * (slow - fast), 0.5 * slow
-    if not low < m < high or slow <= fast:
-        return -1.0
-    safe_low = 0.25 * (slow - fast) * 0.75 * (slow - fast) > 4.0 * c * reach
-    safe_high = (high - fast) * (slow - high) * -1.0 > 4.0 * c * reach
-    return gap if safe_low and safe_high else -1.0
+    return gap if settled(p, f, dg, -gap, w) else -1.0
 
 
 @inline

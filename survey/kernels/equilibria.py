@@ -32,7 +32,7 @@ def equilibria(p, table):
             if (values(p, low)[1] >= 0.0) != (values(p, high)[1] >= 0.0):
                 found[count] = root(p, low, high)
                 count += 1
-        elif half < 1e-9:
+        elif half < 1e-13:
             if count == 0 or abs(middle - found[count - 1]) > 1e-6:
                 found[count] = middle
                 count += 1
@@ -84,7 +84,7 @@ def describe(p, x, row):
     row[STABLE] = 0.0 if abs(f) <= 16.0 * UNIT * p[BOUND_F] + p[BOUND_F] * row[BAR] else math.copysign(1.0, f)
     if row[BAR] > 1e-7 or dg == 0.0:
         row[KIND], row[STABLE] = DEGENERATE, 0.0
-        row[BAR] = max(1e-9, math.sqrt(noise / max(p[BOUND_DDG], 1e-300)))
+        row[BAR] = max(1e-6, 2.0 * math.sqrt(noise / max(p[BOUND_DDG], 1e-300)))
     elif dg > 0.0:
         row[KIND] = SADDLE
     else:
@@ -132,13 +132,12 @@ def captured(table, count, phi, w, bar):
 
 
 @kernel
-def settled(p, row, x, w):
+def settled(p, f, dg, x, w):
     """Is it certain that w keeps its sign from here to the stable node at distance x?
 
     For m = w/x, m' = -(m - fast)(m - slow) + O(r): m in a band between fast and slow/2 stays there and tends to slow,
     when the quadratic terms c r (1 + m^2) are small against the speed at the edges of the band.
     """
-    f, dg = row[F], row[DG]
     square = f * f + 4.0 * dg
     if x == 0.0 or square <= 0.0:
         return False

@@ -18,7 +18,7 @@ from survey.kernels.along import (
     start_sign,
     time_of_turning,
 )
-from survey.kernels.equilibria import ANGLE, BAR, FOCUS, KIND, NODE, STABLE, captured, offset, settled
+from survey.kernels.equilibria import ANGLE, BAR, DG, FOCUS, KIND, NODE, STABLE, F, captured, offset, settled
 from survey.kernels.flow import TWO_PI, TWO_PI_LOW, UNIT, reduced, table, values
 from survey.kernels.jit import inline, kernel
 from survey.kernels.returns import (
@@ -282,7 +282,7 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, phi
             if eqs[held, KIND] != NODE:
                 out[2] = INFINITE
                 return
-            if settled(p, eqs[held], x, w):
+            if settled(p, eqs[held, F], eqs[held, DG], x, w):
                 out[2] = turnings
                 return
             if abs(x) + abs(w) < 1e3 * (bar_phi + bar_w + eqs[held, BAR]):
