@@ -18,6 +18,8 @@ TOLERANCES = 10.0 ** (-3 - 0.5 * np.arange(25))
 CALL_WORK = 8_000_000
 CALL_SAMPLES = 2_000_000
 UNTRIED = -1
+# Radians of the fastest phase per step, at most: zeros are counted by signs at the ends of steps.
+LONGEST = 2.8
 
 
 def solve(problem, method, rtol, missed):
@@ -59,7 +61,8 @@ def _bar(results):
 def _first_steps(problem, method, rtol):
     """The ladder's first step number that the method asks for; beyond the ladder where it has none; UNTRIED at NaN."""
     phase, distance = method.hill_density(rtol)
-    steps = problem.span[:, None] * np.maximum(phase * problem.frequency, distance * problem.rate[:, None])
+    density = np.maximum(max(phase, 1 / LONGEST) * problem.frequency, distance * problem.rate[:, None])
+    steps = problem.span[:, None] * density
     return np.where(np.isfinite(steps), np.searchsorted(LADDER, steps), UNTRIED)
 
 

@@ -135,10 +135,11 @@ def hill_step(f, c2, p, h):
     p12 = b_end * a_start - a_end * b_start
     p21 = da_end * db_start - db_end * da_start
     p22 = db_end * a_start - da_end * b_start
-    # Truncation: the next two coefficients, at the rate at which the last four fall.
+    # Truncation: the next two coefficients, at the rate at which the last four fall; that rate, with its accidents,
+    # is not trusted below 1/50, nor by more than a factor of 3.
     a_last, b_last = abs(a15) + abs(a16), abs(b16) + abs(b17)
-    a_tail = 2.0 * a_last * a_last / (abs(a13) + abs(a14) + 1e-300)
-    b_tail = 2.0 * b_last * b_last / (abs(b14) + abs(b15) + 1e-300)
+    a_tail = 3.0 * a_last * (a_last / (abs(a13) + abs(a14) + 1e-300) + 0.02)
+    b_tail = 3.0 * b_last * (b_last / (abs(b14) + abs(b15) + 1e-300) + 0.02)
     a_size, da_size = abs(a_even) + abs(a_odd), abs(da_even) + abs(da_odd)
     b_size, db_size = abs(b_even) + abs(b_odd), abs(db_even) + abs(db_odd)
     # What the projection left out acts only through the solutions' own components of that degree.

@@ -140,7 +140,7 @@ class Motion:
         k, period, rotates = self.k[:, None], self.period[:, None], self.rotates[:, None]
         first, second = (values[:, None] for values in self.integrals)
         squares = np.where(rotates, 2 * k * second, 8 * (second - self.kc[:, None] ** 2 * first))
-        drift = np.where(rotates, 2 * pi * rho, 0.0)
+        drift = np.where(rotates, pi * rho, 0.0)  # integral of w over T, times rho: am advances by pi
         c = -k * k if self.oblate else (1 - k) * (1 + k)
         size = period * (2 * squares + 2 * abs(drift) + (rho * rho + k * k + 1) * period)
         total = period * (2 * squares + 2 * drift + (rho * rho + c) * period)

@@ -1,0 +1,119 @@
+"""Problems and references that the tests of Hill's equation share."""
+
+import json
+from importlib import resources
+
+import numpy as np
+from mpmath import mp, mpf
+
+from survey.measures import hill
+from survey.scene import Request
+from survey.scenes import satellite
+
+BODY = {"PL": "prolate", "PR": "prolate", "OL": "oblate", "OR": "oblate"}
+REFERENCE = json.loads(resources.files("survey.reference").joinpath("satellite.json").read_text())
+
+
+def cases(*groups):
+    return [case for group in groups for case in REFERENCE[group]]
+
+
+def solve(body="prolate", method="auto", rtol=1e-10, **point):
+    point = {name: np.atleast_1d(np.asarray(values, dtype=float)) for name, values in point.items()}
+    return satellite.solve(point, Request({"body": body}, method, rtol))
+
+
+def truth(case):
+    """The outputs of a reference case, as mpf."""
+    names = {
+        "y1": "y1_half",
+        "y2": "y2_half",
+        "dy1": "dy1_half",
+        "dy2": "dy2_half",
+        "period": "T",
+        "discriminant": "Delta",
+    }
+    with mp.workdps(40):
+        known = {name: mpf(case[key]) for name, key in names.items()}
+        known["exponent"] = mpf(0) if case["stable"] else mp.acosh(abs(known["discriminant"]) / 2)
+        known["rotation_number"] = rotation(known["discriminant"], case["zeros_y1_half"] + case["zeros_y2_half"])
+    return known
+
+
+def rotation(discriminant, zeros):
+    """theta_total / 2 pi from the discriminant and the zeros of y1 and y2 in the half period (digest section 5)."""
+    if abs(discriminant) >= 2:
+        return mpf(zeros + ((zeros % 2 == 1) != (discriminant < 0))) / 2
+    theta = mp.acos(discriminant / 2)
+    return (zeros * mp.pi + (mp.pi - theta if zeros % 2 else theta)) / (2 * mp.pi)
+
+
+def mathieu(a, q, half_periods=1):
+    """y'' + (a - 2 q cos 2t) y = 0 as a Hill problem: rows of q, lanes of a."""
+    half = half_periods * np.pi / 2
+    a, q = np.broadcast_arrays(np.atleast_2d(np.asarray(a, dtype=float)), np.asarray(q, dtype=float)[:, None])
+
+    def sample(rows, nodes, steps):
+        t = (np.arange(steps)[:, None] + nodes) * (half / steps)
+        out = np.ones((rows.size, steps, 2, nodes.size))
+        out[:, :, 0] = -2 * q[rows, 0][:, None, None] * np.cos(2 * t)
+        return out
+
+    return hill.Problem(
+        p=np.ascontiguousarray(a), span=np.full(len(a), half), frequency=np.sqrt(abs(a) + 2 * abs(q)),
+        rate=np.full(len(a), 2.0), c2=0.0, sample=sample, closed=np.zeros(a.shape, bool),
+        marginal=(q == 0) & (a >= 0) & (np.sqrt(abs(a)) == np.rint(np.sqrt(abs(a)))),
+    )  # fmt: skip
+
+
+def mp_factors(family, k, rho, digits=30):
+    """y1, y1', y2, y2' at T/2 and the zeros of y1, y2 inside, by Taylor series with mpmath: nothing shared with survey.
+
+    sn, cn, dn and both solutions are carried by their own differential equations, order 30.
+    """
+    with mp.workdps(digits):
+        k, rho, order = mpf(k), mpf(rho), 30
+        rotates = family in ("PR", "OR")
+        m, scale = (1 / k**2, k) if rotates else (k**2, mpf(1))
+        c = 1 - k**2 if family in ("PL", "PR") else -(k**2)
+        span = mp.ellipk(m) / k if rotates else 2 * mp.ellipk(m)
+        steps = int(mp.ceil(span * (1 + k + abs(rho)) / mpf("0.6")))
+        h = span / steps
+        state = [mpf(v) for v in (0, 1, 1, 1, 0, 0, 1)]
+        zeros = [0, 0]
+        for _ in range(steps):
+            new = _mp_step(state, h, scale, m, k, rho, c, rotates, order)
+            zeros = [n + ((new[i] < 0) != (state[i] < 0)) for n, i in zip(zeros, (3, 5), strict=True)]
+            state = new
+        return (*state[3:], *zeros)
+
+
+def _mp_step(state, h, scale, m, k, rho, c, rotates, order):
+    sn, cn, dn = ([v] for v in state[:3])
+    y = [[state[3], state[4]], [state[5], state[6]]]
+    z = []
+    for n in range(order):
+
+        def product(a, b, n=n):
+            return mp.fdot(a[: n + 1], b[n::-1])
+
+        w = [k * v for v in (dn if rotates else cn)]
+        z.append(2 * product(w, w) + 2 * rho * w[n] + (rho**2 + c if n == 0 else 0))
+        cd, sd, sc = product(cn, dn), product(sn, dn), product(sn, cn)
+        sn.append(scale * cd / (n + 1))
+        cn.append(-scale * sd / (n + 1))
+        dn.append(-scale * m * sc / (n + 1))
+        for series in y:
+            series.append(-product(z, series) / ((n + 1) * (n + 2)))
+    ends = [_value(series, h) for series in (sn, cn, dn)]
+    for series in y:
+        slope = [j * v for j, v in enumerate(series)][1:]
+        ends += [_value(series, h), _value(slope, h)]
+    return ends
+
+
+def _value(series, h):
+    total = mpf(0)
+    for coefficient in reversed(series):
+        total = total * h + coefficient
+    return total
