@@ -187,14 +187,17 @@ def _rotations(method, six, eqs, section, K, L):
 
 
 def _far_cycle(p, section, K, L, scale):
-    """The large cycle w(0) = -L/(pi K) - 2 b31 where the return map cannot tell it: D = pi K/w^2 + C3/w^3."""
+    """The large cycle w(0) ~ -L/(pi K) where the return map cannot tell it (D = pi K/w^2 + ..., below rounding).
+
+    The expansion leaves a shift of the size of the velocities of the system, which the bar covers.
+    """
     b12, b31 = p[0], p[1]
     w = -L / (math.pi * K) - 2.0 * b31 + b12 * math.sin(section) + b31 * math.cos(section) - b31
     w = max(w, 30.0 * scale)
     slope = math.pi * K / w**3
     side = np.sign(K)
     return np.array(
-        [w, 1.0 + slope, 2 * math.pi / w, 0.1 * w + 5.0 * scale, abs(slope) + 1e-15, 0.0, 1.0, 0, -side, side]
+        [w, 1.0 + slope, 2 * math.pi / w, 10.0 * scale, abs(slope) + 1e-15, 0.0, 1.0, 0, -side, side]
     )
 
 

@@ -1,0 +1,113 @@
+"""The scene: shapes, statuses, what applies where, the same bits in any block, and plain Python as the slow twin."""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from survey.scene import Request
+from survey.scenes import gyrostat
+from survey.status import INVALID_PARAMETERS, OK
+
+SIX = dict(zip(("b12", "b31", "d", "c23", "s2", "s3"), (0.7, -0.4, 1.1, 0.3, 0.5, -0.2), strict=True))
+
+
+def solve(question, method="auto", rtol=1e-10, **values):
+    point = {name: np.asarray(value, float) for name, value in (SIX | {"phi0": 0.0, "w0": 0.0} | values).items()}
+    size = max(array.ndim for array in point.values())
+    point = {name: array.reshape((1,) * (size - array.ndim) + array.shape) for name, array in point.items()}
+    return gyrostat.solve(point, Request({"question": question}, method, rtol))
+
+
+def grid(*lengths):
+    """Axes phi0, w0 and perhaps a third, each along its own dimension."""
+    axes = [np.linspace(-3.0, 3.0, n) for n in lengths]
+    return [axis.reshape([-1 if i == j else 1 for j in range(len(axes))]) for i, axis in enumerate(axes)]
+
+
+def test_trajectory_fills_the_block():
+    phi0, w0, t = grid(3, 4, 5)
+    out = solve("trajectory", phi0=phi0, w0=w0, t=t)
+    assert {values.shape for values in out.values()} == {(3, 4, 5)}
+    assert (out["status"] == OK).all() and (out["turnings"] >= 0).all()
+    assert np.isfinite(out["phi"]).all() and (out["phi_error"] < 1e-10 * (1 + np.abs(out["phi"]))).all()
+
+
+def test_abel_tells_what_applies():
+    phi0, w0, phi = grid(3, 4, 5)
+    out = solve("abel", phi0=phi0, w0=w0, phi=phi)
+    reached, turned = out["status"] == OK, out["status"] == 16
+    assert reached.any() and turned.any() and (reached | turned).all()
+    for name in ("w", "t"):
+        assert np.array_equal(np.isfinite(out[name]), reached) and np.array_equal(
+            np.isfinite(out[f"{name}_error"]), reached
+        )
+        assert np.array_equal(np.isfinite(out[f"{'phi' if name == 'w' else 't'}_turning"]), turned)
+
+
+@pytest.mark.parametrize("question", ["fate", "trajectory", "abel"])
+def test_the_same_bits_in_any_block(question):
+    phi0, w0, last = grid(4, 6, 3)
+    extra = {"fate": {}, "trajectory": {"t": last}, "abel": {"phi": last}}[question]
+    whole = solve(question, phi0=phi0, w0=w0, **extra)
+    for i, j in ((slice(1, 3), slice(0, 2)), (slice(3, 4), slice(5, 6))):
+        part = solve(question, phi0=phi0[i], w0=w0[:, j], **extra)
+        for name, values in part.items():
+            wanted = whole[name][i, j]
+            assert np.array_equal(values.reshape(wanted.shape), wanted, equal_nan=values.dtype.kind == "f"), (
+                name,
+                axes,
+            )
+
+
+@pytest.mark.parametrize("name", ["b12", "s3", "phi0", "w0"])
+def test_a_point_outside_the_domain_costs_itself_alone(name):
+    for question, extra in (("fate", {}), ("trajectory", {"t": [1.0, 2.0]}), ("abel", {"phi": [0.1, 0.2]})):
+        start = {"phi0": 0.0, "w0": 2.0} | {name: [[0.5], [np.nan]]}
+        out = solve(question, **start, **extra)
+        assert (out["status"][1] == INVALID_PARAMETERS).all() and (out["status"][0] == OK).all()
+        for key, values in out.items():
+            if values.dtype.kind == "f":
+                assert np.isnan(values[1]).all(), key
+
+
+def test_fates_over_a_parameter():
+    out = solve("fate", b12=np.linspace(-1, 1, 5)[:, None], w0=np.array([[-2.0, 0.3, 2.0]]))
+    assert out["verdict"].shape == (5, 3) and (out["verdict"] >= 0).all()
+    for name in ("limit_phi", "limit_w", "multiplier"):
+        assert np.array_equal(np.isfinite(out[name]), np.isfinite(out[f"{name}_error"]))
+
+
+@pytest.mark.parametrize("method", ["rk4", "dop853"])
+def test_methods_agree_on_fates(method):
+    phi0, w0 = grid(3, 4)
+    best, other = solve("fate", phi0=phi0, w0=w0), solve("fate", method, 1e-7, phi0=phi0, w0=w0)
+    both = (best["verdict"] >= 0) & (other["verdict"] >= 0)
+    assert both.mean() > 0.9 and np.array_equal(best["verdict"][both], other["verdict"][both])
+
+
+PLAIN = """
+import json, numpy as np
+from survey.scene import Request
+from survey.scenes import gyrostat
+P = dict(zip(("b12", "b31", "d", "c23", "s2", "s3"), (0.7, -0.4, 1.1, 0.3, 0.5, -0.2)))
+point = {k: np.array([v]) for k, v in P.items()} | {"phi0": np.array([1.5]), "w0": np.array([0.8])}
+one = gyrostat.solve(point | {"t": np.array([3.0])}, Request({"question": "trajectory"}))
+two = gyrostat.solve(point | {"phi": np.array([2.5])}, Request({"question": "abel"}))
+print(json.dumps({q + k: float(v[0]) for q, o in (("t", one), ("a", two)) for k, v in o.items()}))
+"""
+
+
+def test_plain_python_gives_the_same_bits():
+    texts = []
+    for off in ("0", "1"):
+        run = subprocess.run(
+            [sys.executable, "-c", PLAIN], capture_output=True, text=True, env=os.environ | {"NUMBA_DISABLE_JIT": off}
+        )
+        assert run.returncode == 0, run.stderr
+        texts.append(run.stdout)
+    assert json.loads(texts[0]).keys() == json.loads(texts[1]).keys()
+    assert texts[0] == texts[1]
