@@ -57,8 +57,7 @@ def solve(problem, method, rtol, wanted=()):
             late |= ~(out[f"{name}_error"] <= rtol * (1 + abs(out[name])))
         return out, late
 
-    results, code = hill_effort.solve(problem, method, rtol, lambda *these: judge(*these)[1])
-    out = measure(results, problem.closed, problem.marginal)
+    out, code = hill_effort.solve(problem, method, rtol, judge)
     finite = np.all([np.isfinite(out[name]) for name in FLOATS], axis=0)
     out["status"] = np.where((code == status.OK) & ~finite, status.OVERFLOW, code).astype(np.int8)
     failed = out["status"] != status.OK
@@ -111,13 +110,16 @@ def _verdict(sine, sine_error, cosine, cosine_error, closed, marginal):
 
 def _exponent(sine, sine_error, cosine, cosine_error, verdict):
     """2 asinh sqrt(g), g = -sin^2 or -cos^2 of half the angle, and how far the bar of g can move it."""
+    value, error = np.zeros_like(sine), np.zeros_like(sine)
+    grows = (verdict == UNSTABLE) | (verdict == UNDECIDED)
+    sine, sine_error, cosine, cosine_error = (a[grows] for a in (sine, sine_error, cosine, cosine_error))
     by_sine = sine < cosine
     growth = -np.where(by_sine, sine, cosine)
     bar = np.where(by_sine, sine_error, cosine_error)
-    value = _asinh(growth)
-    error = np.maximum(_asinh(growth + bar) - value, value - _asinh(growth - bar)) + 8 * EPS * value
-    bounded = (verdict == STABLE) | (verdict == MARGINAL)
-    return np.where(bounded, 0.0, value), np.where(bounded, 0.0, error)
+    middle = _asinh(growth)
+    value[grows] = middle
+    error[grows] = np.maximum(_asinh(growth + bar) - middle, middle - _asinh(growth - bar)) + 8 * EPS * middle
+    return value, error
 
 
 def _asinh(growth):
@@ -138,13 +140,11 @@ def _rotation(sine, sine_error, cosine, cosine_error, verdict, zeros):
 
 
 def _angle(sine, sine_error, cosine, cosine_error):
-    """How far the bars can move theta / (2 pi), from the better of sin^2 and cos^2 of theta / 2."""
+    """How far the bars can move theta / (2 pi): arctan2 of both is no worse than either of them."""
+    return np.maximum(_spread(sine, sine_error), _spread(cosine, cosine_error)) / np.pi
 
-    def spread(square, bar):
-        place = np.arcsin(np.sqrt(np.clip(square, 0, 1)))
-        low = np.arcsin(np.sqrt(np.clip(square - bar, 0, 1)))
-        high = np.arcsin(np.sqrt(np.clip(square + bar, 0, 1)))
-        return np.maximum(high - place, place - low) / np.pi
 
-    # arctan2 of both is as good as the better one, up to a factor of 2 where they do not add up to 1.
-    return np.maximum(spread(sine, sine_error), spread(cosine, cosine_error))
+def _spread(square, bar):
+    """How far arcsin sqrt(square) moves within the bar: by its steepest slope there, at most by arcsin sqrt(bar)."""
+    slope = 2 * np.sqrt(np.maximum(square - bar, 0) * np.maximum(1 - square - bar, 0))
+    return np.minimum(bar / slope, 0.5 * np.pi * np.sqrt(np.minimum(bar, 1)))

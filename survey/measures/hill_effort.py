@@ -22,34 +22,44 @@ UNTRIED = -1
 LONGEST = 2.8
 
 
-def solve(problem, method, rtol, missed):
-    """Results (R, L, 10) and status codes; `missed(points, results)` says which points deserve more effort."""
+def solve(problem, method, rtol, judge):
+    """Outputs (R, L) and status codes.
+
+    `judge(points, results)` gives the outputs of the points, by name, and which of them deserve more effort.
+    """
     adaptive = getattr(method, "ADAPTIVE", False)
     run, top = (_walk, len(TOLERANCES) - 1) if adaptive else (_chain, len(LADDER) - 1)
     effort = _first_tolerance(problem, rtol) if adaptive else _first_steps(problem, method, rtol)
-    results = np.full((*problem.p.shape, 10), np.nan)
-    valid = effort != UNTRIED
-    code = np.where(valid, status.OK, status.INVALID_PARAMETERS)
+    code = np.where(effort == UNTRIED, status.INVALID_PARAMETERS, status.OK)
     code[effort > top] = status.STEP_LIMIT
-    points = np.nonzero(valid & (effort <= top))
-    results[points], reached = run(problem, method, points, effort[points])
+    points = np.nonzero(code == status.OK)
+    results, reached = run(problem, method, points, effort[points])
     code[points] = np.where(reached, status.OK, status.STEP_LIMIT)
-    points = tuple(index[reached] for index in points)
-    while points[0].size:
-        late = missed(points, results[points])
-        points = tuple(index[late & (effort[points] + 2 <= top)] for index in points)
-        if not points[0].size:
-            break
-        effort[points] += 2
-        new, reached = run(problem, method, points, effort[points])
-        old_bar, new_bar = _bar(results[points]), _bar(new)
+    outputs, late = judge(points, results)
+    # From here on `left` counts places in `points` and `results`.
+    left = np.nonzero(late & reached)[0]
+    while (left := left[effort[points][left] + 2 <= top]).size:
+        these = tuple(index[left] for index in points)
+        effort[these] += 2
+        new, reached = run(problem, method, these, effort[these])
+        old_bar, new_bar = _bar(results[left]), _bar(new)
         better = reached & (new_bar < old_bar)
-        chosen = tuple(index[better] for index in points)
-        results[chosen] = new[better]
+        new_outputs, late = judge(these, new)
+        for name, values in outputs.items():
+            values[left[better]] = new_outputs[name][better]
+        results[left[better]] = new[better]
         # Truncation falls by a factor of 4 or more each time; where the bar does not halve, rounding rules.
-        falling = reached & (new_bar < 0.5 * old_bar)
-        points = tuple(index[falling] for index in points)
-    return results, code
+        left = left[late & reached & (new_bar < 0.5 * old_bar)]
+    return {name: _spread(values, points, code.shape) for name, values in outputs.items()}, code
+
+
+def _spread(values, points, shape):
+    """Values of the points in their places; NaN, or 0 for integers, elsewhere."""
+    if values.size == np.prod(shape):
+        return values.reshape(shape)
+    whole = np.full(shape, np.nan if values.dtype.kind == "f" else 0, dtype=values.dtype)
+    whole[points] = values
+    return whole
 
 
 def _bar(results):
@@ -81,7 +91,7 @@ def _chain(problem, method, points, effort):
     """Points solved by fixed steps: those with the same number of steps together, in calls of bounded work."""
     rows, lanes = points
     out = np.empty((rows.size, 10))
-    for level in np.unique(effort):
+    for level in np.nonzero(np.bincount(effort))[0]:
         steps = int(LADDER[level])
         chosen = np.nonzero(effort == level)[0]
         for part in _parts(rows[chosen], steps, len(method.NODES)):
@@ -103,9 +113,10 @@ def _parts(rows, steps, nodes):
 
 
 def _call(problem, method, rows, p, steps):
-    used, counts = np.unique(rows, return_counts=True)
+    ends = np.append(np.nonzero(np.diff(rows))[0] + 1, rows.size)
+    used = rows[ends - 1]
     nodes = np.array(method.NODES)
     samples = problem.sample(used, nodes, steps)
     out = np.empty((p.size, 10))
-    method.hill_chain(samples, problem.c2, problem.span[used] / steps, p, np.cumsum(counts), out)
+    method.hill_chain(samples, problem.c2, problem.span[used] / steps, p, ends, out)
     return out

@@ -1,5 +1,9 @@
 """The satellite against 40-digit references, exact facts, and an independent mpmath integration."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from hill_problems import BODY, cases, mp_factors, rotation, solve, truth
@@ -243,3 +247,34 @@ def test_scalars_and_three_dimensions():
     out = solve(k=k, rho=rho)
     assert all(values.shape == (3, 4, 2) for values in out.values())
     assert out["discriminant"][1, 2, 1] == solve(k=k[1, 0, 0], rho=rho[0, 2, 1])["discriminant"][0]
+
+
+def test_a_block_without_a_valid_point():
+    out = solve(k=np.full(3, np.nan), rho=np.arange(3.0))
+    assert np.all(out["status"] == status.INVALID_PARAMETERS) and np.isnan(out["discriminant"]).all()
+
+
+TINY = """
+import sys
+
+import numpy as np
+from survey.scene import Request
+from survey.scenes import satellite
+point = {"k": np.array([[0.3], [0.95], [1.3]]), "rho": np.array([[0.7, 1.9]])}
+for method in ("taylor16", "magnus6", "rk4"):
+    out = satellite.solve(point, Request({"body": "oblate"}, method, 1e-6))
+    sys.stdout.write(" ".join(v.tobytes().hex() for v in (out["discriminant"], out["verdict"], out["y1_error"])))
+point = {"k": np.array([0.3]), "rho": np.array([0.7])}
+out = satellite.solve(point, Request({"body": "oblate"}, "dop853", 1e-3))
+sys.stdout.write(f" {float(out['discriminant'][0]):.13g} {out['verdict'][0]}")
+"""
+
+
+def test_plain_python_gives_the_same_bits():
+    """The readable twin of every kernel is its own source with the JIT off (dop853: math's sin and cos may differ)."""
+    said = []
+    for off in ("0", "1"):
+        environment = {**os.environ, "NUMBA_DISABLE_JIT": off}
+        run = subprocess.run([sys.executable, "-c", TINY], env=environment, capture_output=True, text=True, check=True)
+        said.append(run.stdout)
+    assert said[0] == said[1]
