@@ -23,6 +23,7 @@ I0, I1, I2, G = 0, 1, 2, 3  # strata
 EXACT = 1e-14  # K and L are 0 within the rounding of the parameters
 STEPS = 20_000  # budget of one fate: about 15 ms
 MORE = 10  # times the budget for those that use it up
+MOST = 2_000_000  # steps in all
 BATCH = 50  # fates per kernel call, so that a call stays below a second
 FINE = 1e-16  # truncation per step for cycles, or the finest of the method
 
@@ -226,7 +227,7 @@ def fates(method, skeleton, starts, tolerance, more=1):
     size = max(1, BATCH // (more * method.FLOW_WORK))
     for i in range(0, len(starts), size):
         part = np.ascontiguousarray(starts[i : i + size])
-        limit = more * STEPS * method.FLOW_WORK
+        limit = min(more * STEPS * method.FLOW_WORK, MOST)
         method.flow_fates(s.p, section, s.ends, sizes, *tables, part, tolerance, limit, out[i : i + size])
     return out
 

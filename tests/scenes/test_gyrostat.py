@@ -57,10 +57,7 @@ def test_the_same_bits_in_any_block(question):
         part = solve(question, phi0=phi0[i], w0=w0[:, j], **extra)
         for name, values in part.items():
             wanted = whole[name][i, j]
-            assert np.array_equal(values.reshape(wanted.shape), wanted, equal_nan=values.dtype.kind == "f"), (
-                name,
-                axes,
-            )
+            assert np.array_equal(values.reshape(wanted.shape), wanted, equal_nan=values.dtype.kind == "f"), name
 
 
 @pytest.mark.parametrize("name", ["b12", "s3", "phi0", "w0"])
@@ -95,9 +92,10 @@ from survey.scene import Request
 from survey.scenes import gyrostat
 P = dict(zip(("b12", "b31", "d", "c23", "s2", "s3"), (0.7, -0.4, 1.1, 0.3, 0.5, -0.2)))
 point = {k: np.array([v]) for k, v in P.items()} | {"phi0": np.array([1.5]), "w0": np.array([0.8])}
+fate = gyrostat.solve(point, Request({"question": "fate"}))
 one = gyrostat.solve(point | {"t": np.array([3.0])}, Request({"question": "trajectory"}))
 two = gyrostat.solve(point | {"phi": np.array([2.5])}, Request({"question": "abel"}))
-print(json.dumps({q + k: float(v[0]) for q, o in (("t", one), ("a", two)) for k, v in o.items()}))
+print(json.dumps({q + k: float(v[0]) for q, o in (("t", one), ("a", two), ("f", fate)) for k, v in o.items()}))
 """
 
 
