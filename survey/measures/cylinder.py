@@ -25,7 +25,7 @@ def mirror(rows):
 
 def tolerances(method, rtol):
     """Truncation per step, for the first attempt and for the second."""
-    first = min(max(SHARE * rtol, method.FLOW_FINEST), 1e-3)
+    first = min(max(SHARE * rtol, method.FLOW_FINEST), 1e-6)
     return first, max(1e-4 * first, method.FLOW_FINEST)
 
 

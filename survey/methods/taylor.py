@@ -6,7 +6,7 @@ Mathematics 14 (2005) 99-117. Domain: every parameter value; explicit, so steps 
 """
 
 from survey.kernels import along, fate, returns
-from survey.kernels.flow import LAST, PHI, TRUNC_PHI, TRUNC_W, E, W, Y, series
+from survey.kernels.flow import LAST, PHI, TRUNC_PHI, TRUNC_W, E, W, Y, longest_step, series
 from survey.kernels.flow import ORDER as _ORDER
 from survey.kernels.jit import inline, kernel
 
@@ -30,8 +30,10 @@ def flow_begin(p, phi, w, tolerance, T):
     last = max(abs(T[_ORDER, PHI]), scale * abs(T[_ORDER, W])) + 1e-300
     before = max(abs(T[_ORDER - 1, PHI]), scale * abs(T[_ORDER - 1, W])) + 1e-300
     h = min((tolerance / last) ** (1.0 / _ORDER), (tolerance / before) ** (1.0 / (_ORDER - 1)))
-    T[LAST, TRUNC_PHI] = tolerance
-    T[LAST, TRUNC_W] = tolerance / scale
+    shorter = min(1.0, longest_step(p, w) / h)  # the last terms, and what follows them, at the step that is taken
+    fourth = (shorter * shorter) ** 2
+    error = tolerance * (fourth * fourth) ** 2 * shorter * shorter * shorter
+    T[LAST, TRUNC_PHI], T[LAST, TRUNC_W] = error, error / scale
     return h
 
 
