@@ -197,9 +197,7 @@ def _far_cycle(p, section, K, L, scale):
     w = max(w, 30.0 * scale)
     slope = math.pi * K / w**3
     side = np.sign(K)
-    return np.array(
-        [w, 1.0 + slope, 2 * math.pi / w, 10.0 * scale, abs(slope) + 1e-15, 0.0, 1.0, 0, -side, side]
-    )
+    return np.array([w, 1.0 + slope, 2 * math.pi / w, 10.0 * scale, abs(slope) + 1e-15, 0.0, 1.0, 0, -side, side])
 
 
 def _librations(method, p, eqs):
