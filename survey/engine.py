@@ -16,18 +16,22 @@ from survey.dataset import command, count, describe, layout, now, provenance, ro
 from survey.errors import BadInput, Stopped
 
 BLOCK_SECONDS = 0.5
-BLOCK_POINTS = (2_000, 100_000)
+BLOCK_POINTS = 50_000
 
 
-def points_per_block(scene, request):
-    """Points that keep one block near BLOCK_SECONDS of kernel time, within bounds."""
-    low, high = BLOCK_POINTS
-    return int(np.clip(BLOCK_SECONDS / scene.cost(request.options), low, high))
+def seconds_per_point(scene, request, grid):
+    """The scene's rough figure for this grid."""
+    return scene.cost(request.options, {name: values.size for name, (_, values) in grid.parameters.items()})
+
+
+def points_per_block(scene, request, grid):
+    """Points that keep one block near BLOCK_SECONDS of kernel time."""
+    return int(np.clip(BLOCK_SECONDS / seconds_per_point(scene, request, grid), 1, BLOCK_POINTS))
 
 
 def blocks_of(workflow):
     """The blocks of a workflow's grid."""
-    return workflow.grid.blocks(points_per_block(workflow.scene, workflow.request))
+    return workflow.grid.blocks(points_per_block(workflow.scene, workflow.request, workflow.grid))
 
 
 def solve_block(scene, request, grid, block):
@@ -64,7 +68,7 @@ def compute(grid, scene, request, threads=None):
         for name, values in solve_block(scene, request, grid, block).items():
             result[name][block] = values
 
-    blocks = grid.blocks(points_per_block(scene, request))
+    blocks = grid.blocks(points_per_block(scene, request, grid))
     if len(blocks) == 1:
         task(blocks[0])
     else:
@@ -107,7 +111,7 @@ def plan(workflow):
     """What a run would do: points, blocks, bytes, method, estimated seconds. No kernel is called."""
     scene, request, grid = workflow.scene, workflow.request, workflow.grid
     table = layout(scene, request).values()
-    seconds = grid.points * scene.cost(request.options)
+    seconds = grid.points * seconds_per_point(scene, request, grid)
     return {
         "scene": workflow.name,
         "options": ", ".join(f"{key}={value}" for key, value in request.options.items()),

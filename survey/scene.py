@@ -11,7 +11,7 @@ import numpy as np
 class Parameter:
     """A real number of the system: an axis of a survey or one fixed value.
 
-    `default=None` says that it must be given. `excluded` and the open ends are not part of the domain.
+    `symbol` is TeX. `default=None` says that it must be given. `excluded` and the open ends are not part of the domain.
     `instead_of` names the parameter that this one replaces when it is given. `when` holds the option
     values for which the parameter exists. An axis of a `whole` parameter is never cut into blocks.
     """

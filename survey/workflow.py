@@ -252,8 +252,8 @@ def _apply(data, override):
 def _one_line(error):
     """The first complaint of pydantic as one line: key, value, what is allowed."""
     first = error.errors()[0]
-    key = ".".join(str(part) for part in first["loc"] if part not in ("number", "spread"))
-    key = key.removesuffix(".values") if first["loc"][-2:] == ("values", "values") else key
+    tag = 2 if first["loc"][0] == "axes" else None  # pydantic names the kind of axis after the axis
+    key = ".".join(str(part) for i, part in enumerate(first["loc"]) if i != tag)
     more = "" if error.error_count() == 1 else f" (and {error.error_count() - 1} more)"
     if first["type"] == "extra_forbidden":
         return f"unknown key {key}{_nearest(first['loc'])}{more}"

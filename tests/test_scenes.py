@@ -59,7 +59,12 @@ seeds = pytest.mark.parametrize("seed", [1, 2, 3])
 
 @each
 def test_a_scene_describes_itself(scene, options):
-    assert scene.TITLE and scene.REFERENCES and scene.FAMILY and scene.cost(options) > 0
+    assert (
+        scene.TITLE
+        and scene.REFERENCES
+        and scene.FAMILY
+        and scene.cost(options, {p.name: 1 for p in scene.PARAMETERS}) > 0
+    )
     names = [p.name for p in scene.PARAMETERS]
     assert len(set(names)) == len(names) and all(p.long_name and p.symbol for p in scene.PARAMETERS)
     for parameter in scene.PARAMETERS:
@@ -88,7 +93,7 @@ def test_every_point_has_outputs_bars_and_a_status(scene, options, seed):
 def test_bits_do_not_depend_on_the_block(scene, options, seed, monkeypatch):
     point = draw(scene, options, seed)
     whole = evaluate(scene, options, point)
-    monkeypatch.setattr(engine, "BLOCK_POINTS", (1, 1))
+    monkeypatch.setattr(engine, "BLOCK_POINTS", 1)
     xr.testing.assert_identical(whole.drop_attrs(), evaluate(scene, options, point).drop_attrs())
 
 

@@ -63,7 +63,7 @@ def test_an_incomplete_or_foreign_file_is_refused(copy, tmp_path):
 
 
 def test_finished_blocks_are_used_again_and_give_the_same_bits(small, tmp_path, monkeypatch):
-    monkeypatch.setattr(engine, "BLOCK_POINTS", (1, 4))
+    monkeypatch.setattr(engine, "BLOCK_POINTS", 4)
     whole = survey.run(small, output=tmp_path / "whole.nc")
     checked = workflow.read(small, output=tmp_path / "again.nc")
     blocks = engine.blocks_of(checked)

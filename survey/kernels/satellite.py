@@ -1,7 +1,8 @@
 """Planar motions of a satellite along one row of the map: w = dx/du and z = c0 + rho c1 + rho^2 at given u.
 
-A row is `rows[r]` = (k, k', half period, oblate): for rotations k > 1 and k' is the complement of 1/k. Digest
-section 1: z = (rho + w)^2 + g with g = dn^2 (PL), -k^2 sn^2 (OL), cn^2 (PR), -sn^2 (OR): no cancelling constant.
+A row is `rows[r]` = (k, k', half period, oblate): for rotations k > 1 and k' is the complement of 1/k.
+Notes (scenes/satellite.md), section 1: z = (rho + w)^2 + g with g = dn^2 (PL), -k^2 sn^2 (OL), cn^2 (PR),
+-sn^2 (OR): no cancelling constant.
 """
 
 import numpy as np

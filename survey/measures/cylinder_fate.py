@@ -73,7 +73,8 @@ def _limits(s, row, result, i):
     verdict, index = int(row[0]), int(row[1])
     phi = w = cycle = None
     if verdict in (kf.EQUILIBRIUM, kf.EQUILIBRIUM_START):
-        phi = (s.equilibria[index, eq.ANGLE], s.equilibria[index, eq.BAR]) if index >= 0 else row[5:7]
+        angle, bar = (s.equilibria[index, eq.ANGLE], s.equilibria[index, eq.BAR]) if index >= 0 else row[5:7]
+        phi = angle % (2.0 * math.pi), bar
     elif verdict == kf.LIBRATION:
         cycle = s.librations[index]
         phi = cycle[rt.CYCLE_X], cycle[rt.CYCLE_BAR]
@@ -82,7 +83,7 @@ def _limits(s, row, result, i):
         cycle = (s.plus if sign > 0 else s.minus)[index]
         w = sign * cycle[rt.CYCLE_X], cycle[rt.CYCLE_BAR]
     if phi is not None:
-        result["limit_phi"][i], result["limit_phi_error"][i] = phi[0] % (2.0 * math.pi), phi[1] + 1e-15
+        result["limit_phi"][i], result["limit_phi_error"][i] = phi[0], phi[1] + 1e-15
     if w is not None:
         result["limit_w"][i], result["limit_w_error"][i] = w
     if cycle is not None:

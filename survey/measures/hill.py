@@ -1,6 +1,6 @@
 """Hill's question: is y'' + z(t) y = 0, z even and of period T, stable? Half-period factors, verdict, Floquet data.
 
-With y1, y2 the solutions with y1(0) = y2'(0) = 1, y1'(0) = y2(0) = 0, and everything at T/2 (digest section 5):
+With y1, y2 the solutions with y1(0) = y2'(0) = 1, y1'(0) = y2(0) = 0, and everything at T/2 (notes, section 5):
 
     discriminant D = trace of the monodromy;  D - 2 = 4 y1' y2,  D + 2 = 4 y1 y2'
     unstable  <=>  y1' y2 > 0  or  y1 y2' < 0          (signs of four numbers: nothing cancels)
@@ -127,7 +127,7 @@ def _asinh(growth):
 
 
 def _rotation(sine, sine_error, cosine, cosine_error, verdict, zeros):
-    """theta_total / (2 pi): `zeros` of y1, y2 in (0, T/2) give the band (digest section 5); n / 2 exactly in gaps."""
+    """theta_total / (2 pi): `zeros` of y1, y2 in (0, T/2) give the band (notes, section 5); n / 2 exactly in gaps."""
     odd = zeros % 2 == 1
     gap = (sine < 0) | (cosine < 0)
     negative = cosine < sine

@@ -4,7 +4,8 @@ A scene module holds TITLE (one line), PARAMETERS, OPTIONS, OUTPUTS (tuples), ST
 sentences), FAMILY (the methods that serve it: those whose SERVES names that family), REFERENCES (tuple of
 strings), and two functions:
 
-    cost(options) -> seconds per point, a rough figure for cutting blocks and for the plan
+    cost(options, sizes) -> seconds per point, a rough figure for cutting blocks and for the plan; `sizes` holds the
+        number of values of each parameter
     solve(point, request) -> {output: array}
 
 `point` maps each parameter that exists to a float64 array; all have the same number of dimensions and

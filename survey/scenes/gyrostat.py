@@ -13,7 +13,7 @@ Integrable strata: I0 (g = 0), I1 (b = 0, H conserved), I2 (K = L = 0). Symmetri
 (phi, w, b31, c23, s2) -> -(...); phi -> phi + pi, (b, s) -> -(b, s); rotations of axes 2 and 3.
 
 Source: M. E. Lesina, Ya. V. Zinovyeva, "The gyrostat with Barnett-London effect" (2004), checked and corrected in
-`physics/gyrostat.md` (whose section 5 is the classification that the fates follow).
+`gyrostat.md` beside this file (whose section 5 is the classification that the fates follow).
 
 A fate is decided by the monotone return maps and by proven regions of attraction, never by a limit of steps; the
 cycles are those that a lattice of return maps shows, with dips followed down to folds. b = 0 and g = 0 are taken
@@ -42,16 +42,16 @@ _SYSTEM = ("b12", "b31", "d", "c23", "s2", "s3")
 _TIME, _ABEL, _FATE = ({"question": (name,)} for name in ("trajectory", "abel", "fate"))
 
 PARAMETERS = (
-    Parameter("b12", "Barnett-London coefficient B12 / A11", "b_12", default=0.0),
-    Parameter("b31", "Barnett-London coefficient B31 / A11", "b_31", default=0.0),
+    Parameter("b12", "Barnett-London coefficient B12 / A11", "b_{12}", default=0.0),
+    Parameter("b31", "Barnett-London coefficient B31 / A11", "b_{31}", default=0.0),
     Parameter("d", "difference (C22 - C33) / A11 of the potential matrix", "d", default=0.0),
-    Parameter("c23", "potential matrix element C23 / A11", "c_23", default=0.0),
+    Parameter("c23", "potential matrix element C23 / A11", "c_{23}", default=0.0),
     Parameter("s2", "component s2 / A11 of the centre of mass vector", "s_2", default=0.0),
     Parameter("s3", "component s3 / A11 of the centre of mass vector", "s_3", default=0.0),
-    Parameter("phi0", "initial angle of rotation", "phi_0", units="rad", default=0.0),
+    Parameter("phi0", "initial angle of rotation", r"\varphi_0", units="rad", default=0.0),
     Parameter("w0", "initial angular velocity", "w_0", default=0.0),
     Parameter("t", "time from the initial state (negative: before it)", "t", when=_TIME, whole=True),
-    Parameter("phi", "angle of rotation at which w and t are asked, unwrapped", "phi", units="rad", when=_ABEL,
+    Parameter("phi", "angle of rotation at which w and t are asked, unwrapped", r"\varphi", units="rad", when=_ABEL,
               whole=True),
 )  # fmt: skip
 OPTIONS = (Option("question", ("fate", "trajectory", "abel"), "what is asked of the solution"),)
@@ -67,33 +67,36 @@ _FATES = {
 }  # fmt: skip
 
 OUTPUTS = (
-    Output("phi", "angle of rotation at t, unwrapped", "phi", units="rad", when=_TIME),
+    Output("phi", "angle of rotation at t, unwrapped", r"\varphi", units="rad", when=_TIME),
     Output("w", "angular velocity", "w", when={"question": ("trajectory", "abel")},
            applies="at a place that the solution reaches"),
     Output("turnings", "number of turning points (sign changes of w)", "n_T", integer=True, fill=-2,
            applies="where the error bar can tell the number; -1 means infinitely many",
            when={"question": ("trajectory", "fate")}),
     Output("verdict", "where the solution ends as t -> +inf", flags=_FATES, when=_FATE),
-    Output("limit_phi", "equilibrium that is reached, or right turning point of the libration cycle, in [0, 2 pi)",
-           "phi_inf", units="rad", when=_FATE, applies="at verdicts 0, 1, 4 and 9"),
+    Output("limit_phi", "equilibrium that is reached, in [0, 2 pi), or right turning point of the libration cycle",
+           r"\varphi_\infty", units="rad", when=_FATE,
+           applies="at verdicts 0, 1, 4 and 9; a turning point is counted on from the equilibrium to its left"),
     Output("limit_w", "velocity of the rotation cycle where it passes the saddle of highest V (phi = 0 if no saddle)",
-           "w_inf", when=_FATE, applies="at verdicts 2 and 3"),
+           r"w_\infty", when=_FATE, applies="at verdicts 2 and 3"),
     Output("multiplier", "Floquet multiplier of the limit cycle", "m", when=_FATE, applies="at verdicts 2, 3 and 4"),
     Output("net_turns", "full turns made by the limit (towards zero; a libration counts by the middle of its cycle)",
            "n", integer=True, fill=NO_TURNS, when=_FATE,
            applies="at verdicts 0, 1, 4, 8 and 9; the number is infinite at the others"),
     Output("t", "time at which the solution reaches phi", "t", when=_ABEL,
            applies="at a place that the solution reaches"),
-    Output("phi_turning", "turning point on the way to phi, unwrapped", "phi_T", units="rad", when=_ABEL,
+    Output("phi_turning", "turning point on the way to phi, unwrapped", r"\varphi_T", units="rad", when=_ABEL,
            applies="where the solution turns before it reaches phi"),
     Output("t_turning", "time of the turning point", "t_T", when=_ABEL,
            applies="where the solution turns before it reaches phi"),
 )  # fmt: skip
 
 
-def cost(options):
-    """Seconds per point, rough: one dense output, or one fate."""
-    return {"trajectory": 5e-5, "abel": 5e-5, "fate": 1e-3}[options.get("question", "fate")]
+def cost(options, sizes):
+    """Seconds per point, rough: one solution serves its dense outputs, one set of cycles all fates of a system."""
+    if options["question"] != "fate":
+        return 7e-5 / sizes.get("t", sizes.get("phi", 1)) + 2e-7
+    return 1.3e-4 + 6e-3 / (sizes["phi0"] * sizes["w0"])
 
 
 def solve(point, request):

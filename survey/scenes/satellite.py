@@ -5,7 +5,7 @@ obey Hill's equation, in u = omega_p t, omega_p^2 = 3 omega_0^2 |I - Iz| / I, wi
 
     y'' + z y = 0,    z = 2 w^2 + 2 rho w + rho^2 + c,    w = dx/du = k cn(u, k)   (k < 1)
                                                                    = k dn(k u, 1/k)  (k > 1)
-    c = 1 - k^2   prolate, alpha = Iz/I < 1   (printed + k^2 in Astakhova's eq. 3: see the errata of the digest)
+    c = 1 - k^2   prolate, alpha = Iz/I < 1   (printed + k^2 in Astakhova's eq. 3: see the errata in satellite.md)
     c = -k^2      oblate,  alpha > 1;         T = 4 K(k), or 2 K(1/k) / k for rotations
 
 Parameters, in order: k >= 0, k != 1; or one_minus_k = 1 - k <= 1, != 0, where 1 - k is small (negative: rotations);
@@ -36,16 +36,16 @@ FAMILY = "hill"
 STATUS = {}
 DEFAULT_METHOD = "taylor16"
 REFERENCES = (
-    "I. S. Astakhova, Transformation of satellite equations to Hill's equation (with errata: physics/satellite.md)",
+    "I. S. Astakhova, Transformation of satellite equations to Hill's equation (errata: satellite.md beside this file)",
     "H. M. Yehia, S. Z. Nabih (2013), AJIS 2(6), 127: the same problem, a chart by inertia ratio and amplitude",
     "W. Magnus, S. Winkler, Hill's Equation, Interscience 1966",
 )
 
 PARAMETERS = (
-    Parameter("k", "modulus: energy of the planar motion (librations k < 1, rotations k > 1)", "k",
+    Parameter("k", "modulus of the planar motion", "k",
               minimum=0.0, excluded=(1.0,)),
     Parameter("one_minus_k", "1 - k, where k is close to 1", "1-k", maximum=1.0, excluded=(0.0,), instead_of="k"),
-    Parameter("rho", "ratio of the orbital rate to that of small librations; negative for retrograde rotations", "rho"),
+    Parameter("rho", "ratio of the orbital rate to the rate of small librations", r"\rho"),
 )  # fmt: skip
 OPTIONS = (Option("body", ("prolate", "oblate"), "shape of the body: Iz < I or Iz > I"),)
 OUTPUTS = (
@@ -54,10 +54,10 @@ OUTPUTS = (
     Output("y2", "y2(T/2), where y2(0) = 0, y2'(0) = 1", "y_2(T/2)"),
     Output("dy1", "derivative of y1 at T/2", "y_1'(T/2)"),
     Output("dy2", "derivative of y2 at T/2", "y_2'(T/2)"),
-    Output("exponent", "growth of the logarithm of the amplitude per period T", "mu T"),
-    Output("exponent_per_orbit", "growth of the logarithm of the amplitude per orbital revolution", "mu",
+    Output("exponent", "growth of the logarithm of the amplitude per period T", r"\mu T"),
+    Output("exponent_per_orbit", "growth of the logarithm of the amplitude per orbital revolution", r"\mu",
            applies="where rho is not 0"),
-    Output("rotation_number", "rotation number per period T", "theta / 2 pi"),
+    Output("rotation_number", "rotation number per period T", r"\theta / 2\pi"),
     Output("period", "period T of the planar motion, in u", "T"),
     Output("verdict", "out-of-plane stability of the planar motion, to first order", flags=hill.VERDICTS),
     Output("lyapunov", "Lyapunov's criterion: z >= 0 and T times the integral of z over T <= 4",
@@ -69,7 +69,7 @@ EPS = 2.3e-16
 PERIOD_ULPS = 6
 
 
-def cost(options):
+def cost(options, sizes):
     """Seconds per point, roughly: a point of a dense row, its share of the outputs included."""
     return 1e-6
 

@@ -31,8 +31,9 @@ def test_there_is_a_choice():
 
 def widened(function, **names):
     """The same source in mpmath's arithmetic: binary64 leaves high orders no room between too coarse and rounding."""
-    source = inspect.getsource(getattr(function, "py_func", function)).partition("\n")[2].replace("1.0 / (n + 1)", "mp.mpf(1) / (n + 1)")
-    scope = {**getattr(function, "py_func", function).__globals__, "math": mp, "mp": mp, **names}
+    plain = getattr(function, "py_func", function)
+    source = inspect.getsource(plain).partition("\n")[2].replace("1.0 / (n + 1)", "mp.mpf(1) / (n + 1)")
+    scope = {**plain.__globals__, "math": mp, "mp": mp, **names}
     exec(source, scope)
     return scope[function.__name__]
 
@@ -72,7 +73,7 @@ def marched(method, steps):
         T[flow.LAST, :] = 0.0
         method.flow_begin(p, *state, 1e300 if method.ORDER != 4 else h, T)
         phi, w, e, y = method.flow_at(p, T, h)
-        state, total = np.array([phi, w]), total + [e, y]
+        state, total = np.array([phi, w]), np.add(total, (e, y))
     return state, total
 
 
