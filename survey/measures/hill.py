@@ -17,10 +17,22 @@ import numpy as np
 
 from survey import status
 from survey.measures import hill_effort
+from survey.scene import Output
 
 UNDECIDED, UNSTABLE, STABLE, MARGINAL = -1, 0, 1, 2
 VERDICTS = {"undecided": UNDECIDED, "unstable": UNSTABLE, "stable": STABLE, "marginal": MARGINAL}
 FLOATS = ("discriminant", "y1", "y2", "dy1", "dy2", "exponent", "rotation_number")
+OUTPUTS = (
+    Output("discriminant", "trace of the monodromy matrix over one period T", "D"),
+    Output("y1", "y1(T/2), where y1(0) = 1, y1'(0) = 0", "y_1(T/2)"),
+    Output("y2", "y2(T/2), where y2(0) = 0, y2'(0) = 1", "y_2(T/2)"),
+    Output("dy1", "derivative of y1 at T/2", "y_1'(T/2)"),
+    Output("dy2", "derivative of y2 at T/2", "y_2'(T/2)"),
+    Output("exponent", "growth exponent of the amplitude per period", r"\mu T"),
+    Output("rotation_number", "rotation number per period", r"\theta / 2\pi"),
+    Output("period", "period of the coefficient", "T"),
+    Output("verdict", "stability of the linear motion", flags=VERDICTS),
+)
 EPS = 2.3e-16
 
 

@@ -11,11 +11,15 @@ Everything that belongs to one scene lies in the file of its name beside this on
 
 import csv
 import json
+import os
 import platform
+import subprocess
+import sys
 import time
 from dataclasses import asdict, dataclass
 from math import prod
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -78,7 +82,7 @@ def measure(scene, case, peers=False, say=lambda line: None):
     references, works = case.references(), case.works()
     records = []
     for (method, peer), solve in runs.items():
-        compile_seconds = _first_call(solve, works)
+        compile_seconds = _first_call(solve, works) if peer else _cold(scene, method)
         for setting in SETTINGS:
             error, wrong = _against(solve, references, case.ERROR, setting)
             for work, (point, options) in works.items():
@@ -102,8 +106,25 @@ def _solver(module, method):
     return solve
 
 
+def _cold(scene, method):
+    """Compile seconds of the method in a new process with an empty kernel cache."""
+    words = f"from survey import precision; print(precision.first_call({scene!r}, {method!r}))"
+    with TemporaryDirectory() as empty:
+        environment = os.environ | {"NUMBA_CACHE_DIR": empty}
+        told = subprocess.run(
+            [sys.executable, "-c", words], capture_output=True, text=True, check=True, env=environment
+        )
+    return float(told.stdout)
+
+
+def first_call(scene, method):
+    """Seconds that the first call of a scene's method takes in this process, less those of the second."""
+    case = modules.load(folder, scene, "scene with a precision chart")
+    return _first_call(_solver(modules.load(scenes, scene, "scene"), method), case.works())
+
+
 def _first_call(solve, works):
-    """Seconds of the first call less those of the second, on the smallest work: compilation or loading."""
+    """Seconds of the first call less those of the second, on the smallest work."""
     point, options = min(works.values(), key=lambda work: _points(work[0]))
     times = []
     for _ in range(2):

@@ -45,21 +45,13 @@ PARAMETERS = (
     Parameter("k", "modulus of the planar motion", "k",
               minimum=0.0, excluded=(1.0,)),
     Parameter("one_minus_k", "1 - k, where k is close to 1", "1-k", maximum=1.0, excluded=(0.0,), instead_of="k"),
-    Parameter("rho", "ratio of the orbital rate to the rate of small librations", r"\rho"),
+    Parameter("rho", "orbital rate over libration rate", r"\rho"),
 )  # fmt: skip
 OPTIONS = (Option("body", ("prolate", "oblate"), "shape of the body: Iz < I or Iz > I"),)
 OUTPUTS = (
-    Output("discriminant", "trace of the monodromy matrix over one period T", "D"),
-    Output("y1", "y1(T/2), where y1(0) = 1, y1'(0) = 0", "y_1(T/2)"),
-    Output("y2", "y2(T/2), where y2(0) = 0, y2'(0) = 1", "y_2(T/2)"),
-    Output("dy1", "derivative of y1 at T/2", "y_1'(T/2)"),
-    Output("dy2", "derivative of y2 at T/2", "y_2'(T/2)"),
-    Output("exponent", "growth of the logarithm of the amplitude per period T", r"\mu T"),
+    *hill.OUTPUTS,
     Output("exponent_per_orbit", "growth of the logarithm of the amplitude per orbital revolution", r"\mu",
            applies="where rho is not 0"),
-    Output("rotation_number", "rotation number per period T", r"\theta / 2\pi"),
-    Output("period", "period T of the planar motion, in u", "T"),
-    Output("verdict", "out-of-plane stability of the planar motion, to first order", flags=hill.VERDICTS),
     Output("lyapunov", "Lyapunov's criterion: z >= 0 and T times the integral of z over T <= 4",
            flags={"silent": 0, "certifies_stability": 1}),
 )  # fmt: skip

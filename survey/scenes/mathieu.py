@@ -1,0 +1,113 @@
+"""Mathieu's equation, the yardstick of parametric resonance: y'' + (a - 2 q cos 2t) y = 0, period T = pi.
+
+Parameters, in order: a (characteristic value) and q (parametric excitation), any finite numbers, without units, in the
+notation of DLMF 28.2.1.
+
+Known: the edges of the tongues are the characteristic values a_n(q), b_n(q) (DLMF 28.2(v)); D is even in q (DLMF
+28.2.13 with t -> pi/2 - t); at q = 0 every gap is closed and D = 2 cos(pi sqrt a), marginal at a = n^2; for q != 0 no
+gap is closed (DLMF 28.2(vi): a_n and b_n are distinct). Tongue n opens as q^n (DLMF 28.6.15).
+
+Source: DLMF chapter 28, https://dlmf.nist.gov/28; E. Mathieu, J. Math. Pures Appl. 13 (1868) 137.
+"""
+
+from math import cos, pi
+
+import numpy as np
+
+from survey import methods, modules, status
+from survey.kernels.jit import inline, kernel
+from survey.measures import hill
+from survey.measures.rows import Rows
+from survey.methods import dop853
+from survey.scene import Parameter
+
+TITLE = "Stability of Mathieu's equation"
+FAMILY = "hill"
+STATUS = {}
+AUDIT = "dop853"
+REFERENCES = (
+    "NIST Digital Library of Mathematical Functions, chapter 28",
+    "E. Mathieu, Journal de Mathematiques Pures et Appliquees 13 (1868) 137",
+)
+PARAMETERS = (
+    Parameter("a", "characteristic value", "a"),
+    Parameter("q", "parametric excitation", "q"),
+)
+OPTIONS = ()
+OUTPUTS = hill.OUTPUTS
+HALF_PERIOD = pi / 2
+
+
+def cost(options, sizes):
+    """Seconds per point, roughly: a point of a dense row, its share of the outputs included."""
+    return 1e-6
+
+
+def solve(point, request):
+    """All outputs of a block (see `survey.scenes`)."""
+    block = Rows((point["q"],), point["a"])
+    q, a = block.per_row(point["q"]), block.per_point(point["a"])
+    method = modules.load(methods, "taylor16" if request.method == "auto" else request.method, "method")
+    out = hill.solve(_problem(q, a), method, request.rtol, request.variables)
+    out["period"] = np.where(out["status"] == status.OK, pi, np.nan)
+    out["period_error"] = 1.3e-16 + 0.0 * out["period"]  # pi is rounded
+    return {name: block.back(values) for name, values in out.items()}
+
+
+def _problem(q, a):
+    def samples(used, nodes, steps):
+        out = np.empty((used.size, steps, 2, nodes.size))
+        sample(q[used], nodes, out)
+        return out
+
+    def walk(used, lanes, tolerance):
+        out = np.full((used.size, 10), np.nan)
+        reached = np.zeros(used.size, dtype=np.bool_)
+        walk_points(q[used], a[used, lanes], tolerance, out, reached)
+        return out, reached
+
+    free = q[:, None] == 0
+    with np.errstate(invalid="ignore"):
+        whole = np.rint(np.sqrt(abs(a)))
+    return hill.Problem(
+        p=a,
+        span=np.where(np.isfinite(q), HALF_PERIOD, np.nan),
+        frequency=np.sqrt(abs(a) + 2 * abs(q[:, None])),
+        rate=np.full(q.size, 2.0),
+        c2=0.0,
+        sample=samples,
+        walk=walk,
+        closed=free & (a > 0),
+        marginal=free & (a == whole * whole),
+    )
+
+
+@inline
+def excitation(t, q):
+    """-2 q cos 2t."""
+    return -2.0 * q * cos(2.0 * t)
+
+
+@kernel
+def sample(q, nodes, out):
+    """c0 = -2 q cos 2t and c1 = 1 at the `nodes` (fractions) of the steps of the half period: out[r, step, c, node]."""
+    steps = out.shape[1]
+    for n in range(steps):
+        for i in range(len(nodes)):
+            t = (n + nodes[i]) * HALF_PERIOD / steps
+            for r in range(len(q)):
+                out[r, n, 0, i] = excitation(t, q[r])
+                out[r, n, 1, i] = 1.0
+
+
+@inline
+def potential(t, a, row, table):
+    """z at any t, for the methods that choose their own steps."""
+    return a + excitation(t, row)
+
+
+@kernel
+def walk_points(q, a, tolerance, out, reached):
+    """Points of their own, by DOP853."""
+    for i in range(len(a)):
+        reached[i] = dop853.hill_walk(potential, a[i], q[i], 0.0, HALF_PERIOD, tolerance[i], out[i])
