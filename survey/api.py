@@ -234,7 +234,7 @@ def audit(ds, points, seed=0):
     module = modules.load(scene_folder, ds.attrs["scene"], "scene")
     options = dict(pair.split("=") for pair in ds.attrs["options"].split(", ") if pair)
     others = [m for m in workflows.methods_of(module) if m != ds.attrs["method"]]
-    method = next((m for m in others if m == getattr(module, "AUDIT", None)), others[0])
+    method = module.AUDIT if module.AUDIT in others else others[0]
     flat = ds.stack(_point=ds.status.dims) if ds.status.dims else ds.expand_dims("_point")
     chosen = np.random.default_rng(seed).permutation(flat.sizes["_point"])[:points]
     flat = flat.isel(_point=np.sort(chosen)).reset_index("_point", drop=True)

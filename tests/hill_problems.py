@@ -62,6 +62,7 @@ def mathieu(a, q, half_periods=1):
     return hill.Problem(
         p=np.ascontiguousarray(a), span=np.full(len(a), half), frequency=np.sqrt(abs(a) + 2 * abs(q)),
         rate=np.full(len(a), 2.0), c2=0.0, sample=sample, closed=np.zeros(a.shape, bool),
+        constant=np.full(a.shape, np.nan),
         marginal=(q == 0) & (a >= 0) & (np.sqrt(abs(a)) == np.rint(np.sqrt(abs(a)))),
     )  # fmt: skip
 

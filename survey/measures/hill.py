@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from survey import status
-from survey.measures import hill_effort
+from survey import methods, modules, status
+from survey.measures import hill_auto, hill_effort
 from survey.scene import Output
 
 UNDECIDED, UNSTABLE, STABLE, MARGINAL = -1, 0, 1, 2
@@ -43,7 +43,8 @@ class Problem:
     `sample(rows, nodes, steps)` gives c0, c1 of the rows at `nodes` (fractions) of each step as an array
     (rows, steps, 2, nodes); `walk(rows, points, tolerance)`, for adaptive methods, gives the results of a chain for
     points p[rows[i], points[i]]. `frequency` bounds sqrt(|z|); `rate` is 1 / distance to z's nearest singularity.
-    Points that are `closed` have no unstable side, those `marginal` have |D| = 2, both by exact rules.
+    Points that are `closed` have no unstable side, those `marginal` have |D| = 2, both by exact rules. `constant` is
+    z where it does not depend on t, NaN elsewhere.
     """
 
     p: np.ndarray
@@ -54,11 +55,15 @@ class Problem:
     sample: Callable
     closed: np.ndarray
     marginal: np.ndarray
+    constant: np.ndarray
     walk: Callable | None = None
 
 
 def solve(problem, method, rtol, wanted=()):
-    """All outputs (R, L) with `_error` each, `verdict`, `status`; effort grows until `rtol` is met or useless."""
+    """All outputs (R, L) with `_error` each, `verdict`, `status`; effort grows until `rtol` is met or useless.
+
+    `method` is the name of a method, or "auto" (see `hill_auto`).
+    """
     wanted = [name for name in FLOATS if name in wanted or not wanted]
 
     def judge(points, results):
@@ -69,7 +74,10 @@ def solve(problem, method, rtol, wanted=()):
             late |= ~(out[f"{name}_error"] <= rtol * (1 + abs(out[name])))
         return out, late
 
-    out, code = hill_effort.solve(problem, method, rtol, judge)
+    if method == "auto":
+        out, code = hill_auto.solve(problem, rtol, judge)
+    else:
+        out, code = hill_effort.solve(problem, modules.load(methods, method, "method"), rtol, judge)
     finite = np.all([np.isfinite(out[name]) for name in FLOATS], axis=0)
     out["status"] = np.where((code == status.OK) & ~finite, status.OVERFLOW, code).astype(np.int8)
     failed = out["status"] != status.OK

@@ -14,7 +14,7 @@ from math import cos, pi
 
 import numpy as np
 
-from survey import methods, modules, status
+from survey import status
 from survey.kernels.jit import inline, kernel
 from survey.measures import hill
 from survey.measures.rows import Rows
@@ -47,8 +47,7 @@ def solve(point, request):
     """All outputs of a block (see `survey.scenes`)."""
     block = Rows((point["q"],), point["a"])
     q, a = block.per_row(point["q"]), block.per_point(point["a"])
-    method = modules.load(methods, "taylor16" if request.method == "auto" else request.method, "method")
-    out = hill.solve(_problem(q, a), method, request.rtol, request.variables)
+    out = hill.solve(_problem(q, a), request.method, request.rtol, request.variables)
     out["period"] = np.where(out["status"] == status.OK, pi, np.nan)
     out["period_error"] = 1.3e-16 + 0.0 * out["period"]  # pi is rounded
     return {name: block.back(values) for name, values in out.items()}
@@ -78,6 +77,7 @@ def _problem(q, a):
         sample=samples,
         walk=walk,
         closed=free & (a > 0),
+        constant=np.where(free, a, np.nan),
         marginal=free & (a == whole * whole),
     )
 

@@ -22,7 +22,7 @@ from math import pi
 
 import numpy as np
 
-from survey import methods, modules, status
+from survey import status
 from survey.kernels.elliptic import MEANS
 from survey.kernels.jit import kernel
 from survey.kernels.satellite import complete_integrals, potential, sample, tabulate
@@ -34,7 +34,7 @@ from survey.scene import Option, Output, Parameter
 TITLE = "Out-of-plane stability of a satellite's planar librations and rotations"
 FAMILY = "hill"
 STATUS = {}
-DEFAULT_METHOD = "taylor16"
+AUDIT = "dop853"
 REFERENCES = (
     "I. S. Astakhova, Transformation of satellite equations to Hill's equation (errata: satellite.md beside this file)",
     "H. M. Yehia, S. Z. Nabih (2013), AJIS 2(6), 127: the same problem, a chart by inertia ratio and amplitude",
@@ -72,8 +72,7 @@ def solve(point, request):
     block = Rows(shared, rho)
     row = Motion(*(block.per_row(values) for values in shared), request.options["body"] == "oblate")
     rho = block.per_point(rho)
-    method = modules.load(methods, DEFAULT_METHOD if request.method == "auto" else request.method, "method")
-    out = hill.solve(_problem(row, rho), method, request.rtol, request.variables)
+    out = hill.solve(_problem(row, rho), request.method, request.rtol, request.variables)
     ok = out["status"] == status.OK
     out["period"] = np.where(ok, row.period[:, None], np.nan)
     out["period_error"] = PERIOD_ULPS * EPS * out["period"]
@@ -171,6 +170,7 @@ def _problem(row, rho):
         sample=samples,
         walk=walk,
         closed=np.broadcast_to(k == 0, rho.shape),
+        constant=np.where(k == 0, rho * rho + (0.0 if row.oblate else 1.0), np.nan),
         marginal=_marginal(row, rho),
     )
 

@@ -5,7 +5,7 @@ import pytest
 from hill_problems import REFERENCE, mathieu
 from mpmath import mp, mpf
 
-from survey import methods, modules, status
+from survey import status
 from survey.measures import hill
 from survey.methods import taylor16
 
@@ -15,7 +15,7 @@ DISCRIMINANTS = REFERENCE["standard"]["mathieu_discriminant"]
 
 
 def solve(a, q, rtol=1e-10, method="taylor16"):
-    return hill.solve(mathieu(a, q), modules.load(methods, method, "method"), rtol)
+    return hill.solve(mathieu(a, q), method, rtol)
 
 
 @pytest.mark.parametrize("row", STANDARD, ids=lambda row: f"{row['kind']}{row['n']}-q{row['q']}")
