@@ -2,8 +2,8 @@
 
 import matplotlib.pyplot as plt
 
-from survey.figures import COLOURS
-
+# Okabe and Ito's colours that show as lines
+COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999", "#5D3A9B", "#8C6D31")
 MARKERS = "osD^v<>ph*"
 
 
