@@ -19,11 +19,13 @@ UNDECIDED = -1
 def solve(problem, rtol, judge):
     """As `hill_effort.solve`: outputs by name (R, L) and status codes."""
     free = np.isfinite(problem.constant) & np.isfinite(problem.p)
-    out, code = hill_effort.solve(replace(problem, p=np.where(free, np.nan, problem.p)), taylor16, rtol, judge)
-    rows, lanes = np.nonzero(free)
-    exact, _ = judge((rows, lanes), closed_form(problem.constant[rows, lanes], problem.span[rows]))
-    code[free] = status.OK
-    _fill(out, free, exact)
+    rest = replace(problem, p=np.where(free, np.nan, problem.p)) if free.any() else problem
+    out, code = hill_effort.solve(rest, taylor16, rtol, judge)
+    if free.any():
+        rows, lanes = np.nonzero(free)
+        exact, _ = judge((rows, lanes), closed_form(problem.constant[rows, lanes], problem.span[rows]))
+        code[free] = status.OK
+        _fill(out, free, exact)
     left = (code == status.OK) & (out["verdict"] == UNDECIDED) & ~free
     if left.any() and problem.walk is not None:
         again, reached = hill_effort.solve(replace(problem, p=np.where(left, problem.p, np.nan)), dop853, rtol, judge)
