@@ -73,7 +73,7 @@ def _first_steps(problem, method, rtol):
     phase, distance = method.hill_density(rtol)
     density = np.maximum(max(phase, 1 / LONGEST) * problem.frequency, distance * problem.rate[:, None])
     steps = problem.span[:, None] * density
-    return np.where(np.isfinite(steps), np.searchsorted(LADDER, steps), UNTRIED)
+    return np.where(np.isnan(steps), UNTRIED, np.searchsorted(LADDER, steps))
 
 
 def _first_tolerance(problem, rtol):

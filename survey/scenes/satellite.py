@@ -94,7 +94,8 @@ def moduli(point):
         k = np.asarray(point["k"], dtype=float)
         short = 1 - k
     with np.errstate(all="ignore"):
-        complement = np.sqrt(abs(short) * (1 + k)) / np.maximum(k, 1)
+        scale = np.maximum(k, 1)
+        complement = np.sqrt((abs(short) / scale) * ((1 + k) / scale))
     return k, np.where(k == np.inf, np.nan, complement)
 
 
