@@ -11,17 +11,19 @@ Importing this package compiles nothing and loads nothing heavy.
 
 from importlib import import_module
 
-_HOME = {"run": "survey.api", "evaluate": "survey.api", "open": "survey.api", "scenes": "survey.api"}
+_HOME = {"run": "survey.api", "evaluate": "survey.api", "open": "survey.api"}
 _HOME |= {
     "SurveyError": "survey.errors",
     "BadInput": "survey.errors",
     "Damaged": "survey.errors",
     "Stopped": "survey.errors",
 }
-__all__ = sorted(_HOME)
+__all__ = sorted([*_HOME, "scenes"])
 
 
 def __getattr__(name):
+    if name == "scenes":  # a folder that can be called
+        return import_module("survey.scenes")
     if name in _HOME:
         return getattr(import_module(_HOME[name]), name)
     raise AttributeError(f"module 'survey' has no attribute {name!r}")

@@ -96,6 +96,7 @@ def evaluate(scene, *, method="auto", rtol=1e-10, variables=None, **parameters):
     request = workflows.check_request(module, options, method, rtol, variables)
     given |= {key: xr.DataArray(float(p.default)) for key, p in used.items() if key not in given}
     _check_lone_values(used, given)
+    _check_dimensions(module, given)
     if any(array.chunks for array in given.values()):
         return _lazy(module, scene, request, given)
     grid = _grid(used, given)
@@ -113,7 +114,7 @@ def open(path):
 
 def scenes():
     """{name: title} of the scenes."""
-    return {name: modules.load(scene_folder, name, "scene").TITLE for name in modules.names(scene_folder)}
+    return scene_folder()
 
 
 def _labelled(key, value):
@@ -130,6 +131,20 @@ def _labelled(key, value):
     if value.size == 0:
         raise BadInput(f"{key}: an empty array has no points; give at least one value")
     return value.astype(float)
+
+
+def _check_dimensions(module, given):
+    """Raise BadInput if coordinates disagree along a shared dimension, or a dimension bears an output's name."""
+    try:
+        xr.align(*given.values(), join="exact", copy=False)
+    except ValueError as error:
+        raise BadInput(
+            f"the parameters' coordinates disagree: {str(error).splitlines()[0]}; align them first"
+        ) from None
+    outputs = {output.name for output in module.OUTPUTS} | {"status"}
+    for key, array in given.items():
+        for dim in set(array.dims) & outputs - {key}:
+            raise BadInput(f"{key}: its dimension {dim!r} bears an output's name; rename the dimension")
 
 
 def _check_lone_values(used, given):
@@ -235,7 +250,10 @@ def audit(ds, points, seed=0):
     options = dict(pair.split("=") for pair in ds.attrs["options"].split(", ") if pair)
     others = [m for m in workflows.methods_of(module) if m != ds.attrs["method"]]
     method = module.AUDIT if module.AUDIT in others else others[0]
-    flat = ds.stack(_point=ds.status.dims) if ds.status.dims else ds.expand_dims("_point")
+    if not points:
+        return {"points": 0, "method": method, "outside": 0, "complaints": []}
+    ds = ds if ds.status.dims else ds.expand_dims("_one")
+    flat = ds.stack(_point=ds.status.dims)
     chosen = np.random.default_rng(seed).permutation(flat.sizes["_point"])[:points]
     flat = flat.isel(_point=np.sort(chosen)).reset_index("_point", drop=True)
     names = [p.name for p in module.PARAMETERS if p.name in ds.coords]

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import signal
 import sys
 
@@ -65,8 +66,8 @@ def run(workflow, output, overrides, workers, scheduler, fresh, quiet):
             pictures = api.draw(ds, checked)
     except KeyboardInterrupt as stop:
         code = stop.args[0] if stop.args else 130
-        again = " ".join(["survey", *sys.argv[1:]]).replace(" --fresh", "")
-        complain(f"interrupted; finished blocks are in {checked.path}.blocks; go on with: {again}", code)
+        again = shlex.join(["survey", *(word for word in sys.argv[1:] if word != "--fresh")])
+        complain(f"interrupted; finished blocks are safe; go on with: {again}", code)
         sys.stderr.flush()
         os._exit(code)  # threads inside a kernel cannot be interrupted, and need not be waited for
     if not quiet:

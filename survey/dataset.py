@@ -198,8 +198,10 @@ def _attributes(output):
         attributes["units"] = output.units
     if output.dtype.kind == "f":
         attributes["ancillary_variables"] = f"{output.name}_error"
-    if output.applies:
-        attributes["comment"] = output.applies
+    comment = [output.applies] if output.applies else []
+    comment += [f"{output.fill} where it does not apply"] if output.integer else []
+    if comment:
+        attributes["comment"] = "; ".join(comment)
     return attributes
 
 

@@ -83,6 +83,7 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
     `progress(done, total, reused)` is called as blocks finish. Raises BadInput, Damaged or Stopped.
     """
     started = time.time()
+    scheduler = _client(scheduler) if scheduler else None
     blocks = blocks_of(workflow)
     with store.Blocks(workflow.path, fingerprint(workflow), fresh) as kept:
         reused = kept.done()
@@ -174,7 +175,7 @@ def _through_dask(task, numbers, workers=None, scheduler=None, finished=None, th
     where = {"scheduler": "processes", "num_workers": workers} if workers else {"scheduler": "threads"}
     where = {"num_workers": threads or cpus()} | where
     if scheduler:
-        where = {"scheduler": _client(scheduler)}
+        where = {"scheduler": scheduler}
     if finished:
         finished(0)
     try:

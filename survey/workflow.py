@@ -114,13 +114,15 @@ def check(data, text="", output=None, default_path="survey.nc"):
     for figure in file.output.figures:
         if figure not in request.variables:
             raise BadInput(f"output.figures: {modules.unknown('variable', figure, sorted(request.variables))}")
+    if file.output.figures and not any(np.ndim(values) for values in given.values()):
+        raise BadInput("output.figures: a figure needs at least one axis, and every parameter is a single number")
     return Workflow(
         name=name,
         title=file.title or scene.TITLE,
         scene=scene,
         grid=_grid(parameters, given),
         request=request,
-        path=check_path(output or file.output.path or default_path),
+        path=check_path(next(path for path in (output, file.output.path, default_path) if path is not None)),
         figures=tuple(file.output.figures),
         text=text,
     )
@@ -167,7 +169,7 @@ def check_request(scene, options, method, rtol, variables):
     serving = methods_of(scene)
     if method != "auto" and method not in serving:
         raise BadInput(f"solver.method: {modules.unknown('method', method, ['auto', *serving])}")
-    if not 0 < rtol < 1:
+    if isinstance(rtol, bool) or not isinstance(rtol, (int, float)) or not 0 < rtol < 1:
         raise BadInput(f"solver.rtol = {rtol!r}: it must lie between 0 and 1, such as 1e-10")
     outputs = [output.name for output in scene.OUTPUTS if exists(output, options)]
     for variable in variables or ():
@@ -184,8 +186,14 @@ def methods_of(scene):
 
 def check_path(path):
     """The output path; raises BadInput unless a file can be made there."""
+    if not str(path):
+        raise BadInput("output.path is empty; name a file, such as 'map.nc'")
     path = Path(path)
     folder = path.parent
+    if path.suffix.lower() in (".png", ".pdf", ".svg", ".toml"):
+        raise BadInput(f"output.path = {str(path)!r} is to be a netCDF file; name one, such as {path.stem + '.nc'!r}")
+    if path.is_file() and path.open("rb").read(4) != b"\x89HDF":
+        raise BadInput(f"output.path = {str(path)!r} is there and is no netCDF file; move it away, or use -o OUT.nc")
     if path.is_dir():
         raise BadInput(f"output.path = {str(path)!r} is a folder; name a file, such as {str(path / 'map.nc')!r}")
     if not folder.is_dir():

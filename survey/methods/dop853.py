@@ -29,6 +29,7 @@ SMALLEST, LARGEST = 0.2, 5.0
 # Zeros are counted by signs at the ends of steps: a step stays below this many radians of the fastest phase.
 LONGEST = 2.0
 STEP_LIMIT = 200_000
+DOUBT = 1.0
 
 
 @inline
@@ -42,23 +43,31 @@ def hill_step(z, h, slopes):
                 v += h * A[i, j] * slopes[2 * c + 1, j]
             slopes[2 * c, i] = v
             slopes[2 * c + 1, i] = -z[i] * y
-    p11, d11 = _sums(1.0, h, slopes[0])
-    p21, d21 = _sums(0.0, h, slopes[1])
-    p12, d12 = _sums(0.0, h, slopes[2])
-    p22, d22 = _sums(1.0, h, slopes[3])
-    return p11, p12, p21, p22, d11 + d22, d12, d21
+    size = 0.0
+    for i in range(STAGES):
+        size = max(size, abs(z[i]))
+    # an error of order h^9 is (h sqrt z)^3 of the estimate of order h^6
+    doubt = DOUBT * (h * np.sqrt(size)) ** 3
+    p11, d11 = _sums(1.0, h, slopes[0], doubt)
+    p21, d21 = _sums(0.0, h, slopes[1], doubt)
+    p12, d12 = _sums(0.0, h, slopes[2], doubt)
+    p22, d22 = _sums(1.0, h, slopes[3], doubt)
+    # one entry's estimate may vanish by symmetry (constant z): all four speak for each, in the scale of the phase
+    rate = max(np.sqrt(size), 1.0 / h)
+    level = d11 + d22 + d12 * rate + d21 / rate
+    return p11, p12, p21, p22, level, level / rate, level * rate
 
 
 @inline
-def _sums(start, h, slopes):
-    """The new value, and dop853.f's combination of the estimates of order 5 and 3."""
+def _sums(start, h, slopes, doubt):
+    """The new value, and dop853.f's combination of the estimates of order 5 and 3, which must not vanish by chance."""
     value, fifth, third = 0.0, 0.0, 0.0
     for j in range(STAGES):
         value += B[j] * slopes[j]
         fifth += E5[j] * slopes[j]
         third += E3[j] * slopes[j]
     scale = np.sqrt(fifth * fifth + 0.01 * third * third)
-    return start + h * value, abs(h) * fifth * fifth / (scale + 1e-300)
+    return start + h * value, abs(h) * (fifth * fifth / (scale + 1e-300) + doubt * abs(fifth))
 
 
 @inline
@@ -82,7 +91,7 @@ def hill_walk(potential, p, row, table, span, tolerance, out):
             size = max(size, abs(z[i]))
         wave = np.sqrt(size) + 1e-3
         p11, p12, p21, p22, d11, d12, d21 = hill_step(z, h, slopes)
-        error = d11 + d12 * wave + d21 / wave
+        error = d11  # all four entries speak in it
         if error <= tolerance and h * wave <= 1.01 * LONGEST:
             # The stages pass through sums of size 60 that cancel; t itself is rounded.
             r11, r12, r21 = rounding(4.0 * size, 4.0 * h)

@@ -15,3 +15,18 @@ one axis is computed once). A parameter outside its domain arrives as NaN: such 
 `request.variables` or all of them, `X_error` (float64) for each float output `X`, and `status` (int8). It is pure,
 thread-safe, and gives a point the same bits in any block.
 """
+
+import sys
+from types import ModuleType
+
+from survey import modules
+
+
+class _Folder(ModuleType):
+    """`survey.scenes` is this folder; called, it gives {name: title} of the scenes."""
+
+    def __call__(self):
+        return {name: modules.load(self, name, "scene").TITLE for name in modules.names(self)}
+
+
+sys.modules[__name__].__class__ = _Folder

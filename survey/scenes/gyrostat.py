@@ -3,8 +3,8 @@
     f = b12 cos phi - b31 sin phi,
     g = -d cos phi sin phi - c23 cos 2phi + s2 cos phi - s3 sin phi                              (57)
 
-Parameters, in order: b12, b31 (components of B over A11), d = c22 - c33 and c23 (of C), s2, s3 (of s), any finite
-numbers; phi0 (rad) and w0, the initial angle and velocity. In (57) phi is the independent variable and
+Parameters, in order: b12, b31 (components of B over A11), d = c22 - c33 and c23 (of C), s2, s3 (of s), up to
+1e12; phi0 (rad) and w0, the initial angle and velocity. In (57) phi is the independent variable and
 w w_phi = f w + g; here the system is solved in time, so turning points (w = 0) are passed.
 
 What is known. H = w^2/2 + V, V' = -g: dH/dt = f w^2. K = b12 s3 - b31 s2 decides the ends w -> +-inf: both attract
@@ -39,21 +39,25 @@ REFERENCES = (
     "M. E. Lesina, Ya. V. Zinovyeva (2004): Integration of the equations of a gyrostat with Barnett-London effect",
 )
 
+_LARGE, _FAR = (
+    {"minimum": -1e12, "maximum": 1e12},
+    {"minimum": -1e9, "maximum": 1e9},
+)  # beyond, binary64 has no digits left
 _SYSTEM = ("b12", "b31", "d", "c23", "s2", "s3")
 _TIME, _ABEL, _FATE = ({"question": (name,)} for name in ("trajectory", "abel", "fate"))
 
 PARAMETERS = (
-    Parameter("b12", "Barnett-London coefficient B12 / A11", "b_{12}", default=0.0),
-    Parameter("b31", "Barnett-London coefficient B31 / A11", "b_{31}", default=0.0),
-    Parameter("d", "difference (C22 - C33) / A11 of the potential matrix", "d", default=0.0),
-    Parameter("c23", "potential matrix element C23 / A11", "c_{23}", default=0.0),
-    Parameter("s2", "component s2 / A11 of the centre of mass vector", "s_2", default=0.0),
-    Parameter("s3", "component s3 / A11 of the centre of mass vector", "s_3", default=0.0),
-    Parameter("phi0", "initial angle of rotation", r"\varphi_0", units="rad", default=0.0),
-    Parameter("w0", "initial angular velocity", "w_0", default=0.0),
-    Parameter("t", "time from the initial state (negative: before it)", "t", when=_TIME, whole=True),
+    Parameter("b12", "Barnett-London coefficient B12 / A11", "b_{12}", default=0.0, **_LARGE),
+    Parameter("b31", "Barnett-London coefficient B31 / A11", "b_{31}", default=0.0, **_LARGE),
+    Parameter("d", "difference (C22 - C33) / A11 of the potential matrix", "d", default=0.0, **_LARGE),
+    Parameter("c23", "potential matrix element C23 / A11", "c_{23}", default=0.0, **_LARGE),
+    Parameter("s2", "component s2 / A11 of the centre of mass vector", "s_2", default=0.0, **_LARGE),
+    Parameter("s3", "component s3 / A11 of the centre of mass vector", "s_3", default=0.0, **_LARGE),
+    Parameter("phi0", "initial angle of rotation", r"\varphi_0", units="rad", default=0.0, **_FAR),
+    Parameter("w0", "initial angular velocity", "w_0", default=0.0, **_LARGE),
+    Parameter("t", "time from the initial state (negative: before it)", "t", when=_TIME, whole=True, **_LARGE),
     Parameter("phi", "angle of rotation at which w and t are asked, unwrapped", r"\varphi", units="rad", when=_ABEL,
-              whole=True),
+              whole=True, **_FAR),
 )  # fmt: skip
 OPTIONS = (Option("question", ("fate", "trajectory", "abel"), "what is asked of the solution"),)
 STATUS = {

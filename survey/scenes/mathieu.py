@@ -1,6 +1,6 @@
 """Mathieu's equation, the yardstick of parametric resonance: y'' + (a - 2 q cos 2t) y = 0, period T = pi.
 
-Parameters, in order: a (characteristic value) and q (parametric excitation), any finite numbers, without units, in the
+Parameters, in order: a (characteristic value) and q (parametric excitation), up to 1e12, without units, in the
 notation of DLMF 28.2.1.
 
 Known: the edges of the tongues are the characteristic values a_n(q), b_n(q) (DLMF 28.2(v)); D is even in q (DLMF
@@ -30,8 +30,8 @@ REFERENCES = (
     "E. Mathieu, Journal de Mathematiques Pures et Appliquees 13 (1868) 137",
 )
 PARAMETERS = (
-    Parameter("a", "characteristic value", "a"),
-    Parameter("q", "parametric excitation", "q"),
+    Parameter("a", "characteristic value", "a", minimum=-1e12, maximum=1e12),
+    Parameter("q", "parametric excitation", "q", minimum=-1e12, maximum=1e12),
 )
 OPTIONS = ()
 OUTPUTS = hill.OUTPUTS

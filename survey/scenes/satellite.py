@@ -43,9 +43,10 @@ REFERENCES = (
 
 PARAMETERS = (
     Parameter("k", "modulus of the planar motion", "k",
-              minimum=0.0, excluded=(1.0,)),
-    Parameter("one_minus_k", "1 - k, where k is close to 1", "1-k", maximum=1.0, excluded=(0.0,), instead_of="k"),
-    Parameter("rho", "orbital rate over libration rate", r"\rho"),
+              minimum=0.0, maximum=1e12, excluded=(1.0,)),
+    Parameter("one_minus_k", "1 - k, where k is close to 1", "1-k",
+              minimum=-1e12, maximum=1.0, excluded=(0.0,), instead_of="k"),
+    Parameter("rho", "orbital rate over libration rate", r"\rho", minimum=-1e12, maximum=1e12),
 )  # fmt: skip
 OPTIONS = (Option("body", ("prolate", "oblate"), "shape of the body: Iz < I or Iz > I"),)
 OUTPUTS = (
