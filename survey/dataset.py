@@ -56,7 +56,7 @@ def describe(grid, scene, name, request, arrays):
         variables[output.name] = (own, arrays[output.name], _attributes(output))
         if output.dtype.kind == "f":
             bar = {"long_name": f"error bound of the {output.long_name}", "units": output.units}
-            bar["coverage_content_type"] = "qualityInformation"
+            bar |= {"coverage_content_type": "qualityInformation", "symbol": rf"\delta {output.symbol or output.name}"}
             variables[f"{output.name}_error"] = (own, arrays[f"{output.name}_error"], bar)
     variables["status"] = (dims, arrays["status"], _status_attributes(scene))
     ds = xr.Dataset(variables, coords)
@@ -190,12 +190,9 @@ def _meaning(parameter):
 
 def _attributes(output):
     attributes = {"long_name": output.long_name, "coverage_content_type": "modelResult"}
-    if output.symbol:
-        attributes["symbol"] = output.symbol
+    attributes |= {"units": output.units, "symbol": output.symbol or output.name}
     if output.flags is not None:
         attributes |= _flags(output.flags)
-    else:
-        attributes["units"] = output.units
     if output.dtype.kind == "f":
         attributes["ancillary_variables"] = f"{output.name}_error"
     comment = [output.applies] if output.applies else []
@@ -214,6 +211,8 @@ def _status_attributes(scene):
     return {
         "long_name": "why the point has or has not an answer",
         "coverage_content_type": "qualityInformation",
+        "units": "1",
+        "symbol": "status",
         **_flags({name: code for name, (code, _) in table.items()}),
         "comment": "; ".join(f"{name}: {sentence}" for name, (_, sentence) in table.items()),
     }

@@ -32,7 +32,7 @@ def test_it_passes_the_cf_checker(surveyed):
 def test_every_variable_says_what_it_is(ds):
     for name, variable in ds.variables.items():
         assert variable.attrs["long_name"], name
-        assert "units" in variable.attrs or "flag_values" in variable.attrs, name
+        assert variable.attrs["units"] and variable.attrs["symbol"], name
         assert not np.iscomplexobj(variable), name
     assert set(dataset.error_bars(ds)) == {name for name in ds.data_vars if ds[name].dtype == np.float64}
 
