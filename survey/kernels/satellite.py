@@ -55,11 +55,11 @@ def sample(rows, nodes, out):
 
 @inline
 def potential(u, rho, row, table):
-    """z at any u in [0, half period], for the methods that choose their own steps; `table` from `tabulate`."""
+    """z at any u in [0, half period] and what its rounding is relative to; `table` from `tabulate`."""
     mirror = row[0] <= 1.0 and 2.0 * u > row[2]
     w, g = motion(row[2] - u if mirror else u, row[0], row[3] > 0.0, table, int(table[0, MEANS]))
     shifted = rho - w if mirror else rho + w
-    return shifted * shifted + g
+    return shifted * shifted + g, (abs(rho) + abs(w)) * abs(shifted) + abs(g)
 
 
 @inline

@@ -20,7 +20,7 @@ from survey.measures.cylinder import tolerances
 
 NO_TURNS = kf.NO_TURNS
 I0, I1, I2, G = 0, 1, 2, 3  # strata
-EXACT = 1e-14  # K and L are 0 within the rounding of the parameters
+EXACT = 7e-16  # three ulp: K and L are 0 within the rounding of decimal parameters
 STEPS = 20_000  # budget of one fate: about 15 ms
 MORE = 10  # times the budget for those that use it up
 MOST = 2_000_000  # steps in all
@@ -119,8 +119,8 @@ def constants(b12, b31, d, c23, s2, s3):
     b = math.hypot(b12, b31)
     K = b12 * s3 - b31 * s2
     L = 0.5 * math.pi * (c23 * (b12 * b12 - b31 * b31) - d * b12 * b31)
-    K = 0.0 if abs(K) <= EXACT * b * math.hypot(s2, s3) else K
-    L = 0.0 if abs(L) <= EXACT * b * b * math.hypot(d, 2.0 * c23) * 2.0 else L
+    K = 0.0 if abs(K) <= EXACT * (abs(b12 * s3) + abs(b31 * s2)) else K
+    L = 0.0 if abs(L) <= EXACT * math.pi * (abs(c23) * b * b + abs(d * b12 * b31)) else L
     return K, L
 
 

@@ -34,6 +34,7 @@ OUTPUTS = (
     Output("verdict", "stability of the linear motion", flags=VERDICTS),
 )
 EPS = 2.3e-16
+LARGEST = np.finfo(np.float32).max  # bars are kept as float32
 
 
 @dataclass(frozen=True)
@@ -78,14 +79,19 @@ def solve(problem, method, rtol, wanted=()):
         out, code = hill_auto.solve(problem, rtol, judge)
     else:
         out, code = hill_effort.solve(problem, modules.load(methods, method, "method"), rtol, judge)
-    finite = np.all([np.isfinite(out[name]) for name in FLOATS], axis=0)
-    out["status"] = np.where((code == status.OK) & ~finite, status.OVERFLOW, code).astype(np.int8)
-    failed = out["status"] != status.OK
-    for name in FLOATS:
-        out[name] = np.where(failed, np.nan, out[name])
-        out[f"{name}_error"] = np.where(failed, np.nan, out[f"{name}_error"])
-    out["verdict"] = np.where(failed, UNDECIDED, out["verdict"]).astype(np.int8)
+    out["status"] = code.astype(np.int8)
+    overflow(out, ~np.all([np.isfinite(out[name]) & (out[f"{name}_error"] < LARGEST) for name in FLOATS], axis=0))
     return out
+
+
+def overflow(out, where):
+    """Take back the answers of the points that have a value or bar beyond the range of floats; changes `out`."""
+    out["status"] = np.where((out["status"] == status.OK) & where, status.OVERFLOW, out["status"]).astype(np.int8)
+    failed = out["status"] != status.OK
+    for name, values in out.items():
+        if values.dtype.kind == "f":
+            out[name] = np.where(failed, np.nan, values)
+    out["verdict"] = np.where(failed, UNDECIDED, out["verdict"]).astype(np.int8)
 
 
 def measure(results, closed, marginal):
@@ -167,4 +173,4 @@ def _angle(sine, sine_error, cosine, cosine_error):
 def _spread(square, bar):
     """How far arcsin sqrt(square) moves within the bar: by its steepest slope there, at most by arcsin sqrt(bar)."""
     slope = 2 * np.sqrt(np.maximum(square - bar, 0) * np.maximum(1 - square - bar, 0))
-    return np.minimum(bar / slope, 0.5 * np.pi * np.sqrt(np.minimum(bar, 1)))
+    return np.fmin(bar / slope, 0.5 * np.pi * np.sqrt(np.minimum(bar, 1)))  # 0 / 0: no bar, no spread

@@ -29,7 +29,7 @@ SMALLEST, LARGEST = 0.2, 5.0
 # Zeros are counted by signs at the ends of steps: a step stays below this many radians of the fastest phase.
 LONGEST = 2.0
 STEP_LIMIT = 200_000
-DOUBT = 1.0
+DOUBT = 0.01
 
 
 @inline
@@ -54,7 +54,7 @@ def hill_step(z, h, slopes):
     p22, d22 = _sums(1.0, h, slopes[3], doubt)
     # one entry's estimate may vanish by symmetry (constant z): all four speak for each, in the scale of the phase
     rate = max(np.sqrt(size), 1.0 / h)
-    level = d11 + d22 + d12 * rate + d21 / rate
+    level = max(max(d11, d22), max(d12 * rate, d21 / rate))
     return p11, p12, p21, p22, level, level / rate, level * rate
 
 
@@ -72,12 +72,15 @@ def _sums(start, h, slopes, doubt):
 
 @inline
 def hill_walk(potential, p, row, table, span, tolerance, out):
-    """Integrate y'' + z y = 0 from 0 to `span`, z = potential(t, p, row, table), local errors below `tolerance`.
+    """Integrate y'' + z y = 0 from 0 to `span`, local errors below `tolerance`.
+
+    (z, size of the terms whose sum z is) = potential(t, p, row, table).
 
     Fills `out` as `survey.kernels.lanes.chain` does. False when STEP_LIMIT steps did not reach the end.
     """
     z, slopes = np.empty(STAGES), np.empty((4, STAGES))
-    t, steps, h = 0.0, 0, min(span, 0.1)
+    longest = 0.25 * span  # else a coefficient whose average rules escapes the estimate
+    t, steps, h = 0.0, 0, min(longest, 0.1)
     y1, v1, s1, t1, w1 = 1.0, 0.0, 0.0, 0.0, 0.0
     y2, v2, s2, t2, w2 = 0.0, 1.0, 0.0, 0.0, 0.0
     zeros1, zeros2, total = 0.0, 0.0, 0.0
@@ -85,17 +88,17 @@ def hill_walk(potential, p, row, table, span, tolerance, out):
         final = t + 1.01 * h >= span
         if final:
             h = span - t
-        size = 0.0
+        size, terms = 0.0, 0.0
         for i in range(STAGES):
-            z[i] = potential(t + C[i] * h, p, row, table)
-            size = max(size, abs(z[i]))
+            z[i], scale = potential(t + C[i] * h, p, row, table)
+            size, terms = max(size, abs(z[i])), max(terms, scale)
         wave = np.sqrt(size) + 1e-3
         p11, p12, p21, p22, d11, d12, d21 = hill_step(z, h, slopes)
         error = d11  # all four entries speak in it
         if error <= tolerance and h * wave <= 1.01 * LONGEST:
             # The stages pass through sums of size 60 that cancel; t itself is rounded.
-            r11, r12, r21 = rounding(4.0 * size, 4.0 * h)
-            matrix = (p11, p12, p21, p22, d11 + 4.0 * r11, d12 + r12, d21 + r21)
+            r11, r12, r21 = rounding(terms, 8.0 * h)
+            matrix = (p11, p12, p21, p22, d11 + 2.0 * r11, d12 + r12, d21 + r21)
             old1, old2 = y1, y2
             y1, v1, s1, t1, w1 = column(matrix, y1, v1, s1, t1, w1)
             y2, v2, s2, t2, w2 = column(matrix, y2, v2, s2, t2, w2)
@@ -112,7 +115,7 @@ def hill_walk(potential, p, row, table, span, tolerance, out):
         elif not error >= 0.0:
             return False
         h *= min(LARGEST, max(SMALLEST, 0.9 * (tolerance / (error + 1e-300)) ** 0.125))
-        h = min(h, LONGEST / wave)
+        h = min(h, longest, LONGEST / wave)
     return False
 
 

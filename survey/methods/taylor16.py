@@ -29,7 +29,7 @@ for _j in range(DEGREE + 1):
     TO_POWERS[: _j + 1, _j] = legendre.leg2poly([0.0] * _j + [1.0])
 WIDTH = DEGREE + 3
 TAIL, SIZE = DEGREE + 1, DEGREE + 2
-ROUNDING = 3.3e-16
+ROUNDING = 4.4e-16
 
 
 def hill_density(rtol):

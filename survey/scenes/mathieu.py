@@ -102,8 +102,9 @@ def sample(q, nodes, out):
 
 @inline
 def potential(t, a, row, table):
-    """z at any t, for the methods that choose their own steps."""
-    return a + excitation(t, row)
+    """z at any t and what its rounding is relative to, for the methods that choose their own steps."""
+    z = a + excitation(t, row)
+    return z, abs(a) + 2.0 * abs(row)
 
 
 @kernel

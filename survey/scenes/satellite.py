@@ -82,6 +82,7 @@ def solve(point, request):
         with np.errstate(all="ignore"):
             out[name.replace("exponent", "exponent_per_orbit")] = np.where(rho != 0, out[name] / orbits, np.nan)
     out["exponent_per_orbit_error"] += (PERIOD_ULPS + 4) * EPS * out["exponent_per_orbit"]
+    hill.overflow(out, out["exponent_per_orbit_error"] > hill.LARGEST)
     out["lyapunov"] = (row.lyapunov(rho) & ok).astype(np.int8)
     return {name: block.back(values) for name, values in out.items()}
 
@@ -140,12 +141,12 @@ class Motion:
         return (total <= 4 - 100 * EPS * size) & (self._nonnegative(rho) if self.oblate else True)
 
     def _nonnegative(self, rho):
-        """z >= 0 all along an oblate body's motion: the least of 2 w^2 + 2 rho w + rho^2 - k^2 over the range of w."""
+        """z > 0 all along an oblate body's motion: the least of 2 w^2 + 2 rho w + rho^2 - k^2 over the range of w."""
         k = self.k[:, None]
         low = np.where(self.rotates[:, None], k * self.kc[:, None], -k)
         w = np.clip(-rho / 2, low, k)
         least = 2 * w * w + 2 * rho * w + rho * rho - k * k
-        return least >= 16 * EPS * (rho * rho + k * k)
+        return least > 16 * EPS * (rho * rho + k * k)
 
 
 def _problem(row, rho):
