@@ -1,6 +1,7 @@
 """What users call from Python: run, evaluate, open, scenes."""
 
 import inspect
+import os
 
 import numpy as np
 import xarray as xr
@@ -33,7 +34,7 @@ def run(workflow, output=None, workers=None, scheduler=None, fresh=False):
     ------
     survey.BadInput, survey.Stopped (resumable): one line each.
     """
-    read = workflows.check if isinstance(workflow, dict) else workflows.read
+    read = workflows.read if isinstance(workflow, (str, os.PathLike)) else workflows.check
     checked = read(workflow, output=output)
     ds = engine.run(checked, workers, scheduler, fresh)
     draw(ds, checked)
@@ -93,6 +94,7 @@ def evaluate(scene, *, method="auto", rtol=1e-10, variables=None, **parameters):
     options = workflows.check_options(module, {key: value for key, value in parameters.items() if key in names})
     given = {key: _labelled(key, value) for key, value in parameters.items() if key not in names}
     used = workflows.check_parameters(module, scene, options, given)
+    variables = [variables] if isinstance(variables, str) else variables
     request = workflows.check_request(module, options, method, rtol, variables)
     given |= {key: xr.DataArray(float(p.default)) for key, p in used.items() if key not in given}
     _check_lone_values(used, given)
@@ -213,7 +215,8 @@ def scene(name):
         "options": {o.name: f"{o.long_name}: {' | '.join(o.choices)} (default {o.default})" for o in module.OPTIONS},
         "outputs": {o.name: _output_line(o) for o in module.OUTPUTS},
         "status": {key: sentence for key, (_, sentence) in status.table(module).items()},
-        "methods": {m: _method_line(m) for m in workflows.methods_of(module)},
+        "methods": {"auto": "the method of each region, chosen for you (default)"}
+        | {m: _method_line(m) for m in workflows.methods_of(module)},
         "references": list(module.REFERENCES),
     }
 
@@ -281,7 +284,7 @@ def _along(ds, key, chosen):
 
 
 def _parameter_line(p):
-    unit = "" if p.units == "1" else f" ({p.units})"
+    unit = " (no unit)" if p.units == "1" else f" ({p.units})"
     need = (
         f"default {p.default:g}"
         if p.default is not None
@@ -294,7 +297,7 @@ def _parameter_line(p):
 
 def _output_line(o):
     what = ", ".join(f"{name} {code}" for name, code in o.flags.items()) if o.flags is not None else ""
-    unit = "" if o.units == "1" else f" ({o.units})"
+    unit = "" if o.flags is not None or o.integer else " (no unit)" if o.units == "1" else f" ({o.units})"
     return "; ".join(part for part in (f"{o.long_name}{unit}", what, o.applies) if part) + _only(o)
 
 

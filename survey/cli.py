@@ -135,6 +135,8 @@ def plot(path, output, var):
     target = Path(output or (Path(path).with_suffix(".png") if not var else f"{path.removesuffix('.nc')}_{var}.png"))
     try:
         figures.save(ds, target, var)
+    except BadInput:
+        raise
     except (OSError, ValueError) as error:
         raise BadInput(f"{target}: cannot draw to it ({error}); name a .png, .pdf or .svg file with -o") from None
     out.print(str(target), markup=False)

@@ -55,7 +55,7 @@ def describe(grid, scene, name, request, arrays):
         own = dims + output.dims
         variables[output.name] = (own, arrays[output.name], _attributes(output))
         if output.dtype.kind == "f":
-            bar = {"long_name": f"error bound of the {output.long_name}", "units": output.units}
+            bar = {"long_name": f"error bound of {output.name}", "units": output.units}
             bar |= {"coverage_content_type": "qualityInformation", "symbol": rf"\delta {output.symbol or output.name}"}
             variables[f"{output.name}_error"] = (own, arrays[f"{output.name}_error"], bar)
     variables["status"] = (dims, arrays["status"], _status_attributes(scene))

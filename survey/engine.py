@@ -4,11 +4,13 @@ import hashlib
 import itertools
 import json
 import os
+import shutil
 import time
 from math import prod
 
 import dask
 import numpy as np
+import psutil
 from dask.callbacks import Callback
 
 from survey import store
@@ -83,6 +85,7 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
     `progress(done, total, reused)` is called as blocks finish. Raises BadInput, Damaged or Stopped.
     """
     started = time.time()
+    _refuse_too_large(workflow)
     scheduler = _client(scheduler) if scheduler else None
     blocks = blocks_of(workflow)
     with store.Blocks(workflow.path, fingerprint(workflow), fresh) as kept:
@@ -112,7 +115,6 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
 def plan(workflow):
     """What a run would do: points, blocks, bytes, method, estimated seconds. No kernel is called."""
     scene, request, grid = workflow.scene, workflow.request, workflow.grid
-    table = layout(scene, request).values()
     seconds = grid.points * seconds_per_point(scene, request, grid)
     return {
         "scene": workflow.name,
@@ -120,7 +122,7 @@ def plan(workflow):
         "axes": {name: f"{size} values" for name, size in grid.sizes.items()},
         "points": grid.points,
         "blocks": len(blocks_of(workflow)),
-        "bytes": grid.points * sum(dtype.itemsize * prod(extra) for dtype, _, extra in table),
+        "bytes": grid.points * bytes_per_point(scene, request),
         "method": request.method,
         "rtol": request.rtol,
         "variables": ", ".join(name for name in layout(scene, request)),
@@ -128,6 +130,25 @@ def plan(workflow):
         "threads": cpus(),
         "estimated_seconds": float(f"{seconds / cpus():.2g}"),
     }
+
+
+def _refuse_too_large(workflow):
+    """Raise BadInput if the map does not fit into this machine's memory or onto the disk of its output."""
+    grid, scene, request = workflow.grid, workflow.scene, workflow.request
+    needed = grid.points * bytes_per_point(scene, request)
+    memory = psutil.virtual_memory().total
+    disk = shutil.disk_usage(workflow.path.parent).free
+    for room, what in ((memory, "memory"), (disk, "free disk")):
+        if needed > room:
+            raise BadInput(
+                f"{grid.points:,} points need {needed / 2**30:,.0f} GiB, and the machine has {room / 2**30:,.0f} GiB "
+                f"of {what}; take fewer points, or name fewer outputs in output.variables"
+            )
+
+
+def bytes_per_point(scene, request):
+    """Bytes of all variables at one point."""
+    return sum(dtype.itemsize * prod(extra) for dtype, _, extra in layout(scene, request).values())
 
 
 def label(workflow, arrays):

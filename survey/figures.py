@@ -13,7 +13,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from survey import modules, status
-from survey.dataset import counts
 from survey.errors import BadInput
 
 # after Okabe and Ito, safe for the colour-blind, the first two far apart in grey print too;
@@ -78,20 +77,15 @@ def _map(axes, ds, variable, state):
 
 def _verdicts(axes, x, y, variable, failed, outside):
     """A colour per flag; failed and outside points white and hatched; rare points ringed, so that they are seen."""
-    table = dict(
-        zip(variable.attrs["flag_meanings"].split(), np.atleast_1d(variable.attrs["flag_values"]), strict=True)
-    )
-    number = counts(variable)
-    palette = dict(zip([name for name in table if name != "undecided"], COLOURS, strict=False)) | {
-        "undecided": UNDECIDED
-    }
+    table = _flags(variable)
+    palette = _palette(table)
     codes = sorted(table.values())
     names = {code: name for name, code in table.items()}
     cmap = ListedColormap([palette.get(names[code], "#444444") for code in codes])
     edges = np.append(np.array(codes) - 0.5, codes[-1] + 0.5)
     shown = np.ma.masked_array(variable.values, failed | outside)
     axes.pcolormesh(x, y, shown.T, cmap=cmap, norm=BoundaryNorm(edges, cmap.N), shading="nearest", rasterized=True)
-    number["undecided"] = int((shown == table.get("undecided", -1)).sum())
+    number = {name: int((shown == code).sum()) for name, code in table.items()}
     handles = [
         Patch(
             facecolor=palette.get(names[code], "#444444"),
@@ -107,6 +101,19 @@ def _verdicts(axes, x, y, variable, failed, outside):
     _legend(axes, handles)
 
 
+def _flags(variable):
+    """{meaning: code} of a CF flag variable."""
+    codes = np.atleast_1d(variable.attrs["flag_values"])
+    return dict(zip(variable.attrs["flag_meanings"].split(), codes, strict=True))
+
+
+def _palette(table):
+    """A colour per meaning; "ok" takes that of stable."""
+    meant = [name for name in table if name not in ("undecided", "ok")]
+    first = [c for c in COLOURS if "ok" not in table or c != COLOURS[1]]
+    return {"undecided": UNDECIDED, "ok": COLOURS[1]} | dict(zip(meant, first, strict=False))
+
+
 def _marks(axes, x, y, where, label, colour="white"):
     """Show the points `where`: hatched where they fill an area, ringed where they are rare; their legend handle."""
     total = int(where.sum())
@@ -119,15 +126,30 @@ def _marks(axes, x, y, where, label, colour="white"):
         axes.plot(x.values[i], y.values[j], markersize=4, **ring)
         return [Line2D([], [], markersize=6, label=label, **ring)]
     if colour == "white":
-        if min(where.shape) > 1:
-            axes.contourf(x, y, where.T.astype(float), levels=[0.5, 1.5], colors="none", hatches=["xxx"])
+        # one more cell all round, or the hatching would end at the centres of the outermost cells
+        wide = np.pad(where.T.astype(float), 1, mode="edge")
+        axes.contourf(_widened(x.values), _widened(y.values), wide, levels=[0.5, 1.5], colors="none", hatches=["xxx"])
         return [Patch(facecolor="white", edgecolor="grey", hatch="xxx", label=label)]
     return [Patch(facecolor=colour, label=label)]
 
 
+def _widened(values):
+    """The coordinates with the outer edges of the first and the last cell."""
+    low, high = (0.5 * np.diff(values)[[0, -1]]) if values.size > 1 else (0.5, 0.5)
+    return np.concatenate([[values[0] - low], values, [values[-1] + high]])
+
+
 def _curve(axes, ds, variable, state):
     x = variable[variable.dims[0]]
-    axes.plot(x, variable, lw=1.2, color="#0072B2", label=variable.attrs.get("long_name", variable.name))
+    if "flag_values" in variable.attrs:
+        for height, (name, code) in enumerate(_flags(variable).items()):
+            here = x.values[variable.values == code]
+            axes.plot(here, np.full(here.size, height), "s", markersize=4, color=_palette(_flags(variable))[name])
+        names = [name.replace("_", " ") for name in _flags(variable)]
+        axes.set_yticks(range(len(names)), names, fontsize=8)
+    else:
+        label = textwrap.fill(variable.attrs.get("long_name", variable.name), 60)
+        axes.plot(x, variable, lw=1.2, color="#0072B2", label=label)
     if f"{variable.name}_error" in ds:
         bar = ds[f"{variable.name}_error"].isel({d: 0 for d in ds[variable.name].dims if d not in variable.dims})
         axes.fill_between(x, variable - bar, variable + bar, color="#56B4E9", alpha=0.5, lw=0, label="error bar")
@@ -135,14 +157,15 @@ def _curve(axes, ds, variable, state):
     if bad.any():
         axes.plot(x.values[bad], np.full(bad.sum(), axes.get_ylim()[0]), "x", color="#D55E00", label="no answer")
     axes.set(xlabel=_label(x), ylabel=_label(variable))
-    axes.legend(fontsize=8)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(fontsize=8)
     if _logarithmic(x):
         axes.set_xscale("log")
 
 
 def _legend(axes, handles):
-    below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.13), "ncols": min(4, len(handles))}
-    axes.legend(handles=handles, frameon=False, fontsize=8, **below)
+    columns = min(4, len(handles))
+    axes.figure.legend(handles=handles, frameon=False, fontsize=8, loc="outside lower center", ncols=columns)
 
 
 def _limits(shown):
@@ -160,16 +183,18 @@ def _label(variable):
     """`long name, symbol (unit)`."""
     symbol, units = variable.attrs.get("symbol", ""), variable.attrs.get("units", "1")
     text = variable.attrs.get("long_name", variable.name)
-    text += f", ${symbol}$" if symbol and symbol not in ("", text) else ""
+    text += f", ${symbol}$" if symbol and "flag_values" not in variable.attrs else ""
     text += "" if units in ("1", "") else f" ({units})"
-    return "\n".join(textwrap.wrap(text, 48, break_long_words=False))
+    return textwrap.fill(text, 42, break_long_words=False)
 
 
 def _title(ds, variable):
     """The survey's title, what is drawn, and the numbers that are fixed and not zero."""
     lines = [ds.attrs.get("title", ""), variable.attrs.get("long_name", variable.name)]
-    fixed = [c for c in ds.coords.values() if c.ndim == 0 and c.dtype.kind == "f" and float(c) != 0]
-    numbers = ", ".join(f"${c.attrs.get('symbol') or c.name} = {float(c):.6g}$" for c in fixed)
+    fixed = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind == "f"]
+    fixed = [c for c in fixed if c.name in ds.dims or float(c) != 0]
+    of = {c.name: f" (1 of {ds.sizes[c.name]})" for c in fixed if c.name in ds.dims}
+    numbers = ", ".join(f"${c.attrs.get('symbol') or c.name} = {float(c):.6g}${of.get(c.name, '')}" for c in fixed)
     lines[1] += f" ({ds.attrs['options']})" if ds.attrs.get("options") else ""
     return "\n".join([*lines, numbers] if numbers else lines)
 

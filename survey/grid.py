@@ -64,6 +64,10 @@ def _even_cuts(length, piece):
 
 def coordinates(start, stop, num, spacing="linear"):
     """`num` float64 coordinates from `start` to `stop`, both ends exact; `spacing` is "linear" or "log"."""
+    if num == 1 and start != stop:
+        raise BadInput(f"num = 1 leaves no room for stop = {stop:g}; give num >= 2, or a bare number")
+    if num > 1 and start == stop:
+        raise BadInput(f"start and stop are both {start:g}, with num = {num}; give a bare number, or another stop")
     if spacing == "log":
         if not (start > 0 and stop > 0):
             raise BadInput(f"start = {start:g}, stop = {stop:g} with spacing = 'log': both must be positive")
@@ -77,10 +81,10 @@ def check_axis(key, values):
         raise BadInput(f"{key}: an axis needs at least one value; give values or num >= 1")
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size:
-        raise BadInput(f"{key}: value {bad[0] + 1} is {values[bad[0]]}; every value must be a finite number")
+        raise BadInput(f"{key}: value {bad[0] + 1} is {values[bad[0]]:g}; every value must be a finite number")
     steps = np.diff(values)
     same = np.flatnonzero(steps == 0)
     if same.size:
-        raise BadInput(f"{key}: {values[same[0]]!r} occurs twice; give each value once")
+        raise BadInput(f"{key}: {float(values[same[0]])!r} occurs twice; give each value once")
     if steps.size and not (np.all(steps > 0) or np.all(steps < 0)):
         raise BadInput(f"{key}: the values go up and down; sort them")

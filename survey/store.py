@@ -163,8 +163,8 @@ def write(ds, path):
 def load(path):
     """The complete dataset in `path`, in memory and the file closed; raises BadInput or Damaged."""
     path = Path(path)
-    if not path.is_file():
-        raise BadInput(f"{path}: there is no such file; name the netCDF file that survey run wrote")
+    if not _digest_holds(path):
+        raise Damaged(f"{path}: the file's bits differ from the digest in {path.name}.sha256; run the workflow again")
     try:
         ds = xr.load_dataset(path, engine="netcdf4")
     except (OSError, RuntimeError, ValueError) as error:
@@ -179,12 +179,6 @@ def load(path):
 def check(path):
     """Sentences that say what is wrong with the file (none if it is sound): digest, reading, counts, status."""
     beside = Path(f"{path}.sha256")
-    if not Path(path).is_file():
-        raise BadInput(f"{path}: there is no such file; name the netCDF file that survey run wrote")
-    with open(path, "rb") as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
-    if beside.exists() and digest not in beside.read_text():
-        return [f"{path}: the file's bits differ from the digest in {beside.name}"]
     ds = load(path)
     complaints = [] if beside.exists() else [f"{path}: there is no digest {beside.name} beside it"]
     again = count(ds.copy())
@@ -201,6 +195,16 @@ def check(path):
         if np.isinf(ds[name].values.reshape(*bad.shape, -1)[~bad]).any():
             complaints.append(f"{path}: {name} is infinite where status is ok")
     return complaints
+
+
+def _digest_holds(path):
+    """Has the file at `path` the bits of the digest beside it (or no digest)? Raises BadInput if there is no file."""
+    beside = Path(f"{path}.sha256")
+    if not path.is_file():
+        what = "is a folder" if path.is_dir() else "there is no such file"
+        raise BadInput(f"{path}: {what}; name the netCDF file that survey run wrote")
+    with open(path, "rb") as file:
+        return not beside.exists() or hashlib.file_digest(file, "sha256").hexdigest() in beside.read_text()
 
 
 def _holder():

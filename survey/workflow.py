@@ -2,11 +2,13 @@
 
 import os
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
+import tomli_w
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError
 
 import survey.methods
@@ -16,6 +18,7 @@ from survey.errors import BadInput
 from survey.grid import Grid, check_axis, coordinates
 from survey.scene import Request, exists
 
+MOST = 10**8  # coordinates on one axis
 Number = Annotated[float, Field(allow_inf_nan=False)]
 
 
@@ -26,7 +29,7 @@ class Table(BaseModel):
 class Spread(Table):
     start: Number
     stop: Number
-    num: Annotated[int, Field(ge=1, le=10**9)]
+    num: Annotated[int, Field(ge=1, le=MOST)]
     spacing: Literal["linear", "log"] = "linear"
 
 
@@ -36,7 +39,7 @@ class Listed(Table):
 
 def _axis_kind(value):
     if isinstance(value, dict):
-        return "values" if "values" in value else "spread"
+        return "values" if set(value) == {"values"} else "spread"
     return "number"
 
 
@@ -48,7 +51,7 @@ Axis = Annotated[
 
 class Solver(Table):
     method: str = "auto"
-    rtol: Annotated[float, Field(gt=0, lt=1)] = 1e-10
+    rtol: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False)] = 1e-10
 
 
 class Output(Table):
@@ -93,24 +96,29 @@ def read(path, overrides=(), output=None):
         raise BadInput(f"{path}: this is not TOML ({error})") from None
     for override in overrides:
         _apply(data, override)
-        text += f"\n# --set {override}"
+    if overrides:
+        changes = "".join(f" --set {override}" for override in overrides)
+        text = f"# {path.name}{changes}\n\n{tomli_w.dumps(data)}"
     return check(data, text, output, default_path=path.with_suffix(".nc").name)
 
 
 def check(data, text="", output=None, default_path="survey.nc"):
-    """The checked Workflow of the mapping `data` (a parsed workflow file)."""
+    """The checked Workflow of the mapping `data` (a parsed workflow file); `text` is what it was parsed from."""
+    if not isinstance(data, Mapping):
+        raise BadInput(f"{data!r} is neither the path of a workflow file nor a mapping with its tables")
     try:
         file = File.model_validate(data)
     except ValidationError as error:
         raise BadInput(_one_line(error)) from None
     scene = modules.load(survey.scenes, file.scene, "scene")
     name = file.scene
-    options = check_options(scene, file.options)
+    options = check_options(scene, file.options, "options.")
     given = {key: _values(f"axes.{key}", axis) for key, axis in file.axes.items()}
-    parameters = check_parameters(scene, name, options, given)
+    parameters = check_parameters(scene, name, options, given, "axes.")
     for key, values in given.items():
         _check_domain(parameters[key], values)
-    request = check_request(scene, options, file.solver.method, file.solver.rtol, file.output.variables)
+    solver = file.solver
+    request = check_request(scene, options, solver.method, solver.rtol, file.output.variables, ("solver.", "output."))
     for figure in file.output.figures:
         if figure not in request.variables:
             raise BadInput(f"output.figures: {modules.unknown('variable', figure, sorted(request.variables))}")
@@ -124,31 +132,35 @@ def check(data, text="", output=None, default_path="survey.nc"):
         request=request,
         path=check_path(next(path for path in (output, file.output.path, default_path) if path is not None)),
         figures=tuple(file.output.figures),
-        text=text,
+        text=text or tomli_w.dumps(data),
     )
 
 
-def check_options(scene, given):
-    """Every option of the scene with its value; raises BadInput for an unknown option or value."""
+def check_options(scene, given, table=""):
+    """Every option of the scene with its value; raises BadInput, with the keys of `table`, for an unknown one."""
     known = {option.name: option for option in scene.OPTIONS}
     for key, value in given.items():
         if key not in known:
-            raise BadInput(modules.unknown("option", key, sorted(known)))
+            if key in {p.name for p in scene.PARAMETERS}:
+                raise BadInput(f"{table}{key} is a parameter, not an option; put it under [axes]")
+            raise BadInput(f"{table}{key}: {modules.unknown('option', key, sorted(known))}")
         if str(value) not in known[key].choices:
-            raise BadInput(modules.unknown(f"value of option {key}:", str(value), list(known[key].choices)))
+            raise BadInput(f"{table}{key}: {modules.unknown('value', str(value), list(known[key].choices))}")
     return {name: str(given.get(name, option.default)) for name, option in known.items()}
 
 
-def check_parameters(scene, name, options, given):
+def check_parameters(scene, name, options, given, table=""):
     """{name: Parameter} in use, given ones first; raises BadInput for one that is unknown, missing or said twice."""
     known = {p.name: p for p in scene.PARAMETERS if exists(p, options)}
     replaced = {}
     for key in given:
         if key not in known:
-            raise BadInput(modules.unknown(f"parameter of {name}", key, list(known)))
+            if key in {option.name for option in scene.OPTIONS}:
+                raise BadInput(f"{table}{key} is an option of {name}, not a parameter; put it under [options]")
+            raise BadInput(f"{table}{key}: {modules.unknown(f'parameter of {name}', key, list(known))}")
         original = known[key].instead_of or key
         if original in replaced:
-            raise BadInput(f"{replaced[original]} and {key} say the same thing; give only one of them")
+            raise BadInput(f"{table}{replaced[original]} and {table}{key} say the same thing; give only one of them")
         replaced[original] = key
     used = {key: known[key] for key in given}
     for key, parameter in known.items():
@@ -158,23 +170,23 @@ def check_parameters(scene, name, options, given):
             others = [p.name for p in known.values() if p.instead_of == key]
             instead = f" (or {', '.join(others)} instead)" if others else ""
             raise BadInput(
-                f"axes.{key} is missing: {name} needs {parameter.long_name}{instead}; add an axis or a number"
+                f"{table}{key} is missing: {name} needs {parameter.long_name}{instead}; add an axis or a number"
             )
         used[key] = parameter
     return used
 
 
-def check_request(scene, options, method, rtol, variables):
+def check_request(scene, options, method, rtol, variables, tables=("", "")):
     """The Request; raises BadInput for an unknown method or variable, or an rtol outside (0, 1)."""
     serving = methods_of(scene)
     if method != "auto" and method not in serving:
-        raise BadInput(f"solver.method: {modules.unknown('method', method, ['auto', *serving])}")
+        raise BadInput(f"{tables[0]}method: {modules.unknown('method', method, ['auto', *serving])}")
     if isinstance(rtol, bool) or not isinstance(rtol, (int, float)) or not 0 < rtol < 1:
-        raise BadInput(f"solver.rtol = {rtol!r}: it must lie between 0 and 1, such as 1e-10")
+        raise BadInput(f"{tables[0]}rtol = {rtol!r}: it must lie between 0 and 1, such as 1e-10")
     outputs = [output.name for output in scene.OUTPUTS if exists(output, options)]
     for variable in variables or ():
         if variable not in outputs:
-            raise BadInput(f"output.variables: {modules.unknown('variable', variable, outputs)}")
+            raise BadInput(f"{tables[1]}variables: {modules.unknown('variable', variable, outputs)}")
     return Request(options, method, float(rtol), frozenset(outputs if variables is None else variables))
 
 
@@ -249,7 +261,9 @@ def _apply(data, override):
         value = tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
         value = value.strip()
-    *tables, last = key.strip().split(".")
+    *tables, last = (part.strip() for part in key.split("."))
+    if not all([*tables, last]):
+        raise BadInput(f"--set {override!r}: the key has an empty part; write it as axes.k.num=40")
     for table in tables:
         data = data.setdefault(table, {})
         if not isinstance(data, dict):
@@ -258,16 +272,21 @@ def _apply(data, override):
 
 
 def _one_line(error):
-    """The first complaint of pydantic as one line: key, value, what is allowed."""
-    first = error.errors()[0]
+    """The first complaint of pydantic (an unknown key before a missing one) as one line: key, value, allowed."""
+    first = min(error.errors(), key=lambda complaint: complaint["type"] != "extra_forbidden")
     tag = 2 if first["loc"][0] == "axes" else None  # pydantic names the kind of axis after the axis
     key = ".".join(str(part) for i, part in enumerate(first["loc"]) if i != tag)
     more = "" if error.error_count() == 1 else f" (and {error.error_count() - 1} more)"
+    if first["type"] == "extra_forbidden" and first["loc"][-1] == "values":
+        return f"{key} stands beside other keys; give values alone, or start, stop and num"
     if first["type"] == "extra_forbidden":
         return f"unknown key {key}{_nearest(first['loc'])}{more}"
     if first["type"] == "missing":
         return f"{key} is missing; add it to the workflow{more}"
-    return f"{key} = {first['input']!r}: {first['msg'][0].lower()}{first['msg'][1:]}{more}"
+    if key.startswith("axes.") and isinstance(first["input"], list):
+        return f"{key} is a list; write {key.removeprefix('axes.')} = {{ values = [...] }}{more}"
+    said = first["msg"].partition(" or instance of")[0].replace("dictionary", "table")
+    return f"{key} = {first['input']!r}: {said[0].lower()}{said[1:]}{more}"
 
 
 def _nearest(loc):

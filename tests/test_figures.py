@@ -31,8 +31,8 @@ def toy():
 def test_the_legend_counts_every_kind_of_point(toy):
     figure = figures.draw(toy)
     axes = figure.axes[0]
-    labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert labels == ["unstable (500)", "stable (1,499)", "undecided (1)", "failed (100)", "outside the domain (1)"]
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels == ["unstable (499)", "stable (1,399)", "undecided (1)", "failed (100)", "outside the domain (1)"]
     assert axes.get_xlabel() == "modulus, $k$" and axes.get_ylabel() == r"ratio, $\rho$ (rad)"
     assert axes.get_title().startswith("A toy map") and axes.get_yscale() == "log"
     assert [line.get_xydata().shape[0] for line in axes.lines] == [1, 1]  # rare points are ringed
@@ -41,7 +41,7 @@ def test_the_legend_counts_every_kind_of_point(toy):
 
 def test_undecided_is_not_counted_where_the_point_failed(toy):
     toy.verdict[30:, 40:] = -1
-    labels = [text.get_text() for text in figures.draw(toy).axes[0].get_legend().get_texts()]
+    labels = [text.get_text() for text in figures.draw(toy).legends[0].get_texts()]
     assert "undecided (1)" in labels
     plt.close("all")
 
@@ -59,6 +59,20 @@ def test_any_variable_can_be_drawn(surveyed, tmp_path, name):
     figures.save(ds, tmp_path / "map.png", name)
     figures.save(ds.isel(t=-1), tmp_path / "curve.png", name)
     assert all((tmp_path / file).read_bytes()[:4] == b"\x89PNG" for file in ("map.png", "curve.png"))
+
+
+def test_a_third_axis_is_named_with_its_place(surveyed):
+    ds = survey.open(surveyed).expand_dims(d=[1.0, 2.0], axis=2)
+    figure = figures.draw(ds, "w")
+    assert "= 1$ (1 of 2)" in figure.axes[0].get_title()
+    plt.close(figure)
+
+
+def test_a_row_of_verdicts_is_drawn_by_its_names(toy):
+    figure = figures.draw(toy.isel(rho=0))
+    names = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    assert names == ["undecided", "unstable", "stable", "marginal"]
+    plt.close(figure)
 
 
 def test_a_single_number_has_no_figure(surveyed):

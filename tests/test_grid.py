@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from survey.errors import BadInput
@@ -60,8 +60,17 @@ def test_shared_and_reordered_dimensions_are_aligned():
     st.sampled_from(["linear", "log"]),
 )
 def test_coordinates_have_exact_ends_and_the_right_number(start, stop, num, spacing):
+    assume(start != stop)
     values = coordinates(start, stop, num, spacing)
     assert (values[0], values[-1], values.size) == (start, stop, num)
+
+
+def test_one_value_has_no_room_for_two_ends_nor_two_for_one():
+    with pytest.raises(BadInput, match="num = 1"):
+        coordinates(0.0, 1.0, 1)
+    with pytest.raises(BadInput, match="start and stop are both"):
+        coordinates(0.5, 0.5, 3)
+    assert coordinates(0.5, 0.5, 1) == [0.5]
 
 
 def test_log_coordinates_need_positive_ends():

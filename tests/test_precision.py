@@ -56,8 +56,9 @@ def test_a_wrong_value_or_verdict_shows_in_the_chart(quick):
     assert error > 0.9 and wrong >= 4
 
 
-def test_a_missing_folder_or_chart_is_refused(tmp_path):
-    with pytest.raises(BadInput, match="no such folder"):
-        precision.write("satellite", tmp_path / "nowhere")
+def test_a_folder_that_cannot_be_or_a_missing_chart_is_refused(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(BadInput, match="cannot make this folder"):
+        precision.write("satellite", tmp_path / "file" / "below")
     with pytest.raises(BadInput, match="unknown scene 'satelite'"):
         precision.write("satelite", tmp_path)

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import survey
 from survey import workflow
 from survey.errors import BadInput
 
@@ -60,7 +61,7 @@ def test_defaults_are_filled_in():
         (["axes.rho.values=[1.0, 3.0, 2.0]"], ["axes.rho", "sort"]),
         (["axes.k.spacing=cubic"], ["axes.k.spacing = 'cubic'", "'linear' or 'log'"]),
         (["axes.k.start=0.0", "axes.k.spacing=log"], ["axes.k", "positive"]),
-        (["axes.one_minus_k=0.5"], ["k and one_minus_k", "same thing"]),
+        (["axes.one_minus_k=0.5"], ["axes.k and axes.one_minus_k", "same thing"]),
         (["scene=satelite"], ["unknown scene 'satelite'", "'satellite'"]),
         (["solver.method=taylor61"], ["solver.method", "unknown method 'taylor61'", "'taylor16'"]),
         (["solver.rtol=0"], ["solver.rtol = 0", "greater than 0"]),
@@ -74,6 +75,16 @@ def test_defaults_are_filled_in():
         (["title=3"], ["title = 3", "string"]),
         (["axes.k.num.more=3"], ["num is a value"]),
         (["axes"], ["--set 'axes'", "KEY=VALUE"]),
+        (["axes..k=3"], ["--set 'axes..k=3'", "empty part"]),
+        (["axes.k=[0.1, 0.2]"], ["axes.k is a list", "values = [...]"]),
+        (["axes.rho.num=3"], ["axes.rho.values stands beside", "values alone"]),
+        (["axes.k.stop=0.0"], ["axes.k", "both 0"]),
+        (["axes.k.num=1"], ["axes.k", "num = 1", "bare number"]),
+        (["axes.k.num=1000000000"], ["axes.k.num = 1000000000", "100000000"]),
+        (["axes.body=1.0"], ["axes.body is an option", "[options]"]),
+        (["options.k=0.5"], ["options.k is a parameter", "[axes]"]),
+        (["solver=3"], ["solver = 3", "valid table"]),
+        (["solver.rtol=nan"], ["solver.rtol = nan", "finite"]),
     ],
 )
 def test_bad_input_is_refused_in_one_line(overrides, words):
@@ -95,6 +106,8 @@ def test_a_missing_axis_is_named(key):
 def test_missing_tables_are_named():
     with pytest.raises(BadInput, match="axes is missing"):
         workflow.check({"scene": "satellite"})
+    with pytest.raises(BadInput, match="neither the path"):
+        survey.run(3)
 
 
 def test_what_is_not_toml_or_not_there_is_refused(tmp_path):
@@ -119,7 +132,9 @@ def test_overrides_take_toml_or_strings_and_are_recorded(tmp_path):
     path.write_text(GOOD)
     read = workflow.read(path, ["axes.k.num=7", "title=A new name", "solver.rtol=1e-6"], tmp_path / "o.nc")
     assert (read.grid.sizes["k"], read.title, read.request.rtol) == (7, "A new name", 1e-6)
-    assert "# --set axes.k.num=7" in read.text
+    assert read.text.startswith("# map.toml --set axes.k.num=7 --set title=A new name")
+    again = workflow.check(tomllib.loads(read.text))
+    assert (again.grid.sizes, again.title, again.request) == (read.grid.sizes, read.title, read.request)
     assert read.path == tmp_path / "o.nc"
 
 

@@ -53,10 +53,12 @@ class Record:
 def write(scene, directory, peers=False, say=lambda line: None):
     """Measure and write precision_SCENE.json, .csv and .png into `directory`; returns the three paths."""
     directory = Path(directory)
-    if not directory.is_dir():
-        raise BadInput(f"-o {str(directory)!r}: there is no such folder; make it first")
     modules.load(scenes, scene, "scene")
     case = modules.load(folder, scene, "scene with a precision chart")
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadInput(f"-o {str(directory)!r}: cannot make this folder ({error.strerror})") from None
     records = measure(scene, case, peers, say)
     paths = [directory / f"precision_{scene}.{kind}" for kind in ("json", "csv", "png")]
     machine = provenance() | {"system": platform.platform(), "threads": 1}

@@ -36,7 +36,7 @@ FAMILY = "hill"
 STATUS = {}
 AUDIT = "dop853"
 REFERENCES = (
-    "I. S. Astakhova, Transformation of satellite equations to Hill's equation (errata: satellite.md beside this file)",
+    "I. S. Astakhova, Transformation of satellite equations to Hill's equation (errata: survey/scenes/satellite.md)",
     "H. M. Yehia, S. Z. Nabih (2013), AJIS 2(6), 127: the same problem, a chart by inertia ratio and amplitude",
     "W. Magnus, S. Winkler, Hill's Equation, Interscience 1966",
 )
