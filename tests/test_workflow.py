@@ -78,7 +78,7 @@ def test_defaults_are_filled_in():
         (["axes..k=3"], ["--set 'axes..k=3'", "empty part"]),
         (["axes.k=[0.1, 0.2]"], ["axes.k is a list", "values = [...]"]),
         (["axes.rho.num=3"], ["axes.rho.values stands beside", "values alone"]),
-        (["axes.k.stop=0.0"], ["axes.k", "both 0"]),
+        (["axes.k.stop=0.1"], ["axes.k", "both 0.1"]),
         (["axes.k.num=1"], ["axes.k", "num = 1", "bare number"]),
         (["axes.k.num=1000000000"], ["axes.k.num = 1000000000", "100000000"]),
         (["axes.body=1.0"], ["axes.body is an option", "[options]"]),
