@@ -96,6 +96,14 @@ class Request:
     method: str = "auto"
     rtol: float = 1e-10
     variables: frozenset[str] = frozenset()
+    lines: Mapping[str, tuple[int, float, float]] = field(default_factory=dict)
+
+    def line(self, name):
+        """(number, least, greatest) of the whole axis of the parameter `name`, which no other shares; or None.
+
+        What depends on an axis depends on the whole of it, never on the block: so a block's bits are always the same.
+        """
+        return self.lines.get(name)
 
 
 def exists(item, options):

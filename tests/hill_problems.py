@@ -6,6 +6,7 @@ from importlib import resources
 import numpy as np
 from mpmath import mp, mpf
 
+from survey.kernels.hill import NO_RULE, ON_EDGE
 from survey.measures import hill
 from survey.scene import Request
 from survey.scenes import satellite
@@ -20,7 +21,8 @@ def cases(*groups):
 
 def solve(body="prolate", method="auto", rtol=1e-10, **point):
     point = {name: np.atleast_1d(np.asarray(values, dtype=float)) for name, values in point.items()}
-    return satellite.solve(point, Request({"body": body}, method, rtol))
+    names = frozenset(output.name for output in satellite.OUTPUTS)
+    return satellite.solve(point, Request({"body": body}, method, rtol, names))
 
 
 def truth(case):
@@ -51,19 +53,20 @@ def rotation(discriminant, zeros):
 def mathieu(a, q, half_periods=1):
     """y'' + (a - 2 q cos 2t) y = 0 as a Hill problem: rows of q, lanes of a."""
     half = half_periods * np.pi / 2
-    a, q = np.broadcast_arrays(np.atleast_2d(np.asarray(a, dtype=float)), np.asarray(q, dtype=float)[:, None])
+    a, q = np.atleast_2d(np.asarray(a, dtype=float)), np.asarray(q, dtype=float)
+    a = np.broadcast_to(a, (q.size, a.shape[1]))
 
     def sample(rows, nodes, steps):
         t = (np.arange(steps)[:, None] + nodes) * (half / steps)
         out = np.ones((rows.size, steps, 2, nodes.size))
-        out[:, :, 0] = -2 * q[rows, 0][:, None, None] * np.cos(2 * t)
+        out[:, :, 0] = -2 * q[rows][:, None, None] * np.cos(2 * t)
         return out
 
+    rule = np.where((q[:, None] == 0) & (np.sqrt(abs(a)) == np.rint(np.sqrt(abs(a)))) & (a >= 0), ON_EDGE, NO_RULE)
+    rule = np.where((q[:, None] == 0) & (np.sqrt(abs(a)) == np.rint(np.sqrt(abs(a)))) & (a >= 0), ON_EDGE, NO_RULE)
     return hill.Problem(
-        p=np.ascontiguousarray(a), span=np.full(len(a), half), frequency=np.sqrt(abs(a) + 2 * abs(q)),
-        rate=np.full(len(a), 2.0), c2=0.0, sample=sample, closed=np.zeros(a.shape, bool),
-        constant=np.full(a.shape, np.nan),
-        marginal=(q == 0) & (a >= 0) & (np.sqrt(abs(a)) == np.rint(np.sqrt(abs(a)))),
+        p=np.ascontiguousarray(a), span=np.full(len(a), half), rate=np.full(len(a), 2.0), c2=0.0, sample=sample,
+        bound=np.column_stack([2 * abs(q), np.ones(len(a)), np.zeros(len(a))]), rule=rule.astype(np.int8),
     )  # fmt: skip
 
 

@@ -17,32 +17,29 @@ from survey.kernels.jit import inline
 
 TILE = 64
 STATE = 13
-# What a chain gives per point: y1, y1', y2, y2' at the end, their error bounds, and the zeros of y1 and y2.
-RESULTS = 10
 WORST = 300.0
 
 
 @inline
-def chain(row, step, width, samples, c2, h, p, ends, out):
-    """Compose `step` over all rows; row r owns the lanes ends[r-1]..ends[r] of `p` and of `out`.
+def chain(row, step, width, samples, c2, h, p, order, starts, ends, out):
+    """Compose `step` over all rows; row r owns the points order[starts[r] : ends[r]] of `p` and of `out`.
 
     `row(samples, coefficients)` reduces the samples (2, nodes) of a step to (2, width) coefficients, once per row;
     `step(coefficients, c2, p, h)` gives P11, P12, P21, P22 and the bounds D11 = D22, D12, D21.
     """
-    state = np.empty((STATE, TILE))
+    state, lanes = np.empty((STATE, TILE)), np.empty(TILE)
     coefficients = np.empty((samples.shape[1], 2, width))
-    first = 0
     for r in range(len(ends)):
         for n in range(samples.shape[1]):
             row(samples[r, n], coefficients[n])
-        while first < ends[r]:
+        for first in range(starts[r], ends[r], TILE):
             count = min(TILE, ends[r] - first)
+            for i in range(count):
+                lanes[i] = p[order[first + i]]
             _start(state, count)
-            lanes = p[first : first + count]
             for n in range(samples.shape[1]):
                 _advance(step, coefficients[n], c2, lanes, h[r], state, count)
-            _finish(state, count, samples.shape[1], out[first : first + count])
-            first += count
+            _finish(state, count, samples.shape[1], order[first : first + count], out)
 
 
 @inline
@@ -92,11 +89,12 @@ def column(matrix, y, v, s, t, w):
 
 
 @inline
-def _finish(state, count, steps, out):
+def _finish(state, count, steps, places, out):
     for i in range(count):
-        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = state[0, i], state[1, i], state[2, i], state[3, i]
-        bars(state[4, i], state[6, i], state[7, i], state[9, i], steps, state[12, i], out[i])
-        out[i, 8], out[i, 9] = state[10, i], state[11, i]
+        own = out[places[i]]
+        own[0], own[1], own[2], own[3] = state[0, i], state[1, i], state[2, i], state[3, i]
+        bars(state[4, i], state[6, i], state[7, i], state[9, i], steps, state[12, i], own)
+        own[8], own[9] = state[10, i], state[11, i]
 
 
 @inline

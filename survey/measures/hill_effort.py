@@ -8,115 +8,127 @@ go through one kernel call of at most about a second.
 import numpy as np
 
 from survey import status
+from survey.kernels.hill import RESULTS, UNTRIED, levels, segments
+from survey.measures.hill_answers import Answers
 
-# 4, 6, 8, 12, 16, 24, ...: even, so that a half period's middle falls between steps.
-LADDER = np.array([(4, 6)[i % 2] << (i // 2) for i in range(30)])
-STEP_BUDGET = int(LADDER[-1])
+# Even, so that a half period's middle falls between steps; four to the octave from 8 on.
+LADDER = np.array([4, 6, *((4 + i % 4) << (i // 4 + 1) for i in range(57))])
+# The place of twice as many steps.
+HARDER = np.searchsorted(LADDER, 2 * LADDER)
 # Adaptive methods: the local tolerance at effort i is 10^(-3 - i / 2).
 TOLERANCES = 10.0 ** (-3 - 0.5 * np.arange(25))
 # Keep a kernel call below about a second and its samples in tens of megabytes.
 CALL_WORK = 8_000_000
 CALL_SAMPLES = 2_000_000
-UNTRIED = -1
 # Radians of the fastest phase per step, at most: zeros are counted by signs at the ends of steps.
 LONGEST = 2.8
 
 
-def solve(problem, method, rtol, judge):
-    """Outputs (R, L) and status codes.
-
-    `judge(points, results)` gives the outputs of the points, by name, and which of them deserve more effort.
-    """
+def solve(problem, method, asked, answers, where=None):
+    """Answer the points `where` (N, bool; all by default) of the problem, in place."""
     adaptive = getattr(method, "ADAPTIVE", False)
     run, top = (_walk, len(TOLERANCES) - 1) if adaptive else (_chain, len(LADDER) - 1)
-    effort = _first_tolerance(problem, rtol) if adaptive else _first_steps(problem, method, rtol)
-    code = np.where(effort == UNTRIED, status.INVALID_PARAMETERS, status.OK)
-    code[effort > top] = status.STEP_LIMIT
-    points = np.nonzero(code == status.OK)
-    results, reached = run(problem, method, points, effort[points])
-    code[points] = np.where(reached, status.OK, status.STEP_LIMIT)
-    outputs, late = judge(points, results)
-    # From here on `left` counts places in `points` and `results`.
-    left = np.nonzero(late & reached)[0]
-    while (left := left[effort[points][left] + 2 <= top]).size:
-        these = tuple(index[left] for index in points)
-        effort[these] += 2
-        new, reached = run(problem, method, these, effort[these])
-        old_bar, new_bar = _bar(results[left]), _bar(new)
-        better = reached & (new_bar < old_bar)
-        new_outputs, late = judge(these, new)
-        for name, values in outputs.items():
-            values[left[better]] = new_outputs[name][better]
-        results[left[better]] = new[better]
+    level = _first_tolerance(problem, asked.rtol) if adaptive else _first_steps(problem, method, asked.rtol)
+    flat = level.reshape(-1)
+    if where is None:
+        places, own, rule = None, answers, problem.rule
+    else:
+        flat[~where] = UNTRIED
+        places = np.flatnonzero(where)
+        own, rule = Answers(places.size), None if problem.rule is None else problem.rule.reshape(-1)[places]
+    mine = flat if places is None else flat[places]
+    own.status[mine == UNTRIED] = status.INVALID_PARAMETERS
+    own.status[mine > top] = status.STEP_LIMIT
+    results = np.empty((flat.size, RESULTS))
+    run(problem, method, level, results)
+    results = results if places is None else results[places]
+    own.status[(own.status == status.OK) & np.isnan(results[:, 8])] = status.STEP_LIMIT
+    own.judge(results, None if rule is None else rule.reshape(-1), asked)
+    _harder(problem, method, asked, own, places, level, results, run, top)
+    if places is not None:
+        answers.put(places, own)
+
+
+def _harder(problem, method, asked, own, places, level, results, run, top):
+    """Solve the late points again with twice the effort, as long as that halves their bars."""
+    left = np.flatnonzero(own.late)
+    new = None
+    while left.size:
+        there = left if places is None else places[left]
+        effort = level.reshape(-1)[there]
+        effort = effort + 2 if run is _walk else HARDER[effort]
+        left, there, effort = left[effort <= top], there[effort <= top], effort[effort <= top]
+        level[:] = UNTRIED
+        level.reshape(-1)[there] = effort
+        new = np.empty((level.size, RESULTS)) if new is None else new
+        run(problem, method, level, new)
+        old_bar, new_bar = _bar(results[left]), _bar(new[there])
+        better = new_bar < old_bar
+        results[left[better]] = new[there[better]]
+        again = Answers(left.size)
+        again.judge(results[left], None if problem.rule is None else problem.rule.reshape(-1)[there], asked)
+        own.put(left, again)
         # Truncation falls by a factor of 4 or more each time; where the bar does not halve, rounding rules.
-        left = left[late & reached & (new_bar < 0.5 * old_bar)]
-    return {name: _spread(values, points, code.shape) for name, values in outputs.items()}, code
-
-
-def _spread(values, points, shape):
-    """Values of the points in their places; NaN, or 0 for integers, elsewhere."""
-    if values.size == np.prod(shape):
-        return values.reshape(shape)
-    whole = np.full(shape, np.nan if values.dtype.kind == "f" else 0, dtype=values.dtype)
-    whole[points] = values
-    return whole
+        left = left[again.late & (new_bar < 0.5 * old_bar)]
 
 
 def _bar(results):
     """One figure for the four bars; a point without a finite one has an infinite bar."""
-    bar = results[..., 4:8].max(axis=-1)
+    bar = results[:, 4:8].max(axis=-1)
     return np.where(np.isfinite(bar), bar, np.inf)
 
 
 def _first_steps(problem, method, rtol):
     """The ladder's first step number that the method asks for; beyond the ladder where it has none; UNTRIED at NaN."""
     phase, distance = method.hill_density(rtol)
-    density = np.maximum(max(phase, 1 / LONGEST) * problem.frequency, distance * problem.rate[:, None])
-    steps = problem.span[:, None] * density
-    return np.where(np.isnan(steps), UNTRIED, np.searchsorted(LADDER, steps))
+    level = np.empty(problem.p.shape, np.int64)
+    levels(problem.p, problem.bound, problem.span, problem.rate, max(phase, 1 / LONGEST), distance, LADDER, level)
+    return level
 
 
 def _first_tolerance(problem, rtol):
+    level = np.empty(problem.p.shape, np.int64)
+    levels(problem.p, problem.bound, problem.span, problem.rate, 0.0, 0.0, LADDER, level)
     first = int(np.searchsorted(-TOLERANCES, -max(0.01 * rtol, TOLERANCES[-1])))
-    valid = np.isfinite(problem.span[:, None] * problem.frequency)
-    return np.where(valid, first, UNTRIED)
+    return np.where(level == UNTRIED, UNTRIED, first)
 
 
-def _walk(problem, method, points, effort):
-    rows, lanes = points
-    return problem.walk(rows, lanes, TOLERANCES[effort])
+def _walk(problem, method, level, out):
+    """Points of their own, each with its tolerance; results are NaN (zeros too) where the end was not reached."""
+    places = np.flatnonzero(level >= 0)
+    rows = places // level.shape[1]
+    results, reached = problem.walk(rows, problem.p.reshape(-1)[places], TOLERANCES[level.reshape(-1)[places]])
+    out[places] = np.where(reached[:, None], results, np.nan)
 
 
-def _chain(problem, method, points, effort):
+def _chain(problem, method, level, out):
     """Points solved by fixed steps: those with the same number of steps together, in calls of bounded work."""
-    rows, lanes = points
-    out = np.empty((rows.size, 10))
-    for level in np.nonzero(np.bincount(effort))[0]:
-        steps = int(LADDER[level])
-        chosen = np.nonzero(effort == level)[0]
-        for part in _parts(rows[chosen], steps, len(method.NODES)):
-            index = chosen[part]
-            out[index] = _call(problem, method, rows[index], problem.p[rows[index], lanes[index]], steps)
-    return out, np.ones(rows.size, bool)
+    most = level.shape[0] * min(level.shape[1], len(LADDER)) + 1
+    order = np.empty(level.size, np.int64)
+    rows, of_level, starts = (np.empty(most, np.int64) for _ in range(3))
+    count = segments(level, len(LADDER) - 1, order, rows, of_level, starts)
+    rows, of_level, starts, ends = rows[:count], of_level[:count], starts[:count], starts[1 : count + 1]
+    nodes, p = np.array(method.NODES), problem.p.reshape(-1)
+    for at in np.flatnonzero(np.bincount(of_level)):
+        steps, own = int(LADDER[at]), of_level == at
+        for used, first, last in _calls(rows[own], starts[own], ends[own], steps, nodes.size):
+            samples = problem.sample(used, nodes, steps)
+            method.hill_chain(samples, problem.c2, problem.span[used] / steps, p, order, first, last, out)
 
 
-def _parts(rows, steps, nodes):
-    """Slices of the points (sorted by row), each one kernel call."""
+def _calls(rows, starts, ends, steps, nodes):
+    """(rows, starts, ends) of the segments in parts, each one kernel call; long segments are cut."""
     most = max(1, CALL_WORK // steps)
-    most_rows = max(1, CALL_SAMPLES // (steps * nodes))
-    order = np.concatenate([[0], np.cumsum(np.diff(rows) != 0)])
-    first = 0
+    pieces = -(-(ends - starts) // most)
+    if pieces.max(initial=1) > 1:
+        number = np.arange(pieces.sum()) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+        rows, ends = np.repeat(rows, pieces), np.repeat(ends, pieces)
+        starts = np.repeat(starts, pieces) + most * number
+        ends = np.minimum(ends, starts + most)
+    total = np.cumsum(ends - starts)
+    most_rows, first = max(1, CALL_SAMPLES // (steps * nodes)), 0
     while first < rows.size:
-        last = min(first + most, int(np.searchsorted(order, order[first] + most_rows)))
-        yield slice(first, last)
+        done = total[first - 1] if first else 0
+        last = max(first + 1, min(first + most_rows, int(np.searchsorted(total, done + most, "right"))))
+        yield rows[first:last], starts[first:last], ends[first:last]
         first = last
-
-
-def _call(problem, method, rows, p, steps):
-    ends = np.append(np.nonzero(np.diff(rows))[0] + 1, rows.size)
-    used = rows[ends - 1]
-    nodes = np.array(method.NODES)
-    samples = problem.sample(used, nodes, steps)
-    out = np.empty((p.size, 10))
-    method.hill_chain(samples, problem.c2, problem.span[used] / steps, p, ends, out)
-    return out

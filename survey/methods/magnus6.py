@@ -86,5 +86,5 @@ def hill_step(f, c2, p, h):
 
 
 @kernel
-def hill_chain(samples, c2, h, p, ends, out):
-    chain(samples_only, hill_step, WIDTH, samples, c2, h, p, ends, out)
+def hill_chain(samples, c2, h, p, order, starts, ends, out):
+    chain(samples_only, hill_step, WIDTH, samples, c2, h, p, order, starts, ends, out)

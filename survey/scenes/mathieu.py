@@ -15,6 +15,7 @@ from math import cos, pi
 import numpy as np
 
 from survey import status
+from survey.kernels.hill import NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE, RESULTS
 from survey.kernels.jit import inline, kernel
 from survey.measures import hill
 from survey.measures.rows import Rows
@@ -44,42 +45,49 @@ def cost(options, sizes):
 
 
 def solve(point, request):
-    """All outputs of a block (see `survey.scenes`)."""
+    """All outputs of a block that the request wants (see `survey.scenes`)."""
     block = Rows((point["q"],), point["a"])
-    q, a = block.per_row(point["q"]), block.per_point(point["a"])
-    out = hill.solve(_problem(q, a), request.method, request.rtol, request.variables)
+    problem = _problem(block.per_row(point["q"]), block.per_point(point["a"]), request.line("a"))
+    out = hill.solve(problem, request.method, request.rtol, request.variables)
     out["period"] = np.where(out["status"] == status.OK, pi, np.nan)
     out["period_error"] = 1.3e-16 + 0.0 * out["period"]  # pi is rounded
     return {name: block.back(values) for name, values in out.items()}
 
 
-def _problem(q, a):
+def _problem(q, a, line=None):
     def samples(used, nodes, steps):
         out = np.empty((used.size, steps, 2, nodes.size))
         sample(q[used], nodes, out)
         return out
 
-    def walk(used, lanes, tolerance):
-        out = np.full((used.size, 10), np.nan)
-        reached = np.zeros(used.size, dtype=np.bool_)
-        walk_points(q[used], a[used, lanes], tolerance, out, reached)
+    def walk(used, p, tolerance):
+        out, reached = np.full((used.size, RESULTS), np.nan), np.zeros(used.size, np.bool_)
+        walk_points(q[used], p, tolerance, out, reached)
         return out, reached
 
-    free = q[:, None] == 0
-    with np.errstate(invalid="ignore"):
-        whole = np.rint(np.sqrt(abs(a)))
+    rule, constant = _rules(q, a)
     return hill.Problem(
         p=a,
         span=np.where(np.isfinite(q), HALF_PERIOD, np.nan),
-        frequency=np.sqrt(abs(a) + 2 * abs(q[:, None])),
+        bound=np.column_stack([2 * abs(q), np.ones(q.size), np.zeros(q.size)]),
         rate=np.full(q.size, 2.0),
         c2=0.0,
         sample=samples,
         walk=walk,
-        closed=free & (a > 0),
-        constant=np.where(free, a, np.nan),
-        marginal=free & (a == whole * whole),
+        rule=rule,
+        constant=constant,
+        line=line,
     )
+
+
+def _rules(q, a):
+    """At q = 0, z = a: no unstable side for a > 0, and |D| = 2 at squares."""
+    free = q[:, None] == 0
+    if not free.any():
+        return None, None
+    whole = np.rint(np.sqrt(abs(a)))
+    rule = np.where(a == whole * whole, ON_EDGE, np.where(a > 0, NO_UNSTABLE_SIDE, NO_RULE))
+    return np.where(free, rule, NO_RULE).astype(np.int8), np.where(free, a, np.nan)
 
 
 @inline

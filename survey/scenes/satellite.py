@@ -24,6 +24,7 @@ import numpy as np
 
 from survey import status
 from survey.kernels.elliptic import MEANS
+from survey.kernels.hill import LARGEST, NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE, RESULTS
 from survey.kernels.jit import kernel
 from survey.kernels.satellite import complete_integrals, potential, sample, tabulate
 from survey.measures import hill
@@ -68,23 +69,33 @@ def cost(options, sizes):
 
 
 def solve(point, request):
-    """All outputs of a block (see `survey.scenes`)."""
+    """All outputs of a block that the request wants (see `survey.scenes`)."""
     shared, rho = moduli(point), point["rho"]
     block = Rows(shared, rho)
     row = Motion(*(block.per_row(values) for values in shared), request.options["body"] == "oblate")
-    rho = block.per_point(rho)
-    out = hill.solve(_problem(row, rho), request.method, request.rtol, request.variables)
+    problem = _problem(row, block.per_point(rho), request.line("rho"))
+    wanted = set(request.variables) | ({"exponent"} if "exponent_per_orbit" in request.variables else set())
+    out = hill.solve(problem, request.method, request.rtol, wanted)
     ok = out["status"] == status.OK
-    out["period"] = np.where(ok, row.period[:, None], np.nan)
-    out["period_error"] = PERIOD_ULPS * EPS * out["period"]
-    orbits = abs(rho) * out["period"] / (2 * pi)
-    for name in ("exponent", "exponent_error"):
-        with np.errstate(all="ignore"):
-            out[name.replace("exponent", "exponent_per_orbit")] = np.where(rho != 0, out[name] / orbits, np.nan)
-    out["exponent_per_orbit_error"] += (PERIOD_ULPS + 4) * EPS * out["exponent_per_orbit"]
-    hill.overflow(out, out["exponent_per_orbit_error"] > hill.LARGEST)
-    out["lyapunov"] = (row.lyapunov(rho) & ok).astype(np.int8)
+    if "period" in wanted:
+        out["period"] = np.where(ok, row.period[:, None], np.nan)
+        out["period_error"] = PERIOD_ULPS * EPS * out["period"]
+    if "exponent_per_orbit" in wanted:
+        _per_orbit(out, abs(problem.p) * (row.period[:, None] / (2 * pi)))
+    if "lyapunov" in wanted:
+        out["lyapunov"] = (row.lyapunov(problem.p) & ok).astype(np.int8)
     return {name: block.back(values) for name, values in out.items()}
+
+
+def _per_orbit(out, orbits):
+    """Add the exponent per orbital revolution, `orbits` of which make a period; it does not apply where none do."""
+    orbits = np.where(orbits > 0, orbits, np.nan)
+    out["exponent_per_orbit"], out["exponent_per_orbit_error"] = (
+        out["exponent"] / orbits,
+        out["exponent_error"] / orbits,
+    )
+    out["exponent_per_orbit_error"] += (PERIOD_ULPS + 4) * EPS * out["exponent_per_orbit"]
+    hill.overflow(out, out["exponent_per_orbit_error"] > LARGEST)
 
 
 def moduli(point):
@@ -149,8 +160,7 @@ class Motion:
         return least > 16 * EPS * (rho * rho + k * k)
 
 
-def _problem(row, rho):
-    k = row.k[:, None]
+def _problem(row, rho, line):
     rows = np.column_stack([row.k, row.kc, row.period / 2, np.full(row.k.size, float(row.oblate))])
 
     def samples(used, nodes, steps):
@@ -158,34 +168,42 @@ def _problem(row, rho):
         sample(rows[used], nodes, out)
         return out
 
-    def walk(used, lanes, tolerance):
-        out = np.full((used.size, 10), np.nan)
-        reached = np.zeros(used.size, dtype=np.bool_)
-        walk_points(rows[used], rho[used, lanes], tolerance, out, reached)
+    def walk(used, p, tolerance):
+        out, reached = np.full((used.size, RESULTS), np.nan), np.zeros(used.size, np.bool_)
+        walk_points(rows[used], p, tolerance, out, reached)
         return out, reached
 
+    rule, constant = _rules(row, rho)
     return hill.Problem(
         p=rho,
         span=row.period / 2,
-        frequency=np.sqrt((abs(rho) + k) ** 2 + 1),
+        bound=np.column_stack([row.k**2 + 1, 2 * row.k, np.ones(row.k.size)]),  # (|rho| + k)^2 + 1
         rate=row.rate,
         c2=1.0,
         sample=samples,
         walk=walk,
-        closed=np.broadcast_to(k == 0, rho.shape),
-        constant=np.where(k == 0, rho * rho + (0.0 if row.oblate else 1.0), np.nan),
-        marginal=_marginal(row, rho),
+        rule=rule,
+        constant=constant,
+        line=line,
+        even=not row.rotates.any(),
     )
 
 
-def _marginal(row, rho):
-    """|D| = 2 exactly: rho = 0; or k = 0 and 2 rho an integer (oblate).
+def _rules(row, rho):
+    """What exact rules say of the points: no unstable side at k = 0, |D| = 2 at rho = 0; and z at k = 0.
 
-    For the prolate body 2 sqrt(1 + rho^2) = n asks for (2 rho)^2 = n^2 - 4, two squares of integers (a binary
-    fraction whose square is an integer is one) that differ by 4: only rho = 0.
+    At k = 0 also |D| = 2 where 2 rho is an integer (oblate). For the prolate body 2 sqrt(1 + rho^2) = n asks for
+    (2 rho)^2 = n^2 - 4, two squares of integers (a binary fraction whose square is an integer is one) that differ by
+    4: only rho = 0.
     """
+    at_rest = row.k[:, None] == 0
+    if not at_rest.any() and rho.all():
+        return None, None
     whole = (2 * rho == np.rint(2 * rho)) if row.oblate else False
-    return (rho == 0) | ((row.k[:, None] == 0) & whole)
+    edge = (rho == 0) | (at_rest & whole)
+    rule = np.where(edge, ON_EDGE, np.where(at_rest, NO_UNSTABLE_SIDE, NO_RULE)).astype(np.int8)
+    constant = np.where(at_rest, rho * rho + (0.0 if row.oblate else 1.0), np.nan) if at_rest.any() else None
+    return rule, constant
 
 
 @kernel

@@ -7,6 +7,7 @@ from mpmath import mp, mpf
 
 from survey import status
 from survey.measures import hill
+from survey.measures.hill_answers import Answers, Asked
 from survey.methods import taylor16
 
 METHODS = ["taylor16", "magnus6", "rk4"]
@@ -63,8 +64,9 @@ def test_exponent_and_rotation_number_agree_with_the_discriminant():
 
 def test_verdict_is_undecided_where_the_bar_holds_both_answers():
     results = np.array([[1e-9, 1.0, 1e-9, 1.0, *[1e-8] * 4, 0, 0], [0.1, -9.9, 0.1, 0.1, *[1e-8] * 4, 1, 0]])
-    out = hill.measure(results, np.zeros(2, bool), np.zeros(2, bool))
-    assert list(out["verdict"]) == [hill.UNDECIDED, hill.STABLE]
+    answers = Answers(2)
+    answers.judge(results, None, Asked(1e-10, np.ones(7, bool)))
+    assert list(answers.verdict) == [hill.UNDECIDED, hill.STABLE] and answers.late.all()
 
 
 def test_failures_are_values():

@@ -18,12 +18,16 @@ from survey.measures import hill_effort
 from survey.methods import magnus6, rk4, taylor16
 
 HILL = [n for n in modules.names(survey.methods) if "hill" in modules.load(survey.methods, n, "method").SERVES]
+ZERO = np.zeros(1, np.int64)
 PROBLEM = mathieu([np.linspace(8.0, 16.0, 8)], [5.0], half_periods=8)
 
 
 def fixed(method, steps):
     """Results of a chain of `steps` equal steps of the method."""
-    return hill_effort._call(PROBLEM, method, np.zeros(8, int), PROBLEM.p[0], steps)
+    out = np.empty((8, 10))
+    samples = PROBLEM.sample(np.zeros(1, int), np.array(method.NODES), steps)
+    method.hill_chain(samples, 0.0, PROBLEM.span / steps, PROBLEM.p[0], np.arange(8), ZERO, ZERO + 8, out)
+    return out
 
 
 EXACT = fixed(taylor16, 512)
@@ -38,7 +42,7 @@ def step(method, start, h, parts=1):
         a, b, c, d, *_ = method.hill_step(samples[0, 0, 0] + 1.0, h, np.empty((4, 12)))
         return np.array([a, c, b, d])
     out = np.empty((1, 10))
-    method.hill_chain(samples, 0.0, np.array([h / parts]), np.ones(1), np.array([1]), out)
+    method.hill_chain(samples, 0.0, np.array([h / parts]), np.ones(1), ZERO, ZERO, ZERO + 1, out)
     return out[0, :4]
 
 
@@ -68,12 +72,13 @@ def test_the_reference_of_the_order_is_right():
 def bars_hold(method):
     """With q = 5, over four periods: at every effort, each true error lies within its bar."""
     held = []
-    for steps in hill_effort.LADDER[3:17]:
-        if (PROBLEM.frequency * PROBLEM.span[:, None] / steps > hill_effort.LONGEST).any():
+    frequency = np.sqrt(np.max(PROBLEM.bound[0, 0] + PROBLEM.p))
+    for steps in hill_effort.LADDER[4:33]:
+        if frequency * PROBLEM.span[0] / steps > hill_effort.LONGEST:
             continue
         out = fixed(method, int(steps))
         held.append(np.all(abs(out[:, :4] - EXACT[:, :4]) <= out[:, 4:8] + EXACT[:, 4:8]))
-    return all(held) and len(held) > 5
+    return all(held) and len(held) > 10
 
 
 CHAINS = [n for n in HILL if not getattr(modules.load(survey.methods, n, "method"), "ADAPTIVE", False)]
@@ -91,8 +96,8 @@ def wrong_step(f, c2, p, h):
 
 
 @kernel
-def wrong_chain(samples, c2, h, p, ends, out):
-    chain(rk4.samples_only, wrong_step, rk4.WIDTH, samples, c2, h, p, ends, out)
+def wrong_chain(samples, c2, h, p, order, starts, ends, out):
+    chain(rk4.samples_only, wrong_step, rk4.WIDTH, samples, c2, h, p, order, starts, ends, out)
 
 
 def test_the_checks_see_a_broken_method():

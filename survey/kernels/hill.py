@@ -1,0 +1,188 @@
+"""Arithmetic of Hill's question, point by point: how many steps, and what follows from the half-period factors.
+
+Results of a point are ten numbers: y1, y1', y2, y2' at T/2, their error bounds, and the zeros of y1, y2 in (0, T/2).
+Formulas: `survey.measures.hill`.
+"""
+
+from math import asinh, atan2, isfinite, pi, sqrt
+
+import numpy as np
+
+from survey.kernels.jit import inline, kernel
+
+RESULTS = 10
+EPS = 2.3e-16
+LARGEST = float(np.finfo(np.float32).max)  # bars are kept as float32
+UNDECIDED, UNSTABLE, STABLE, MARGINAL = -1, 0, 1, 2
+# What an exact rule says of a point.
+NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE = 0, 1, 2
+# Columns of `measure`, each followed by that of its error bound.
+FLOATS = ("discriminant", "y1", "y2", "dy1", "dy2", "exponent", "rotation_number")
+DISCRIMINANT, Y1, Y2, DY1, DY2, EXPONENT, ROTATION = range(0, 14, 2)
+UNTRIED = -1
+
+
+@kernel
+def levels(p, bound, span, rate, phase, distance, ladder, out):
+    """The ladder's first step number that gives every point `phase` steps per radian and `distance` times `rate`.
+
+    |z| <= bound[r, 0] + |p| bound[r, 1] + p^2 bound[r, 2] in row r of `p` and of `out`, which holds places in the
+    ladder: its length where no number is enough, UNTRIED where the point or its row is not finite.
+    """
+    top = len(ladder)
+    for r in range(p.shape[0]):
+        least = distance * rate[r] * span[r]
+        level = 0
+        for i in range(p.shape[1]):
+            size = abs(p[r, i])
+            frequency = sqrt(bound[r, 0] + size * (bound[r, 1] + size * bound[r, 2]))
+            steps = phase * frequency * span[r]
+            if not isfinite(steps + least):
+                out[r, i] = UNTRIED
+                continue
+            steps = max(steps, least)
+            while level < top and ladder[level] < steps:
+                level += 1
+            while level > 0 and ladder[level - 1] >= steps:
+                level -= 1
+            out[r, i] = level
+
+
+@kernel
+def segments(level, top, order, rows, of_level, starts):
+    """Points with a level in 0..top by row and level: their flat places in `order`; returns the number of segments.
+
+    Segment i is order[starts[i] : starts[i + 1]], all in row rows[i] and of level of_level[i].
+    """
+    counts = np.zeros(top + 2, np.int64)
+    count = place = 0
+    for r in range(level.shape[0]):
+        counts[:] = 0
+        for i in range(level.shape[1]):
+            if 0 <= level[r, i] <= top:
+                counts[level[r, i]] += 1
+        for at in range(top + 1):
+            if counts[at] > 0:
+                rows[count], of_level[count], starts[count] = r, at, place
+                place, counts[at] = place + counts[at], place
+                count += 1
+        for i in range(level.shape[1]):
+            at = level[r, i]
+            if 0 <= at <= top:
+                order[counts[at]] = r * level.shape[1] + i
+                counts[at] += 1
+    starts[count] = place
+    return count
+
+
+@kernel
+def measure(results, rule, wanted, rtol, overflow, floats, verdict, late, status):
+    """All that follows from `results` (N, 10): `floats` (14, N) with the bars, `verdict`, and who misses `rtol`.
+
+    Points whose `status` is not 0 are passed over; those that leave the range of floats get the status `overflow`.
+    `rule` (N, or empty) holds what exact rules say, `wanted` (7) which columns count for `late`.
+    """
+    for i in range(len(results)):
+        late[i] = False
+        verdict[i] = UNDECIDED
+        if status[i] != 0:
+            for c in range(len(floats)):
+                floats[c, i] = np.nan
+            continue
+        y1, dy1, y2, dy2 = results[i, 0], results[i, 1], results[i, 2], results[i, 3]
+        e1, de1, e2, de2 = results[i, 4], results[i, 5], results[i, 6], results[i, 7]
+        sine, sine_bar = _product(-dy1, y2, de1, e2)
+        cosine, cosine_bar = _product(y1, dy2, e1, de2)
+        said = decide(sine, sine_bar, cosine, cosine_bar, rule[i] if len(rule) > 0 else NO_RULE)
+        # D from 2 - 4 sin^2 or 4 cos^2 - 2, whichever has the smaller bar.
+        d = 2.0 - 4.0 * sine if sine_bar <= cosine_bar else 4.0 * cosine - 2.0
+        d_bar = 4.0 * min(sine_bar, cosine_bar) + 2.0 * EPS * (2.0 + abs(d))
+        if not (isfinite(d) and max(max(max(e1, e2), max(de1, de2)), d_bar) < LARGEST):
+            status[i] = overflow
+            for c in range(len(floats)):
+                floats[c, i] = np.nan
+            continue
+        verdict[i] = said
+        missed = said == UNDECIDED
+        if wanted[0]:
+            floats[DISCRIMINANT, i], floats[DISCRIMINANT + 1, i] = d, d_bar
+            missed |= not d_bar <= rtol * (1.0 + abs(d))
+        if wanted[1]:
+            floats[Y1, i], floats[Y1 + 1, i] = y1, e1
+            missed |= not e1 <= rtol * (1.0 + abs(y1))
+        if wanted[2]:
+            floats[Y2, i], floats[Y2 + 1, i] = y2, e2
+            missed |= not e2 <= rtol * (1.0 + abs(y2))
+        if wanted[3]:
+            floats[DY1, i], floats[DY1 + 1, i] = dy1, de1
+            missed |= not de1 <= rtol * (1.0 + abs(dy1))
+        if wanted[4]:
+            floats[DY2, i], floats[DY2 + 1, i] = dy2, de2
+            missed |= not de2 <= rtol * (1.0 + abs(dy2))
+        if wanted[5]:
+            by_sine = sine < cosine
+            x, bar = exponent(-sine if by_sine else -cosine, sine_bar if by_sine else cosine_bar, said)
+            floats[EXPONENT, i], floats[EXPONENT + 1, i] = x, bar
+            missed |= not bar <= rtol * (1.0 + x)
+        if wanted[6]:
+            x, bar = _rotation(sine, sine_bar, cosine, cosine_bar, said, results[i, 8] + results[i, 9])
+            floats[ROTATION, i], floats[ROTATION + 1, i] = x, bar
+            missed |= not bar <= rtol * (1.0 + x)
+        late[i] = missed
+
+
+@inline
+def _product(a, b, ea, eb):
+    """a b and its error bound, the rounding of the product included."""
+    return a * b, ea * abs(b) + eb * abs(a) + ea * eb + EPS * abs(a * b)
+
+
+@inline
+def decide(sine, sine_bar, cosine, cosine_bar, rule):
+    """The verdict: certain only when the bars exclude the other answer, or by an exact rule."""
+    if rule == ON_EDGE:
+        return MARGINAL
+    if sine < -sine_bar or cosine < -cosine_bar:
+        return UNSTABLE
+    if (sine > sine_bar and cosine > cosine_bar) or rule == NO_UNSTABLE_SIDE:
+        return STABLE
+    return UNDECIDED
+
+
+@inline
+def exponent(growth, bar, verdict):
+    """2 asinh sqrt(growth), growth = -sin^2 or -cos^2 of half the angle, and how far the bar can move it."""
+    if verdict == STABLE or verdict == MARGINAL:
+        return 0.0, 0.0
+    middle = _asinh(growth)
+    return middle, max(_asinh(growth + bar) - middle, middle - _asinh(growth - bar)) + 8.0 * EPS * middle
+
+
+@inline
+def _asinh(growth):
+    return 2.0 * asinh(sqrt(max(growth, 0.0)))
+
+
+@inline
+def _rotation(sine, sine_bar, cosine, cosine_bar, verdict, zeros):
+    """theta_total / (2 pi): `zeros` of y1, y2 in (0, T/2) give the band (notes, section 5); n / 2 exactly in gaps."""
+    odd = zeros % 2.0 == 1.0
+    if sine < 0.0 or cosine < 0.0:
+        value = 0.5 * (zeros + (1.0 if odd != (cosine < sine) else 0.0))
+    else:
+        half = atan2(sqrt(sine), sqrt(cosine)) / pi
+        value = 0.5 * (zeros + (1.0 - 2.0 * half if odd else 2.0 * half))
+    if verdict == MARGINAL:
+        return 0.5 * np.rint(2.0 * value), 0.0
+    if verdict == UNSTABLE:
+        return value, 0.0
+    bar = max(_spread(sine, sine_bar), _spread(cosine, cosine_bar)) / pi  # arctan2 of both is no worse than either
+    return value, max(bar, 4.0 * EPS * (1.0 + value))
+
+
+@inline
+def _spread(square, bar):
+    """How far arcsin sqrt(square) moves within the bar: by its steepest slope there, at most by arcsin sqrt(bar)."""
+    slope = 2.0 * sqrt(max(square - bar, 0.0) * max(1.0 - square - bar, 0.0))
+    most = 0.5 * pi * sqrt(min(bar, 1.0))
+    return min(bar / slope, most) if slope > 0.0 else most

@@ -1,0 +1,41 @@
+"""What is asked of the points of a Hill problem, and their answers as they come in."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from survey import status
+from survey.kernels import hill as kernels
+
+NONE = np.zeros(0, np.int8)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The accuracy asked for, |error| <= rtol (1 + |value|), of the columns `wanted` of `kernels.hill.FLOATS`."""
+
+    rtol: float
+    wanted: np.ndarray
+
+
+class Answers:
+    """`floats` (14, N; the wanted columns), `verdict`, `status`, and who is `late`: bars too wide."""
+
+    def __init__(self, size):
+        self.floats = np.empty((2 * len(kernels.FLOATS), size))
+        self.verdict = np.full(size, kernels.UNDECIDED, np.int8)
+        self.status = np.zeros(size, np.int8)
+        self.late = np.zeros(size, np.bool_)
+
+    def judge(self, results, rule, asked):
+        """Answer every point whose status is ok from its results (N, 10)."""
+        kernels.measure(
+            results, NONE if rule is None else rule, asked.wanted, asked.rtol, status.OVERFLOW,
+            self.floats, self.verdict, self.late, self.status,
+        )  # fmt: skip
+
+    def put(self, places, other, at=slice(None)):
+        """The answers of the points `places` are those of `other` at `at` (all of them by default, in that order)."""
+        self.floats[:, places] = other.floats[:, at]
+        self.verdict[places], self.late[places] = other.verdict[at], other.late[at]
+        self.status[places] = other.status[at]
