@@ -2,6 +2,7 @@
 
 import inspect
 import os
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
@@ -12,7 +13,7 @@ from survey import engine, modules, status, store
 from survey import workflow as workflows
 from survey.dataset import count, counts, describe, error_bars, layout
 from survey.errors import BadInput
-from survey.grid import Grid
+from survey.grid import Grid, line
 
 
 def run(workflow, output=None, workers=None, scheduler=None, fresh=False):
@@ -180,6 +181,10 @@ def _lazy(module, scene, request, given):
     """The same dataset, its values computed block by block when they are asked for."""
     table = layout(module, request)
     names = list(given)
+    alone = {
+        key: a for key, a in given.items() if a.ndim == 1 and sum(a.dims[0] in b.dims for b in given.values()) == 1
+    }
+    request = replace(request, lines={key: line(np.asarray(array)) for key, array in alone.items()})
 
     def solve(*arrays):
         shape = np.broadcast_shapes(*(array.shape for array in arrays))

@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import time
+from dataclasses import replace
 from math import prod
 
 import dask
@@ -39,7 +40,7 @@ def blocks_of(workflow):
 def solve_block(scene, request, grid, block):
     """The variables of `layout` in one block of the grid."""
     shape = tuple(len(range(*cut.indices(size))) for cut, size in zip(block, grid.shape, strict=True))
-    return solve_point(scene, request, grid.point(block), shape)
+    return solve_point(scene, replace(request, lines=grid.lines), grid.point(block), shape)
 
 
 def solve_point(scene, request, point, shape):

@@ -29,6 +29,16 @@ class Grid:
     def points(self):
         return prod(self.shape)
 
+    @property
+    def lines(self):
+        """{name: (number, least, greatest)} of the axes that one parameter has for itself."""
+        alone = {
+            name: dims[0]
+            for name, (dims, _) in self.parameters.items()
+            if len(dims) == 1 and sum(dims[0] in other for other, _ in self.parameters.values()) == 1
+        }
+        return {name: line(self.parameters[name][1]) for name in alone}
+
     def blocks(self, points_per_block):
         """Slices per dimension, row by row: the first dimensions are cut first, to at most `points_per_block`."""
         lengths, size = dict(self.sizes), self.points
@@ -53,6 +63,12 @@ class Grid:
             part = part.reshape([part.shape[order.index(dims.index(dim))] if dim in dims else 1 for dim in where])
             aligned[name] = part.copy()
         return aligned
+
+
+def line(values):
+    """(number, least, greatest) of the finite values of an axis."""
+    finite = values[np.isfinite(values)]
+    return values.size, float(finite.min(initial=np.inf)), float(finite.max(initial=-np.inf))
 
 
 def _even_cuts(length, piece):

@@ -7,7 +7,7 @@ Notes (scenes/satellite.md), section 1: z = (rho + w)^2 + g with g = dn^2 (PL), 
 
 import numpy as np
 
-from survey.kernels.elliptic import MEANS, complete, jacobi, means
+from survey.kernels.elliptic import LANES, MEANS, complete, jacobi, jacobi_lanes, means
 from survey.kernels.jit import inline, kernel
 
 
@@ -38,19 +38,29 @@ def motion(u, k, oblate, pairs, last):
 def sample(rows, nodes, out):
     """c0 = w^2 + g and c1 = 2 w at the `nodes` (fractions) of the steps of the half period: out[r, step, c, node]."""
     pairs = np.empty((2, MEANS))
-    steps = out.shape[1]
+    steps, width = out.shape[1], len(nodes)
+    lanes = np.empty((LANES, steps * width))
     for r in range(rows.shape[0]):
         k, kc, span, oblate = rows[r, 0], rows[r, 1], rows[r, 2], rows[r, 3] > 0.0
         last = means(kc, pairs)
+        scale = span / steps if k <= 1.0 else k * (span / steps)
         for n in range(steps):
-            for i in range(len(nodes)):
+            for i in range(width):
                 place = n + nodes[i]
                 # cn(2K - u) = -cn(u): the second half mirrors the first, where u has a smaller rounding error.
                 mirror = k <= 1.0 and 2.0 * place > steps
-                u = (steps - place if mirror else place) * span / steps
-                w, g = motion(u, k, oblate, pairs, last)
+                lanes[0, n * width + i] = (steps - place if mirror else place) * scale
+        jacobi_lanes(lanes, pairs, last)
+        for n in range(steps):
+            for i in range(width):
+                sn, cn, dn = lanes[1, n * width + i], lanes[2, n * width + i], lanes[3, n * width + i]
+                if k <= 1.0:
+                    w, g = k * cn, -(k * k) * sn * sn if oblate else dn * dn
+                    w = -w if 2.0 * (n + nodes[i]) > steps else w
+                else:
+                    w, g = k * dn, -sn * sn if oblate else cn * cn
                 out[r, n, 0, i] = w * w + g
-                out[r, n, 1, i] = -2.0 * w if mirror else 2.0 * w
+                out[r, n, 1, i] = 2.0 * w
 
 
 @inline

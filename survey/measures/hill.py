@@ -60,10 +60,10 @@ class Problem:
     line: tuple[int, float, float] | None = None
     even: bool = False
 
-    def at(self, rows, p):
-        """Other points `p` (one row for each of `rows`), of which nothing is known beforehand."""
+    def at(self, rows, p, rule=None):
+        """Points `p` (one row for each of `rows`) on their own, no axis, with what exact rules say of them."""
         return replace(
-            self, p=p, span=self.span[rows], bound=self.bound[rows], rate=self.rate[rows], rule=None, constant=None,
+            self, p=p, span=self.span[rows], bound=self.bound[rows], rate=self.rate[rows], rule=rule, constant=None,
             line=None, sample=lambda used, nodes, steps: self.sample(rows[used], nodes, steps),
             walk=self.walk and (lambda used, p, tolerance: self.walk(rows[used], p, tolerance)),
         )  # fmt: skip
@@ -75,7 +75,7 @@ def solve(problem, method, rtol, wanted=()):
     `method` is the name of a method, or "auto" (see `hill_auto`); effort grows until `rtol` is met or useless.
     """
     asked = Asked(rtol, np.array([name in wanted or not wanted for name in FLOATS]))
-    answers = Answers(problem.p.size)
+    answers = Answers(problem.p.size, asked)
     if method == "auto":
         hill_auto.solve(problem, asked, answers)
     else:

@@ -12,30 +12,36 @@ NONE = np.zeros(0, np.int8)
 
 @dataclass(frozen=True)
 class Asked:
-    """The accuracy asked for, |error| <= rtol (1 + |value|), of the columns `wanted` of `kernels.hill.FLOATS`."""
+    """The accuracy asked for, |error| <= rtol (1 + |value|), of the columns `wanted` of `kernels.hill.FLOATS`.
+
+    Points of a row that come `together` share the steps of the one that needs most, and so the row's samples.
+    """
 
     rtol: float
     wanted: np.ndarray
+    together: bool = False
 
 
 class Answers:
     """`floats` (14, N; the wanted columns), `verdict`, `status`, and who is `late`: bars too wide."""
 
-    def __init__(self, size):
+    def __init__(self, size, asked):
+        self.asked, self.columns = asked, np.flatnonzero(np.repeat(asked.wanted, 2))
         self.floats = np.empty((2 * len(kernels.FLOATS), size))
         self.verdict = np.full(size, kernels.UNDECIDED, np.int8)
         self.status = np.zeros(size, np.int8)
         self.late = np.zeros(size, np.bool_)
 
-    def judge(self, results, rule, asked):
+    def judge(self, results, rule):
         """Answer every point whose status is ok from its results (N, 10)."""
         kernels.measure(
-            results, NONE if rule is None else rule, asked.wanted, asked.rtol, status.OVERFLOW,
+            results, NONE if rule is None else rule, self.asked.wanted, self.asked.rtol, status.OVERFLOW,
             self.floats, self.verdict, self.late, self.status,
         )  # fmt: skip
 
     def put(self, places, other, at=slice(None)):
         """The answers of the points `places` are those of `other` at `at` (all of them by default, in that order)."""
-        self.floats[:, places] = other.floats[:, at]
+        for column in self.columns:
+            self.floats[column, places] = other.floats[column, at]
         self.verdict[places], self.late[places] = other.verdict[at], other.late[at]
         self.status[places] = other.status[at]

@@ -8,7 +8,7 @@ import numpy as np
 
 from survey import status
 from survey.kernels.hill import UNDECIDED
-from survey.measures import hill_effort
+from survey.measures import hill_dense, hill_effort
 from survey.measures.hill_answers import Answers
 from survey.methods import dop853, taylor16
 
@@ -18,17 +18,21 @@ EPS = 2.3e-16
 def solve(problem, asked, answers):
     """Answer every point of the problem, in place."""
     free = None if problem.constant is None else np.isfinite(problem.constant + problem.p).reshape(-1)
-    hill_effort.solve(problem, taylor16, asked, answers, None if free is None else ~free)
+    open_points = hill_dense.solve(problem, taylor16, asked, answers) if hill_dense.serves(problem, asked) else None
+    if free is not None:
+        open_points = ~free if open_points is None else open_points & ~free
+    if open_points is None or open_points.any():
+        hill_effort.solve(problem, taylor16, asked, answers, open_points)
     if free is not None:
         places = np.flatnonzero(free)
-        own = Answers(places.size)
+        own = Answers(places.size, asked)
         results = closed_form(problem.constant.reshape(-1)[places], problem.span[places // problem.p.shape[1]])
-        own.judge(results, None if problem.rule is None else problem.rule.reshape(-1)[places], asked)
+        own.judge(results, None if problem.rule is None else problem.rule.reshape(-1)[places])
         answers.put(places, own)
     left = (answers.status == status.OK) & (answers.verdict == UNDECIDED)
     left = left if free is None else left & ~free
     if left.any() and problem.walk is not None:
-        again = Answers(left.size)
+        again = Answers(left.size, asked)
         hill_effort.solve(problem, dop853, asked, again, left)
         decided = np.flatnonzero(left & (again.status == status.OK) & (again.verdict != UNDECIDED))
         answers.put(decided, again, decided)

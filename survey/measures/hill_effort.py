@@ -26,47 +26,59 @@ LONGEST = 2.8
 
 def solve(problem, method, asked, answers, where=None):
     """Answer the points `where` (N, bool; all by default) of the problem, in place."""
+    if where is not None:  # leave out the rows that have no such point
+        inside = where.reshape(problem.p.shape)
+        rows = np.flatnonzero(inside.any(axis=1))
+        rule = None if problem.rule is None else problem.rule[rows]
+        problem, places, where = (
+            problem.at(rows, problem.p[rows], rule),
+            np.flatnonzero(where),
+            inside[rows].reshape(-1),
+        )
     adaptive = getattr(method, "ADAPTIVE", False)
     run, top = (_walk, len(TOLERANCES) - 1) if adaptive else (_chain, len(LADDER) - 1)
     level = _first_tolerance(problem, asked.rtol) if adaptive else _first_steps(problem, method, asked.rtol)
+    if asked.together:
+        level = np.where(level == UNTRIED, UNTRIED, level.max(axis=1, keepdims=True))
     flat = level.reshape(-1)
-    if where is None:
-        places, own, rule = None, answers, problem.rule
-    else:
+    chosen = slice(None) if where is None else np.flatnonzero(where)
+    if where is not None:
         flat[~where] = UNTRIED
-        places = np.flatnonzero(where)
-        own, rule = Answers(places.size), None if problem.rule is None else problem.rule.reshape(-1)[places]
-    mine = flat if places is None else flat[places]
+    own = answers if where is None else Answers(chosen.size, asked)
+    rule = None if problem.rule is None else problem.rule.reshape(-1)[chosen]
+    mine = flat[chosen].copy()
     own.status[mine == UNTRIED] = status.INVALID_PARAMETERS
     own.status[mine > top] = status.STEP_LIMIT
     results = np.empty((flat.size, RESULTS))
     run(problem, method, level, results)
-    results = results if places is None else results[places]
+    results = results[chosen]
     own.status[(own.status == status.OK) & np.isnan(results[:, 8])] = status.STEP_LIMIT
-    own.judge(results, None if rule is None else rule.reshape(-1), asked)
-    _harder(problem, method, asked, own, places, level, results, run, top)
-    if places is not None:
+    own.judge(results, rule)
+    _harder(problem, method, own, rule, chosen, mine, level, results, run, top)
+    if where is not None:
         answers.put(places, own)
 
 
-def _harder(problem, method, asked, own, places, level, results, run, top):
-    """Solve the late points again with twice the effort, as long as that halves their bars."""
-    left = np.flatnonzero(own.late)
-    new = None
+def _harder(problem, method, own, rule, chosen, effort, level, results, run, top):
+    """Solve the late points again with twice the effort, as long as that halves their bars.
+
+    `effort` (changed) and `results` are those of the answers `own`, which lie at `chosen` in the flat problem.
+    """
+    left, new = np.flatnonzero(own.late), None
+    places = np.arange(level.size)[chosen]
     while left.size:
-        there = left if places is None else places[left]
-        effort = level.reshape(-1)[there]
-        effort = effort + 2 if run is _walk else HARDER[effort]
-        left, there, effort = left[effort <= top], there[effort <= top], effort[effort <= top]
+        effort[left] = effort[left] + 2 if run is _walk else HARDER[effort[left]]
+        left = left[effort[left] <= top]
+        there = places[left]
         level[:] = UNTRIED
-        level.reshape(-1)[there] = effort
+        level.reshape(-1)[there] = effort[left]
         new = np.empty((level.size, RESULTS)) if new is None else new
         run(problem, method, level, new)
         old_bar, new_bar = _bar(results[left]), _bar(new[there])
         better = new_bar < old_bar
         results[left[better]] = new[there[better]]
-        again = Answers(left.size)
-        again.judge(results[left], None if problem.rule is None else problem.rule.reshape(-1)[there], asked)
+        again = Answers(left.size, own.asked)
+        again.judge(results[left], None if rule is None else rule[left])
         own.put(left, again)
         # Truncation falls by a factor of 4 or more each time; where the bar does not halve, rounding rules.
         left = left[again.late & (new_bar < 0.5 * old_bar)]

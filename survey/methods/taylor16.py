@@ -27,6 +27,8 @@ TO_LEGENDRE = np.array([(j + 0.5) * _WEIGHTS * legendre.Legendre.basis(j)(_POINT
 TO_POWERS = np.zeros((DEGREE + 1, DEGREE + 1))
 for _j in range(DEGREE + 1):
     TO_POWERS[: _j + 1, _j] = legendre.leg2poly([0.0] * _j + [1.0])
+# By columns, so that products with them become vector code.
+LEGENDRE_COLUMNS, POWER_COLUMNS = TO_LEGENDRE.T.copy(), TO_POWERS.T.copy()
 WIDTH = DEGREE + 3
 TAIL, SIZE = DEGREE + 1, DEGREE + 2
 ROUNDING = 4.4e-16
@@ -46,14 +48,13 @@ def hill_row(samples, coefficients):
         size = 0.0
         for i in range(DEGREE + 1):
             size = max(size, abs(samples[c, i]))
-            series[i] = 0.0
-            for j in range(DEGREE + 1):
-                series[i] += TO_LEGENDRE[i, j] * samples[c, j]
-        for i in range(DEGREE + 1):
-            power = 0.0
-            for j in range(i, DEGREE + 1):
-                power += TO_POWERS[i, j] * series[j]
-            coefficients[c, i] = power
+            series[i] = coefficients[c, i] = 0.0
+        for j in range(DEGREE + 1):
+            for i in range(DEGREE + 1):
+                series[i] += LEGENDRE_COLUMNS[j, i] * samples[c, j]
+        for j in range(DEGREE + 1):
+            for i in range(j + 1):
+                coefficients[c, i] += POWER_COLUMNS[j, i] * series[j]
         coefficients[c, TAIL] = abs(series[DEGREE]) + abs(series[DEGREE - 1])
         coefficients[c, SIZE] = size
 
