@@ -51,7 +51,9 @@ def solve(problem, method, asked, answers):
         rows = np.flatnonzero((place == at) & (at <= first + RETRIES))
         if rows.size:
             series, bars = _series(problem, method, asked, rows, int(DEGREES[at]), middle, radius, even)
-            good = bars <= asked.rtol * (1 + abs(series).sum(axis=1))  # of use where D is largest, at least
+            good = bars <= asked.rtol
+            useful = bars <= asked.rtol * (1 + abs(series).sum(axis=1))  # where D is largest, at least
+            good |= useful & (at == first[rows] + RETRIES)
             place[rows[~good]] += 1
             rows, series, bars = rows[good], np.ascontiguousarray(series[good]), bars[good]
         if rows.size:
