@@ -92,8 +92,8 @@ def evaluate(scene, *, method="auto", rtol=1e-10, variables=None, **parameters):
     """
     module = modules.load(scene_folder, scene, "scene")
     names = {option.name for option in module.OPTIONS}
-    options = workflows.check_options(module, {key: value for key, value in parameters.items() if key in names})
     given = {key: _labelled(key, value) for key, value in parameters.items() if key not in names}
+    options = workflows.check_options(module, {key: parameters[key] for key in parameters if key in names}, given)
     used = workflows.check_parameters(module, scene, options, given)
     variables = [variables] if isinstance(variables, str) else variables
     request = workflows.check_request(module, options, method, rtol, variables)
@@ -217,7 +217,9 @@ def scene(name):
         "title": module.TITLE,
         "about": inspect.cleandoc(module.__doc__),
         "parameters": {p.name: _parameter_line(p) for p in module.PARAMETERS},
-        "options": {o.name: f"{o.long_name}: {' | '.join(o.choices)} (default {o.default})" for o in module.OPTIONS},
+        "options": {
+            o.name: f"{o.long_name}: {' | '.join(o.choices)} (default {o.default}){_beside(o)}" for o in module.OPTIONS
+        },
         "outputs": {o.name: _output_line(o) for o in module.OUTPUTS},
         "status": {key: sentence for key, (_, sentence) in status.table(module).items()},
         "methods": {"auto": "the method of each region, chosen for you (default)"}
@@ -286,6 +288,11 @@ def audit(ds, points, seed=0):
 def _along(ds, key, chosen):
     """The parameter `key` at the flat point numbers `chosen` (sorted)."""
     return ds[key].broadcast_like(ds.status).values.reshape(-1)[np.sort(chosen)]
+
+
+def _beside(option):
+    words = f"; only with {option.only_with}" if option.only_with else ""
+    return words + (f"; not beside {option.said_by}, which says it" if option.said_by else "")
 
 
 def _parameter_line(p):

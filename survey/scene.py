@@ -51,12 +51,17 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Option:
-    """A switch of the scene; the first choice is the default unless `default` says otherwise."""
+    """A switch of the scene; the first choice is the default unless `default` says otherwise.
+
+    It exists only with the parameter `only_with`, and not beside the parameter `said_by`, which says the same.
+    """
 
     name: str
     choices: tuple[str, ...]
     long_name: str
     default: str = ""
+    only_with: str = ""
+    said_by: str = ""
 
     def __post_init__(self):
         object.__setattr__(self, "default", self.default or self.choices[0])

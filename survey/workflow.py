@@ -112,7 +112,7 @@ def check(data, text="", output=None, default_path="survey.nc"):
         raise BadInput(_one_line(error)) from None
     scene = modules.load(survey.scenes, file.scene, "scene")
     name = file.scene
-    options = check_options(scene, file.options, "options.")
+    options = check_options(scene, file.options, file.axes, "options.")
     given = {key: _values(f"axes.{key}", axis) for key, axis in file.axes.items()}
     parameters = check_parameters(scene, name, options, given, "axes.")
     for key, values in given.items():
@@ -136,8 +136,8 @@ def check(data, text="", output=None, default_path="survey.nc"):
     )
 
 
-def check_options(scene, given, table=""):
-    """Every option of the scene with its value; raises BadInput, with the keys of `table`, for an unknown one."""
+def check_options(scene, given, parameters=(), table=""):
+    """Every option that exists beside the given `parameters`, with its value; raises BadInput for an unknown one."""
     known = {option.name: option for option in scene.OPTIONS}
     for key, value in given.items():
         if key not in known:
@@ -146,7 +146,14 @@ def check_options(scene, given, table=""):
             raise BadInput(f"{table}{key}: {modules.unknown('option', key, sorted(known))}")
         if str(value) not in known[key].choices:
             raise BadInput(f"{table}{key}: {modules.unknown('value', str(value), list(known[key].choices))}")
-    return {name: str(given.get(name, option.default)) for name, option in known.items()}
+        if known[key].said_by in parameters:
+            raise BadInput(f"{table}{key} and {known[key].said_by} say the same thing; give only one of them")
+        if known[key].only_with and known[key].only_with not in parameters:
+            raise BadInput(
+                f"{table}{key} goes only with the parameter {known[key].only_with}; give that, or leave it out"
+            )
+    exist = [o for o in known.values() if o.said_by not in parameters and o.only_with in ("", *parameters)]
+    return {option.name: str(given.get(option.name, option.default)) for option in exist}
 
 
 def check_parameters(scene, name, options, given, table=""):

@@ -17,7 +17,9 @@ def questions():
     """(scene's name, option values) for every scene and every combination of its options."""
     for name in modules.names(survey.scenes):
         scene = modules.load(survey.scenes, name, "scene")
-        choices = [[(option.name, choice) for choice in option.choices] for option in scene.OPTIONS]
+        choices = [
+            [(option.name, choice) for choice in option.choices] for option in scene.OPTIONS if not option.only_with
+        ]
         for combination in itertools.product(*choices):
             yield pytest.param(scene, dict(combination), id="-".join([name, *(value for _, value in combination)]))
 

@@ -44,8 +44,8 @@ class Problem:
     points p of those rows, and which of them reached the end. |z| <= bound[r, 0] + |p| bound[r, 1] + p^2 bound[r, 2];
     `rate` is 1 / distance to z's nearest singularity. `rule` (R, L) holds what exact rules say (`kernels.hill`),
     `constant` (R, L) is z where it does not depend on t, NaN elsewhere; None where no point has one.
-    `line` is the whole axis of p, when every row has the same points: (number, least, greatest). `even` says that
-    p -> -p exchanges y1 and y2' at T/2, and leaves y2 and y1'.
+    `line` is the whole axis of p, when every row has the same points: (number, least, greatest). `even` (R) says
+    where p -> -p exchanges y1 and y2' at T/2, and leaves y2 and y1'.
     """
 
     p: np.ndarray
@@ -58,7 +58,7 @@ class Problem:
     rule: np.ndarray | None = None
     constant: np.ndarray | None = None
     line: tuple[int, float, float] | None = None
-    even: bool = False
+    even: np.ndarray | None = None
 
     def at(self, rows, p, rule=None):
         """Points `p` (one row for each of `rows`) on their own, no axis, with what exact rules say of them."""

@@ -40,12 +40,21 @@ def serves(problem, asked):
 
 def solve(problem, method, asked, answers):
     """Answer the points of the rows that a proxy serves; returns the points (N, bool) still to be solved."""
-    number, low, high = problem.line
     open_points = np.ones(problem.p.shape, np.bool_)
-    even = problem.even and _halved(problem, low, high)
+    halved = max(-problem.line[1], problem.line[2]) < 1.5 * (problem.line[2] - problem.line[1])
+    even = np.zeros(problem.span.size, np.bool_) if problem.even is None or not halved else problem.even
+    for half in np.unique(even):
+        _solve(problem, method, asked, answers, np.flatnonzero(even == half), bool(half), open_points)
+    return open_points.reshape(-1)
+
+
+def _solve(problem, method, asked, answers, chosen, even, open_points):
+    """Answer the points of the `chosen` rows; `even`: from half of a symmetric axis, which then needs fewer nodes."""
+    number, low, high = problem.line
     middle, radius = (0.0, max(abs(low), abs(high))) if even else (0.5 * (low + high), 0.5 * (high - low))
     most = int(np.searchsorted(DEGREES, number / POINTS_PER_NODE * (2 if even else 1), "right"))
-    place = _places(problem, radius, asked.rtol)
+    place = np.full(problem.span.size, DEGREES.size)
+    place[chosen] = _places(problem, radius, asked.rtol)[chosen]
     first = place.copy()
     for at in range(most):  # a row whose series has not converged goes on to the next degree
         rows = np.flatnonzero((place == at) & (at <= first + RETRIES))
@@ -63,12 +72,6 @@ def solve(problem, method, asked, answers):
                 answers.floats, answers.verdict, answers.late,
             )  # fmt: skip
             open_points[rows] = answers.late.reshape(problem.p.shape)[rows]
-    return open_points.reshape(-1)
-
-
-def _halved(problem, low, high):
-    """Do the nodes of half of a symmetric axis number fewer than those of the axis itself?"""
-    return max(abs(low), abs(high)) < 1.5 * (high - low)
 
 
 def _places(problem, radius, rtol):

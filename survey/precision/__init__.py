@@ -98,7 +98,7 @@ def _solver(module, method):
     """A function of (point, options, rtol) that calls the scene on one thread; see `works`."""
 
     def solve(point, options, rtol):
-        options = workflow.check_options(module, options)
+        options = workflow.check_options(module, options, point)
         used = workflow.check_parameters(module, module.TITLE, options, point)
         request = Request(options, method, rtol, frozenset(o.name for o in module.OUTPUTS if exists(o, options)))
         ndim = max(np.ndim(values) for values in point.values()) or 1

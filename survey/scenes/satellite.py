@@ -9,7 +9,8 @@ obey Hill's equation, in u = omega_p t, omega_p^2 = 3 omega_0^2 |I - Iz| / I, wi
     c = -k^2      oblate,  alpha > 1;         T = 4 K(k), or 2 K(1/k) / k for rotations
 
 Parameters, in order: k >= 0, k != 1; or one_minus_k = 1 - k <= 1, != 0, where 1 - k is small (negative: rotations);
-rho, any sign: rho^2 = 1 / (3 |1 - alpha|), so rho >= 1/sqrt(3) is a body; rho < 0 is a retrograde rotation.
+or amplitude = asin k (rad), a libration's. rho, any sign: rho^2 = 1 / (3 |1 - alpha|), so rho >= 1/sqrt(3) is a body;
+rho < 0 is a retrograde rotation. Or, instead of rho and the body, inertia_ratio = alpha: 0 a thin rod, 2 a disc.
 
 Known: at k = 0 every gap is closed and D = 2 cos(2 pi sqrt(1 + rho^2)) (prolate), 2 cos(2 pi rho) (oblate); rho = 0 is
 an edge of Lame's equation, |D| = 2; D is even in rho for librations; tongue n opens as k^n; k = 1 is a scattering
@@ -47,9 +48,16 @@ PARAMETERS = (
               minimum=0.0, maximum=1e12, excluded=(1.0,)),
     Parameter("one_minus_k", "1 - k, where k is close to 1", "1-k",
               minimum=-1e12, maximum=1.0, excluded=(0.0,), instead_of="k"),
+    Parameter("amplitude", "amplitude of the libration, asin k", r"\beta", "rad",
+              minimum=0.0, maximum=pi / 2, open_maximum=True, instead_of="k"),
     Parameter("rho", "orbital rate over libration rate", r"\rho", minimum=-1e12, maximum=1e12),
+    Parameter("inertia_ratio", "inertia ratio Iz / I", r"\alpha",
+              minimum=0.0, maximum=2.0, excluded=(1.0,), instead_of="rho"),
 )  # fmt: skip
-OPTIONS = (Option("body", ("prolate", "oblate"), "shape of the body: Iz < I or Iz > I"),)
+OPTIONS = (
+    Option("body", ("prolate", "oblate"), "shape of the body: Iz < I or Iz > I", said_by="inertia_ratio"),
+    Option("direction", ("1", "-1"), "sense of a rotation: 1 as the orbit, -1 against it", only_with="inertia_ratio"),
+)
 OUTPUTS = (
     *hill.OUTPUTS,
     Output("exponent_per_orbit", "growth of the logarithm of the amplitude per orbital revolution", r"\mu",
@@ -70,10 +78,23 @@ def cost(options, sizes):
 
 def solve(point, request):
     """All outputs of a block that the request wants (see `survey.scenes`)."""
-    shared, rho = moduli(point), point["rho"]
+    shared = moduli(point)
+    if "rho" in point:
+        return _solve(shared, point["rho"], request.options["body"] == "oblate", request, request.line("rho"))
+    alpha = np.asarray(point["inertia_ratio"], dtype=float)
+    rho = float(request.options["direction"]) / np.sqrt(3 * abs(1 - alpha))
+    bodies = [
+        _solve(shared, np.where((alpha > 1) == oblate, rho, np.nan), oblate, request, None)
+        for oblate in np.unique(alpha > 1)
+    ]
+    return {name: np.where(alpha > 1, bodies[-1][name], bodies[0][name]) for name in bodies[0]}
+
+
+def _solve(shared, rho, oblate, request, line):
+    """The outputs for one kind of body; points that are not of it have rho = NaN."""
     block = Rows(shared, rho)
-    row = Motion(*(block.per_row(values) for values in shared), request.options["body"] == "oblate")
-    problem = _problem(row, block.per_point(rho), request.line("rho"))
+    row = Motion(*(block.per_row(values) for values in shared), bool(oblate))
+    problem = _problem(row, block.per_point(rho), line)
     wanted = set(request.variables) | ({"exponent"} if "exponent_per_orbit" in request.variables else set())
     out = hill.solve(problem, request.method, request.rtol, wanted)
     ok = out["status"] == status.OK
@@ -90,16 +111,18 @@ def solve(point, request):
 def _per_orbit(out, orbits):
     """Add the exponent per orbital revolution, `orbits` of which make a period; it does not apply where none do."""
     orbits = np.where(orbits > 0, orbits, np.nan)
-    out["exponent_per_orbit"], out["exponent_per_orbit_error"] = (
-        out["exponent"] / orbits,
-        out["exponent_error"] / orbits,
+    out["exponent_per_orbit"] = out["exponent"] / orbits
+    out["exponent_per_orbit_error"] = (
+        out["exponent_error"] / orbits + (PERIOD_ULPS + 4) * EPS * out["exponent_per_orbit"]
     )
-    out["exponent_per_orbit_error"] += (PERIOD_ULPS + 4) * EPS * out["exponent_per_orbit"]
     hill.overflow(out, out["exponent_per_orbit_error"] > LARGEST)
 
 
 def moduli(point):
-    """k, the complement (of 1/k for rotations) and 1 - |k|, from k or from 1 - k: no digit is lost near k = 1."""
+    """k and the complement (of 1/k for rotations), from k, 1 - k or asin k: no digit is lost near k = 1."""
+    if "amplitude" in point:
+        amplitude = np.asarray(point["amplitude"], dtype=float)
+        return np.sin(amplitude), np.cos(amplitude)
     if "one_minus_k" in point:
         short = np.asarray(point["one_minus_k"], dtype=float)
         k = 1 - short
@@ -185,7 +208,7 @@ def _problem(row, rho, line):
         rule=rule,
         constant=constant,
         line=line,
-        even=not row.rotates.any(),
+        even=~row.rotates,
     )
 
 

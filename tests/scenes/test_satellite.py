@@ -9,6 +9,7 @@ import pytest
 from hill_problems import BODY, cases, mp_factors, rotation, solve, truth
 from mpmath import mp, mpf
 
+import survey
 from survey import status
 
 METHODS = ["taylor16", "magnus6", "rk4", "dop853"]
@@ -278,3 +279,50 @@ def test_plain_python_gives_the_same_bits():
         run = subprocess.run([sys.executable, "-c", TINY], env=environment, capture_output=True, text=True, check=True)
         said.append(run.stdout)
     assert said[0] == said[1]
+
+
+def test_inertia_ratio_and_amplitude_are_other_words_for_rho_and_k():
+    """alpha = 1/2 and 3/2 give rho^2 = 2/3; critical amplitudes of the rod and the disc (notes, section 4)."""
+    amplitude = np.array([0.1, 0.8, 1.5])
+    named = survey.evaluate("satellite", inertia_ratio=[0.5, 1.5], amplitude=amplitude)
+    for place, body in enumerate(("prolate", "oblate")):
+        plain = survey.evaluate("satellite", k=np.sin(amplitude), rho=np.sqrt(2 / 3), body=body)
+        for name in ("discriminant", "exponent_per_orbit", "rotation_number"):
+            np.testing.assert_allclose(named[name][place], plain[name], rtol=1e-11, atol=1e-11)
+        np.testing.assert_array_equal(named.verdict[place], plain.verdict)
+    degrees = np.array([8.92, 8.94, 58.05, 58.07, 75.49, 75.51])
+    ends = survey.evaluate("satellite", inertia_ratio=[0.0, 2.0], amplitude=np.deg2rad(degrees))
+    assert ends.verdict.values.tolist() == [[1, 1, 1, 0, 0, 1], [1, 0, 0, 0, 0, 0]]
+
+
+@pytest.mark.parametrize(("direction", "rod", "disc"), [(1, 1.0865, 1.0789), (-1, 1.2766, 1.4692)])
+def test_rotations_are_stable_beyond_a_speed(direction, rod, disc):
+    for alpha, edge in ((0.0, rod), (2.0, disc)):
+        k = edge + np.array([-2e-4, 2e-4, 1.0])
+        ds = survey.evaluate("satellite", inertia_ratio=alpha, k=k, direction=direction)
+        assert ds.verdict.values.tolist() == [0, 1, 1]
+
+
+def test_bars_hold_the_rounding_of_the_inertia_ratio():
+    rng = np.random.default_rng(5)
+    for alpha, amplitude in zip(rng.uniform(0, 2, 6), rng.uniform(0.1, 1.5, 6), strict=True):
+        ds = survey.evaluate("satellite", inertia_ratio=alpha, amplitude=amplitude, rtol=1e-13)
+        with mp.workdps(30):
+            rho, k = 1 / mp.sqrt(3 * abs(1 - mpf(alpha))), mp.sin(mpf(amplitude))
+        exact = mp_factors("PL" if alpha < 1 else "OL", k, rho)
+        for name, value in zip(("y1", "dy1", "y2", "dy2"), exact[:4], strict=True):
+            assert abs(value - mpf(float(ds[name]))) <= float(ds[f"{name}_error"]), (alpha, amplitude, name)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"inertia_ratio": 0.5, "body": "prolate"}, "body and inertia_ratio say the same"),
+        ({"inertia_ratio": 0.5, "rho": 1.0}, "inertia_ratio and rho say the same"),
+        ({"rho": 0.5, "direction": -1}, "direction goes only with the parameter inertia_ratio"),
+        ({"inertia_ratio": 1.0}, "inertia_ratio != 1"),
+    ],
+)
+def test_saying_the_same_twice_is_refused(given, words):
+    with pytest.raises(survey.BadInput, match=words):
+        survey.evaluate("satellite", k=0.5, **given)
