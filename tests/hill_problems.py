@@ -73,15 +73,15 @@ def mathieu(a, q, half_periods=1):
 def mp_factors(family, k, rho, digits=30):
     """y1, y1', y2, y2' at T/2 and the zeros of y1, y2 inside, by Taylor series with mpmath: nothing shared with survey.
 
-    sn, cn, dn and both solutions are carried by their own differential equations, order 30.
+    sn, cn, dn and both solutions are carried by their own differential equations, to an order of one for each digit.
     """
     with mp.workdps(digits):
-        k, rho, order = mpf(k), mpf(rho), 30
+        k, rho, order = mpf(k), mpf(rho), digits
         rotates = family in ("PR", "OR")
         m, scale = (1 / k**2, k) if rotates else (k**2, mpf(1))
         c = 1 - k**2 if family in ("PL", "PR") else -(k**2)
         span = mp.ellipk(m) / k if rotates else 2 * mp.ellipk(m)
-        steps = int(mp.ceil(span * (1 + k + abs(rho)) / mpf("0.6")))
+        steps = int(mp.ceil(span * (1 + k + abs(rho)) / mpf("0.3")))
         h = span / steps
         state = [mpf(v) for v in (0, 1, 1, 1, 0, 0, 1)]
         zeros = [0, 0]

@@ -1,12 +1,14 @@
 """Planar motions of a satellite along one row of the map: w = dx/du and z = c0 + rho c1 + rho^2 at given u.
 
-A row is `rows[r]` = (k, k', half period, oblate): for rotations k > 1 and k' is the complement of 1/k.
+A row is `rows[r]` = (k, k', half period, oblate, high, low): for rotations k > 1 and k' is the complement of 1/k;
+high + low is k exactly, also where 1 - k was given.
 Notes (scenes/satellite.md), section 1: z = (rho + w)^2 + g with g = dn^2 (PL), -k^2 sn^2 (OL), cn^2 (PR),
 -sn^2 (OR): no cancelling constant.
 """
 
 import numpy as np
 
+from survey.kernels import double as dd
 from survey.kernels.elliptic import LANES, MEANS, complete, jacobi, jacobi_lanes, means
 from survey.kernels.jit import inline, kernel
 
@@ -76,3 +78,84 @@ def potential(u, rho, row, table):
 def tabulate(row, table):
     """What `potential` needs of a row, once: the means of 1 and k', and in the last place their number."""
     table[0, MEANS] = means(row[1], table)
+
+
+# In double-double the clock is the pendulum itself, x'' = -sin x cos x: sin x, cos x, w = x', and w^2 for z.
+# dn = cos x and k sn = sin x for librations; cn and sn for rotations.
+SIN, COS, W, SQUARE = range(4)
+CLOCK = 4
+
+
+@inline
+def exactly(row):
+    """k, |1 - k|, sqrt(|1 - k^2|) as double-doubles, and whether k > 1."""
+    k = row[4], row[5]
+    short = dd.sub((1.0, 0.0), k)
+    rotates = short[0] < 0.0
+    if rotates:
+        short = dd.neg(short)
+    return k, dd.sqrt(dd.mul(short, dd.add((1.0, 0.0), k))), rotates
+
+
+@inline
+def half_period(row):
+    """2 K(k), or K(1/k) / k for rotations, as a double-double."""
+    k, complement, rotates = exactly(row)
+    if rotates:
+        return dd.div(dd.HALF_PI, dd.mean(k, complement))
+    return dd.div(dd.PI, dd.mean((1.0, 0.0), complement))
+
+
+@inline
+def slowest(row, clock):
+    """The clock where w is least, from where errors do not grow: u = K for librations, K(1/k) / k for rotations."""
+    k, complement, rotates = exactly(row)
+    for n in range(CLOCK):
+        clock[n, 0, 0], clock[n, 1, 0] = 0.0, 0.0
+    if rotates:
+        clock[SIN, 0, 0] = 1.0
+        clock[W, 0, 0], clock[W, 1, 0] = complement
+    else:
+        clock[SIN, 0, 0], clock[SIN, 1, 0] = k
+        clock[COS, 0, 0], clock[COS, 1, 0] = complement
+
+
+@inline
+def pendulum(row, h, clock):
+    """Series of the clock in x = u / h: (sin x)' = w cos x, (cos x)' = -w sin x, w' = -sin x cos x."""
+    sine, cosine, w = clock[SIN], clock[COS], clock[W]
+    for n in range(clock.shape[2] - 1):
+        scale = n + 1.0
+        sine[0, n + 1], sine[1, n + 1] = dd.over(dd.mul(h, dd.convolved(cosine, w, n)), scale)
+        cosine[0, n + 1], cosine[1, n + 1] = dd.over(dd.mul(h, dd.convolved(sine, w, n)), -scale)
+        w[0, n + 1], w[1, n + 1] = dd.over(dd.mul(h, dd.convolved(sine, cosine, n)), -scale)
+    for n in range(clock.shape[2]):
+        clock[SQUARE, 0, n], clock[SQUARE, 1, n] = dd.convolved(w, w, n)
+
+
+@inline
+def coefficient(side, row, rho, clock, z):
+    """Series of z = (rho + w)^2 + g; w is odd about u = K for librations, even about K(1/k) / k for rotations."""
+    k, _, rotates = exactly(row)
+    sign = 1.0 if rotates else side
+    for n in range(1, clock.shape[2]):
+        shift = dd.times((clock[W, 0, n], clock[W, 1, n]), 2.0 * sign * rho)
+        # w^2 + sin^2 x is constant, so g' = (w^2)'
+        z[0, n], z[1, n] = dd.add(shift, (2.0 * clock[SQUARE, 0, n], 2.0 * clock[SQUARE, 1, n]))
+    shifted = dd.add((rho, 0.0), (sign * clock[W, 0, 0], sign * clock[W, 1, 0]))
+    place = SIN if row[3] > 0.0 else COS
+    g = (clock[place, 0, 0], clock[place, 1, 0])
+    g = dd.mul(g, g)
+    z[0, 0], z[1, 0] = dd.add(dd.mul(shifted, shifted), dd.neg(g) if row[3] > 0.0 else g)
+    return 2.0 * (abs(rho) + k[0]) * k[0] + 2.0
+
+
+@inline
+def missed(row, clock):
+    """Where w is largest sin x = 0, |cos x| = 1, |w| = k: how far off, sin x and w relative to their amplitudes."""
+    k, _, _ = exactly(row)
+    sine = abs(clock[SIN, 0, 0]) / min(1.0, k[0])
+    cosine, w = (clock[COS, 0, 0], clock[COS, 1, 0]), (clock[W, 0, 0], clock[W, 1, 0])
+    cosine = dd.sub(dd.neg(cosine) if cosine[0] < 0.0 else cosine, (1.0, 0.0))
+    w = dd.sub(dd.neg(w) if w[0] < 0.0 else w, k)
+    return max(sine, max(abs(cosine[0]), abs(w[0]) / k[0]))

@@ -41,7 +41,8 @@ class Problem:
 
     `sample(rows, nodes, steps)` gives c0, c1 of the rows at `nodes` (fractions) of each step as an array
     (rows, steps, 2, nodes); `walk(rows, p, tolerance)`, for adaptive methods, gives the results of a chain for
-    points p of those rows, and which of them reached the end. |z| <= bound[r, 0] + |p| bound[r, 1] + p^2 bound[r, 2];
+    points p of those rows, and which of them reached the end; `exact(rows, p, steps)` gives them in double-double, each
+    in its even number of steps, for p and rows that are exact. |z| <= bound[r, 0] + |p| bound[r, 1] + p^2 bound[r, 2];
     `rate` is 1 / distance to z's nearest singularity. `rule` (R, L) holds what exact rules say (`kernels.hill`),
     `constant` (R, L) is z where it does not depend on t, NaN elsewhere; None where no point has one.
     `line` is the whole axis of p, when every row has the same points: (number, least, greatest). `even` (R) says
@@ -55,6 +56,7 @@ class Problem:
     c2: float
     sample: Callable
     walk: Callable | None = None
+    exact: Callable | None = None
     rule: np.ndarray | None = None
     constant: np.ndarray | None = None
     line: tuple[int, float, float] | None = None
@@ -65,7 +67,7 @@ class Problem:
         return replace(
             self, p=p, span=self.span[rows], bound=self.bound[rows], rate=self.rate[rows], rule=rule, constant=None,
             line=None, sample=lambda used, nodes, steps: self.sample(rows[used], nodes, steps),
-            walk=self.walk and (lambda used, p, tolerance: self.walk(rows[used], p, tolerance)),
+            walk=self.walk and (lambda used, p, tolerance: self.walk(rows[used], p, tolerance)), exact=None,
         )  # fmt: skip
 
 

@@ -166,6 +166,8 @@ def _complete(solve, rows, edges, low, high):
         for at, edge in enumerate(own, 1):
             expected = np.where(np.arange(4) == edges[3][edge], -expected, expected)
             told = signs[:, i, at]
+            if at < own.size and np.diff(edges[1][own[at - 1 : at + 1]]) <= edges[2][own[at - 1 : at + 1]].sum():
+                told = 0 * told  # between edges closer than their errors nothing is told
             known = (told != 0) & (expected != 0)
             sound[i] &= bool((told == expected)[known].all())
             expected = np.where(told != 0, told, expected)

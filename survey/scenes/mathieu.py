@@ -15,11 +15,12 @@ from math import cos, pi
 import numpy as np
 
 from survey import status
+from survey.kernels import double as dd
 from survey.kernels.hill import NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE, RESULTS
 from survey.kernels.jit import inline, kernel
 from survey.measures import hill
 from survey.measures.rows import Rows
-from survey.methods import dop853
+from survey.methods import dop853, taylor_double
 from survey.scene import Parameter
 
 TITLE = "Stability of Mathieu's equation"
@@ -65,6 +66,11 @@ def _problem(q, a, line=None):
         walk_points(q[used], p, tolerance, out, reached)
         return out, reached
 
+    def exact(used, p, steps):
+        out = np.empty((used.size, RESULTS))
+        solve_points(q[used], p, steps, out)
+        return out
+
     rule, constant = _rules(q, a)
     return hill.Problem(
         p=a,
@@ -74,6 +80,7 @@ def _problem(q, a, line=None):
         c2=0.0,
         sample=samples,
         walk=walk,
+        exact=exact,
         rule=rule,
         constant=constant,
         line=line,
@@ -120,3 +127,44 @@ def walk_points(q, a, tolerance, out, reached):
     """Points of their own, by DOP853."""
     for i in range(len(a)):
         reached[i] = dop853.hill_walk(potential, a[i], q[i], 0.0, HALF_PERIOD, tolerance[i], out[i])
+
+
+@inline
+def start(row, clock):
+    """cos 2t and sin 2t at t = 0."""
+    clock[0, 0, 0], clock[0, 1, 0] = 1.0, 0.0
+    clock[1, 0, 0], clock[1, 1, 0] = 0.0, 0.0
+
+
+@inline
+def circular(row, h, clock):
+    """Series of cos 2t and sin 2t in x = t / h."""
+    for n in range(clock.shape[2] - 1):
+        for c in range(2):
+            ahead = dd.times(dd.mul(h, (clock[1 - c, 0, n], clock[1 - c, 1, n])), 4.0 * c - 2.0)
+            clock[c, 0, n + 1], clock[c, 1, n + 1] = dd.over(ahead, n + 1.0)
+
+
+@inline
+def coefficient(side, row, a, clock, z):
+    """Series of z = a - 2 q cos 2t."""
+    for n in range(clock.shape[2]):
+        z[0, n], z[1, n] = dd.times((clock[0, 0, n], clock[0, 1, n]), -2.0 * row)
+    z[0, 0], z[1, 0] = dd.add((z[0, 0], z[1, 0]), (a, 0.0))
+    return 2.0 * abs(row)
+
+
+@inline
+def missed(row, clock):
+    """cos 2t = -1 and sin 2t = 0 at t = T/2: how far off."""
+    return abs(dd.add((clock[0, 0, 0], clock[0, 1, 0]), (1.0, 0.0))[0]) + abs(clock[1, 0, 0])
+
+
+@kernel
+def solve_points(q, a, steps, out):
+    """Points of their own, in double-double, in `steps` steps each."""
+    work, chain = taylor_double.workspace(2), np.empty((steps.max(), taylor_double.STEP))
+    for i in range(len(a)):
+        taylor_double.hill_walk(
+            start, circular, coefficient, missed, q[i], a[i], dd.HALF_PI, 0, steps[i], work, chain, out[i]
+        )

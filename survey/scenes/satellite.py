@@ -24,13 +24,14 @@ from math import pi
 import numpy as np
 
 from survey import status
+from survey.kernels import satellite as motion
 from survey.kernels.elliptic import MEANS
 from survey.kernels.hill import LARGEST, NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE, RESULTS
 from survey.kernels.jit import kernel
 from survey.kernels.satellite import complete_integrals, potential, sample, tabulate
 from survey.measures import hill
 from survey.measures.rows import Rows
-from survey.methods import dop853
+from survey.methods import dop853, taylor_double
 from survey.scene import Option, Output, Parameter
 
 TITLE = "Out-of-plane stability of a satellite's planar librations and rotations"
@@ -80,21 +81,24 @@ def solve(point, request):
     """All outputs of a block that the request wants (see `survey.scenes`)."""
     shared = moduli(point)
     if "rho" in point:
-        return _solve(shared, point["rho"], request.options["body"] == "oblate", request, request.line("rho"))
+        oblate, exactly = request.options["body"] == "oblate", "amplitude" not in point
+        return _solve(shared, point["rho"], oblate, request, request.line("rho"), exactly)
     alpha = np.asarray(point["inertia_ratio"], dtype=float)
     rho = float(request.options["direction"]) / np.sqrt(3 * abs(1 - alpha))
     bodies = [
-        _solve(shared, np.where((alpha > 1) == oblate, rho, np.nan), oblate, request, None)
-        for oblate in np.unique(alpha > 1)
+        _solve(shared, np.where((alpha > 1) == oblate, rho, np.nan), oblate, request) for oblate in np.unique(alpha > 1)
     ]
     return {name: np.where(alpha > 1, bodies[-1][name], bodies[0][name]) for name in bodies[0]}
 
 
-def _solve(shared, rho, oblate, request, line):
-    """The outputs for one kind of body; points that are not of it have rho = NaN."""
+def _solve(shared, rho, oblate, request, line=None, exactly_given=False):
+    """The outputs for one kind of body; points that are not of it have rho = NaN.
+
+    What k and rho are exactly is known only where they are `exactly_given`, not computed from other words.
+    """
     block = Rows(shared, rho)
     row = Motion(*(block.per_row(values) for values in shared), bool(oblate))
-    problem = _problem(row, block.per_point(rho), line)
+    problem = _problem(row, block.per_point(rho), line, exactly_given)
     wanted = set(request.variables) | ({"exponent"} if "exponent_per_orbit" in request.variables else set())
     out = hill.solve(problem, request.method, request.rtol, wanted)
     ok = out["status"] == status.OK
@@ -119,28 +123,35 @@ def _per_orbit(out, orbits):
 
 
 def moduli(point):
-    """k and the complement (of 1/k for rotations), from k, 1 - k or asin k: no digit is lost near k = 1."""
+    """k, the complement (of 1/k for rotations), and two numbers whose sum is k exactly: no digit is lost near k = 1.
+
+    From k, from 1 - k, or from the amplitude asin k, where the sum is as good as float64 makes it.
+    """
     if "amplitude" in point:
         amplitude = np.asarray(point["amplitude"], dtype=float)
-        return np.sin(amplitude), np.cos(amplitude)
-    if "one_minus_k" in point:
-        short = np.asarray(point["one_minus_k"], dtype=float)
-        k = 1 - short
-    else:
-        k = np.asarray(point["k"], dtype=float)
-        short = 1 - k
+        return np.sin(amplitude), np.cos(amplitude), np.sin(amplitude), 0 * amplitude
     with np.errstate(all="ignore"):
+        if "one_minus_k" in point:
+            short = np.asarray(point["one_minus_k"], dtype=float)
+            high = 1 - short
+            low = (1 - (high - (high - 1))) - (short + (high - 1))  # the rounding of 1 - k, exactly (Knuth)
+            k = np.where(short < 0, np.maximum(high, np.nextafter(1, 2)), high)  # a rotation remains one
+        else:
+            k = high = np.asarray(point["k"], dtype=float)
+            short, low = 1 - k, 0 * k
         scale = np.maximum(k, 1)
         complement = np.sqrt((abs(short) / scale) * ((1 + k) / scale))
-    return k, np.where(k == np.inf, np.nan, complement)
+    return k, np.where(k == np.inf, np.nan, complement), high, low
 
 
 @dataclass(frozen=True)
 class Motion:
-    """The planar motions of the rows: k, the complement, and what follows from them."""
+    """The planar motions of the rows: k, the complement, k exactly as a sum, and what follows from them."""
 
     k: np.ndarray
     kc: np.ndarray
+    high: np.ndarray
+    low: np.ndarray
     oblate: bool
 
     @cached_property
@@ -183,8 +194,9 @@ class Motion:
         return least > 16 * EPS * (rho * rho + k * k)
 
 
-def _problem(row, rho, line):
-    rows = np.column_stack([row.k, row.kc, row.period / 2, np.full(row.k.size, float(row.oblate))])
+def _problem(row, rho, line, exactly_given):
+    oblate = np.full(row.k.size, float(row.oblate))
+    rows = np.column_stack([row.k, row.kc, row.period / 2, oblate, row.high, row.low])
 
     def samples(used, nodes, steps):
         out = np.empty((used.size, steps, 2, nodes.size))
@@ -196,6 +208,11 @@ def _problem(row, rho, line):
         walk_points(rows[used], p, tolerance, out, reached)
         return out, reached
 
+    def exact(used, p, steps):
+        out = np.empty((used.size, RESULTS))
+        solve_points(rows[used], p, steps, out)
+        return out
+
     rule, constant = _rules(row, rho)
     return hill.Problem(
         p=rho,
@@ -205,6 +222,7 @@ def _problem(row, rho, line):
         c2=1.0,
         sample=samples,
         walk=walk,
+        exact=exact if exactly_given else None,
         rule=rule,
         constant=constant,
         line=line,
@@ -236,3 +254,15 @@ def walk_points(rows, rho, tolerance, out, reached):
     for i in range(len(rho)):
         tabulate(rows[i], table)
         reached[i] = dop853.hill_walk(potential, rho[i], rows[i], table, rows[i, 2], tolerance[i], out[i])
+
+
+@kernel
+def solve_points(rows, rho, steps, out):
+    """Points of their own, in double-double, in `steps` (even) steps each."""
+    work, chain = taylor_double.workspace(motion.CLOCK), np.empty((steps.max(), taylor_double.STEP))
+    for i in range(len(rho)):
+        before = steps[i] if rows[i, 0] > 1.0 else steps[i] // 2
+        taylor_double.hill_walk(
+            motion.slowest, motion.pendulum, motion.coefficient, motion.missed, rows[i], rho[i],
+            motion.half_period(rows[i]), before, steps[i] - before, work, chain, out[i],
+        )  # fmt: skip

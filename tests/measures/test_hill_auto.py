@@ -1,11 +1,15 @@
 """The rule of `auto`: closed forms hold within their bars, and what stays undecided is tried by DOP853."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from mpmath import mp, mpf
 
 import survey
 from survey.measures import hill, hill_auto
 from survey.methods import dop853
+from survey.scenes import mathieu
 
 
 def test_closed_forms_hold_within_their_bars():
@@ -32,9 +36,13 @@ def test_closed_forms_agree_with_integration():
             assert (abs(exact[name] - solved[name]) <= bars).all(), name
 
 
-def test_undecided_points_are_tried_by_dop853(monkeypatch):
-    """With Taylor's bars made useless every verdict comes from DOP853, and is right."""
+@pytest.mark.parametrize("exact", [False, True])
+def test_undecided_points_are_tried_again(monkeypatch, exact):
+    """With Taylor's bars made useless every verdict comes from double-double, or from DOP853, and is right."""
     tried = []
+    problem_of = mathieu._problem
+    if not exact:
+        monkeypatch.setattr(mathieu, "_problem", lambda *given: replace(problem_of(*given), exact=None))
     good = hill_auto.hill_effort.solve
 
     def spoiled(problem, method, asked, answers, where=None):
@@ -46,4 +54,4 @@ def test_undecided_points_are_tried_by_dop853(monkeypatch):
 
     monkeypatch.setattr(hill_auto.hill_effort, "solve", spoiled)
     ds = survey.evaluate("mathieu", a=[0.5, 1.0, 2.0], q=1.0)
-    assert tried == [3] and ds.verdict.values.tolist() == [0, 0, 1]
+    assert tried == ([] if exact else [3]) and ds.verdict.values.tolist() == [0, 0, 1]

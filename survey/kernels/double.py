@@ -1,0 +1,145 @@
+"""Double-double numbers: a pair (hi, lo) of float64 whose exact sum, |lo| <= ulp(hi) / 2, carries about 31 digits.
+
+Each operation is good to a few UNIT, relative to its result. Strict floats are what makes them right: no fastmath,
+no contraction. Range: products between 1e-290 and 1e300.
+
+Sources: T. J. Dekker, Numer. Math. 18 (1971) 224 (product, split); D. H. Bailey's QD (add, div, sqrt);
+T. Ogita, S. M. Rump, S. Oishi, SIAM J. Sci. Comput. 26 (2005) 1955 (inner products); DLMF 19.8(i) (mean).
+"""
+
+from math import sqrt as root
+
+from survey.kernels.jit import inline
+
+SPLITTER = 134217729.0  # 2^27 + 1
+UNIT = 2.0**-104
+PI = (3.141592653589793, 1.2246467991473532e-16)
+HALF_PI = (1.5707963267948966, 6.123233995736766e-17)
+MEANS = 20
+GAP = 1e-16  # convergence is quadratic: the next mean has every digit
+
+
+@inline
+def two_sum(a, b):
+    """a + b exactly: the rounded sum and its error."""
+    s = a + b
+    t = s - a
+    return s, (a - (s - t)) + (b - t)
+
+
+@inline
+def quick_two_sum(a, b):
+    """As `two_sum`, where |a| >= |b| or a = 0."""
+    s = a + b
+    return s, b - (s - a)
+
+
+@inline
+def two_prod(a, b):
+    """a b exactly: the rounded product and its error."""
+    p = a * b
+    c, d = SPLITTER * a, SPLITTER * b
+    high, other = c - (c - a), d - (d - b)
+    low, rest = a - high, b - other
+    return p, ((high * other - p) + high * rest + low * other) + low * rest
+
+
+@inline
+def neg(a):
+    return -a[0], -a[1]
+
+
+@inline
+def add(a, b):
+    """a + b, however much of it cancels."""
+    s, e = two_sum(a[0], b[0])
+    t, f = two_sum(a[1], b[1])
+    s, e = quick_two_sum(s, e + t)
+    return quick_two_sum(s, e + f)
+
+
+@inline
+def sub(a, b):
+    return add(a, neg(b))
+
+
+@inline
+def mul(a, b):
+    p, e = two_prod(a[0], b[0])
+    return quick_two_sum(p, e + (a[0] * b[1] + a[1] * b[0]))
+
+
+@inline
+def times(a, number):
+    """a times a float64."""
+    p, e = two_prod(a[0], number)
+    return quick_two_sum(p, e + a[1] * number)
+
+
+@inline
+def over(a, number):
+    """a divided by a float64."""
+    q = a[0] / number
+    p, e = two_prod(q, number)
+    return quick_two_sum(q, (((a[0] - p) - e) + a[1]) / number)
+
+
+@inline
+def div(a, b):
+    q = a[0] / b[0]
+    rest = sub(a, times(b, q))
+    r = rest[0] / b[0]
+    rest = sub(rest, times(b, r))
+    return add(quick_two_sum(q, r), (rest[0] / b[0], 0.0))
+
+
+@inline
+def sqrt(a):
+    """The square root of a >= 0, by one step of Newton's from float64's."""
+    if a[0] == 0.0:
+        return 0.0, 0.0
+    s = root(a[0])
+    rest = sub(a, two_prod(s, s))
+    return quick_two_sum(s, rest[0] / (2.0 * s))
+
+
+@inline
+def mean(a, b):
+    """The arithmetic-geometric mean of a and b > 0; K = pi / (2 mean(1, k'))."""
+    for _ in range(MEANS):
+        if abs(a[0] - b[0]) <= GAP * a[0]:
+            break
+        a, b = times(add(a, b), 0.5), sqrt(mul(a, b))
+    return times(add(a, b), 0.5)
+
+
+@inline
+def convolved(a, b, n):
+    """Coefficient n of the product of two series (2, orders), hi and lo; its error is relative to the sum of |terms|.
+
+    An inner product in which the exact float64 sum of the leading parts is corrected once, at the end.
+    """
+    s, c = 0.0, 0.0
+    for i in range(n + 1):
+        p, e = two_prod(a[0, i], b[0, n - i])
+        s, q = two_sum(s, p)
+        c += q + (e + (a[0, i] * b[1, n - i] + a[1, i] * b[0, n - i]))
+    return quick_two_sum(s, c)
+
+
+@inline
+def total(series):
+    """The sum of the coefficients of a series (2, orders), the last ones, the smallest, first."""
+    s = (0.0, 0.0)
+    for n in range(series.shape[1] - 1, -1, -1):
+        s = add(s, (series[0, n], series[1, n]))
+    return s
+
+
+@inline
+def slope(series):
+    """The sum of n times coefficient n: the derivative at 1."""
+    s = (0.0, 0.0)
+    for n in range(series.shape[1] - 1, 0, -1):
+        s = add(s, times((series[0, n], series[1, n]), float(n)))
+    return s
