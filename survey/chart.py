@@ -1,29 +1,55 @@
-"""The work-precision chart as a figure: one panel per work, one line per method or peer."""
+"""The work-precision chart as a figure: one panel per work, one line per method or peer, and the machine's limit."""
 
 import matplotlib.pyplot as plt
 
 # Okabe and Ito's colours that show as lines
 COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999", "#5D3A9B", "#8C6D31")
-MARKERS = "osD^v<>ph*"
+MARKERS = "osD^vP*X<>"
+LEAST_ERROR = 1e-17  # a chart in logarithms has no zero
 
 
-def draw(records, scene, name, path):
-    """Draw the records of `survey precision` to `path`: lower left is better."""
+def draw(records, machine, scene, name, path):
+    """Draw the records of `survey precision`, and the least times in `machine`, to `path`: lower left is better."""
     works = list(dict.fromkeys(record.work for record in records))
     runs = list(dict.fromkeys((record.method, record.peer) for record in records))
-    figure, panels = plt.subplots(1, len(works), figsize=(4.6 * len(works), 4.6), sharey=True, layout="constrained")
-    for axes, work in zip(panels if len(works) > 1 else [panels], works, strict=True):
-        for (method, peer), marker, colour in zip(runs, MARKERS, COLOURS, strict=False):
-            own = [r for r in records if (r.work, r.method, r.peer) == (work, method, peer)]
-            seconds, errors = [r.seconds_per_point for r in own], [max(r.error, 1e-17) for r in own]
-            style = {"ls": "--" if peer else "-", "lw": 2.5 if method == "auto" else 1.2}
-            wrong = sum(r.wrong_verdicts for r in own)
-            label = (method or f"{peer} (peer)") + (f", {wrong} wrong verdicts" if wrong else "")
-            axes.loglog(seconds, errors, marker=marker, ms=4, color=colour, label=label, **style)
-        axes.set(title=work, xlabel="seconds per point, one thread")
+    figure, panels = plt.subplots(
+        1, len(works), figsize=(4.6 * len(works), 5.6), sharex=True, sharey=True, squeeze=False, layout="constrained"
+    )
+    for axes, work in zip(panels[0], works, strict=True):
+        own = [record for record in records if record.work == work]
+        _limit(axes, [entry for entry in machine["least"] if entry["work"] == work], own)
+        for number, (method, peer) in enumerate(runs):
+            look = {"marker": MARKERS[number % len(MARKERS)], "color": COLOURS[number % len(COLOURS)]}
+            _line(axes, [r for r in own if (r.method, r.peer) == (method, peer)], look)
+        axes.set(title=work, xlabel="time per point on one thread (s)", xscale="log", yscale="log")
         axes.grid(alpha=0.3)
-    (panels if len(works) == 1 else panels[0]).set_ylabel(f"largest error of the {name}, relative to 1 + |value|")
-    (panels if len(works) == 1 else panels[-1]).legend(fontsize=8)
-    figure.suptitle(f"{scene}: error against time (lower left is better)")
+    panels[0, 0].set_ylabel(f"largest error of the {name}, relative to 1 + |value|")
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=5, fontsize=8)
+    figure.suptitle(
+        f"{scene}: error against time, lower left is better (beside points: wrong verdicts on the references)"
+    )
     figure.savefig(path, dpi=150)
     plt.close(figure)
+
+
+def _line(axes, own, look):
+    """One method or peer (hollow, dashed), with the number of wrong verdicts beside each point that has any."""
+    method, peer = own[0].method, own[0].peer
+    seconds, errors = [r.seconds_per_point for r in own], [max(r.error, LEAST_ERROR) for r in own]
+    style = {"ls": "--", "mfc": "white"} if peer else {"lw": 2.5 if method == "auto" else 1.2}
+    axes.plot(seconds, errors, ms=5, label=f"{peer} (peer)" if peer else method, **{"lw": 1.2} | style | look)
+    for number, record in enumerate(r for r in own if r.wrong_verdicts):
+        # to the right and to the left in turn, else the figures of neighbours read as one number
+        place = {"xytext": (5, 3), "ha": "left"} if number % 2 == 0 else {"xytext": (-5, -9), "ha": "right"}
+        axes.annotate(record.wrong_verdicts, (record.seconds_per_point, max(record.error, LEAST_ERROR)),
+                      textcoords="offset points", color=look["color"], fontsize=8, **place)  # fmt: skip
+
+
+def _limit(axes, least, records):
+    """The least time of a method's operations, at the errors which that method has there."""
+    errors = {r.setting: max(r.error, LEAST_ERROR) for r in records if r.method == least[0]["method"]}
+    heights = [errors[entry["setting"]] for entry in least]
+    axes.plot(
+        [entry["seconds_per_point"] for entry in least], heights, "k--", lw=1,
+        label=f"limit: {least[0]['method']}'s operations at this core's peak rate",
+    )  # fmt: skip

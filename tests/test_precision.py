@@ -1,6 +1,7 @@
 """The work-precision chart: real measurements, errors against the references, the same records in all three files."""
 
 import csv
+import importlib.util
 import json
 
 import numpy as np
@@ -24,16 +25,21 @@ def quick(monkeypatch):
     return case
 
 
-def test_records_hold_what_was_measured(quick, tmp_path):
+def test_records_hold_what_was_measured(quick, tmp_path, monkeypatch):
     said = []
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: name == "scipy" or None)
     paths = precision.write("satellite", tmp_path, peers=True, say=said.append)
     assert [path.name for path in paths] == [f"precision_satellite.{kind}" for kind in ("json", "csv", "png")]
     told = json.loads(paths[0].read_text())
     records = told["records"]
     assert list(records[0]) == FIELDS and told["machine"]["cpu"]
+    times = {(r["method"], r["work"], r["setting"]): r["seconds_per_point"] for r in records}
+    for least in told["machine"]["least"]:
+        assert 0 < least["seconds_per_point"] < times[least["method"], least["work"], least["setting"]]
     methods = {record["method"] for record in records if not record["peer"]}
     assert {"auto", "rk4", "magnus6", "taylor16"} <= methods
-    assert "scipy" in {record["peer"] for record in records}
+    assert {record["peer"] for record in records} == {"", "scipy"}
+    assert any(line.startswith("heyoka is not installed and is missing") for line in said)
     assert all(record["seconds_per_point"] > 0 and record["error"] >= 0 for record in records)
     assert sum(record["wrong_verdicts"] for record in records if not record["peer"]) == 0
     with open(paths[1], newline="") as file:
@@ -46,6 +52,22 @@ def test_records_hold_what_was_measured(quick, tmp_path):
 def test_the_asked_accuracy_is_reached_on_the_references(quick):
     for record in precision.measure("satellite", quick):
         assert record.error <= record.setting, record
+
+
+def test_a_peer_is_judged_by_its_discriminant(quick):
+    def constant(value):
+        system = type("Constant", (), {"integrate": lambda self, system, rtol: np.full((1, 6), value)})()
+        return precision._against(precision._peer(quick, system), quick.references(), "discriminant", 1e-8)[1]
+
+    verdicts = [verdict for *_, verdict in quick.references()]
+    assert constant(0.1) == verdicts.count(0) and constant(10.0) == verdicts.count(1)
+
+
+def test_a_share_is_points_of_the_work(quick):
+    (point, _) = quick.works()["row"]
+    assert precision._share(point, None) is point and precision._share(point, 8) is point
+    share = precision._share(point, 3)
+    assert share["k"].shape == share["rho"].shape == (3,) and set(share["rho"]) < set(point["rho"][0])
 
 
 def test_a_wrong_value_or_verdict_shows_in_the_chart(quick):

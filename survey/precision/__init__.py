@@ -5,11 +5,14 @@ Everything that belongs to one scene lies in the file of its name beside this on
     ERROR                  the output whose error is charted
     references()           [(parameters, options, {output: exact value}, verdict or None), ...]
     works()                {name of the work: (point, options)}, what is timed; the arrays of `point` broadcast
-    peers()                {name: function(point, options, rtol) -> {ERROR: values}}, those that are installed
-    missing()              names of the peers that are not
+    system(point, options) the same question as ODEs, for the peers in `survey.peers`
+    outcome(ends)          {ERROR: values, "verdict": values} from the states (points, n) at the ends of the spans
+    LIMITED                the method whose operations, at the machine's peak rate, are the least time of the chart
+    operations_of(run)     its operations while `run()` solves a work with it
 """
 
 import csv
+import importlib.util
 import json
 import os
 import platform
@@ -17,23 +20,25 @@ import subprocess
 import sys
 import time
 from dataclasses import asdict, dataclass
+from functools import partial
 from math import prod
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
+import survey.peers as programs
 import survey.precision as folder
 import survey.scenes as scenes
-from survey import modules, workflow
+from survey import modules, peak, workflow
 from survey.dataset import provenance
 from survey.errors import BadInput
+from survey.grid import line
 from survey.scene import Request, exists
 
 SETTINGS = tuple(10.0**-n for n in range(4, 14))
 REPEATS = 5
 ENOUGH_SECONDS = 2.0
-PEER_POINTS = 40  # of peers that go point by point, whatever the work
 
 
 @dataclass
@@ -50,6 +55,18 @@ class Record:
     compile_seconds: float
 
 
+@dataclass
+class Least:
+    """The least time of a method's steps: its operations at the peak rate, multiplied and added apart or fused."""
+
+    work: str
+    method: str
+    setting: float
+    operations_per_point: float
+    seconds_per_point: float
+    seconds_per_point_fused: float
+
+
 def write(scene, directory, peers=False, say=lambda line: None):
     """Measure and write precision_SCENE.json, .csv and .png into `directory`; returns the three paths."""
     directory = Path(directory)
@@ -61,7 +78,7 @@ def write(scene, directory, peers=False, say=lambda line: None):
         raise BadInput(f"-o {str(directory)!r}: cannot make this folder ({error.strerror})") from None
     records = measure(scene, case, peers, say)
     paths = [directory / f"precision_{scene}.{kind}" for kind in ("json", "csv", "png")]
-    machine = provenance() | {"system": platform.platform(), "threads": 1}
+    machine = provenance() | {"system": platform.platform(), "threads": 1} | limit(scene, case)
     paths[0].write_text(json.dumps({"records": [asdict(r) for r in records], "machine": machine}, indent=1) + "\n")
     with open(paths[1], "w", newline="") as file:
         table = csv.DictWriter(file, list(asdict(records[0])))
@@ -69,38 +86,89 @@ def write(scene, directory, peers=False, say=lambda line: None):
         table.writerows(asdict(record) for record in records)
     from survey.chart import draw
 
-    draw(records, scene, case.ERROR, paths[2])
+    draw(records, machine, scene, case.ERROR, paths[2])
     return paths
 
 
 def measure(scene, case, peers=False, say=lambda line: None):
     """The records of every method (and, if asked, of every peer that is installed) at every setting."""
     module = modules.load(scenes, scene, "scene")
-    runs = {(method, ""): _solver(module, method) for method in ["auto", *workflow.methods_of(module)]}
-    if peers:
-        runs |= {("", name): function for name, function in case.peers().items()}
-        for name in case.missing():
+    runs = {
+        (method, ""): (_solver(module, method, case.ERROR), None) for method in ["auto", *workflow.methods_of(module)]
+    }
+    for name in modules.names(programs) if peers else ():
+        if importlib.util.find_spec(name):
+            peer = modules.load(programs, name, "peer")
+            runs["", name] = _peer(case, peer), peer.POINTS
+        else:
             say(f"{name} is not installed and is missing in the chart: pip install 'survey[bench]'")
     references, works = case.references(), case.works()
     records = []
-    for (method, peer), solve in runs.items():
-        compile_seconds = _first_call(solve, works) if peer else _cold(scene, method)
+    for (method, peer), (solve, most) in runs.items():
+        compile_seconds = _first_call(solve, works, most) if peer else _cold(scene, method)
+        for point, options in works.values() if method else ():  # every path is compiled before it is timed
+            solve(point, options, SETTINGS[0])
         for setting in SETTINGS:
-            error, wrong = _against(solve, references, case.ERROR, setting)
+            alone = _against(solve, references, case.ERROR, setting)
             for work, (point, options) in works.items():
-                seconds = _per_point(solve, point, options, setting, PEER_POINTS if peer else None)
+                # auto treats a dense row as a whole: its error is that of the references within such a row
+                inside = [_within(reference, point) for reference in references] if method == "auto" else None
+                error, wrong = _against(solve, inside, case.ERROR, setting) if inside else alone
+                seconds = _per_point(solve, point, options, setting, most)
                 records.append(Record(work, method, peer, setting, error, seconds, wrong, compile_seconds))
         say(f"{scene}: {method or peer} measured")
     return records
 
 
-def _solver(module, method):
-    """A function of (point, options, rtol) that calls the scene on one thread; see `works`."""
+def limit(scene, case):
+    """The machine's rates, and the least seconds per point that the operations of one method leave possible."""
+    rates = peak.rates()
+    solve = _solver(modules.load(scenes, scene, "scene"), case.LIMITED, case.ERROR)
+    least = []
+    for work, (point, options) in case.works().items():
+        for setting in SETTINGS:
+            count = case.operations_of(partial(solve, point, options, setting)) / _points(point)
+            seconds = [0.5e-9 * count / rate for rate in rates.values()]
+            least.append(Least(work, case.LIMITED, setting, count, *seconds))
+    return {"rates": rates, "least": [asdict(entry) for entry in least]}
+
+
+def _peer(case, peer):
+    """A function of (point, options, rtol) that has the peer integrate the scene's equations."""
+
+    def solve(point, options, rtol):
+        return case.outcome(peer.integrate(case.system(point, options), rtol))
+
+    return solve
+
+
+def _lines(point):
+    """The axes that one parameter of a work has for itself, as `Request.lines`."""
+    shapes = {name: np.shape(values) for name, values in point.items()}
+    own = {name: [i for i, size in enumerate(shape) if size > 1] for name, shape in shapes.items()}
+    alone = (name for name in own if len(own[name]) == 1 and sum(own[name] == other for other in own.values()) == 1)
+    return {name: line(np.ravel(point[name])) for name in alone}
+
+
+def _within(reference, point):
+    """The reference as the first point of a row of the work, where the work has rows."""
+    parameters, options, exact, verdict = reference
+    lines = [name for name in _lines(point) if np.shape(point[name])[-1] > 1]
+    if not lines:
+        return reference
+    whole = {name: np.array([[value]]) for name, value in parameters.items()}
+    whole |= {name: np.concatenate([whole[name], np.atleast_2d(point[name])], axis=1) for name in lines}
+    return whole, options, exact, verdict
+
+
+def _solver(module, method, error):
+    """A function of (point, options, rtol) that calls the scene for the output `error` and the verdict; see `works`."""
 
     def solve(point, options, rtol):
         options = workflow.check_options(module, options, point)
         used = workflow.check_parameters(module, module.TITLE, options, point)
-        request = Request(options, method, rtol, frozenset(o.name for o in module.OUTPUTS if exists(o, options)))
+        wanted = frozenset(o.name for o in module.OUTPUTS if exists(o, options) and o.name in (error, "verdict"))
+        request = Request(options, method, rtol, wanted, _lines(point))
         ndim = max(np.ndim(values) for values in point.values()) or 1
         whole = {key: np.asarray(point.get(key, p.default), float) for key, p in used.items()}
         return module.solve({key: v if v.ndim else v.reshape((1,) * ndim) for key, v in whole.items()}, request)
@@ -122,12 +190,13 @@ def _cold(scene, method):
 def first_call(scene, method):
     """Seconds that the first call of a scene's method takes in this process, less those of the second."""
     case = modules.load(folder, scene, "scene with a precision chart")
-    return _first_call(_solver(modules.load(scenes, scene, "scene"), method), case.works())
+    return _first_call(_solver(modules.load(scenes, scene, "scene"), method, case.ERROR), case.works())
 
 
-def _first_call(solve, works):
+def _first_call(solve, works, most=None):
     """Seconds of the first call less those of the second, on the smallest work."""
     point, options = min(works.values(), key=lambda work: _points(work[0]))
+    point = _share(point, most)
     times = []
     for _ in range(2):
         start = time.perf_counter()
@@ -150,16 +219,22 @@ def _against(solve, references, name, rtol):
 
 def _per_point(solve, point, options, rtol, most=None):
     """Median seconds per point of a few calls, on at most `most` points of the work."""
-    if most:
-        names, flat = list(point), [values.ravel() for values in np.broadcast_arrays(*point.values())]
-        chosen = np.random.default_rng(0).permutation(flat[0].size)[:most]
-        point = {name: values[chosen] for name, values in zip(names, flat, strict=True)}
+    point = _share(point, most)
     times, begin = [], time.perf_counter()
     while len(times) < REPEATS and (not times or time.perf_counter() - begin < ENOUGH_SECONDS):
         start = time.perf_counter()
         solve(point, options, rtol)
         times.append(time.perf_counter() - start)
     return float(np.median(times)) / _points(point)
+
+
+def _share(point, most):
+    """At most `most` points of the work, drawn at random."""
+    if most is None or _points(point) <= most:
+        return point
+    names, flat = list(point), [values.ravel() for values in np.broadcast_arrays(*point.values())]
+    chosen = np.random.default_rng(0).permutation(flat[0].size)[:most]
+    return {name: values[chosen] for name, values in zip(names, flat, strict=True)}
 
 
 def _points(point):

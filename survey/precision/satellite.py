@@ -1,12 +1,20 @@
-"""What is measured of the satellite: a row and a map of prolate librations, scattered points; 40-digit references."""
+"""The satellite's chart: a row and a map of prolate librations, scattered points; errors by 40-digit references."""
 
-import importlib.util
 import json
 from importlib import resources
+from unittest.mock import patch
 
 import numpy as np
 
+from survey.kernels import lanes
+from survey.measures import hill
+from survey.methods import taylor16
+from survey.peak import operations
+from survey.peers import System
+from survey.scenes.satellite import Motion, moduli
+
 ERROR = "discriminant"
+LIMITED = "taylor16"
 _FAMILIES = {"PL": "prolate", "PR": "prolate", "OL": "oblate", "OR": "oblate"}
 
 
@@ -21,51 +29,71 @@ def references():
 
 
 def works():
-    """A row of 600 ratios, a map, and points that share nothing."""
+    """A row of 600 ratios, some rows of two maps (rows share nothing), and points that share nothing."""
     random = np.random.default_rng(1)
     rho = np.linspace(0.6, 4.0, 600)
     return {
         "row": ({"k": np.array([[0.5]]), "rho": rho[None, :]}, {}),
-        "map 40x600": ({"k": np.linspace(0.0, 0.99, 40)[:, None], "rho": rho[None, :]}, {}),
+        "map 400x600": ({"k": np.linspace(0.0, 0.99, 400)[::10, None], "rho": rho[None, :]}, {}),
+        "map 2000x2000": (
+            {"k": np.linspace(0.0, 0.99, 2000)[::50, None], "rho": np.linspace(0.6, 4.0, 2000)[None, :]},
+            {},
+        ),
         "scattered": ({"k": random.uniform(0.01, 0.99, 300), "rho": random.uniform(0.6, 4.0, 300)}, {}),
     }
 
 
-def peers():
-    """scipy's adaptive DOP853 over half a period, by symmetry, with sn, cn, dn as states."""
-    return {"scipy": _scipy} if importlib.util.find_spec("scipy") else {}
+def system(point, options):
+    """Half a period, by symmetry, of x = sqrt(2) w and of y1, y2, as first-order equations.
+
+    w'' = (2 k^2 - 1) w - 2 w^3 for librations and rotations alike: no elliptic function is needed.
+    """
+    oblate = options.get("body", "prolate") == "oblate"
+    rows = np.atleast_1d(point["k"])  # a row's period is worked out once
+    halves = Motion(*moduli({"k": rows.ravel()}), oblate).period.reshape(rows.shape) / 2
+    k, rho, span = (np.ravel(values) for values in np.broadcast_arrays(rows, point["rho"], halves))
+    zero, one = np.zeros(k.size), np.ones(k.size)
+    constant = rho * rho - k * k if oblate else rho * rho + (1 - k) * (1 + k)
+    return System(
+        slope=_slope,
+        start=np.column_stack([np.sqrt(2) * k, zero, one, zero, zero, one]),
+        parameters=np.column_stack([2 * k * k - 1, np.sqrt(2) * rho, constant]),
+        span=span,
+        effort=span * (abs(rho) + k + 1),
+    )
 
 
-def missing():
-    """Peers that are not installed."""
-    return [] if importlib.util.find_spec("scipy") else ["scipy"]
+def _slope(state, parameters):
+    square = state[0] ** 2
+    z = square + (parameters[1] * state[0] + parameters[2])
+    bend = state[0] * (parameters[0] - square)
+    return state[1], bend, state[3], -z * state[2], state[5], -z * state[4]
 
 
-def _scipy(point, options, rtol):
-    from scipy.integrate import solve_ivp
-    from scipy.special import ellipkm1
-
-    k, rho = (np.ravel(values) for values in np.broadcast_arrays(point["k"], point["rho"]))
-    result = np.empty(k.size)
-    for i in range(k.size):
-        half = 2 * ellipkm1((1 - k[i]) * (1 + k[i])) if k[i] < 1 else ellipkm1((1 - 1 / k[i]) * (1 + 1 / k[i])) / k[i]
-        start = [0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0]
-        equations = _equations(k[i], rho[i], options.get("body", "prolate"))
-        solved = solve_ivp(equations, (0.0, half), start, "DOP853", rtol=max(rtol, 3e-14), atol=rtol)
-        y1, _, _, dy2 = solved.y[3:, -1]
-        result[i] = 2 * (2 * y1 * dy2 - 1)
-    return {ERROR: result}
+def outcome(ends):
+    """The discriminant and, as a user of an integrator would have it, the verdict by |D| > 2."""
+    discriminant = 2 * (2 * ends[:, 2] * ends[:, 5] - 1)
+    return {ERROR: discriminant, "verdict": np.where(abs(discriminant) > 2, hill.UNSTABLE, hill.STABLE)}
 
 
-def _equations(k, rho, body):
-    """(sn, cn, dn, y1, y1', y2, y2')' for z = (w + rho)^2 + w^2 + c, w = k cn(u, k) or k dn(k u, 1/k)."""
-    modulus, rate = (k, 1.0) if k < 1 else (1 / k, k)
-    constant = 1 - k * k if body == "prolate" else -k * k
+def operations_of(run):
+    """Operations of midpoint Taylor's steps, counted from their formulas, while `run()` solves a work."""
+    steps = []
+    chain = taylor16.hill_chain
 
-    def slope(_, state):
-        sn, cn, dn, y1, dy1, y2, dy2 = state
-        w = k * (cn if k < 1 else dn)
-        z = (w + rho) ** 2 + w * w + constant
-        return [rate * cn * dn, -rate * sn * dn, -rate * modulus**2 * sn * cn, dy1, -z * y1, dy2, -z * y2]
+    def counting(samples, c2, h, p, order, starts, ends, out):
+        steps.append(samples.shape[1] * int((ends - starts).sum()))
+        chain(samples, c2, h, p, order, starts, ends, out)
 
-    return slope
+    with patch.object(taylor16, "hill_chain", counting):
+        run()
+    return sum(steps) * operations(_one_step)
+
+
+def _one_step(p):
+    """All that `lanes.chain` does per lane and step: the step, two columns with error ellipses, zeros and sums."""
+    matrix = taylor16.hill_step.py_func(np.ones((2, taylor16.WIDTH)), 1.0, p, 0.1)
+    for _ in range(2):
+        lanes.column.py_func(matrix, p, p, p, p, p)
+        p + 1.0
+    return p + lanes.relative.py_func(matrix, 0.1)

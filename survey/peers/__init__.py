@@ -1,0 +1,35 @@
+"""Other programs that the work-precision charts measure beside survey's methods, each by its best documented use.
+
+One file per peer, found by its name, which is that of the package it imports:
+
+    POINTS                      how many points of a work it is timed on, so that a chart takes minutes
+    integrate(system, rtol)     states (points, n) at the end of every point's span
+
+A peer is imported only when it is measured; `[bench]` in pyproject.toml installs them all.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class System:
+    """An autonomous system of ODEs at many points, each over its own span from 0.
+
+    `slope(state, parameters)` gives a tuple; it only indexes, adds, multiplies and squares, so that every peer can
+    take it as it is: as Python, compiled, traced or as symbols. Points of like `effort` take about as many steps.
+    """
+
+    slope: Callable
+    start: np.ndarray
+    parameters: np.ndarray
+    span: np.ndarray
+    effort: np.ndarray
+
+
+def batches(system, lanes):
+    """Indices (batches, lanes) of points, like efforts together; the last points fill up the last batch."""
+    order = np.argsort(system.effort, kind="stable")
+    return np.append(order, np.repeat(order[-1:], -order.size % lanes)).reshape(-1, lanes)
