@@ -102,8 +102,9 @@ def counts(variable):
 
 
 def error_bars(ds):
-    """Names of the float outputs of `ds` (those that have an error bar)."""
-    return [name for name in ds.data_vars if f"{name}_error" in ds.data_vars]
+    """Names of the float outputs of `ds`, one value or more per point (those that have an error bar)."""
+    point = set(ds.status.dims)
+    return [name for name in ds.data_vars if f"{name}_error" in ds.data_vars and point <= set(ds[name].dims)]
 
 
 def encoding(ds):
@@ -116,7 +117,7 @@ def encoding(ds):
             settings[name]["_FillValue"] = None
         if name in ds.data_vars and variable.ndim:
             tile = [
-                min(size, 256) if axis >= variable.ndim - 2 else min(size, 16)
+                max(1, min(size, 256) if axis >= variable.ndim - 2 else min(size, 16))
                 for axis, size in enumerate(variable.shape)
             ]
             settings[name] |= packed | {"chunksizes": tile}

@@ -106,6 +106,10 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
             for name, values in kept.load(number).items():
                 arrays[name][block] = values
         ds = label(workflow, arrays)
+        if workflow.boundaries:
+            from survey import boundaries
+
+            ds = ds.merge(boundaries.find(workflow)).assign_attrs(boundaries=workflow.boundaries)
         ds.attrs["wall_time_s"] = round(time.time() - started, 3)
         ds.attrs["blocks_reused"] = len(reused)
         store.write(ds, workflow.path)

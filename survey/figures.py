@@ -31,7 +31,7 @@ def save(ds, path, name=None):
 
 def draw(ds, name=None):
     """The matplotlib figure of one variable over the survey's axes; raises BadInput for an unknown variable."""
-    drawable = [key for key in ds.data_vars if not key.endswith("_error")]
+    drawable = [key for key in ds.data_vars if not key.endswith("_error") and not key.startswith("edge_")]
     name = name or ("verdict" if "verdict" in ds else drawable[0])
     if name not in drawable:
         raise BadInput(modules.unknown("variable", name, drawable))
@@ -69,10 +69,25 @@ def _map(axes, ds, variable, state):
         handles += [Patch(color="#dddddd", label="does not apply")] if shown.mask.any() else []
         if handles:
             _legend(axes, handles)
+    if "edge_position" in ds:
+        _edges(axes, ds, x, y)
     for axis, coord in ((axes.xaxis, x), (axes.yaxis, y)):
         axis.set_label_text(_label(coord))
         if _logarithmic(coord):
             (axes.set_xscale if axis is axes.xaxis else axes.set_yscale)("log")
+
+
+def _edges(axes, ds, x, y):
+    """The edges of the tongues over the map: a line per class and index, dots where a row has several of one."""
+    rows = ds[ds.edge_count.dims[0]].values if ds.edge_count.dims else np.zeros(1)
+    place = np.repeat(rows, ds.edge_count.values)
+    for kind, index in sorted({*zip(ds.edge_class.values.tolist(), ds.edge_index.values.tolist(), strict=True)}):
+        own = (ds.edge_class.values == kind) & (ds.edge_index.values == index)
+        along = (place[own], ds.edge_position.values[own])
+        single = np.unique(along[0]).size == along[0].size
+        style = {"lw": 0.5} if single else {"ls": "none", "marker": ".", "markersize": 1.5, "markeredgewidth": 0}
+        axes.plot(*(along if ds.attrs["boundaries"] == y.name else along[::-1]), color="#000000", **style)
+    axes.set(xlim=_widened(x.values)[[0, -1]], ylim=_widened(y.values)[[0, -1]])
 
 
 def _verdicts(axes, x, y, variable, failed, outside):

@@ -60,6 +60,10 @@ class Output(Table):
     variables: list[str] | None = None
 
 
+class Boundaries(Table):
+    axis: str | None = None
+
+
 class File(Table):
     title: str = ""
     scene: str
@@ -67,6 +71,7 @@ class File(Table):
     axes: dict[str, Axis]
     solver: Solver = Solver()
     output: Output = Output()
+    boundaries: Boundaries | None = None
 
 
 @dataclass(frozen=True)
@@ -81,6 +86,7 @@ class Workflow:
     path: Path
     figures: tuple[str, ...]
     text: str
+    boundaries: str | None = None
 
 
 def read(path, overrides=(), output=None):
@@ -133,7 +139,22 @@ def check(data, text="", output=None, default_path="survey.nc"):
         path=check_path(next(path for path in (output, file.output.path, default_path) if path is not None)),
         figures=tuple(file.output.figures),
         text=text or tomli_w.dumps(data),
+        boundaries=_check_boundaries(scene, name, file.boundaries, given),
     )
+
+
+def _check_boundaries(scene, name, asked, given):
+    """The axis along which edges of tongues are sought, the last one by default; None if none are asked for."""
+    if asked is None:
+        return None
+    axes = [key for key, values in given.items() if np.ndim(values)]
+    if scene.FAMILY != "hill":
+        raise BadInput(f"boundaries: the scene {name} has no tongues; leave the table out")
+    if not 1 <= len(axes) <= 2:
+        raise BadInput(f"boundaries: they are drawn on one axis or two, and there are {len(axes)}; fix the others")
+    if asked.axis is not None and asked.axis not in axes:
+        raise BadInput(f"boundaries.axis: {modules.unknown('axis', asked.axis, axes)}")
+    return asked.axis or axes[-1]
 
 
 def check_options(scene, given, parameters=(), table=""):
@@ -298,7 +319,11 @@ def _one_line(error):
 
 def _nearest(loc):
     """The keys that are allowed beside an unknown one, the nearest first named."""
-    table = {"solver": Solver, "output": Output, "axes": Spread}.get(loc[0], File) if len(loc) > 1 else File
+    table = (
+        {"solver": Solver, "output": Output, "axes": Spread, "boundaries": Boundaries}.get(loc[0], File)
+        if len(loc) > 1
+        else File
+    )
     known = list(table.model_fields) + (["values"] if table is Spread else [])
     return modules.unknown("", str(loc[-1]), known).removeprefix(f"unknown  {str(loc[-1])!r}")
 
