@@ -65,7 +65,7 @@ def mathieu(a, q, half_periods=1):
     rule = np.where((q[:, None] == 0) & (np.sqrt(abs(a)) == np.rint(np.sqrt(abs(a)))) & (a >= 0), ON_EDGE, NO_RULE)
     rule = np.where((q[:, None] == 0) & (np.sqrt(abs(a)) == np.rint(np.sqrt(abs(a)))) & (a >= 0), ON_EDGE, NO_RULE)
     return hill.Problem(
-        p=np.ascontiguousarray(a), span=np.full(len(a), half), rate=np.full(len(a), 2.0), c2=0.0, sample=sample,
+        p=a.copy(), span=np.full(len(a), half), rate=np.full(len(a), 2.0), c2=0.0, sample=sample,
         bound=np.column_stack([2 * abs(q), np.ones(len(a)), np.zeros(len(a))]), rule=rule.astype(np.int8),
     )  # fmt: skip
 

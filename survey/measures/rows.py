@@ -26,9 +26,9 @@ class Rows:
         return np.ascontiguousarray(self.per_point(array)[:, 0])
 
     def per_point(self, array):
-        """All values, as (rows, lanes), contiguous float64."""
+        """All values, as (rows, lanes), contiguous float64; a copy, as a read-only view would be compiled for anew."""
         whole = np.broadcast_to(np.asarray(array, dtype=float), self.shape).transpose(self.order)
-        return np.ascontiguousarray(whole.reshape(self.rows, self.lanes))
+        return np.array(whole.reshape(self.rows, self.lanes), order="C")
 
     def back(self, array):
         """(rows, lanes), or (rows, 1), in the block's shape."""
