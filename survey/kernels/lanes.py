@@ -16,6 +16,7 @@ import numpy as np
 from survey.kernels.jit import inline
 
 TILE = 64
+VECTOR = 8
 STATE = 13
 WORST = 300.0
 
@@ -24,22 +25,68 @@ WORST = 300.0
 def chain(row, step, width, samples, c2, h, p, order, starts, ends, out):
     """Compose `step` over all rows; row r owns the points order[starts[r] : ends[r]] of `p` and of `out`.
 
-    `row(samples, coefficients)` reduces the samples (2, nodes) of a step to (2, width) coefficients, once per row;
-    `step(coefficients, c2, p, h)` gives P11, P12, P21, P22 and the bounds D11 = D22, D12, D21.
+    `row(samples, h, coefficients)` reduces samples (2, nodes, L) of L steps of lengths h (L) to coefficients
+    (2 width, L); `step(coefficients, c2, p, h)` gives P11, P12, P21, P22 and the bounds D11 = D22, D12, D21.
     """
+    steps, nodes = samples.shape[1], samples.shape[3]
     state, lanes = np.empty((STATE, TILE)), np.empty(TILE)
-    coefficients = np.empty((samples.shape[1], 2, width))
+    by_step, lengths = np.empty((2, nodes, steps)), np.empty(steps)
+    together, coefficients = np.empty((2 * width, steps)), np.empty((steps, 2 * width))
     for r in range(len(ends)):
-        for n in range(samples.shape[1]):
-            row(samples[r, n], coefficients[n])
+        for n in range(steps):
+            lengths[n] = h[r]
+            for c in range(2):
+                for i in range(nodes):
+                    by_step[c, i, n] = samples[r, n, c, i]
+        row(by_step, lengths, together)
+        for n in range(steps):
+            for i in range(2 * width):
+                coefficients[n, i] = together[i, n]
         for first in range(starts[r], ends[r], TILE):
             count = min(TILE, ends[r] - first)
+            whole = _whole(count)
+            for i in range(whole):
+                lanes[i] = p[order[first + min(i, count - 1)]]
+            _start(state, whole)
+            for n in range(steps):
+                for i in range(whole):
+                    _advance(step(coefficients[n], c2, lanes[i], h[r]), h[r], state, i)
             for i in range(count):
-                lanes[i] = p[order[first + i]]
-            _start(state, count)
-            for n in range(samples.shape[1]):
-                _advance(step, coefficients[n], c2, lanes, h[r], state, count)
-            _finish(state, count, samples.shape[1], order[first : first + count], out)
+                _finish(state, i, steps, out[order[first + i]])
+
+
+@inline
+def scatter(row, step, width, samples, c2, h, p, order, starts, out):
+    """As `chain` where each row owns one point, order[starts[r]]: lanes are rows. The same operations, so bits."""
+    steps, nodes = samples.shape[1], samples.shape[3]
+    # in one array, so that LLVM sees that they do not overlap
+    work = np.empty((STATE + 2 + 2 * width, TILE))
+    state, lanes, lengths = work[:STATE], work[STATE], work[STATE + 1]
+    coefficients, by_lane = work[STATE + 2 :], np.empty((2, nodes, TILE))
+    for first in range(0, len(starts), TILE):
+        count = min(TILE, len(starts) - first)
+        whole = _whole(count)
+        for i in range(TILE):
+            r = first + min(i, count - 1)
+            lanes[i], lengths[i] = p[order[starts[r]]], h[r]
+        _start(state, whole)
+        for n in range(steps):
+            for i in range(TILE):
+                r = first + min(i, count - 1)
+                for c in range(2):
+                    for k in range(nodes):
+                        by_lane[c, k, i] = samples[r, n, c, k]
+            row(by_lane, lengths, coefficients)
+            for i in range(whole):
+                _advance(step(coefficients[:, i], c2, lanes[i], lengths[i]), lengths[i], state, i)
+        for i in range(count):
+            _finish(state, i, steps, out[order[starts[first + i]]])
+
+
+@inline
+def _whole(count):
+    """So many lanes fill the machine's vectors; those beyond `count` repeat the last."""
+    return (count + VECTOR - 1) // VECTOR * VECTOR
 
 
 @inline
@@ -53,19 +100,17 @@ def _start(state, count):
 
 
 @inline
-def _advance(step, coefficients, c2, p, h, state, count):
-    """One step of all lanes. State: y1, y1', y2, y2', S of column 1 (3), S of column 2 (3), zeros of y1, y2, M."""
-    for i in range(count):
-        matrix = step(coefficients, c2, p[i], h)
-        y, v, s, t, w = column(matrix, state[0, i], state[1, i], state[4, i], state[5, i], state[6, i])
-        state[10, i] += 1.0 if (y < 0.0) != (state[0, i] < 0.0) else 0.0
-        state[0, i], state[1, i] = y, v
-        state[4, i], state[5, i], state[6, i] = s, t, w
-        y, v, s, t, w = column(matrix, state[2, i], state[3, i], state[7, i], state[8, i], state[9, i])
-        state[11, i] += 1.0 if (y < 0.0) != (state[2, i] < 0.0) else 0.0
-        state[2, i], state[3, i] = y, v
-        state[7, i], state[8, i], state[9, i] = s, t, w
-        state[12, i] += relative(matrix, h)
+def _advance(matrix, h, state, i):
+    """One step of lane i. State: y1, y1', y2, y2', S of column 1 (3), S of column 2 (3), zeros of y1, y2, M."""
+    y, v, s, t, w = column(matrix, state[0, i], state[1, i], state[4, i], state[5, i], state[6, i])
+    state[10, i] += 1.0 if (y < 0.0) != (state[0, i] < 0.0) else 0.0
+    state[0, i], state[1, i] = y, v
+    state[4, i], state[5, i], state[6, i] = s, t, w
+    y, v, s, t, w = column(matrix, state[2, i], state[3, i], state[7, i], state[8, i], state[9, i])
+    state[11, i] += 1.0 if (y < 0.0) != (state[2, i] < 0.0) else 0.0
+    state[2, i], state[3, i] = y, v
+    state[7, i], state[8, i], state[9, i] = s, t, w
+    state[12, i] += relative(matrix, h)
 
 
 @inline
@@ -89,12 +134,11 @@ def column(matrix, y, v, s, t, w):
 
 
 @inline
-def _finish(state, count, steps, places, out):
-    for i in range(count):
-        own = out[places[i]]
-        own[0], own[1], own[2], own[3] = state[0, i], state[1, i], state[2, i], state[3, i]
-        bars(state[4, i], state[6, i], state[7, i], state[9, i], steps, state[12, i], own)
-        own[8], own[9] = state[10, i], state[11, i]
+def _finish(state, i, steps, out):
+    for k in range(4):
+        out[k] = state[k, i]
+    bars(state[4, i], state[6, i], state[7, i], state[9, i], steps, state[12, i], out)
+    out[8], out[9] = state[10, i], state[11, i]
 
 
 @inline

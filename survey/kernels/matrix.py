@@ -6,14 +6,16 @@ ROUNDING = 2.2e-16
 
 
 @inline
-def samples_only(samples, coefficients):
-    """The row function of methods that use z itself: the samples, then the largest."""
+def samples_only(samples, h, coefficients):
+    """The row function of methods that use z itself: the samples, then the largest (see `lanes.chain`)."""
+    nodes = samples.shape[1]
     for c in range(2):
-        size = 0.0
-        for i in range(samples.shape[1]):
-            coefficients[c, i] = samples[c, i]
-            size = max(size, abs(samples[c, i]))
-        coefficients[c, samples.shape[1]] = size
+        for i in range(samples.shape[2]):
+            coefficients[c * (nodes + 1) + nodes, i] = 0.0
+        for k in range(nodes):
+            for i in range(samples.shape[2]):
+                coefficients[c * (nodes + 1) + k, i] = samples[c, k, i]
+                coefficients[c * (nodes + 1) + nodes, i] = max(coefficients[c * (nodes + 1) + nodes, i], abs(samples[c, k, i]))
 
 
 @inline

@@ -17,9 +17,11 @@ LADDER = np.array([4, 6, *((4 + i % 4) << (i // 4 + 1) for i in range(57))])
 HARDER = np.searchsorted(LADDER, 2 * LADDER)
 # Adaptive methods: the local tolerance at effort i is 10^(-3 - i / 2).
 TOLERANCES = 10.0 ** (-3 - 0.5 * np.arange(25))
-# Keep a kernel call below about a second and its samples in tens of megabytes.
+# Keep a kernel call below about a second and its samples in the processor's cache.
 CALL_WORK = 8_000_000
-CALL_SAMPLES = 2_000_000
+CALL_SAMPLES = 200_000
+# Rows with fewer points go with each in a lane of its own, samples and all: the same bits.
+LANES_PER_ROW = 3
 # Radians of the fastest phase per step, at most: zeros are counted by signs at the ends of steps.
 LONGEST = 2.8
 
@@ -123,9 +125,21 @@ def _chain(problem, method, level, out):
     nodes, p = np.array(method.NODES), problem.p.reshape(-1)
     for at in np.flatnonzero(np.bincount(of_level)):
         steps, own = int(LADDER[at]), of_level == at
-        for used, first, last in _calls(rows[own], starts[own], ends[own], steps, nodes.size):
-            samples = problem.sample(used, nodes, steps)
-            method.hill_chain(samples, problem.c2, problem.span[used] / steps, p, order, first, last, out)
+        lone = int((ends - starts)[own].sum()) < LANES_PER_ROW * np.count_nonzero(own)
+        segment = _points_alone(rows[own], starts[own], ends[own]) if lone else (rows[own], starts[own], ends[own])
+        for used, first, last in _calls(*segment, steps, nodes.size):
+            samples, h = problem.sample(used, nodes, steps), problem.span[used] / steps
+            if lone:
+                method.hill_scatter(samples, problem.c2, h, p, order, first, out)
+            else:
+                method.hill_chain(samples, problem.c2, h, p, order, first, last, out)
+
+
+def _points_alone(rows, starts, ends):
+    """(rows, starts, ends) of the segments cut into points."""
+    count = ends - starts
+    first = np.repeat(starts - np.cumsum(count) + count, count) + np.arange(count.sum())
+    return np.repeat(rows, count), first, first + 1
 
 
 def _calls(rows, starts, ends, steps, nodes):

@@ -9,7 +9,7 @@ Source: S. Blanes, F. Casas, J. A. Oteo, J. Ros, Physics Reports 470 (2009) 151-
 from math import sqrt
 
 from survey.kernels.jit import inline, kernel
-from survey.kernels.lanes import chain
+from survey.kernels.lanes import chain, scatter
 from survey.kernels.matrix import doubled, samples_only
 
 ORDER = 6
@@ -69,16 +69,16 @@ def _matrix(z1, z2, z3, h):
 def hill_step(f, c2, p, h):
     """P over two half steps, and its local error bounds."""
     base = p * p * c2
-    z1 = f[0, 0] + p * f[1, 0] + base
-    z2 = f[0, 1] + p * f[1, 1] + base
-    z3 = f[0, 2] + p * f[1, 2] + base
-    z4 = f[0, 3] + p * f[1, 3] + base
-    z5 = f[0, 4] + p * f[1, 4] + base
-    z6 = f[0, 5] + p * f[1, 5] + base
-    left = f[0, 6] + p * f[1, 6] + base
-    middle = f[0, 7] + p * f[1, 7] + base
-    right = f[0, 8] + p * f[1, 8] + base
-    size = f[0, 9] + abs(p) * f[1, 9] + abs(base)
+    z1 = f[0] + p * f[WIDTH + 0] + base
+    z2 = f[1] + p * f[WIDTH + 1] + base
+    z3 = f[2] + p * f[WIDTH + 2] + base
+    z4 = f[3] + p * f[WIDTH + 3] + base
+    z5 = f[4] + p * f[WIDTH + 4] + base
+    z6 = f[5] + p * f[WIDTH + 5] + base
+    left = f[6] + p * f[WIDTH + 6] + base
+    middle = f[7] + p * f[WIDTH + 7] + base
+    right = f[8] + p * f[WIDTH + 8] + base
+    size = f[9] + abs(p) * f[WIDTH + 9] + abs(base)
     half = 0.5 * h
     return doubled(
         _matrix(z1, z2, z3, half), _matrix(z4, z5, z6, half), _matrix(left, middle, right, h), ORDER, size, h
@@ -88,3 +88,8 @@ def hill_step(f, c2, p, h):
 @kernel
 def hill_chain(samples, c2, h, p, order, starts, ends, out):
     chain(samples_only, hill_step, WIDTH, samples, c2, h, p, order, starts, ends, out)
+
+
+@kernel
+def hill_scatter(samples, c2, h, p, order, starts, out):
+    scatter(samples_only, hill_step, WIDTH, samples, c2, h, p, order, starts, out)

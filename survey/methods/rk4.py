@@ -11,7 +11,7 @@ import math
 from survey.kernels import along, fate, returns
 from survey.kernels.flow import BOUND_DG, BOUND_F, LAST, LOW, PHI, TRUNC_PHI, TRUNC_W, W, series, values
 from survey.kernels.jit import inline, kernel
-from survey.kernels.lanes import chain
+from survey.kernels.lanes import chain, scatter
 from survey.kernels.matrix import doubled, samples_only
 
 ORDER = 4
@@ -50,12 +50,12 @@ def _matrix(z0, z1, z2, h):
 def hill_step(f, c2, p, h):
     """P over two half steps, and its local error bounds."""
     base = p * p * c2
-    z0 = f[0, 0] + p * f[1, 0] + base
-    z1 = f[0, 1] + p * f[1, 1] + base
-    z2 = f[0, 2] + p * f[1, 2] + base
-    z3 = f[0, 3] + p * f[1, 3] + base
-    z4 = f[0, 4] + p * f[1, 4] + base
-    size = f[0, 5] + abs(p) * f[1, 5] + abs(base)
+    z0 = f[0] + p * f[WIDTH + 0] + base
+    z1 = f[1] + p * f[WIDTH + 1] + base
+    z2 = f[2] + p * f[WIDTH + 2] + base
+    z3 = f[3] + p * f[WIDTH + 3] + base
+    z4 = f[4] + p * f[WIDTH + 4] + base
+    size = f[5] + abs(p) * f[WIDTH + 5] + abs(base)
     half = 0.5 * h
     return doubled(_matrix(z0, z1, z2, half), _matrix(z2, z3, z4, half), _matrix(z0, z2, z4, h), ORDER, size, h)
 
@@ -63,6 +63,11 @@ def hill_step(f, c2, p, h):
 @kernel
 def hill_chain(samples, c2, h, p, order, starts, ends, out):
     chain(samples_only, hill_step, WIDTH, samples, c2, h, p, order, starts, ends, out)
+
+
+@kernel
+def hill_scatter(samples, c2, h, p, order, starts, out):
+    scatter(samples_only, hill_step, WIDTH, samples, c2, h, p, order, starts, out)
 
 
 @inline

@@ -8,7 +8,7 @@ DEGREE = 20
 
 
 class Series:
-    """A power series in h, cut after h^20; abs and division by anything but h/2 serve error bounds only."""
+    """A power series in h, cut after h^20, perhaps over h; abs and division by anything but h serve bounds only."""
 
     def __init__(self, coefficients):
         self.c = np.zeros(DEGREE + 2)
@@ -18,6 +18,8 @@ class Series:
         return Series(self.c + _series(other).c)
 
     def __mul__(self, other):
+        if isinstance(other, OverH):
+            return Series(np.append(other.factor * self.c[1:], 0))
         return Series(np.convolve(self.c, _series(other).c)[: DEGREE + 2])
 
     def __neg__(self):
@@ -29,14 +31,20 @@ class Series:
     def __rsub__(self, other):
         return _series(other) - self
 
-    def __truediv__(self, other):
-        half = np.count_nonzero(other.c) == 1 and other.c[1] == 0.5
-        return Series(np.append(2 * self.c[1:], 0)) if half else self
+    def __rtruediv__(self, number):
+        return OverH(number) if np.count_nonzero(self.c) == 1 and self.c[1] == 1.0 else self
 
     def __abs__(self):
         return self
 
     __radd__, __rmul__ = __add__, __mul__
+
+
+class OverH:
+    """A number over h: only to multiply a series by."""
+
+    def __init__(self, factor):
+        self.factor = factor
 
 
 def _series(value):
@@ -65,7 +73,8 @@ def exact(z):
 
 def test_local_error_is_h_to_the_17():
     z = np.random.default_rng(4).uniform(0.5, 1.5, 10)
-    f = [[Series([0.0] * j + [z[j] * 0.5**j]) for j in range(10)] + [Series([0])] * 2, [Series([0])] * 12]
+    powers = [Series([0.0] * (j + 2) + [-z[j] * 0.5 ** (j + 2)]) for j in range(10)]
+    f = [powers + [Series([0])] * 2, [Series([0])] * 12]
     step = getattr(taylor16.hill_step, "py_func", taylor16.hill_step)
     table = {(c, j): f[c][j] for c in range(2) for j in range(12)}
     got = step(table, 0.0, 0.0, Series([0.0, 1.0]))[:4]
