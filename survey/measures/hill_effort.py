@@ -14,7 +14,7 @@ from survey.measures.hill_answers import Answers
 # Even, so that a half period's middle falls between steps; four to the octave from 8 on.
 LADDER = np.array([4, 6, *((4 + i % 4) << (i // 4 + 1) for i in range(57))])
 # The place of twice as many steps.
-HARDER = np.searchsorted(LADDER, 2 * LADDER)
+HARDER = np.searchsorted(LADDER, 1.4 * LADDER)
 # Adaptive methods: the local tolerance at effort i is 10^(-3 - i / 2).
 TOLERANCES = 10.0 ** (-3 - 0.5 * np.arange(25))
 # Keep a kernel call below about a second and its samples in the processor's cache.
