@@ -9,36 +9,16 @@ from survey.kernels.hill import EPS, EXPONENT, NO_RULE, STABLE, UNDECIDED, UNSTA
 from survey.kernels.jit import inline, kernel
 
 TILE = 64
-
-
-@inline
-def _series(coefficients, state, count):
-    """sum_k c_k T_k(x) in `count` lanes of state[1], where state[0] is 2 x; state[2] is scratch."""
-    for i in range(count):
-        state[1, i] = state[2, i] = 0.0
-    k = len(coefficients) - 1
-    if k % 2 == 1:  # two terms a turn keep the recurrence in place
-        for i in range(count):
-            state[1, i] = coefficients[k]
-        k -= 1
-    while k > 0:
-        c, next_c = coefficients[k], coefficients[k - 1]
-        for i in range(count):
-            state[2, i] = c + state[0, i] * state[1, i] - state[2, i]
-            state[1, i] = next_c + state[0, i] * state[2, i] - state[1, i]
-        k -= 2
-    c = coefficients[0]
-    for i in range(count):
-        state[1, i] = c + 0.5 * state[0, i] * state[1, i] - state[2, i]
+ROWS = 8
 
 
 @kernel
-def expand(values, bars, even, transform, polynomials, back, lebesgue, series, totals):
+def expand(values, bars, even, transform, polynomials, back, lebesgue, place, series, totals):
     """The series of D and its bar, row by row, from the factors y1, y1', y2, y2' (4, R, nodes) and their bars there.
 
     `transform` takes n values to coefficients, `polynomials` these to m values, `back` those to coefficients (all by
-    columns: [from, to]); `lebesgue` holds the constants of n and m nodes. Where D is `even` the nodes are those of
-    the upper half axis, x falling from 1, and y1(-p) = y2'(p) gives the other half.
+    columns: [from, to]); `lebesgue` holds the constants of n and m nodes, `place` is that of `_doubt`. Where D is
+    `even` the nodes are those of the upper half axis, x falling from 1, and y1(-p) = y2'(p) gives the other half.
     """
     n, m, own = transform.shape[0], back.shape[0], values.shape[2]
     row, coefficients, factors = np.empty(n), np.empty(n), np.empty((4, m))
@@ -52,7 +32,7 @@ def expand(values, bars, even, transform, polynomials, back, lebesgue, series, t
                 row[i] = values[other, r, n - 1 - i] if mirrored else values[f, r, i]
                 error = max(error, bars[other, r, n - 1 - i] if mirrored else bars[f, r, i])
             _product(row, transform, coefficients)
-            bar[f] = lebesgue[0] * error + _doubt(coefficients)
+            bar[f] = lebesgue[0] * error + _doubt(coefficients, place)
             _product(coefficients, polynomials, factors[f])
         worst = 0.0
         for i in range(m):
@@ -64,7 +44,42 @@ def expand(values, bars, even, transform, polynomials, back, lebesgue, series, t
             worst = max(worst, 4.0 * min(sine_bar, cosine_bar) + 2.0 * EPS * (2.0 + abs(d)))
             factors[0, i] = d
         _product(factors[0], back, series[r])
-        totals[r] = lebesgue[1] * worst + _doubt(series[r])
+        totals[r] = lebesgue[1] * worst + _doubt(series[r], place)
+
+
+@kernel
+def transform(rows, matrix, place, out):
+    """Coefficients along the first axis of `rows` (n, m), values at nodes by `matrix` (by columns: [from, to]).
+
+    Returns the `_doubt` over all columns.
+    """
+    n, m = rows.shape
+    sizes = np.empty(n)
+    for k in range(n):
+        out[k] = 0.0
+        for j in range(n):
+            for i in range(m):
+                out[k, i] += matrix[j, k] * rows[j, i]
+        sizes[k] = 0.0
+        for i in range(m):
+            sizes[k] += abs(out[k, i])
+    return _doubt(sizes, place)
+
+
+@kernel
+def restrict(series, x, out):
+    """out[r] = sum_k series[k] T_k(x[r]): the rows' own coefficients, by Clenshaw's recurrence."""
+    n, m = series.shape
+    last, before = np.empty(m), np.empty(m)
+    for r in range(len(x)):
+        last[:] = 0.0
+        before[:] = 0.0
+        for k in range(n - 1, 0, -1):
+            for i in range(m):
+                before[i] = series[k, i] + 2.0 * x[r] * last[i] - before[i]
+            last, before = before, last
+        for i in range(m):
+            out[r, i] = series[0, i] + x[r] * last[i] - before[i]
 
 
 @inline
@@ -77,8 +92,8 @@ def _product(values, columns, out):
 
 
 @inline
-def _doubt(series):
-    """What a series leaves out and folds back, and rounding.
+def _doubt(series, place):
+    """What a series leaves out and folds back, and rounding; a place on [-1, 1] is known to `place` ulp.
 
     The first from its last coefficients at the rate at which they fall; the second of the transform, of Clenshaw's
     recurrence, and of the rounded place in the axis, where T_k' <= k^2.
@@ -89,41 +104,76 @@ def _doubt(series):
         size = abs(series[k])
         last = max(last, size) if k >= n - 4 else last
         before = max(before, size) if n - 8 <= k < n - 4 else before
-        rounding += size * (4.0 + k + 0.5 * k * k)
+        rounding += size * (4.0 + k + (0.5 + place) * k * k)
     rate = min(max(last / (before + 1e-300), 0.1), 0.9)
     return 4.0 * last / (1.0 - rate) + EPS * rounding
 
 
-@kernel
-def discriminants(rows, coefficients, bars, middle, radius, even, p, rule, rtol, wanted, floats, verdict, late):
-    """D of the `rows` of p (R, L) from its series: D, its bar, the verdict, the exponent; `late` where not enough.
+@inline
+def _polynomials(x, tile):
+    """T_0 ... at x, in the first lanes of the rows of `tile`."""
+    for i in range(len(x)):
+        tile[0, i], tile[1, i] = 1.0, x[i]
+    for k in range(2, len(tile)):
+        for i in range(len(x)):
+            tile[k, i] = 2.0 * x[i] * tile[k - 1, i] - tile[k - 2, i]
 
-    Row rows[j]: D = sum_k coefficients[j, k] T_k(x) within bars[j], x = (p - middle) / radius, or 2 (p / radius)^2 - 1
-    where D is `even`. Columns and `wanted` as in `survey.kernels.hill.measure`.
+
+@inline
+def _sum(c, tile, sums, count):
+    """sum_k c_k T_k in `count` lanes, eight terms a turn; there are a multiple of eight."""
+    for i in range(count):
+        sums[i] = 0.0
+    for k in range(len(c) - 8, -1, -8):
+        c0, c1, c2, c3, c4, c5, c6, c7 = c[k], c[k + 1], c[k + 2], c[k + 3], c[k + 4], c[k + 5], c[k + 6], c[k + 7]
+        t = tile[k : k + 8]
+        for i in range(count):
+            low = (c0 * t[0, i] + c1 * t[1, i]) + (c2 * t[2, i] + c3 * t[3, i])
+            high = (c4 * t[4, i] + c5 * t[5, i]) + (c6 * t[6, i] + c7 * t[7, i])
+            sums[i] += low + high
+
+
+@kernel
+def discriminants(rows, coefficients, bars, x, rule, rtol, wanted, floats, verdict, late):
+    """D of the `rows` from its series at x (L): D, its bar, the verdict, the exponent; `late` where not enough.
+
+    Row rows[j]: D = sum_k coefficients[j, k] T_k(x) within bars[j]. Columns and `wanted` as in `kernels.hill.measure`.
     """
-    state = np.empty((3, TILE))
-    for j in range(len(rows)):
-        r, bar = rows[j], bars[j]
-        for start in range(0, p.shape[1], TILE):
-            count = min(TILE, p.shape[1] - start)
-            for i in range(count):
-                t = (p[r, start + i] - middle) / radius
-                state[0, i] = 4.0 * t * t - 2.0 if even else 2.0 * t
-            _series(coefficients[j], state, count)
-            first = r * p.shape[1] + start
-            for i in range(count):
-                d = state[1, i]
-                size = abs(d)
-                floats[0, first + i], floats[1, first + i] = d, bar
-                said = STABLE if size < 2.0 - bar else UNSTABLE if size > 2.0 + bar else UNDECIDED
-                verdict[first + i] = said
-                late[first + i] = (said == UNDECIDED) | (not bar <= rtol * (1.0 + size))
+    terms, tiles = (coefficients.shape[1] + 7) // 8 * 8, (len(x) + TILE - 1) // TILE
+    table, sums, own = np.empty((tiles, terms, TILE)), np.empty(TILE), np.zeros((len(rows), terms))
+    own[:, : coefficients.shape[1]] = coefficients
+    for t in range(tiles):
+        _polynomials(x[t * TILE : (t + 1) * TILE], table[t])
+    # A tile of the table stays in the first cache for some rows, and what is written within some pages.
+    for turn in range((len(rows) + ROWS - 1) // ROWS * tiles):
+        start, t = turn // tiles * ROWS, turn % tiles
+        for j in range(start, min(start + ROWS, len(rows))):
+            count = min(TILE, len(x) - t * TILE)
+            _sum(own[j], table[t], sums, count)
+            first = rows[j] * len(x) + t * TILE
+            said, missed = verdict[first : first + count], late[first : first + count]
+            _judge(sums, bars[j], floats[:, first : first + count], rtol, said, missed)
             if len(rule) > 0:
                 for i in range(count):
-                    late[first + i] |= rule[r, start + i] != NO_RULE
+                    missed[i] |= rule[rows[j], t * TILE + i] != NO_RULE
             if wanted[5]:
                 for i in range(count):
                     # |D| - 2 = 4 sinh^2(exponent / 2)
-                    growth, own = exponent(0.25 * (abs(state[1, i]) - 2.0), 0.25 * bar, verdict[first + i])
-                    floats[EXPONENT, first + i], floats[EXPONENT + 1, first + i] = growth, own
-                    late[first + i] |= not own <= rtol * (1.0 + growth)
+                    growth, bar = exponent(0.25 * (abs(sums[i]) - 2.0), 0.25 * bars[j], said[i])
+                    floats[EXPONENT, first + i], floats[EXPONENT + 1, first + i] = growth, bar
+                    missed[i] |= not bar <= rtol * (1.0 + growth)
+
+
+@inline
+def _judge(d, bar, floats, rtol, verdict, late):
+    """D, its bar and the verdict of neighbouring points, and who is late. Views: an offset index is not vector code."""
+    for i in range(len(verdict)):
+        floats[0, i], floats[1, i] = d[i], bar
+    for i in range(len(verdict)):
+        stable, unstable = abs(d[i]) < 2.0 - bar, abs(d[i]) > 2.0 + bar
+        verdict[i] = np.int8(STABLE) if stable else np.int8(UNSTABLE) if unstable else np.int8(UNDECIDED)
+    for i in range(len(verdict)):
+        late[i] = verdict[i] == UNDECIDED
+    if not bar <= rtol:
+        for i in range(len(verdict)):
+            late[i] |= not bar <= rtol * (1.0 + abs(d[i]))

@@ -10,12 +10,12 @@ def samples_only(samples, h, coefficients):
     """The row function of methods that use z itself: the samples, then the largest (see `lanes.chain`)."""
     nodes = samples.shape[1]
     for c in range(2):
-        for i in range(samples.shape[2]):
-            coefficients[c * (nodes + 1) + nodes, i] = 0.0
+        first, size = c * (nodes + 1), coefficients[c * (nodes + 1) + nodes]
+        size[:] = 0.0
         for k in range(nodes):
             for i in range(samples.shape[2]):
-                coefficients[c * (nodes + 1) + k, i] = samples[c, k, i]
-                coefficients[c * (nodes + 1) + nodes, i] = max(coefficients[c * (nodes + 1) + nodes, i], abs(samples[c, k, i]))
+                coefficients[first + k, i] = samples[c, k, i]
+                size[i] = max(size[i], abs(samples[c, k, i]))
 
 
 @inline

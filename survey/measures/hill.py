@@ -36,6 +36,20 @@ OUTPUTS = (
 
 
 @dataclass(frozen=True)
+class Across:
+    """The rows of a problem as places `s` (R) on an axis of `number` rows from `low` to `high`, known to 4 + |s| ulp.
+
+    The factors are analytic in s; `at(s)` is the Problem of rows at any places, without points of its own.
+    """
+
+    s: np.ndarray
+    number: int
+    low: float
+    high: float
+    at: Callable
+
+
+@dataclass(frozen=True)
 class Problem:
     """R rows of L points: y'' + (c0(t) + p c1(t) + p^2 c2) y = 0 on half a period, p varying along the row.
 
@@ -43,10 +57,10 @@ class Problem:
     (rows, steps, 2, nodes); `walk(rows, p, tolerance)`, for adaptive methods, gives the results of a chain for
     points p of those rows, and which of them reached the end; `exact(rows, p, steps)` gives them in double-double, each
     in its even number of steps, for p and rows that are exact. |z| <= bound[r, 0] + |p| bound[r, 1] + p^2 bound[r, 2];
-    `rate` is 1 / distance to z's nearest singularity. `rule` (R, L) holds what exact rules say (`kernels.hill`),
-    `constant` (R, L) is z where it does not depend on t, NaN elsewhere; None where no point has one.
+    `rate` is 1 / distance to z's nearest singularity. `rule` (R, L) holds what exact rules say (`kernels.hill`), and
+    `constant` the rows where z does not depend on t, with z there (rows, L); None where nothing is to be said.
     `line` is the whole axis of p, when every row has the same points: (number, least, greatest). `even` (R) says
-    where p -> -p exchanges y1 and y2' at T/2, and leaves y2 and y1'.
+    where p -> -p exchanges y1 and y2' at T/2, and leaves y2 and y1'. `across` is the axis of the rows, if there is one.
     """
 
     p: np.ndarray
@@ -58,15 +72,16 @@ class Problem:
     walk: Callable | None = None
     exact: Callable | None = None
     rule: np.ndarray | None = None
-    constant: np.ndarray | None = None
+    constant: tuple[np.ndarray, np.ndarray] | None = None
     line: tuple[int, float, float] | None = None
     even: np.ndarray | None = None
+    across: Across | None = None
 
     def at(self, rows, p, rule=None):
         """Points `p` (one row for each of `rows`) on their own, no axis, with what exact rules say of them."""
         return replace(
             self, p=p, span=self.span[rows], bound=self.bound[rows], rate=self.rate[rows], rule=rule, constant=None,
-            line=None, sample=lambda used, nodes, steps: self.sample(rows[used], nodes, steps),
+            line=None, across=None, sample=lambda used, nodes, steps: self.sample(rows[used], nodes, steps),
             walk=self.walk and (lambda used, p, tolerance: self.walk(rows[used], p, tolerance)), exact=None,
         )  # fmt: skip
 

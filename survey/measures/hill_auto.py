@@ -19,7 +19,12 @@ CALL_STEPS = 20_000
 
 def solve(problem, asked, answers):
     """Answer every point of the problem, in place."""
-    free = None if problem.constant is None else np.isfinite(problem.constant + problem.p).reshape(-1)
+    free = None
+    if problem.constant is not None:
+        rows, z = problem.constant
+        free = np.zeros(problem.p.shape, np.bool_)
+        free[rows] = np.isfinite(z)
+        free = free.reshape(-1)
     open_points = hill_dense.solve(problem, taylor16, asked, answers) if hill_dense.serves(problem, asked) else None
     if free is not None:
         open_points = ~free if open_points is None else open_points & ~free
@@ -28,7 +33,7 @@ def solve(problem, asked, answers):
     if free is not None:
         places = np.flatnonzero(free)
         own = Answers(places.size, asked)
-        results = closed_form(problem.constant.reshape(-1)[places], problem.span[places // problem.p.shape[1]])
+        results = closed_form(z[np.isfinite(z)], problem.span[places // problem.p.shape[1]])
         own.judge(results, None if problem.rule is None else problem.rule.reshape(-1)[places])
         answers.put(places, own)
     left = (answers.status == status.OK) & (answers.verdict == UNDECIDED)

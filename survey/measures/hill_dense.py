@@ -1,9 +1,10 @@
-"""Dense rows of a Hill problem: the discriminant as a Chebyshev series in p, solved at its nodes alone.
+"""Dense maps of a Hill problem: the discriminant as a Chebyshev series in p, and across rows, solved at nodes alone.
 
 The factors y1, y1', y2, y2' at T/2 are entire functions of p (z is a polynomial in p), so their series on the axis
 converge faster than any power. The factors are solved at a row's nodes; their product D, with twice the degree, is
 expanded at as many nodes as it needs. Where p -> -p exchanges y1 and y2', the nodes of one half axis serve both, and D
-is a series in p^2.
+is a series in p^2. Where the rows are an axis too, D's coefficients are series across it, solved at its nodes; a panel
+of rows on which they do not converge is halved, and what is left over is served row by row.
 
 D's bar: the nodes' own bars times the Lebesgue constant, the tail of the series, and rounding. Points whose verdict
 or accuracy it leaves open are `late`, and solved one by one from their factors. All depends on the row and on the whole
@@ -12,12 +13,13 @@ axis, never on the block.
 Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 4, 8 and 15.
 """
 
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
 from survey.kernels import hill as kernels
-from survey.kernels.chebyshev import discriminants, expand
+from survey.kernels.chebyshev import discriminants, expand, restrict, transform
 from survey.measures import hill_effort
 from survey.measures.hill_answers import Answers, Asked
 
@@ -25,6 +27,7 @@ NO_RULES = np.zeros((0, 0), np.int8)
 DEGREES = np.array([16, 20, 24, 28, 32, 40, 48, 56, 64, 80, 96, 112, 128, 160, 192])
 # A proxy pays if a row has this many points for each that it solves.
 POINTS_PER_NODE = 3
+ROWS_PER_NODE = 2
 # Of the asked accuracy, for the factors at the nodes: Lebesgue constants and products multiply their bars by 100.
 NODES_SHARE = 2e-3
 RETRIES = 2
@@ -41,61 +44,139 @@ def serves(problem, asked):
 def solve(problem, method, asked, answers):
     """Answer the points of the rows that a proxy serves; returns the points (N, bool) still to be solved."""
     open_points = np.ones(problem.p.shape, np.bool_)
-    halved = max(-problem.line[1], problem.line[2]) < 1.5 * (problem.line[2] - problem.line[1])
-    even = np.zeros(problem.span.size, np.bool_) if problem.even is None or not halved else problem.even
-    for half in np.unique(even):
-        _solve(problem, method, asked, answers, np.flatnonzero(even == half), bool(half), open_points)
+    even = np.zeros(problem.span.size, np.bool_) if problem.even is None else problem.even
+    for symmetric in np.unique(even):
+        rows = np.flatnonzero(even == symmetric)
+        axis = _axis(problem.line, bool(symmetric))
+        if problem.across is not None:
+            rows = _surfaces(problem, method, asked, answers, rows, axis, open_points)
+        _rows(problem, method, asked, answers, rows, axis, open_points)
     return open_points.reshape(-1)
 
 
-def _solve(problem, method, asked, answers, chosen, even, open_points):
-    """Answer the points of the `chosen` rows; `even`: from half of a symmetric axis, which then needs fewer nodes."""
-    number, low, high = problem.line
-    middle, radius = (0.0, max(abs(low), abs(high))) if even else (0.5 * (low + high), 0.5 * (high - low))
-    most = int(np.searchsorted(DEGREES, number / POINTS_PER_NODE * (2 if even else 1), "right"))
+@dataclass(frozen=True)
+class _Axis:
+    """Where the series in p live; `even`: on half of a symmetric axis, which then needs fewer nodes."""
+
+    number: int
+    middle: float
+    radius: float
+    even: bool
+
+
+def _axis(line, symmetric):
+    number, low, high = line
+    if symmetric and max(-low, high) < 1.5 * (high - low):
+        return _Axis(number, 0.0, max(abs(low), abs(high)), True)
+    return _Axis(number, 0.5 * (low + high), 0.5 * (high - low), False)
+
+
+def _rows(problem, method, asked, answers, chosen, axis, open_points):
+    """Answer the points of the `chosen` rows, each by a series of its own."""
+    most = int(np.searchsorted(DEGREES, axis.number / POINTS_PER_NODE * (2 if axis.even else 1), "right"))
     place = np.full(problem.span.size, DEGREES.size)
-    place[chosen] = _places(problem, radius, asked.rtol)[chosen]
+    place[chosen] = _places(problem, axis, asked.rtol)[chosen]
     first = place.copy()
     for at in range(most):  # a row whose series has not converged goes on to the next degree
         rows = np.flatnonzero((place == at) & (at <= first + RETRIES))
         if rows.size:
-            series, bars = _series(problem, method, asked, rows, int(DEGREES[at]), middle, radius, even)
+            series, bars = _series(problem, method, asked.rtol, rows, int(DEGREES[at]), axis)
             good = bars <= asked.rtol
             useful = bars <= asked.rtol * (1 + abs(series).sum(axis=1))  # where D is largest, at least
             good |= useful & (at == first[rows] + RETRIES)
             place[rows[~good]] += 1
             rows, series, bars = rows[good], np.ascontiguousarray(series[good]), bars[good]
         if rows.size:
-            rule = NO_RULES if problem.rule is None else problem.rule
-            discriminants(
-                rows, series, bars, middle, radius, even, problem.p, rule, asked.rtol, asked.wanted,
-                answers.floats, answers.verdict, answers.late,
-            )  # fmt: skip
-            open_points[rows] = answers.late.reshape(problem.p.shape)[rows]
+            _answer(problem, asked, answers, rows, series, bars, axis, open_points)
 
 
-def _places(problem, radius, rtol):
-    """The place in DEGREES that each row's factors need: where a coefficient, about J_n of their type, is below rtol.
+def _answer(problem, asked, answers, rows, series, bars, axis, open_points):
+    rule = NO_RULES if problem.rule is None else problem.rule
+    x = (problem.p[rows[0]] - axis.middle) / axis.radius  # all rows have the same points
+    x = 2 * x * x - 1 if axis.even else x
+    discriminants(rows, series, bars, x, rule, asked.rtol, asked.wanted, answers.floats, answers.verdict, answers.late)
+    open_points[rows] = answers.late.reshape(problem.p.shape)[rows]
 
-    |J_n(x)| <= (x/2)^n / n! (DLMF 10.14.4); beyond DEGREES where none is enough or the row is not finite.
+
+def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
+    """Answer the points of those of the `chosen` rows that a series in s and p serves; returns the other rows.
+
+    The axis of rows is halved until D has converged on a panel to `rtol`, or the panel has too few rows.
     """
+    across, left = problem.across, [np.zeros(0, int)]
+    panels = [(across.low, across.high, across.number)]
+    while panels:
+        low, high, number = panels.pop()
+        s = across.s[chosen]
+        rows = chosen[(s >= low) & ((s < high) | ((s == high) & (high == across.high)))]
+        if not rows.size:
+            continue
+        middle, radius = 0.5 * (low + high), 0.5 * (high - low)
+        if number < ROWS_PER_NODE * DEGREES[0] or not radius > 0:
+            left.append(rows)
+            continue
+        surface = _surface(across, method, asked, middle, radius, number, axis)
+        if surface is None:
+            panels += [(low, middle, number / 2), (middle, high, number / 2)]
+            continue
+        series, bar = surface
+        own = np.empty((rows.size, series.shape[1]))
+        restrict(series, (across.s[rows] - middle) / radius, own)
+        _answer(problem, asked, answers, rows, own, np.full(rows.size, bar), axis, open_points)
+    outside = chosen[~((across.s[chosen] >= across.low) & (across.s[chosen] <= across.high))]
+    return np.concatenate([*left, outside])
+
+
+def _surface(across, method, asked, middle, radius, number, axis):
+    """D on a panel of rows: (coefficients of T_j in s, by T_k in p; bar), or None where `rtol` is not met."""
+    ends = across.at(middle + radius * np.array([-1.0, 1.0]))
+    size = np.sqrt((ends.bound * np.abs([1.0, axis.radius, axis.radius**2])).sum(axis=1))
+    kind = np.abs(np.diff(ends.span * size))  # half the change of D's phase
+    at = int(_enough(kind, asked.rtol)[0])
+    place = int(_places(ends, axis, asked.rtol).max())
+    most = [np.searchsorted(DEGREES, count, "right") for count in (number / ROWS_PER_NODE, axis.number)]
+    for _ in range(2 * RETRIES):
+        if at >= most[0] or place >= most[1]:
+            return None
+        n = int(DEGREES[at])
+        nodes = across.at(middle + radius * _nodes(n))
+        series, bars = _series(nodes, method, 0.25 * asked.rtol, np.arange(n), int(DEGREES[place]), axis)
+        surface = np.empty_like(series)
+        place_ulps = (4 + abs(middle) + radius) / radius
+        own, of_rows = transform(series, _transform(n), place_ulps, surface), _lebesgue(n) * bars.max()
+        if own + of_rows <= asked.rtol:
+            return surface, own + of_rows
+        at, place = (at + 1, place) if own > of_rows else (at, place + 1)
+    return None
+
+
+def _places(problem, axis, rtol):
+    """The place in DEGREES that each row's factors need; beyond DEGREES where none is enough."""
     if problem.c2:
-        kind = problem.span * radius * np.sqrt(problem.c2)
+        kind = problem.span * axis.radius * np.sqrt(problem.c2)
     else:
         # cos(span sqrt(p)) on an axis of length 2 radius is half as rich as cos(span p) on its square root
-        kind = 0.5 * problem.span * np.sqrt(2 * radius * problem.bound[:, 1])
+        kind = 0.5 * problem.span * np.sqrt(2 * axis.radius * problem.bound[:, 1])
+    return _enough(kind, rtol)
+
+
+def _enough(kind, rtol):
+    """The place in DEGREES where J_n(kind), about a coefficient, is below rtol; beyond DEGREES where there is none.
+
+    |J_n(x)| <= (x/2)^n / n! (DLMF 10.14.4).
+    """
     with np.errstate(divide="ignore"):
         size = DEGREES * np.log(0.5 * np.e / DEGREES * kind[:, None]) - 0.5 * np.log(2 * np.pi * DEGREES)
     enough = size < np.log(0.01 * rtol)
     return np.where(enough.any(axis=1), enough.argmax(axis=1), DEGREES.size)
 
 
-def _series(problem, method, asked, rows, n, middle, radius, even):
-    """Coefficients of D (rows, m; of T_k(2 (p/radius)^2 - 1) if `even`) and its bar, not finite where there is none."""
-    x = _nodes(n)
+def _series(problem, method, rtol, rows, n, axis):
+    """Coefficients of D (rows, m; of T_k(2 (p/radius)^2 - 1) if even) and its bar, not finite where there is none."""
+    x, even = _nodes(n), axis.even
     solved = x[: n // 2] if even else x
-    nodes = problem.at(rows, np.broadcast_to(middle + radius * solved, (rows.size, solved.size)).copy())
-    finer = Asked(max(NODES_SHARE * asked.rtol, 3e-14), FACTORS, together=True)
+    nodes = problem.at(rows, np.broadcast_to(axis.middle + axis.radius * solved, (rows.size, solved.size)).copy())
+    finer = Asked(max(NODES_SHARE * rtol, 3e-14), FACTORS, together=True)
     own = Answers(nodes.p.size, finer)
     hill_effort.solve(nodes, method, finer, own)
     values, bars = (
@@ -105,11 +186,19 @@ def _series(problem, method, asked, rows, n, middle, radius, even):
         for at in (0, 1)
     )
     m = n + n // 2
-    x = _nodes(m)[: m // 2] if even else _nodes(m)  # those in x of the upper half are those in 2 x^2 - 1 of the whole
-    series, totals = np.empty((rows.size, x.size)), np.empty(rows.size)
-    lebesgue = 2 / np.pi * np.log(np.array([n, x.size]) + 1) + 1  # Trefethen, theorem 15.2
-    expand(values, bars, even, _transform(n), _polynomials(n, x), _transform(x.size), lebesgue, series, totals)
+    m = m // 2 if even else m
+    series, totals = np.empty((rows.size, m)), np.empty(rows.size)
+    lebesgue = np.array([_lebesgue(n), _lebesgue(m)])
+    place_ulps = (abs(axis.middle) + axis.radius) / axis.radius
+    expand(
+        values, bars, even, _transform(n), _polynomials(n, m, even), _transform(m), lebesgue, place_ulps, series, totals
+    )
     return series, totals
+
+
+def _lebesgue(n):
+    """Lebesgue constant of n Chebyshev nodes: Trefethen, theorem 15.2."""
+    return 2 / np.pi * np.log(n + 1) + 1
 
 
 @cache
@@ -128,6 +217,8 @@ def _transform(n):
     return matrix
 
 
-def _polynomials(n, x):
-    """Coefficients -> values at x, by columns: T_0 ... T_(n-1) at x."""
+@cache
+def _polynomials(n, m, even):
+    """Coefficients -> values, by columns: T_0 ... T_(n-1) at m nodes; those in x of the upper half if `even`."""
+    x = _nodes(2 * m)[:m] if even else _nodes(m)  # those of T_k(2 x^2 - 1)
     return np.cos(np.arange(n)[:, None] * np.arccos(x))

@@ -48,14 +48,14 @@ def cost(options, sizes):
 def solve(point, request):
     """All outputs of a block that the request wants (see `survey.scenes`)."""
     block = Rows((point["q"],), point["a"])
-    problem = _problem(block.per_row(point["q"]), block.per_point(point["a"]), request.line("a"))
+    problem = _problem(block.per_row(point["q"]), block.per_point(point["a"]), request.line("a"), request.line("q"))
     out = hill.solve(problem, request.method, request.rtol, request.variables)
     out["period"] = np.where(out["status"] == status.OK, pi, np.nan)
     out["period_error"] = 1.3e-16 + 0.0 * out["period"]  # pi is rounded
     return {name: block.back(values) for name, values in out.items()}
 
 
-def _problem(q, a, line=None):
+def _problem(q, a, line=None, ends=None):
     def samples(used, nodes, steps):
         out = np.empty((used.size, steps, 2, nodes.size))
         sample(q[used], nodes, out)
@@ -84,17 +84,20 @@ def _problem(q, a, line=None):
         rule=rule,
         constant=constant,
         line=line,
+        across=hill.Across(q, *ends, at=lambda q: _problem(q, np.zeros((q.size, 0)))) if ends else None,
     )
 
 
 def _rules(q, a):
     """At q = 0, z = a: no unstable side for a > 0, and |D| = 2 at squares."""
-    free = q[:, None] == 0
-    if not free.any():
+    free = np.flatnonzero(q == 0)
+    if not free.size:
         return None, None
-    whole = np.rint(np.sqrt(abs(a)))
-    rule = np.where(a == whole * whole, ON_EDGE, np.where(a > 0, NO_UNSTABLE_SIDE, NO_RULE))
-    return np.where(free, rule, NO_RULE).astype(np.int8), np.where(free, a, np.nan)
+    z = a[free]
+    whole = np.rint(np.sqrt(abs(z)))
+    rule = np.full(a.shape, NO_RULE, np.int8)
+    rule[free] = np.where(z == whole * whole, ON_EDGE, np.where(z > 0, NO_UNSTABLE_SIDE, NO_RULE))
+    return rule, (free, z)
 
 
 @inline

@@ -82,7 +82,7 @@ def solve(point, request):
     shared = moduli(point)
     if "rho" in point:
         oblate, exactly = request.options["body"] == "oblate", "amplitude" not in point
-        return _solve(shared, point["rho"], oblate, request, request.line("rho"), exactly)
+        return _solve(shared, point["rho"], oblate, request, request.line("rho"), exactly, _ends(request))
     alpha = np.asarray(point["inertia_ratio"], dtype=float)
     rho = float(request.options["direction"]) / np.sqrt(3 * abs(1 - alpha))
     bodies = [
@@ -91,14 +91,14 @@ def solve(point, request):
     return {name: np.where(alpha > 1, bodies[-1][name], bodies[0][name]) for name in bodies[0]}
 
 
-def _solve(shared, rho, oblate, request, line=None, exactly_given=False):
+def _solve(shared, rho, oblate, request, line=None, exactly_given=False, across=None):
     """The outputs for one kind of body; points that are not of it have rho = NaN.
 
     What k and rho are exactly is known only where they are `exactly_given`, not computed from other words.
     """
     block = Rows(shared, rho)
     row = Motion(*(block.per_row(values) for values in shared), bool(oblate))
-    problem = _problem(row, block.per_point(rho), line, exactly_given)
+    problem = _problem(row, block.per_point(rho), line, exactly_given, across)
     wanted = set(request.variables) | ({"exponent"} if "exponent_per_orbit" in request.variables else set())
     out = hill.solve(problem, request.method, request.rtol, wanted)
     ok = out["status"] == status.OK
@@ -194,7 +194,30 @@ class Motion:
         return least > 16 * EPS * (rho * rho + k * k)
 
 
-def _problem(row, rho, line, exactly_given):
+def _ends(request):
+    """(number, least and greatest s = -log |1 - k^2| or -log(1 - 1/k^2)) of an axis of one family of motions."""
+    for name in ("k", "one_minus_k", "amplitude"):
+        line = request.line(name)
+        if line is not None:
+            k, kc, _, _ = moduli({name: np.array(line[1:])})
+            return (line[0], *np.sort(-2 * np.log(kc))) if (k > 1).all() or (k < 1).all() else None
+    return None
+
+
+def _at(s, oblate, rotates):
+    """The rows at places s of the axis."""
+    k, kc = np.sqrt(-np.expm1(-s)), np.exp(-s / 2)
+    k = 1 / k if rotates else k
+    return _problem(Motion(k, kc, k, 0 * k, oblate), np.zeros((s.size, 0)))
+
+
+def _across(row, ends):
+    s = -2 * np.log(row.kc)
+    rotates = bool(row.rotates.any())
+    return hill.Across(s, *ends, at=lambda places: _at(places, row.oblate, rotates))
+
+
+def _problem(row, rho, line=None, exactly_given=False, ends=None):
     oblate = np.full(row.k.size, float(row.oblate))
     rows = np.column_stack([row.k, row.kc, row.period / 2, oblate, row.high, row.low])
 
@@ -227,6 +250,7 @@ def _problem(row, rho, line, exactly_given):
         constant=constant,
         line=line,
         even=~row.rotates,
+        across=_across(row, ends) if ends else None,
     )
 
 
@@ -237,14 +261,16 @@ def _rules(row, rho):
     (2 rho)^2 = n^2 - 4, two squares of integers (a binary fraction whose square is an integer is one) that differ by
     4: only rho = 0.
     """
-    at_rest = row.k[:, None] == 0
-    if not at_rest.any() and rho.all():
+    at_rest, balanced = np.flatnonzero(row.k == 0), rho == 0
+    if not at_rest.size and not balanced.any():
         return None, None
-    whole = (2 * rho == np.rint(2 * rho)) if row.oblate else False
-    edge = (rho == 0) | (at_rest & whole)
-    rule = np.where(edge, ON_EDGE, np.where(at_rest, NO_UNSTABLE_SIDE, NO_RULE)).astype(np.int8)
-    constant = np.where(at_rest, rho * rho + (0.0 if row.oblate else 1.0), np.nan) if at_rest.any() else None
-    return rule, constant
+    rule = np.where(balanced, np.int8(ON_EDGE), np.int8(NO_RULE))
+    if not at_rest.size:
+        return rule, None
+    still = rho[at_rest]
+    whole = (still == 0) | ((2 * still == np.rint(2 * still)) if row.oblate else False)
+    rule[at_rest] = np.where(whole, ON_EDGE, NO_UNSTABLE_SIDE)
+    return rule, (at_rest, still * still + (0.0 if row.oblate else 1.0))
 
 
 @kernel
