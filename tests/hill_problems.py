@@ -8,6 +8,7 @@ from mpmath import mp, mpf
 
 from survey.kernels.hill import NO_RULE, ON_EDGE
 from survey.measures import hill
+from survey.methods import taylor_double
 from survey.scene import Request
 from survey.scenes import satellite
 
@@ -23,6 +24,16 @@ def solve(body="prolate", method="auto", rtol=1e-10, **point):
     point = {name: np.atleast_1d(np.asarray(values, dtype=float)) for name, values in point.items()}
     names = frozenset(output.name for output in satellite.OUTPUTS)
     return satellite.solve(point, Request({"body": body}, method, rtol, names))
+
+
+def factors(body, rho, **modulus):
+    """The ten results of one point of the satellite, by the double-double kernel itself (held against mpmath)."""
+    shared = satellite.moduli({name: np.array([[value]]) for name, value in modulus.items()})
+    row = satellite.Motion(*(np.ravel(values) for values in shared), body == "oblate")
+    problem = satellite._problem(row, np.array([[rho]]), None, True)
+    phase, distance = taylor_double.hill_density()
+    steps = 2 * np.ceil(0.5 * row.period / 2 * np.maximum(phase * (abs(rho) + row.k + 1), distance * row.rate))
+    return problem.exact(np.zeros(1, int), np.array([rho]), steps.astype(np.int64))[0]
 
 
 def truth(case):

@@ -26,6 +26,18 @@ def complete_integrals(k, kc):
     return first, second
 
 
+def half_periods(k, kc):
+    """2 K(k), or K(1/k) / k for rotations; correctly rounded, nearly: phases are rho times as long (DLMF 19.8.5).
+
+    In the machine's extended floats (on some machines float64) and numpy, which has nothing to compile.
+    """
+    a, b = np.ones_like(kc, dtype=np.longdouble), kc.astype(np.longdouble)
+    for _ in range(MEANS):
+        a, b = (a + b) / 2, np.sqrt(a * b)
+    two = (np.longdouble(dd.PI[0]) + np.longdouble(dd.PI[1])) / a
+    return np.where(k > 1, two / (2 * np.maximum(k, 1)), two).astype(float)
+
+
 @inline
 def motion(u, k, oblate, pairs, last):
     """w and g at u: w = k cn(u, k) for librations, k dn(k u, 1/k) for rotations."""

@@ -28,7 +28,7 @@ from survey.kernels import satellite as motion
 from survey.kernels.elliptic import MEANS
 from survey.kernels.hill import LARGEST, NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE, RESULTS
 from survey.kernels.jit import kernel
-from survey.kernels.satellite import complete_integrals, potential, sample, tabulate
+from survey.kernels.satellite import complete_integrals, half_periods, potential, sample, tabulate
 from survey.measures import hill
 from survey.measures.rows import Rows
 from survey.methods import dop853, taylor_double
@@ -68,7 +68,7 @@ OUTPUTS = (
 )  # fmt: skip
 
 EPS = 2.3e-16
-# K and E by the arithmetic-geometric mean, k' from k, and the rounding of one division.
+# K by the arithmetic-geometric mean, as it is where a machine has no longer floats than float64, and k' from k.
 PERIOD_ULPS = 6
 
 
@@ -165,8 +165,7 @@ class Motion:
 
     @cached_property
     def period(self):
-        first, _ = self.integrals
-        return np.where(self.rotates, 2 * first / np.maximum(self.k, 1), 4 * first)
+        return 2 * half_periods(self.k, self.kc)
 
     @cached_property
     def rate(self):

@@ -2,25 +2,14 @@
 
 import numpy as np
 import pytest
-from hill_problems import mp_factors
+from hill_problems import factors, mp_factors
 from mpmath import mp, mpf
 
 import survey
 from survey.kernels.hill import RESULTS, STABLE, UNSTABLE
-from survey.methods import taylor_double
-from survey.scenes import mathieu, satellite
+from survey.scenes import mathieu
 
 FAMILIES = {("prolate", True): "PL", ("prolate", False): "PR", ("oblate", True): "OL", ("oblate", False): "OR"}
-
-
-def factors(body, rho, **modulus):
-    """The ten results of one point of the satellite, by the double-double kernel itself."""
-    shared = satellite.moduli({name: np.array([[value]]) for name, value in modulus.items()})
-    row = satellite.Motion(*(np.ravel(values) for values in shared), body == "oblate")
-    problem = satellite._problem(row, np.array([[rho]]), None, True)
-    phase, distance = taylor_double.hill_density()
-    steps = 2 * np.ceil(0.5 * row.period / 2 * np.maximum(phase * (abs(rho) + row.k + 1), distance * row.rate))
-    return problem.exact(np.zeros(1, int), np.array([rho]), steps.astype(np.int64))[0]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,141 @@
+"""Satellites close to the separatrix and at large rho (notes, section 7), against double-double and mpmath."""
+
+import numpy as np
+import pytest
+from hill_problems import factors, mp_factors, solve
+from mpmath import mp, mpf
+
+import survey
+from survey import status
+from survey.kernels.hill import STABLE, UNSTABLE
+from survey.kernels.satellite import half_periods
+
+NAMES = ("y1", "dy1", "y2", "dy2")
+BODIES = ("prolate", "oblate")
+
+
+def told(y1, dy1, y2, dy2):
+    """D and the verdict from the factors, known so well that their signs are certain."""
+    d = 4 * y1 * dy2 - 2 if abs(y1 * dy2) < abs(dy1 * y2) else 4 * dy1 * y2 + 2
+    return d, UNSTABLE if dy1 * y2 > 0 or y1 * dy2 < 0 else STABLE
+
+
+def miss(body, rho, **modulus):
+    """|error of D| / max(1, |D|); asserts that the verdict is right and that every factor and D lie within their bars.
+
+    The truth is that of the double-double kernel, whose own bar is half an ulp.
+    """
+    exact = factors(body, rho, **modulus)
+    out = solve(body, rtol=1e-13, rho=rho, **modulus)
+    d, verdict = told(*exact[:4])
+    off = abs(out["discriminant"][0] - d)
+    assert out["status"][0] == status.OK and out["verdict"][0] == verdict, (body, rho, modulus)
+    assert off <= out["discriminant_error"][0] + 4e-16 * (2 + abs(d)), (body, rho, modulus)
+    for i, name in enumerate(NAMES):
+        assert abs(out[name][0] - exact[i]) <= out[f"{name}_error"][0] + exact[4 + i], (body, rho, modulus, name)
+    return off / max(1.0, abs(d))
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("body", BODIES)
+def test_relative_error_down_to_1e_12(body, side):
+    """Random rho, 1 - k = +- 1e-2 .. 1e-12."""
+    random = np.random.default_rng(11)
+    for _ in range(200):
+        rho, short = random.uniform(-4, 4), side * 10 ** random.uniform(-12, -2)
+        assert miss(body, rho, one_minus_k=short) < 1e-12, (rho, short)
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_rho_up_to_1000(body):
+    random = np.random.default_rng(12)
+    for _ in range(30):
+        k, rho = random.uniform(0, 0.999), 10 ** random.uniform(1, 3)
+        assert miss(body, rho, k=k) < 1e-11, (rho, k)
+        assert miss(body, random.choice([-1, 1]) * rho, k=1 / k) < 1e-11, (rho, 1 / k)
+
+
+@pytest.mark.parametrize("short", [1e-6, 1e-12, -1e-12])
+def test_rho_of_1000_at_the_separatrix(short):
+    """Both at once: 3e4 radians, so half an ulp of h and of z alone is 1e-11 (median 2e-12)."""
+    for rho in np.linspace(985, 1000, 4):
+        assert miss("prolate", rho, one_minus_k=short) < 3e-11, rho
+
+
+@pytest.mark.parametrize("short", [1e-4, 1e-12, -1e-12])
+@pytest.mark.parametrize("body", BODIES)
+def test_dense_rows_by_the_separatrix(body, short):
+    """By way of the proxy of whole rows: every verdict right, D within its bar."""
+    rho = np.linspace(0.1, 4, 3000)
+    ds = survey.evaluate("satellite", one_minus_k=short, rho=rho, body=body, variables=["discriminant", "verdict"])
+    for i in range(0, rho.size, 30):
+        d, verdict = told(*factors(body, rho[i], one_minus_k=short)[:4])
+        assert int(ds.verdict[i]) == verdict, rho[i]
+        assert abs(float(ds.discriminant[i]) - d) <= float(ds.discriminant_error[i]), rho[i]
+        assert float(ds.discriminant_error[i]) < 1e-9 * (1 + abs(d))
+
+
+@pytest.mark.parametrize("short", [1e-2, 1e-4, 1e-8, 1e-12])
+def test_exponentially_thin_stable_bands_of_an_oblate_body(short):
+    """For rho < 1 a stable band is as narrow as exp(-4 K sqrt(1 - rho^2)); both its edges, from the next double on."""
+    rho = np.linspace(0.05, 0.999, 300)
+    out = solve("oblate", one_minus_k=short, rho=rho)
+    assert (out["status"] == status.OK).all() and (out["verdict"] >= 0).all()
+    count = 0
+    for place, name in enumerate(NAMES):
+        for i in np.flatnonzero(np.diff(np.sign(out[name]))):
+            edge, count = (
+                closed_in(lambda x, at=place: factors("oblate", x, one_minus_k=short)[at], *rho[i : i + 2]),
+                count + 1,
+            )
+            for away in (0.0, 2e-16, 1e-15, 1e-13, 1e-10, 1e-7):
+                miss("oblate", edge - away, one_minus_k=short)
+                miss("oblate", np.nextafter(edge, 9) + away, one_minus_k=short)
+    assert count >= 2
+
+
+def closed_in(function, low, high):
+    """The double below the zero of a function between `low` and `high`."""
+    side = function(low) > 0
+    while low < (middle := 0.5 * (low + high)) < high:
+        low, high = (middle, high) if (function(middle) > 0) == side else (low, middle)
+    return low
+
+
+def test_no_overflow_and_no_false_alarm():
+    """|D| of an oblate body is up to 1e31 at the last double below k = 1; far beyond, its bar leaves float32."""
+    rho = np.linspace(0.02, 3, 150)
+    for body in BODIES:
+        near = solve(body, one_minus_k=np.array([[1e-14], [1e-16], [-1e-14], [-2e-16]]), rho=rho)
+        assert (near["status"] == status.OK).all() and (near["verdict"] >= 0).all()
+        far = solve(body, one_minus_k=1e-100, rho=rho)
+        np.testing.assert_array_equal(far["status"] == status.OVERFLOW, (far["verdict"] < 0))
+        assert (far["status"][rho > 1] == status.OK).all()
+    assert abs(near["discriminant"]).max() > 1e30
+
+
+def test_half_period_to_an_ulp():
+    random = np.random.default_rng(13)
+    bound = 2.3e-16 if np.finfo(np.longdouble).eps < 1e-18 else 6e-16
+    for k in np.concatenate([1 - 10 ** random.uniform(-12, 0, 20), 1 + 10 ** random.uniform(-12, 3, 20)]):
+        with mp.workdps(30):
+            small = min(mpf(k), 1 / mpf(k))
+            true, kc = mp.ellipk(small**2) * (2 if k < 1 else 1 / mpf(k)), float(mp.sqrt(1 - small**2))
+            assert abs(half_periods(np.array([k]), np.array([kc]))[0] - true) < bound * true, k
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(12))
+def test_the_same_by_mpmath(seed):
+    """No kernel of ours in the truth: near the separatrix, and at rho about 100."""
+    random = np.random.default_rng(seed)
+    body, short = BODIES[seed % 2], (-1) ** (seed // 2) * 10 ** random.uniform(-12, -2)
+    rho = 100 * random.uniform(0.5, 1) if seed > 8 else random.uniform(-4, 4)
+    family = ("P" if body == "prolate" else "O") + ("L" if short > 0 else "R")
+    with mp.workdps(45):
+        exact = mp_factors(family, 1 - mpf(short), mpf(rho), 45)[:4]
+        d, verdict = told(*exact)
+        out = solve(body, rtol=1e-13, rho=rho, one_minus_k=short)
+        assert abs(out["discriminant"][0] - d) < min(1e-12 * max(1, abs(d)), mpf(out["discriminant_error"][0]))
+    assert out["verdict"][0] == verdict
+    miss(body, rho, one_minus_k=short)
