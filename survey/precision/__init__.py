@@ -39,6 +39,8 @@ from survey.scene import Request, exists
 SETTINGS = tuple(10.0**-n for n in range(4, 14))
 REPEATS = 5
 ENOUGH_SECONDS = 2.0
+# Methods other than auto, which treats a map as a whole, are timed on so many points of it.
+POINTS = 50_000
 
 
 @dataclass
@@ -93,18 +95,19 @@ def write(scene, directory, peers=False, say=lambda line: None):
 def measure(scene, case, peers=False, say=lambda line: None):
     """The records of every method (and, if asked, of every peer that is installed) at every setting."""
     module = modules.load(scenes, scene, "scene")
-    runs = {
-        (method, ""): (_solver(module, method, case.ERROR), None) for method in ["auto", *workflow.methods_of(module)]
-    }
+    methods = ["auto", *workflow.methods_of(module)]
+    runs = {(method, ""): (_solver(module, method, case.ERROR), None) for method in methods}
     for name in modules.names(programs) if peers else ():
         if importlib.util.find_spec(name):
             peer = modules.load(programs, name, "peer")
             runs["", name] = _peer(case, peer), peer.POINTS
         else:
             say(f"{name} is not installed and is missing in the chart: pip install 'survey[bench]'")
-    references, works = case.references(), case.works()
+    references, whole = case.references(), case.works()
+    thinned = {work: (_thinned(point), options) for work, (point, options) in whole.items()}
     records = []
     for (method, peer), (solve, most) in runs.items():
+        works = whole if peer or method == "auto" else thinned
         compile_seconds = _first_call(solve, works, most) if peer else _cold(scene, method)
         for point, options in works.values() if method else ():  # every path is compiled before it is timed
             solve(point, options, SETTINGS[0])
@@ -126,6 +129,7 @@ def limit(scene, case):
     solve = _solver(modules.load(scenes, scene, "scene"), case.LIMITED, case.ERROR)
     least = []
     for work, (point, options) in case.works().items():
+        point = _thinned(point)
         for setting in SETTINGS:
             count = case.operations_of(partial(solve, point, options, setting)) / _points(point)
             seconds = [0.5e-9 * count / rate for rate in rates.values()]
@@ -226,6 +230,12 @@ def _per_point(solve, point, options, rtol, most=None):
         solve(point, options, rtol)
         times.append(time.perf_counter() - start)
     return float(np.median(times)) / _points(point)
+
+
+def _thinned(point):
+    """About POINTS points of a larger map, in whole rows: enough where rows share nothing."""
+    every = -(-_points(point) // POINTS)
+    return {name: values[::every] if np.ndim(values) > 1 else values for name, values in point.items()}
 
 
 def _share(point, most):

@@ -29,18 +29,15 @@ def references():
 
 
 def works():
-    """A row of 600 ratios, some rows of two maps (rows share nothing), and points that share nothing."""
+    """A row, two maps, and points that share nothing."""
     random = np.random.default_rng(1)
-    rho = np.linspace(0.6, 4.0, 600)
-    return {
-        "row": ({"k": np.array([[0.5]]), "rho": rho[None, :]}, {}),
-        "map 400x600": ({"k": np.linspace(0.0, 0.99, 400)[::10, None], "rho": rho[None, :]}, {}),
-        "map 2000x2000": (
-            {"k": np.linspace(0.0, 0.99, 2000)[::50, None], "rho": np.linspace(0.6, 4.0, 2000)[None, :]},
-            {},
-        ),
-        "scattered": ({"k": random.uniform(0.01, 0.99, 300), "rho": random.uniform(0.6, 4.0, 300)}, {}),
-    }
+    scattered = {"k": random.uniform(0.01, 0.99, 30_000), "rho": random.uniform(0.6, 4.0, 30_000)}
+    maps = {f"map {n}x{m}": (_map(np.linspace(0.0, 0.99, n), m), {}) for n, m in ((400, 600), (2000, 2000))}
+    return {"row": (_map(np.array([0.5]), 20_000), {})} | maps | {"scattered": (scattered, {})}
+
+
+def _map(k, number):
+    return {"k": k[:, None], "rho": np.linspace(0.6, 4.0, number)[None, :]}
 
 
 def system(point, options):
@@ -92,7 +89,7 @@ def operations_of(run):
 
 def _one_step(p):
     """All that `lanes.chain` does per lane and step: the step, two columns with error ellipses, zeros and sums."""
-    matrix = taylor16.hill_step.py_func(np.ones((2, taylor16.WIDTH)), 1.0, p, 0.1)
+    matrix = taylor16.hill_step.py_func(np.ones(2 * taylor16.WIDTH), 1.0, p, 0.1)
     for _ in range(2):
         lanes.column.py_func(matrix, p, p, p, p, p)
         p + 1.0
