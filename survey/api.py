@@ -244,11 +244,22 @@ def summary(ds):
         "variables": {
             name: v.attrs.get("long_name", "") for name, v in ds.data_vars.items() if not name.endswith("_error")
         },
+        **({"areas": areas(ds)} if "area" in ds else {}),
         "counts": {name: counts(ds[name]) for name in ("verdict", "status") if name in ds},
         "provenance": {
             k: v for k, v in ds.attrs.items() if k not in ("title", "scene", "options", "workflow", "summary")
         },
     }
+
+
+def areas(ds):
+    """{verdict: its area with its error bound, and its share of the map} of a refined map."""
+    lines = {}
+    for name in ds.area_verdict.values:
+        own = ds.sel(area_verdict=name)
+        area, bar, share = float(own.area), float(own.area_error), float(own.area_fraction)
+        lines[str(name)] = f"{area:.10g} +- {bar:.2g} ({share:.4%} +- {bar / area * share if area else bar:.1g})"
+    return lines
 
 
 def audit(ds, points, seed=0):

@@ -117,7 +117,7 @@ def encoding(ds):
             settings[name]["_FillValue"] = None
         if name in ds.data_vars and variable.ndim:
             tile = [
-                max(1, min(size, 256) if axis >= variable.ndim - 2 else min(size, 16))
+                max(1, min(size, 65536 if variable.ndim == 1 else 256) if axis >= variable.ndim - 2 else min(size, 16))
                 for axis, size in enumerate(variable.shape)
             ]
             settings[name] |= packed | {"chunksizes": tile}

@@ -129,19 +129,24 @@ def _anew(sums, bars, doubt, here, place, depth):
 
     The tail must be small beside what a factor varies: on the block itself, whose halves are solved otherwise, beside
     what it varies on the last cells; on a smaller cell, which is solved itself otherwise, beside what it varies there.
-    Below the other slack it does not matter.
+    Below the other slack it does not matter. An axis whose tail hides a factor is halved before the other; where it
+    is halved to the end already, nothing helps.
     """
-    x = y = False
+    x = y = hidden_x = hidden_y = False
     whole = here[0] == place[0] and here[2] == place[2]
     share = ENOUGH * 0.5 ** max(depth[0] - here[0], depth[1] - here[2]) if whole else BLURRED
     for f in range(4):
         if not _sure(sums, bars, f):
-            most = max(share * sums[f, 1], doubt[f, 2])
+            most, size = max(share * sums[f, 1], doubt[f, 2]), abs(sums[f, 0]) + sums[f, 1]
             x |= not doubt[f, 0] <= most
             y |= not doubt[f, 1] <= most
-    return x and (here[0] < depth[0] if whole else here[0] > place[0]), y and (
-        here[2] < depth[1] if whole else here[2] > place[2]
-    )
+            hidden_x |= not doubt[f, 0] <= size
+            hidden_y |= not doubt[f, 1] <= size
+    if not whole:
+        return x and here[0] > place[0], y and here[2] > place[2]
+    if (hidden_x and here[0] == depth[0]) or (hidden_y and here[2] == depth[1]):
+        return False, False
+    return x and here[0] < depth[0] and hidden_x >= hidden_y, y and here[2] < depth[1] and hidden_y >= hidden_x
 
 
 @inline

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from survey.kernels.cells import AGAIN, descend
+from survey.kernels.cells import AGAIN, ENOUGH, descend
 from survey.kernels.hill import EPS, UNDECIDED
 from survey.measures.hill_edges import FACTORS
 
@@ -105,6 +105,11 @@ def find(solve, x, y, each=lambda task, items: [task(item) for item in items], t
         if sum(map(len, kept)) > MOST:
             raise OverflowError(f"more than {MOST:,} cells")
     return _gathered(x, y, depth, np.concatenate(kept), points)
+
+
+def accuracy(depth):
+    """The relative accuracy of the factors that cells of so many halvings need: below what a series may leave out."""
+    return float(np.clip(1e-2 * ENOUGH * 0.5**depth, 1e-13, 1e-9))
 
 
 def _first(depth):
