@@ -14,6 +14,7 @@ from survey import workflow as workflows
 from survey.dataset import count, counts, describe, error_bars, layout
 from survey.errors import BadInput
 from survey.grid import Grid, line
+from survey.refine import percent
 
 
 def run(workflow, output=None, workers=None, scheduler=None, fresh=False):
@@ -254,12 +255,11 @@ def summary(ds):
 
 def areas(ds):
     """{verdict: its area with its error bound, and its share of the map} of a refined map."""
-    lines = {}
-    for name in ds.area_verdict.values:
-        own = ds.sel(area_verdict=name)
-        area, bar, share = float(own.area), float(own.area_error), float(own.area_fraction)
-        lines[str(name)] = f"{area:.10g} +- {bar:.2g} ({share:.4%} +- {bar / area * share if area else bar:.1g})"
-    return lines
+    rows = zip(
+        *(ds[n].values for n in ("area_verdict", "area", "area_error", "area_fraction", "area_fraction_error")),
+        strict=True,
+    )
+    return {str(name): f"{area:.12g} +- {bar:.2g} ({percent(part, off)})" for name, area, bar, part, off in rows}
 
 
 def audit(ds, points, seed=0):

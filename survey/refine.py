@@ -38,6 +38,12 @@ def find(workflow, each, tell):
     return _describe(workflow, found, points)
 
 
+def percent(share, bar):
+    """`34.97 +- 0.58 %`: to two digits of the bar."""
+    digits = int(np.clip(1 - np.floor(np.log10(100 * bar)), 0, 12)) if bar > 0 else 2
+    return f"{100 * share:.{digits}f} +- {100 * bar:.{digits}f} %"
+
+
 def _area(panels):
     return sum((x.high - x.low) * (y.high - y.low) for x, y in panels)
 
@@ -68,9 +74,7 @@ def _solver(workflow, x, y):
     """What `hill_cells.find` asks of the scene; NaN outside the parameters' domains."""
     rtol = hill_cells.accuracy(max(x.depth, y.depth))
     request = Request(workflow.request.options, "auto", rtol, frozenset(FACTORS))
-    fixed = {
-        name: np.full((1, 1, 1), values) for name, (dims, values) in workflow.grid.parameters.items() if not dims
-    }
+    fixed = {name: np.full((1, 1, 1), values) for name, (dims, values) in workflow.grid.parameters.items() if not dims}
     axes = [next(p for p in workflow.scene.PARAMETERS if p.name == name) for name in workflow.refine]
 
     def solve(*values):
@@ -114,5 +118,5 @@ def _describe(workflow, found, points):
     return xr.Dataset(variables, coords, {
         "refine": ", ".join(names),
         "refine_points": points,
-        "areas": ", ".join(f"{key}: {value / total:.4%} +- {error / total:.1g}" for key, value in zip(LABELS, area, strict=True)),
+        "areas": ", ".join(f"{key}: {percent(value / total, error / total)}" for key, value in zip(LABELS, area, strict=True)),
     })  # fmt: skip

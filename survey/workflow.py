@@ -202,7 +202,9 @@ def _check_refine(scene, name, file, given):
             raise BadInput(f"{where} = {width:g}: it must lie between 0 and {most:g}, such as {1e-3 * most:.1g}")
         fraction = width / most if not log or most == 1.0 else np.log1p(width) / np.log1p(most)
         if fraction < FINEST:
-            raise BadInput(f"{where} = {width:g}: cells below {FINEST * most:.1g} would be too many; take a greater width")
+            raise BadInput(
+                f"{where} = {width:g}: cells below {FINEST * most:.1g} would be too many; take a greater width"
+            )
         asked[key] = (float(fraction), log)
     return asked
 
@@ -370,7 +372,9 @@ def _one_line(error):
 def _nearest(loc):
     """The keys that are allowed beside an unknown one, the nearest first named."""
     table = (
-        {"solver": Solver, "output": Output, "axes": Spread, "boundaries": Boundaries, "refine": Refine}.get(loc[0], File)
+        {"solver": Solver, "output": Output, "axes": Spread, "boundaries": Boundaries, "refine": Refine}.get(
+            loc[0], File
+        )
         if len(loc) > 1
         else File
     )
