@@ -11,10 +11,9 @@ import survey.methods as method_folder
 import survey.scenes as scene_folder
 from survey import engine, modules, status, store
 from survey import workflow as workflows
-from survey.dataset import count, counts, describe, error_bars, layout
+from survey.dataset import count, counts, describe, error_bars, layout, percent
 from survey.errors import BadInput
 from survey.grid import Grid, line
-from survey.refine import percent
 
 
 def run(workflow, output=None, workers=None, scheduler=None, fresh=False):

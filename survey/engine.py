@@ -113,9 +113,8 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
         if workflow.refine:
             from survey import refine
 
-            ds = ds.merge(cells := refine.find(workflow, _each, getattr(progress, "refining", None))).assign_attrs(
-                cells.attrs
-            )
+            cells = refine.find(workflow, _each, getattr(progress, "refining", None))
+            ds = ds.merge(cells).assign_attrs(cells.attrs)
         ds.attrs["wall_time_s"] = round(time.time() - started, 3)
         ds.attrs["blocks_reused"] = len(reused)
         store.write(ds, workflow.path)

@@ -14,8 +14,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from survey import modules, status
+from survey.dataset import percent
 from survey.errors import BadInput
-from survey.refine import percent
 
 # after Okabe and Ito, safe for the colour-blind, the first two far apart in grey print too;
 # black is kept for undecided, white with hatching for failed
@@ -105,9 +105,8 @@ def _cells(axes, ds, x, y, failed):
     for name, code in reversed(table.items()):
         own, colour = ds.cell_verdict.values == code, _palette(table)[name]
         # without smoothing there are no seams between neighbours; a hairline keeps small undecided cells in sight
-        line = (
-            {"edgecolors": colour, "lw": 0.3} if name == "undecided" else {"edgecolors": "none", "antialiased": False}
-        )
+        line = {"edgecolors": "none", "antialiased": False}
+        line = {"edgecolors": colour, "lw": 0.3} if name == "undecided" else line
         axes.add_collection(PolyCollection(corners[own], facecolors=colour, rasterized=True, **line))
         part = percent(shares[name], float(ds.area_fraction_error[0])) if name in shares else f"{own.sum():,} cells"
         part = part.replace("+-", "±")

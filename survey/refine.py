@@ -1,14 +1,15 @@
 """The map on whole cells, as small as needed where the verdict changes, and the area of each verdict.
 
-Cells are halved until they are decided or as wide as the workflow's [refine] says; variables along the dimension `cell`.
+Cells are halved until they are decided or as wide as [refine] says, and become variables along the dimension `cell`.
 """
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import xarray as xr
 
-from survey.dataset import round_up
+from survey.dataset import percent, round_up
 from survey.errors import BadInput
 from survey.measures import hill, hill_cells
 from survey.measures.hill_edges import FACTORS
@@ -38,12 +39,6 @@ def find(workflow, each, tell):
     return _describe(workflow, found, points)
 
 
-def percent(share, bar):
-    """`34.97 +- 0.58 %`: to two digits of the bar."""
-    digits = int(np.clip(1 - np.floor(np.log10(100 * bar)), 0, 12)) if bar > 0 else 2
-    return f"{100 * share:.{digits}f} +- {100 * bar:.{digits}f} %"
-
-
 def _area(panels):
     return sum((x.high - x.low) * (y.high - y.low) for x, y in panels)
 
@@ -66,7 +61,7 @@ def _sides(workflow, name, width, log):
 
     return [
         hill_cells.Axis(a, b, max(0, math.ceil(math.log2(length(a, b) / (width * length(low, high))) - 1e-9)), log)
-        for a, b in zip(cuts, cuts[1:], strict=False)
+        for a, b in pairwise(cuts)
     ]
 
 
@@ -115,8 +110,6 @@ def _describe(workflow, found, points):
         variables[f"{name}_error"] = ("area_verdict", round_up(np.full(len(LABELS), error / scale)), {
             "long_name": f"error bound of {name}", "units": unit})  # fmt: skip
     coords = {"area_verdict": ("area_verdict", np.array(LABELS), {"long_name": "verdict of the area"})}
-    return xr.Dataset(variables, coords, {
-        "refine": ", ".join(names),
-        "refine_points": points,
-        "areas": ", ".join(f"{key}: {percent(value / total, error / total)}" for key, value in zip(LABELS, area, strict=True)),
-    })  # fmt: skip
+    words = (f"{label}: {percent(value / total, error / total)}" for label, value in zip(LABELS, area, strict=True))
+    about = {"refine": ", ".join(names), "refine_points": points, "areas": ", ".join(words)}
+    return xr.Dataset(variables, coords, about)

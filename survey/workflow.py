@@ -183,7 +183,12 @@ def _check_refine(scene, name, file, given):
         raise BadInput(f"refine: the verdict of {name} is one of points, not of cells; leave the table out")
     if len(axes) != 2 or min(values.size for values in axes.values()) < 2:
         raise BadInput("refine: cells need exactly two axes of two values or more; fix the other parameters")
-    widths = file.refine.width
+    widths = _check_width_table(file.refine.width, axes)
+    return {key: _fraction(widths, key, values, file.axes[key]) for key, values in axes.items()}
+
+
+def _check_width_table(widths, axes):
+    """The widths as they are; raises BadInput unless a table of them names each axis and nothing else."""
     if isinstance(widths, dict):
         for key in widths:
             if key not in axes:
@@ -191,22 +196,22 @@ def _check_refine(scene, name, file, given):
         for key in axes:
             if key not in widths:
                 raise BadInput(f"refine.width.{key} is missing; give a width for each axis, or one number for both")
-    asked = {}
-    for key, values in axes.items():
-        log = getattr(file.axes[key], "spacing", "linear") == "log"
-        width, where, most = widths, "refine.width", 1.0
-        if isinstance(widths, dict):
-            ratio = values.max() / values.min() if log else np.inf
-            width, where, most = widths[key], f"refine.width.{key}", ratio - 1 if log else np.ptp(values)
-        if not 0 < width < most:
-            raise BadInput(f"{where} = {width:g}: it must lie between 0 and {most:g}, such as {1e-3 * most:.1g}")
-        fraction = width / most if not log or most == 1.0 else np.log1p(width) / np.log1p(most)
-        if fraction < FINEST:
-            raise BadInput(
-                f"{where} = {width:g}: cells below {FINEST * most:.1g} would be too many; take a greater width"
-            )
-        asked[key] = (float(fraction), log)
-    return asked
+    return widths
+
+
+def _fraction(widths, key, values, axis):
+    """(width as a fraction of the axis, is that logarithmic?) from one fraction or from widths in the axes' units."""
+    log = isinstance(axis, Spread) and axis.spacing == "log"
+    where, width, most = "refine.width", widths, 1.0
+    if isinstance(widths, dict):
+        most = values.max() / values.min() - 1 if log else np.ptp(values)
+        where, width = f"{where}.{key}", widths[key]
+    if not 0 < width < most:
+        raise BadInput(f"{where} = {width:g}: it must lie between 0 and {most:g}, such as {1e-3 * most:.1g}")
+    fraction = np.log1p(width) / np.log1p(most) if log and isinstance(widths, dict) else width / most
+    if fraction < FINEST:
+        raise BadInput(f"{where} = {width:g}: such cells are too many; take at least a millionth of the axis")
+    return float(fraction), log
 
 
 def check_options(scene, given, parameters=(), table=""):

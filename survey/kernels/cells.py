@@ -102,15 +102,15 @@ def _add_up(own, size, sums):
     for f in range(4):
         total = 0.0
         for j in range(size[0]):
-            for k in range(size[1]):
+            for k in range(1 if j == 0 else 0, size[1]):
                 total += abs(own[f, j, k])
-        sums[f, 0], sums[f, 1] = own[f, 0, 0], total - abs(own[f, 0, 0])
+        sums[f, 0], sums[f, 1] = own[f, 0, 0], total
 
 
 @inline
 def _sure(sums, bars, f):
     """Has factor f one sign? Not where anything is NaN."""
-    return abs(sums[f, 0]) > (sums[f, 1] + bars[f]) * (1.0 + 64.0 * EPS)
+    return abs(sums[f, 0]) > (sums[f, 1] + bars[f]) * (1.0 + 256.0 * EPS)
 
 
 @inline

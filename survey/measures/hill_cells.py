@@ -22,7 +22,7 @@ NODES = 16
 CHECK = 0.539  # near an extremum of T_16, and of no period with it
 START = 2  # halvings of the first blocks
 BATCH = 16  # blocks of one task
-MOST = 30_000_000  # cells
+MOST = 10_000_000  # cells
 
 X = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
 PLACES = np.append(X, CHECK)
@@ -81,7 +81,7 @@ class Cells:
 def find(solve, x, y, each=lambda task, items: [task(item) for item in items], tell=None):
     """The Cells of the rectangle of the axes x and y.
 
-    `solve(x, y)` gives the four factors with their bars at broadcast arrays of both parameters, NaN where there is none;
+    `solve(x, y)` gives the four factors with their bars at broadcast arrays of both parameters, NaN where none are;
     `each(task, items)` gives the list of task(item), on threads if it likes. `tell(part, points)` is told how much of
     the rectangle is settled. Raises OverflowError if there are more than MOST cells.
     """
