@@ -254,11 +254,9 @@ def summary(ds):
 
 def areas(ds):
     """{verdict: its area with its error bound, and its share of the map} of a refined map."""
-    rows = zip(
-        *(ds[n].values for n in ("area_verdict", "area", "area_error", "area_fraction", "area_fraction_error")),
-        strict=True,
-    )
-    return {str(name): f"{area:.12g} +- {bar:.2g} ({percent(part, off)})" for name, area, bar, part, off in rows}
+    names = ("area", "area_error", "area_fraction", "area_fraction_error")
+    rows = zip(ds.area_verdict.attrs["flag_meanings"].split(), *(ds[name].values for name in names), strict=True)
+    return {name: f"{area:.12g} +- {bar:.2g} ({percent(part, off)})" for name, area, bar, part, off in rows}
 
 
 def audit(ds, points, seed=0):

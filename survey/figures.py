@@ -100,13 +100,14 @@ def _cells(axes, ds, x, y, failed):
     """The map's cells instead of its points, with the area of each verdict."""
     left, right, low, high = (ds[f"cell_{axis.name}_{end}"].values for axis in (x, y) for end in ("low", "high"))
     corners = np.stack([left, low, left, high, right, high, right, low], axis=1).reshape(-1, 4, 2)
-    table, shares = _flags(ds.cell_verdict), ds.area_fraction.to_series()
+    table = _flags(ds.cell_verdict)
+    shares = dict(zip(_flags(ds.area_verdict), ds.area_fraction.values, strict=True))
     handles = []
     for name, code in reversed(table.items()):
         own, colour = ds.cell_verdict.values == code, _palette(table)[name]
         # without smoothing there are no seams between neighbours; a hairline keeps small undecided cells in sight
         line = {"edgecolors": "none", "antialiased": False}
-        line = {"edgecolors": colour, "lw": 0.3} if name == "undecided" else line
+        line = {"edgecolors": colour, "lw": 0.4, "snap": False} if name == "undecided" else line
         axes.add_collection(PolyCollection(corners[own], facecolors=colour, rasterized=True, **line))
         part = percent(shares[name], float(ds.area_fraction_error[0])) if name in shares else f"{own.sum():,} cells"
         part = part.replace("+-", "±")

@@ -109,7 +109,10 @@ def _describe(workflow, found, points):
             "long_name": words, "units": unit, "ancillary_variables": f"{name}_error"})  # fmt: skip
         variables[f"{name}_error"] = ("area_verdict", round_up(np.full(len(LABELS), error / scale)), {
             "long_name": f"error bound of {name}", "units": unit})  # fmt: skip
-    coords = {"area_verdict": ("area_verdict", np.array(LABELS), {"long_name": "verdict of the area"})}
+    codes = np.array([flags[label] for label in LABELS], np.int8)
+    coords = {"area_verdict": ("area_verdict", codes, {
+        "long_name": "verdict of the area", "units": "1",
+        "flag_values": codes, "flag_meanings": " ".join(LABELS)})}  # fmt: skip
     words = (f"{label}: {percent(value / total, error / total)}" for label, value in zip(LABELS, area, strict=True))
     about = {"refine": ", ".join(names), "refine_points": points, "areas": ", ".join(words)}
     return xr.Dataset(variables, coords, about)
