@@ -11,7 +11,7 @@ import survey.methods as method_folder
 import survey.scenes as scene_folder
 from survey import engine, modules, status, store
 from survey import workflow as workflows
-from survey.dataset import count, counts, describe, error_bars, layout
+from survey.dataset import count, counts, describe, error_bars, layout, percent
 from survey.errors import BadInput
 from survey.grid import Grid, line
 
@@ -244,11 +244,19 @@ def summary(ds):
         "variables": {
             name: v.attrs.get("long_name", "") for name, v in ds.data_vars.items() if not name.endswith("_error")
         },
+        **({"areas": areas(ds)} if "area" in ds else {}),
         "counts": {name: counts(ds[name]) for name in ("verdict", "status") if name in ds},
         "provenance": {
             k: v for k, v in ds.attrs.items() if k not in ("title", "scene", "options", "workflow", "summary")
         },
     }
+
+
+def areas(ds):
+    """{verdict: its area with its error bound, and its share of the map} of a refined map."""
+    names = ("area", "area_error", "area_fraction", "area_fraction_error")
+    rows = zip(ds.area_verdict.attrs["flag_meanings"].split(), *(ds[name].values for name in names), strict=True)
+    return {name: f"{area:.12g} +- {bar:.2g} ({percent(part, off)})" for name, area, bar, part, off in rows}
 
 
 def audit(ds, points, seed=0):

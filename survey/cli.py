@@ -206,7 +206,7 @@ def _closing(ds, paths):
     for path in paths:
         err.print(f"wrote {path}", markup=False)
     attributes = ds.attrs
-    for key in ("verdict_counts", "status_counts"):
+    for key in ("verdict_counts", "status_counts", "areas"):
         if key in attributes:
             err.print(f"{key.removesuffix('_counts')}: {attributes[key]}", markup=False)
     if attributes["accuracy_missed"]:

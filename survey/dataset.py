@@ -42,6 +42,12 @@ def round_up(errors):
     return np.where(small < errors, np.nextafter(small, np.float32(np.inf)), small)
 
 
+def percent(share, bar):
+    """`34.97 +- 0.58 %`: to two digits of the bar."""
+    digits = int(np.clip(1 - np.floor(np.log10(100 * bar)), 0, 12)) if bar > 0 else 2
+    return f"{100 * share:.{digits}f} +- {100 * bar:.{digits}f} %"
+
+
 def describe(grid, scene, name, request, arrays):
     """The dataset of a survey: `arrays` holds the variables of `layout` in the grid's shape."""
     used = {p.name: p for p in scene.PARAMETERS}
@@ -117,7 +123,7 @@ def encoding(ds):
             settings[name]["_FillValue"] = None
         if name in ds.data_vars and variable.ndim:
             tile = [
-                max(1, min(size, 256) if axis >= variable.ndim - 2 else min(size, 16))
+                max(1, min(size, 65536 if variable.ndim == 1 else 256) if axis >= variable.ndim - 2 else min(size, 16))
                 for axis, size in enumerate(variable.shape)
             ]
             settings[name] |= packed | {"chunksizes": tile}

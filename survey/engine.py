@@ -110,6 +110,11 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
             from survey import boundaries
 
             ds = ds.merge(boundaries.find(workflow)).assign_attrs(boundaries=workflow.boundaries)
+        if workflow.refine:
+            from survey import refine
+
+            cells = refine.find(workflow, _each, getattr(progress, "refining", None))
+            ds = ds.merge(cells).assign_attrs(cells.attrs)
         ds.attrs["wall_time_s"] = round(time.time() - started, 3)
         ds.attrs["blocks_reused"] = len(reused)
         store.write(ds, workflow.path)
@@ -213,6 +218,13 @@ def _through_dask(task, numbers, workers=None, scheduler=None, finished=None, th
         if type(error).__name__ in ("BrokenProcessPool", "KilledWorker", "CommClosedError"):
             raise Stopped(f"a worker died ({error}); run the command again to go on") from None
         raise
+
+
+def _each(task, items):
+    """[task(item) for item in items], on the threads of this machine."""
+    results = [None] * len(items)
+    _through_dask(lambda at: results.__setitem__(at, task(items[at])), range(len(items)))
+    return results
 
 
 def _client(address):

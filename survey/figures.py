@@ -8,11 +8,13 @@ import numpy as np
 matplotlib.use("Agg", force=False)
 
 import matplotlib.pyplot as plt
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from survey import modules, status
+from survey.dataset import percent
 from survey.errors import BadInput
 
 # after Okabe and Ito, safe for the colour-blind, the first two far apart in grey print too;
@@ -31,7 +33,8 @@ def save(ds, path, name=None):
 
 def draw(ds, name=None):
     """The matplotlib figure of one variable over the survey's axes; raises BadInput for an unknown variable."""
-    drawable = [key for key in ds.data_vars if not key.endswith("_error") and not key.startswith("edge_")]
+    others = tuple(key for key in ds.data_vars if key.endswith("_error") or key.startswith(("edge_", "cell_", "area")))
+    drawable = [key for key in ds.data_vars if key not in others]
     name = name or ("verdict" if "verdict" in ds else drawable[0])
     if name not in drawable:
         raise BadInput(modules.unknown("variable", name, drawable))
@@ -58,7 +61,9 @@ def _map(axes, ds, variable, state):
     x, y = (variable[dim] for dim in variable.dims)
     failed = np.isin(state.values, list(status.FAILURES))
     outside = state.values == status.INVALID_PARAMETERS
-    if "flag_values" in variable.attrs:
+    if variable.name == "verdict" and "cell_verdict" in ds:
+        _cells(axes, ds, x, y, failed)
+    elif "flag_values" in variable.attrs:
         _verdicts(axes, x, y, variable, failed, outside)
     else:
         shown = np.ma.masked_invalid(np.where(failed | outside, np.nan, variable.values.astype(float)))
@@ -87,7 +92,28 @@ def _edges(axes, ds, x, y):
         single = np.unique(along[0]).size == along[0].size
         style = {"lw": 0.5} if single else {"ls": "none", "marker": ".", "markersize": 1.5, "markeredgewidth": 0}
         axes.plot(*(along if ds.attrs["boundaries"] == y.name else along[::-1]), color="#000000", **style)
-    axes.set(xlim=_widened(x.values)[[0, -1]], ylim=_widened(y.values)[[0, -1]])
+    if "cell_verdict" not in ds:
+        axes.set(xlim=_widened(x.values)[[0, -1]], ylim=_widened(y.values)[[0, -1]])
+
+
+def _cells(axes, ds, x, y, failed):
+    """The map's cells instead of its points, with the area of each verdict."""
+    left, right, low, high = (ds[f"cell_{axis.name}_{end}"].values for axis in (x, y) for end in ("low", "high"))
+    corners = np.stack([left, low, left, high, right, high, right, low], axis=1).reshape(-1, 4, 2)
+    table = _flags(ds.cell_verdict)
+    shares = dict(zip(_flags(ds.area_verdict), ds.area_fraction.values, strict=True))
+    handles = []
+    for name, code in reversed(table.items()):
+        own, colour = ds.cell_verdict.values == code, _palette(table)[name]
+        # without smoothing there are no seams between neighbours; a hairline keeps small undecided cells in sight
+        line = {"edgecolors": "none", "antialiased": False}
+        line = {"edgecolors": colour, "lw": 0.4, "snap": False} if name == "undecided" else line
+        axes.add_collection(PolyCollection(corners[own], facecolors=colour, rasterized=True, **line))
+        part = percent(shares[name], float(ds.area_fraction_error[0])) if name in shares else f"{own.sum():,} cells"
+        part = part.replace("+-", "±")
+        handles += [Patch(facecolor=colour, edgecolor="black", lw=0.5, label=f"{name} ({part})")] if own.any() else []
+    _legend(axes, handles + _marks(axes, x, y, failed, "failed"))
+    axes.set(xlim=(left.min(), right.max()), ylim=(low.min(), high.max()))
 
 
 def _verdicts(axes, x, y, variable, failed, outside):

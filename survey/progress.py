@@ -45,5 +45,16 @@ class Progress:
         if done == total:
             self._line(f"computed {done - reused}, reused {reused} of {total} blocks")
 
+    def refining(self, settled, points):
+        """Told as cells are refined: which part of the map is settled, and how many points were solved for it."""
+        if self.silent:
+            return
+        text = f"cells: {settled:.2%} of the map settled, {points:,} points solved"
+        if self.bar and settled < 1:
+            self.bar.update(self.task, description=f"{self.workflow.name}: {text}")
+        elif settled == 1 or time.monotonic() - self.logged > LOG_SECONDS:
+            self.logged = time.monotonic()
+            self._line(text)
+
     def _line(self, text):
         self.console.print(f"{self.workflow.name}: {text}", markup=False)

@@ -19,6 +19,7 @@ from survey.grid import Grid, check_axis, coordinates
 from survey.scene import Request, exists
 
 MOST = 10**8  # coordinates on one axis
+FINEST = 1e-6  # width of a cell as a fraction of its axis
 Number = Annotated[float, Field(allow_inf_nan=False)]
 
 
@@ -64,6 +65,13 @@ class Boundaries(Table):
     axis: str | None = None
 
 
+class Refine(Table):
+    width: Annotated[
+        Annotated[Number, Tag("number")] | Annotated[dict[str, Number], Tag("table")],
+        Discriminator(lambda value: "table" if isinstance(value, dict) else "number"),
+    ]
+
+
 class File(Table):
     title: str = ""
     scene: str
@@ -72,11 +80,15 @@ class File(Table):
     solver: Solver = Solver()
     output: Output = Output()
     boundaries: Boundaries | None = None
+    refine: Refine | None = None
 
 
 @dataclass(frozen=True)
 class Workflow:
-    """A checked survey: `scene` is the scene's module; `text` is the workflow as it was run."""
+    """A checked survey: `scene` is the scene's module; `text` is the workflow as it was run.
+
+    `refine`: for each axis how wide cells may be, as a fraction of it, and whether it is logarithmic.
+    """
 
     name: str
     title: str
@@ -87,6 +99,7 @@ class Workflow:
     figures: tuple[str, ...]
     text: str
     boundaries: str | None = None
+    refine: Mapping[str, tuple[float, bool]] | None = None
 
 
 def read(path, overrides=(), output=None):
@@ -140,6 +153,7 @@ def check(data, text="", output=None, default_path="survey.nc"):
         figures=tuple(file.output.figures),
         text=text or tomli_w.dumps(data),
         boundaries=_check_boundaries(scene, name, file.boundaries, given),
+        refine=_check_refine(scene, name, file, given),
     )
 
 
@@ -155,6 +169,49 @@ def _check_boundaries(scene, name, asked, given):
     if asked.axis is not None and asked.axis not in axes:
         raise BadInput(f"boundaries.axis: {modules.unknown('axis', asked.axis, axes)}")
     return asked.axis or axes[-1]
+
+
+def _check_refine(scene, name, file, given):
+    """{axis: (width of the smallest cells as a fraction of the axis, is it logarithmic?)}; None if not asked for.
+
+    Of a logarithmic axis the fraction is one of its logarithm, and a width of its own is one of the ratio less 1.
+    """
+    if file.refine is None:
+        return None
+    axes = {key: values for key, values in given.items() if np.ndim(values)}
+    if scene.FAMILY != "hill":
+        raise BadInput(f"refine: the verdict of {name} is one of points, not of cells; leave the table out")
+    if len(axes) != 2 or min(values.size for values in axes.values()) < 2:
+        raise BadInput("refine: cells need exactly two axes of two values or more; fix the other parameters")
+    widths = _check_width_table(file.refine.width, axes)
+    return {key: _fraction(widths, key, values, file.axes[key]) for key, values in axes.items()}
+
+
+def _check_width_table(widths, axes):
+    """The widths as they are; raises BadInput unless a table of them names each axis and nothing else."""
+    if isinstance(widths, dict):
+        for key in widths:
+            if key not in axes:
+                raise BadInput(f"refine.width.{key}: {modules.unknown('axis', key, list(axes))}")
+        for key in axes:
+            if key not in widths:
+                raise BadInput(f"refine.width.{key} is missing; give a width for each axis, or one number for both")
+    return widths
+
+
+def _fraction(widths, key, values, axis):
+    """(width as a fraction of the axis, is that logarithmic?) from one fraction or from widths in the axes' units."""
+    log = isinstance(axis, Spread) and axis.spacing == "log"
+    where, width, most = "refine.width", widths, 1.0
+    if isinstance(widths, dict):
+        most = values.max() / values.min() - 1 if log else np.ptp(values)
+        where, width = f"{where}.{key}", widths[key]
+    if not 0 < width < most:
+        raise BadInput(f"{where} = {width:g}: it must lie between 0 and {most:g}, such as {1e-3 * most:.1g}")
+    fraction = np.log1p(width) / np.log1p(most) if log and isinstance(widths, dict) else width / most
+    if fraction < FINEST:
+        raise BadInput(f"{where} = {width:g}: such cells are too many; take at least a millionth of the axis")
+    return float(fraction), log
 
 
 def check_options(scene, given, parameters=(), table=""):
@@ -302,7 +359,7 @@ def _apply(data, override):
 def _one_line(error):
     """The first complaint of pydantic (an unknown key before a missing one) as one line: key, value, allowed."""
     first = min(error.errors(), key=lambda complaint: complaint["type"] != "extra_forbidden")
-    tag = 2 if first["loc"][0] == "axes" else None  # pydantic names the kind of axis after the axis
+    tag = 2 if first["loc"][0] in ("axes", "refine") else None  # pydantic names the kind of axis after the axis
     key = ".".join(str(part) for i, part in enumerate(first["loc"]) if i != tag)
     more = "" if error.error_count() == 1 else f" (and {error.error_count() - 1} more)"
     if first["type"] == "extra_forbidden" and first["loc"][-1] == "values":
@@ -320,7 +377,9 @@ def _one_line(error):
 def _nearest(loc):
     """The keys that are allowed beside an unknown one, the nearest first named."""
     table = (
-        {"solver": Solver, "output": Output, "axes": Spread, "boundaries": Boundaries}.get(loc[0], File)
+        {"solver": Solver, "output": Output, "axes": Spread, "boundaries": Boundaries, "refine": Refine}.get(
+            loc[0], File
+        )
         if len(loc) > 1
         else File
     )

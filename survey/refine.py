@@ -1,0 +1,118 @@
+"""The map on whole cells, as small as needed where the verdict changes, and the area of each verdict.
+
+Cells are halved until they are decided or as wide as [refine] says, and become variables along the dimension `cell`.
+"""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import xarray as xr
+
+from survey.dataset import percent, round_up
+from survey.errors import BadInput
+from survey.measures import hill, hill_cells
+from survey.measures.hill_edges import FACTORS
+from survey.scene import Request
+
+LABELS = ("unstable", "stable")
+ROUNDING = 1e-13  # of the sum of areas, relative to the whole
+
+
+def find(workflow, each, tell):
+    """The dataset of the workflow's cells and areas; `each` and `tell` (or None) as in `hill_cells.find`."""
+    panels = _panels(workflow)
+    points, found, whole = 0, [], _area(panels)
+    for x, y in panels:
+        share, done = _area([(x, y)]) / whole, _area(panels[: len(found)]) / whole
+
+        def told(part, solved, share=share, done=done, before=points):
+            if tell:
+                tell(done + share * part, before + solved)
+
+        try:
+            cells = hill_cells.find(_solver(workflow, x, y), x, y, each, told)
+        except OverflowError as error:
+            raise BadInput(f"refine.width: the map has {error}; take a greater width, or a smaller map") from None
+        found.append(cells)
+        points += cells.points
+    return _describe(workflow, found, points)
+
+
+def _area(panels):
+    return sum((x.high - x.low) * (y.high - y.low) for x, y in panels)
+
+
+def _panels(workflow):
+    """The rectangles (x, y) of the map between the values that a parameter excludes: nothing is analytic across."""
+    sides = [_sides(workflow, name, *asked) for name, asked in workflow.refine.items()]
+    return [(x, y) for x in sides[0] for y in sides[1]]
+
+
+def _sides(workflow, name, width, log):
+    """The Axis between each two neighbours of the ends and the excluded values."""
+    values = workflow.grid.parameters[name][1]
+    low, high = float(values.min()), float(values.max())
+    excluded = next(p.excluded for p in workflow.scene.PARAMETERS if p.name == name)
+    cuts = [low, *sorted(value for value in excluded if low < value < high), high]
+
+    def length(a, b):
+        return math.log(b / a) if log else b - a
+
+    return [
+        hill_cells.Axis(a, b, max(0, math.ceil(math.log2(length(a, b) / (width * length(low, high))) - 1e-9)), log)
+        for a, b in pairwise(cuts)
+    ]
+
+
+def _solver(workflow, x, y):
+    """What `hill_cells.find` asks of the scene; NaN outside the parameters' domains."""
+    rtol = hill_cells.accuracy(max(x.depth, y.depth))
+    request = Request(workflow.request.options, "auto", rtol, frozenset(FACTORS))
+    fixed = {name: np.full((1, 1, 1), values) for name, (dims, values) in workflow.grid.parameters.items() if not dims}
+    axes = [next(p for p in workflow.scene.PARAMETERS if p.name == name) for name in workflow.refine]
+
+    def solve(*values):
+        point = {p.name: np.where(p.holds(v), v, np.nan) for p, v in zip(axes, values, strict=True)}
+        with np.errstate(all="ignore"):
+            return workflow.scene.solve(fixed | point, request)
+
+    return solve
+
+
+def _describe(workflow, found, points):
+    """Variables and attributes."""
+    names = list(workflow.refine)
+    parameters = [next(p for p in workflow.scene.PARAMETERS if p.name == name) for name in names]
+    box = np.concatenate([cells.box for cells in found])
+    verdict = np.concatenate([cells.verdict for cells in found])
+    variables = {}
+    for at, p in enumerate(parameters):
+        for side, end in enumerate(("low", "high")):
+            meaning = {"long_name": f"{end} end of the cell in {p.long_name}", "units": p.units, "symbol": p.symbol}
+            variables[f"cell_{p.name}_{end}"] = ("cell", box[:, 2 * at + side], meaning)
+    flags = {key: code for key, code in hill.VERDICTS.items() if key != "marginal"}
+    variables["cell_verdict"] = ("cell", verdict, {
+        "long_name": "stability everywhere in the cell", "units": "1",
+        "flag_values": np.array(list(flags.values()), np.int8), "flag_meanings": " ".join(flags),
+        "comment": "undecided: an edge of a tongue may lie in it, or the verdict could not be shown"})  # fmt: skip
+    total = sum(cells.total for cells in found)
+    least = np.array([sum(getattr(cells, name) for cells in found) for name in LABELS])
+    bar = 0.5 * max(0.0, total - least.sum())
+    area, error = least + bar, bar + ROUNDING * total
+    units = " ".join(p.units for p in parameters if p.units != "1") or "1"
+    for name, scale, unit, words in (
+        ("area", 1.0, units, "area of the map with this verdict"),
+        ("area_fraction", total, "1", "share of the map's area with this verdict"),
+    ):
+        variables[name] = ("area_verdict", area / scale, {
+            "long_name": words, "units": unit, "ancillary_variables": f"{name}_error"})  # fmt: skip
+        variables[f"{name}_error"] = ("area_verdict", round_up(np.full(len(LABELS), error / scale)), {
+            "long_name": f"error bound of {name}", "units": unit})  # fmt: skip
+    codes = np.array([flags[label] for label in LABELS], np.int8)
+    coords = {"area_verdict": ("area_verdict", codes, {
+        "long_name": "verdict of the area", "units": "1",
+        "flag_values": codes, "flag_meanings": " ".join(LABELS)})}  # fmt: skip
+    words = (f"{label}: {percent(value / total, error / total)}" for label, value in zip(LABELS, area, strict=True))
+    about = {"refine": ", ".join(names), "refine_points": points, "areas": ", ".join(words)}
+    return xr.Dataset(variables, coords, about)
