@@ -13,38 +13,15 @@ ROWS = 8
 
 
 @kernel
-def expand(values, bars, even, transform, polynomials, back, lebesgue, place, series, totals):
-    """The series of D and its bar, row by row, from the factors y1, y1', y2, y2' (4, R, nodes) and their bars there.
-
-    `transform` takes n values to coefficients, `polynomials` these to m values, `back` those to coefficients (all by
-    columns: [from, to]); `lebesgue` holds the constants of n and m nodes, `place` is that of `_doubt`. Where D is
-    `even` the nodes are those of the upper half axis, x falling from 1, and y1(-p) = y2'(p) gives the other half.
-    """
-    n, m, own = transform.shape[0], back.shape[0], values.shape[2]
-    row, coefficients, factors = np.empty(n), np.empty(n), np.empty((4, m))
-    bar = np.empty(4)
-    for r in range(values.shape[1]):
-        for f in range(4):
-            other = 3 - f if f == 0 or f == 3 else f
-            error = 0.0
-            for i in range(n):
-                mirrored = even and i >= own
-                row[i] = values[other, r, n - 1 - i] if mirrored else values[f, r, i]
-                error = max(error, bars[other, r, n - 1 - i] if mirrored else bars[f, r, i])
-            _product(row, transform, coefficients)
-            bar[f] = lebesgue[0] * error + _doubt(coefficients, place)
-            _product(coefficients, polynomials, factors[f])
-        worst = 0.0
-        for i in range(m):
-            y1, dy1, y2, dy2 = factors[0, i], factors[1, i], factors[2, i], factors[3, i]
-            sine, cosine = -dy1 * y2, y1 * dy2
-            sine_bar = bar[1] * abs(y2) + bar[2] * abs(dy1) + bar[1] * bar[2] + EPS * abs(sine)
-            cosine_bar = bar[0] * abs(dy2) + bar[3] * abs(y1) + bar[0] * bar[3] + EPS * abs(cosine)
-            d = 2.0 - 4.0 * sine if sine_bar <= cosine_bar else 4.0 * cosine - 2.0
-            worst = max(worst, 4.0 * min(sine_bar, cosine_bar) + 2.0 * EPS * (2.0 + abs(d)))
-            factors[0, i] = d
-        _product(factors[0], back, series[r])
-        totals[r] = lebesgue[1] * worst + _doubt(series[r], place)
+def expand(values, matrix, place, series, doubts):
+    """The series of each row of `values` (R, n) at nodes, by `matrix` (columns: [from, to]), and its `_doubt`."""
+    for r in range(len(values)):
+        out = series[r]
+        out[:] = 0.0
+        for i in range(len(matrix)):
+            for j in range(len(matrix)):
+                out[j] += values[r, i] * matrix[i, j]
+        doubts[r] = _doubt(out, place)
 
 
 @kernel
@@ -80,15 +57,6 @@ def restrict(series, x, out):
             last, before = before, last
         for i in range(m):
             out[r, i] = series[0, i] + x[r] * last[i] - before[i]
-
-
-@inline
-def _product(values, columns, out):
-    """out = values @ columns, summed in order: the same bits in any block."""
-    out[:] = 0.0
-    for i in range(columns.shape[0]):
-        for j in range(columns.shape[1]):
-            out[j] += values[i] * columns[i, j]
 
 
 @inline

@@ -1,14 +1,13 @@
 """Dense maps of a Hill problem: the discriminant as a Chebyshev series in p, and across rows, solved at nodes alone.
 
-The factors y1, y1', y2, y2' at T/2 are entire functions of p (z is a polynomial in p), so their series on the axis
-converge faster than any power. The factors are solved at a row's nodes; their product D, with twice the degree, is
-expanded at as many nodes as it needs. Where p -> -p exchanges y1 and y2', the nodes of one half axis serve both, and D
-is a series in p^2. Where the rows are an axis too, D's coefficients are series across it, solved at its nodes; a panel
-of rows on which they do not converge is halved, and what is left over is served row by row.
+D is an entire function of p (z is a polynomial in p), so its series on the axis converges faster than any power; where
+p -> -p exchanges y1 and y2', D is a series in p^2 and its nodes those of one half axis. Where the rows are an axis too,
+D's coefficients are series across it, solved at its nodes; a panel of rows on which they do not converge is halved,
+and what is left over is served row by row.
 
-D's bar: the nodes' own bars times the Lebesgue constant, the tail of the series, and rounding. Points whose verdict
+D's bar: the nodes' own bars times the Lebesgue constants, the tails of the series, and rounding. Points whose verdict
 or accuracy it leaves open are `late`, and solved one by one from their factors. All depends on the row and on the whole
-axis, never on the block.
+axes, never on the block.
 
 Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 4, 8 and 15.
 """
@@ -24,15 +23,16 @@ from survey.measures import hill_effort
 from survey.measures.hill_answers import Answers, Asked
 
 NO_RULES = np.zeros((0, 0), np.int8)
-DEGREES = np.array([16, 20, 24, 28, 32, 40, 48, 56, 64, 80, 96, 112, 128, 160, 192])
-# A proxy pays if a row has this many points for each that it solves.
+DEGREES = np.array([16, 20, 24, 28, 32, 40, 48, 56, 64, 80, 96, 112, 128, 160, 192, 224, 256, 320, 384])
+# A proxy pays if there are this many points, and rows, for each that it solves.
 POINTS_PER_NODE = 3
 ROWS_PER_NODE = 2
-# Of the asked accuracy, for the factors at the nodes: Lebesgue constants and products multiply their bars by 100.
-NODES_SHARE = 2e-3
+# Of the asked accuracy, for D at the nodes of a row: the Lebesgue constant multiplies its bar by 4, and a surface's
+# by 4 again.
+NODES_SHARE = 0.1
 RETRIES = 2
 ANSWERS = frozenset({"discriminant", "exponent"})
-FACTORS = np.array([name in ("y1", "y2", "dy1", "dy2") for name in kernels.FLOATS])
+DISCRIMINANT = np.array([name == "discriminant" for name in kernels.FLOATS])
 
 
 def serves(problem, asked):
@@ -56,12 +56,17 @@ def solve(problem, method, asked, answers):
 
 @dataclass(frozen=True)
 class _Axis:
-    """Where the series in p live; `even`: on half of a symmetric axis, which then needs fewer nodes."""
+    """Where the series in p live; `even`: on half of a symmetric axis, which then needs half the nodes."""
 
     number: int
     middle: float
     radius: float
     even: bool
+
+    @property
+    def most(self):
+        """The number of DEGREES whose nodes pay."""
+        return int(np.searchsorted(DEGREES, self.number / POINTS_PER_NODE * (2 if self.even else 1), "right"))
 
 
 def _axis(line, symmetric):
@@ -73,7 +78,7 @@ def _axis(line, symmetric):
 
 def _rows(problem, method, asked, answers, chosen, axis, open_points):
     """Answer the points of the `chosen` rows, each by a series of its own."""
-    most = int(np.searchsorted(DEGREES, axis.number / POINTS_PER_NODE * (2 if axis.even else 1), "right"))
+    most = axis.most
     place = np.full(problem.span.size, DEGREES.size)
     place[chosen] = _places(problem, axis, asked.rtol)[chosen]
     first = place.copy()
@@ -101,63 +106,60 @@ def _answer(problem, asked, answers, rows, series, bars, axis, open_points):
 def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
     """Answer the points of those of the `chosen` rows that a series in s and p serves; returns the other rows.
 
-    The axis of rows is halved until D has converged on a panel to `rtol`, or the panel has too few rows.
+    The axis of rows is halved until D has converged on a panel to `rtol`, as long as all that is solved for it pays.
     """
     across, left = problem.across, [np.zeros(0, int)]
-    panels = [(across.low, across.high, across.number)]
+    panels, budget = [(across.low, across.high, 1.0)], across.number / ROWS_PER_NODE
+    s = across.s[chosen]
     while panels:
-        low, high, number = panels.pop()
-        s = across.s[chosen]
+        low, high, share = panels.pop(0)
         rows = chosen[(s >= low) & ((s < high) | ((s == high) & (high == across.high)))]
-        if not rows.size:
-            continue
         middle, radius = 0.5 * (low + high), 0.5 * (high - low)
-        if number < ROWS_PER_NODE * DEGREES[0] or not radius > 0:
+        surface, spent = None, 0
+        if radius > 0:
+            surface, spent = _surface(across, method, asked, middle, radius, axis, min(budget, share * across.number))
+        budget -= spent
+        if surface is not None and rows.size:
+            series, bar = surface
+            own = np.empty((rows.size, series.shape[1]))
+            restrict(series, (across.s[rows] - middle) / radius, own)
+            _answer(problem, asked, answers, rows, own, np.full(rows.size, bar), axis, open_points)
+        elif surface is None and spent:
+            panels += [(low, middle, 0.5 * share), (middle, high, 0.5 * share)]
+        elif surface is None:
             left.append(rows)
-            continue
-        surface = _surface(across, method, asked, middle, radius, number, axis)
-        if surface is None:
-            panels += [(low, middle, number / 2), (middle, high, number / 2)]
-            continue
-        series, bar = surface
-        own = np.empty((rows.size, series.shape[1]))
-        restrict(series, (across.s[rows] - middle) / radius, own)
-        _answer(problem, asked, answers, rows, own, np.full(rows.size, bar), axis, open_points)
-    outside = chosen[~((across.s[chosen] >= across.low) & (across.s[chosen] <= across.high))]
+    outside = chosen[~((s >= across.low) & (s <= across.high))]
     return np.concatenate([*left, outside])
 
 
-def _surface(across, method, asked, middle, radius, number, axis):
-    """D on a panel of rows: (coefficients of T_j in s, by T_k in p; bar), or None where `rtol` is not met."""
+def _surface(across, method, asked, middle, radius, axis, budget):
+    """((coefficients of T_j in s, by T_k in p; bar), or None where `rtol` is not met; rows solved, within `budget`)."""
     ends = across.at(middle + radius * np.array([-1.0, 1.0]))
     size = np.sqrt((ends.bound * np.abs([1.0, axis.radius, axis.radius**2])).sum(axis=1))
-    kind = np.abs(np.diff(ends.span * size))  # half the change of D's phase
-    at = int(_enough(kind, asked.rtol)[0])
-    place = int(_places(ends, axis, asked.rtol).max())
-    most = [np.searchsorted(DEGREES, count, "right") for count in (number / ROWS_PER_NODE, axis.number)]
-    for _ in range(2 * RETRIES):
-        if at >= most[0] or place >= most[1]:
-            return None
-        n = int(DEGREES[at])
+    at = int(_enough(np.abs(np.diff(ends.span * size)), asked.rtol)[0])  # half the change of D's phase
+    place, spent, doubt = int(_places(ends, axis, asked.rtol).max()), 0, np.inf
+    while at < DEGREES.size and place < axis.most and spent + DEGREES[at] <= budget:
+        n, before = int(DEGREES[at]), doubt
+        spent += n
         nodes = across.at(middle + radius * _nodes(n))
         series, bars = _series(nodes, method, 0.25 * asked.rtol, np.arange(n), int(DEGREES[place]), axis)
         surface = np.empty_like(series)
-        place_ulps = (4 + abs(middle) + radius) / radius
-        own, of_rows = transform(series, _transform(n), place_ulps, surface), _lebesgue(n) * bars.max()
-        if own + of_rows <= asked.rtol:
-            return surface, own + of_rows
-        at, place = (at + 1, place) if own > of_rows else (at, place + 1)
-    return None
+        tail = transform(series, _transform(n), (4 + abs(middle) + radius) / radius, surface)
+        doubt = tail + _lebesgue(n) * bars.max()
+        if doubt <= asked.rtol:
+            return (surface, doubt), spent
+        if not doubt < 0.5 * before:
+            break
+        at, place = (at + 1, place) if tail > 0.5 * doubt else (at, place + 1)
+    return None, spent
 
 
 def _places(problem, axis, rtol):
-    """The place in DEGREES that each row's factors need; beyond DEGREES where none is enough."""
+    """The place in DEGREES that each row's D needs; beyond DEGREES where none is enough."""
     if problem.c2:
-        kind = problem.span * axis.radius * np.sqrt(problem.c2)
-    else:
-        # cos(span sqrt(p)) on an axis of length 2 radius is half as rich as cos(span p) on its square root
-        kind = 0.5 * problem.span * np.sqrt(2 * axis.radius * problem.bound[:, 1])
-    return _enough(kind, rtol)
+        return _enough(2 * problem.span * axis.radius * np.sqrt(problem.c2), rtol)
+    # cos(span sqrt(p)) on an axis of length 2 radius is half as rich as cos(span p) on its square root
+    return _enough(problem.span * np.sqrt(2 * axis.radius * problem.bound[:, 1]), rtol)
 
 
 def _enough(kind, rtol):
@@ -172,28 +174,16 @@ def _enough(kind, rtol):
 
 
 def _series(problem, method, rtol, rows, n, axis):
-    """Coefficients of D (rows, m; of T_k(2 (p/radius)^2 - 1) if even) and its bar, not finite where there is none."""
-    x, even = _nodes(n), axis.even
-    solved = x[: n // 2] if even else x
-    nodes = problem.at(rows, np.broadcast_to(axis.middle + axis.radius * solved, (rows.size, solved.size)).copy())
-    finer = Asked(max(NODES_SHARE * rtol, 3e-14), FACTORS, together=True)
+    """Coefficients of D (rows, n; n/2 of T_k(2 (p/radius)^2 - 1) if even) and its bar, not finite if there is none."""
+    x = _nodes(n)[: n // 2] if axis.even else _nodes(n)
+    nodes = problem.at(rows, np.broadcast_to(axis.middle + axis.radius * x, (rows.size, x.size)).copy())
+    finer = Asked(max(NODES_SHARE * rtol, 1e-14), DISCRIMINANT, together=True)
     own = Answers(nodes.p.size, finer)
     hill_effort.solve(nodes, method, finer, own)
-    values, bars = (
-        np.stack(
-            [own.floats[c + at].reshape(nodes.p.shape) for c in (kernels.Y1, kernels.DY1, kernels.Y2, kernels.DY2)]
-        )
-        for at in (0, 1)
-    )
-    m = n + n // 2
-    m = m // 2 if even else m
-    series, totals = np.empty((rows.size, m)), np.empty(rows.size)
-    lebesgue = np.array([_lebesgue(n), _lebesgue(m)])
-    place_ulps = (abs(axis.middle) + axis.radius) / axis.radius
-    expand(
-        values, bars, even, _transform(n), _polynomials(n, m, even), _transform(m), lebesgue, place_ulps, series, totals
-    )
-    return series, totals
+    values, bars = (own.floats[c].reshape(nodes.p.shape) for c in (kernels.DISCRIMINANT, kernels.DISCRIMINANT + 1))
+    series, totals = np.empty(values.shape), np.empty(rows.size)
+    expand(values, _transform(x.size), (abs(axis.middle) + axis.radius) / axis.radius, series, totals)
+    return series, totals + _lebesgue(x.size) * bars.max(axis=1)
 
 
 def _lebesgue(n):
@@ -215,10 +205,3 @@ def _transform(n):
     matrix = 2 / n * np.cos(np.pi * k * (2 * np.arange(n)[:, None] + 1) / (2 * n))
     matrix[:, 0] /= 2
     return matrix
-
-
-@cache
-def _polynomials(n, m, even):
-    """Coefficients -> values, by columns: T_0 ... T_(n-1) at m nodes; those in x of the upper half if `even`."""
-    x = _nodes(2 * m)[:m] if even else _nodes(m)  # those of T_k(2 x^2 - 1)
-    return np.cos(np.arange(n)[:, None] * np.arccos(x))
