@@ -29,7 +29,8 @@ def run(workflow, output=None, workers=None, scheduler=None, fresh=False):
 
     Returns
     -------
-    xarray.Dataset, loaded; the file (and its figures) are written and closed.
+    xarray.Dataset, the file and its figures being written: in memory and the file closed, or, if it takes more than
+    256 MiB there, lazy (dask arrays) and the file open.
 
     Raises
     ------
@@ -37,7 +38,8 @@ def run(workflow, output=None, workers=None, scheduler=None, fresh=False):
     """
     read = workflows.read if isinstance(workflow, (str, os.PathLike)) else workflows.check
     checked = read(workflow, output=output)
-    ds = engine.run(checked, workers, scheduler, fresh)
+    engine.run(checked, workers, scheduler, fresh)
+    ds = store.load(checked.path)
     draw(ds, checked)
     return ds
 
@@ -108,7 +110,7 @@ def evaluate(scene, *, method="auto", rtol=1e-10, variables=None, **parameters):
 
 
 def open(path):
-    """The dataset in the netCDF file `path`, in memory and the file closed.
+    """The dataset in the netCDF file `path`: in memory and the file closed; or lazy, if it takes more than 256 MiB.
 
     Raises survey.BadInput if there is no such file or survey did not write it, survey.Damaged if it is incomplete.
     """
