@@ -175,14 +175,13 @@ class Assembly:
             self.place += [len(self.regions)] * len(blocks)
             self.regions.append((region, first, blocks))
             self.waiting.append(len(blocks))
-        self.output = store.Output(workflow.path, kept.folder)
-        meanings = variables(workflow.grid, workflow.scene, workflow.request)
-        self.output.define_map(
-            coordinates(workflow.grid, workflow.scene, workflow.request), meanings, self.layout,
-            workflow.grid.shape, tile,
-        )  # fmt: skip
+        scene, request, grid = workflow.scene, workflow.request, workflow.grid
+        meanings = variables(grid, scene, request)
         flags = {name: meanings[name][1] for name in ("status", "verdict") if name in meanings}
-        self.tally = Tally(flags, workflow.request.rtol)
+        self.tally = Tally(flags, request.rtol)
+        self.output = store.Output(
+            workflow.path, kept.folder, coordinates(grid, scene, request), meanings, self.layout, grid.shape, tile
+        )
         self.writer, self.writes, self.room = ThreadPoolExecutor(1), [], {}
 
     def __enter__(self):
@@ -190,7 +189,7 @@ class Assembly:
 
     def __exit__(self, *_):
         self.writer.shutdown(cancel_futures=True)
-        self.output.__exit__()
+        self.output.discard()
 
     def has(self, number):
         """Block `number` is finished. Raises what writing another part has raised."""

@@ -45,11 +45,11 @@ class Blocks:
     def __enter__(self):
         with refused(self.path):
             self._hold()
-            if self.fresh:
-                shutil.rmtree(self.folder, ignore_errors=True)
-            self.folder.mkdir(exist_ok=True)
-            self._same_survey()
-            write_atomically(self.folder / "holder.json", json.dumps(_holder()).encode())
+            try:
+                self._prepare()
+            except BaseException:
+                self.lock.release()
+                raise
         return self
 
     def __exit__(self, *_):
@@ -93,6 +93,13 @@ class Blocks:
 
     def _file(self, number):
         return self.folder / f"{number:08d}.block"
+
+    def _prepare(self):
+        if self.fresh:
+            shutil.rmtree(self.folder, ignore_errors=True)
+        self.folder.mkdir(exist_ok=True)
+        self._same_survey()
+        write_atomically(self.folder / "holder.json", json.dumps(_holder()).encode())
 
     def _hold(self):
         try:
@@ -183,20 +190,26 @@ def publish(part, path):
 
 
 class Output:
-    """The netCDF file of a map, written piece by piece beside the blocks; `publish` puts it in its place."""
+    """The netCDF file of a map, written piece by piece beside the blocks; `publish` puts it in its place.
 
-    def __init__(self, path, folder):
-        self.path, self.part = Path(path), folder / "output.nc"
+    `coordinates`, `variables` and `layout` are those of `survey.dataset`; `shape` is the map's.
+    """
+
+    def __init__(self, path, folder, coordinates, variables, layout, shape, tile):
+        self.path, self.part, self.beside = Path(path), folder / "output.nc", {}
         with refused(self.path):
             self.file = netCDF4.Dataset(self.part, "w")
-        self.beside = {}
+            try:
+                self._define_map(coordinates, variables, layout, shape, tile)
+            except BaseException:
+                self.discard()
+                raise
 
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
+    def discard(self):
+        """Close and remove what is not published."""
         if self.file.isopen():
-            self.file.close()
+            with contextlib.suppress(OSError, RuntimeError):
+                self.file.close()
         self.part.unlink(missing_ok=True)
 
     def define(self, name, dims, shape, dtype, attributes, tile=None):
@@ -218,8 +231,7 @@ class Output:
         values = np.asarray(values)
         self.file[name][where if where != () else ...] = values.astype(object) if values.dtype.kind == "U" else values
 
-    def define_map(self, coordinates, variables, layout, shape, tile):
-        """Make the coordinates, with their values, and the variables of a map of this shape (see `dataset`)."""
+    def _define_map(self, coordinates, variables, layout, shape, tile):
         for name, (dims, values, meaning) in coordinates.items():
             self.define(name, dims, np.shape(values), np.asarray(values).dtype, meaning)
             self.put(name, values)
