@@ -41,8 +41,7 @@ class Grid:
 
     def blocks(self, points_per_block):
         """Slices per dimension, row by row: the first dimensions are cut first, to at most `points_per_block`."""
-        cuts = [_even_cuts(range(size), piece) for size, piece in zip(self.shape, self._lengths(points_per_block))]
-        return list(product(*cuts))
+        return self._within([slice(0, size) for size in self.shape], points_per_block)
 
     def tiled(self, points_per_block, points_per_region, points_per_tile):
         """(lengths of a tile, [(region, its blocks)]): no tile belongs to two regions, and no block does.
@@ -51,14 +50,16 @@ class Grid:
         """
         region = self._lengths(points_per_region)
         tile = halved(region, points_per_tile)
-        whole = [size if piece == size else piece // own * own for size, piece, own in zip(self.shape, region, tile)]
-        cuts = [[slice(a, min(a + w, n)) for a in range(0, n, w)] for n, w in zip(self.shape, whole)]
+        cuts = []
+        for size, piece, own in zip(self.shape, region, tile, strict=True):
+            step = piece if piece == size else piece // own * own
+            cuts.append([slice(first, min(first + step, size)) for first in range(0, size, step)])
         return tile, [(place, self._within(place, points_per_block)) for place in product(*cuts)]
 
     def _within(self, region, points_per_block):
         """The blocks of a region."""
         spans = [range(cut.start, cut.stop) for cut in region]
-        lengths = replace(self, sizes=dict(zip(self.sizes, map(len, spans))))._lengths(points_per_block)
+        lengths = replace(self, sizes=dict(zip(self.sizes, map(len, spans), strict=True)))._lengths(points_per_block)
         return list(product(*map(_even_cuts, spans, lengths)))
 
     def _lengths(self, points):

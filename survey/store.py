@@ -15,7 +15,7 @@ import netCDF4
 import numpy as np
 
 from survey import status
-from survey.dataset import error_bars, tally
+from survey.dataset import tally
 from survey.errors import BadInput, Damaged, Stopped, SurveyError
 from survey.grid import halved
 
@@ -254,7 +254,7 @@ class Output:
         return {"coordinates": " ".join(names)} if names else {}
 
     def publish(self, attributes):
-        """Finish the file, `complete` last, and put it in its place with its digest (`OUT.nc.sha256`, for sha256sum)."""
+        """Finish the file, `complete` last, and put it in its place, its digest beside it (`OUT.nc.sha256`)."""
         self.file.setncatts(attributes | {"complete": np.int8(1)})
         self.file.close()
         with open(self.part, "rb+") as file:

@@ -72,4 +72,4 @@ def kernel(function):
 
 def inline(function):
     """Compile `function` as part of the kernels that call it (always inlined by LLVM, never cached alone)."""
-    return numba.njit(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_FLAGS)(function)
+    return numba.njit(forceinline=True, no_cfunc_wrapper=True, **_FLAGS)(function)
