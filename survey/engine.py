@@ -12,6 +12,8 @@ from math import prod
 from typing import Any
 
 import dask
+import dask.multiprocessing
+import dask.threaded
 import numpy as np
 from dask.callbacks import Callback
 
@@ -297,10 +299,12 @@ def _through_dask(task, numbers, workers=None, scheduler=None, finished=None, th
     done = itertools.count(1)
     callback = Callback(posttask=lambda key, result, *_: finished(next(done), result) if finished else None)
     call = dask.delayed(task, pure=False, traverse=False)
-    where = {"scheduler": "processes", "num_workers": workers} if workers else {"scheduler": "threads"}
-    where = {"num_workers": threads or cpus()} | where
     if scheduler:
         where = {"scheduler": scheduler}
+    elif workers:
+        where = {"scheduler": dask.multiprocessing.get, "num_workers": workers}
+    else:  # the function itself: by its name, dask imports all of distributed before
+        where = {"scheduler": dask.threaded.get, "num_workers": threads or cpus()}
     if finished:
         finished(0)
     try:
