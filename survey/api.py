@@ -29,7 +29,8 @@ def run(workflow, output=None, workers=None, scheduler=None, fresh=False):
 
     Returns
     -------
-    xarray.Dataset, loaded; the file (and its figures) are written and closed.
+    xarray.Dataset, the file and its figures being written: in memory and the file closed, or, if it takes more than
+    256 MiB there, lazy (dask arrays) and the file open.
 
     Raises
     ------
@@ -37,7 +38,8 @@ def run(workflow, output=None, workers=None, scheduler=None, fresh=False):
     """
     read = workflows.read if isinstance(workflow, (str, os.PathLike)) else workflows.check
     checked = read(workflow, output=output)
-    ds = engine.run(checked, workers, scheduler, fresh)
+    engine.run(checked, workers, scheduler, fresh)
+    ds = store.load(checked.path)
     draw(ds, checked)
     return ds
 
@@ -108,7 +110,7 @@ def evaluate(scene, *, method="auto", rtol=1e-10, variables=None, **parameters):
 
 
 def open(path):
-    """The dataset in the netCDF file `path`, in memory and the file closed.
+    """The dataset in the netCDF file `path`: in memory and the file closed; or lazy, if it takes more than 256 MiB.
 
     Raises survey.BadInput if there is no such file or survey did not write it, survey.Damaged if it is incomplete.
     """
@@ -271,11 +273,12 @@ def audit(ds, points, seed=0):
     if not points:
         return {"points": 0, "method": method, "outside": 0, "complaints": []}
     ds = ds if ds.status.dims else ds.expand_dims("_one")
-    flat = ds.stack(_point=ds.status.dims)
-    chosen = np.random.default_rng(seed).permutation(flat.sizes["_point"])[:points]
-    flat = flat.isel(_point=np.sort(chosen)).reset_index("_point", drop=True)
+    size = min(points, ds.status.size)
+    chosen = np.sort(np.random.default_rng(seed).choice(ds.status.size, size, replace=False, shuffle=False))
+    places = np.unravel_index(chosen, ds.status.shape)
+    flat = ds.isel({dim: ("_point", place) for dim, place in zip(ds.status.dims, places, strict=True)}).load()
     names = [p.name for p in module.PARAMETERS if p.name in ds.coords]
-    given = {key: ("_point", np.broadcast_to(_along(ds, key, chosen), chosen.size).copy()) for key in names}
+    given = {key: ("_point", np.broadcast_to(flat[key].values, size).copy()) for key in names}
     again = evaluate(
         ds.attrs["scene"],
         method=method,
@@ -291,11 +294,6 @@ def audit(ds, points, seed=0):
             where = ", ".join(f"{key} = {values[i]!r}" for key, (_, values) in given.items())
             complaints.append(f"{name} at {where}: off by {np.nanmax(off[i]):.3g}, error bars {np.nanmax(bar[i]):.3g}")
     return {"points": chosen.size, "method": method, "outside": len(complaints), "complaints": complaints}
-
-
-def _along(ds, key, chosen):
-    """The parameter `key` at the flat point numbers `chosen` (sorted)."""
-    return ds[key].broadcast_like(ds.status).values.reshape(-1)[np.sort(chosen)]
 
 
 def _beside(option):

@@ -1,4 +1,4 @@
-"""Arrays -> a labelled dataset: CF attributes, flags, error bars, counts and provenance."""
+"""Labels for arrays: CF attributes, flags, error bars, counts and provenance; as a dataset, or for a file."""
 
 import datetime
 import platform
@@ -9,12 +9,12 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
-import xarray as xr
 
 from survey import status
 from survey.scene import exists
 
 CONVENTIONS = "CF-1.11, ACDD-1.3"
+CHUNK = 2**14  # points: what is computed of them stays in the cache
 
 
 def outputs_of(scene, request):
@@ -36,10 +36,13 @@ def layout(scene, request):
 
 
 def round_up(errors):
-    """float64 error bars as float32, never smaller than before."""
+    """float64 error bars (not negative) as float32, never smaller than before."""
+    errors = np.asarray(errors, dtype=float)
     with np.errstate(over="ignore"):
-        small = np.asarray(errors).astype(np.float32)
-    return np.where(small < errors, np.nextafter(small, np.float32(np.inf)), small)
+        small = errors.astype(np.float32)
+    bits = small.view(np.int32)
+    bits += small < errors  # the next float32 up: consecutive floats are consecutive integers
+    return small
 
 
 def percent(share, bar):
@@ -50,23 +53,36 @@ def percent(share, bar):
 
 def describe(grid, scene, name, request, arrays):
     """The dataset of a survey: `arrays` holds the variables of `layout` in the grid's shape."""
+    import xarray as xr
+
+    data = {key: (dims, arrays[key], meaning) for key, (dims, meaning) in variables(grid, scene, request).items()}
+    return xr.Dataset(data, coordinates(grid, scene, request), attributes(scene, name, request))
+
+
+def coordinates(grid, scene, request):
+    """{name: (dimensions, values, attributes)}: the parameters, then the extra dimensions of the outputs."""
     used = {p.name: p for p in scene.PARAMETERS}
     coords = {key: (dims, values, _meaning(used[key])) for key, (dims, values) in grid.parameters.items()}
+    extra = dict.fromkeys(dim for output in outputs_of(scene, request) for dim in output.dims)
+    return coords | {dim: ((dim,), np.asarray(scene.DIMENSIONS[dim]), {"long_name": dim}) for dim in extra}
+
+
+def variables(grid, scene, request):
+    """{name: (dimensions, attributes)} of the variables of `layout`."""
     dims = tuple(grid.sizes)
-    outputs = outputs_of(scene, request)
-    for dim in {dim for output in outputs for dim in output.dims}:
-        coords[dim] = (dim, np.asarray(scene.DIMENSIONS[dim]), {"long_name": dim})
-    variables = {}
-    for output in outputs:
-        own = dims + output.dims
-        variables[output.name] = (own, arrays[output.name], _attributes(output))
+    table = {}
+    for output in outputs_of(scene, request):
+        table[output.name] = (dims + output.dims, _attributes(output))
         if output.dtype.kind == "f":
             bar = {"long_name": f"error bound of {output.name}", "units": output.units}
             bar |= {"coverage_content_type": "qualityInformation", "symbol": rf"\delta {output.symbol or output.name}"}
-            variables[f"{output.name}_error"] = (own, arrays[f"{output.name}_error"], bar)
-    variables["status"] = (dims, arrays["status"], _status_attributes(scene))
-    ds = xr.Dataset(variables, coords)
-    ds.attrs = {
+            table[f"{output.name}_error"] = (dims + output.dims, bar)
+    return table | {"status": (dims, _status_attributes(scene))}
+
+
+def attributes(scene, name, request):
+    """The global attributes that say what was asked, of what, and by which code."""
+    return {
         "Conventions": CONVENTIONS,
         "title": scene.TITLE,
         "summary": (scene.__doc__ or scene.TITLE).strip().split("\n\n")[0].replace("\n", " "),
@@ -79,55 +95,84 @@ def describe(grid, scene, name, request, arrays):
         "source": f"survey {version('survey')}: scene {name}, method {request.method}",
         **provenance(),
     }
-    return ds
+
+
+class Tally:
+    """Counts by status and verdict, and of points whose bar exceeds the asked accuracy, over pieces of a map.
+
+    `flags` is {"status": its attributes, "verdict": its attributes (where there is one)}.
+    """
+
+    def __init__(self, flags, rtol):
+        self.codes = {name: _codes(meaning) for name, meaning in flags.items()}
+        self.counts = {name: dict.fromkeys(codes, 0) for name, codes in self.codes.items()}
+        self.rtol = rtol
+        self.points = self.missed = 0
+
+    def add(self, arrays):
+        """Count the points of a piece: {variable: array}."""
+        size = np.size(arrays["status"])
+        flat = {name: np.asarray(array).reshape(size, -1) for name, array in arrays.items()}
+        bars = [name for name in flat if f"{name}_error" in flat]
+        for first in range(0, size, CHUNK):
+            some = slice(first, first + CHUNK)
+            missed = np.zeros(min(CHUNK, size - first), bool)
+            for name in bars:
+                missed |= _above(flat[name][some], flat[f"{name}_error"][some], self.rtol).any(axis=-1)
+            self.missed += int(np.count_nonzero(missed))
+        self.points += size
+        for name, codes in self.codes.items():
+            for key, code in codes.items():
+                self.counts[name][key] += int(np.count_nonzero(arrays[name] == code))
+
+    @property
+    def attributes(self):
+        """The counts as global attributes."""
+        told = {"points": self.points, "accuracy_missed": self.missed}
+        for name, number in self.counts.items():
+            told[f"{name}_counts"] = ", ".join(f"{key}: {n}" for key, n in number.items() if n)
+        return told
+
+
+def _above(value, bar, rtol):
+    """Where the bar exceeds rtol (1 + |value|)."""
+    asked = np.abs(value)
+    asked += 1
+    asked *= rtol
+    with np.errstate(invalid="ignore"):
+        return bar > asked
+
+
+def tally(ds):
+    """The empty Tally of a survey's dataset."""
+    return Tally({name: ds[name].attrs for name in ("status", "verdict") if name in ds}, ds.attrs["rtol"])
 
 
 def count(ds):
-    """Add the counts by status and by verdict, and of points whose bar exceeds the asked accuracy, to `ds.attrs`."""
-    missed = np.zeros(ds.status.shape, bool)
-    for name in error_bars(ds):
-        value, bar = ds[name].values, ds[f"{name}_error"].values
-        with np.errstate(invalid="ignore"):
-            above = bar > ds.attrs["rtol"] * (1 + np.abs(value))
-        missed |= above.reshape(*missed.shape, -1).any(axis=-1)
-    ds.attrs["points"] = int(ds.status.size)
-    ds.attrs["accuracy_missed"] = int(missed.sum())
-    for name in ("status", "verdict"):
-        if name in ds:
-            ds.attrs[f"{name}_counts"] = ", ".join(f"{key}: {n}" for key, n in counts(ds[name]).items() if n)
+    """Add the counts of `Tally` to `ds.attrs`, from its data in memory."""
+    whole = tally(ds)
+    names = ["status", *whole.codes, *error_bars(ds), *(f"{name}_error" for name in error_bars(ds))]
+    point = ds.status.dims
+    whole.add({name: ds[name].transpose(*point, ...).values for name in names})
+    ds.attrs |= whole.attributes
     return ds
 
 
 def counts(variable):
     """{flag meaning: number of points} of a CF flag variable."""
-    codes = np.atleast_1d(variable.attrs["flag_values"])
-    return {
-        name: int((variable.values == code).sum())
-        for name, code in zip(variable.attrs["flag_meanings"].split(), codes, strict=True)
-    }
+    values = variable.values
+    return {name: int(np.count_nonzero(values == code)) for name, code in _codes(variable.attrs).items()}
+
+
+def _codes(meaning):
+    """{flag meaning: code} from a variable's attributes."""
+    return dict(zip(meaning["flag_meanings"].split(), np.atleast_1d(meaning["flag_values"]).tolist(), strict=True))
 
 
 def error_bars(ds):
     """Names of the float outputs of `ds`, one value or more per point (those that have an error bar)."""
     point = set(ds.status.dims)
     return [name for name in ds.data_vars if f"{name}_error" in ds.data_vars and point <= set(ds[name].dims)]
-
-
-def encoding(ds):
-    """Checksummed compression in tiles: readable everywhere, and every flipped bit is found."""
-    packed = {"zlib": True, "complevel": 4, "shuffle": True, "fletcher32": True}
-    settings = {}
-    for name, variable in ds.variables.items():
-        settings[name] = {"_FillValue": np.nan} if name in error_bars(ds) or name.endswith("_error") else {}
-        if variable.dtype.kind in "iu" or name in ds.coords:
-            settings[name]["_FillValue"] = None
-        if name in ds.data_vars and variable.ndim:
-            tile = [
-                max(1, min(size, 65536 if variable.ndim == 1 else 256) if axis >= variable.ndim - 2 else min(size, 16))
-                for axis, size in enumerate(variable.shape)
-            ]
-            settings[name] |= packed | {"chunksizes": tile}
-    return settings
 
 
 @cache

@@ -6,20 +6,26 @@ import json
 import os
 import shutil
 import time
-from dataclasses import replace
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from math import prod
+from typing import Any
 
 import dask
+import dask.multiprocessing
+import dask.threaded
 import numpy as np
-import psutil
 from dask.callbacks import Callback
 
 from survey import store
-from survey.dataset import command, count, describe, layout, now, provenance, round_up
+from survey.dataset import Tally, attributes, command, coordinates, layout, now, provenance, round_up, variables
 from survey.errors import BadInput, Stopped
+from survey.kernels.jit import compile_seconds
 
 BLOCK_SECONDS = 0.5
-BLOCK_POINTS = 50_000
+BLOCK_POINTS = 2**17
+# what the writer holds at a time: enough for the tiles to be square, little beside what else a process takes
+REGION_POINTS, REGION_BYTES = 2**20, 2**25
 
 
 def seconds_per_point(scene, request, grid):
@@ -32,9 +38,16 @@ def points_per_block(scene, request, grid):
     return int(np.clip(BLOCK_SECONDS / seconds_per_point(scene, request, grid), 1, BLOCK_POINTS))
 
 
+def regions_of(workflow):
+    """(lengths of a tile, [(region, its blocks)]) of a workflow's grid: a region holds whole tiles and whole blocks."""
+    scene, request, grid = workflow.scene, workflow.request, workflow.grid
+    region = max(1, min(REGION_POINTS, REGION_BYTES // bytes_per_point(scene, request)))
+    return grid.tiled(points_per_block(scene, request, grid), region, store.TILE_POINTS)
+
+
 def blocks_of(workflow):
-    """The blocks of a workflow's grid."""
-    return workflow.grid.blocks(points_per_block(workflow.scene, workflow.request, workflow.grid))
+    """The blocks of a workflow's grid, in the order of their numbers."""
+    return [block for _, blocks in regions_of(workflow)[1] for block in blocks]
 
 
 def solve_block(scene, request, grid, block):
@@ -66,7 +79,7 @@ def stored(scene, request, solved, shape):
 
 def compute(grid, scene, request, threads=None):
     """All variables of the grid, in memory: {name: array in the grid's shape}."""
-    result = _empty(grid, scene, request)
+    result = {name: np.empty(grid.shape + extra, kind) for name, (kind, _, extra) in layout(scene, request).items()}
 
     def task(block):
         for name, values in solve_block(scene, request, grid, block).items():
@@ -80,46 +93,150 @@ def compute(grid, scene, request, threads=None):
     return result
 
 
-def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
-    """Run or resume the survey, write its netCDF file and return the dataset.
+@dataclass(frozen=True)
+class Finished:
+    """What a run has written: the file's attributes, the counts, and seconds of wall time (they do not overlap)."""
 
+    attributes: dict[str, Any]
+    counts: dict[str, dict[str, int]]
+    compiling: float
+    computing: float
+    writing: float
+
+
+def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
+    """Run or resume the survey and write its netCDF file; returns what was Finished.
+
+    A part of the file is written as soon as the blocks of its region are there, while others are computed.
     `progress(done, total, reused)` is called as blocks finish. Raises BadInput, Damaged or Stopped.
     """
-    started = time.time()
+    started = time.perf_counter()
     _refuse_too_large(workflow)
     scheduler = _client(scheduler) if scheduler else None
-    blocks = blocks_of(workflow)
+    tile, regions = regions_of(workflow)
+    blocks = [block for _, blocks in regions for block in blocks]
     with store.Blocks(workflow.path, fingerprint(workflow), fresh) as kept:
-        reused = kept.done()
+        reused = kept.sound()
         todo = [number for number in range(len(blocks)) if number not in reused]
+        compiled = {}
 
         def task(number):
             kept.save(number, solve_block(workflow.scene, workflow.request, workflow.grid, blocks[number]))
+            return number, os.getpid(), compile_seconds()
 
-        def finished(done):
-            if progress:
-                progress(len(reused) + done, len(blocks), len(reused))
+        with Assembly(workflow, kept, tile, regions) as assembly:
 
-        _through_dask(task, todo, workers, scheduler, finished)
-        arrays = _empty(workflow.grid, workflow.scene, workflow.request)
-        for number, block in enumerate(blocks):
-            for name, values in kept.load(number).items():
-                arrays[name][block] = values
-        ds = label(workflow, arrays)
-        if workflow.boundaries:
-            from survey import boundaries
+            def finished(done, result=None):
+                if result:
+                    number, process, compiled[process] = result
+                    assembly.has(number)
+                if progress:
+                    progress(len(reused) + done, len(blocks), len(reused))
 
-            ds = ds.merge(boundaries.find(workflow)).assign_attrs(boundaries=workflow.boundaries)
-        if workflow.refine:
-            from survey import refine
-
-            cells = refine.find(workflow, _each, getattr(progress, "refining", None))
-            ds = ds.merge(cells).assign_attrs(cells.attrs)
-        ds.attrs["wall_time_s"] = round(time.time() - started, 3)
-        ds.attrs["blocks_reused"] = len(reused)
-        store.write(ds, workflow.path)
+            before, began = compile_seconds(), time.perf_counter()
+            for number in sorted(reused):
+                assembly.has(number)
+            _through_dask(task, todo, workers, scheduler, finished)
+            computed = time.perf_counter()
+            if os.getpid() in compiled:
+                compiled[os.getpid()] -= before
+            compiling = max(compiled.values(), default=0.0)  # processes compile side by side
+            further = extras(workflow, progress)
+            told = {
+                "wall_time_s": round(time.perf_counter() - started, 3),
+                "compile_time_s": round(compiling, 3),
+                "blocks_reused": len(reused),
+            }
+            written = assembly.finish(further, told)
         kept.remove()
-    return ds.assign_attrs(complete=np.int8(1))
+    writing = time.perf_counter() - computed
+    return Finished(written, assembly.tally.counts, compiling, max(0.0, computed - began - compiling), writing)
+
+
+def extras(workflow, progress=None):
+    """Datasets that go into the file beside the map, their attributes with its own."""
+    further = []
+    if workflow.boundaries:
+        from survey import boundaries
+
+        further.append(boundaries.find(workflow))
+    if workflow.refine:
+        from survey import refine
+
+        further.append(refine.find(workflow, _each, getattr(progress, "refining", None)))
+    return further
+
+
+class Assembly:
+    """The netCDF file of a run as it grows: one thread writes each region once its blocks are finished.
+
+    Use as a context manager around the run; what it does not `finish` leaves no file.
+    """
+
+    def __init__(self, workflow, kept, tile, regions):
+        self.workflow, self.kept = workflow, kept
+        self.layout = layout(workflow.scene, workflow.request)
+        self.regions, self.waiting, self.place = [], [], []
+        for region, blocks in regions:
+            first = len(self.place)
+            self.place += [len(self.regions)] * len(blocks)
+            self.regions.append((region, first, blocks))
+            self.waiting.append(len(blocks))
+        scene, request, grid = workflow.scene, workflow.request, workflow.grid
+        meanings = variables(grid, scene, request)
+        flags = {name: meanings[name][1] for name in ("status", "verdict") if name in meanings}
+        self.tally = Tally(flags, request.rtol)
+        self.output = store.Output(
+            workflow.path, kept.folder, coordinates(grid, scene, request), meanings, self.layout, grid.shape, tile
+        )
+        self.writer, self.writes, self.room = ThreadPoolExecutor(1), [], {}
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.writer.shutdown(cancel_futures=True)
+        self.output.discard()
+
+    def has(self, number):
+        """Block `number` is finished. Raises what writing another part has raised."""
+        place = self.place[number]
+        self.waiting[place] -= 1
+        if not self.waiting[place]:
+            self.writes.append(self.writer.submit(self._write, *self.regions[place]))
+        while self.writes and self.writes[0].done():
+            self.writes.pop(0).result()
+
+    def finish(self, further, told):
+        """Wait for the map's variables, write `further` datasets, the counts and the history; publish the file."""
+        for write in self.writes:
+            write.result()
+        workflow = self.workflow
+        written = attributes(workflow.scene, workflow.name, workflow.request) | self.tally.attributes
+        written |= {"title": workflow.title, "workflow": workflow.text, "date_created": now()}
+        written["history"] = f"{now()}: {command()}"
+        with store.refused(workflow.path):
+            for ds in further:
+                self.output.add(ds)
+                written |= ds.attrs
+            written |= told
+            self.output.publish(written)
+        return written | {"complete": 1}
+
+    def _write(self, region, first, blocks):
+        """Write the region whose blocks are numbered from `first`."""
+        shape = tuple(cut.stop - cut.start for cut in region)
+        if self.room.get("status", np.empty(0)).shape != shape:
+            self.room = {name: np.empty(shape + extra, kind) for name, (kind, _, extra) in self.layout.items()}
+        for number, block in enumerate(blocks, first):
+            inside = tuple(slice(b.start - r.start, b.stop - r.start) for b, r in zip(block, region, strict=True))
+            arrays = self.kept.load(number)
+            self.tally.add(arrays)
+            for name, values in arrays.items():
+                self.room[name][inside] = values
+        with store.refused(self.workflow.path):
+            for name, values in self.room.items():
+                self.output.put(name, values, region)
 
 
 def plan(workflow):
@@ -143,30 +260,20 @@ def plan(workflow):
 
 
 def _refuse_too_large(workflow):
-    """Raise BadInput if the map does not fit into this machine's memory or onto the disk of its output."""
-    grid, scene, request = workflow.grid, workflow.scene, workflow.request
-    needed = grid.points * bytes_per_point(scene, request)
-    memory = psutil.virtual_memory().total
-    disk = shutil.disk_usage(workflow.path.parent).free
-    for room, what in ((memory, "memory"), (disk, "free disk")):
-        if needed > room:
-            raise BadInput(
-                f"{grid.points:,} points need {needed / 2**30:,.0f} GiB, and the machine has {room / 2**30:,.0f} GiB "
-                f"of {what}; take fewer points, or name fewer outputs in output.variables"
-            )
+    """Raise BadInput if the map's blocks and its file do not fit onto the disk of its output."""
+    grid = workflow.grid
+    needed = 2 * grid.points * bytes_per_point(workflow.scene, workflow.request)
+    room = shutil.disk_usage(workflow.path.parent).free
+    if needed > room:
+        raise BadInput(
+            f"{grid.points:,} points need {needed / 2**30:,.0f} GiB, and the disk of {workflow.path} has "
+            f"{room / 2**30:,.0f} GiB free; take fewer points, or name fewer outputs in output.variables"
+        )
 
 
 def bytes_per_point(scene, request):
     """Bytes of all variables at one point."""
     return sum(dtype.itemsize * prod(extra) for dtype, _, extra in layout(scene, request).values())
-
-
-def label(workflow, arrays):
-    """The dataset of a workflow with its counts and its history."""
-    ds = count(describe(workflow.grid, workflow.scene, workflow.name, workflow.request, arrays))
-    ds.attrs |= {"title": workflow.title, "workflow": workflow.text, "date_created": now()}
-    ds.attrs["history"] = f"{now()}: {command()}"
-    return ds
 
 
 def fingerprint(workflow):
@@ -192,26 +299,23 @@ def cpus():
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _empty(grid, scene, request):
-    return {
-        name: np.full(grid.shape + extra, fill, dtype) for name, (dtype, fill, extra) in layout(scene, request).items()
-    }
-
-
 def _through_dask(task, numbers, workers=None, scheduler=None, finished=None, threads=None):
     """Call the task for every number: on threads of this machine, on worker processes, or on a dask cluster."""
     done = itertools.count(1)
-    callback = Callback(posttask=lambda *_: finished(next(done)) if finished else None)
+    callback = Callback(posttask=lambda key, result, *_: finished(next(done), result) if finished else None)
     call = dask.delayed(task, pure=False, traverse=False)
-    where = {"scheduler": "processes", "num_workers": workers} if workers else {"scheduler": "threads"}
-    where = {"num_workers": threads or cpus()} | where
     if scheduler:
         where = {"scheduler": scheduler}
+    elif workers:
+        where = {"scheduler": dask.multiprocessing.get, "num_workers": workers}
+    else:  # the function itself: by its name, dask imports all of distributed before
+        where = {"scheduler": dask.threaded.get, "num_workers": threads or cpus()}
     if finished:
         finished(0)
     try:
         with callback:
-            dask.compute(*[call(number) for number in numbers], **where)
+            # dask takes equals in the order of their names
+            dask.compute(*[call(number, dask_key_name=f"block-{number:09d}") for number in numbers], **where)
     except OSError as error:
         raise Stopped(f"the run stopped ({error}); run the command again to go on") from None
     except Exception as error:

@@ -21,6 +21,7 @@ from survey.errors import BadInput
 # black is kept for undecided, white with hatching for failed
 COLOURS = ("#D55E00", "#A6D8F5", "#E69F00", "#F0E442", "#009E73", "#CC79A7", "#0072B2", "#999999", "#B8E0D2", "#5D3A9B")
 UNDECIDED = "#000000"
+CELLS = 2000  # along an axis: more than a picture has pixels, and each costs a hundred bytes
 MARK_BELOW = 0.002  # a share of the map: rarer points are also marked with a ring, or nobody would see them
 
 
@@ -66,8 +67,11 @@ def _map(axes, ds, variable, state):
     elif "flag_values" in variable.attrs:
         _verdicts(axes, x, y, variable, failed, outside)
     else:
-        shown = np.ma.masked_invalid(np.where(failed | outside, np.nan, variable.values.astype(float)))
-        drawn = axes.pcolormesh(x, y, shown.T, cmap="viridis", shading="nearest", rasterized=True, **_limits(shown))
+        some = _thinned(variable)
+        shown = np.where((failed | outside)[some], np.nan, variable.values[some].astype(float))
+        shown = np.ma.masked_invalid(shown)
+        look = {"cmap": "viridis", "shading": "nearest", "rasterized": True}
+        drawn = axes.pcolormesh(x[some[0]], y[some[1]], shown.T, **look, **_limits(shown))
         axes.figure.colorbar(drawn, ax=axes, label=_label(variable))
         axes.set_facecolor("#dddddd")
         handles = _marks(axes, x, y, failed, "failed") + _marks(axes, x, y, outside, "outside the domain")
@@ -125,7 +129,9 @@ def _verdicts(axes, x, y, variable, failed, outside):
     cmap = ListedColormap([palette.get(names[code], "#444444") for code in codes])
     edges = np.append(np.array(codes) - 0.5, codes[-1] + 0.5)
     shown = np.ma.masked_array(variable.values, failed | outside)
-    axes.pcolormesh(x, y, shown.T, cmap=cmap, norm=BoundaryNorm(edges, cmap.N), shading="nearest", rasterized=True)
+    some = _thinned(variable)
+    look = {"cmap": cmap, "norm": BoundaryNorm(edges, cmap.N), "shading": "nearest", "rasterized": True}
+    axes.pcolormesh(x[some[0]], y[some[1]], shown[some].T, **look)
     number = {name: int((shown == code).sum()) for name, code in table.items()}
     handles = [
         Patch(
@@ -140,6 +146,11 @@ def _verdicts(axes, x, y, variable, failed, outside):
     handles += _marks(axes, x, y, (shown == table.get("undecided", -1)).filled(False), "undecided", UNDECIDED)
     handles += _marks(axes, x, y, failed, "failed") + _marks(axes, x, y, outside, "outside the domain")
     _legend(axes, handles)
+
+
+def _thinned(variable):
+    """The places of a map that are drawn: all, or every so many where there are more than CELLS along an axis."""
+    return tuple(slice(None, None, -(-size // CELLS)) for size in variable.shape)
 
 
 def _flags(variable):
@@ -167,9 +178,11 @@ def _marks(axes, x, y, where, label, colour="white"):
         axes.plot(x.values[i], y.values[j], markersize=4, **ring)
         return [Line2D([], [], markersize=6, label=label, **ring)]
     if colour == "white":
+        some = _thinned(where)
         # one more cell all round, or the hatching would end at the centres of the outermost cells
-        wide = np.pad(where.T.astype(float), 1, mode="edge")
-        axes.contourf(_widened(x.values), _widened(y.values), wide, levels=[0.5, 1.5], colors="none", hatches=["xxx"])
+        wide = np.pad(where[some].T.astype(float), 1, mode="edge")
+        x, y = _widened(x.values[some[0]]), _widened(y.values[some[1]])
+        axes.contourf(x, y, wide, levels=[0.5, 1.5], colors="none", hatches=["xxx"])
         return [Patch(facecolor="white", edgecolor="grey", hatch="xxx", label=label)]
     return [Patch(facecolor=colour, label=label)]
 

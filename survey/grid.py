@@ -1,7 +1,7 @@
 """Axes -> exact coordinates -> blocks. A block reaches a scene as its axes, not as a list of points."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from math import ceil, prod
 
@@ -41,16 +41,38 @@ class Grid:
 
     def blocks(self, points_per_block):
         """Slices per dimension, row by row: the first dimensions are cut first, to at most `points_per_block`."""
+        return self._within([slice(0, size) for size in self.shape], points_per_block)
+
+    def tiled(self, points_per_block, points_per_region, points_per_tile):
+        """(lengths of a tile, [(region, its blocks)]): no tile belongs to two regions, and no block does.
+
+        Regions and blocks are slices per dimension, of at most so many points where `whole` dimensions allow it.
+        """
+        region = self._lengths(points_per_region)
+        tile = halved(region, points_per_tile)
+        cuts = []
+        for size, piece, own in zip(self.shape, region, tile, strict=True):
+            step = piece if piece == size else piece // own * own
+            cuts.append([slice(first, min(first + step, size)) for first in range(0, size, step)])
+        return tile, [(place, self._within(place, points_per_block)) for place in product(*cuts)]
+
+    def _within(self, region, points_per_block):
+        """The blocks of a region."""
+        spans = [range(cut.start, cut.stop) for cut in region]
+        lengths = replace(self, sizes=dict(zip(self.sizes, map(len, spans), strict=True)))._lengths(points_per_block)
+        return list(product(*map(_even_cuts, spans, lengths)))
+
+    def _lengths(self, points):
+        """The length of a piece along each dimension."""
         lengths, size = dict(self.sizes), self.points
         for name, length in self.sizes.items():
-            if size <= points_per_block:
+            if size <= points:
                 break
             if name not in self.whole:
                 rest = size // length
-                lengths[name] = max(1, points_per_block // rest)
+                lengths[name] = max(1, points // rest)
                 size = rest * lengths[name]
-        cuts = [_even_cuts(self.sizes[name], lengths[name]) for name in self.sizes]
-        return list(product(*cuts))
+        return tuple(lengths.values())
 
     def point(self, block):
         """{name: array} for `block` (a tuple of slices): every array has one axis per dimension (length 1 or long)."""
@@ -71,10 +93,19 @@ def line(values):
     return values.size, float(finite.min(initial=np.inf)), float(finite.max(initial=-np.inf))
 
 
-def _even_cuts(length, piece):
-    """Slices of nearly equal length, none longer than `piece`, that cover range(length)."""
-    pieces = max(1, ceil(length / piece))
-    edges = [length * i // pieces for i in range(pieces + 1)]
+def halved(lengths, most):
+    """The lengths of a tile: the longest is halved until at most `most` points are left."""
+    lengths = list(lengths)
+    while prod(lengths) > most:
+        longest = lengths.index(max(lengths))
+        lengths[longest] = ceil(lengths[longest] / 2)
+    return tuple(lengths)
+
+
+def _even_cuts(span, piece):
+    """Slices of nearly equal length, none longer than `piece`, that cover a range."""
+    pieces = max(1, ceil(len(span) / piece))
+    edges = [span.start + len(span) * i // pieces for i in range(pieces + 1)]
     return [slice(a, b) for a, b in pairwise(edges)]
 
 

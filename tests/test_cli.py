@@ -127,12 +127,12 @@ def test_an_interrupted_run_can_be_resumed(program, small, name, code):
     )
     blocks = program.folder / "small.nc.blocks"
     deadline = time.time() + 60
-    while not list(blocks.glob("*.npz")) and time.time() < deadline:
+    while not list(blocks.glob("*.block")) and time.time() < deadline:
         time.sleep(0.005)
     running.send_signal(getattr(signal, name))
     told = running.communicate(timeout=30)[1]
     assert running.returncode == code and "go on with: survey run small.toml" in told, told
-    finished = len(list(blocks.glob("*.npz")))
+    finished = len(list(blocks.glob("*.block")))
     assert finished and not (program.folder / "small.nc").exists()
     resumed = program(*command)
     assert resumed.returncode == 0 and f", reused {finished} of" in resumed.stderr, resumed.stderr

@@ -46,6 +46,15 @@ def test_undecided_is_not_counted_where_the_point_failed(toy):
     plt.close("all")
 
 
+def test_a_large_map_is_thinned_for_the_picture_and_counted_in_full(toy, monkeypatch):
+    monkeypatch.setattr(figures, "CELLS", 20)
+    figure = figures.draw(toy)
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels == ["unstable (499)", "stable (1,399)", "undecided (1)", "failed (100)", "outside the domain (1)"]
+    assert figure.axes[0].collections[0].get_array().shape == (17, 20)
+    plt.close(figure)
+
+
 def test_the_colours_differ_for_the_colour_blind_and_in_grey():
     from matplotlib.colors import to_rgb
 

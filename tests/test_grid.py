@@ -29,6 +29,24 @@ def test_blocks_cover_every_point_once(lengths, points_per_block):
     assert (seen == 1).all()
 
 
+@given(sizes, st.integers(1, 60), st.integers(1, 200), st.integers(1, 60), st.booleans())
+def test_regions_hold_whole_tiles_and_whole_blocks(lengths, block, region, tile, whole):
+    grid = grid_of(lengths, whole={"x0"} if whole and lengths else ())
+    of_tile, regions = grid.tiled(block, region, tile)
+    assert np.prod(of_tile) <= tile
+    seen = np.zeros(grid.shape, int)
+    for place, blocks in regions:
+        for cut, length, size in zip(place, of_tile, grid.shape, strict=True):
+            assert cut.start % length == 0 and (cut.stop % length == 0 or cut.stop == size)
+        seen[place] += 1
+        for part in blocks:
+            assert all(a.start <= b.start <= b.stop <= a.stop for a, b in zip(place, part, strict=True))
+            assert whole or seen[part].size <= block
+            seen[part] += 1
+        assert whole or seen[place].size <= region
+    assert (seen == 2).all()
+
+
 @given(sizes.filter(len), st.integers(1, 400))
 def test_a_whole_dimension_is_never_cut(lengths, points_per_block):
     grid = grid_of(lengths, whole={"x0"})

@@ -1,5 +1,6 @@
 """Nothing finished is lost, nothing partial is published, and every flipped bit is found."""
 
+import io
 import multiprocessing
 import os
 
@@ -72,13 +73,20 @@ def test_finished_blocks_are_used_again_and_give_the_same_bits(small, tmp_path, 
     blocks = engine.blocks_of(checked)
     assert len(blocks) == 6
     with store.Blocks(checked.path, engine.fingerprint(checked)) as kept:
-        for number in (1, 4):
+        for number in (1, 3, 4):
             kept.save(number, engine.solve_block(checked.scene, checked.request, checked.grid, blocks[number]))
+        _flip(kept._file(3))
     seen = []
-    again = engine.run(checked, progress=lambda done, total, reused: seen.append((done, total, reused)))
-    assert seen[0] == (2, 6, 2) and seen[-1] == (6, 6, 2)
-    xr.testing.assert_equal(whole.drop_attrs(), again.drop_attrs())
+    engine.run(checked, progress=lambda done, total, reused: seen.append((done, total, reused)))
+    assert seen[0] == (2, 6, 2) and seen[-1] == (6, 6, 2)  # the damaged block was computed again
+    xr.testing.assert_equal(whole.drop_attrs(), survey.open(checked.path).drop_attrs())
     assert not checked.path.with_name("again.nc.blocks").exists()
+
+
+def _flip(file):
+    bits = bytearray(file.read_bytes())
+    bits[len(bits) // 2] ^= 1
+    file.write_bytes(bits)
 
 
 def test_blocks_of_another_survey_are_refused_unless_fresh(small, tmp_path):
@@ -95,10 +103,7 @@ def test_a_damaged_block_is_found_and_dropped(small, tmp_path):
     checked = workflow.read(small, output=tmp_path / "o.nc")
     with store.Blocks(checked.path, engine.fingerprint(checked)) as kept:
         kept.save(0, {"w": np.arange(100.0)})
-        file = kept._file(0)
-        bits = bytearray(file.read_bytes())
-        bits[len(bits) // 2] ^= 1
-        file.write_bytes(bits)
+        _flip(kept._file(0))
         with pytest.raises(Damaged, match="run the command again"):
             kept.load(0)
         assert kept.done() == set()
@@ -124,15 +129,54 @@ def test_a_second_writer_is_told_who_holds_the_output_and_a_killed_holder_frees_
         pass
 
 
-def test_a_disk_that_refuses_leaves_the_old_file(copy, monkeypatch):
+ARRAYS = {
+    "w": np.linspace(0, 1, 12).reshape(3, 4),
+    "w_error": np.full((3, 4), 1e-9, np.float32),
+    "status": np.arange(12, dtype=np.int8).reshape(3, 4),
+    "none": np.zeros((0, 4)),
+    "one": np.float64(2.5),
+}
+
+
+def test_a_block_comes_back_bit_for_bit():
+    file = io.BytesIO()
+    store.pack(ARRAYS, file)
+    again = store.unpack(file.getvalue())
+    assert list(again) == list(ARRAYS)
+    for name, array in ARRAYS.items():
+        np.testing.assert_array_equal(again[name], array, strict=True)
+
+
+def test_every_flipped_bit_and_every_cut_of_a_block_is_found():
+    file = io.BytesIO()
+    store.pack(ARRAYS, file)
+    content = file.getvalue()
+    for place in range(len(content)):
+        flipped = bytearray(content)
+        flipped[place] ^= 1 << place % 8
+        for bad in (bytes(flipped), content[:place]):
+            with pytest.raises(ValueError, match="checksum"):
+                store.unpack(bad)
+
+
+@pytest.mark.parametrize(
+    ("where", "name", "error"),
+    [
+        (os, "fsync", OSError(28, "No space left on device")),
+        (store.Output, "put", RuntimeError("NetCDF: HDF error")),
+        (store.Output, "define", OSError(5, "Input/output error")),
+    ],
+)
+def test_a_disk_that_refuses_leaves_the_old_file(copy, small, monkeypatch, where, name, error):
     before = copy.read_bytes()
-    ds = survey.open(copy)
 
-    def full(*_):
-        raise OSError(28, "No space left on device")
+    def refuse(*_, **__):
+        raise error
 
-    monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(Stopped, match=r"copy\.nc.*No space left"):
-        store.write(ds, copy)
-    assert copy.read_bytes() == before
-    assert [file.name for file in copy.parent.iterdir() if file.name.endswith(".part")] == []
+    with monkeypatch.context() as patch:
+        patch.setattr(where, name, refuse)
+        with pytest.raises(Stopped, match=r"copy\.nc.*(No space left|HDF error|Input/output)"):
+            survey.run(small, output=copy)
+    assert copy.read_bytes() == before and store.check(copy) == []
+    assert [file.name for file in copy.parent.rglob("*") if file.name.endswith((".part", "output.nc"))] == []
+    assert survey.run(small, output=copy).status.size == 24  # the lock is free, and what is there is of use

@@ -16,6 +16,7 @@ import llvmlite
 import llvmlite.binding as llvm
 import numba
 import platformdirs
+from numba.core import event
 
 SOURCES = ("kernels", "methods", "measures", "scenes")
 
@@ -46,6 +47,15 @@ def _cache_directory():
 
 
 _DIRECTORY = _cache_directory()
+_COMPILING = event.TimingListener()
+event.register("numba:compile", _COMPILING)
+
+
+def compile_seconds():
+    """Seconds in which this process has compiled kernels so far."""
+    return _COMPILING.duration if _COMPILING.done else 0.0
+
+
 _FLAGS = {"nogil": True, "error_model": "numpy"}
 
 
@@ -62,4 +72,4 @@ def kernel(function):
 
 def inline(function):
     """Compile `function` as part of the kernels that call it (always inlined by LLVM, never cached alone)."""
-    return numba.njit(forceinline=True, **_FLAGS)(function)
+    return numba.njit(forceinline=True, no_cfunc_wrapper=True, **_FLAGS)(function)

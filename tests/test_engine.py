@@ -1,0 +1,91 @@
+"""A run's file grows region by region: the same bits, labels and counts for any cut, and no tile packed twice."""
+
+import netCDF4
+import numpy as np
+import pytest
+import xarray as xr
+
+import survey
+from survey import dataset, engine, store, workflow
+
+CUTS = [(1, 2**20, 2**16), (5, 2**20, 2**16), (4, 8, 4), (3, 6, 2), (24, 1, 1)]
+
+
+@pytest.mark.parametrize(("block", "region", "tile"), CUTS)
+def test_any_cut_gives_the_same_file(small, surveyed, tmp_path, monkeypatch, block, region, tile):
+    monkeypatch.setattr(engine, "BLOCK_POINTS", block)
+    monkeypatch.setattr(engine, "REGION_POINTS", region)
+    monkeypatch.setattr(store, "TILE_POINTS", tile)
+    survey.run(small, output=tmp_path / "cut.nc")
+    whole, cut = (xr.load_dataset(path) for path in (surveyed, tmp_path / "cut.nc"))
+    for ds in (whole, cut):
+        for key in ("date_created", "history", "wall_time_s", "compile_time_s"):
+            del ds.attrs[key]
+    xr.testing.assert_identical(whole, cut)
+    assert np.prod(cut.w.encoding["chunksizes"]) <= tile
+    assert store.check(tmp_path / "cut.nc") == []
+
+
+def test_the_file_says_what_xarray_would_have_written(small, surveyed, tmp_path):
+    checked = workflow.read(small)
+    arrays = engine.compute(checked.grid, checked.scene, checked.request)
+    ds = dataset.describe(checked.grid, checked.scene, checked.name, checked.request, arrays)
+    ds.to_netcdf(tmp_path / "other.nc", encoding={name: {"_FillValue": None} for name in ds.coords})
+    with netCDF4.Dataset(surveyed) as ours, netCDF4.Dataset(tmp_path / "other.nc") as other:
+        assert set(ours.variables) == set(other.variables) and set(ours.dimensions) == set(other.dimensions)
+        for name, variable in other.variables.items():
+            own = ours[name]
+            assert (own.dtype, own.dimensions) == (variable.dtype, variable.dimensions)
+            assert set(own.ncattrs()) == set(variable.ncattrs()), name
+            for key in own.ncattrs():
+                np.testing.assert_array_equal(own.getncattr(key), variable.getncattr(key))
+            np.testing.assert_array_equal(own[:], variable[:])
+        for key in other.ncattrs():
+            if key != "title":
+                assert ours.getncattr(key) == other.getncattr(key)
+
+
+def test_labels_of_an_extra_dimension_are_kept(tmp_path):
+    labels, values = np.array(["200", "110"]), np.array([[1.0, np.nan]] * 3)
+    coordinates = {"x": (("x",), np.arange(3.0), {"units": "1"}), "order": (("order",), labels, {"long_name": "order"})}
+    layout = {"c": (np.dtype(float), np.nan, (2,)), "status": (np.dtype("int8"), 0, ())}
+    variables = {"c": (("x", "order"), {"units": "1"}), "status": (("x",), {"units": "1"})}
+    output = store.Output(tmp_path / "o.nc", tmp_path, coordinates, variables, layout, (3,), (2,))
+    for part in (slice(0, 2), slice(2, 3)):
+        output.put("c", values[part], (part,))
+    output.put("status", np.zeros(3, np.int8))
+    output.publish({})
+    ds = xr.load_dataset(tmp_path / "o.nc")
+    assert ds.order.values.tolist() == ["200", "110"] and ds.c.dims == ("x", "order")
+    np.testing.assert_array_equal(ds.c, values)
+
+
+def test_counts_are_those_of_the_whole(small, tmp_path, monkeypatch):
+    monkeypatch.setattr(engine, "BLOCK_POINTS", 4)
+    monkeypatch.setattr(dataset, "CHUNK", 3)
+    checked = workflow.read(small, ["solver.rtol=1e-15", "axes.t.stop=300.0"], tmp_path / "o.nc")
+    finished = engine.run(checked)
+    ds = survey.open(checked.path)
+    missed = (ds.w_error > 1e-15 * (1 + abs(ds.w))) | (ds.phi_error > 1e-15 * (1 + abs(ds.phi)))
+    assert ds.attrs["accuracy_missed"] == int(missed.sum()) > 0
+    assert finished.counts["status"] == {name: int((ds.status == code).sum()) for name, code in _codes(ds).items()}
+
+
+def _codes(ds):
+    return dict(zip(ds.status.attrs["flag_meanings"].split(), ds.status.attrs["flag_values"], strict=True))
+
+
+def test_a_large_file_is_opened_lazily_and_checked_piece_by_piece(small, tmp_path, monkeypatch):
+    monkeypatch.setattr(engine, "REGION_POINTS", 8)
+    monkeypatch.setattr(store, "IN_MEMORY", 0)
+    ds = survey.run(small, output=tmp_path / "o.nc")
+    assert ds.w.chunks and len(list(store.pieces(ds))) == 3
+    assert store.check(tmp_path / "o.nc") == []
+    again = survey.run(small, output=tmp_path / "o.nc")  # an open file does not stand in the way
+    xr.testing.assert_equal(ds.drop_attrs(), again.drop_attrs())
+
+
+def test_what_compiling_kernels_and_file_took_is_told_apart(surveyed, small, tmp_path):
+    finished = engine.run(workflow.read(small, output=tmp_path / "o.nc"))
+    assert min(finished.compiling, finished.computing, finished.writing) >= 0
+    assert 0 <= xr.load_dataset(surveyed).attrs["compile_time_s"] <= xr.load_dataset(surveyed).attrs["wall_time_s"]

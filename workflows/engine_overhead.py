@@ -1,0 +1,182 @@
+"""What the engine adds: a map of ten million points against its kernels and netCDF4 alone, and how soon a map starts.
+
+python workflows/engine_overhead.py [-o results] [--variables discriminant,verdict] [--points 2500x4000]
+"""
+
+import argparse
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import netCDF4
+
+from survey import engine, workflow
+from survey.dataset import now, provenance
+
+WORKFLOW = Path(__file__).with_name("satellite_prolate.toml")
+REPEATS = 3
+# the program, telling when its first block was solved
+FIRST_BLOCK = """
+import sys, time
+from survey import store
+save = store.Blocks.save
+def told(*given):
+    print(time.time(), flush=True)
+    store.Blocks.save = save
+    save(*given)
+store.Blocks.save = told
+from survey.cli import main
+main(sys.argv[1:])
+"""
+# the program, telling when all that reads a workflow is imported
+READING = """
+import sys, time
+from survey import workflow
+from survey.cli import main
+print(time.time(), flush=True)
+main(sys.argv[1:])
+"""
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("results"))
+    parser.add_argument("--variables", default="discriminant,verdict")
+    parser.add_argument("--points", default="2500x4000", metavar="KxRHO")
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory(dir=given.output) as folder:
+        page = measure(given, Path(folder) / "map.nc")
+    path = given.output / "engine_overhead.md"
+    path.write_text(page)
+    print(path)
+
+
+def measure(given, target):
+    """The page, from runs that write to `target`."""
+    k, rho = given.points.split("x")
+    overrides = [f"axes.k.num={k}", f"axes.rho.num={rho}", f"output.variables={given.variables.split(',')}"]
+    overrides.append("output.figures=[]")
+    command = ["run", str(WORKFLOW), "-o", str(target), *(w for text in overrides for w in ("--set", text))]
+    small = [*command, "--set", "axes.k.num=40", "--set", "axes.rho.num=400", "--quiet"]
+    checked = workflow.read(WORKFLOW, overrides, target)
+    cold, warm = starts(small)
+    whole = [run(command) for _ in range(REPEATS)]
+    arrays, packing = read(target)
+    runs = {
+        "kernels": [kernels(checked) for _ in range(REPEATS)],
+        "netCDF4": [netcdf4_alone(arrays, packing, target.with_name("alone.nc")) for _ in range(REPEATS)],
+        "command": [seconds for seconds, _, _ in whole],
+        "since": [seconds - begin for seconds, begin, _ in whole],
+    }
+    times = {name: statistics.median(values) for name, values in runs.items()}
+    least = times["kernels"] + times["netCDF4"]
+    points = checked.grid.points
+    added = max(0.0, times["since"] - least) / points * 1e9
+    peak = max(peak for _, _, peak in whole)
+    own = provenance()
+    return f"""# What the engine adds
+
+Made by `python {" ".join(sys.argv)}`, {now()}, commit {own["commit"][:10]}, on {own["cpu"]}, {engine.cpus()} threads,
+load {os.getloadavg()[0]:.1f}; medians of {REPEATS}.
+
+A map of {points:,} points, {k} x {rho}: `{given.variables}` with error bars and status, from the workflow file to the
+closed, synced, digested and renamed netCDF file of {target.stat().st_size / 1e6:.0f} MB.
+
+| | seconds |
+|---|---|
+| kernels alone, the same blocks on the same threads, results dropped | {times["kernels"]:.2f} |
+| netCDF4 alone, the same variables and encoding, neither synced nor digested | {times["netCDF4"]:.2f} |
+| sum of the two | {least:.2f} |
+| the command from reading its workflow on | {times["since"]:.2f} |
+| the command, Python's start and imports included | {times["command"]:.2f} |
+
+Ratio to the sum: {times["since"] / least:.2f} from reading the workflow on, {times["command"] / least:.2f} for all of
+the command; asked: at most 1.5. The engine adds {added:.0f} ns a point (0 is possible: it packs while kernels run).
+Peak memory of the command: {peak:.0f} MiB; asked: below 1024.
+
+| the first block is solved, after the command was given | seconds |
+|---|---|
+| on a new machine: nothing compiled; asked: 5 | {cold:.2f} |
+| in a later process; asked: 1.5 | {warm:.2f} |
+"""
+
+
+def starts(command):
+    """Seconds until the first block is solved: with an empty kernel cache, and (median) with a filled one."""
+    with tempfile.TemporaryDirectory() as cache:
+        seconds = [first_block(command, cache) for _ in range(1 + REPEATS)]
+    return seconds[0], statistics.median(seconds[1:])
+
+
+def first_block(command, cache):
+    begin = time.time()
+    done = subprocess.run(
+        [sys.executable, "-c", FIRST_BLOCK, *command, "--fresh"],
+        env=os.environ | {"NUMBA_CACHE_DIR": cache}, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    return float(done.stdout.split()[0]) - begin
+
+
+def run(command):
+    """(seconds of the command, seconds of these before it read its workflow, peak MiB)."""
+    begin = time.time()
+    process = subprocess.Popen([sys.executable, "-c", READING, *command, "--quiet"], stdout=subprocess.PIPE, text=True)
+    reading = float(process.stdout.readline())
+    _, status, usage = os.wait4(process.pid, 0)
+    seconds = time.time() - begin
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise SystemExit(f"the command failed with exit code {process.returncode}")
+    return seconds, reading - begin, usage.ru_maxrss / 1024
+
+
+def kernels(checked):
+    """Seconds of solving all blocks, on as many threads as the command takes."""
+    blocks = engine.blocks_of(checked)
+
+    def solve(block):
+        engine.solve_block(checked.scene, checked.request, checked.grid, block)
+
+    solve(blocks[0])
+    begin = time.perf_counter()
+    with ThreadPoolExecutor(engine.cpus()) as pool:
+        list(pool.map(solve, blocks))
+    return time.perf_counter() - begin
+
+
+def read(path):
+    """The map's arrays, and how the file packs each."""
+    arrays, packing = {}, {}
+    with netCDF4.Dataset(path) as file:
+        file.set_auto_maskandscale(False)
+        for name, variable in file.variables.items():
+            if variable.dimensions == file["status"].dimensions:
+                filters = variable.filters()
+                packing[name] = {key: filters[key] for key in ("zlib", "shuffle", "complevel", "fletcher32")}
+                packing[name]["chunksizes"] = variable.chunking()
+                arrays[name] = variable[:]
+    return arrays, packing
+
+
+def netcdf4_alone(arrays, packing, path):
+    """Seconds of writing the arrays, each at once, to a file of netCDF4's."""
+    begin = time.perf_counter()
+    with netCDF4.Dataset(path, "w") as file:
+        for number, size in enumerate(arrays["status"].shape):
+            file.createDimension(f"x{number}", size)
+        for name, values in arrays.items():
+            made = file.createVariable(name, values.dtype, tuple(file.dimensions), **packing[name])
+            made.set_auto_maskandscale(False)
+            made[:] = values
+    seconds = time.perf_counter() - begin
+    path.unlink()
+    return seconds
+
+
+if __name__ == "__main__":
+    main()
