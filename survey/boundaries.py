@@ -52,10 +52,10 @@ def find(workflow):
 
 def _solver(workflow, axis, rows):
     """What `hill_edges.find` asks of the scene, for these rows."""
-    request = Request(workflow.request.options, "auto", RTOL, frozenset(hill_edges.NEEDS))
     others = {name: values for name, (_, values) in workflow.grid.parameters.items() if name != axis}
 
-    def solve(row, x):
+    def solve(row, x, wanted):
+        request = Request(workflow.request.options, "auto", RTOL, frozenset(wanted))
         point = {name: values[rows[row]][:, None] if np.ndim(values) else values for name, values in others.items()}
         with np.errstate(all="ignore"):
             return workflow.scene.solve(point | {axis: x}, request)
