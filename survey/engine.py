@@ -83,7 +83,8 @@ def compute(grid, scene, request, threads=None):
 def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
     """Run or resume the survey, write its netCDF file and return the dataset.
 
-    `progress(done, total, reused)` is called as blocks finish. Raises BadInput, Damaged or Stopped.
+    `progress(done, total, reused, what)` is called as blocks and parts of the boundaries finish.
+    Raises BadInput, Damaged or Stopped.
     """
     started = time.time()
     _refuse_too_large(workflow)
@@ -98,7 +99,7 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
 
         def finished(done):
             if progress:
-                progress(len(reused) + done, len(blocks), len(reused))
+                progress(len(reused) + done, len(blocks), len(reused), "blocks")
 
         _through_dask(task, todo, workers, scheduler, finished)
         arrays = _empty(workflow.grid, workflow.scene, workflow.request)
@@ -109,7 +110,11 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
         if workflow.boundaries:
             from survey import boundaries
 
-            ds = ds.merge(boundaries.find(workflow)).assign_attrs(boundaries=workflow.boundaries)
+            def each(task, numbers, what):
+                told = progress and (lambda done: progress(done, len(numbers), 0, what))
+                _through_dask(task, numbers, finished=told)
+
+            ds = ds.merge(boundaries.find(workflow, each)).assign_attrs(boundaries=workflow.boundaries)
         ds.attrs["wall_time_s"] = round(time.time() - started, 3)
         ds.attrs["blocks_reused"] = len(reused)
         store.write(ds, workflow.path)
