@@ -14,7 +14,7 @@ from survey.scene import Request
 ROWS = 8  # solved together
 COLUMNS = 9  # searched for curves that meet no row
 RTOL = 1e-13
-MARGIN = 1e-6  # of an axis: how near curves come to a value that is no parameter, such as k = 1
+MARGIN = 1e-3  # of an axis: how near curves come to a value that is no parameter, such as k = 1
 
 
 def find(workflow, each=None):
@@ -137,11 +137,16 @@ def _square(workflow, across, axis):
 
 
 def _pieces(workflow, name, square, place):
-    """Parts (low, high) of an axis of the square between the values that the parameter leaves out."""
+    """Parts (low, high) of an axis of the square between the values that the parameter leaves out.
+
+    Singular there, tongues accumulate: the parts end half a step before the map's nearest values, or MARGIN before.
+    """
     excluded = np.array(next(p for p in workflow.scene.PARAMETERS if p.name == name).excluded)
     inner = excluded[(excluded > square.low[place]) & (excluded < square.high[place])]
-    cuts = square.inside(np.stack([inner, inner], axis=1))[:, place]
-    return list(zip([0.0, *(cuts + MARGIN)], [*(cuts - MARGIN), 1.0], strict=True))
+    known = np.asarray(workflow.grid.parameters[name][1])
+    units = [square.inside(np.stack([v, v], axis=1))[:, place] for v in (inner, known[~np.isin(known, excluded)])]
+    apart = np.array([min(MARGIN, 0.5 * abs(units[1] - cut).min()) for cut in units[0]])
+    return list(zip([0.0, *(units[0] + apart)], [*(units[0] - apart), 1.0], strict=True))
 
 
 def _of_columns(solve, square, low, high):
@@ -158,13 +163,13 @@ def _of_columns(solve, square, low, high):
 
 
 def _seeds(x, kind, index, pieces):
-    """Seeds, each in the rectangle of pieces that holds it; those beside a value that is left out are dropped."""
+    """Seeds, each in the rectangle of pieces that holds it."""
     low, high = np.zeros_like(x), np.ones_like(x)
     for place, own in enumerate(pieces):
         lows, highs = np.array(own).T
         piece = np.clip(np.searchsorted(lows, x[:, place], "right") - 1, 0, None)
         low[:, place], high[:, place] = lows[piece], highs[piece]
-    return hill_curves.Seeds(np.clip(x, low, high), kind, index, low, high)
+    return hill_curves.Seeds(x, kind, index, low, high)
 
 
 def _named(workflow, name):

@@ -83,13 +83,14 @@ def _candidates(solve, rows, low, high, panels):
         middle, radius = 0.5 * (left + right), 0.5 * (right - left)
         out = solve(row, middle[:, None] + radius[:, None] * nodes, FACTORS)
         series = np.stack([out[name] for name in FACTORS]) @ matrix.T
+        noise = np.stack([out[f"{name}_error"] for name in FACTORS]).max(axis=2)
         size, tail = abs(series).max(axis=2), abs(series[:, :, -3:]).max(axis=2)
-        rough = ~(tail <= CONVERGED * size).all(axis=0) & (depth < DEEPEST - 1)
-        for panel in np.flatnonzero(~rough & np.isfinite(size).all(axis=0)):
-            for kind in range(len(FACTORS)):
-                zeros = _zeros(series[kind, panel])
-                number = np.full(zeros.size, 1)
-                found.append((number * row[panel], number * kind, middle[panel] + radius[panel] * zeros))
+        rough = ~(tail <= CONVERGED * size + noise).all(axis=0) & (depth < DEEPEST - 1)
+        told = np.isfinite(size).all(axis=0) & ~rough
+        for kind, panel in zip(*np.nonzero((size > noise) & told), strict=True):
+            zeros = _zeros(series[kind, panel])
+            number = np.full(zeros.size, 1)
+            found.append((number * row[panel], number * kind, middle[panel] + radius[panel] * zeros))
         row = np.repeat(row[rough], 2)
         left, right = _halves(left[rough], middle[rough]), _halves(middle[rough], right[rough])
         if not row.size:
