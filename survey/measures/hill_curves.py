@@ -23,7 +23,7 @@ LONGEST, SHORTEST = 0.02, 1e-9  # steps
 BEND = 0.15  # radians per step
 TURN = np.cos(2 * BEND)  # a step that turns more is taken again
 OFF = 0.05  # of a step: how long the corrector may be
-SPACING = 0.01  # of a step: between the nine points
+SPACING, LEAST = 1e-3, 1e-7  # between the nine points: of a step, and at least
 STEPS = 10_000
 NEAR = 0.02  # of a step: how far a seed may lie from the curve that goes through it
 STENCIL = np.array([-1.0, 0.0, 1.0])
@@ -90,17 +90,18 @@ class Curves:
 
 @dataclass
 class Look:
-    """F at places (n, 2): value (n), gradient (n, 2), second derivatives (n, 2, 2)."""
+    """F at places (n, 2): value (n), gradient (n, 2), second derivatives (n, 2, 2); twice the rotation number near."""
 
     value: np.ndarray
     gradient: np.ndarray
     second: np.ndarray
+    turns: np.ndarray
 
     def moved(self, shift):
         """The same at places `shift` (n, 2) further on."""
         bent = np.einsum("nij,nj->ni", self.second, shift)
         value = self.value + ((self.gradient + 0.5 * bent) * shift).sum(axis=1)
-        return Look(value, self.gradient + bent, self.second)
+        return Look(value, self.gradient + bent, self.second, self.turns)
 
     def zero(self, line):
         """How far along unit vectors (n, 2) the nearest zero lies (Halley)."""
@@ -134,8 +135,9 @@ def trace(solve, square, seeds, each=in_turn):
     towards = np.zeros(seeds.x.shape)
 
     def task(own):
-        spacing = np.full(own.size, SPACING * LONGEST)
-        seen = look(seeds.x[own], seeds.kind[own], spacing, seeds.low[own], seeds.high[own])
+        # on the edge itself the rotation number would ask for double-double arithmetic
+        step = np.full(own.size, LONGEST)
+        seen = look(seeds.x[own], seeds.kind[own], step, seeds.low[own], seeds.high[own], count=False)
         towards[own] = seen.course(np.ones(own.size))[0]
 
     _in_chunks(each, task, of_seed.size, "parts of the curves' seeds")
@@ -159,12 +161,12 @@ def _in_chunks(each, task, number, what):
 
 
 def _looker(solve, square):
-    def look(x, kind, spacing, low, high):
-        """F and its derivatives at places x from nine points about it, `spacing` apart, inside low ... high."""
-        spacing = np.minimum(spacing[:, None], 0.2 * (high - low))
+    def look(x, kind, length, low, high, count=True):
+        """F and its derivatives at places x from nine points, close against a step of `length`, in low ... high."""
+        spacing = np.minimum(np.maximum(SPACING * length, LEAST)[:, None], 0.2 * (high - low))
         middle = np.clip(x, low + spacing, high - spacing)
         nine = square.places(middle[:, None] + spacing[:, None] * STENCIL[:, None])
-        out = solve(nine[..., 0].reshape(-1, 1), np.repeat(nine[..., 1], 3, axis=0), FACTORS)
+        out = solve(nine[..., 0].reshape(-1, 1), np.repeat(nine[..., 1], 3, axis=0), FACTORS + COUNTS[:count])
         f, _ = of_kind({name: values.reshape(-1, 3, 3) for name, values in out.items()}, kind)
         h, k = spacing.T
         gradient = np.stack([(f[:, 2, 1] - f[:, 0, 1]) / (2 * h), (f[:, 1, 2] - f[:, 1, 0]) / (2 * k)], axis=1)
@@ -172,7 +174,8 @@ def _looker(solve, square):
         pp = (f[:, 1, 2] - 2 * f[:, 1, 1] + f[:, 1, 0]) / k**2
         qp = (f[:, 2, 2] - f[:, 2, 0] - f[:, 0, 2] + f[:, 0, 0]) / (4 * h * k)
         second = np.stack([qq, qp, qp, pp], axis=1).reshape(-1, 2, 2)
-        return Look(f[:, 1, 1], gradient, second).moved(x - middle)
+        turns = 2 * out["rotation_number"].reshape(f.shape)[:, 1, 1] if count else np.full(kind.size, np.nan)
+        return Look(f[:, 1, 1], gradient, second, turns).moved(x - middle)
 
     return look
 
@@ -190,29 +193,32 @@ class Path:
 def _follow(look, seeds, start):
     """The paths through the seeds `start`, both ways, all together."""
     n = start.size
-    kind, low, high = np.tile(seeds.kind[start], 2), *(np.tile(v[start], (2, 1)) for v in (seeds.low, seeds.high))
+    kind, index = np.tile(seeds.kind[start], 2), np.tile(seeds.index[start], 2)
+    low, high = (np.tile(v[start], (2, 1)) for v in (seeds.low, seeds.high))
     side = np.repeat([1.0, -1.0], n)
     x = np.tile(seeds.x[start], (2, 1))
     step = np.full(2 * n, 0.1 * LONGEST)
-    along, normal, bend = look(x, kind, SPACING * step, low, high).course(side)
+    along, normal, bend = look(x, kind, step, low, high, count=False).course(side)
     home, heading, gone = x.copy(), along.copy(), np.zeros(2 * n)
     ended, closed, lost = np.zeros((3, 2 * n), bool)
-    trail = [(np.arange(2 * n), home, heading, _square_line(x, normal, low, high))]
+    trail = [(np.arange(2 * n), home, heading, _first_line(x, normal, low, high))]
     for _ in range(STEPS):
         a = np.flatnonzero(~ended & ~lost)
         if not a.size:
             break
-        length, guess, line, border = _predict(x[a], along[a], normal[a], bend[a], step[a], low[a], high[a])
+        length, guess, edge, border = _predict(x[a], along[a], normal[a], bend[a], step[a], low[a], high[a])
         leaves = border & (length < 4 * SHORTEST)  # it stands at the border and points outside
         with np.errstate(all="ignore"):
-            seen = look(guess, kind[a], SPACING * length, low[a], high[a])
-            own = seen.course(side[a])[1]
-            line = np.where(border[:, None], line, own)
+            seen = look(guess, kind[a], length, low[a], high[a])
+            border &= abs(seen.zero(edge)) <= OFF * length
+            line = np.where(border[:, None], edge, seen.course(side[a])[1])
             off = seen.zero(line)
-            new = np.where(border[:, None] & (line == 0), guess, guess + off[:, None] * line)
+            new = guess + off[:, None] * line
             t, nrm, c = seen.moved(new - guess).course(side[a])
         good = (abs(off) <= OFF * length) & ((t * along[a]).sum(axis=1) >= TURN) & np.isfinite(c) & ~leaves
         good &= ((new >= low[a]) & (new <= high[a])).all(axis=1)
+        astray = abs(seen.turns - index[a])
+        good &= (astray < 0.5) | (astray == 1)  # in the tongue, near it, or beyond a band too thin to be seen
         closing = good & _returns(x[a], new, t, home[a], heading[a], length, gone[a])
         new[closing], t[closing], line[closing] = home[a][closing], heading[a][closing], trail[0][3][a][closing]
         took = a[good]
@@ -258,10 +264,11 @@ def _predict(x, along, normal, bend, step, low, high):
     return length, guess, line, border
 
 
-def _square_line(x, normal, low, high):
+def _first_line(x, normal, low, high):
     """The line to close a seed in along: the normal, or the border on which it lies."""
     on = (x <= low) | (x >= high)
-    return np.where(on.any(axis=1)[:, None], (~on).astype(float), normal)
+    border = np.stack([on[:, 1] & ~on[:, 0], on[:, 0]], axis=1)
+    return np.where(on.any(axis=1)[:, None], border, normal)
 
 
 def _returns(x, new, t, home, heading, length, gone):

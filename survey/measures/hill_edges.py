@@ -30,7 +30,7 @@ NODES = 24
 CONVERGED = 1e-9
 DEEPEST = 14
 HALVINGS = 3
-ROUNDS = 9
+ROUNDS = 12
 # So many half widths beside an edge the verdict is certain without double-double arithmetic.
 ASIDE = 8
 
@@ -160,8 +160,9 @@ def close_in(look, x, width, grain):
             slope = (f[:, 2] - f[:, 0]) / (2 * wide)
             step = np.nan_to_num(-f[:, 1] / slope)
             bend = abs((f[:, 2] - f[:, 1]) - (f[:, 1] - f[:, 0])) / abs(f[:, 2] - f[:, 0])
-            reach = 3 * bar[:, 1] / abs(slope) + 2 * grain[left] + 4 * bend * step**2 / wide  # bars, and Newton's error
-        better = certain & (abs(step) <= wide) & (reach < 0.5 * wide) & (attempt < ROUNDS - 1)
+            least = 3 * bar[:, 1] / abs(slope) + 2 * grain[left]
+            reach = np.minimum(least + 4 * bend * step**2 / wide, 0.5 * wide)  # bars, and Newton's error
+        better = certain & (abs(step) <= wide) & (least < 0.5 * wide) & (attempt < ROUNDS - 1)
         x[left[better]] += step[better]
         width[left] = np.where(better, reach, np.where(certain, wide, 3 * wide))
         sure[left] = certain & ~better
