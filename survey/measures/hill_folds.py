@@ -22,6 +22,7 @@ X = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
 TO_SERIES = 2 / NODES * np.cos(np.pi * np.outer(np.arange(NODES), np.arange(NODES) + 0.5) / NODES)
 TO_SERIES[0] /= 2
 ROUNDS = 12
+WIDER = (1, 4, 16)  # panels: times the step at the turn
 EPS = 2.3e-16
 
 
@@ -44,34 +45,44 @@ def find(solve, square, curves):
     share = (slope[at] / (slope[at] - slope[at + 1]))[:, None]
     guess = (1 - share) * curves.x[at] + share * curves.x[at + 1]
     radius = np.clip(np.hypot(*(curves.x[at + 1] - curves.x[at]).T), 1e-4 * LONGEST, LONGEST)
-    kind, middle = curves.kind[whose[at]], np.clip(guess[:, 1], radius, 1 - radius)
+    kind = curves.kind[whose[at]]
 
-    def stationary(who, q):
-        """(x, value, its bar, bar of x) where F(q, .) is stationary on each panel, x from -1 to 1; q is (m, n)."""
-        p = middle[who][:, None] + radius[who][:, None] * X
-        places = square.places(np.stack(np.broadcast_arrays(q[..., None], p[:, None]), axis=-1))
+    def stationary(who, q, start, wider=1):
+        """(p, value, its bar, bar of p) where F(q, .) is stationary near p = start (m), on each panel; q is (m, n)."""
+        half = np.minimum(wider * radius[who], 0.5)
+        middle = np.clip(start, half, 1 - half)
+        p = (middle[:, None] + half[:, None] * X)[:, None]
+        places = square.places(np.stack(np.broadcast_arrays(q[..., None], p), axis=-1))
         out = solve(places[..., 0, 0].reshape(-1, 1), places[..., 1].reshape(-1, NODES), FACTORS)
         f, bar = of_kind({name: values.reshape(*q.shape, NODES) for name, values in out.items()}, kind[who])
-        return _stationary(f, bar)
+        x, value, bar, off = _stationary(f, bar, ((start - middle) / half)[:, None])
+        return middle[:, None] + half[:, None] * x, value, bar, np.where(abs(x) < 1, half[:, None] * off, np.inf)
 
     q, width, sure = close_in(
-        lambda who, q: stationary(who, q)[1:3], guess[:, 0], 1e-3 * radius, np.full(at.size, square.grain)
+        lambda who, q: stationary(who, q, guess[who, 1])[1:3],
+        guess[:, 0],
+        1e-3 * radius,
+        np.full(at.size, square.grain),
     )
-    x, _, _, off = stationary(np.arange(at.size), q[:, None] + width[:, None] * np.array([-1.0, 0.0, 1.0]))
-    p = middle + radius * x[:, 1]
-    error = radius * (off.max(axis=1) + np.ptp(x, axis=1)) + square.grain
-    good = sure & (abs(x) < 1).all(axis=1)
+    sides = q[:, None] + width[:, None] * np.array([-1.0, 0.0, 1.0])
+    p, error = guess[:, 1], np.full(at.size, np.inf)
+    for wider in WIDER:  # the series' derivative is sharper on a longer panel, as long as the series converges
+        new, _, _, off = stationary(np.arange(at.size), sides, p, wider)
+        off = off.max(axis=1) + np.ptp(new, axis=1) + square.grain
+        better = (off < error) & (abs(new[:, 1] - p) <= error + off)  # not another stationary point
+        p, error = np.where(better, new[:, 1], p), np.where(better, off, error)
+    good = sure & np.isfinite(error)
     places, errors = np.stack([q, p], axis=1), np.stack([width + square.grain, error], axis=1)
     return Folds(whose[at][good], places[good], errors[good])
 
 
-def _stationary(f, bar):
-    """Where the series through f (..., NODES) is stationary: (x, value, bar of the value, bar of x), x in [-1, 1]."""
+def _stationary(f, bar, x):
+    """Where the series through f (..., NODES) is stationary near x: (x, value, its bar, bar of x), x in [-1, 1]."""
     series = f @ TO_SERIES.T
     bar = LEBESGUE * bar.max(axis=-1) + 2 * abs(series[..., -2:]).sum(axis=-1) + 4 * EPS * abs(series).sum(axis=-1)
     columns = np.moveaxis(series, -1, 0)
     first, second = chebyshev.chebder(columns), chebyshev.chebder(columns, 2)
-    x = np.zeros(bar.shape)
+    x = x + np.zeros(bar.shape)
     with np.errstate(all="ignore"):
         for _ in range(ROUNDS):
             x = np.clip(x - _value(x, first) / _value(x, second), -1, 1)
