@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from survey.grid import logarithmic
-from survey.measures import hill_curves, hill_edges, hill_folds
+from survey.measures import hill_curves, hill_edges, hill_folds, hill_look
 from survey.scene import Request
 
 ROWS = 8  # solved together
@@ -133,7 +133,7 @@ def _curves(workflow, across, axis, edges, each):
 def _square(workflow, across, axis):
     values = [np.asarray(workflow.grid.parameters[name][1]) for name in (across, axis)]
     low, high = (np.array([end(v) for v in values]) for end in (np.min, np.max))
-    return hill_curves.Square(low, high, np.array([logarithmic(v) for v in values]))
+    return hill_look.Square(low, high, np.array([logarithmic(v) for v in values]))
 
 
 def _pieces(workflow, name, square, place):

@@ -83,7 +83,7 @@ def compute(grid, scene, request, threads=None):
 def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
     """Run or resume the survey, write its netCDF file and return the dataset.
 
-    `progress(done, total, reused, what)` is called as blocks and parts of the boundaries finish.
+    `progress(done, total, reused)` is called as blocks finish, and with what they are as parts of the boundaries do.
     Raises BadInput, Damaged or Stopped.
     """
     started = time.time()
@@ -99,7 +99,7 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
 
         def finished(done):
             if progress:
-                progress(len(reused) + done, len(blocks), len(reused), "blocks")
+                progress(len(reused) + done, len(blocks), len(reused))
 
         _through_dask(task, todo, workers, scheduler, finished)
         arrays = _empty(workflow.grid, workflow.scene, workflow.request)

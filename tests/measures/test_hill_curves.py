@@ -6,11 +6,11 @@ from hill_problems import mp_factors
 from hill_qep import coefficients, eigenvalues
 from test_hill_edges import solver
 
-from survey.measures import hill_curves, hill_edges, hill_folds
+from survey.measures import hill_curves, hill_edges, hill_folds, hill_look
 from survey.scene import Request
 from survey.scenes import mathieu, satellite
 
-UNIT = hill_curves.Square(np.zeros(2), np.ones(2), np.zeros(2, bool))
+UNIT = hill_look.Square(np.zeros(2), np.ones(2), np.zeros(2, bool))
 
 
 def seeds(x, kind, index):
@@ -25,7 +25,7 @@ def satellite_curves(body, k, rho):
         return satellite.solve({"k": q, "rho": p}, Request({"body": body}, "auto", 1e-13, frozenset(wanted)))
 
     edges = hill_edges.find(solver(satellite, "k", k, "rho", body=body), k.size, *rho)
-    square = hill_curves.Square(np.array([k[0], rho[0]]), np.array([k[-1], rho[1]]), np.zeros(2, bool))
+    square = hill_look.Square(np.array([k[0], rho[0]]), np.array([k[-1], rho[1]]), np.zeros(2, bool))
     x = square.inside(np.stack([k[edges.row], edges.position], axis=1))
     return solve, square, hill_curves.trace(solve, square, seeds(x, edges.kind, edges.index))
 
@@ -117,7 +117,7 @@ def test_folds_lie_on_their_curves():
 
     rows = np.linspace(-5.0, 20.0, 60)
     edges = hill_edges.find(solver(mathieu, "a", rows, "q"), rows.size, -10.0, 10.0)
-    square = hill_curves.Square(np.array([-5.0, -10.0]), np.array([20.0, 10.0]), np.zeros(2, bool))
+    square = hill_look.Square(np.array([-5.0, -10.0]), np.array([20.0, 10.0]), np.zeros(2, bool))
     x = square.inside(np.stack([rows[edges.row], edges.position], axis=1))
     curves = hill_curves.trace(solve, square, seeds(x, edges.kind, edges.index))
     folds = hill_folds.find(solve, square, curves)
@@ -166,7 +166,7 @@ def test_a_curve_that_meets_a_double_point_is_lost_there():
 
 
 def test_a_logarithmic_axis_keeps_its_ends():
-    square = hill_curves.Square(np.array([1e-8, -1.0]), np.array([0.5, 3.0]), np.array([True, False]))
+    square = hill_look.Square(np.array([1e-8, -1.0]), np.array([0.5, 3.0]), np.array([True, False]))
     ends = square.places(np.array([[0.0, 0.0], [1.0, 1.0]]))
     np.testing.assert_array_equal(ends, [square.low, square.high])
     x = np.random.default_rng(0).uniform(size=(50, 2))
