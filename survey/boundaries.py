@@ -1,63 +1,193 @@
-"""The edges of the tongues along one axis, for every place on the other: arrays -> variables of the dataset.
+"""The edges of the tongues of a map, row by row and as curves: arrays -> variables of the dataset.
 
-Contiguous ragged arrays (CF 9.3.3): `edge_count` edges of each row lie one after another along `edge`.
+Contiguous ragged arrays (CF 9.3.3): `edge_count` edges of each row lie one after another along `edge`, and
+`curve_count` points of each curve along `curve_point`.
 """
 
 import numpy as np
 import xarray as xr
 
-from survey.measures import hill_edges
+from survey.grid import logarithmic
+from survey.measures import hill_curves, hill_edges, hill_folds, hill_look
 from survey.scene import Request
 
 ROWS = 8  # solved together
+COLUMNS = 9  # searched for curves that meet no row
 RTOL = 1e-13
+MARGIN = 1e-3  # of an axis: how near curves come to a value that is no parameter, such as k = 1
 
 
-def find(workflow):
-    """The dataset of the workflow's edges: positions with their errors, class, index, and which rows are complete."""
+def find(workflow, each=None):
+    """The dataset of the workflow's edges, and of their curves where there are two axes.
+
+    `each(task, numbers, what)` calls the task for every number, in any order, on threads if it likes.
+    """
+    each = each or hill_curves.in_turn
     grid, axis = workflow.grid, workflow.boundaries
     other = [dim for dim in grid.sizes if dim != axis]
-    rows = grid.sizes[other[0]] if other else 1
-    ends = np.asarray(grid.parameters[axis][1])[[0, -1]]
-    parts = []
-    for first in range(0, rows, ROWS):
-        some = np.arange(first, min(first + ROWS, rows))
-        parts.append(hill_edges.find(_solver(workflow, axis, some), some.size, *sorted(ends)))
-    count = np.concatenate([np.bincount(p.row, minlength=p.complete.size) for p in parts]).astype(np.int32)
-    complete = np.concatenate([part.complete for part in parts]).astype(np.int8)
-    whole = {name: np.concatenate([getattr(p, name) for p in parts]) for name in ("position", "error", "kind", "index")}
-    parameter = next(p for p in workflow.scene.PARAMETERS if p.name == axis)
-    named = {"units": parameter.units, "symbol": parameter.symbol}
-    codes = np.array(list(hill_edges.CLASSES.values()), np.int8)
-    flags = {"flag_values": codes, "flag_meanings": " ".join(hill_edges.CLASSES)}
-    position = named | {"long_name": f"{parameter.long_name} at the edge of a tongue"}
-    dims, shape = (tuple(other), (rows,)) if other else ((), ())
-    return xr.Dataset(
-        {
-            "edge_count": (dims, count.reshape(shape), {
-                "long_name": "number of edges of tongues", "units": "1", "sample_dimension": "edge"}),
-            "edge_complete": (dims, complete.reshape(shape), {
-                "long_name": "are all edges of the row found", "units": "1",
-                "flag_values": np.array([0, 1], np.int8), "flag_meanings": "not_shown complete"}),
-            "edge_position": ("edge", whole["position"], position | {"ancillary_variables": "edge_position_error"}),
-            "edge_position_error": ("edge", whole["error"], named | {"long_name": "error bound of edge_position"}),
-            "edge_class": ("edge", whole["kind"].astype(np.int8), flags | {
-                "long_name": "kind of the periodic solution at the edge", "units": "1"}),
-            "edge_index": ("edge", whole["index"].astype(np.int32), {
-                "long_name": "number of the tongue, twice its rotation number", "units": "1", "symbol": "n"}),
-        },
-        attrs={"boundaries": axis},
-    )  # fmt: skip
+    edges = _edges(workflow, axis, grid.sizes[other[0]] if other else 1, each)
+    found = _rows(workflow, axis, other, edges)
+    if other:
+        found |= _curves(workflow, other[0], axis, edges, each)
+    return xr.Dataset(found, attrs={"boundaries": axis})
 
 
-def _solver(workflow, axis, rows):
+def _edges(workflow, axis, rows, each):
+    """All Edges of all rows, a few rows at a time."""
+    ends = np.asarray(workflow.grid.parameters[axis][1])[[0, -1]]
+    parts = [None] * -(-rows // ROWS)
+
+    def task(number):
+        some = np.arange(number * ROWS, min((number + 1) * ROWS, rows))
+        own = hill_edges.find(_row_solver(workflow, axis, some), some.size, *sorted(ends))
+        own.row += some[0]
+        parts[number] = own
+
+    each(task, range(len(parts)), "parts of the edges")
+    names = ("row", "position", "error", "kind", "index", "complete")
+    return hill_edges.Edges(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+
+def _row_solver(workflow, axis, rows):
     """What `hill_edges.find` asks of the scene, for these rows."""
-    request = Request(workflow.request.options, "auto", RTOL, frozenset(hill_edges.NEEDS))
     others = {name: values for name, (_, values) in workflow.grid.parameters.items() if name != axis}
 
-    def solve(row, x):
+    def solve(row, x, wanted):
         point = {name: values[rows[row]][:, None] if np.ndim(values) else values for name, values in others.items()}
-        with np.errstate(all="ignore"):
-            return workflow.scene.solve(point | {axis: x}, request)
+        return _solve(workflow, point | {axis: x}, wanted)
 
     return solve
+
+
+def _solve(workflow, point, wanted):
+    with np.errstate(all="ignore"):
+        return workflow.scene.solve(point, Request(workflow.request.options, "auto", RTOL, frozenset(wanted)))
+
+
+def _rows(workflow, axis, other, edges):
+    """The variables of the rows."""
+    rows = edges.complete.size
+    dims, shape = (tuple(other), (rows,)) if other else ((), ())
+    count = np.bincount(edges.row, minlength=rows).astype(np.int32).reshape(shape)
+    parameter, named = _named(workflow, axis)
+    position = named | {"long_name": f"{parameter.long_name} at the edge of a tongue"}
+    return {
+        "edge_count": (dims, count, {
+            "long_name": "number of edges of tongues", "units": "1", "sample_dimension": "edge"}),
+        "edge_complete": (dims, edges.complete.astype(np.int8).reshape(shape),
+                          _yes_or_no("are all edges of the row found", "not_shown complete")),
+        "edge_position": ("edge", edges.position, position | {"ancillary_variables": "edge_position_error"}),
+        "edge_position_error": ("edge", edges.error, named | {"long_name": "error bound of edge_position"}),
+        "edge_class": ("edge", *_class(edges.kind)),
+        "edge_index": ("edge", *_index(edges.index)),
+    }  # fmt: skip
+
+
+def _curves(workflow, across, axis, edges, each):
+    """The variables of the curves on the map of the axes `across` (its rows) and `axis`, and of their folds."""
+    square = _square(workflow, across, axis)
+    fixed = {name: values for name, (dims, values) in workflow.grid.parameters.items() if not dims}
+
+    def solve(q, p, wanted):
+        return _solve(workflow, fixed | {across: q, axis: p}, wanted)
+
+    pieces = [_pieces(workflow, name, square, i) for i, name in enumerate((across, axis))]
+    rows = np.asarray(workflow.grid.parameters[across][1])[edges.row]
+    of_rows = square.inside(np.stack([rows, edges.position], axis=1)), edges.kind, edges.index
+    found = [of_rows, *(_of_columns(solve, square, *piece) for piece in pieces[0])]
+    seeds = _seeds(*(np.concatenate(values) for values in zip(*found, strict=True)), pieces)
+    curves = hill_curves.trace(solve, square, seeds, each)
+    folds = hill_folds.find(solve, square, curves)
+    names, places = (across, axis), (square.places(curves.x), square.places(folds.x))
+    variables = {
+        "edge_curve": ("edge", curves.of_seed[: edges.row.size].astype(np.int32), {
+            "long_name": "curve through the edge, counted from 0", "units": "1"}),
+        "curve_count": ("curve", curves.count.astype(np.int32), {
+            "long_name": "number of points of the curve", "units": "1", "sample_dimension": "curve_point"}),
+        "curve_class": ("curve", *_class(curves.kind)),
+        "curve_index": ("curve", *_index(curves.index)),
+        "curve_complete": ("curve", curves.complete.astype(np.int8),
+                           _yes_or_no("is the curve closed, or does it end at the map's border", "lost complete")),
+        "curve_position_error": ("curve_point", curves.error, {
+            "long_name": "error bound of a point's distance from the curve", "units": "1",
+            "comment": "along the normal, on the map's border along that; unit: the range of either axis, "
+                       "of its logarithm if the axis is logarithmic"}),
+        "fold_curve": ("fold", folds.curve.astype(np.int32), {
+            "long_name": f"curve that turns back in {across}, counted from 0", "units": "1",
+            "instance_dimension": "curve"}),
+    }  # fmt: skip
+    for i, name in enumerate(names):
+        parameter, named = _named(workflow, name)
+        variables[f"curve_{name}"] = ("curve_point", places[0][:, i], named | {
+            "long_name": f"{parameter.long_name} on the edge of a tongue",
+            "ancillary_variables": "curve_position_error"})  # fmt: skip
+        variables[f"fold_{name}"] = ("fold", places[1][:, i], named | {
+            "long_name": f"{parameter.long_name} at the fold of an edge",
+            "ancillary_variables": f"fold_{name}_error"})  # fmt: skip
+        ends = square.places(np.stack([folds.x - folds.error, folds.x + folds.error]))[..., i]
+        variables[f"fold_{name}_error"] = ("fold", abs(ends - places[1][:, i]).max(axis=0), named | {
+            "long_name": f"error bound of fold_{name}"})  # fmt: skip
+    return variables
+
+
+def _square(workflow, across, axis):
+    values = [np.asarray(workflow.grid.parameters[name][1]) for name in (across, axis)]
+    low, high = (np.array([end(v) for v in values]) for end in (np.min, np.max))
+    return hill_look.Square(low, high, np.array([logarithmic(v) for v in values]))
+
+
+def _pieces(workflow, name, square, place):
+    """Parts (low, high) of an axis of the square between the values that the parameter leaves out.
+
+    Singular there, tongues accumulate: the parts end half a step before the map's nearest values, or MARGIN before.
+    """
+    excluded = np.array(next(p for p in workflow.scene.PARAMETERS if p.name == name).excluded)
+    inner = excluded[(excluded > square.low[place]) & (excluded < square.high[place])]
+    known = np.asarray(workflow.grid.parameters[name][1])
+    units = [square.inside(np.stack([v, v], axis=1))[:, place] for v in (inner, known[~np.isin(known, excluded)])]
+    apart = np.array([min(MARGIN, 0.5 * abs(units[1] - cut).min()) for cut in units[0]])
+    return list(zip([0.0, *(units[0] + apart)], [*(units[0] - apart), 1.0], strict=True))
+
+
+def _of_columns(solve, square, low, high):
+    """(places, kind, index) of the edges along some columns, from low to high in the square."""
+    columns = np.linspace(0, 1, COLUMNS)
+
+    def along(column, x, wanted):
+        places = square.places(np.stack(np.broadcast_arrays(x, columns[column][:, None]), axis=-1))
+        out = solve(places[..., 0].reshape(-1, 1), places[..., 1].reshape(-1, 1), wanted)
+        return {name: values.reshape(x.shape) for name, values in out.items()}
+
+    edges = hill_edges.find(along, COLUMNS, low, high)
+    return np.stack([edges.position, columns[edges.row]], axis=1), edges.kind, edges.index
+
+
+def _seeds(x, kind, index, pieces):
+    """Seeds, each in the rectangle of pieces that holds it."""
+    low, high = np.zeros_like(x), np.ones_like(x)
+    for place, own in enumerate(pieces):
+        lows, highs = np.array(own).T
+        piece = np.clip(np.searchsorted(lows, x[:, place], "right") - 1, 0, None)
+        low[:, place], high[:, place] = lows[piece], highs[piece]
+    return hill_curves.Seeds(x, kind, index, low, high)
+
+
+def _named(workflow, name):
+    """A parameter, with the attributes of its values."""
+    parameter = next(p for p in workflow.scene.PARAMETERS if p.name == name)
+    return parameter, {"units": parameter.units, "symbol": parameter.symbol}
+
+
+def _class(kind):
+    codes = np.array(list(hill_edges.CLASSES.values()), np.int8)
+    flags = {"flag_values": codes, "flag_meanings": " ".join(hill_edges.CLASSES)}
+    return kind.astype(np.int8), flags | {"long_name": "kind of the periodic solution at the edge", "units": "1"}
+
+
+def _index(index):
+    meaning = {"long_name": "number of the tongue, twice its rotation number", "units": "1", "symbol": "n"}
+    return index.astype(np.int32), meaning
+
+
+def _yes_or_no(question, answers):
+    return {"long_name": question, "units": "1", "flag_values": np.array([0, 1], np.int8), "flag_meanings": answers}

@@ -108,7 +108,8 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
     """Run or resume the survey and write its netCDF file; returns what was Finished.
 
     A part of the file is written as soon as the blocks of its region are there, while others are computed.
-    `progress(done, total, reused)` is called as blocks finish. Raises BadInput, Damaged or Stopped.
+    `progress(done, total, reused)` is called as blocks finish, and with what they are as parts of the boundaries do.
+    Raises BadInput, Damaged or Stopped.
     """
     started = time.perf_counter()
     _refuse_too_large(workflow)
@@ -159,7 +160,11 @@ def extras(workflow, progress=None):
     if workflow.boundaries:
         from survey import boundaries
 
-        further.append(boundaries.find(workflow))
+        def each(task, numbers, what):
+            told = progress and (lambda done, _=None: progress(done, len(numbers), 0, what))
+            _through_dask(task, numbers, finished=told)
+
+        further.append(boundaries.find(workflow, each))
     if workflow.refine:
         from survey import refine
 

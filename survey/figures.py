@@ -16,6 +16,7 @@ from matplotlib.patches import Patch
 from survey import modules, status
 from survey.dataset import percent
 from survey.errors import BadInput
+from survey.grid import logarithmic
 
 # after Okabe and Ito, safe for the colour-blind, the first two far apart in grey print too;
 # black is kept for undecided, white with hatching for failed
@@ -23,6 +24,11 @@ COLOURS = ("#D55E00", "#A6D8F5", "#E69F00", "#F0E442", "#009E73", "#CC79A7", "#0
 UNDECIDED = "#000000"
 CELLS = 2000  # along an axis: more than a picture has pixels, and each costs a hundred bytes
 MARK_BELOW = 0.002  # a share of the map: rarer points are also marked with a ring, or nobody would see them
+# the edges of tongues by class (`measures.hill_edges`)
+EDGES = {
+    kind: {"color": "#000000" if kind % 2 == 0 else "#707070", "ls": "-" if kind > 1 else (0, (5, 2)), "lw": 0.8}
+    for kind in range(4)
+}
 
 
 def save(ds, path, name=None):
@@ -34,8 +40,7 @@ def save(ds, path, name=None):
 
 def draw(ds, name=None):
     """The matplotlib figure of one variable over the survey's axes; raises BadInput for an unknown variable."""
-    others = tuple(key for key in ds.data_vars if key.endswith("_error") or key.startswith(("edge_", "cell_", "area")))
-    drawable = [key for key in ds.data_vars if key not in others]
+    drawable = [key for key in ds.data_vars if not key.endswith("_error") and set(ds[key].dims) >= set(ds.status.dims)]
     name = name or ("verdict" if "verdict" in ds else drawable[0])
     if name not in drawable:
         raise BadInput(modules.unknown("variable", name, drawable))
@@ -63,9 +68,9 @@ def _map(axes, ds, variable, state):
     failed = np.isin(state.values, list(status.FAILURES))
     outside = state.values == status.INVALID_PARAMETERS
     if variable.name == "verdict" and "cell_verdict" in ds:
-        _cells(axes, ds, x, y, failed)
+        handles = _cells(axes, ds, x, y, failed)
     elif "flag_values" in variable.attrs:
-        _verdicts(axes, x, y, variable, failed, outside)
+        handles = _verdicts(axes, x, y, variable, failed, outside)
     else:
         some = _thinned(variable)
         shown = np.where((failed | outside)[some], np.nan, variable.values[some].astype(float))
@@ -76,32 +81,30 @@ def _map(axes, ds, variable, state):
         axes.set_facecolor("#dddddd")
         handles = _marks(axes, x, y, failed, "failed") + _marks(axes, x, y, outside, "outside the domain")
         handles += [Patch(color="#dddddd", label="does not apply")] if shown.mask.any() else []
-        if handles:
-            _legend(axes, handles)
-    if "edge_position" in ds:
-        _edges(axes, ds, x, y)
+    if "curve_count" in ds:
+        handles += _curves(axes, ds, x, y)
+    if handles:
+        _legend(axes, handles)
     for axis, coord in ((axes.xaxis, x), (axes.yaxis, y)):
         axis.set_label_text(_label(coord))
-        if _logarithmic(coord):
+        if logarithmic(coord.values):
             (axes.set_xscale if axis is axes.xaxis else axes.set_yscale)("log")
 
 
-def _edges(axes, ds, x, y):
-    """The edges of the tongues over the map: a line per class and index, dots where a row has several of one."""
-    rows = ds[ds.edge_count.dims[0]].values if ds.edge_count.dims else np.zeros(1)
-    place = np.repeat(rows, ds.edge_count.values)
-    for kind, index in sorted({*zip(ds.edge_class.values.tolist(), ds.edge_index.values.tolist(), strict=True)}):
-        own = (ds.edge_class.values == kind) & (ds.edge_index.values == index)
-        along = (place[own], ds.edge_position.values[own])
-        single = np.unique(along[0]).size == along[0].size
-        style = {"lw": 0.5} if single else {"ls": "none", "marker": ".", "markersize": 1.5, "markeredgewidth": 0}
-        axes.plot(*(along if ds.attrs["boundaries"] == y.name else along[::-1]), color="#000000", **style)
+def _curves(axes, ds, x, y):
+    """The edges of the tongues over the map, and their legend handle."""
+    ends = np.cumsum(ds.curve_count.values)
+    for last, number, kind in zip(ends, ds.curve_count.values, ds.curve_class.values, strict=True):
+        own = slice(last - number, last)
+        axes.plot(ds[f"curve_{x.name}"].values[own], ds[f"curve_{y.name}"].values[own], **EDGES[kind])
     if "cell_verdict" not in ds:
         axes.set(xlim=_widened(x.values)[[0, -1]], ylim=_widened(y.values)[[0, -1]])
+    label = "edges: even dark, odd grey;\nperiodic solid, antiperiodic dashed"
+    return [Line2D([], [], label=label, **EDGES[2])] if ends.size else []
 
 
 def _cells(axes, ds, x, y, failed):
-    """The map's cells instead of its points, with the area of each verdict."""
+    """The map's cells instead of its points, with the area of each verdict. Returns the handles."""
     left, right, low, high = (ds[f"cell_{axis.name}_{end}"].values for axis in (x, y) for end in ("low", "high"))
     corners = np.stack([left, low, left, high, right, high, right, low], axis=1).reshape(-1, 4, 2)
     table = _flags(ds.cell_verdict)
@@ -116,12 +119,12 @@ def _cells(axes, ds, x, y, failed):
         part = percent(shares[name], float(ds.area_fraction_error[0])) if name in shares else f"{own.sum():,} cells"
         part = part.replace("+-", "±")
         handles += [Patch(facecolor=colour, edgecolor="black", lw=0.5, label=f"{name} ({part})")] if own.any() else []
-    _legend(axes, handles + _marks(axes, x, y, failed, "failed"))
     axes.set(xlim=(left.min(), right.max()), ylim=(low.min(), high.max()))
+    return handles + _marks(axes, x, y, failed, "failed")
 
 
 def _verdicts(axes, x, y, variable, failed, outside):
-    """A colour per flag; failed and outside points white and hatched; rare points ringed, so that they are seen."""
+    """A colour per flag; failed and outside points white and hatched; rare points ringed. Returns the handles."""
     table = _flags(variable)
     palette = _palette(table)
     codes = sorted(table.values())
@@ -145,7 +148,7 @@ def _verdicts(axes, x, y, variable, failed, outside):
     ]
     handles += _marks(axes, x, y, (shown == table.get("undecided", -1)).filled(False), "undecided", UNDECIDED)
     handles += _marks(axes, x, y, failed, "failed") + _marks(axes, x, y, outside, "outside the domain")
-    _legend(axes, handles)
+    return handles
 
 
 def _thinned(variable):
@@ -213,7 +216,7 @@ def _curve(axes, ds, variable, state):
     axes.set(xlabel=_label(x), ylabel=_label(variable))
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=8)
-    if _logarithmic(x):
+    if logarithmic(x.values):
         axes.set_xscale("log")
 
 
@@ -251,15 +254,6 @@ def _title(ds, variable):
     numbers = ", ".join(f"${c.attrs.get('symbol') or c.name} = {float(c):.6g}${of.get(c.name, '')}" for c in fixed)
     lines[1] += f" ({ds.attrs['options']})" if ds.attrs.get("options") else ""
     return "\n".join([*lines, numbers] if numbers else lines)
-
-
-def _logarithmic(coord):
-    """Are the coordinates spaced evenly in the logarithm, and not evenly?"""
-    values = coord.values
-    if values.size < 3 or values.min() <= 0:
-        return False
-    ratio, step = values[1:] / values[:-1], np.diff(values)
-    return np.allclose(ratio, ratio[0]) and not np.allclose(step, step[0])
 
 
 def _counted(name, number):

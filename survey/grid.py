@@ -122,6 +122,14 @@ def coordinates(start, stop, num, spacing="linear"):
     return np.linspace(start, stop, num)
 
 
+def logarithmic(values):
+    """Are the coordinates spaced evenly in the logarithm, and not evenly?"""
+    if values.size < 3 or values.min() <= 0:
+        return False
+    ratio, step = values[1:] / values[:-1], np.diff(values)
+    return np.allclose(ratio, ratio[0]) and not np.allclose(step, step[0])
+
+
 def check_axis(key, values):
     """Raise BadInput, naming `key`, unless `values` is non-empty, finite and strictly monotonic."""
     if values.size == 0:

@@ -9,20 +9,24 @@ LOG_SECONDS = 60
 
 
 class Progress:
-    """Called with (blocks done, blocks in all, blocks reused); a context manager around the run."""
+    """Called with (done, in all, reused, what of), once with nothing done for each `what`; a context manager."""
 
     def __init__(self, console, workflow, silent=False):
         self.console, self.workflow, self.silent = console, workflow, silent
         self.started = self.logged = time.monotonic()
-        self.bar = None
+        self.bar = self.task = None
 
     def __enter__(self):
         if self.console.is_terminal and not self.silent:
-            columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("blocks"))
+            columns = (
+                TextColumn("{task.description}"),
+                BarColumn(),
+                MofNCompleteColumn(),
+                TextColumn("{task.fields[what]}"),
+            )
             self.bar = Bar(
                 *columns, TimeElapsedColumn(), TextColumn("ETA"), TimeRemainingColumn(), console=self.console
             )
-            self.task = self.bar.add_task(self.workflow.name, total=None)
             self.bar.start()
         return self
 
@@ -30,20 +34,27 @@ class Progress:
         if self.bar:
             self.bar.stop()
 
-    def __call__(self, done, total, reused):
+    def __call__(self, done, total, reused, what="blocks"):
         if self.silent:
             return
-        if self.bar:
-            self.bar.update(self.task, completed=done, total=total)
         if done == reused:
-            self._line(f"{self.workflow.grid.points:,} points in {total} blocks, {reused} already done")
-        elif not self.bar and (done == total or time.monotonic() - self.logged > LOG_SECONDS):
+            self._begin(total, reused, what)
+        if self.bar:
+            self.bar.update(self.task, completed=done)
+        elif done != reused and (done == total or time.monotonic() - self.logged > LOG_SECONDS):
             self.logged = time.monotonic()
             elapsed = self.logged - self.started
             left = elapsed / (done - reused) * (total - done)
-            self._line(f"{done} of {total} blocks, {elapsed:.0f} s elapsed, ETA {left:.0f} s")
-        if done == total:
+            self._line(f"{done} of {total} {what}, {elapsed:.0f} s elapsed, ETA {left:.0f} s")
+        if done == total and what == "blocks":
             self._line(f"computed {done - reused}, reused {reused} of {total} blocks")
+
+    def _begin(self, total, reused, what):
+        self.started = self.logged = time.monotonic()
+        if self.bar:
+            self.task = self.bar.add_task(self.workflow.name, total=total, what=what)
+        if what == "blocks":
+            self._line(f"{self.workflow.grid.points:,} points in {total} blocks, {reused} already done")
 
     def refining(self, settled, points):
         """Told as cells are refined: which part of the map is settled, and how many points were solved for it."""

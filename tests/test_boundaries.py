@@ -1,12 +1,15 @@
 """[boundaries] in a workflow: edges in the netCDF file as ragged arrays, drawn over the map."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
 
 import survey
-from survey import figures, store
+from survey import boundaries, figures, store
+from survey.workflow import check
 
 WORKFLOW = {
     "scene": "satellite",
@@ -47,12 +50,59 @@ def test_the_tongue_n_2_opens_with_half_the_square(path):
     np.testing.assert_allclose([np.ptp(own), own.mean() - 1], [0.01 / 2, 0.01 / 12], rtol=0.03)
 
 
+def test_each_edge_lies_on_its_curve(path):
+    ds = xr.load_dataset(path)
+    assert ds.curve_count.attrs["sample_dimension"] == "curve_point" and int(ds.curve_count.sum()) == ds.curve_k.size
+    assert (ds.curve_complete == 1).all() and (ds.curve_position_error < 1e-13).all()
+    assert (ds.edge_curve >= 0).all()
+    np.testing.assert_array_equal(ds.edge_class, ds.curve_class[ds.edge_curve])
+    np.testing.assert_array_equal(ds.edge_index, ds.curve_index[ds.edge_curve])
+    ends = np.cumsum(ds.curve_count.values)
+    k = np.repeat(ds.k.values, ds.edge_count.values)
+    for edge in range(ds.sizes["edge"]):
+        last, number = (values[int(ds.edge_curve[edge])] for values in (ends, ds.curve_count.values))
+        own = slice(last - number, last)
+        order = np.argsort(ds.curve_k.values[own])
+        along = np.interp(k[edge], ds.curve_k.values[own][order], ds.curve_rho.values[own][order])
+        assert abs(along - ds.edge_position.values[edge]) < 2e-3
+
+
+def test_a_curve_between_the_rows_is_found_and_its_fold_in_the_file(tmp_path):
+    """Oblate tongue n = 2: its upper edge has its greatest rho, 1.149, between these rows of rho."""
+    axes = {"rho": {"values": [1.1487, 1.1493]}, "k": {"start": 0.3, "stop": 0.95, "num": 4}}
+    ds = survey.run(WORKFLOW | {"axes": axes, "boundaries": {"axis": "k"}, "output": {}}, output=tmp_path / "fold.nc")
+    assert ds.sizes["fold"] == 1 and ds.fold_rho.attrs["ancillary_variables"] == "fold_rho_error"
+    assert int(ds.curve_index[int(ds.fold_curve[0])]) == 2
+    assert 1.1487 < float(ds.fold_rho[0]) < 1.1493 and float(ds.fold_rho_error[0]) < 1e-12
+    assert float(ds.fold_k_error[0]) < 1e-9
+
+
+def test_the_bits_are_the_same_on_any_number_of_threads_and_in_any_order():
+    workflow = check(WORKFLOW, output="unused.nc")
+
+    def shuffled(task, numbers, what):
+        with ThreadPoolExecutor(3) as pool:
+            list(pool.map(task, reversed(numbers)))
+
+    one, other = boundaries.find(workflow), boundaries.find(workflow, shuffled)
+    xr.testing.assert_identical(one, other)
+
+
 def test_they_are_drawn_over_the_map(path):
     ds = survey.open(path)
     figure = figures.draw(ds)
     drawn = sum(line.get_xydata().shape[0] for line in figure.axes[0].lines)
-    assert drawn >= ds.sizes["edge"] > 20
+    assert drawn == ds.sizes["curve_point"] and len(figure.axes[0].lines) == ds.sizes["curve"]
+    assert figure.legends[0].get_texts()[-1].get_text().startswith("edges: even dark")
     plt.close(figure)
+
+
+def test_a_map_without_tongues_has_empty_curves(tmp_path):
+    axes = {"q": {"start": 0.0, "stop": 0.1, "num": 3}, "a": {"start": -3.0, "stop": -2.0, "num": 4}}
+    ds = survey.run({"scene": "mathieu", "axes": axes, "boundaries": {}}, output=tmp_path / "none.nc")
+    assert ds.sizes["edge"] == ds.sizes["curve"] == ds.sizes["fold"] == 0 and (ds.edge_complete == 1).all()
+    figures.draw(survey.open(tmp_path / "none.nc"))
+    plt.close("all")
 
 
 def test_a_row_of_its_own(tmp_path):

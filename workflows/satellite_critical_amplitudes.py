@@ -68,9 +68,9 @@ class Edge:
 def edges(case, panels=8):
     """All edges of the case, from the mildest motion on; two rows, the second of a slightly different body."""
     alpha = np.array([case.alpha, case.alpha + np.sign(1 - case.alpha) * MOVED])
-    request = Request({"direction": str(case.direction)}, "auto", 1e-13, frozenset(hill_edges.NEEDS))
 
-    def solve(row, x):
+    def solve(row, x, wanted):
+        request = Request({"direction": str(case.direction)}, "auto", 1e-13, frozenset(wanted))
         return satellite.solve({"inertia_ratio": alpha[row][:, None], "one_minus_k": case.one_minus_k(x)}, request)
 
     found = hill_edges.find(solve, alpha.size, *case.range, panels)

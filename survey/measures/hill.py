@@ -21,6 +21,8 @@ from survey.measures import hill_auto, hill_effort
 from survey.measures.hill_answers import Answers, Asked
 from survey.scene import Output
 
+# Outputs that follow from the verdict, or are sharper with it.
+DECIDED = frozenset({"verdict", "exponent", "rotation_number", "discriminant"})
 VERDICTS = {"undecided": UNDECIDED, "unstable": UNSTABLE, "stable": STABLE, "marginal": MARGINAL}
 OUTPUTS = (
     Output("discriminant", "trace of the monodromy matrix over one period T", "D"),
@@ -94,7 +96,8 @@ def solve(problem, method, rtol, wanted=()):
     asked = Asked(rtol, np.array([name in wanted or not wanted for name in FLOATS]))
     answers = Answers(problem.p.size, asked)
     if method == "auto":
-        hill_auto.solve(problem, asked, answers)
+        decide = not wanted or not DECIDED.isdisjoint(wanted)
+        hill_auto.solve(problem, asked, answers, decide)
     else:
         hill_effort.solve(problem, modules.load(methods, method, "method"), asked, answers)
     out = {"verdict": answers.verdict.reshape(problem.p.shape), "status": answers.status.reshape(problem.p.shape)}

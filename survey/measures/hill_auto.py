@@ -17,8 +17,8 @@ EPS = 2.3e-16
 CALL_STEPS = 20_000
 
 
-def solve(problem, asked, answers):
-    """Answer every point of the problem, in place."""
+def solve(problem, asked, answers, decide=True):
+    """Answer every point of the problem, in place; what stays undecided is left so unless it is to `decide`."""
     free = None
     if problem.constant is not None:
         rows, z = problem.constant
@@ -37,7 +37,7 @@ def solve(problem, asked, answers):
         own.judge(results, None if problem.rule is None else problem.rule.reshape(-1)[places])
         answers.put(places, own)
     left = (answers.status == status.OK) & (answers.verdict == UNDECIDED)
-    left = left if free is None else left & ~free
+    left = left & decide if free is None else left & ~free & decide
     if left.any() and problem.exact is not None:
         _exactly(problem, answers, np.flatnonzero(left), asked)
     elif left.any() and problem.walk is not None:

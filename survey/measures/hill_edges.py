@@ -5,7 +5,7 @@
 The factors are analytic in every parameter, so on panels short enough each is its Chebyshev series to rounding, and
 the eigenvalues of the series' colleague matrix are all its zeros, double ones too. Each is then closed in by signs of
 the factor itself, certain against its bar. A row is complete when, between its edges, every factor has the sign that
-the list says; else its panels are halved.
+the list says, and the rotation number counts the same tongues; else its panels are halved.
 
 Sources: W. Magnus, S. Winkler, Hill's Equation (1966), theorem 1.1; J. P. Boyd, SIAM J. Numer. Anal. 40 (2002) 1666.
 """
@@ -15,11 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from survey.kernels.hill import STABLE, UNSTABLE
 from survey.scene import Output
 
 FACTORS = ("y1", "dy2", "dy1", "y2")
 CLASSES = {"even_antiperiodic": 0, "odd_antiperiodic": 1, "even_periodic": 2, "odd_periodic": 3}
-NEEDS = (*FACTORS, "rotation_number", "verdict")
+COUNTS = ("rotation_number", "verdict")
 OUTPUTS = (
     Output("edge_class", "kind of the solution on the edge of a tongue", flags=CLASSES),
     Output("edge_index", "number of the tongue: twice its rotation number", "n", integer=True),
@@ -29,7 +30,9 @@ NODES = 24
 CONVERGED = 1e-9
 DEEPEST = 14
 HALVINGS = 3
-ROUNDS = 6
+ROUNDS = 12
+# So many half widths beside an edge the verdict is certain without double-double arithmetic.
+ASIDE = 8
 
 
 @dataclass
@@ -47,7 +50,7 @@ class Edges:
 def find(solve, rows, low, high, panels=4):
     """All edges between `low` and `high` on each of `rows` rows.
 
-    `solve(row, x)` gives the outputs NEEDS, with the bars of the factors, at x (m, n), one row number for each of m.
+    `solve(row, x, wanted)` gives the outputs `wanted`, with their bars, at x (m, n), one row number for each of m.
     """
     found, left = [], np.arange(rows)
     complete = np.zeros(rows, np.bool_)
@@ -78,15 +81,16 @@ def _candidates(solve, rows, low, high, panels):
     found = [(np.zeros(0, int), np.zeros(0, int), np.zeros(0))]
     for depth in range(DEEPEST):
         middle, radius = 0.5 * (left + right), 0.5 * (right - left)
-        out = solve(row, middle[:, None] + radius[:, None] * nodes)
+        out = solve(row, middle[:, None] + radius[:, None] * nodes, FACTORS)
         series = np.stack([out[name] for name in FACTORS]) @ matrix.T
+        noise = np.stack([out[f"{name}_error"] for name in FACTORS]).max(axis=2)
         size, tail = abs(series).max(axis=2), abs(series[:, :, -3:]).max(axis=2)
-        rough = ~(tail <= CONVERGED * size).all(axis=0) & (depth < DEEPEST - 1)
-        for panel in np.flatnonzero(~rough & np.isfinite(size).all(axis=0)):
-            for kind in range(len(FACTORS)):
-                zeros = _zeros(series[kind, panel])
-                number = np.full(zeros.size, 1)
-                found.append((number * row[panel], number * kind, middle[panel] + radius[panel] * zeros))
+        rough = ~(tail <= CONVERGED * size + noise).all(axis=0) & (depth < DEEPEST - 1)
+        told = np.isfinite(size).all(axis=0) & ~rough
+        for kind, panel in zip(*np.nonzero((size > noise) & told), strict=True):
+            zeros = _zeros(series[kind, panel])
+            number = np.full(zeros.size, 1)
+            found.append((number * row[panel], number * kind, middle[panel] + radius[panel] * zeros))
         row = np.repeat(row[rough], 2)
         left, right = _halves(left[rough], middle[rough]), _halves(middle[rough], right[rough])
         if not row.size:
@@ -108,67 +112,104 @@ def _zeros(series):
 
 
 def _close_in(solve, row, kind, x, low, high):
-    """Sharpen each zero, with a half width at whose ends the factor has opposite, certain signs; drop doubles."""
-    scale = np.maximum(abs(low), abs(high))
-    width = np.full(x.size, 1e-9 * scale)
-    sure = np.zeros(x.size, np.bool_)
-    index = np.zeros(x.size, int)
-    names = np.arange(x.size)
-    for _ in range(ROUNDS):
-        if not x.size:
-            break
-        sides = x[:, None] + width[:, None] * np.array([-1.0, 0.0, 1.0])
-        out = solve(row, sides)
-        f = np.stack([out[name] for name in FACTORS])[kind, names]
-        bar = np.stack([out[f"{name}_error"] for name in FACTORS])[kind, names]
-        certain = (abs(f[:, 0]) > bar[:, 0]) & (abs(f[:, 2]) > bar[:, 2]) & (np.sign(f[:, 0]) == -np.sign(f[:, 2]))
-        slope = (f[:, 2] - f[:, 0]) / (sides[:, 2] - sides[:, 0])
-        with np.errstate(all="ignore"):
-            step = np.where(slope != 0, -f[:, 1] / slope, 0.0)
-            reach = 3 * bar[:, 1] / abs(slope) + 4 * np.spacing(abs(x))
-        sure |= certain
-        index = np.where(certain | ~sure, np.rint(2 * out["rotation_number"][:, 1]).astype(int), index)
-        best = certain & (abs(step) <= width)
-        # inside a bracket: go to the secant's zero and close in; outside: widen
-        narrower = np.maximum(reach, np.minimum(0.1 * width, 10 * abs(step)))
-        moved = best & (narrower < 0.5 * width)
-        x = np.where(moved, x + step, x)
-        width = np.where(moved, np.maximum(narrower, 2 * np.spacing(abs(x))), np.where(certain, width, 3 * width))
-    final = solve(row, x[:, None] + width[:, None] * np.array([-1.0, 1.0])) if x.size else None
-    if final is not None:
-        f = np.stack([final[name] for name in FACTORS])[kind, names]
-        bar = np.stack([final[f"{name}_error"] for name in FACTORS])[kind, names]
-        sure = (abs(f) > bar).all(axis=1) & (np.sign(f[:, 0]) == -np.sign(f[:, 1]))
+    """(row, position, error, kind, index) of the zeros that change sign and lie on the axis, each once."""
+
+    def look(who, x):
+        return of_kind(solve(row[who], x, FACTORS), kind[who])
+
+    scale = max(abs(low), abs(high))
+    x, width, sure = close_in(look, x, np.full(x.size, 1e-9 * scale), 4 * np.spacing(abs(x)))
     inside = sure & (x >= low) & (x <= high)
-    row, kind, x, width, index = (values[inside] for values in (row, kind, x, width, index))
+    row, kind, x, width = (values[inside] for values in (row, kind, x, width))
     order = np.lexsort((x, kind, row))
-    row, kind, x, width, index = (values[order] for values in (row, kind, x, width, index))
+    row, kind, x, width = (values[order] for values in (row, kind, x, width))
     same = (np.diff(row) == 0) & (np.diff(kind) == 0) & (np.diff(x) <= width[1:] + width[:-1])
     keep = np.concatenate([[True], ~same]) if x.size else np.zeros(0, bool)
-    return row[keep], x[keep], width[keep], kind[keep], index[keep]
+    row, kind, x, width = (values[keep] for values in (row, kind, x, width))
+    sides = x[:, None] + ASIDE * width[:, None] * np.array([-1.0, 1.0])
+    index = tongue(solve(row, sides, COUNTS), kind) if x.size else np.zeros(0, int)
+    return row, x, width, kind, index
+
+
+def of_kind(out, kind):
+    """The factor, and its bar, that belongs to each row's kind."""
+    rows = np.arange(kind.size)
+    return (np.stack([out[name + end] for name in FACTORS])[kind, rows] for end in ("", "_error"))
+
+
+def tongue(out, kind):
+    """The tongue's number from the rotation number at places close by its edge (n, m), odd where antiperiodic."""
+    near = np.rint(2 * np.nan_to_num(out["rotation_number"])).astype(int)
+    return near[np.arange(kind.size), np.argmax(near % 2 == (kind < 2)[:, None], axis=1)]
+
+
+def close_in(look, x, width, grain):
+    """Sharpen simple zeros near x (n) on lines: (x, half width, certain), with opposite, certain signs at its ends.
+
+    `look(who, x)` gives the functions `who` (m places in x) and their bars at x (m, 3); `grain` (n) is x's rounding.
+    """
+    x, width, sure = x.copy(), width.copy(), np.zeros(x.size, np.bool_)
+    left = np.arange(x.size)
+    for attempt in range(ROUNDS):
+        if not left.size:
+            break
+        wide = width[left]
+        f, bar = look(left, x[left, None] + wide[:, None] * np.array([-1.0, 0.0, 1.0]))
+        certain = (abs(f) > bar)[:, ::2].all(axis=1) & (np.sign(f[:, 0]) == -np.sign(f[:, 2]))
+        with np.errstate(all="ignore"):
+            slope = (f[:, 2] - f[:, 0]) / (2 * wide)
+            step = np.nan_to_num(-f[:, 1] / slope)
+            bend = abs((f[:, 2] - f[:, 1]) - (f[:, 1] - f[:, 0])) / abs(f[:, 2] - f[:, 0])
+            least = 3 * bar[:, 1] / abs(slope) + 2 * grain[left]
+            reach = np.minimum(least + 4 * bend * step**2 / wide, 0.5 * wide)  # bars, and Newton's error
+        better = certain & (abs(step) <= wide) & (least < 0.5 * wide) & (attempt < ROUNDS - 1)
+        x[left[better]] += step[better]
+        width[left] = np.where(better, reach, np.where(certain, wide, 3 * wide))
+        sure[left] = certain & ~better
+        left = left[better | ~certain]
+    return x, width, sure
 
 
 def _complete(solve, rows, edges, low, high):
-    """Which rows are complete: between neighbouring edges every factor has the sign that the list says."""
-    sound = np.ones(rows.size, np.bool_)
-    by_row = {r: np.flatnonzero(edges[0] == r) for r in rows}
-    most = max((own.size for own in by_row.values()), default=0) + 1
+    """Which rows are complete: between neighbouring edges the factors' signs and the rotation number are as listed."""
+    order = np.lexsort((edges[1], edges[0]))
+    row, x, width, kind, index = (values[order] for values in edges)
+    own = [np.flatnonzero(row == r) for r in rows]
+    most = max((mine.size for mine in own), default=0) + 1
     places = np.empty((rows.size, most))
-    for i, r in enumerate(rows):
-        x = np.sort(edges[1][by_row[r]])
-        between = 0.5 * (np.concatenate([[low], x]) + np.concatenate([x, [high]]))
+    for i, mine in enumerate(own):
+        between = 0.5 * (np.concatenate([[low], x[mine]]) + np.concatenate([x[mine], [high]]))
         places[i] = np.concatenate([between, np.full(most - between.size, between[-1])])
-    out = solve(rows, places)
+    out = solve(rows, places, (*FACTORS, *COUNTS))
     signs = np.stack([np.where(abs(out[n]) > out[f"{n}_error"], np.sign(out[n]), 0) for n in FACTORS])
-    for i, r in enumerate(rows):
-        own = by_row[r][np.argsort(edges[1][by_row[r]])]
-        expected = signs[:, i, 0]
-        for at, edge in enumerate(own, 1):
-            expected = np.where(np.arange(4) == edges[3][edge], -expected, expected)
-            told = signs[:, i, at]
-            if at < own.size and np.diff(edges[1][own[at - 1 : at + 1]]) <= edges[2][own[at - 1 : at + 1]].sum():
-                told = 0 * told  # between edges closer than their errors nothing is told
-            known = (told != 0) & (expected != 0)
-            sound[i] &= bool((told == expected)[known].all())
-            expected = np.where(told != 0, told, expected)
+    band = _band(out)
+    sound = np.isfinite([out[name] for name in FACTORS]).all(axis=(0, 2))
+    for i, mine in enumerate(own):
+        # between edges closer than their errors nothing is told
+        told = np.concatenate([[True], np.diff(x[mine]) > width[mine][1:] + width[mine][:-1], [True]])[: mine.size + 1]
+        seen = np.where(told, signs[:, i, : mine.size + 1], 0)
+        sound[i] = _signs_agree(seen, kind[mine])
+        sound[i] &= _rotation_agrees(np.where(told, band[i, : mine.size + 1], np.nan), index[mine])
     return sound
+
+
+def _signs_agree(seen, kind):
+    """Do the signs (4, m + 1; 0 unknown) of the factors between m edges change at the edges of their kind alone?"""
+    turns = np.cumsum(kind == np.arange(len(FACTORS))[:, None], axis=1)
+    straight = seen * np.where(np.pad(turns, ((0, 0), (1, 0))) % 2, -1, 1)
+    return bool(((straight >= 0).all(axis=1) | (straight <= 0).all(axis=1)).all())
+
+
+def _band(out):
+    """2 theta / 2 pi to the half: n in the gap of tongue n, n + 1/2 in the band above it; NaN where it is not told."""
+    turns, bar = 2 * out["rotation_number"], 2 * out["rotation_number_error"]
+    whole = np.rint(turns)
+    inside = (out["verdict"] == STABLE) & (abs(turns - whole) > bar)
+    return np.where(out["verdict"] == UNSTABLE, whole, np.where(inside, np.floor(turns) + 0.5, np.nan))
+
+
+def _rotation_agrees(band, index):
+    """Does every edge lie between its tongue n and a band beside it, as `band` (m + 1) between the m edges tells?"""
+    before, after = abs(band[:-1] - index), abs(band[1:] - index)
+    wrong = (before > 0.5) | (after > 0.5) | (before == after)
+    return not wrong.any()
