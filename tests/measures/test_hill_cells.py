@@ -48,14 +48,20 @@ def test_mathieus_unstable_area_is_the_integral_of_the_characteristic_values(log
     assert np.ptp(sides, axis=2).prod(axis=1).sum() == pytest.approx(cells.total, rel=1e-12)
 
 
+def _edges(k, low, high, rtol):
+    """All edges of the prolate tongues in rows k."""
+
+    def solve(row, rho, wanted):
+        return solver(satellite, "k", "rho", outputs=wanted, rtol=rtol, body="prolate")(k[row][:, None], rho)
+
+    return hill_edges.find(solve, k.size, low, high)
+
+
 def test_the_area_of_a_satellites_tongue_is_the_integral_of_its_edges():
     """Prolate tongue n = 3, which lies in 0.9 < rho < 1.3 for k <= 0.5."""
     x, weights = np.polynomial.legendre.leggauss(12)
     k = 0.3 + 0.2 * x
-    edges = hill_edges.find(
-        lambda row, rho: solver(satellite, "k", "rho", outputs=hill_edges.NEEDS, body="prolate")(k[row][:, None], rho),
-        k.size, 0.9, 1.3,
-    )  # fmt: skip
+    edges = _edges(k, 0.9, 1.3, 1e-11)
     assert edges.complete.all() and np.bincount(edges.row).tolist() == [2] * 12
     exact = 0.2 * (weights * np.diff(edges.position.reshape(12, 2))[:, 0]).sum()
     cells = hill_cells.find(solver(satellite, "k", "rho", body="prolate"), Axis(0.1, 0.5, 9), Axis(0.9, 1.3, 9))
@@ -75,8 +81,7 @@ def test_the_unstable_shares_of_librations(start, share):
 def test_no_tongue_is_stable_however_narrow():
     """Rows of prolate tongues n = 3 ... 7, down to 3e-13 wide: all that lies in them is unstable or undecided."""
     k = np.array([0.0512, 0.1512, 0.3013])
-    solve = solver(satellite, "k", "rho", outputs=hill_edges.NEEDS, rtol=1e-13, body="prolate")
-    edges = hill_edges.find(lambda row, rho: solve(k[row][:, None], rho), k.size, 0.61, 3.41)
+    edges = _edges(k, 0.61, 3.41, 1e-13)
     cells = hill_cells.find(solver(satellite, "k", "rho", body="prolate"), Axis(0.0, 0.4, 7), Axis(0.6, 3.42, 7))
     assert (holding(cells, k[edges.row], edges.position) == UNDECIDED).all()
     inside = edges.index[1:] == edges.index[:-1]
