@@ -6,7 +6,7 @@ Source: J. C. Mason, D. C. Handscomb, Chebyshev Polynomials (2003), 2.4.1 (Clens
 import numpy as np
 
 from survey.kernels.hill import EPS, EXPONENT, NO_RULE, STABLE, UNDECIDED, UNSTABLE, exponent
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import kernel, splice
 
 TILE = 64
 ROWS = 8
@@ -59,7 +59,7 @@ def restrict(series, x, out):
             out[r, i] = series[0, i] + x[r] * last[i] - before[i]
 
 
-@inline
+@splice
 def _doubt(series, place):
     """What a series leaves out and folds back, and rounding; a place on [-1, 1] is known to `place` ulp.
 
@@ -77,7 +77,7 @@ def _doubt(series, place):
     return 4.0 * last / (1.0 - rate) + EPS * rounding
 
 
-@inline
+@splice
 def _polynomials(x, tile):
     """T_0 ... at x, in the first lanes of the rows of `tile`."""
     for i in range(len(x)):
@@ -87,7 +87,7 @@ def _polynomials(x, tile):
             tile[k, i] = 2.0 * x[i] * tile[k - 1, i] - tile[k - 2, i]
 
 
-@inline
+@splice
 def _sum(c, tile, sums, count):
     """sum_k c_k T_k in `count` lanes, eight terms a turn; there are a multiple of eight."""
     for i in range(count):
@@ -109,7 +109,9 @@ def discriminants(rows, coefficients, bars, x, rule, rtol, wanted, floats, verdi
     """
     terms, tiles = (coefficients.shape[1] + 7) // 8 * 8, (len(x) + TILE - 1) // TILE
     table, sums, own = np.empty((tiles, terms, TILE)), np.empty(TILE), np.zeros((len(rows), terms))
-    own[:, : coefficients.shape[1]] = coefficients
+    for j in range(len(rows)):
+        for k in range(coefficients.shape[1]):
+            own[j, k] = coefficients[j, k]
     for t in range(tiles):
         _polynomials(x[t * TILE : (t + 1) * TILE], table[t])
     # A tile of the table stays in the first cache for some rows, and what is written within some pages.
@@ -132,7 +134,7 @@ def discriminants(rows, coefficients, bars, x, rule, rtol, wanted, floats, verdi
                     missed[i] |= not bar <= rtol * (1.0 + growth)
 
 
-@inline
+@splice
 def _judge(d, bar, floats, rtol, verdict, late):
     """D, its bar and the verdict of neighbouring points, and who is late. Views: an offset index is not vector code."""
     for i in range(len(verdict)):

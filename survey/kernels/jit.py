@@ -73,3 +73,8 @@ def kernel(function):
 def inline(function):
     """Compile `function` as part of the kernels that call it (always inlined by LLVM, never cached alone)."""
     return numba.njit(forceinline=True, no_cfunc_wrapper=True, **_FLAGS)(function)
+
+
+def splice(function):
+    """As `inline`, but copied into its callers before they are typed: compiled once, if it is called once."""
+    return numba.njit(inline="always", **_FLAGS)(function)

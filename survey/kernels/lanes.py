@@ -13,7 +13,7 @@ the bounds are multiplied by exp(M), else a step so long that the method damps w
 
 import numpy as np
 
-from survey.kernels.jit import inline
+from survey.kernels.jit import splice
 
 TILE = 64
 VECTOR = 8
@@ -21,7 +21,7 @@ STATE = 13
 WORST = 300.0
 
 
-@inline
+@splice
 def chain(row, step, width, samples, c2, h, p, order, starts, ends, out):
     """Compose `step` over all rows; row r owns the points order[starts[r] : ends[r]] of `p` and of `out`.
 
@@ -55,7 +55,7 @@ def chain(row, step, width, samples, c2, h, p, order, starts, ends, out):
                 _finish(state, i, steps, out[order[first + i]])
 
 
-@inline
+@splice
 def scatter(row, step, width, samples, c2, h, p, order, starts, out):
     """As `chain` where each row owns one point, order[starts[r]]: lanes are rows. The same operations, so bits."""
     steps, nodes = samples.shape[1], samples.shape[3]
@@ -83,13 +83,13 @@ def scatter(row, step, width, samples, c2, h, p, order, starts, out):
             _finish(state, i, steps, out[order[starts[first + i]]])
 
 
-@inline
+@splice
 def _whole(count):
     """So many lanes fill the machine's vectors; those beyond `count` repeat the last."""
     return (count + VECTOR - 1) // VECTOR * VECTOR
 
 
-@inline
+@splice
 def _start(state, count):
     for k in range(STATE):
         for i in range(count):
@@ -99,7 +99,7 @@ def _start(state, count):
         state[3, i] = 1.0
 
 
-@inline
+@splice
 def _advance(matrix, h, state, i):
     """One step of lane i. State: y1, y1', y2, y2', S of column 1 (3), S of column 2 (3), zeros of y1, y2, M."""
     y, v, s, t, w = column(matrix, state[0, i], state[1, i], state[4, i], state[5, i], state[6, i])
@@ -113,13 +113,13 @@ def _advance(matrix, h, state, i):
     state[12, i] += relative(matrix, h)
 
 
-@inline
+@splice
 def relative(matrix, h):
     """The local error bounds of a step as one number without units."""
     return matrix[4] + (matrix[5] / h + matrix[6] * h)
 
 
-@inline
+@splice
 def column(matrix, y, v, s, t, w):
     """(y, v) and its error ellipse (s, t; t, w) after the step with propagator and bounds `matrix`."""
     a, b, c, d, diagonal, upper, lower = matrix
@@ -133,7 +133,7 @@ def column(matrix, y, v, s, t, w):
     return a * y + b * v, c * y + d * v, s, t, w
 
 
-@inline
+@splice
 def _finish(state, i, steps, out):
     for k in range(4):
         out[k] = state[k, i]
@@ -141,7 +141,7 @@ def _finish(state, i, steps, out):
     out[8], out[9] = state[10, i], state[11, i]
 
 
-@inline
+@splice
 def bars(s1, w1, s2, w2, steps, total, out):
     """The four error bounds from the diagonals of the ellipses, the number of steps and M."""
     doubt = np.exp(min(total, WORST))

@@ -20,7 +20,7 @@ TOLERANCES = 10.0 ** (-3 - 0.5 * np.arange(25))
 # Keep a kernel call below about a second and its samples in the processor's cache.
 CALL_WORK = 8_000_000
 CALL_SAMPLES = 200_000
-# Rows with fewer points go with each in a lane of its own, samples and all: the same bits.
+# Points of shorter rows go each in a lane of its own, samples and all: the same bits.
 LANES_PER_ROW = 3
 # Radians of the fastest phase per step, at most: zeros are counted by signs at the ends of steps.
 LONGEST = 2.8
@@ -125,7 +125,7 @@ def _chain(problem, method, level, out):
     nodes, p = np.array(method.NODES), problem.p.reshape(-1)
     for at in np.flatnonzero(np.bincount(of_level)):
         steps, own = int(LADDER[at]), of_level == at
-        lone = int((ends - starts)[own].sum()) < LANES_PER_ROW * np.count_nonzero(own)
+        lone = level.shape[1] < LANES_PER_ROW
         segment = _points_alone(rows[own], starts[own], ends[own]) if lone else (rows[own], starts[own], ends[own])
         for used, first, last in _calls(*segment, steps, nodes.size):
             samples, h = problem.sample(used, nodes, steps), problem.span[used] / steps

@@ -12,7 +12,7 @@ II.7 (why Gauss points give twice the order).
 import numpy as np
 from numpy.polynomial import legendre
 
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.lanes import chain, scatter
 
 ORDER = 16
@@ -41,14 +41,14 @@ def hill_density(rtol):
     return 0.13 * scale, 0.88 * scale
 
 
-@inline
+@splice
 def _product(matrix, k, x, i):
     """Row k of the matrix times lane i of x."""
     first = matrix[k, 0] * x[0, i] + matrix[k, 1] * x[1, i]
     return first + matrix[k, 2] * x[2, i] + matrix[k, 3] * x[3, i] + matrix[k, 4] * x[4, i]
 
 
-@inline
+@splice
 def hill_row(samples, h, coefficients):
     """Per function, in units of -4/h^2: powers of x, then the last two Legendre coefficients, then the largest."""
     count = samples.shape[2]
