@@ -296,6 +296,7 @@ def fingerprint(workflow):
         "variables": sorted(request.variables),
         "blocks": len(blocks_of(workflow)),
         "kernels": provenance()["kernel_hash"],
+        "scene_hash": getattr(workflow.scene, "HASH", ""),
     }
 
 

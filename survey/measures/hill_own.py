@@ -106,9 +106,7 @@ def problem(z, points, edges, period, slack, even):
 
     def walk(rows, p, tolerance):
         out, reached = np.full((rows.size, RESULTS), np.nan), np.zeros(rows.size, np.bool_)
-        kernels(z).walk(
-            points[rows], edges[rows], pieces[rows], slack[rows], scale[rows], tolerance, out, reached
-        )
+        kernels(z).walk(points[rows], edges[rows], pieces[rows], slack[rows], scale[rows], tolerance, out, reached)
         return out, reached
 
     own = hill.Problem(
