@@ -252,7 +252,9 @@ def summary(ds):
         **({"areas": areas(ds)} if "area" in ds else {}),
         "counts": {name: counts(ds[name]) for name in ("verdict", "status") if name in ds},
         "provenance": {
-            k: v for k, v in ds.attrs.items() if k not in ("title", "scene", "options", "workflow", "summary", "scene_text")
+            k: v
+            for k, v in ds.attrs.items()
+            if k not in ("title", "scene", "options", "workflow", "summary", "scene_text")
         },
     }
 

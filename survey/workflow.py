@@ -128,7 +128,7 @@ def check(data, text="", output=None, default_path="survey.nc", near=None):
     if not isinstance(data, Mapping):
         raise BadInput(f"{data!r} is neither the path of a workflow file nor a mapping with its tables")
     given_scene = data.get("scene")
-    if isinstance(given_scene, own.Hill):
+    if isinstance(given_scene, own.HillScene):
         data = {**data, "scene": given_scene.NAME}
     try:
         file = File.model_validate(data)
@@ -171,9 +171,7 @@ def _check_boundaries(scene, name, asked, given):
     if scene.FAMILY != "hill":
         raise BadInput(f"boundaries: the scene {name} has no tongues; leave the table out")
     if not getattr(scene, "EVEN", True):
-        raise BadInput(
-            f"boundaries: the z of {name} is not even: it has no half-period factors; leave them out"
-        )
+        raise BadInput(f"boundaries: the z of {name} is not even: it has no half-period factors; leave them out")
     if not 1 <= len(axes) <= 2:
         raise BadInput(f"boundaries: they are drawn on one axis or two, and there are {len(axes)}; fix the others")
     if asked.axis is not None and asked.axis not in axes:

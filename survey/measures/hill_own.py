@@ -62,10 +62,17 @@ def kernels(z):
     return SimpleNamespace(look=look, walk=walk)
 
 
+class Raised(Exception):
+    """z raised its cause, or cannot be compiled."""
+
+
 def at(z, points, u):
     """z at the places u (N, M) of the points (N, n)."""
     out = np.empty(u.shape)
-    kernels(z).look(np.ascontiguousarray(points), np.ascontiguousarray(u), out)
+    try:
+        kernels(z).look(np.ascontiguousarray(points), np.ascontiguousarray(u), out)
+    except Exception as error:
+        raise Raised from error
     return out
 
 
