@@ -148,7 +148,8 @@ class HillScene:
         """Raise BadInput unless z(u, p) can be compiled; plain Python says why not, and checks the bounds of p."""
         value = failed = None
         try:
-            value = getattr(self.z, "py_func", self.z)(0.25, point)
+            with np.errstate(all="ignore"):
+                value = getattr(self.z, "py_func", self.z)(0.25, point)
         except Exception as error:
             failed = error
         if isinstance(failed, IndexError):

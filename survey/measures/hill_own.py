@@ -144,7 +144,8 @@ def measured(z, points, edges, period, slack):
         for some in np.array_split(unresolved, unresolved.size * number // CALL_SAMPLES + 1):
             size[some], rate[some], noise[some], last[some] = spectrum(values(some, number))
         unresolved = unresolved[last[unresolved] > RESOLVED * size[unresolved]]
-    rate *= 2 / (right - left)[:, 0]
+    length = (right - left)[:, 0]
+    rate = np.where(length > 0, 2 * rate / np.where(length > 0, length, 1), 0)
     off = 0 * size
     if period is not None:
         everywhere = np.arange(owner.size)
