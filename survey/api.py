@@ -21,7 +21,7 @@ def run(workflow, output=None, workers=None, scheduler=None, fresh=False):
 
     Parameters
     ----------
-    workflow : path of a workflow file, or a mapping with the same tables.
+    workflow : path of a workflow file, or a mapping with the same tables (its scene may be what `survey.hill` returns).
     output : path of the netCDF file, instead of the workflow's.
     workers : number of worker processes; by default threads of this process.
     scheduler : address or scheduler file of a dask.distributed cluster.

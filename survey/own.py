@@ -8,7 +8,9 @@ The file holds
     EVEN         True where z(T - u) = z(u), which halves the work and makes edges certain; False by default
     BREAKS       where z or a derivative jumps, in [0, T]: number(s), or a function of p; none by default
 
-and, as it likes, a docstring, TITLE and REFERENCES. It is run, as any Python file is: use files that you trust.
+and, as it likes, a docstring, TITLE and REFERENCES. It is run, as any Python file is: use files that you trust. What
+it imports is not watched when a run is resumed. z goes on with period T; what is narrower than a hundredth of T may be
+missed unless BREAKS stand beside it. [boundaries] and [refine] take z to be analytic in the parameters.
 """
 
 import hashlib
@@ -97,7 +99,8 @@ def check(scene, grid=None):
     names = [p.name for p in scene.PARAMETERS]
     values = np.array([[float(np.ravel(point[name])[0]) for name in names] for point in points])
     inside = [all(p.holds(v) for p, v in zip(scene.PARAMETERS, row, strict=True)) for row in values]
-    scene.check(values.reshape(-1, len(names))[np.array(inside, bool)])
+    with np.errstate(all="ignore"):  # a value that is none is found as one
+        scene.check(values.reshape(-1, len(names))[np.array(inside, bool)])
 
 
 def of_dataset(ds):
@@ -185,6 +188,12 @@ def _arguments(z):
         return 0
 
 
+def _names(code):
+    """Names that the code, or a function inside it, looks up."""
+    inner = [const for const in code.co_consts if inspect.iscode(const)]
+    return [*code.co_names, *(name for own in inner for name in _names(own))]
+
+
 def _bits(value, seen=()):
     """Bytes that change when a function, what it calls, or any of its numbers changes."""
     value = getattr(value, "py_func", value)
@@ -197,7 +206,7 @@ def _bits(value, seen=()):
     if inspect.iscode(code):
         own = [code.co_code, repr(code.co_names).encode(), _bits(code.co_consts, seen)]
         if code is not value:
-            names = [value.__globals__.get(name) for name in code.co_names]
+            names = [value.__globals__.get(name) for name in _names(code)]
             cells = [cell.cell_contents for cell in value.__closure__ or ()]
             own += [_bits([*names, *cells, *(value.__defaults__ or ())], seen)]
         return b"<" + b";".join(own) + b">"

@@ -170,13 +170,18 @@ def _check_boundaries(scene, name, asked, given):
     axes = [key for key, values in given.items() if np.ndim(values)]
     if scene.FAMILY != "hill":
         raise BadInput(f"boundaries: the scene {name} has no tongues; leave the table out")
-    if not getattr(scene, "EVEN", True):
-        raise BadInput(f"boundaries: the z of {name} is not even: it has no half-period factors; leave them out")
+    _check_even(scene, name, "boundaries")
     if not 1 <= len(axes) <= 2:
         raise BadInput(f"boundaries: they are drawn on one axis or two, and there are {len(axes)}; fix the others")
     if asked.axis is not None and asked.axis not in axes:
         raise BadInput(f"boundaries.axis: {modules.unknown('axis', asked.axis, axes)}")
     return asked.axis or axes[-1]
+
+
+def _check_even(scene, name, table):
+    """Raise BadInput where there are no factors at T/2, whose zeros are the edges."""
+    if not getattr(scene, "EVEN", True):
+        raise BadInput(f"{table}: the z of {name} is not even, so it has no half-period factors; leave the table out")
 
 
 def _check_refine(scene, name, file, given):
@@ -189,6 +194,7 @@ def _check_refine(scene, name, file, given):
     axes = {key: values for key, values in given.items() if np.ndim(values)}
     if scene.FAMILY != "hill":
         raise BadInput(f"refine: the verdict of {name} is one of points, not of cells; leave the table out")
+    _check_even(scene, name, "refine")
     if len(axes) != 2 or min(values.size for values in axes.values()) < 2:
         raise BadInput("refine: cells need exactly two axes of two values or more; fix the other parameters")
     widths = _check_width_table(file.refine.width, axes)

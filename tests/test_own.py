@@ -120,6 +120,19 @@ def test_a_function_from_python_runs_in_other_processes(tmp_path):
         own.of_dataset(survey.open(tmp_path / "one.nc"))
 
 
+@pytest.mark.parametrize("workers", [None, 2])
+def test_what_z_raises_in_the_middle_of_a_run_is_one_line(workers, tmp_path):
+    def z(u, p):
+        if 0.2 < p[0] < 0.3:
+            raise ValueError("no")
+        return p[0]
+
+    axes = {"a": {"start": 0.0, "stop": 1.0, "num": 50}, "q": 1.0}
+    with pytest.raises(BadInput, match=r"hill\(z\): z\(u, p\) raises ValueError\('no'\); let it return nan") as refusal:
+        survey.run({"scene": scene(z), "axes": axes}, output=tmp_path / "o.nc", workers=workers)
+    assert "\n" not in str(refusal.value)
+
+
 def test_dask_input_stays_lazy_and_gives_the_same_bits():
     a, q = np.linspace(0.0, 9.0, 6), np.array([0.5, 1.0])
     ds = survey.evaluate(scene(), a=xr.DataArray(da.from_array(a, chunks=4), dims="a"), q=q)
@@ -133,9 +146,10 @@ def test_where_z_is_not_even_the_outputs_say_so_and_there_are_no_edges():
     odd = scene(lambda u, p: p[0] + p[1] * np.sin(2 * u) ** 3, even=False)
     ds = survey.evaluate(odd, a=1.0, q=1.0)
     assert ds.y1.attrs["long_name"].startswith("y1(T),") and ds.dy2.attrs["symbol"] == "y_2'(T)"
-    axes = {"a": {"start": -1.0, "stop": 10.0, "num": 8}, "q": 1.0}
-    with pytest.raises(BadInput, match=r"boundaries: the z of .* is not even"):
-        survey.run({"scene": odd, "axes": axes, "boundaries": {}})
+    axes = {"a": {"start": -1.0, "stop": 10.0, "num": 8}, "q": {"start": 1.0, "stop": 2.0, "num": 8}}
+    for table in ({"boundaries": {}}, {"refine": {"width": 0.1}}):
+        with pytest.raises(BadInput, match=rf"{next(iter(table))}: the z of .* is not even"):
+            survey.run({"scene": odd, "axes": axes} | table)
 
 
 BAD = [

@@ -164,7 +164,7 @@ def spectrum(values):
     tail = series[:, -(n // 4) :]
     last, noise = tail.max(axis=1), 3 * np.sqrt(0.5 * n * (tail**2).mean(axis=1))
     least = np.maximum(RESOLVED * size, 2 * last)[:, None]
-    fall = np.log(series.max(axis=1, keepdims=True) / np.maximum(series, least))
+    fall = np.log(series.max(axis=1, keepdims=True) / np.maximum(np.maximum(series, least), 1e-300))
     rate = np.where(series > least, np.arange(n + 1) / (1 + fall), 0).max(axis=1)
     return size, rate, noise, last
 

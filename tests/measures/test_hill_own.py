@@ -123,6 +123,16 @@ def test_meissner_by_its_closed_form(z, breaks, even, method):
             assert error < 1e-13 * (1 + abs(d)) and bar < 1e-11 * (1 + abs(d))
 
 
+def test_where_a_square_wave_starts_does_not_matter():
+    given = {"period": pi, "parameters": ("a", "q", "duty")}
+    even = survey.hill(square, **given, even=True, breaks=edges_of_square)
+    whole = survey.hill(stair, **given, breaks=lambda p: [0, p[2] * pi])
+    point = {"a": [-3.0, 0.4, 7.3, 60.0], "q": [0.5, 2.5, 11.0], "duty": [0.01, 0.3, 0.5]}
+    one, other = survey.evaluate(even, **point), survey.evaluate(whole, **point)
+    assert within(one, other, ["discriminant", "exponent", "rotation_number"]) <= 1
+    np.testing.assert_array_equal(one.verdict, other.verdict)
+
+
 def ince(u, p):
     return p[0] + 4 * p[1] * p[2] * cos(2 * u) + 2 * p[2] * p[2] * cos(4 * u)
 
