@@ -9,7 +9,7 @@ import xarray as xr
 
 import survey.methods as method_folder
 import survey.scenes as scene_folder
-from survey import engine, modules, status, store
+from survey import engine, modules, own, status, store
 from survey import workflow as workflows
 from survey.dataset import count, counts, describe, error_bars, layout, percent
 from survey.errors import BadInput
@@ -21,7 +21,7 @@ def run(workflow, output=None, workers=None, scheduler=None, fresh=False):
 
     Parameters
     ----------
-    workflow : path of a workflow file, or a mapping with the same tables.
+    workflow : path of a workflow file, or a mapping with the same tables (its scene may be what `survey.hill` returns).
     output : path of the netCDF file, instead of the workflow's.
     workers : number of worker processes; by default threads of this process.
     scheduler : address or scheduler file of a dask.distributed cluster.
@@ -67,7 +67,8 @@ def evaluate(scene, *, method="auto", rtol=1e-10, variables=None, **parameters):
 
     Parameters
     ----------
-    scene : name of a scene, such as "satellite" (`survey.scenes()` lists them, `survey scenes NAME` explains one).
+    scene : name of a scene, such as "satellite" (`survey.scenes()` lists them, `survey scenes NAME` explains one); the
+        path of a file with your own Hill equation (see `survey/own.py`); or what `survey.hill` returns.
     method : "auto" or the name of a method.
     rtol : asked accuracy, |error| <= rtol (1 + |value|); the `X_error` variables say what was reached.
     variables : names of the outputs wanted; all by default. Errors and status come along.
@@ -92,7 +93,7 @@ def evaluate(scene, *, method="auto", rtol=1e-10, variables=None, **parameters):
     >>> ds.verdict.dims
     ('k',)
     """
-    module = modules.load(scene_folder, scene, "scene")
+    scene, module = own.find(scene)
     names = {option.name for option in module.OPTIONS}
     given = {key: _labelled(key, value) for key, value in parameters.items() if key not in names}
     options = workflows.check_options(module, {key: parameters[key] for key in parameters if key in names}, given)
@@ -103,8 +104,10 @@ def evaluate(scene, *, method="auto", rtol=1e-10, variables=None, **parameters):
     _check_lone_values(used, given)
     _check_dimensions(module, given)
     if any(array.chunks for array in given.values()):
+        own.check(module)
         return _lazy(module, scene, request, given)
     grid = _grid(used, given)
+    own.check(module, grid)
     ds = describe(grid, module, scene, request, engine.compute(grid, module, request))
     return count(ds.assign_coords(_own_coordinates(given)))
 
@@ -213,7 +216,7 @@ def _lazy(module, scene, request, given):
 
 def scene(name):
     """Everything a user needs of one scene: equations, parameters, options, outputs, status, methods, sources."""
-    module = modules.load(scene_folder, name, "scene")
+    name, module = own.find(name)
     return {
         "name": name,
         "title": module.TITLE,
@@ -249,7 +252,9 @@ def summary(ds):
         **({"areas": areas(ds)} if "area" in ds else {}),
         "counts": {name: counts(ds[name]) for name in ("verdict", "status") if name in ds},
         "provenance": {
-            k: v for k, v in ds.attrs.items() if k not in ("title", "scene", "options", "workflow", "summary")
+            k: v
+            for k, v in ds.attrs.items()
+            if k not in ("title", "scene", "options", "workflow", "summary", "scene_text")
         },
     }
 
@@ -266,7 +271,8 @@ def audit(ds, points, seed=0):
 
     Returns {"points", "method", "outside", "complaints"}.
     """
-    module = modules.load(scene_folder, ds.attrs["scene"], "scene")
+    name = own.of_dataset(ds)
+    _, module = own.find(name)
     options = dict(pair.split("=") for pair in ds.attrs["options"].split(", ") if pair)
     others = [m for m in workflows.methods_of(module) if m != ds.attrs["method"]]
     method = module.AUDIT if module.AUDIT in others else others[0]
@@ -280,7 +286,7 @@ def audit(ds, points, seed=0):
     names = [p.name for p in module.PARAMETERS if p.name in ds.coords]
     given = {key: ("_point", np.broadcast_to(flat[key].values, size).copy()) for key in names}
     again = evaluate(
-        ds.attrs["scene"],
+        name,
         method=method,
         rtol=max(ds.attrs["rtol"] / 100, 1e-13),
         **options,

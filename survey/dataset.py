@@ -94,6 +94,7 @@ def attributes(scene, name, request):
         "references": "; ".join(scene.REFERENCES),
         "source": f"survey {version('survey')}: scene {name}, method {request.method}",
         **provenance(),
+        **({"scene_text": scene.TEXT, "scene_hash": scene.HASH} if hasattr(scene, "TEXT") else {}),
     }
 
 

@@ -19,7 +19,7 @@ from dask.callbacks import Callback
 
 from survey import store
 from survey.dataset import Tally, attributes, command, coordinates, layout, now, provenance, round_up, variables
-from survey.errors import BadInput, Stopped
+from survey.errors import BadInput, Stopped, SurveyError
 from survey.kernels.jit import compile_seconds
 
 BLOCK_SECONDS = 0.5
@@ -296,6 +296,7 @@ def fingerprint(workflow):
         "variables": sorted(request.variables),
         "blocks": len(blocks_of(workflow)),
         "kernels": provenance()["kernel_hash"],
+        "scene_hash": getattr(workflow.scene, "HASH", ""),
     }
 
 
@@ -324,6 +325,8 @@ def _through_dask(task, numbers, workers=None, scheduler=None, finished=None, th
     except OSError as error:
         raise Stopped(f"the run stopped ({error}); run the command again to go on") from None
     except Exception as error:
+        if isinstance(error, SurveyError):
+            raise getattr(error, "exception", error) from None  # dask adds a worker's traceback to the message
         if type(error).__name__ in ("BrokenProcessPool", "KilledWorker", "CommClosedError"):
             raise Stopped(f"a worker died ({error}); run the command again to go on") from None
         raise

@@ -16,8 +16,11 @@ FAILURES = frozenset({OVERFLOW, NO_CONVERGENCE, STEP_LIMIT, WORKER_DIED, PENDING
 
 
 def table(scene):
-    """All codes that `scene` (a module of `survey.scenes`) may give: {name: (code, sentence)}."""
-    own = getattr(scene, "STATUS", {})
-    return {name: (CODES[name], SENTENCES[name]) for name in CODES} | {
-        name: (FIRST_OF_SCENE + i, sentence) for i, (name, sentence) in enumerate(own.items())
-    }
+    """All codes that `scene` (a module of `survey.scenes`) may give: {name: (code, sentence)}.
+
+    A scene's STATUS holds its own, and its own sentence for a common one.
+    """
+    given = getattr(scene, "STATUS", {})
+    own = [name for name in given if name not in CODES]
+    codes = CODES | {name: FIRST_OF_SCENE + i for i, name in enumerate(own)}
+    return {name: (code, (SENTENCES | given)[name]) for name, code in codes.items()}

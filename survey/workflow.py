@@ -12,8 +12,7 @@ import tomli_w
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError
 
 import survey.methods
-import survey.scenes
-from survey import modules
+from survey import modules, own
 from survey.errors import BadInput
 from survey.grid import Grid, check_axis, coordinates
 from survey.scene import Request, exists
@@ -118,19 +117,24 @@ def read(path, overrides=(), output=None):
     if overrides:
         changes = "".join(f" --set {override}" for override in overrides)
         text = f"# {path.name}{changes}\n\n{tomli_w.dumps(data)}"
-    return check(data, text, output, default_path=path.with_suffix(".nc").name)
+    return check(data, text, output, default_path=path.with_suffix(".nc").name, near=path.parent)
 
 
-def check(data, text="", output=None, default_path="survey.nc"):
-    """The checked Workflow of the mapping `data` (a parsed workflow file); `text` is what it was parsed from."""
+def check(data, text="", output=None, default_path="survey.nc", near=None):
+    """The checked Workflow of the mapping `data` (a parsed workflow file); `text` is what it was parsed from.
+
+    A scene that is a file lies relative to the current folder, or else to the folder `near`.
+    """
     if not isinstance(data, Mapping):
         raise BadInput(f"{data!r} is neither the path of a workflow file nor a mapping with its tables")
+    given_scene = data.get("scene")
+    if isinstance(given_scene, own.HillScene):
+        data = {**data, "scene": given_scene.NAME}
     try:
         file = File.model_validate(data)
     except ValidationError as error:
         raise BadInput(_one_line(error)) from None
-    scene = modules.load(survey.scenes, file.scene, "scene")
-    name = file.scene
+    name, scene = own.find(given_scene, near)
     options = check_options(scene, file.options, file.axes, "options.")
     given = {key: _values(f"axes.{key}", axis) for key, axis in file.axes.items()}
     parameters = check_parameters(scene, name, options, given, "axes.")
@@ -143,11 +147,13 @@ def check(data, text="", output=None, default_path="survey.nc"):
             raise BadInput(f"output.figures: {modules.unknown('variable', figure, sorted(request.variables))}")
     if file.output.figures and not any(np.ndim(values) for values in given.values()):
         raise BadInput("output.figures: a figure needs at least one axis, and every parameter is a single number")
+    grid = _grid(parameters, given)
+    own.check(scene, grid)
     return Workflow(
         name=name,
         title=file.title or scene.TITLE,
         scene=scene,
-        grid=_grid(parameters, given),
+        grid=grid,
         request=request,
         path=check_path(next(path for path in (output, file.output.path, default_path) if path is not None)),
         figures=tuple(file.output.figures),
@@ -164,11 +170,18 @@ def _check_boundaries(scene, name, asked, given):
     axes = [key for key, values in given.items() if np.ndim(values)]
     if scene.FAMILY != "hill":
         raise BadInput(f"boundaries: the scene {name} has no tongues; leave the table out")
+    _check_even(scene, name, "boundaries")
     if not 1 <= len(axes) <= 2:
         raise BadInput(f"boundaries: they are drawn on one axis or two, and there are {len(axes)}; fix the others")
     if asked.axis is not None and asked.axis not in axes:
         raise BadInput(f"boundaries.axis: {modules.unknown('axis', asked.axis, axes)}")
     return asked.axis or axes[-1]
+
+
+def _check_even(scene, name, table):
+    """Raise BadInput where there are no factors at T/2, whose zeros are the edges."""
+    if not getattr(scene, "EVEN", True):
+        raise BadInput(f"{table}: the z of {name} is not even, so it has no half-period factors; leave the table out")
 
 
 def _check_refine(scene, name, file, given):
@@ -181,6 +194,7 @@ def _check_refine(scene, name, file, given):
     axes = {key: values for key, values in given.items() if np.ndim(values)}
     if scene.FAMILY != "hill":
         raise BadInput(f"refine: the verdict of {name} is one of points, not of cells; leave the table out")
+    _check_even(scene, name, "refine")
     if len(axes) != 2 or min(values.size for values in axes.values()) < 2:
         raise BadInput("refine: cells need exactly two axes of two values or more; fix the other parameters")
     widths = _check_width_table(file.refine.width, axes)

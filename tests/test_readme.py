@@ -8,6 +8,9 @@ from pathlib import Path
 
 import pytest
 
+import survey
+from survey import engine, workflow
+
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
 BIN = Path(sys.executable).parent
@@ -50,10 +53,28 @@ def test_the_main_command_runs(folder):
 
 
 def test_the_notebook_example_runs(folder):
-    (code,) = fenced("python")
+    code, _ = fenced("python")
     done = subprocess.run([sys.executable, "-c", small(code)], cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("undecided unstable stable marginal\n") and "+-" in done.stdout
+
+
+def test_the_scene_of_ones_own_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (call,) = re.findall(r'`survey.evaluate\("two_harmonics.py",\n(.*?)\)`', README)
+    (tmp_path / "two_harmonics.py").write_text(fenced("python")[1])
+    ds = survey.evaluate("two_harmonics.py", **eval(f"dict({call})"))
+    assert int(ds.verdict) == 1 and ds.attrs["title"].startswith("Mathieu's equation with a second harmonic")
+
+
+@pytest.mark.parametrize("name", ["whittaker_hill", "meissner"])
+def test_the_examples_of_own_scenes_run(name, tmp_path):
+    axes = {"whittaker_hill": "m", "meissner": "q"}
+    small = [f"axes.{axes[name]}.num=3", "axes.a.num=8"]
+    checked = workflow.read(ROOT / f"workflows/{name}.toml", small, tmp_path / "small.nc")
+    engine.run(checked)
+    ds = survey.open(checked.path)
+    assert (ds.status == 0).all() and ds.edge_complete.values.all()
 
 
 def test_every_command_in_the_table_runs(folder):

@@ -76,11 +76,13 @@ def segments(level, top, order, rows, of_level, starts):
 
 
 @kernel
-def measure(results, rule, wanted, rtol, overflow, floats, verdict, late, status):
+def measure(results, rule, wanted, rtol, whole, overflow, floats, verdict, late, status):
     """All that follows from `results` (N, 10): `floats` (14, N) with the bars, `verdict`, and who misses `rtol`.
 
     Points whose `status` is not 0 are passed over; those that leave the range of floats get the status `overflow`.
-    `rule` (N, or empty) holds what exact rules say, `wanted` (7) which columns count for `late`.
+    `rule` (N, or empty) holds what exact rules say, `wanted` (7) which columns count for `late`. With `whole` the
+    results are those at T: sin^2 and cos^2 of half the angle are then (2 - D) / 4 and (2 + D) / 4, D = y1 + y2', and
+    the zeros of y2 in (0, T) give the band (that solution's angle advances from 0 to between d pi and (d + 1) pi).
     """
     for i in range(len(results)):
         late[i] = False
@@ -93,6 +95,12 @@ def measure(results, rule, wanted, rtol, overflow, floats, verdict, late, status
         e1, de1, e2, de2 = results[i, 4], results[i, 5], results[i, 6], results[i, 7]
         sine, sine_bar = _product(-dy1, y2, de1, e2)
         cosine, cosine_bar = _product(y1, dy2, e1, de2)
+        zeros, doubt = results[i, 8] + results[i, 9], 0.0
+        if whole:
+            trace, bar = y1 + dy2, 0.25 * (e1 + de2 + 2.0 * EPS * (abs(y1) + abs(dy2) + 2.0))
+            sine, cosine, sine_bar, cosine_bar = 0.25 * (2.0 - trace), 0.25 * (2.0 + trace), bar, bar
+            # where y2's last zero may lie on either side of T: sin^2 of the angle is at most -y1' y2
+            zeros, doubt = results[i, 9], e2 * (abs(dy1) + de1) if abs(y2) <= e2 else 0.0
         said = decide(sine, sine_bar, cosine, cosine_bar, rule[i] if len(rule) > 0 else NO_RULE)
         # D from 2 - 4 sin^2 or 4 cos^2 - 2, whichever has the smaller bar.
         d = 2.0 - 4.0 * sine if sine_bar <= cosine_bar else 4.0 * cosine - 2.0
@@ -125,7 +133,8 @@ def measure(results, rule, wanted, rtol, overflow, floats, verdict, late, status
             floats[EXPONENT, i], floats[EXPONENT + 1, i] = x, bar
             missed |= not bar <= rtol * (1.0 + x)
         if wanted[6]:
-            x, bar = _rotation(sine, sine_bar, cosine, cosine_bar, said, results[i, 8] + results[i, 9])
+            x, bar = _rotation(sine, sine_bar, cosine, cosine_bar, said, zeros)
+            bar += sqrt(min(doubt, 1.0)) if said != UNSTABLE else 0.0
             floats[ROTATION, i], floats[ROTATION + 1, i] = x, bar
             missed |= not bar <= rtol * (1.0 + x)
         late[i] = missed

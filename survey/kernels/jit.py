@@ -70,6 +70,11 @@ def kernel(function):
         numba.config.CACHE_DIR = previous
 
 
+def fresh(function):
+    """Compile `function`, which calls a user's, anew in each process: kept on disk it could go stale."""
+    return numba.njit(**_FLAGS)(function)
+
+
 def inline(function):
     """Compile `function` as part of the kernels that call it (always inlined by LLVM, never cached alone)."""
     return numba.njit(forceinline=True, no_cfunc_wrapper=True, **_FLAGS)(function)

@@ -25,6 +25,8 @@ WORST = 300.0
 def chain(row, step, width, samples, c2, h, p, order, starts, ends, out):
     """Compose `step` over all rows; row r owns the points order[starts[r] : ends[r]] of `p` and of `out`.
 
+    `h` (rows, steps) holds the lengths of the steps.
+
     `row(samples, h, coefficients)` reduces samples (2, nodes, L) of L steps of lengths h (L) to coefficients
     (2 width, L); `step(coefficients, c2, p, h)` gives P11, P12, P21, P22 and the bounds D11 = D22, D12, D21.
     """
@@ -34,7 +36,7 @@ def chain(row, step, width, samples, c2, h, p, order, starts, ends, out):
     together, coefficients = np.empty((2 * width, steps)), np.empty((steps, 2 * width))
     for r in range(len(ends)):
         for n in range(steps):
-            lengths[n] = h[r]
+            lengths[n] = h[r, n]
             for c in range(2):
                 for i in range(nodes):
                     by_step[c, i, n] = samples[r, n, c, i]
@@ -50,7 +52,7 @@ def chain(row, step, width, samples, c2, h, p, order, starts, ends, out):
             _start(state, whole)
             for n in range(steps):
                 for i in range(whole):
-                    _advance(step(coefficients[n], c2, lanes[i], h[r]), h[r], state, i)
+                    _advance(step(coefficients[n], c2, lanes[i], h[r, n]), h[r, n], state, i)
             for i in range(count):
                 _finish(state, i, steps, out[order[first + i]])
 
@@ -68,11 +70,12 @@ def scatter(row, step, width, samples, c2, h, p, order, starts, out):
         whole = _whole(count)
         for i in range(TILE):
             r = first + min(i, count - 1)
-            lanes[i], lengths[i] = p[order[starts[r]]], h[r]
+            lanes[i] = p[order[starts[r]]]
         _start(state, whole)
         for n in range(steps):
             for i in range(TILE):
                 r = first + min(i, count - 1)
+                lengths[i] = h[r, n]
                 for c in range(2):
                     for k in range(nodes):
                         by_lane[c, k, i] = samples[r, n, c, k]

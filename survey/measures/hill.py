@@ -63,6 +63,8 @@ class Problem:
     `constant` the rows where z does not depend on t, with z there (rows, L); None where nothing is to be said.
     `line` is the whole axis of p, when every row has the same points: (number, least, greatest). `even` (R) says
     where p -> -p exchanges y1 and y2' at T/2, and leaves y2 and y1'. `across` is the axis of the rows, if there is one.
+    `cut(rows, steps)` gives the lengths of the steps (rows, steps) where they differ. With `whole`, where z is not
+    even, the whole period stands for the half.
     """
 
     p: np.ndarray
@@ -78,6 +80,12 @@ class Problem:
     line: tuple[int, float, float] | None = None
     even: np.ndarray | None = None
     across: Across | None = None
+    cut: Callable | None = None
+    whole: bool = False
+
+    def lengths(self, rows, steps):
+        """Lengths of the steps (rows, steps)."""
+        return self.cut(rows, steps) if self.cut else np.repeat(self.span[rows, None] / steps, steps, axis=1)
 
     def at(self, rows, p, rule=None):
         """Points `p` (one row for each of `rows`) on their own, no axis, with what exact rules say of them."""
@@ -85,6 +93,7 @@ class Problem:
             self, p=p, span=self.span[rows], bound=self.bound[rows], rate=self.rate[rows], rule=rule, constant=None,
             line=None, across=None, sample=lambda used, nodes, steps: self.sample(rows[used], nodes, steps),
             walk=self.walk and (lambda used, p, tolerance: self.walk(rows[used], p, tolerance)), exact=None,
+            cut=self.cut and (lambda used, steps: self.cut(rows[used], steps)),
         )  # fmt: skip
 
 
@@ -93,7 +102,7 @@ def solve(problem, method, rtol, wanted=()):
 
     `method` is the name of a method, or "auto" (see `hill_auto`); effort grows until `rtol` is met or useless.
     """
-    asked = Asked(rtol, np.array([name in wanted or not wanted for name in FLOATS]))
+    asked = Asked(rtol, np.array([name in wanted or not wanted for name in FLOATS]), whole=problem.whole)
     answers = Answers(problem.p.size, asked)
     if method == "auto":
         decide = not wanted or not DECIDED.isdisjoint(wanted)

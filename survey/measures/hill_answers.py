@@ -14,12 +14,14 @@ NONE = np.zeros(0, np.int8)
 class Asked:
     """The accuracy asked for, |error| <= rtol (1 + |value|), of the columns `wanted` of `kernels.hill.FLOATS`.
 
-    Points of a row that come `together` share the steps of the one that needs most, and so the row's samples.
+    Points of a row that come `together` share the steps of the one that needs most, and so the row's samples. With
+    `whole` the results are those of the whole period, where z is not even.
     """
 
     rtol: float
     wanted: np.ndarray
     together: bool = False
+    whole: bool = False
 
 
 class Answers:
@@ -35,8 +37,8 @@ class Answers:
     def judge(self, results, rule):
         """Answer every point whose status is ok from its results (N, 10)."""
         kernels.measure(
-            results, NONE if rule is None else rule, self.asked.wanted, self.asked.rtol, status.OVERFLOW,
-            self.floats, self.verdict, self.late, self.status,
+            results, NONE if rule is None else rule, self.asked.wanted, self.asked.rtol, self.asked.whole,
+            status.OVERFLOW, self.floats, self.verdict, self.late, self.status,
         )  # fmt: skip
 
     def put(self, places, other, at=slice(None)):

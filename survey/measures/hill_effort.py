@@ -128,7 +128,7 @@ def _chain(problem, method, level, out):
         lone = level.shape[1] < LANES_PER_ROW
         segment = _points_alone(rows[own], starts[own], ends[own]) if lone else (rows[own], starts[own], ends[own])
         for used, first, last in _calls(*segment, steps, nodes.size):
-            samples, h = problem.sample(used, nodes, steps), problem.span[used] / steps
+            samples, h = problem.sample(used, nodes, steps), problem.lengths(used, steps)
             if lone:
                 method.hill_scatter(samples, problem.c2, h, p, order, first, out)
             else:

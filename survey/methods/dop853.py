@@ -78,19 +78,29 @@ def hill_walk(potential, p, row, table, span, tolerance, out):
 
     Fills `out` as `survey.kernels.lanes.chain` does. False when STEP_LIMIT steps did not reach the end.
     """
+    return hill_walk_pieces(potential, p, row, table, np.array([0.0, span]), 0.0, tolerance, out)
+
+
+@inline
+def hill_walk_pieces(potential, p, row, table, edges, slack, tolerance, out):
+    """As `hill_walk`, from the first to the last of `edges`; z may jump at those between, where a step ends.
+
+    `potential` is asked no nearer to an edge than `slack`: on the side that is meant.
+    """
     z, slopes = np.empty(STAGES), np.empty((4, STAGES))
-    longest = 0.25 * span  # else a coefficient whose average rules escapes the estimate
-    t, steps, h = 0.0, 0, min(longest, 0.1)
+    longest = 0.25 * (edges[-1] - edges[0])  # else a coefficient whose average rules escapes the estimate
+    place, t, steps, h = 1, edges[0], 0, min(longest, 0.1)
     y1, v1, s1, t1, w1 = 1.0, 0.0, 0.0, 0.0, 0.0
     y2, v2, s2, t2, w2 = 0.0, 1.0, 0.0, 0.0, 0.0
     zeros1, zeros2, total = 0.0, 0.0, 0.0
     for _ in range(STEP_LIMIT):
-        final = t + 1.01 * h >= span
+        final = t + 1.01 * h >= edges[place]
         if final:
-            h = span - t
+            h = edges[place] - t
         size, terms = 0.0, 0.0
         for i in range(STAGES):
-            z[i], scale = potential(t + C[i] * h, p, row, table)
+            inside = min(max(t + C[i] * h, edges[place - 1] + slack), edges[place] - slack)
+            z[i], scale = potential(inside, p, row, table)
             size, terms = max(size, abs(z[i])), max(terms, scale)
         wave = np.sqrt(size) + 1e-3
         p11, p12, p21, p22, d11, d12, d21 = hill_step(z, h, slopes)
@@ -106,8 +116,9 @@ def hill_walk(potential, p, row, table, span, tolerance, out):
             zeros2 += 1.0 if (y2 < 0.0) != (old2 < 0.0) else 0.0
             total += relative(matrix, h)
             steps += 1
-            t += h
-            if final:
+            t = edges[place] if final else t + h
+            place += 1 if final else 0
+            if place == len(edges):
                 out[0], out[1], out[2], out[3] = y1, v1, y2, v2
                 bars(s1, w1, s2, w2, steps, total, out)
                 out[8], out[9] = zeros1, zeros2

@@ -26,7 +26,7 @@ def fixed(method, steps):
     """Results of a chain of `steps` equal steps of the method."""
     out = np.empty((8, 10))
     samples = PROBLEM.sample(np.zeros(1, int), np.array(method.NODES), steps)
-    method.hill_chain(samples, 0.0, PROBLEM.span / steps, PROBLEM.p[0], np.arange(8), ZERO, ZERO + 8, out)
+    method.hill_chain(samples, 0.0, PROBLEM.lengths(ZERO, steps), PROBLEM.p[0], np.arange(8), ZERO, ZERO + 8, out)
     return out
 
 
@@ -42,7 +42,7 @@ def step(method, start, h, parts=1):
         a, b, c, d, *_ = method.hill_step(samples[0, 0, 0] + 1.0, h, np.empty((4, 12)))
         return np.array([a, c, b, d])
     out = np.empty((1, 10))
-    method.hill_chain(samples, 0.0, np.array([h / parts]), np.ones(1), ZERO, ZERO, ZERO + 1, out)
+    method.hill_chain(samples, 0.0, np.full((1, parts), h / parts), np.ones(1), ZERO, ZERO, ZERO + 1, out)
     return out[0, :4]
 
 

@@ -1,0 +1,215 @@
+"""A user's own Hill equation y'' + z(u, p) y = 0, surveyed like a built-in scene: from one file, or one function.
+
+The file holds
+
+    z(u, p)      a function, plain or numba's, for 0 <= u <= T; p is the float64 array of the parameters, in order
+    PARAMETERS   their names, or `survey.scene.Parameter`s, which have a domain, a unit, a default
+    PERIOD       T, a number or a function of p
+    EVEN         True where z(T - u) = z(u), which halves the work and makes edges certain; False by default
+    BREAKS       where z or a derivative jumps, in [0, T]: number(s), or a function of p; none by default
+
+and, as it likes, a docstring, TITLE and REFERENCES. It is run, as any Python file is: use files that you trust. What
+it imports is not watched when a run is resumed. z goes on with period T; what is narrower than a hundredth of T may be
+missed unless BREAKS stand beside it. [boundaries] and [refine] take z to be analytic in the parameters.
+"""
+
+import hashlib
+import inspect
+from collections.abc import Iterable
+from functools import lru_cache
+from itertools import product
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+
+import survey.scenes
+from survey import modules
+from survey.errors import BadInput
+from survey.hill_scene import SAME, HillScene, is_number, reason
+from survey.measures import hill as measure
+from survey.scene import Parameter
+
+EXAMPLES = {
+    "z": "def z(u, p): return p[0] + p[1] * cos(2 * u)",
+    "PERIOD": "PERIOD = 3.14 (its length in u), or a function of p",
+    "PARAMETERS": 'PARAMETERS = ("a", "b"), the names of p[0], p[1]',
+}
+REFERENCES = ("W. Magnus, S. Winkler, Hill's Equation, Interscience 1966",)
+
+
+def hill(z, *, period, parameters, even=False, breaks=(), title=None):
+    """The scene of y'' + z(u, p) y = 0, for `survey.evaluate` and `survey.run`.
+
+    Parameters
+    ----------
+    z : function of u and p, plain Python or numba's: 0 <= u <= T, p the float64 array of the parameters, in order.
+    period : T, a number or a function of p.
+    parameters : their names, or `survey.scene.Parameter`s.
+    even : is z(T - u) = z(u)? It is checked.
+    breaks : where z or a derivative jumps, in [0, T]: number(s), or a function of p.
+
+    Raises survey.BadInput in one line that names what is wrong.
+
+    Examples
+    --------
+    >>> import math, survey
+    >>> z = lambda u, p: p[0] - 2 * p[1] * math.cos(2 * u)
+    >>> mathieu = survey.hill(z, period=math.pi, parameters=("a", "q"), even=True)
+    >>> int(survey.evaluate(mathieu, a=2.0, q=0.1).verdict)
+    1
+    """
+    function = getattr(z, "py_func", z)
+    name = f"hill({getattr(function, '__name__', 'z').strip('<>')})"
+    try:
+        text = inspect.getsource(function)
+    except (OSError, TypeError):
+        text = ""
+    return _hill(z, period, parameters, even, breaks, name, text, title, inspect.getdoc(function), ())
+
+
+def find(scene, near=None):
+    """(name, scene) of a scene's name, of a file `*.py` (relative to this folder, or else to `near`), or of `hill`."""
+    if isinstance(scene, HillScene):
+        return scene.NAME, scene
+    if callable(scene):
+        raise BadInput(
+            f"scene = {scene!r} is a function; give survey.hill({getattr(scene, '__name__', 'z')}, period=...)"
+        )
+    if not str(scene).endswith(".py"):
+        return scene, modules.load(survey.scenes, scene, "scene")
+    paths = [Path(scene), *([Path(near) / scene] if near is not None else [])]
+    path = next((path for path in paths if path.is_file()), None)
+    if path is None:
+        looked = " or ".join(dict.fromkeys(str(path) for path in paths))
+        raise BadInput(f"scene = {str(scene)!r}: there is no file {looked}; name the file of your own Hill equation")
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise BadInput(f"{path}: cannot read this scene ({getattr(error, 'strerror', None) or error})") from None
+    return str(path), _from_text(str(path), text)
+
+
+def check(scene, grid=None):
+    """Raise BadInput if `scene` is a user's and wrong at the ends and middles of the grid's axes."""
+    if not isinstance(scene, HillScene):
+        return
+    places = [sorted({0, size // 2, size - 1}) for size in grid.sizes.values()] if grid else []
+    points = [grid.point(tuple(slice(i, i + 1) for i in place)) for place in product(*places)] if grid else []
+    names = [p.name for p in scene.PARAMETERS]
+    values = np.array([[float(np.ravel(point[name])[0]) for name in names] for point in points])
+    inside = [all(p.holds(v) for p, v in zip(scene.PARAMETERS, row, strict=True)) for row in values]
+    with np.errstate(all="ignore"):  # a value that is none is found as one
+        scene.check(values.reshape(-1, len(names))[np.array(inside, bool)])
+
+
+def of_dataset(ds):
+    """The scene's name, as `find` takes it, of a survey's dataset; BadInput if it was a user's and is not as it was."""
+    name = ds.attrs["scene"]
+    if "scene_hash" not in ds.attrs:
+        return name
+    if not name.endswith(".py"):
+        raise BadInput(f"scene = {name!r} was a function given from Python: points cannot be solved again without it")
+    try:
+        name, scene = find(name, Path(ds.encoding.get("source", "")).parent)
+    except BadInput:
+        raise BadInput(f"scene = {name!r}: its file has gone; the attribute scene_text holds what it said") from None
+    if scene.HASH != ds.attrs["scene_hash"]:
+        raise BadInput(f"scene = {name!r}: its file has changed since; the attribute scene_text holds what it said")
+    return name
+
+
+@lru_cache(maxsize=32)
+def _from_text(name, text):
+    """The scene in the text of a file."""
+    module = ModuleType(Path(name).stem)
+    module.__file__ = name
+    try:
+        exec(compile(text, name, "exec"), module.__dict__)
+    except Exception as error:
+        raise BadInput(f"{name}: this is no scene that runs ({type(error).__name__}: {reason(error)})") from None
+    for needed in ("z", "PERIOD", "PARAMETERS"):
+        if not hasattr(module, needed):
+            raise BadInput(f"{name}: {needed} is missing; write {EXAMPLES[needed]}")
+    title, references = getattr(module, "TITLE", None), getattr(module, "REFERENCES", ())
+    optional = getattr(module, "EVEN", False), getattr(module, "BREAKS", ())
+    about = module.__doc__ or inspect.getdoc(getattr(module.z, "py_func", module.z))
+    return _hill(module.z, module.PERIOD, module.PARAMETERS, *optional, name, text, title, about, references)
+
+
+def _hill(z, period, parameters, even, breaks, name, text, title, about, references):
+    """The checked scene; raises BadInput."""
+
+    def refuse(words):
+        raise BadInput(f"{name}: {words}")
+
+    if not callable(z) or _arguments(z) != 2:
+        refuse("z must be a function of two arguments, z(u, p); the parameters are p[0], p[1], ...")
+    if isinstance(parameters, (str, Parameter)) or not isinstance(parameters, Iterable):
+        parameters = (parameters,)
+    parameters = tuple(
+        p if isinstance(p, Parameter) else Parameter(str(p), str(p), _symbol(str(p))) for p in parameters
+    )
+    names = [p.name for p in parameters]
+    taken = {o.name for o in measure.OUTPUTS} | {"status", "method", "rtol", "variables", "scene"}
+    bad = [n for n in names if not n.isidentifier() or n in taken or names.count(n) > 1]
+    if not names or bad:
+        refuse(f"PARAMETERS = {names!r}: name at least one, each once, by a word that is no output's and no keyword's")
+    if not isinstance(even, (bool, np.bool_)):
+        refuse(f"EVEN = {even!r}: it is True or False")
+    if not callable(period) and not (is_number(period) and 0 < period < np.inf):
+        refuse(f"PERIOD = {period!r}: it must be a positive number, or a function of p that returns one")
+    if not callable(breaks):
+        try:
+            breaks = tuple(float(place) for place in np.atleast_1d(breaks))
+        except (TypeError, ValueError):
+            refuse(f"BREAKS = {breaks!r}: number(s) between 0 and the period, or a function of p that returns them")
+        outside = [b for b in breaks if not 0 <= b <= (np.inf if callable(period) else period * (1 + SAME))]
+        if outside:
+            refuse(f"BREAKS: {outside[0]:g} lies outside 0 <= u <= T; name the places within one period")
+    about = inspect.cleandoc(about or f"y'' + z(u, p) y = 0, p = ({', '.join(names)}).")
+    bits = text.encode() if name.endswith(".py") else _bits((z, period, breaks, parameters, even))
+    return HillScene(
+        z=z, period=period, breaks=breaks, PARAMETERS=parameters, EVEN=bool(even), NAME=name, TEXT=text,
+        HASH=hashlib.sha256(bits).hexdigest(), TITLE=title or about.splitlines()[0].rstrip("."), about=about,
+        REFERENCES=tuple(references) or REFERENCES,
+    )  # fmt: skip
+
+
+def _symbol(name):
+    """The name in TeX."""
+    return name if len(name) == 1 else rf"\mathrm{{{name.replace('_', chr(92) + '_')}}}"
+
+
+def _arguments(z):
+    try:
+        return len(inspect.signature(getattr(z, "py_func", z)).parameters)
+    except (TypeError, ValueError):
+        return 0
+
+
+def _names(code):
+    """Names that the code, or a function inside it, looks up."""
+    inner = [const for const in code.co_consts if inspect.iscode(const)]
+    return [*code.co_names, *(name for own in inner for name in _names(own))]
+
+
+def _bits(value, seen=()):
+    """Bytes that change when a function, what it calls, or any of its numbers changes."""
+    value = getattr(value, "py_func", value)
+    if id(value) in seen:
+        return b""
+    seen = (*seen, id(value))
+    if isinstance(value, (tuple, list)):
+        return b"(" + b",".join(_bits(item, seen) for item in value) + b")"
+    code = getattr(value, "__code__", value)
+    if inspect.iscode(code):
+        own = [code.co_code, repr(code.co_names).encode(), _bits(code.co_consts, seen)]
+        if code is not value:
+            names = [value.__globals__.get(name) for name in _names(code)]
+            cells = [cell.cell_contents for cell in value.__closure__ or ()]
+            own += [_bits([*names, *cells, *(value.__defaults__ or ())], seen)]
+        return b"<" + b";".join(own) + b">"
+    if isinstance(value, np.ndarray):
+        return value.tobytes()
+    return (value.__name__ if inspect.ismodule(value) else repr(value)).encode()
