@@ -10,8 +10,8 @@ det M = 1 is no check: it fails by 1e3 where |D| is 1e19. A verdict is given onl
 Source: W. Magnus, S. Winkler, Hill's Equation (1966), 1.3 and 2.1; symmetric z: theorem 1.1 there.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -39,16 +39,16 @@ OUTPUTS = (
 
 @dataclass(frozen=True)
 class Across:
-    """The rows of a problem as places `s` (R) on an axis of `number` rows from `low` to `high`, known to 4 + |s| ulp.
+    """An axis of `number` rows from place `low` to `high`; equal keys, and so equal axes, mean the same equations.
 
-    The factors are analytic in s; `at(s)` is the Problem of rows at any places, without points of its own.
+    The factors are analytic in the place; `at(places)` is the Problem of rows there, without points of its own.
     """
 
-    s: np.ndarray
+    key: Hashable
     number: int
     low: float
     high: float
-    at: Callable
+    at: Callable = field(compare=False)
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,8 @@ class Problem:
     `rate` is 1 / distance to z's nearest singularity. `rule` (R, L) holds what exact rules say (`kernels.hill`), and
     `constant` the rows where z does not depend on t, with z there (rows, L); None where nothing is to be said.
     `line` is the whole axis of p, when every row has the same points: (number, least, greatest). `even` (R) says
-    where p -> -p exchanges y1 and y2' at T/2, and leaves y2 and y1'. `across` is the axis of the rows, if there is one.
+    where p -> -p exchanges y1 and y2' at T/2, and leaves y2 and y1'. `across` is the axis of the rows, if there
+    is one, and `places` (R) where they lie on it, known to 4 + |place| ulp.
     `cut(rows, steps)` gives the lengths of the steps (rows, steps) where they differ. With `whole`, where z is not
     even, the whole period stands for the half.
     """
@@ -80,6 +81,7 @@ class Problem:
     line: tuple[int, float, float] | None = None
     even: np.ndarray | None = None
     across: Across | None = None
+    places: np.ndarray | None = None
     cut: Callable | None = None
     whole: bool = False
 

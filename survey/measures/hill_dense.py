@@ -12,8 +12,9 @@ axes, never on the block.
 Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 4, 8 and 15.
 """
 
+import threading
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -31,6 +32,7 @@ ROWS_PER_NODE = 2
 # by 4 again.
 NODES_SHARE = 0.1
 RETRIES = 2
+_ONE_AT_A_TIME = threading.Lock()
 ANSWERS = frozenset({"discriminant", "exponent"})
 DISCRIMINANT = np.array([name == "discriminant" for name in kernels.FLOATS])
 
@@ -104,49 +106,56 @@ def _answer(problem, asked, answers, rows, series, bars, axis, open_points):
 
 
 def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
-    """Answer the points of those of the `chosen` rows that a series in s and p serves; returns the other rows.
-
-    The axis of rows is halved until D has converged on a panel to `rtol`, as long as all that is solved for it pays.
-    """
-    across, left = problem.across, [np.zeros(0, int)]
-    panels, budget = [(across.low, across.high, 1.0)], across.number / ROWS_PER_NODE
-    s = across.s[chosen]
-    while panels:
-        low, high, share = panels.pop(0)
-        rows = chosen[(s >= low) & ((s < high) | ((s == high) & (high == across.high)))]
-        middle, radius = 0.5 * (low + high), 0.5 * (high - low)
-        surface, spent = None, 0
-        if radius > 0:
-            surface, spent = _surface(across, method, asked, middle, radius, axis, min(budget, share * across.number))
-        budget -= spent
-        if surface is not None and rows.size:
-            series, bar = surface
-            own = np.empty((rows.size, series.shape[1]))
-            restrict(series, (across.s[rows] - middle) / radius, own)
+    """Answer the points of those of the `chosen` rows that a series across rows serves; returns the other rows."""
+    with _ONE_AT_A_TIME:
+        served = panels(problem.across, method, asked.rtol, axis)
+    place, left = problem.places[chosen], np.ones(chosen.size, np.bool_)
+    for low, high, series, bar in served:
+        inside = left & (place >= low) & (place <= high)
+        rows, own = chosen[inside], np.empty((np.count_nonzero(inside), series.shape[1]))
+        if rows.size:
+            restrict(series, (place[inside] - 0.5 * (low + high)) / (0.5 * (high - low)), own)
             _answer(problem, asked, answers, rows, own, np.full(rows.size, bar), axis, open_points)
-        elif surface is None and spent:
-            panels += [(low, middle, 0.5 * share), (middle, high, 0.5 * share)]
-        elif surface is None:
-            left.append(rows)
-    outside = chosen[~((s >= across.low) & (s <= across.high))]
-    return np.concatenate([*left, outside])
+        left &= ~inside
+    return chosen[left]
 
 
-def _surface(across, method, asked, middle, radius, axis, budget):
+@lru_cache(maxsize=64)
+def panels(across, method, rtol, axis):
+    """[(low, high, D's series, its bar)] of the panels of rows on which D converges: the same for all blocks of a map.
+
+    The axis of rows is halved until D has converged to `rtol`, as long as all that is solved for it pays.
+    """
+    left, found, budget = [(across.low, across.high, 1.0)], [], across.number / ROWS_PER_NODE
+    while left:
+        low, high, share = left.pop(0)
+        if not high > low:
+            continue
+        middle, radius = 0.5 * (low + high), 0.5 * (high - low)
+        surface, spent = _surface(across, method, rtol, middle, radius, axis, min(budget, share * across.number))
+        budget -= spent
+        if surface is not None:
+            found.append((low, high, *surface))
+        elif spent:
+            left += [(low, middle, 0.5 * share), (middle, high, 0.5 * share)]
+    return found
+
+
+def _surface(across, method, rtol, middle, radius, axis, budget):
     """((coefficients of T_j in s, by T_k in p; bar), or None where `rtol` is not met; rows solved, within `budget`)."""
     ends = across.at(middle + radius * np.array([-1.0, 1.0]))
     size = np.sqrt((ends.bound * np.abs([1.0, axis.radius, axis.radius**2])).sum(axis=1))
-    at = int(_enough(np.abs(np.diff(ends.span * size)), asked.rtol)[0])  # half the change of D's phase
-    place, spent, doubt = int(_places(ends, axis, asked.rtol).max()), 0, np.inf
+    at = int(_enough(np.abs(np.diff(ends.span * size)), rtol)[0])  # half the change of D's phase
+    place, spent, doubt = int(_places(ends, axis, rtol).max()), 0, np.inf
     while at < DEGREES.size and place < axis.most and spent + DEGREES[at] <= budget:
         n, before = int(DEGREES[at]), doubt
         spent += n
         nodes = across.at(middle + radius * _nodes(n))
-        series, bars = _series(nodes, method, 0.25 * asked.rtol, np.arange(n), int(DEGREES[place]), axis)
+        series, bars = _series(nodes, method, 0.25 * rtol, np.arange(n), int(DEGREES[place]), axis)
         surface = np.empty_like(series)
         tail = transform(series, _transform(n), (4 + abs(middle) + radius) / radius, surface)
         doubt = tail + _lebesgue(n) * bars.max()
-        if doubt <= asked.rtol:
+        if doubt <= rtol:
             return (surface, doubt), spent
         if not doubt < 0.5 * before:
             break

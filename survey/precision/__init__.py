@@ -34,6 +34,7 @@ from survey import modules, peak, workflow
 from survey.dataset import provenance
 from survey.errors import BadInput
 from survey.grid import line
+from survey.measures import hill_dense
 from survey.scene import Request, exists
 
 SETTINGS = tuple(10.0**-n for n in range(4, 14))
@@ -175,6 +176,7 @@ def _solver(module, method, error):
         request = Request(options, method, rtol, wanted, _lines(point))
         ndim = max(np.ndim(values) for values in point.values()) or 1
         whole = {key: np.asarray(point.get(key, p.default), float) for key, p in used.items()}
+        hill_dense.panels.cache_clear()  # every call pays for its set-up
         return module.solve({key: v if v.ndim else v.reshape((1,) * ndim) for key, v in whole.items()}, request)
 
     return solve

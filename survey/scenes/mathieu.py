@@ -84,7 +84,8 @@ def _problem(q, a, line=None, ends=None):
         rule=rule,
         constant=constant,
         line=line,
-        across=hill.Across(q, *ends, at=lambda q: _problem(q, np.zeros((q.size, 0)))) if ends else None,
+        across=hill.Across("mathieu", *ends, at=lambda q: _problem(q, np.zeros((q.size, 0)))) if ends else None,
+        places=q,
     )
 
 

@@ -211,9 +211,9 @@ def _at(s, oblate, rotates):
 
 
 def _across(row, ends):
-    s = -2 * np.log(row.kc)
     rotates = bool(row.rotates.any())
-    return hill.Across(s, *ends, at=lambda places: _at(places, row.oblate, rotates))
+    key = "satellite", row.oblate, rotates
+    return hill.Across(key, *ends, at=lambda places: _at(places, row.oblate, rotates))
 
 
 def _problem(row, rho, line=None, exactly_given=False, ends=None):
@@ -250,6 +250,7 @@ def _problem(row, rho, line=None, exactly_given=False, ends=None):
         line=line,
         even=~row.rotates,
         across=_across(row, ends) if ends else None,
+        places=-2 * np.log(row.kc) if ends else None,
     )
 
 
