@@ -5,6 +5,8 @@ import itertools
 import json
 import os
 import shutil
+import subprocess
+import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -20,6 +22,7 @@ from dask.callbacks import Callback
 from survey import store
 from survey.dataset import Tally, attributes, command, coordinates, layout, now, provenance, round_up, variables
 from survey.errors import BadInput, Stopped, SurveyError
+from survey.kernels import jit
 from survey.kernels.jit import compile_seconds
 
 BLOCK_SECONDS = 0.5
@@ -119,6 +122,7 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
     with store.Blocks(workflow.path, fingerprint(workflow), fresh) as kept:
         reused = kept.sound()
         todo = [number for number in range(len(blocks)) if number not in reused]
+        helper = _compiling_ahead(workflow.scene)
         compiled = {}
 
         def task(number):
@@ -150,8 +154,20 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
             }
             written = assembly.finish(further, told)
         kept.remove()
+        if helper:
+            helper.kill()
+            helper.wait()
     writing = time.perf_counter() - computed
     return Finished(written, assembly.tally.counts, compiling, max(0.0, computed - began - compiling), writing)
+
+
+def _compiling_ahead(scene):
+    """On a new machine, a process that compiles the kernels needed last while this one compiles those needed first."""
+    ahead = getattr(scene, "AHEAD", None)
+    if ahead and jit.is_new() and cpus() > 1:
+        words = f"import gc; gc.disable(); from survey.measures import {ahead}; {ahead}.compile_ahead()"
+        return subprocess.Popen([sys.executable, "-c", words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    return None
 
 
 def extras(workflow, progress=None):

@@ -8,7 +8,7 @@ Sources: DLMF 19.8(i) and 22.20(ii); R. Bulirsch, Numer. Math. 7 (1965) 78-90 (s
 
 from math import cos, pi, sin, sqrt
 
-from survey.kernels.jit import inline
+from survey.kernels.jit import inline, splice
 
 # Convergence is quadratic: a relative gap of 1e-8 leaves 1e-17, and k' = 1e-150 gets there in eleven steps.
 GAP = 1e-8
@@ -70,7 +70,7 @@ def jacobi(u, pairs, last):
 LANES = 5
 
 
-@inline
+@splice
 def jacobi_lanes(lanes, pairs, last):
     """As `jacobi`, for many u in 0..K at once: u in lanes[0]; sn, cn, dn in lanes[1..3]; lanes[4] is scratch."""
     count = lanes.shape[1]

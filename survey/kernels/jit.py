@@ -51,12 +51,17 @@ _COMPILING = event.TimingListener()
 event.register("numba:compile", _COMPILING)
 
 
+def is_new():
+    """Has this machine compiled no kernel of these sources yet, and can it keep them?"""
+    return _DIRECTORY is not None and not numba.config.DISABLE_JIT and next(_DIRECTORY.rglob("*.nbi"), None) is None
+
+
 def compile_seconds():
     """Seconds in which this process has compiled kernels so far."""
     return _COMPILING.duration if _COMPILING.done else 0.0
 
 
-_FLAGS = {"nogil": True, "error_model": "numpy"}
+_FLAGS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 
 def kernel(function):
@@ -77,7 +82,7 @@ def fresh(function):
 
 def inline(function):
     """Compile `function` as part of the kernels that call it (always inlined by LLVM, never cached alone)."""
-    return numba.njit(forceinline=True, no_cfunc_wrapper=True, **_FLAGS)(function)
+    return numba.njit(forceinline=True, **_FLAGS)(function)
 
 
 def splice(function):

@@ -43,6 +43,20 @@ def serves(problem, asked):
     return problem.line is not None and named <= ANSWERS and problem.line[2] > problem.line[1]
 
 
+def compile_ahead():
+    """Compile, by calls on next to nothing, what a dense map needs once its nodes are solved."""
+    asked, one = Asked(1.0, DISCRIMINANT), np.ones((1, 1))
+    answers = Answers(1, asked)
+    answers.judge(np.ones((1, kernels.RESULTS)), None)
+    expand(one, one, 1.0, one.copy(), np.ones(1))
+    transform(one, one, 1.0, one.copy())
+    restrict(one, np.ones(1), one.copy())
+    discriminants(
+        np.zeros(1, int), one, np.ones(1), np.ones(1), NO_RULES, 1.0, asked.wanted,
+        answers.floats, answers.verdict, answers.late,
+    )  # fmt: skip
+
+
 def solve(problem, method, asked, answers):
     """Answer the points of the rows that a proxy serves; returns the points (N, bool) still to be solved."""
     open_points = np.ones(problem.p.shape, np.bool_)

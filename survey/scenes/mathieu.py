@@ -25,6 +25,7 @@ from survey.scene import Parameter
 
 TITLE = "Stability of Mathieu's equation"
 FAMILY = "hill"
+AHEAD = "hill_dense"
 STATUS = {}
 AUDIT = "dop853"
 REFERENCES = (

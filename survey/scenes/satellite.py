@@ -36,6 +36,7 @@ from survey.scene import Option, Output, Parameter
 
 TITLE = "Out-of-plane stability of a satellite's planar librations and rotations"
 FAMILY = "hill"
+AHEAD = "hill_dense"
 STATUS = {}
 AUDIT = "dop853"
 REFERENCES = (
