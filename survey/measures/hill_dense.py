@@ -27,10 +27,12 @@ NO_RULES = np.zeros((0, 0), np.int8)
 DEGREES = np.array([16, 20, 24, 28, 32, 40, 48, 56, 64, 80, 96, 112, 128, 160, 192, 224, 256, 320, 384])
 # A proxy pays if there are this many points, and rows, for each that it solves.
 POINTS_PER_NODE = 3
-ROWS_PER_NODE = 2
-# Of the asked accuracy, for D at the nodes of a row: the Lebesgue constant multiplies its bar by 4, and a surface's
-# by 4 again.
-NODES_SHARE = 0.1
+ROWS_PER_NODE = 3
+# Of the asked accuracy, for D at the nodes of a row, whose bars the Lebesgue constant multiplies by 4; those of a map
+# are solved as well as can be.
+NODES_SHARE, BEST = 0.1, 1e-14
+# The share of the nodes known to the asked accuracy from which on a series serves.
+MOST = 0.9
 RETRIES = 2
 _ONE_AT_A_TIME = threading.Lock()
 ANSWERS = frozenset({"discriminant", "exponent"})
@@ -94,17 +96,15 @@ def _axis(line, symmetric):
 
 def _rows(problem, method, asked, answers, chosen, axis, open_points):
     """Answer the points of the `chosen` rows, each by a series of its own."""
-    most = axis.most
     place = np.full(problem.span.size, DEGREES.size)
     place[chosen] = _places(problem, axis, asked.rtol)[chosen]
     first = place.copy()
-    for at in range(most):  # a row whose series has not converged goes on to the next degree
+    for at in range(axis.most):  # a row whose series has not converged goes on to the next degree
         rows = np.flatnonzero((place == at) & (at <= first + RETRIES))
         if rows.size:
-            series, bars = _series(problem, method, asked.rtol, rows, int(DEGREES[at]), axis)
-            good = bars <= asked.rtol
-            useful = bars <= asked.rtol * (1 + abs(series).sum(axis=1))  # where D is largest, at least
-            good |= useful & (at == first[rows] + RETRIES)
+            values, series, bars = _series(problem, method, NODES_SHARE * asked.rtol, rows, int(DEGREES[at]), axis)
+            served = _served(values, bars[:, None], asked.rtol).mean(axis=1)
+            good = (served >= MOST) | ((served > 0) & (at == first[rows] + RETRIES))
             place[rows[~good]] += 1
             rows, series, bars = rows[good], np.ascontiguousarray(series[good]), bars[good]
         if rows.size:
@@ -165,11 +165,11 @@ def _surface(across, method, rtol, middle, radius, axis, budget):
         n, before = int(DEGREES[at]), doubt
         spent += n
         nodes = across.at(middle + radius * _nodes(n))
-        series, bars = _series(nodes, method, 0.25 * rtol, np.arange(n), int(DEGREES[place]), axis)
+        values, series, bars = _series(nodes, method, 0.0, np.arange(n), int(DEGREES[place]), axis)
         surface = np.empty_like(series)
         tail = transform(series, _transform(n), (4 + abs(middle) + radius) / radius, surface)
         doubt = tail + _lebesgue(n) * bars.max()
-        if doubt <= rtol:
+        if _served(values, doubt, rtol).mean() >= MOST:
             return (surface, doubt), spent
         if not doubt < 0.5 * before:
             break
@@ -197,16 +197,24 @@ def _enough(kind, rtol):
 
 
 def _series(problem, method, rtol, rows, n, axis):
-    """Coefficients of D (rows, n; n/2 of T_k(2 (p/radius)^2 - 1) if even) and its bar, not finite if there is none."""
+    """D at nodes (rows, n; n/2 if even), its coefficients (of T_k(2 (p/radius)^2 - 1) if even), and its bar (rows).
+
+    Nodes are solved to `rtol` or as well as can be; a bar is not finite where there is none.
+    """
     x = _nodes(n)[: n // 2] if axis.even else _nodes(n)
     nodes = problem.at(rows, np.broadcast_to(axis.middle + axis.radius * x, (rows.size, x.size)).copy())
-    finer = Asked(max(NODES_SHARE * rtol, 1e-14), DISCRIMINANT, together=True)
+    finer = Asked(max(rtol, BEST), DISCRIMINANT, together=True)
     own = Answers(nodes.p.size, finer)
     hill_effort.solve(nodes, method, finer, own)
     values, bars = (own.floats[c].reshape(nodes.p.shape) for c in (kernels.DISCRIMINANT, kernels.DISCRIMINANT + 1))
     series, totals = np.empty(values.shape), np.empty(rows.size)
     expand(values, _transform(x.size), (abs(axis.middle) + axis.radius) / axis.radius, series, totals)
-    return series, totals + _lebesgue(x.size) * bars.max(axis=1)
+    return values, series, totals + _lebesgue(x.size) * bars.max(axis=1)
+
+
+def _served(values, bar, rtol):
+    """Where D is known to `rtol` (relative where it is large) if it is `values` within `bar`."""
+    return bar <= rtol * (1 + abs(values))
 
 
 def _lebesgue(n):

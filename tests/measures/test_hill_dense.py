@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import survey
 from survey.measures import hill_dense
@@ -45,6 +46,59 @@ def test_dense_rows_agree_with_their_points(served, body, k, rho, rtol):
         assert (dense[f"{name}_error"].values <= rtol * 1.001 * (1 + abs(dense[name].values))).mean() > 0.99
     both = (dense.verdict >= 0) & (alone.verdict >= 0)
     assert (dense.verdict == alone.verdict).where(both, True).all() and both.mean() > 0.999
+
+
+@pytest.fixture
+def surfaces(monkeypatch):
+    """The panels of rows that were found."""
+    found, solve = [], hill_dense.panels
+
+    def kept(*arguments):
+        found.append(solve(*arguments))
+        return found[-1]
+
+    monkeypatch.setattr(hill_dense, "panels", kept)
+    return found
+
+
+MAPS = [
+    ("satellite", {"k": (0.0, 0.99), "rho": (0.6, 4.0)}, {"body": "prolate"}, 1),
+    ("satellite", {"one_minus_k": (1e-3, 1e-2), "rho": (0.6, 4.0)}, {"body": "prolate"}, 1),
+    ("satellite", {"amplitude": (0.1, 1.3), "rho": (-1.0, 3.0)}, {"body": "oblate"}, 1),
+    ("satellite", {"k": (1.02, 3.0), "rho": (-4.0, 4.0)}, {"body": "oblate"}, 1),
+    ("satellite", {"k": (0.9, 0.9001), "rho": (50.0, 50.01)}, {"body": "prolate"}, 1),
+    ("mathieu", {"q": (-2.0, 3.0), "a": (-1.0, 60.0)}, {}, 1),
+]
+
+
+@pytest.mark.parametrize(("scene", "ranges", "options", "fewest"), MAPS)
+def test_dense_maps_agree_with_their_points(surfaces, scene, ranges, options, fewest):
+    (row, rows), (lane, lanes) = ranges.items()
+    axes = {row: np.linspace(*rows, 600), lane: np.linspace(*lanes, 240)}
+    dense = survey.evaluate(scene, **axes, **options, variables=NAMES)
+    assert len(surfaces[0]) >= fewest
+    random = np.random.default_rng(0)
+    places = {name: xr.DataArray(random.integers(0, axes[name].size, 1500), dims="point") for name in axes}
+    mine = dense.isel(places)
+    points = {name: mine[name].drop_vars(list(axes)) for name in axes}
+    alone = survey.evaluate(scene, **points, **options, rtol=1e-13, method="taylor16")
+    for name in ("discriminant", "exponent"):
+        off = abs(mine[name].values - alone[name].values)
+        assert (off <= mine[f"{name}_error"].values.astype(float) + alone[f"{name}_error"].values).all(), name
+    both = (mine.verdict.values >= 0) & (alone.verdict.values >= 0)
+    assert both.mean() > 0.99 and (mine.verdict.values == alone.verdict.values)[both].all()
+
+
+def test_blocks_of_a_map_share_its_panels(surfaces):
+    rows, lanes = np.linspace(0.05, 0.95, 200)[:, None], np.linspace(0.6, 4.0, 300)[None, :]
+    lines = {"rho": (300, 0.6, 4.0), "k": (200, 0.05, 0.95)}
+    request = Request({"body": "prolate"}, "auto", 1e-10, NAMES, lines)
+    whole = satellite.solve({"k": rows, "rho": lanes}, request)
+    for cut in (slice(3, 4), slice(100, 200)):
+        part = satellite.solve({"k": rows[cut], "rho": lanes[:, 100:107]}, request)
+        for name in ("discriminant", "discriminant_error", "exponent", "verdict"):
+            np.testing.assert_array_equal(part[name], whole[name][cut, 100:107], err_msg=name)
+    assert len(surfaces) == 3 and surfaces[0] and surfaces[1] is surfaces[0] is surfaces[2]
 
 
 def test_mathieu_rows_are_served_too(served):
