@@ -71,9 +71,8 @@ LANES = 5
 
 
 @splice
-def jacobi_lanes(lanes, pairs, last):
-    """As `jacobi`, for many u in 0..K at once: u in lanes[0]; sn, cn, dn in lanes[1..3]; lanes[4] is scratch."""
-    count = lanes.shape[1]
+def jacobi_lanes(lanes, count, pairs, last):
+    """As `jacobi`, for `count` values u in 0..K: u in lanes[0]; sn, cn, dn in lanes[1..3]; lanes[4] is scratch."""
     mean = 0.5 * (pairs[0, last] + pairs[1, last])
     for i in range(count):
         sine, cosine = _sine_cosine(mean * lanes[0, i])

@@ -57,11 +57,13 @@ def segments(level, top, order, rows, of_level, starts):
     counts = np.zeros(top + 2, np.int64)
     count = place = 0
     for r in range(level.shape[0]):
-        counts[:] = 0
+        low, high = top + 1, -1
         for i in range(level.shape[1]):
-            if 0 <= level[r, i] <= top:
-                counts[level[r, i]] += 1
-        for at in range(top + 1):
+            at = level[r, i]
+            if 0 <= at <= top:
+                counts[at] += 1
+                low, high = min(low, at), max(high, at)
+        for at in range(low, high + 1):
             if counts[at] > 0:
                 rows[count], of_level[count], starts[count] = r, at, place
                 place, counts[at] = place + counts[at], place
@@ -71,6 +73,7 @@ def segments(level, top, order, rows, of_level, starts):
             if 0 <= at <= top:
                 order[counts[at]] = r * level.shape[1] + i
                 counts[at] += 1
+        counts[low : high + 1] = 0
     starts[count] = place
     return count
 

@@ -12,6 +12,9 @@ from survey.kernels import double as dd
 from survey.kernels.elliptic import LANES, MEANS, complete, jacobi, jacobi_lanes, means
 from survey.kernels.jit import inline, kernel
 
+# A relative gap of the means whose square is below the rounding of extended floats.
+CLOSE = 1e-10
+
 
 @kernel
 def _complete_integrals(k, kc, first, second):
@@ -32,8 +35,11 @@ def half_periods(k, kc):
     In the machine's extended floats (on some machines float64) and numpy, which has nothing to compile.
     """
     a, b = np.ones_like(kc, dtype=np.longdouble), kc.astype(np.longdouble)
-    for _ in range(MEANS):
-        a, b = (a + b) / 2, np.sqrt(a * b)
+    wide = np.flatnonzero(b < a)
+    while wide.size:  # each row goes its own way, so that its bits do not depend on others
+        one, other = a[wide], b[wide]
+        a[wide], b[wide] = (one + other) / 2, np.sqrt(one * other)
+        wide = wide[one - other > CLOSE * one]
     two = (np.longdouble(dd.PI[0]) + np.longdouble(dd.PI[1])) / a
     return np.where(k > 1, two / (2 * np.maximum(k, 1)), two).astype(float)
 
@@ -50,31 +56,40 @@ def motion(u, k, oblate, pairs, last):
 
 @kernel
 def sample(rows, nodes, out):
-    """c0 = w^2 + g and c1 = 2 w at the `nodes` (fractions) of the steps of the half period: out[r, step, c, node]."""
+    """c0 = w^2 + g and c1 = 2 w at the `nodes` (fractions) of the steps of the half period: out[r, step, c, node].
+
+    Steps are even in number, and `nodes` symmetric: cn(2K - u) = -cn(u) gives the second half of a libration from the
+    first, where u has a smaller rounding error.
+    """
     pairs = np.empty((2, MEANS))
     steps, width = out.shape[1], len(nodes)
-    lanes = np.empty((LANES, steps * width))
+    lanes, partner = np.empty((LANES, steps * width)), np.empty(width, np.int64)
+    for i in range(width):
+        partner[i] = np.argmin(np.abs(nodes + nodes[i] - 1.0))
     for r in range(rows.shape[0]):
         k, kc, span, oblate = rows[r, 0], rows[r, 1], rows[r, 2], rows[r, 3] > 0.0
         last = means(kc, pairs)
-        scale = span / steps if k <= 1.0 else k * (span / steps)
-        for n in range(steps):
+        librates = k <= 1.0
+        scale = span / steps if librates else k * (span / steps)
+        own = steps // 2 if librates else steps
+        for n in range(own):
             for i in range(width):
-                place = n + nodes[i]
-                # cn(2K - u) = -cn(u): the second half mirrors the first, where u has a smaller rounding error.
-                mirror = k <= 1.0 and 2.0 * place > steps
-                lanes[0, n * width + i] = (steps - place if mirror else place) * scale
-        jacobi_lanes(lanes, pairs, last)
-        for n in range(steps):
+                lanes[0, n * width + i] = (n + nodes[i]) * scale
+        jacobi_lanes(lanes, own * width, pairs, last)
+        # w = k cn and g = dn^2 or -k^2 sn^2 for librations, k dn and cn^2 or -sn^2 for rotations
+        squared = -k * k if oblate and librates else -1.0 if oblate else 1.0
+        shape = 1 if oblate else 3 if librates else 2
+        velocity = 2 if librates else 3
+        for i in range(own * width):
+            w = k * lanes[velocity, i]
+            lanes[0, i], lanes[4, i] = w * w + squared * (lanes[shape, i] * lanes[shape, i]), 2.0 * w
+        for n in range(own):
             for i in range(width):
-                sn, cn, dn = lanes[1, n * width + i], lanes[2, n * width + i], lanes[3, n * width + i]
-                if k <= 1.0:
-                    w, g = k * cn, -(k * k) * sn * sn if oblate else dn * dn
-                    w = -w if 2.0 * (n + nodes[i]) > steps else w
-                else:
-                    w, g = k * dn, -sn * sn if oblate else cn * cn
-                out[r, n, 0, i] = w * w + g
-                out[r, n, 1, i] = 2.0 * w
+                out[r, n, 0, i], out[r, n, 1, i] = lanes[0, n * width + i], lanes[4, n * width + i]
+        for n in range(steps - own):
+            for i in range(width):
+                out[r, steps - 1 - n, 0, partner[i]] = lanes[0, n * width + i]
+                out[r, steps - 1 - n, 1, partner[i]] = -lanes[4, n * width + i]
 
 
 @inline

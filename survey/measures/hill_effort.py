@@ -19,7 +19,7 @@ HARDER = np.searchsorted(LADDER, 1.4 * LADDER)
 TOLERANCES = 10.0 ** (-3 - 0.5 * np.arange(25))
 # Keep a kernel call below about a second and its samples in the processor's cache.
 CALL_WORK = 8_000_000
-CALL_SAMPLES = 200_000
+CALL_SAMPLES = 40_000
 # Points of shorter rows go each in a lane of its own, samples and all: the same bits.
 LANES_PER_ROW = 3
 # Radians of the fastest phase per step, at most: zeros are counted by signs at the ends of steps.

@@ -33,7 +33,7 @@ def works():
     random = np.random.default_rng(1)
     scattered = {"k": random.uniform(0.01, 0.99, 30_000), "rho": random.uniform(0.6, 4.0, 30_000)}
     maps = {f"map {n}x{m}": (_map(np.linspace(0.0, 0.99, n), m), {}) for n, m in ((400, 600), (2000, 2000))}
-    return {"row": (_map(np.array([0.5]), 20_000), {})} | maps | {"scattered": (scattered, {})}
+    return {"row": (_map(np.array([0.5]), 10_000), {})} | maps | {"scattered": (scattered, {})}
 
 
 def _map(k, number):
