@@ -222,8 +222,9 @@ def _closing(finished, paths):
             err.print(f"{key.removesuffix('_counts')}: {attributes[key]}", markup=False)
     if attributes["accuracy_missed"]:
         err.print(f"accuracy_missed: {attributes['accuracy_missed']} points have an error bar above rtol")
-    phases = ("compiled", finished.compiling), ("kernels", finished.computing), ("file", finished.writing)
-    err.print(", ".join(f"{name} {seconds:.1f} s" for name, seconds in phases))
+    took = {"compiled": finished.compiling, "kernels": finished.computing, "file": finished.writing}
+    took |= {"edges and cells": finished.beside} if finished.beside else {}
+    err.print(", ".join(f"{name} {seconds:.1f} s" for name, seconds in took.items()))
 
 
 def _failed(finished):

@@ -104,6 +104,7 @@ class Finished:
     counts: dict[str, dict[str, int]]
     compiling: float
     computing: float
+    beside: float  # edges, cells
     writing: float
 
 
@@ -147,6 +148,7 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
                 compiled[os.getpid()] -= before
             compiling = max(compiled.values(), default=0.0)  # processes compile side by side
             further = extras(workflow, progress)
+            beside = time.perf_counter() - computed
             told = {
                 "wall_time_s": round(time.perf_counter() - started, 3),
                 "compile_time_s": round(compiling, 3),
@@ -157,8 +159,9 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
         if helper:
             helper.kill()
             helper.wait()
-    writing = time.perf_counter() - computed
-    return Finished(written, assembly.tally.counts, compiling, max(0.0, computed - began - compiling), writing)
+    writing = time.perf_counter() - computed - beside
+    computing = max(0.0, computed - began - compiling)
+    return Finished(written, assembly.tally.counts, compiling, computing, beside if further else 0.0, writing)
 
 
 def _compiling_ahead(scene):
