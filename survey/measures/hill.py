@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from survey import methods, modules, status
-from survey.kernels.hill import FLOATS, MARGINAL, STABLE, UNDECIDED, UNSTABLE
+from survey.kernels.hill import FLOATS, MARGINAL, RESULTS, STABLE, UNDECIDED, UNSTABLE
 from survey.measures import hill_auto, hill_effort
 from survey.measures.hill_answers import Answers, Asked
 from survey.scene import Output
@@ -97,6 +97,30 @@ class Problem:
             walk=self.walk and (lambda used, p, tolerance: self.walk(rows[used], p, tolerance)), exact=None,
             cut=self.cut and (lambda used, steps: self.cut(rows[used], steps)),
         )  # fmt: skip
+
+
+def of_rows(rows, sample, walk, exact=None):
+    """The functions of a Problem from a scene's kernels, which take some of its `rows` (R, ...) and fill `out`.
+
+    `sample(rows, nodes, out)`; `walk(rows, p, tolerance, out, reached)`; `exact(rows, p, steps, out)` or None.
+    """
+
+    def samples(used, nodes, steps):
+        out = np.empty((used.size, steps, 2, nodes.size))
+        sample(rows[used], nodes, out)
+        return out
+
+    def walked(used, p, tolerance):
+        out, reached = np.full((used.size, RESULTS), np.nan), np.zeros(used.size, np.bool_)
+        walk(rows[used], p, tolerance, out, reached)
+        return out, reached
+
+    def solved(used, p, steps):
+        out = np.empty((used.size, RESULTS))
+        exact(rows[used], p, steps, out)
+        return out
+
+    return {"sample": samples, "walk": walked, "exact": solved if exact else None}
 
 
 def solve(problem, method, rtol, wanted=()):

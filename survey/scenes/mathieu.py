@@ -16,7 +16,7 @@ import numpy as np
 
 from survey import status
 from survey.kernels import double as dd
-from survey.kernels.hill import NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE, RESULTS
+from survey.kernels.hill import NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE
 from survey.kernels.jit import inline, kernel
 from survey.measures import hill
 from survey.measures.rows import Rows
@@ -57,21 +57,6 @@ def solve(point, request):
 
 
 def _problem(q, a, line=None, ends=None):
-    def samples(used, nodes, steps):
-        out = np.empty((used.size, steps, 2, nodes.size))
-        sample(q[used], nodes, out)
-        return out
-
-    def walk(used, p, tolerance):
-        out, reached = np.full((used.size, RESULTS), np.nan), np.zeros(used.size, np.bool_)
-        walk_points(q[used], p, tolerance, out, reached)
-        return out, reached
-
-    def exact(used, p, steps):
-        out = np.empty((used.size, RESULTS))
-        solve_points(q[used], p, steps, out)
-        return out
-
     rule, constant = _rules(q, a)
     return hill.Problem(
         p=a,
@@ -79,9 +64,7 @@ def _problem(q, a, line=None, ends=None):
         bound=np.column_stack([2 * abs(q), np.ones(q.size), np.zeros(q.size)]),
         rate=np.full(q.size, 2.0),
         c2=0.0,
-        sample=samples,
-        walk=walk,
-        exact=exact,
+        **hill.of_rows(q, sample, walk_points, solve_points),
         rule=rule,
         constant=constant,
         line=line,

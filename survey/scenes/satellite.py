@@ -26,7 +26,7 @@ import numpy as np
 from survey import status
 from survey.kernels import satellite as motion
 from survey.kernels.elliptic import MEANS
-from survey.kernels.hill import LARGEST, NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE, RESULTS
+from survey.kernels.hill import LARGEST, NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE
 from survey.kernels.jit import kernel
 from survey.kernels.satellite import complete_integrals, half_periods, potential, sample, tabulate
 from survey.measures import hill
@@ -221,21 +221,6 @@ def _problem(row, rho, line=None, exactly_given=False, ends=None):
     oblate = np.full(row.k.size, float(row.oblate))
     rows = np.column_stack([row.k, row.kc, row.period / 2, oblate, row.high, row.low])
 
-    def samples(used, nodes, steps):
-        out = np.empty((used.size, steps, 2, nodes.size))
-        sample(rows[used], nodes, out)
-        return out
-
-    def walk(used, p, tolerance):
-        out, reached = np.full((used.size, RESULTS), np.nan), np.zeros(used.size, np.bool_)
-        walk_points(rows[used], p, tolerance, out, reached)
-        return out, reached
-
-    def exact(used, p, steps):
-        out = np.empty((used.size, RESULTS))
-        solve_points(rows[used], p, steps, out)
-        return out
-
     rule, constant = _rules(row, rho)
     return hill.Problem(
         p=rho,
@@ -243,9 +228,7 @@ def _problem(row, rho, line=None, exactly_given=False, ends=None):
         bound=np.column_stack([row.k**2 + 1, 2 * row.k, np.ones(row.k.size)]),  # (|rho| + k)^2 + 1
         rate=row.rate,
         c2=1.0,
-        sample=samples,
-        walk=walk,
-        exact=exact if exactly_given else None,
+        **hill.of_rows(rows, sample, walk_points, solve_points if exactly_given else None),
         rule=rule,
         constant=constant,
         line=line,
