@@ -128,25 +128,25 @@ def _twice(run, asked, method, rtol):
     """Solve all rows, then once more, finer, those that miss the asked accuracy; keep the better of the two."""
     first, second = tolerances(method, rtol)
     results = run(np.ones(len(asked), dtype=bool), first)
-    again = (_missed(results, rtol) & asked).any(axis=1)
+    again = (missed(results, rtol) & asked).any(axis=1)
     if again.any() and second < first:
         finer = run(again, second)
         kept = [result[again] for result in results]
-        better = _badness(finer) <= _badness(kept)
+        better = badness(finer) <= badness(kept)
         for result, old, new in zip(results, kept, finer, strict=True):
             old[better] = new[better]
             result[again] = old
     return results
 
 
-def _missed(results, rtol):
+def missed(results, rtol):
     floats, status = results[0], results[-1]
     values, bars = floats[..., :2], floats[..., 2:]
     met = (bars <= rtol * (1.0 + np.abs(values))).all(axis=-1)
     return ~(met & (status >= 0)) & ((status == OK) | (status == TURNING)) | (status > OK) & (status != TURNING)
 
 
-def _badness(results):
+def badness(results):
     floats, status = results[0], results[-1]
     worst = np.where(np.isnan(floats[..., 2]), 0.0, np.nanmax(floats[..., 2:], axis=-1, initial=0.0))
     return worst + np.where((status == OK) | (status == TURNING), 0.0, 1e300)

@@ -20,13 +20,15 @@ cycles are those that a lattice of return maps shows, with dips followed down to
 exactly, K = 0 and L = 0 within the rounding of the parameters. `multiplier` and cycles carry error bars; verdicts near
 a stable separatrix are -1 (status `separatrix`).
 
+`auto` takes trajectories and Abel solutions in closed form where one applies (method `closed`), else by Taylor series.
+
 Questions: `trajectory` (phi and w at t), `abel` (w and t at phi) and `fate` (where the solution ends).
 """
 
 import numpy as np
 
 from survey import methods
-from survey.measures import cylinder, cylinder_fate
+from survey.measures import cylinder, cylinder_auto, cylinder_fate
 from survey.measures.cylinder_fate import NO_TURNS
 from survey.modules import load
 from survey.scene import Option, Output, Parameter
@@ -64,8 +66,9 @@ STATUS = {
     "turning": "the solution turns back before it reaches phi: phi_turning and t_turning say where and when",
     "equilibrium": "the solution runs into an equilibrium, in infinite time, before it reaches phi",
     "separatrix": "the error bar cannot tell on which side of a separatrix the solution passes",
+    "no_closed_form": "no closed form applies (they need b = 0, g = 0 or (61), and no fate): try another method",
 }
-_TURNING = 16
+_TURNING, _NO_CLOSED_FORM = 16, 19
 _FATES = {
     "undecided": -1, "focus_or_node": 0, "saddle": 1, "rotation_plus": 2, "rotation_minus": 3, "libration": 4,
     "spin_up_plus": 5, "spin_up_minus": 6, "periodic_rotation": 7, "periodic_libration": 8, "equilibrium_start": 9,
@@ -108,7 +111,10 @@ def solve(point, request):
     """Every output at every point of the block."""
     method = load(methods, "taylor" if request.method == "auto" else request.method, "method")
     question = request.options.get("question", "fate")
-    return {"trajectory": _trajectory, "abel": _abel, "fate": _fate}[question](point, method, request.rtol)
+    if question == "fate":
+        return _fate(point, method, request.rtol)
+    measure = cylinder_auto if request.method == "auto" else cylinder
+    return {"trajectory": _trajectory, "abel": _abel}[question](point, measure, method, request.rtol)
 
 
 def _dense(point, name):
@@ -138,10 +144,10 @@ def _valid(rows, places):
     return np.where(np.isfinite(rows).all(axis=1)[:, None], rows, 0.0), np.where(good, places, 0.0), good
 
 
-def _trajectory(point, method, rtol):
+def _trajectory(point, measure, method, rtol):
     rows, times, back = _dense(point, "t")
     rows, times, good = _valid(rows, times)
-    floats, turnings, status = cylinder.trajectories(method, rows, times, rtol)
+    floats, turnings, status = measure.trajectories(method, rows, times, rtol)
     status = np.where(good, status, INVALID_PARAMETERS)
     floats[status != OK] = np.nan
     turnings[status != OK] = -2
@@ -150,10 +156,10 @@ def _trajectory(point, method, rtol):
     return results | {"turnings": back(turnings), "status": back(status)}
 
 
-def _abel(point, method, rtol):
+def _abel(point, measure, method, rtol):
     rows, places, back = _dense(point, "phi")
     rows, places, good = _valid(rows, places)
-    floats, status = cylinder.abel(method, rows, places, rtol)
+    floats, status = measure.abel(method, rows, places, rtol)
     status = np.where(good, status, INVALID_PARAMETERS)
     results = {"status": back(status)}
     for names, code in ((("w", "t"), OK), (("phi_turning", "t_turning"), _TURNING)):
@@ -172,11 +178,14 @@ def _fate(point, method, rtol):
     group = np.broadcast_to(group, shape).ravel()
     starts = np.stack([np.broadcast_to(array, shape).ravel() for array in arrays[6:]], axis=-1)
     result = cylinder_fate.empty(len(starts), INVALID_PARAMETERS)
+    solves = hasattr(method, "flow_fates")
     order = np.argsort(group, kind="stable")
     cuts = np.flatnonzero(np.diff(group[order])) + 1
     for members in np.split(order, cuts):
         six = systems.reshape(-1, 6)[group[members[0]]]
         good = members[np.isfinite(starts[members]).all(axis=1)]
-        if np.isfinite(six).all() and len(good):
+        if np.isfinite(six).all() and not solves:
+            result["status"][good] = _NO_CLOSED_FORM
+        elif np.isfinite(six).all() and len(good):
             cylinder_fate.solve(method, six, starts[good], rtol, result, good)
     return {name: values.reshape(shape) for name, values in result.items()}

@@ -1,4 +1,4 @@
-"""What every method for flows on the cylinder promises, for each one found in the folder."""
+"""What every method of steps for flows on the cylinder promises, for each one found in the folder."""
 
 import inspect
 import json
@@ -13,7 +13,7 @@ from survey.kernels import flow
 from survey.measures import cylinder
 
 FOUND = [modules.load(methods, name, "method") for name in modules.names(methods)]
-FLOWS = [pytest.param(m, id=m.__name__.split(".")[-1]) for m in FOUND if "cylinder" in m.SERVES]
+FLOWS = [pytest.param(m, id=m.__name__.split(".")[-1]) for m in FOUND if "cylinder" in m.SERVES and m.ORDER]
 each = pytest.mark.parametrize("method", FLOWS)
 REFERENCE = json.loads((files("survey.reference") / "gyrostat.json").read_text())
 SIX, START = (0.7, -0.4, 1.1, 0.3, 0.5, -0.2), (1.5, 0.8)

@@ -1,0 +1,501 @@
+"""Solutions in closed form of the flow on the cylinder where g = 0 or alike, or where b = 0.
+
+Trigonometric, kind 1: w = mu F(phi) + n is an invariant curve, g = (mu - 1) f (mu F + n); mu = 1 is g = 0 (50), other
+mu are (61). With u = tan(x/2), x = phi - phi0, du/dt is quadratic in u: one formula in Delta^2 = n^2 - (mu b)^2.
+Elliptic, b = 0: w^2 = w0^2 + 2 (V(phi0) - V(phi)), a trigonometric polynomial of degree 2, and chi = am(theta),
+theta = Omega t + theta0, after a real projective map of tan(phi/2) that is centred on the turning points (libration,
+kind 2) or on the complex roots (rotation, kind 3). Nothing lies at infinity, so no variant of (66) needs its own case.
+
+All start with w0 >= 0 (the caller mirrors). `data` holds what `start_*` found out; `*_at` take it at any time.
+"""
+
+import cmath
+import math
+
+import numpy as np
+
+from survey.kernels.elliptic import MEANS, complete, jacobi, means
+from survey.kernels.flow import B12, B31, C23, S2, S3, TWO_PI, UNIT, D
+from survey.kernels.jit import inline, kernel
+
+NONE, TRIGONOMETRIC, LIBRATION, ROTATION, LOST = 0, 1, 2, 3, 4
+SIZE = 32
+SAME = 64.0 * UNIT  # how far, relative, parameters may miss the conditions of (61); the miss goes into the bars
+
+# places in data
+W0, A1, B1, A2, B2 = range(5)  # g(phi0 + x) = A1 cos x + B1 sin x + A2 cos 2x + B2 sin 2x
+F0, SLOPE, ALPHA, SQUARE, NOISE, MISS, GROWTH = range(5, 12)  # kind 1
+LEFT, RIGHT, BAR_LEFT, BAR_RIGHT, RATIO, RHO, RHO_M, THETA0, OMEGA, KC, KC2, QUARTER, LAST_MEAN, SLACK, CHI0 = range(5, 20)
+RE, IM, TILT, LEAST, MISFIT = range(20, 25)  # kind 3
+MARGIN = 1.5
+
+
+@inline
+def local(p, phi0, side, data):
+    """Coefficients of g about phi0, mirrored (x -> -x, w -> -w) where side < 0."""
+    s, c = math.sin(phi0), math.cos(phi0)
+    s2, c2 = 2.0 * s * c, (c - s) * (c + s)
+    a2, b2 = -p[C23], -0.5 * p[D]
+    data[A1], data[B1] = side * (p[S2] * c - p[S3] * s), -p[S2] * s - p[S3] * c
+    data[A2], data[B2] = side * (a2 * c2 + b2 * s2), b2 * c2 - a2 * s2
+
+
+@inline
+def square_of_w(data, x):
+    """w^2 at phi0 + x on the energy of the start, its derivative, and a bound of its rounding."""
+    s, c = math.sin(0.5 * x), math.cos(0.5 * x)
+    sx, cx = 2.0 * s * c, (c - s) * (c + s)
+    inner = 2.0 * c * (data[A1] + data[A2] * cx) + s * (2.0 * data[B1] + 4.0 * data[B2] * c * c)
+    first, second = abs(data[A1]) + abs(data[B1]), abs(data[A2]) + abs(data[B2])
+    slope = data[A1] * cx + data[B1] * sx + data[A2] * (cx - sx) * (cx + sx) + 2.0 * data[B2] * sx * cx
+    noise = 4.0 * UNIT * (data[W0] ** 2 + 6.0 * abs(s) * (first + 2.0 * second))
+    return data[W0] ** 2 + 2.0 * s * inner, 2.0 * slope, noise
+
+
+@inline
+def reach(data, side):
+    """(distance to the first zero of w^2 on that side, its bar); (inf, 0) if none within a turn, NaN if unsure.
+
+    Each step ends where a parabola of the greatest curvature, which lies below w^2, has its zero: none is jumped over.
+    """
+    first, second = math.hypot(data[A1], data[B1]), math.hypot(data[A2], data[B2])
+    bend = 2.02 * (first + 2.0 * second)
+    x = 0.0
+    for _ in range(200):
+        h, slope, noise = square_of_w(data, side * x)
+        slope *= side
+        if h <= noise:
+            if x > 0.0 or data[W0] == 0.0:
+                if slope < 0.0 and slope * slope > 1e3 * noise * bend:
+                    new = x - h / slope
+                    return new, 2.0 * noise / -slope + 4.0 * UNIT * new
+                if not (data[W0] == 0.0 and x == 0.0 and slope > 0.0):
+                    return math.nan, 0.0
+        root = math.sqrt(slope * slope + 2.0 * bend * max(h, 0.0))
+        step = (slope + root) / bend if slope > 0.0 else 2.0 * h / (root - slope)
+        x += step
+        if x >= TWO_PI:
+            return math.inf, 0.0
+        if step <= 2.0 * UNIT * x:
+            _h, slope, noise = square_of_w(data, side * x)
+            slope *= side
+            if slope < 0.0 and slope * slope > 1e3 * noise * bend:
+                return x, 2.0 * noise / -slope + 4.0 * UNIT * x
+            return math.nan, 0.0
+    return math.nan, 0.0
+
+
+@inline
+def amplitude(pairs, last, quarter, theta):
+    """am(theta), sn, cn, dn at the rest of theta after multiples of 2 K, and that multiple."""
+    j = math.floor(theta / (2.0 * quarter) + 0.5)
+    sn, cn, dn = jacobi(theta - j * 2.0 * quarter, pairs, last)
+    return j * math.pi + math.atan2(sn, cn), sn, cn, dn, j
+
+
+@inline
+def carlson(x, y, z):
+    """R_F(x, y, z), by duplication (DLMF 19.36.1)."""
+    for _ in range(40):
+        mean = (x + y + z) / 3.0
+        if max(abs(x - mean), max(abs(y - mean), abs(z - mean))) < 2e-3 * mean:
+            break
+        shift = math.sqrt(x) * math.sqrt(y) + math.sqrt(y) * math.sqrt(z) + math.sqrt(z) * math.sqrt(x)
+        x, y, z = 0.25 * (x + shift), 0.25 * (y + shift), 0.25 * (z + shift)
+    mean = (x + y + z) / 3.0
+    a, b = 1.0 - x / mean, 1.0 - y / mean
+    c = -a - b
+    e2, e3 = a * b - c * c, a * b * c
+    fourth = e2 * e2 / 24.0 - 3.0 * e2 * e3 / 44.0 - 5.0 * e2**3 / 208.0 + 3.0 * e3 * e3 / 104.0 + e2 * e2 * e3 / 16.0
+    return (1.0 - e2 / 10.0 + e3 / 14.0 + fourth) / math.sqrt(mean)
+
+
+@inline
+def first_kind(chi, kc2, quarter):
+    """F(chi | m), 1 - m = kc2, for any chi (DLMF 19.25.5)."""
+    j = math.floor(chi / math.pi + 0.5)
+    s, c = math.sin(chi), math.cos(chi)
+    s = -s if j % 2 else s
+    return 2.0 * quarter * j + s * carlson(c * c, c * c + kc2 * s * s, 1.0)
+
+
+@inline
+def applies(p, phi0, w0):
+    """(kind, mu, miss): NONE, TRIGONOMETRIC with mu and the greatest |g - (mu - 1) f (mu F + n)|, or LIBRATION if b = 0."""
+    b12, b31 = p[B12], p[B31]
+    if p[D] == 0.0 and p[C23] == 0.0 and p[S2] == 0.0 and p[S3] == 0.0:
+        return TRIGONOMETRIC, 1.0, 0.0
+    square = b12 * b12 + b31 * b31
+    if square == 0.0:
+        return LIBRATION, 0.0, 0.0
+    u, v = b12 * b12 - b31 * b31, b12 * b31
+    delta = (p[D] * u + 4.0 * p[C23] * v) / (u * u + 4.0 * v * v)
+    sigma = (p[S2] * b12 + p[S3] * b31) / square
+    rest = 0.5 * abs(p[D] - delta * u) + abs(p[C23] - delta * v)
+    rest += abs(p[S2] - sigma * b12) + abs(p[S3] - sigma * b31)
+    b, F = math.sqrt(square), b12 * math.sin(phi0) + b31 * math.cos(phi0)
+    inner = 0.25 - delta
+    if inner < -SAME:
+        return NONE, 0.0, 0.0
+    root = math.sqrt(inner) if inner > SAME else 0.0
+    for i in range(2):
+        mu = 0.5 + root if i == 0 else (delta / (0.5 + root))
+        n = w0 - mu * F
+        miss = rest + b * (abs((mu - 1.0) * n - sigma) + b * abs(delta - mu * (1.0 - mu)))
+        size = b * (abs(sigma) + abs(delta) * b + abs(mu - 1.0) * (abs(w0) + abs(mu) * b))
+        if miss <= SAME * size:
+            return TRIGONOMETRIC, mu, miss + 8.0 * UNIT * size
+    return NONE, 0.0, 0.0
+
+
+@kernel
+def start(p, phi0, w0, data, pairs):
+    """Fill data for the solution from (phi0, w0); returns (kind, side): x and w are to be multiplied by side."""
+    kind, mu, miss = applies(p, phi0, w0)
+    side = 1.0 if w0 >= 0.0 else -1.0
+    if kind == TRIGONOMETRIC:
+        start_trigonometric(p, phi0, w0, side, mu, miss, data)
+        return kind, side
+    if kind == NONE:
+        return kind, side
+    local(p, phi0, side, data)
+    if w0 == 0.0 and data[A1] + data[A2] < 0.0:
+        side = -1.0
+        data[A1], data[A2] = -data[A1], -data[A2]
+    data[W0] = abs(w0)
+    right, bar_right = reach(data, 1.0)
+    if right == math.inf:
+        return (ROTATION if start_rotation(data, pairs) else LOST), side
+    if w0 == 0.0:
+        left, bar_left = 0.0, 0.0
+    else:
+        left, bar_left = reach(data, -1.0)
+    if not (math.isfinite(left) and math.isfinite(right)):
+        return LOST, side
+    data[LEFT], data[RIGHT], data[BAR_LEFT], data[BAR_RIGHT] = left, right, bar_left, bar_right
+    return (LIBRATION if start_libration(data, pairs) else LOST), side
+
+
+@inline
+def start_trigonometric(p, phi0, w0, side, mu, miss, data):
+    s, c = math.sin(phi0), math.cos(phi0)
+    F, f = side * mu * (p[B12] * s + p[B31] * c), mu * (p[B12] * c - p[B31] * s)
+    b = math.hypot(p[B12], p[B31])
+    data[W0], data[F0], data[SLOPE] = abs(w0), F, f
+    data[ALPHA] = abs(w0) - 2.0 * F
+    data[SQUARE] = data[ALPHA] * abs(w0) - f * f  # n^2 - (mu b)^2
+    data[NOISE] = 6.0 * UNIT * abs(mu) * b + (4.0 * UNIT * abs(w0) if b > 0.0 else 0.0)
+    data[MISS], data[GROWTH] = miss, b * abs(1.0 - mu)
+
+
+@inline
+def drift(data, theta, s, c, low):
+    """Integral of w(0)/w over the time 2 theta, over c^2 where `low` (hyperbolic, c = 1 and s = tanh/Delta) is 1/c^2."""
+    square, f, w0 = data[SQUARE], data[SLOPE], data[W0]
+    z = square * theta * theta
+    third = 2.0 / 3.0 * theta**3 * low if abs(z) < 1e-3 else (theta * low - s * c) / square
+    return theta * low + s * c - 2.0 * f * s * s + (w0 * w0 + f * f) * abs(third)
+
+
+@inline
+def trigonometric_at(data, t):
+    """x, w, bar x, bar w at t >= 0 (50): x = 2 arg((c - f0 s) + i w0 s), s = sin(Delta t/2)/Delta, w = w0/(y1^2 + y2^2)."""
+    w0, f, square = data[W0], data[SLOPE], data[SQUARE]
+    theta, root = 0.5 * t, math.sqrt(abs(data[SQUARE]))
+    if w0 == 0.0:
+        return 0.0, 0.0, data[MISS] * t * t, data[MISS] * t
+    if data[F0] == 0.0 and f == 0.0:
+        x = w0 * t
+        return x, w0, 2.0 * UNIT * x + data[MISS] * t * t, data[MISS] * t
+    turns, low = 0.0, 1.0
+    s, c = theta, 1.0
+    if square > 0.0:
+        turns = math.floor(root * theta / math.pi + 0.5)
+        phase = root * theta - turns * math.pi
+        s, c = math.sin(phase) / root, math.cos(phase)
+        whole, wide = math.sin(root * theta) / root, math.cos(root * theta)
+        total = drift(data, theta, whole, wide, 1.0)
+    elif square < 0.0:
+        s = math.tanh(root * theta) / root
+        low = 1.0 / math.cosh(root * theta) ** 2 if root * theta < 350.0 else 0.0
+        total = drift(data, theta, s, 1.0, low)
+    else:
+        total = drift(data, theta, s, c, 1.0)
+    y1, y2 = w0 * s, c - f * s
+    norm = y1 * y1 + y2 * y2
+    x = 2.0 * (math.atan2(y1, y2) + turns * math.pi)
+    w = w0 * low / norm
+    moved, _most = misfit(data, t, w)
+    bar = (data[NOISE] + moved) * total / norm
+    bar += 16.0 * UNIT * (abs(y1) * (abs(c) + abs(f * s)) + abs(y1 * y2)) / norm + 6.0 * UNIT * (w * t + abs(x))
+    steep = math.hypot(data[F0], f)
+    slope = abs(f * math.cos(x) - data[F0] * math.sin(x)) + steep * bar
+    return x, w, MARGIN * bar, MARGIN * (slope * bar + moved + 4.0 * data[NOISE] + 4.0 * UNIT * w)
+
+
+@inline
+def misfit(data, t, w):
+    """Bound of |w - (mu F + n)| after t, where parameters miss (61) by MISS, and the fastest w."""
+    most = max(data[W0] - data[F0], data[F0] - data[W0]) + math.hypot(data[F0], data[SLOPE])
+    if data[MISS] == 0.0 or data[GROWTH] == 0.0:
+        return data[MISS] * t, most
+    return data[MISS] * t * math.exp(min(2.0 * data[GROWTH] * min(t, 2.0 / max(min(w, data[W0]), 1e-300)), 700.0)), most
+
+
+@inline
+def trigonometric_reach(data, x):
+    """(t, bar t) at which phi0 + x, x >= 0, is reached; t = inf beyond an equilibrium, NaN where rounding cannot tell."""
+    w0, f, square = data[W0], data[SLOPE], data[SQUARE]
+    if data[F0] == 0.0 and f == 0.0:
+        return x / w0, 2.0 * UNIT * x / w0 + data[MISS] * (x / w0) ** 2 / w0
+    root = math.sqrt(abs(square))
+    turns = math.floor(0.5 * x / math.pi + 0.5)
+    rest = 0.5 * x - turns * math.pi
+    y1, y2 = math.sin(rest), w0 * math.cos(rest) + f * math.sin(rest)
+    blur = 4.0 * UNIT * (w0 * abs(math.cos(rest)) + abs(f * y1))
+    if square > 0.0:
+        theta = (math.atan2(root * y1, y2) + turns * math.pi) / root
+        near = y2 * y2 + square * y1 * y1
+        s, c = math.sin(root * theta) / root, math.cos(root * theta)
+        total = drift(data, theta, s, c, 1.0)
+    else:
+        if x >= TWO_PI:
+            return math.inf, 0.0
+        if turns == 1.0:
+            y1, y2 = -y1, -y2
+        margin = y2 - root * y1
+        if margin <= 0.0:
+            return (math.inf if margin < -1e3 * (blur + data[NOISE]) else math.nan), 0.0
+        near = margin * (y2 + root * y1)
+        theta = math.atanh(root * y1 / y2) / root if root > 0.0 else y1 / y2
+        if root * theta > 300.0:
+            return math.nan, 0.0
+        s = math.sinh(root * theta) / root if root > 0.0 else theta
+        total = drift(data, theta, s, math.cosh(root * theta), 1.0)
+    t = 2.0 * theta
+    # the formula is evaluated with rounded data, which moves Delta^2 as well
+    moved, _most = misfit(data, t, near)
+    bar = (data[NOISE] + moved) * total / w0 + 2.0 * abs(y1) * blur / near + 6.0 * UNIT * t
+    bar += 3.0 * UNIT * (abs(x) + 1.0) * w0 / near * 2.0
+    return t, MARGIN * bar
+
+
+@inline
+def start_libration(data, pairs):
+    """Turning points, parameter m and phase of the libration; False where the digits are lost."""
+    left, right = data[LEFT], data[RIGHT]
+    middle, half = 0.5 * (right - left), 0.5 * (right + left)
+    s, c = math.sin(middle), math.cos(middle)
+    s2, c2 = 2.0 * s * c, (c - s) * (c + s)
+    b1, a2, b2 = data[B1] * c - data[A1] * s, data[A2] * c2 + data[B2] * s2, data[B2] * c2 - data[A2] * s2
+    ch, sh = math.cos(half), math.sin(half)
+    # w^2 = sin((x - a)/2) sin((b - x)/2) Q, Q = q0 + q1 cos xi + p1 sin xi, xi = x - middle
+    q0, q1, p1 = -4.0 * b1 - 4.0 * b2 * ch, -4.0 * b2, 4.0 * a2
+    qa, qb = q0 + q1 * ch - p1 * sh, q0 + q1 * ch + p1 * sh
+    first, second = math.hypot(data[A1], data[B1]), math.hypot(data[A2], data[B2])
+    blur = 4.0 * (first + 3.0 * second) * (8.0 * UNIT + data[BAR_LEFT] + data[BAR_RIGHT])
+    if not (qa > 30.0 * blur and qb > 30.0 * blur and sh > 0.0):
+        return False
+    product = math.sqrt(qa) * math.sqrt(qb)
+    beta = (q0 * ch + q1) / product
+    kc2 = 0.5 * (1.0 + beta)
+    if beta < 0.0:
+        kc2 = 0.5 * sh * sh * (q0 * q0 - q1 * q1 - p1 * p1) / (product * product * (1.0 - beta))
+    rho = blur / qa + blur / qb
+    bar = 0.5 * (2.0 * blur / product + abs(beta) * rho)
+    if not kc2 > 30.0 * bar:
+        return False
+    data[RATIO], data[RHO], data[RHO_M] = math.sqrt(qa / qb), rho, bar / kc2
+    data[OMEGA], data[KC2], data[KC] = 0.5 * math.sqrt(product), kc2, math.sqrt(kc2)
+    quarter, _second = complete(0.0, data[KC])
+    data[QUARTER], data[LAST_MEAN] = quarter, means(data[KC], pairs)
+    v = math.sin(0.5 * left) / math.sin(0.5 * right)
+    chi = 2.0 * math.atan(math.sqrt(v / data[RATIO]))
+    data[CHI0], data[THETA0] = chi, first_kind(chi, kc2, quarter)
+    if left == 0.0:
+        data[SLACK] = 0.0
+        return True
+    edge = data[BAR_LEFT] / left + data[BAR_RIGHT] / right + rho + 8.0 * UNIT
+    data[SLACK] = 0.5 * math.sin(chi) * edge / math.sqrt(1.0 - (1.0 - kc2) * math.sin(chi) ** 2)
+    return True
+
+
+@inline
+def phase_bar(data, theta):
+    """Bound of the error of theta - theta0, as time."""
+    whole = theta + data[THETA0]
+    relative = 0.25 * data[RHO] * theta + 0.5 * data[RHO_M] * whole + 12.0 * UNIT * (whole + 1.0)
+    return (relative + data[SLACK]) / data[OMEGA]
+
+
+@inline
+def libration_at(data, pairs, t):
+    """x, w, bar x, bar w, turnings at t >= 0."""
+    theta = data[OMEGA] * t + data[THETA0]
+    _chi, sn, cn, dn, j = amplitude(pairs, int(data[LAST_MEAN]), data[QUARTER], theta)
+    sign = -1.0 if j % 2 else 1.0
+    sn, cn = sign * sn, sign * cn  # of chi itself
+    half, r = 0.5 * (data[LEFT] + data[RIGHT]), data[RATIO]
+    sh, ch = math.sin(half), math.cos(half)
+    low, high = 0.5 * (1.0 + cn), 0.5 * (1.0 - cn)
+    if cn > 0.0:
+        high = 0.5 * sn * sn / (1.0 + cn)
+    else:
+        low = 0.5 * sn * sn / (1.0 - cn)
+    size = (low - r * high) ** 2 + 4.0 * r * low * high * math.cos(0.5 * half) ** 2
+    x = -data[LEFT] + 2.0 * math.atan2(r * high * sh, low + r * high * ch)
+    w = sh * r * data[OMEGA] * sn * dn / size
+    slope = 0.5 * abs(square_of_w(data, x)[1])
+    late = phase_bar(data, theta)
+    # dx/dln r at a fixed chi is 2 r low high sin h / size
+    shape = 0.5 * data[RHO] + data[BAR_LEFT] + data[BAR_RIGHT] + 8.0 * UNIT
+    fixed = data[BAR_LEFT] + data[BAR_RIGHT] + 2.0 * r * low * high * sh / size * shape
+    fixed += 8.0 * UNIT * (1.0 + data[LEFT] + half)
+    cancelled = (low + r * high) ** 2 / size
+    wider = cancelled * (shape + data[RHO]) + data[RHO_M] + data[RHO] + 12.0 * UNIT
+    wider += (data[BAR_LEFT] + data[BAR_RIGHT]) / sh
+    tick = 12.0 * UNIT / (data[OMEGA] * dn)
+    bend = 2.0 * (math.hypot(data[A1], data[B1]) + math.hypot(data[A2], data[B2]))
+    late += tick
+    bar_w = abs(w) * wider + slope * late + bend * late * (abs(w) * late + late * late * bend)
+    turned = theta / (2.0 * data[QUARTER])
+    count = int(math.floor(turned))
+    near = abs(turned - math.floor(turned + 0.5)) * 2.0 * data[QUARTER] / data[OMEGA]
+    certain = near > MARGIN * late or (math.floor(turned + 0.5) == 0.0 and t == 0.0)
+    bar_x = abs(w) * late + bend * late * late + fixed
+    return x, w, MARGIN * bar_x, MARGIN * bar_w, count if certain else -2
+
+
+@inline
+def flight(data, chi, slack):
+    """(t, bar t) at which chi >= chi0 is reached; slack is the error of chi."""
+    theta = first_kind(chi, data[KC2], data[QUARTER])
+    slack += 8.0 * UNIT * (1.0 + abs(chi))
+    slack /= math.sqrt(1.0 - (1.0 - data[KC2]) * math.sin(chi) ** 2)
+    return (theta - data[THETA0]) / data[OMEGA], MARGIN * (phase_bar(data, theta) + slack / data[OMEGA])
+
+
+@inline
+def libration_reach(data, x):
+    """(t, bar t) at which phi0 + x, x in [0, RIGHT], is first reached."""
+    ahead, behind = data[RIGHT] - x, data[LEFT] + x
+    chi = 2.0 * math.atan2(math.sqrt(math.sin(0.5 * behind)), math.sqrt(data[RATIO] * math.sin(0.5 * ahead)))
+    blur = 4.0 * UNIT * (abs(x) + 1.0)
+    edge = (data[BAR_LEFT] + blur) / behind if behind > 0.0 else 0.0
+    edge += (data[BAR_RIGHT] + blur) / ahead if ahead > 0.0 else 0.0
+    slack = 0.5 * math.sin(chi) * (edge + data[RHO])
+    return flight(data, chi, slack)
+
+
+@inline
+def start_rotation(data, pairs):
+    """Complex roots zeta of w^2 (z = e^{ix}) within the circle, w^2 = kappa |z - zeta1|^2 |z - zeta2|^2, and the map.
+
+    Weierstrass (Durand-Kerner) iteration on both roots; the other two are their mirror images. What the product
+    misses of the coefficients is carried as an error of w^2.
+    """
+    a1, b1, a2, b2 = data[A1], data[B1], data[A2], data[B2]
+    mean = data[W0] ** 2 + 2.0 * b1 + b2
+    first, second = complex(-2.0 * b1, -2.0 * a1), complex(-b2, -a2)  # w^2 = mean + Re(first z + second z^2)
+    r, s = 0.31 + 0.17j, -0.23 + 0.29j
+    for _ in range(60):
+        kappa = mean / ((1.0 + abs2(r)) * (1.0 + abs2(s)) + 2.0 * (r * s.conjugate()).real)
+        move1 = quartic(mean, first, second, r) / (kappa * (r - s) * (1.0 - abs2(r)) * (1.0 - s.conjugate() * r))
+        r = inside(r - move1)
+        kappa = mean / ((1.0 + abs2(r)) * (1.0 + abs2(s)) + 2.0 * (r * s.conjugate()).real)
+        move2 = quartic(mean, first, second, s) / (kappa * (s - r) * (1.0 - abs2(s)) * (1.0 - r.conjugate() * s))
+        s = inside(s - move2)
+        if not abs2(move1) + abs2(move2) > 1e-31:
+            break
+    if r == s:
+        s = r + 1e-17
+    kappa = mean / ((1.0 + abs2(r)) * (1.0 + abs2(s)) + 2.0 * (r * s.conjugate()).real)
+    c1 = -2.0 * kappa * (r.conjugate() * (1.0 + abs2(s)) + s.conjugate() * (1.0 + abs2(r)))
+    c2 = 2.0 * kappa * r.conjugate() * s.conjugate()
+    misfit = abs(c1 - first) + abs(c2 - second) + 12.0 * UNIT * (abs(mean) + abs(first) + abs(second))
+    least = kappa * ((1.0 - abs(r)) * (1.0 - abs(s))) ** 2
+    if not (mean > 0.0 and least > 30.0 * misfit):
+        return False
+    gap = (s - r) / (1.0 - r.conjugate() * s)
+    kc2 = (1.0 - abs2(r)) * (1.0 - abs2(s)) / abs2(1.0 - r.conjugate() * s)
+    step = gap / (1.0 + math.sqrt(kc2))
+    centre = (step + r) / (1.0 + r.conjugate() * step)
+    image = (s - centre) / (1.0 - centre.conjugate() * s)
+    scale = abs(1.0 - centre.conjugate() * r) * abs(1.0 - centre.conjugate() * s)
+    data[OMEGA] = (1.0 + abs2(image)) * math.sqrt(kappa) * scale / (1.0 - abs2(centre))
+    data[KC2], data[KC] = kc2, math.sqrt(kc2)
+    data[RE], data[IM], data[TILT] = centre.real, centre.imag, math.atan2(image.imag, image.real) + 0.5 * math.pi
+    data[QUARTER], _second = complete(0.0, data[KC])
+    data[LAST_MEAN], data[LEAST], data[MISFIT] = means(data[KC], pairs), least, misfit
+    data[RHO], data[RHO_M] = 0.0, 0.0
+    data[SLACK] = 16.0 * UNIT * (1.0 + 2.0 / (1.0 - abs(centre))) / data[KC]
+    data[CHI0] = mapped(data, 0.0)
+    data[THETA0] = first_kind(data[CHI0], kc2, data[QUARTER])
+    return True
+
+
+@inline
+def abs2(z):
+    return z.real * z.real + z.imag * z.imag
+
+
+@inline
+def inside(z):
+    """z, or its mirror image in the unit circle."""
+    return z if abs2(z) < 1.0 else 1.0 / z.conjugate()
+
+
+@inline
+def quartic(mean, first, second, z):
+    """z^2 w^2."""
+    return 0.5 * (((second * z + first) * z + 2.0 * mean) * z + first.conjugate()) * z + 0.5 * second.conjugate()
+
+
+@inline
+def mapped(data, x):
+    """chi at phi0 + x."""
+    c = complex(data[RE], data[IM])
+    v = 1.0 - c * complex(math.cos(x), -math.sin(x))
+    return x + 2.0 * math.atan2(v.imag, v.real) - data[TILT]
+
+
+@inline
+def rotation_at(data, pairs, t):
+    """x, w, bar x, bar w at t >= 0."""
+    theta = data[OMEGA] * t + data[THETA0]
+    chi, _sn, _cn, dn, _j = amplitude(pairs, int(data[LAST_MEAN]), data[QUARTER], theta)
+    angle = chi + data[TILT]
+    v = 1.0 + complex(data[RE], -data[IM]) * complex(math.cos(angle), math.sin(angle))
+    x = angle - 2.0 * math.atan2(v.imag, v.real)
+    w = data[OMEGA] * dn * (1.0 - data[RE] ** 2 - data[IM] ** 2) / abs2(v)
+    late = rotation_bar(data, abs(theta - data[THETA0]), t)
+    slope = 0.5 * abs(square_of_w(data, x)[1]) / w
+    centre = math.hypot(data[RE], data[IM])
+    bar = w * late + 8.0 * UNIT * (abs(x) + w / (data[OMEGA] * dn) + 2.0 / (1.0 - centre))
+    bend = 2.0 * (math.hypot(data[A1], data[B1]) + math.hypot(data[A2], data[B2])) / w
+    bar += bend * late * late * w
+    return x, w, MARGIN * bar, MARGIN * (slope * bar + bend * bar * bar + 0.5 * data[MISFIT] / w + 12.0 * UNIT * w)
+
+
+@inline
+def rotation_bar(data, theta, t):
+    centre = math.hypot(data[RE], data[IM])
+    return phase_bar(data, theta + abs(data[THETA0])) + t * (
+        0.5 * data[MISFIT] / data[LEAST] + 16.0 * UNIT / (1.0 - centre)
+    )
+
+
+@inline
+def rotation_reach(data, x):
+    """(t, bar t) at which phi0 + x is reached."""
+    chi = mapped(data, x)
+    t, bar = flight(data, chi, 8.0 * UNIT * (1.0 + abs(x)))
+    return t, bar + MARGIN * (
+        rotation_bar(data, 0.0, t) + data[SLACK] / data[OMEGA] + 8.0 * UNIT * abs(x) / math.sqrt(data[LEAST])
+    )
+
+
+@inline
+def scratch():
+    """Empty data and pairs."""
+    return np.zeros(SIZE), np.zeros((2, MEANS))

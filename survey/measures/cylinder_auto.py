@@ -1,0 +1,37 @@
+"""Method "auto" for flows on the cylinder: closed forms where they apply and keep their digits, point by point."""
+
+import numpy as np
+
+from survey.kernels.along import EQUILIBRIUM, OK, UNTOLD
+from survey.measures import cylinder
+from survey.methods import closed
+
+
+def trajectories(method, rows, times, rtol):
+    """As `cylinder.trajectories`: in closed form, and by `method` where that has no answer or too wide a bar."""
+    results = cylinder.trajectories(closed, rows, times, rtol)
+    missed = cylinder.missed(results, rtol) | (results[1] == UNTOLD)
+    results[0][missed & (results[1] == UNTOLD)] = np.nan
+    results[2][missed & (results[1] == UNTOLD) & (results[2] == OK)] = closed.NO_CONVERGENCE
+    return _completed(results, missed, lambda some, at: cylinder.trajectories(method, some, at, rtol), rows, times)
+
+
+def abel(method, rows, targets, rtol):
+    """As `cylinder.abel`, likewise."""
+    results = cylinder.abel(closed, rows, targets, rtol)
+    missed = cylinder.missed(results, rtol) & (results[-1] != EQUILIBRIUM)
+    return _completed(results, missed, lambda some, at: cylinder.abel(method, some, at, rtol), rows, targets)
+
+
+def _completed(results, missed, solve, rows, places):
+    """`results` with those of `solve` put in where they are missed and `solve` does no worse."""
+    some = missed.any(axis=1)
+    if not some.any():
+        return results
+    others = solve(rows[some], np.where(missed[some], places[some], np.inf))
+    old = [result[some] for result in results]
+    take = missed[some] & (cylinder.badness(others) <= cylinder.badness(old))
+    for result, held, new in zip(results, old, others, strict=True):
+        held[take] = new[take]
+        result[some] = held
+    return results
