@@ -19,7 +19,7 @@ from survey.measures.cylinder_fate import EXACT, I0, G, followed, remembered, si
 from survey.status import NO_CONVERGENCE, OK
 
 CYCLES, EQUILIBRIA = 8, 4  # places; surveys of random points found no more than 4 cycles, and g has 4 roots at most
-ROTATION_PLUS, ROTATION_MINUS, LIBRATION = range(3)
+NONE, ROTATION_PLUS, ROTATION_MINUS, LIBRATION = range(4)
 TOO_MANY = 19  # as in the STATUS of scenes/gyrostat.py
 UNDECIDED, DEGENERATE, STABLE = -1, 0, 1
 COUNTS = ("equilibria", "saddles", "rotations_plus", "rotations_minus", "librations")
@@ -35,7 +35,7 @@ def empty(count, status):
     for name in ("stratum", "end_plus", "end_minus", *COUNTS, "verdict"):
         result[name] = np.full(count, -1, dtype=np.int64)
     for name, places in (("equilibrium_type", EQUILIBRIA), ("cycle_kind", CYCLES)):
-        result[name] = np.full((count, places), -1, dtype=np.int64)
+        result[name] = np.full((count, places), NONE, dtype=np.int64)
     return result | {"status": np.full(count, status, dtype=np.int64)}
 
 
@@ -47,7 +47,7 @@ def solve(method, systems, rtol):
         result["verdict"][i] = _verdict(method, s, rtol)
         _ends(s, six, result, i)
         _rests(s, result, i)
-        cycles = [(kind, row) for kind, table in enumerate((s.plus, s.minus, s.librations)) for row in table]
+        cycles = [(kind, row) for kind, table in enumerate((s.plus, s.minus, s.librations), 1) for row in table]
         if len(cycles) > CYCLES:
             result["verdict"][i], result["status"][i] = UNDECIDED, TOO_MANY
         listed += [(i, place, kind, row, s, six) for place, (kind, row) in enumerate(cycles[:CYCLES])]
@@ -81,11 +81,11 @@ def _rests(s, result, i):
 
 
 def _type(row):
-    """0 saddle, 1 to 6 node or focus: attracting, weak (f = 0 within the bar), repelling; 7 degenerate."""
+    """1 saddle, 2 to 7 node or focus: attracting, weak (f = 0 within the bar), repelling; 8 degenerate."""
     kind = int(row[eq.KIND])
     if kind in (eq.NODE, eq.FOCUS):
-        return 2 + int(row[eq.STABLE]) + 3 * (kind == eq.FOCUS)
-    return 0 if kind == eq.SADDLE else 7
+        return 3 + int(row[eq.STABLE]) + 3 * (kind == eq.FOCUS)
+    return 1 if kind == eq.SADDLE else 8
 
 
 def _verdict(method, s, rtol):

@@ -81,11 +81,11 @@ _FATES = {
     "spin_up_plus": 5, "spin_up_minus": 6, "periodic_rotation": 7, "periodic_libration": 8, "equilibrium_start": 9,
 }  # fmt: skip
 _ENDS = {"repelling": 0, "neutral": 1, "attracting": 2}
-_TYPES = ("saddle", "attracting_node", "weak_node", "repelling_node", "attracting_focus", "weak_focus",
+_TYPES = ("none", "saddle", "attracting_node", "weak_node", "repelling_node", "attracting_focus", "weak_focus",
           "repelling_focus", "degenerate")  # fmt: skip
 DIMENSIONS = {
-    "equilibrium": np.arange(cylinder_portrait.EQUILIBRIA),
-    "cycle": np.arange(cylinder_portrait.CYCLES),
+    "equilibrium": np.arange(1, cylinder_portrait.EQUILIBRIA + 1),
+    "cycle": np.arange(1, cylinder_portrait.CYCLES + 1),
 }
 
 OUTPUTS = (
@@ -126,13 +126,13 @@ OUTPUTS = (
     Output("equilibrium_phi", "angle of the equilibrium, ascending in [0, 2 pi)", r"\varphi_e", units="rad",
            when=_PORTRAIT, dims=("equilibrium",), applies="at as many places as there are equilibria"),
     Output("equilibrium_type", "type of the equilibrium", flags={name: i for i, name in enumerate(_TYPES)},
-           when=_PORTRAIT, dims=("equilibrium",), applies="at as many places as there are equilibria"),
-    Output("cycle_kind", "kind of the cycle: rotations by |w|, then librations by their right turning point",
-           flags={"rotation_plus": 0, "rotation_minus": 1, "libration": 2}, when=_PORTRAIT, dims=("cycle",),
-           applies="at as many places as there are cycles"),
-    Output("cycle_w", "velocity where the cycle passes the saddle of highest V (phi = 0 if no saddle); w > 0 of a "
-           "libration at the equilibrium next to the left of its right turning point", "w_c", when=_PORTRAIT,
-           dims=("cycle",), applies="at as many places as there are cycles"),
+           when=_PORTRAIT, dims=("equilibrium",), fill=0, applies="at as many places as there are equilibria"),
+    Output("cycle_kind", "kind of the cycle", when=_PORTRAIT, dims=("cycle",), fill=0,
+           flags={"none": 0, "rotation_plus": 1, "rotation_minus": 2, "libration": 3},
+           applies="rotations by |w|, then librations by their right turning points"),
+    Output("cycle_w", "velocity of the cycle on its section", "w", when=_PORTRAIT, dims=("cycle",),
+           applies="rotations: at the saddle of highest V (phi = 0 if no saddle); librations: the w > 0 at the "
+           "equilibrium next to the left of their right turning point"),
     Output("cycle_multiplier", "Floquet multiplier of the cycle", "m", when=_PORTRAIT, dims=("cycle",),
            applies="at as many places as there are cycles"),
     Output("cycle_period", "period of the cycle", "T", when=_PORTRAIT, dims=("cycle",),
