@@ -203,7 +203,13 @@ def _curve(axes, ds, variable, state):
     if "flag_values" in variable.attrs:
         for height, (name, code) in enumerate(_flags(variable).items()):
             here = x.values[variable.values == code]
-            axes.plot(here, np.full(here.size, height), "s", markersize=4, color=_palette(_flags(variable))[name])
+            axes.plot(
+                here,
+                np.full(here.size, height),
+                "s",
+                markersize=4,
+                color=_palette(_flags(variable)).get(name, "#444444"),
+            )
         names = [name.replace("_", " ") for name in _flags(variable)]
         axes.set_yticks(range(len(names)), names, fontsize=8)
     else:

@@ -104,7 +104,7 @@ def test_scattered_points_have_the_same_bits_as_a_grid(scene, options):
     point = draw(scene, options, 4)
     grid = evaluate(scene, options, point)
     axes = [name for name in point if np.ndim(point[name])]
-    flat = grid.stack(point=grid.status.dims).reset_index("point")
+    flat = grid.stack(point=grid.status.dims).reset_index("point").transpose("point", ...)
     given = point | {name: flat[name].drop_attrs().reset_coords(drop=True) for name in axes}
     scattered = evaluate(scene, options, given)
     for name in scattered.data_vars:
