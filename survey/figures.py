@@ -201,15 +201,11 @@ def _widened(values):
 def _curve(axes, ds, variable, state):
     x = variable[variable.dims[0]]
     if "flag_values" in variable.attrs:
+        palette = _palette(_flags(variable))
         for height, (name, code) in enumerate(_flags(variable).items()):
             here = x.values[variable.values == code]
-            axes.plot(
-                here,
-                np.full(here.size, height),
-                "s",
-                markersize=4,
-                color=_palette(_flags(variable)).get(name, "#444444"),
-            )
+            colour = palette.get(name, "#444444")
+            axes.plot(here, np.full(here.size, height), "s", markersize=4, color=colour)
         names = [name.replace("_", " ") for name in _flags(variable)]
         axes.set_yticks(range(len(names)), names, fontsize=8)
     else:

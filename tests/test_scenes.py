@@ -128,6 +128,8 @@ def test_one_bad_point_costs_one_point(scene, options):
 @seeds
 def test_the_methods_check_one_another(scene, options, seed):
     point = draw(scene, options, seed)
+    if scene.cost(options, {name: np.size(values) for name, values in point.items()}) > 1e-3:
+        point = {name: np.ravel(values)[0] for name, values in point.items()}  # the slowest methods take seconds
     auto = evaluate(scene, options, point, rtol=1e-9)
     for method in workflow.methods_of(scene):
         assert agree(auto, evaluate(scene, options, point, rtol=1e-6, method=method)) == [], method
