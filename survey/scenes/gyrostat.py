@@ -145,7 +145,7 @@ OUTPUTS = (
 def cost(options, sizes):
     """Seconds per point, rough: one solution serves its dense outputs, one set of cycles all fates of a system."""
     if options["question"] == "portrait":
-        return 7e-3
+        return 8e-3
     if options["question"] != "fate":
         return 7e-5 / sizes.get("t", sizes.get("phi", 1)) + 2e-7
     return 1.3e-4 + 6e-3 / (sizes["phi0"] * sizes["w0"])
