@@ -14,6 +14,7 @@ from survey import workflow as workflows
 from survey.dataset import count, counts, describe, error_bars, layout, percent
 from survey.errors import BadInput
 from survey.grid import Grid, line
+from survey.scene import exists
 
 
 def run(workflow, output=None, workers=None, scheduler=None, fresh=False):
@@ -149,10 +150,10 @@ def _check_dimensions(module, given):
         raise BadInput(
             f"the parameters' coordinates disagree: {str(error).splitlines()[0]}; align them first"
         ) from None
-    outputs = {output.name for output in module.OUTPUTS} | {"status"}
+    outputs = {output.name for output in module.OUTPUTS} | {"status", *getattr(module, "DIMENSIONS", ())}
     for key, array in given.items():
         for dim in set(array.dims) & outputs - {key}:
-            raise BadInput(f"{key}: its dimension {dim!r} bears an output's name; rename the dimension")
+            raise BadInput(f"{key}: its dimension {dim!r} bears the name of an output or of its dimension; rename it")
 
 
 def _check_lone_values(used, given):
@@ -197,7 +198,7 @@ def _lazy(module, scene, request, given):
         solved = engine.solve_point(module, request, dict(zip(names, wide, strict=True)), shape)
         return tuple(solved[name] for name in table)
 
-    outputs = {o.name: o for o in module.OUTPUTS}
+    outputs = {o.name: o for o in module.OUTPUTS if exists(o, request.options)}
     extra = [outputs.get(name.removesuffix("_error")) for name in table]
     results = xr.apply_ufunc(
         solve,
@@ -225,7 +226,10 @@ def scene(name):
         "options": {
             o.name: f"{o.long_name}: {' | '.join(o.choices)} (default {o.default}){_beside(o)}" for o in module.OPTIONS
         },
-        "outputs": {o.name: _output_line(o) for o in module.OUTPUTS},
+        "outputs": {
+            o.name: " | ".join(_output_line(other) for other in module.OUTPUTS if other.name == o.name)
+            for o in module.OUTPUTS
+        },
         "status": {key: sentence for key, (_, sentence) in status.table(module).items()},
         "methods": {"auto": "the method of each region, chosen for you (default)"}
         | {m: _method_line(m) for m in workflows.methods_of(module)},

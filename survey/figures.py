@@ -12,6 +12,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 
 from survey import modules, status
 from survey.dataset import percent
@@ -77,7 +78,8 @@ def _map(axes, ds, variable, state):
         shown = np.ma.masked_invalid(shown)
         look = {"cmap": "viridis", "shading": "nearest", "rasterized": True}
         drawn = axes.pcolormesh(x[some[0]], y[some[1]], shown.T, **look, **_limits(shown))
-        axes.figure.colorbar(drawn, ax=axes, label=_label(variable))
+        whole = MaxNLocator(integer=True) if variable.dtype.kind == "i" else None
+        axes.figure.colorbar(drawn, ax=axes, label=_label(variable), ticks=whole)
         axes.set_facecolor("#dddddd")
         handles = _marks(axes, x, y, failed, "failed") + _marks(axes, x, y, outside, "outside the domain")
         handles += [Patch(color="#dddddd", label="does not apply")] if shown.mask.any() else []
@@ -199,9 +201,11 @@ def _widened(values):
 def _curve(axes, ds, variable, state):
     x = variable[variable.dims[0]]
     if "flag_values" in variable.attrs:
+        palette = _palette(_flags(variable))
         for height, (name, code) in enumerate(_flags(variable).items()):
             here = x.values[variable.values == code]
-            axes.plot(here, np.full(here.size, height), "s", markersize=4, color=_palette(_flags(variable))[name])
+            colour = palette.get(name, "#444444")
+            axes.plot(here, np.full(here.size, height), "s", markersize=4, color=colour)
         names = [name.replace("_", " ") for name in _flags(variable)]
         axes.set_yticks(range(len(names)), names, fontsize=8)
     else:
@@ -248,7 +252,7 @@ def _label(variable):
 def _title(ds, variable):
     """The survey's title, what is drawn, and the numbers that are fixed and not zero."""
     lines = [ds.attrs.get("title", ""), variable.attrs.get("long_name", variable.name)]
-    fixed = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind == "f"]
+    fixed = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "fi"]
     fixed = [c for c in fixed if c.name in ds.dims or float(c) != 0]
     of = {c.name: f" (1 of {ds.sizes[c.name]})" for c in fixed if c.name in ds.dims}
     numbers = ", ".join(f"${c.attrs.get('symbol') or c.name} = {float(c):.6g}${of.get(c.name, '')}" for c in fixed)

@@ -25,7 +25,9 @@ SAME = 64.0 * UNIT  # how far, relative, parameters may miss the conditions of (
 # places in data
 W0, A1, B1, A2, B2 = range(5)  # g(phi0 + x) = A1 cos x + B1 sin x + A2 cos 2x + B2 sin 2x
 F0, SLOPE, ALPHA, SQUARE, NOISE, MISS, GROWTH = range(5, 12)  # kind 1
-LEFT, RIGHT, BAR_LEFT, BAR_RIGHT, RATIO, RHO, RHO_M, THETA0, OMEGA, KC, KC2, QUARTER, LAST_MEAN, SLACK, CHI0 = range(5, 20)
+LEFT, RIGHT, BAR_LEFT, BAR_RIGHT, RATIO, RHO, RHO_M, THETA0, OMEGA, KC, KC2, QUARTER, LAST_MEAN, SLACK, CHI0 = range(
+    5, 20
+)
 RE, IM, TILT, LEAST, MISFIT = range(20, 25)  # kind 3
 MARGIN = 1.5
 

@@ -157,16 +157,17 @@ def crossing_time(at, p, T, target, h):
 
 
 @inline
-def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, phi0, w0, tolerance, limit, out):
+def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, start, tolerance, limit, out):
     """Fill out = verdict, index of the limit, turnings, unwrapped turns of the limit, status.
 
-    The index is a row of eqs (verdicts 0, 9), of plus or minus (2, 3) or of lib (4). sizes = numbers of rows of
-    these, then the stratum and whether weak foci attract.
+    start = phi0, w0 and their bars. The index is a row of eqs (verdicts 0, 9), of plus or minus (2, 3) or of lib (4).
+    sizes = numbers of rows of these, then the stratum and whether weak foci attract.
     """
     count, n_plus, n_minus, n_lib, stratum, weak = sizes[0], sizes[1], sizes[2], sizes[3], sizes[4], sizes[5] > 0
     out[0], out[1], out[2], out[3], out[4] = UNDECIDED, -1, UNTOLD, NO_TURNS, OK
+    phi0, w0 = start[0], start[1]
     phi, turns = reduced(phi0)
-    w, slip = w0, 4.0 * UNIT * (turns != 0.0)
+    w, slip = w0, start[2] + 4.0 * UNIT * (turns != 0.0)
     if w == 0.0:
         for i in range(count):
             x, k = offset(phi, eqs[i, ANGLE])
@@ -175,7 +176,7 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, phi
                 return
     T = table()
     how = setting(p, w0, tolerance)
-    saa, sab, sbb, n, turnings = slip * slip, 0.0, 0.0, 0, 0
+    saa, sab, sbb, n, turnings = slip * slip, 0.0, start[3] * start[3], 0, 0
     sign = start_sign(p, phi, w)
     before, before_bar = -1.0, 0.0  # last passage of the section without a turning since
     right, right_bar, left = math.nan, 0.0, math.nan  # last turning points, unwrapped from `turns` = base
@@ -292,9 +293,8 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, phi
 
 @inline
 def fates(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out):
-    """`fate` for each row (phi0, w0) of starts."""
+    """`fate` for each row (phi0, w0 and their bars) of starts."""
     for i in range(len(starts)):
-        phi, w = starts[i, 0], starts[i, 1]
-        fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, phi, w, tolerance, limit, out[i])
+        fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, starts[i], tolerance, limit, out[i])
         if out[i, 0] != UNDECIDED:
             out[i, 4] = OK

@@ -122,15 +122,17 @@ def fixed_points(image_of, kind, p, eqs, count, place, interval, xs, tolerance, 
     """All fixed points on the lattice xs (ascending), appended to `cycles`; returns their number.
 
     Borders of a class are bisected, so that a fixed point beside one is not lost; where D has no change of sign but
-    dips towards 0, the dip is followed down (a pair of cycles near its fold). edges = (w_c, w_d) of a rotation, and
-    D at the last node with its bar.
+    dips towards 0, the dip is followed down (a pair of cycles near its fold). edges = (w_c, w_d) of a rotation, D
+    and its bar at the last node and at the first, the number of nodes without an answer.
     """
     nodes = np.zeros((MOST_NODES, 7))
     size = scan(image_of, kind, p, eqs, count, place, xs, tolerance, nodes)
     edges[0], edges[1], edges[2], edges[3] = math.nan, math.nan, nodes[size - 1, CHANGE], nodes[size - 1, ERROR]
+    edges[4], edges[5], edges[6] = nodes[0, CHANGE], nodes[0, ERROR], 1.0 * (nodes[0, CLASS] == UNKNOWN)
     m = np.zeros(7)
     for i in range(1, size):
         a, b = nodes[i - 1], nodes[i]
+        edges[6] += b[CLASS] == UNKNOWN
         if b[CLASS] == 1.0 and a[CLASS] != 1.0:
             edges[0], edges[1] = b[X], b[X] + b[CHANGE]
         if a[CLASS] <= 0.0 or a[CLASS] != b[CLASS] or found + 2 > len(cycles) or b[X] <= a[X]:

@@ -25,6 +25,7 @@ STEPS = 20_000  # budget of one fate: about 15 ms
 MORE = 10  # times the budget for those that use it up
 MOST = 2_000_000  # steps in all
 BATCH = 50  # fates per kernel call, so that a call stays below a second
+LEAST = 1e-6  # slowest rotation of the lattice, in velocities of the system
 FINE = 1e-16  # truncation per step for cycles, or the finest of the method
 
 
@@ -39,13 +40,8 @@ def empty(size, status):
 
 def solve(method, six, starts, rtol, result, where):
     """Fates at one parameter point, written into `result` (see `empty`) at the indices `where`."""
-    s = _remembered(method.__name__, tuple(float(value) for value in six))
-    first, second = tolerances(method, rtol)
-    out = fates(method, s, starts, first)
-    for code, tolerance, more in ((STEP_LIMIT, first, MORE), (SEPARATRIX, second, MORE)):
-        again = out[:, 4] == code
-        if again.any():
-            out[again] = fates(method, s, starts[again], tolerance, more)
+    s = remembered(method, six)
+    out = followed(method, s, starts, rtol)
     result["verdict"][where], result["turnings"][where], result["status"][where] = out[:, 0], out[:, 2], out[:, 4]
     result["net_turns"][where] = out[:, 3]
     for i, row in zip(where, out, strict=True):
@@ -54,6 +50,17 @@ def solve(method, six, starts, rtol, result, where):
     turns = np.trunc((middle + 2.0 * math.pi * out[:, 3] - starts[:, 0]) / (2.0 * math.pi))
     told = np.isfinite(turns) & (out[:, 0] != kf.PERIODIC_LIBRATION)
     result["net_turns"][where[told]] = turns[told]
+
+
+def followed(method, s, starts, rtol):
+    """`fates` of the skeleton s, once more with more effort where they are not decided."""
+    first, second = tolerances(method, rtol)
+    out = fates(method, s, starts, first)
+    for code, tolerance in ((STEP_LIMIT, first), (SEPARATRIX, second)):
+        again = out[:, 4] == code
+        if again.any():
+            out[again] = fates(method, s, starts[again], tolerance, MORE)
+    return out
 
 
 def _middles(s, out):
@@ -91,9 +98,13 @@ def _limits(s, row, result, i):
         result["multiplier_error"][i] = cycle[rt.MULTIPLIER_BAR]
 
 
+def remembered(method, six):
+    """The skeleton of the parameter point `six`; blocks of one survey share it."""
+    return _remembered(method.__name__, tuple(float(value) for value in six))
+
+
 @lru_cache(maxsize=256)
 def _remembered(method, six):
-    """The skeleton of the parameter point `six`, by the method of that name; blocks of one survey share it."""
     return skeleton(sys.modules[method], six)
 
 
@@ -112,16 +123,23 @@ class Skeleton:
     minus: np.ndarray
     librations: np.ndarray
     thresholds: np.ndarray  # (w_c, w_d) of the two rotation maps; NaN where every turn from w > 0 is completed
+    conclusive: bool  # do the signs of D fit together (so the parity law holds), and did every map answer?
+
+
+def sizes(b12, b31, d, c23, s2, s3):
+    """Sums of the magnitudes of the terms of K and of L."""
+    b = math.hypot(b12, b31)
+    return abs(b12 * s3) + abs(b31 * s2), math.pi * (abs(c23) * b * b + abs(d * b12 * b31))
 
 
 def constants(b12, b31, d, c23, s2, s3):
     """K and L, which decide the ends; 0 where they vanish within rounding."""
-    b = math.hypot(b12, b31)
     K = b12 * s3 - b31 * s2
     L = 0.5 * math.pi * (c23 * (b12 * b12 - b31 * b31) - d * b12 * b31)
-    K = 0.0 if abs(K) <= EXACT * (abs(b12 * s3) + abs(b31 * s2)) else K
-    L = 0.0 if abs(L) <= EXACT * math.pi * (abs(c23) * b * b + abs(d * b12 * b31)) else L
-    return K, L
+    return tuple(
+        0.0 if abs(value) <= EXACT * size else value
+        for value, size in zip((K, L), sizes(b12, b31, d, c23, s2, s3), strict=True)
+    )
 
 
 def stratum_of(b12, b31, d, c23, s2, s3):
@@ -146,11 +164,13 @@ def skeleton(method, six):
     section = _section(p, eqs)
     none, thresholds = np.zeros((0, 10)), np.full((2, 2), np.nan)
     if stratum != G:
-        return Skeleton(p, stratum, K, L, ends, section, eqs, none, none, none, thresholds)
-    plus, thresholds[0] = _rotations(method, six, eqs, section, K, L)
+        return Skeleton(p, stratum, K, L, ends, section, eqs, none, none, none, thresholds, True)
+    plus, thresholds[0], first = _rotations(method, six, eqs, section, K, L)
     mirrored = [six[0], -six[1], six[2], -six[3], -six[4], six[5]]
-    minus, thresholds[1] = _rotations(method, mirrored, eqs, -section, K, -L)
-    return Skeleton(p, stratum, K, L, ends, section, eqs, plus, minus, _librations(method, p, eqs), thresholds)
+    minus, thresholds[1], second = _rotations(method, mirrored, _mirrored(eqs), -section, K, -L)
+    librations, third = _librations(method, p, eqs)
+    conclusive = first and second and third
+    return Skeleton(p, stratum, K, L, ends, section, eqs, plus, minus, librations, thresholds, conclusive)
 
 
 def _section(p, eqs):
@@ -164,20 +184,28 @@ def _section(p, eqs):
     return float(highest - 2.0 * math.pi if highest > math.pi else highest)
 
 
+def _mirrored(eqs):
+    """The equilibria under S2."""
+    turned = eqs.copy()
+    turned[:, eq.ANGLE] = -eqs[:, eq.ANGLE] % (2.0 * math.pi)
+    return turned
+
+
 def _rotations(method, six, eqs, section, K, L):
-    """Cycles with w > 0 of the system `six`, ascending in w, and (w_c, w_d)."""
+    """Cycles with w > 0 of the system `six`, ascending in w; (w_c, w_d); are they conclusive?"""
     p = np.ascontiguousarray(coefficients(*six))
     scale = p[BOUND_F] + math.sqrt(p[BOUND_DG])
-    table, edges, fine = np.zeros((rt.MOST_CYCLES, 10)), np.zeros(4), max(FINE, method.FLOW_FINEST)
-    xs = scale * np.geomspace(1e-6, 30.0, 80)
+    table, edges, fine = np.zeros((rt.MOST_CYCLES, 10)), np.zeros(7), max(FINE, method.FLOW_FINEST)
+    xs = scale * np.geomspace(LEAST, 30.0, 80)
     found = method.flow_cycles(rt.ROTATION, p, eqs, len(eqs), section, 0, xs, fine, table, 0, edges)
-    border = edges[:2].copy()
+    border, start, untold = edges[:2].copy(), edges[4], edges[6]
     end = np.sign(K) if K != 0.0 else np.sign(L)
     top, change, error = xs[-1], edges[2], edges[3]
     while change * end < 0.0 and abs(change) > 4.0 * error and top < 1e5 * scale and found < len(table) - 1:
         xs = top * np.array([1.0, 1.3, 1.7, 2.2, 3.0])
         before = found
         found = method.flow_cycles(rt.ROTATION, p, eqs, len(eqs), section, 0, xs, fine, table, found, edges)
+        untold += edges[6]
         if found > before and (found - before) % 2:
             break
         top, change, error = xs[-1], edges[2], edges[3]
@@ -185,7 +213,11 @@ def _rotations(method, six, eqs, section, K, L):
     last = cycles[-1, rt.ABOVE] if found else np.sign(change)
     if last * end < 0.0 and K != 0.0:
         cycles = np.vstack([cycles, _far_cycle(p, section, K, L, scale)])
-    return cycles, border
+    # where every turn is completed, D tends to w_d > 0 as w -> 0: cycles below the lattice need w_d below it too
+    near = np.sign(border[1] - border[0]) if border[0] > 0.0 else np.sign(start)
+    sure = border[0] > 0.0 or start > LEAST * scale
+    sides = [near, *(cycles[:, rt.ABOVE])], [*cycles[:, rt.BELOW], end]
+    return cycles, border, bool(untold == 0.0 and sure and found < len(table) - 2 and sides[0] == sides[1])
 
 
 def _far_cycle(p, section, K, L, scale):
@@ -202,23 +234,25 @@ def _far_cycle(p, section, K, L, scale):
 
 
 def _librations(method, p, eqs):
-    """Libration cycles, by their right turning point, of every interval where g < 0."""
-    table, edges, fine, found = np.zeros((rt.MOST_CYCLES, 10)), np.zeros(4), max(FINE, method.FLOW_FINEST), 0
-    share = 1.0 / (1.0 + np.exp(-np.linspace(-11.0, 11.0, 56)))
+    """Libration cycles, by their right turning point, of every interval where g < 0; are they conclusive?"""
+    table, edges, fine, found = np.zeros((rt.MOST_CYCLES, 10)), np.zeros(7), max(FINE, method.FLOW_FINEST), 0
+    share, sure = 1.0 / (1.0 + np.exp(-np.linspace(-11.0, 11.0, 56))), True
     for i, row in enumerate(eqs):
         if row[eq.DG] < 0.0 and row[eq.KIND] != eq.DEGENERATE:
             high = eqs[i + 1, eq.ANGLE] if i + 1 < len(eqs) else eqs[0, eq.ANGLE] + 2.0 * math.pi
             xs = row[eq.ANGLE] + share * (high - row[eq.ANGLE])
             found = method.flow_cycles(rt.LIBRATION, p, eqs, len(eqs), high, i, xs, fine, table, found, edges)
-    return table[:found]
+            against = row[eq.KIND] == eq.FOCUS and edges[4] * row[eq.STABLE] < 0.0 and abs(edges[4]) > edges[5]
+            sure = sure and not against and edges[6] == 0.0
+    return table[:found], bool(sure and found < len(table) - 2)
 
 
 def fates(method, skeleton, starts, tolerance, more=1):
-    """Verdict, row of the limit, turning points, turns of the limit, status, for rows (phi0, w0) of `starts`."""
+    """Verdict, row of the limit, turning points, turns of the limit, status: for rows phi0, w0 (and their bars)."""
     if skeleton.stratum in (I0, I1):
         return (_free if skeleton.stratum == I0 else _conservative)(skeleton, starts)
     out = np.zeros((len(starts), 5))
-    s = skeleton
+    s, starts = skeleton, np.pad(starts, ((0, 0), (0, 4 - starts.shape[1])))
     section = s.section if s.stratum == G else math.atan2(s.p[0], s.p[1])
     sizes = np.array([len(s.equilibria), len(s.plus), len(s.minus), len(s.librations),
                       kf.GENERIC if s.stratum == G else kf.REVERSIBLE, int(s.K < 0.0)])  # fmt: skip

@@ -22,13 +22,19 @@ a stable separatrix are -1 (status `separatrix`).
 
 `auto` takes trajectories and Abel solutions in closed form where one applies (method `closed`), else by Taylor series.
 
-Questions: `trajectory` (phi and w at t), `abel` (w and t at phi) and `fate` (where the solution ends).
+A portrait is what the fates of a system share: ends, equilibria, cycles, and whether small changes of the parameters
+keep them all. It is structurally stable where, by the error bars, K is off zero (L, where K = 0 exactly), no
+equilibrium is degenerate or a Hopf point, no multiplier is 1, the signs of the return maps fit together (so the parity
+law holds), and every unstable branch of a saddle ends elsewhere than in a saddle; near saddle connections it is -1.
+
+Questions: `trajectory` (phi and w at t), `abel` (w and t at phi), `fate` (where the solution ends) and `portrait` (of
+the system, without an initial state).
 """
 
 import numpy as np
 
 from survey import methods
-from survey.measures import cylinder, cylinder_auto, cylinder_fate
+from survey.measures import cylinder, cylinder_auto, cylinder_fate, cylinder_portrait
 from survey.measures.cylinder_fate import NO_TURNS
 from survey.modules import load
 from survey.scene import Option, Output, Parameter
@@ -46,7 +52,9 @@ _LARGE, _FAR = (
     {"minimum": -1e9, "maximum": 1e9},
 )  # beyond, binary64 has no digits left
 _SYSTEM = ("b12", "b31", "d", "c23", "s2", "s3")
-_TIME, _ABEL, _FATE = ({"question": (name,)} for name in ("trajectory", "abel", "fate"))
+_QUESTIONS = ("fate", "trajectory", "abel", "portrait")
+_FATE, _TIME, _ABEL, _PORTRAIT = ({"question": (name,)} for name in _QUESTIONS)
+_STARTS = {"question": _QUESTIONS[:3]}
 
 PARAMETERS = (
     Parameter("b12", "Barnett-London coefficient B12 / A11", "b_{12}", default=0.0, **_LARGE),
@@ -55,24 +63,33 @@ PARAMETERS = (
     Parameter("c23", "potential matrix element C23 / A11", "c_{23}", default=0.0, **_LARGE),
     Parameter("s2", "component s2 / A11 of the centre of mass vector", "s_2", default=0.0, **_LARGE),
     Parameter("s3", "component s3 / A11 of the centre of mass vector", "s_3", default=0.0, **_LARGE),
-    Parameter("phi0", "initial angle of rotation", r"\varphi_0", units="rad", default=0.0, **_FAR),
-    Parameter("w0", "initial angular velocity", "w_0", default=0.0, **_LARGE),
+    Parameter("phi0", "initial angle of rotation", r"\varphi_0", units="rad", default=0.0, when=_STARTS,
+              **_FAR),
+    Parameter("w0", "initial angular velocity", "w_0", default=0.0, when=_STARTS, **_LARGE),
     Parameter("t", "time from the initial state (negative: before it)", "t", when=_TIME, whole=True, **_LARGE),
     Parameter("phi", "angle of rotation at which w and t are asked, unwrapped", r"\varphi", units="rad", when=_ABEL,
               whole=True, **_FAR),
 )  # fmt: skip
-OPTIONS = (Option("question", ("fate", "trajectory", "abel"), "what is asked of the solution"),)
+OPTIONS = (Option("question", _QUESTIONS, "what is asked of the solution, or of the system"),)
 STATUS = {
     "turning": "the solution turns back before it reaches phi: phi_turning and t_turning say where and when",
     "equilibrium": "the solution runs into an equilibrium, in infinite time, before it reaches phi",
     "separatrix": "the error bar cannot tell on which side of a separatrix the solution passes",
-    "no_closed_form": "no closed form applies (they need b = 0, g = 0 or (61), and no fate): try another method",
+    "no_closed_form": "no closed form applies (they need b = 0, g = 0 or (61), and no fate or portrait): try another method",
+    "too_many_cycles": "there are more cycles than places for them: the first are given",
 }
 _TURNING, _NO_CLOSED_FORM = 16, 19
 _FATES = {
     "undecided": -1, "focus_or_node": 0, "saddle": 1, "rotation_plus": 2, "rotation_minus": 3, "libration": 4,
     "spin_up_plus": 5, "spin_up_minus": 6, "periodic_rotation": 7, "periodic_libration": 8, "equilibrium_start": 9,
 }  # fmt: skip
+_ENDS = {"repelling": 0, "neutral": 1, "attracting": 2}
+_TYPES = ("none", "saddle", "attracting_node", "weak_node", "repelling_node", "attracting_focus", "weak_focus",
+          "repelling_focus", "degenerate")  # fmt: skip
+DIMENSIONS = {
+    "equilibrium": np.arange(1, cylinder_portrait.EQUILIBRIA + 1),
+    "cycle": np.arange(1, cylinder_portrait.CYCLES + 1),
+}
 
 OUTPUTS = (
     Output("phi", "angle of rotation at t, unwrapped", r"\varphi", units="rad", when=_TIME),
@@ -97,11 +114,41 @@ OUTPUTS = (
            applies="where the solution turns before it reaches phi"),
     Output("t_turning", "time of the turning point", "t_T", when=_ABEL,
            applies="where the solution turns before it reaches phi"),
+    Output("K", "K = b12 s3 - b31 s2, which decides the ends", "K", when=_PORTRAIT),
+    Output("L", "L = (pi/2)(c23 (b12^2 - b31^2) - d b12 b31), which decides them where K = 0", "L", when=_PORTRAIT),
+    Output("stratum", "g = 0 (I0), b = 0 (I1), K = L = 0 (I2), or none of them (G)", when=_PORTRAIT,
+           flags={"I0": 0, "I1": 1, "I2": 2, "G": 3}),
+    Output("end_plus", "does w -> +inf attract?", flags=_ENDS, when=_PORTRAIT),
+    Output("end_minus", "does w -> -inf attract?", flags=_ENDS, when=_PORTRAIT),
+    Output("equilibria", "number of equilibria on the circle", integer=True, when=_PORTRAIT,
+           applies="but in stratum I0, where every angle is one"),
+    Output("saddles", "number of saddles", integer=True, when=_PORTRAIT, applies="but in stratum I0"),
+    Output("rotations_plus", "number of isolated rotation cycles with w > 0", integer=True, when=_PORTRAIT),
+    Output("rotations_minus", "number of isolated rotation cycles with w < 0", integer=True, when=_PORTRAIT),
+    Output("librations", "number of isolated libration cycles", integer=True, when=_PORTRAIT),
+    Output("equilibrium_phi", "angle of the equilibrium, ascending in [0, 2 pi)", r"\varphi_e", units="rad",
+           when=_PORTRAIT, dims=("equilibrium",), applies="at as many places as there are equilibria"),
+    Output("equilibrium_type", "type of the equilibrium", flags={name: i for i, name in enumerate(_TYPES)},
+           when=_PORTRAIT, dims=("equilibrium",), fill=0, applies="at as many places as there are equilibria"),
+    Output("cycle_kind", "kind of the cycle", when=_PORTRAIT, dims=("cycle",), fill=0,
+           flags={"none": 0, "rotation_plus": 1, "rotation_minus": 2, "libration": 3},
+           applies="rotations by |w|, then librations by their right turning points"),
+    Output("cycle_w", "velocity of the cycle on its section", "w", when=_PORTRAIT, dims=("cycle",),
+           applies="rotations: at the saddle of highest V (phi = 0 if no saddle); librations: the w > 0 at the "
+           "equilibrium next to the left of their right turning point"),
+    Output("cycle_multiplier", "Floquet multiplier of the cycle", "m", when=_PORTRAIT, dims=("cycle",),
+           applies="at as many places as there are cycles"),
+    Output("cycle_period", "period of the cycle", "T", when=_PORTRAIT, dims=("cycle",),
+           applies="at as many places as there are cycles"),
+    Output("verdict", "is the portrait structurally stable?", when=_PORTRAIT,
+           flags={"undecided": -1, "degenerate": 0, "structurally_stable": 1}),
 )  # fmt: skip
 
 
 def cost(options, sizes):
     """Seconds per point, rough: one solution serves its dense outputs, one set of cycles all fates of a system."""
+    if options["question"] == "portrait":
+        return 8e-3
     if options["question"] != "fate":
         return 7e-5 / sizes.get("t", sizes.get("phi", 1)) + 2e-7
     return 1.3e-4 + 6e-3 / (sizes["phi0"] * sizes["w0"])
@@ -111,8 +158,8 @@ def solve(point, request):
     """Every output at every point of the block."""
     method = load(methods, "taylor" if request.method == "auto" else request.method, "method")
     question = request.options.get("question", "fate")
-    if question == "fate":
-        return _fate(point, method, request.rtol)
+    if question in ("fate", "portrait"):
+        return {"fate": _fate, "portrait": _portrait}[question](point, method, request.rtol)
     measure = cylinder_auto if request.method == "auto" else cylinder
     return {"trajectory": _trajectory, "abel": _abel}[question](point, measure, method, request.rtol)
 
@@ -189,3 +236,16 @@ def _fate(point, method, rtol):
         elif np.isfinite(six).all() and len(good):
             cylinder_fate.solve(method, six, starts[good], rtol, result, good)
     return {name: values.reshape(shape) for name, values in result.items()}
+
+
+def _portrait(point, method, rtol):
+    """One portrait for each set of the six parameters."""
+    systems = np.stack(np.broadcast_arrays(*(np.asarray(point[key], dtype=float) for key in _SYSTEM)), axis=-1)
+    rows = systems.reshape(-1, 6)
+    good = np.isfinite(rows).all(axis=1)
+    result = cylinder_portrait.empty(len(rows), INVALID_PARAMETERS)
+    if not hasattr(method, "flow_fates"):
+        result["status"][good], good = _NO_CLOSED_FORM, good & False
+    for name, values in cylinder_portrait.solve(method, rows[good], rtol).items():
+        result[name][good] = values
+    return {name: values.reshape(systems.shape[:-1] + values.shape[1:]) for name, values in result.items()}

@@ -17,6 +17,8 @@ SIX = dict(zip(("b12", "b31", "d", "c23", "s2", "s3"), (0.7, -0.4, 1.1, 0.3, 0.5
 
 def solve(question, method="auto", rtol=1e-10, **values):
     point = {name: np.asarray(value, float) for name, value in (SIX | {"phi0": 0.0, "w0": 0.0} | values).items()}
+    if question == "portrait":
+        del point["phi0"], point["w0"]
     size = max(array.ndim for array in point.values())
     point = {name: array.reshape((1,) * (size - array.ndim) + array.shape) for name, array in point.items()}
     return gyrostat.solve(point, Request({"question": question}, method, rtol))
@@ -71,6 +73,22 @@ def test_a_point_outside_the_domain_costs_itself_alone(name):
                 assert np.isnan(values[1]).all(), key
 
 
+def test_portraits_over_parameters():
+    """The same bits in any block, places beyond the cycles are empty, a point outside the domain costs itself alone."""
+    s2, d = np.array([[-1.0], [0.5], [np.nan], [1.2]]), np.array([[-2.0, 0.4, 1.1]])
+    whole = solve("portrait", s2=s2, d=d)
+    assert whole["cycle_w"].shape == (4, 3, 8) and whole["equilibrium_phi"].shape == (4, 3, 4)
+    assert (whole["status"][2] == INVALID_PARAMETERS).all() and (np.delete(whole["status"], 2, 0) == OK).all()
+    part = solve("portrait", s2=s2[1:2], d=d[:, 1:])
+    for name, values in part.items():
+        np.testing.assert_array_equal(values, whole[name][1:2, 1:], err_msg=name)
+    cycles = whole["rotations_plus"] + whole["rotations_minus"] + whole["librations"]
+    for name in ("cycle_w", "cycle_multiplier", "cycle_period"):
+        for values in (whole[name], whole[f"{name}_error"]):
+            assert np.array_equal(np.isfinite(values).sum(axis=-1), np.maximum(cycles, 0)), name
+    assert np.array_equal((whole["cycle_kind"] > 0).sum(axis=-1), np.maximum(cycles, 0)) and cycles.max() > 0
+
+
 def test_fates_over_a_parameter():
     out = solve("fate", b12=np.linspace(-1, 1, 5)[:, None], w0=np.array([[-2.0, 0.3, 2.0]]))
     assert out["verdict"].shape == (5, 3) and (out["verdict"] >= 0).all()
@@ -95,7 +113,10 @@ point = {k: np.array([v]) for k, v in P.items()} | {"phi0": np.array([1.5]), "w0
 fate = gyrostat.solve(point, Request({"question": "fate"}))
 one = gyrostat.solve(point | {"t": np.array([3.0])}, Request({"question": "trajectory"}))
 two = gyrostat.solve(point | {"phi": np.array([2.5])}, Request({"question": "abel"}))
-print(json.dumps({q + k: float(v[0]) for q, o in (("t", one), ("a", two), ("f", fate)) for k, v in o.items()}))
+del point["phi0"], point["w0"]
+whole = gyrostat.solve(point, Request({"question": "portrait"}))
+all_of = ("t", one), ("a", two), ("f", fate), ("p", whole)
+print(json.dumps({q + k: float(np.ravel(v)[0]) for q, o in all_of for k, v in o.items()}))
 """
 
 
