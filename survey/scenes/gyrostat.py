@@ -34,7 +34,7 @@ from survey.status import INVALID_PARAMETERS, OK
 
 TITLE = "Gyrostat with Barnett-London effect, rotation about axis 1"
 FAMILY = "cylinder"
-AUDIT = "dop853"
+AUDIT = ("dop853", "full")
 REFERENCES = (
     "M. E. Lesina, Ya. V. Zinovyeva (2004): Integration of the equations of a gyrostat with Barnett-London effect",
 )
