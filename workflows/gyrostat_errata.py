@@ -727,6 +727,10 @@ def residual(function):
     return float(max(trials(function)))
 
 
+def short(value):
+    return f"{value:.0e}" if value else "0"
+
+
 def main():
     words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     words.add_argument("-o", "--output", default="results", metavar="DIR", help="where the page goes")
@@ -738,9 +742,9 @@ def main():
     page = PAGE.format(
         digits=DIGITS,
         trials=TRIALS,
-        errata="\n".join(f"| {place} | {a} | {b} | {x:.1g} | {y:.0e} |" for place, a, b, x, y in errata),
-        right="\n".join(f"| {place} | {what} | {residual(test):.0e} |" for place, what, test in RIGHT),
-        gaps="\n".join(f"| {place} | {what} | {residual(test):.0e} |" for place, what, test in GAPS),
+        errata="\n".join(f"| {place} | {a} | {b} | {x:.1g} | {short(y)} |" for place, a, b, x, y in errata),
+        right="\n".join(f"| {place} | {what} | {short(residual(test))} |" for place, what, test in RIGHT),
+        gaps="\n".join(f"| {place} | {what} | {short(residual(test))} |" for place, what, test in GAPS),
     )
     path = folder / "gyrostat_errata.md"
     path.write_text(page)

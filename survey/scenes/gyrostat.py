@@ -20,6 +20,9 @@ cycles are those that a lattice of return maps shows, with dips followed down to
 exactly, K = 0 and L = 0 within the rounding of the parameters. `multiplier` and cycles carry error bars; verdicts near
 a stable separatrix are -1 (status `separatrix`).
 
+The method `full` solves the six equations (1)-(6) of a gyrostat whose invariant set is this motion; `survey verify`
+holds trajectories against it, and `workflows/gyrostat_deviation.py` measures how deviations from the set grow.
+
 Questions: `trajectory` (phi and w at t), `abel` (w and t at phi) and `fate` (where the solution ends).
 """
 
