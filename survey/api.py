@@ -333,4 +333,5 @@ def _only(when):
 
 def _method_line(name):
     method = modules.load(method_folder, name, "method")
-    return inspect.cleandoc(method.__doc__).splitlines()[0] + _only(getattr(method, "WHEN", {}))
+    first, when = inspect.cleandoc(method.__doc__).splitlines()[0], _only(getattr(method, "WHEN", {}))
+    return first.removesuffix(".") + when if when else first

@@ -278,6 +278,11 @@ def check_parameters(scene, name, options, given, table=""):
 def check_request(scene, options, method, rtol, variables, tables=("", "")):
     """The Request; raises BadInput for an unknown method or variable, or an rtol outside (0, 1)."""
     serving = methods_of(scene, options)
+    if method not in serving and method in methods_of(scene):
+        given = ", ".join(f"{name} = {value}" for name, value in options.items())
+        raise BadInput(
+            f"{tables[0]}method: {method!r} does not serve {given} (allowed: {', '.join(['auto', *serving])})"
+        )
     if method != "auto" and method not in serving:
         raise BadInput(f"{tables[0]}method: {modules.unknown('method', method, ['auto', *serving])}")
     if isinstance(rtol, bool) or not isinstance(rtol, (int, float)) or not 0 < rtol < 1:

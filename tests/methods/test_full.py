@@ -7,6 +7,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+import survey
 from survey.kernels import gyrostat
 from survey.kernels.flow import coefficients
 from survey.measures import cylinder
@@ -163,6 +164,11 @@ def test_where_the_set_is_unstable_rounding_grows_as_measured():
         assert off < 1e-14 * growth_here
         growth.append(growth_here)
     assert max(growth) > 1e4
+
+
+def test_another_question_is_refused():
+    with pytest.raises(survey.BadInput, match="'full' does not serve question = fate .allowed: auto, dop853"):
+        survey.evaluate("gyrostat", b12=0.1, method="full")
 
 
 def test_the_tangent_map_is_the_derivative():
