@@ -271,17 +271,18 @@ def areas(ds):
 
 
 def audit(ds, points, seed=0):
-    """Solve random points of `ds` again by another method at higher accuracy; each difference against the error bars.
+    """Solve random points of `ds` again by other methods at higher accuracy; each difference against the error bars.
 
     Returns {"points", "method", "outside", "complaints"}.
     """
     name = own.of_dataset(ds)
     _, module = own.find(name)
     options = dict(pair.split("=") for pair in ds.attrs["options"].split(", ") if pair)
-    others = [m for m in workflows.methods_of(module) if m != ds.attrs["method"]]
-    method = module.AUDIT if module.AUDIT in others else others[0]
+    others = [m for m in workflows.methods_of(module, options) if m != ds.attrs["method"]]
+    used = [m for m in module.AUDIT if m in others] or others[:1]
+    report = {"points": 0, "method": " and ".join(used), "outside": 0, "complaints": []}
     if not points:
-        return {"points": 0, "method": method, "outside": 0, "complaints": []}
+        return report
     ds = ds if ds.status.dims else ds.expand_dims("_one")
     size = min(points, ds.status.size)
     chosen = np.sort(np.random.default_rng(seed).choice(ds.status.size, size, replace=False, shuffle=False))
@@ -289,21 +290,22 @@ def audit(ds, points, seed=0):
     flat = ds.isel({dim: ("_point", place) for dim, place in zip(ds.status.dims, places, strict=True)}).load()
     names = [p.name for p in module.PARAMETERS if p.name in ds.coords]
     given = {key: ("_point", np.broadcast_to(flat[key].values, size).copy()) for key in names}
-    again = evaluate(
-        name,
-        method=method,
-        rtol=max(ds.attrs["rtol"] / 100, 1e-13),
-        **options,
-        **{key: xr.DataArray(values, dims=dim) for key, (dim, values) in given.items()},
-    )
+    arrays = {key: xr.DataArray(values, dims=dim) for key, (dim, values) in given.items()}
     complaints = []
-    for name in error_bars(ds):
+    for method in used:
+        again = evaluate(name, method=method, rtol=max(ds.attrs["rtol"] / 100, 1e-13), **options, **arrays)
+        complaints += [f"{line}, by {method}" for line in _outside(flat, again, given)]
+    return report | {"points": chosen.size, "outside": len(complaints), "complaints": complaints}
+
+
+def _outside(flat, again, given):
+    """A sentence per output and point whose difference exceeds the sum of the error bars."""
+    for name in error_bars(flat):
         bar = flat[f"{name}_error"].values.astype(float) + again[f"{name}_error"].transpose("_point", ...).values
         off = np.abs(flat[name].transpose("_point", ...).values - again[name].transpose("_point", ...).values)
         for i in np.unique(np.argwhere(off > bar)[:, :1]):
             where = ", ".join(f"{key} = {values[i]!r}" for key, (_, values) in given.items())
-            complaints.append(f"{name} at {where}: off by {np.nanmax(off[i]):.3g}, error bars {np.nanmax(bar[i]):.3g}")
-    return {"points": chosen.size, "method": method, "outside": len(complaints), "complaints": complaints}
+            yield f"{name} at {where}: off by {np.nanmax(off[i]):.3g}, error bars {np.nanmax(bar[i]):.3g}"
 
 
 def _beside(option):
@@ -320,18 +322,20 @@ def _parameter_line(p):
         if p.instead_of
         else "required"
     )
-    return f"{p.long_name}{unit}; {p.domain}; {need}{_only(p)}"
+    return f"{p.long_name}{unit}; {p.domain}; {need}{_only(p.when)}"
 
 
 def _output_line(o):
     what = ", ".join(f"{name} {code}" for name, code in o.flags.items()) if o.flags is not None else ""
     unit = "" if o.flags is not None or o.integer else " (no unit)" if o.units == "1" else f" ({o.units})"
-    return "; ".join(part for part in (f"{o.long_name}{unit}", what, o.applies) if part) + _only(o)
+    return "; ".join(part for part in (f"{o.long_name}{unit}", what, o.applies) if part) + _only(o.when)
 
 
-def _only(item):
-    return "".join(f"; only when {key} = {' | '.join(allowed)}" for key, allowed in item.when.items())
+def _only(when):
+    return "".join(f"; only when {key} = {' | '.join(allowed)}" for key, allowed in when.items())
 
 
 def _method_line(name):
-    return inspect.cleandoc(modules.load(method_folder, name, "method").__doc__).splitlines()[0]
+    method = modules.load(method_folder, name, "method")
+    first, when = inspect.cleandoc(method.__doc__).splitlines()[0], _only(getattr(method, "WHEN", {}))
+    return first.removesuffix(".") + when if when else first

@@ -47,7 +47,7 @@ class HillScene:
     about: str
     REFERENCES: tuple[str, ...]
     FAMILY = "hill"
-    AUDIT = "dop853"
+    AUDIT = ("dop853",)
     OPTIONS = ()
     STATUS = STATUS
 

@@ -277,7 +277,12 @@ def check_parameters(scene, name, options, given, table=""):
 
 def check_request(scene, options, method, rtol, variables, tables=("", "")):
     """The Request; raises BadInput for an unknown method or variable, or an rtol outside (0, 1)."""
-    serving = methods_of(scene)
+    serving = methods_of(scene, options)
+    if method not in serving and method in methods_of(scene):
+        given = ", ".join(f"{name} = {value}" for name, value in options.items())
+        raise BadInput(
+            f"{tables[0]}method: {method!r} does not serve {given} (allowed: {', '.join(['auto', *serving])})"
+        )
     if method != "auto" and method not in serving:
         raise BadInput(f"{tables[0]}method: {modules.unknown('method', method, ['auto', *serving])}")
     if isinstance(rtol, bool) or not isinstance(rtol, (int, float)) or not 0 < rtol < 1:
@@ -289,10 +294,14 @@ def check_request(scene, options, method, rtol, variables, tables=("", "")):
     return Request(options, method, float(rtol), frozenset(outputs if variables is None else variables))
 
 
-def methods_of(scene):
-    """Names of the methods that serve the scene's family, found by walking the folder of methods."""
-    found = modules.names(survey.methods)
-    return [m for m in found if scene.FAMILY in modules.load(survey.methods, m, "method").SERVES]
+def methods_of(scene, options=None):
+    """Names of the methods that serve the scene's family (and these option values), found by walking their folder."""
+    found = {name: modules.load(survey.methods, name, "method") for name in modules.names(survey.methods)}
+    return [name for name, m in found.items() if scene.FAMILY in m.SERVES and (options is None or _fits(m, options))]
+
+
+def _fits(method, options):
+    return all(options.get(name) in allowed for name, allowed in getattr(method, "WHEN", {}).items())
 
 
 def check_path(path):

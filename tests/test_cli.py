@@ -77,7 +77,7 @@ def test_info_verify_and_plot(program, small):
     assert told["counts"]["status"]["ok"] == 24 and told["provenance"]["kernel_hash"]
     assert "phi0" in program("info", "small.nc").stdout
     verified = program("verify", "small.nc")
-    assert verified.returncode == 0 and "20 points solved again by" in verified.stdout, verified.stderr
+    assert verified.returncode == 0 and "20 points solved again by dop853 and full" in verified.stdout, verified.stderr
     plotted = program("plot", "small.nc", "--var", "turnings", "-o", "t.pdf")
     assert plotted.returncode == 0 and (program.folder / "t.pdf").read_bytes()[:4] == b"%PDF"
     assert "did you mean 'turnings'" in program("plot", "small.nc", "--var", "turning").stderr

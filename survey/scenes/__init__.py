@@ -2,7 +2,7 @@
 
 A scene module holds TITLE (one line), PARAMETERS, OPTIONS, OUTPUTS (tuples), STATUS (its own status names and
 sentences), FAMILY (the methods that serve it: those whose SERVES names that family), AUDIT (the
-method by which `survey verify` solves points again), REFERENCES (tuple of strings), and two functions:
+methods by which `survey verify` solves points again), REFERENCES (tuple of strings), and two functions:
 
     cost(options, sizes) -> seconds per point, a rough figure for cutting blocks and for the plan; `sizes` holds the
         number of values of each parameter

@@ -22,6 +22,9 @@ a stable separatrix are -1 (status `separatrix`).
 
 `auto` takes trajectories and Abel solutions in closed form where one applies (method `closed`), else by Taylor series.
 
+The method `full` solves the six equations (1)-(6) of a gyrostat whose invariant set is this motion; `survey verify`
+holds trajectories against it, and `workflows/gyrostat_deviation.py` measures how deviations from the set grow.
+
 A portrait is what the fates of a system share: ends, equilibria, cycles, and whether small changes of the parameters
 keep them all. It is structurally stable where, by the error bars, K is off zero (L, where K = 0 exactly), no
 equilibrium is degenerate or a Hopf point, no multiplier is 1, the signs of the return maps fit together (so the parity
@@ -42,7 +45,7 @@ from survey.status import INVALID_PARAMETERS, OK
 
 TITLE = "Gyrostat with Barnett-London effect, rotation about axis 1"
 FAMILY = "cylinder"
-AUDIT = "dop853"
+AUDIT = ("dop853", "full")
 REFERENCES = (
     "M. E. Lesina, Ya. V. Zinovyeva (2004): Integration of the equations of a gyrostat with Barnett-London effect",
 )
@@ -75,7 +78,7 @@ STATUS = {
     "turning": "the solution turns back before it reaches phi: phi_turning and t_turning say where and when",
     "equilibrium": "the solution runs into an equilibrium, in infinite time, before it reaches phi",
     "separatrix": "the error bar cannot tell on which side of a separatrix the solution passes",
-    "no_closed_form": "no closed form applies (they need b = 0, g = 0 or (61), and no fate or portrait): try another method",
+    "no_closed_form": "no closed form applies (b = 0, g = 0 or (61), and no fate or portrait): try another method",
     "too_many_cycles": "there are more cycles than places for them: the first are given",
 }
 _TURNING, _NO_CLOSED_FORM = 16, 19

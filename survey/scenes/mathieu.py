@@ -27,7 +27,7 @@ TITLE = "Stability of Mathieu's equation"
 FAMILY = "hill"
 AHEAD = "hill_dense"
 STATUS = {}
-AUDIT = "dop853"
+AUDIT = ("dop853",)
 REFERENCES = (
     "NIST Digital Library of Mathematical Functions, chapter 28",
     "E. Mathieu, Journal de Mathematiques Pures et Appliquees 13 (1868) 137",

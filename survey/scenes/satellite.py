@@ -38,7 +38,7 @@ TITLE = "Out-of-plane stability of a satellite's planar librations and rotations
 FAMILY = "hill"
 AHEAD = "hill_dense"
 STATUS = {}
-AUDIT = "dop853"
+AUDIT = ("dop853",)
 REFERENCES = (
     "I. S. Astakhova, Transformation of satellite equations to Hill's equation (errata: survey/scenes/satellite.md)",
     "H. M. Yehia, S. Z. Nabih (2013), AJIS 2(6), 127: the same problem, a chart by inertia ratio and amplitude",

@@ -1,0 +1,105 @@
+"""The six equations (1)-(6) of a gyrostat whose invariant set is the scene, in a rotated body frame: an audit.
+
+Builds A, B, C, s, lambda from the reduced parameters, what these leave free being generic (`kernels/gyrostat.py`),
+and knows nothing of the set: its bars hold the growth of deviations from it. Taylor series of order 20. Domain:
+trajectories whose set is not strongly unstable.
+"""
+
+import math
+
+import numpy as np
+
+from survey.kernels import gyrostat
+from survey.kernels.along import NO_CONVERGENCE, OK, OVERFLOW, STEP_LIMIT, TRUST, UNTOLD, bar, finite, start_sign
+from survey.kernels.flow import LOW, TWO_PI, TWO_PI_LOW, UNIT, longest_step, reduced
+from survey.kernels.jit import kernel
+
+ORDER = gyrostat.ORDER
+SERVES = ("cylinder",)
+WHEN = {"question": ("trajectory",)}
+FLOW_FINEST = 1e-17  # useful truncation error of a step
+FLOW_WORK = 2  # steps, relative to the Taylor method
+_FIRST = 4.0 * UNIT  # rounding of the initial state in the rotated frame
+
+
+@kernel
+def read(state, squares, n, near, out):
+    """out = phi next to `near`, w = phi', and their bars, of a state and its error ellipse after n steps."""
+    frame = gyrostat.FRAME
+    w = s = c = 0.0
+    for i in range(3):
+        w += frame[i, 0] * state[i]
+        s += frame[i, 1] * state[3 + i]
+        c += frame[i, 2] * state[3 + i]
+    phi = math.atan2(s, c)
+    turns = math.floor((near - phi) / TWO_PI + 0.5)
+    a = b = 0.0
+    for i in range(3):
+        for j in range(3):
+            a += (c * frame[i, 1] - s * frame[i, 2]) * squares[3 + i, 3 + j] * (c * frame[j, 1] - s * frame[j, 2])
+            b += frame[i, 0] * squares[i, j] * frame[j, 0]
+    out[0], out[1] = phi + turns * TWO_PI, w
+    out[2] = bar(n, a) + UNIT * (4.0 + 4.0 * abs(turns) * TWO_PI)
+    out[3] = bar(n, b) + UNIT * 4.0 * abs(w)
+
+
+@kernel
+def trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
+    """As `along.trajectory`, by the full equations."""
+    free, G, squares, axis = np.empty(8), np.empty((14, 3)), np.zeros((6, 6)), gyrostat.FRAME[:, 0].copy()
+    T, V = np.zeros((gyrostat.LAST + 1, 12)), np.zeros((LOW + 1, 6, 12))
+    state, new, J, work = np.empty(6), np.empty(6), np.empty((6, 6)), np.empty((6, 6))
+    here, there = np.empty(4), np.empty((6, 6))
+    gyrostat.generic(p, w0, free)
+    gyrostat.embed(p, free, G)
+    phi, before = reduced(phi0)  # before: turns already in phi0
+    gyrostat.start(phi, w0, state)
+    for i in range(6):
+        squares[i, i] = (_FIRST * (abs(w0) if i < 3 else 2.0)) ** 2
+    w, t, t_low, j, size = w0, 0.0, 0.0, 0, len(times)
+    sign, unsure, count = start_sign(p, phi, w), 0, 0
+    for n in range(1, limit + 1):
+        if j == size:
+            return OK
+        h = min(gyrostat.begin(G, state, tolerance, T, V), longest_step(p, w))
+        if not (h > 0.0 and math.isfinite(h)):
+            return OVERFLOW
+        while j < size and (times[j] - t) - t_low < h:
+            dt = (times[j] - t) - t_low
+            gyrostat.at(T, dt, new)
+            there[:] = squares
+            gyrostat.carry(G, T, V, dt, there, J, work)
+            read(new, there, n, phi + gyrostat.angle(T, dt, axis), here)
+            if not (here[2] < TRUST and here[3] < TRUST * (1.0 + abs(here[1]))):
+                return NO_CONVERGENCE
+            floats[j, 0], floats[j, 1] = (here[0] + before * TWO_PI_LOW) + before * TWO_PI, here[1]
+            floats[j, 2], floats[j, 3] = here[2] + 3e-16 * abs(before) * TWO_PI, here[3]
+            turnings[j] = count + (here[1] * sign < 0.0) if unsure < 3 and count >= 0 else UNTOLD
+            j += 1
+        gyrostat.at(T, h, new)
+        gyrostat.carry(G, T, V, h, squares, J, work)
+        read(new, squares, n, phi + gyrostat.angle(T, h, axis), here)
+        state[:] = new
+        phi, w = here[0], here[1]
+        high = t + h
+        t_low += h - (high - t)
+        t = high
+        if not (here[2] < 1.0 and here[3] < 1.0 + abs(w)):
+            return NO_CONVERGENCE if math.isfinite(w) else OVERFLOW
+        if abs(w) <= here[3]:
+            unsure += 1
+            continue
+        if unsure > 2 and sign != 0:
+            count = UNTOLD - limit  # below zero for good
+        count += w * sign < 0.0
+        sign, unsure = (1 if w > 0.0 else -1), 0
+    return STEP_LIMIT
+
+
+@kernel
+def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
+    """See `along.trajectories`."""
+    for i in range(len(P)):
+        size = finite(times[i])
+        status[i] = trajectory(P[i], starts[i, 0], starts[i, 1], times[i, :size], tolerance, limit, floats[i],
+                               turnings[i])  # fmt: skip
