@@ -9,7 +9,6 @@ kind 2) or on the complex roots (rotation, kind 3). Nothing lies at infinity, so
 All start with w0 >= 0 (the caller mirrors). `data` holds what `start_*` found out; `*_at` take it at any time.
 """
 
-import cmath
 import math
 
 import numpy as np
@@ -25,10 +24,9 @@ SAME = 64.0 * UNIT  # how far, relative, parameters may miss the conditions of (
 # places in data
 W0, A1, B1, A2, B2 = range(5)  # g(phi0 + x) = A1 cos x + B1 sin x + A2 cos 2x + B2 sin 2x
 F0, SLOPE, ALPHA, SQUARE, NOISE, MISS, GROWTH = range(5, 12)  # kind 1
-LEFT, RIGHT, BAR_LEFT, BAR_RIGHT, RATIO, RHO, RHO_M, THETA0, OMEGA, KC, KC2, QUARTER, LAST_MEAN, SLACK, CHI0 = range(
-    5, 20
-)
-RE, IM, TILT, LEAST, MISFIT = range(20, 25)  # kind 3
+LEFT, RIGHT, BAR_LEFT, BAR_RIGHT, RATIO = range(5, 10)  # kind 2
+RHO, RHO_M, THETA0, OMEGA, KC, KC2, QUARTER, LAST_MEAN, SLACK = range(10, 19)  # kinds 2 and 3
+RE, IM, TILT, LEAST, MISFIT = range(19, 24)  # kind 3
 MARGIN = 1.5
 
 
@@ -123,7 +121,7 @@ def first_kind(chi, kc2, quarter):
 
 @inline
 def applies(p, phi0, w0):
-    """(kind, mu, miss): NONE, TRIGONOMETRIC with mu and the greatest |g - (mu - 1) f (mu F + n)|, or LIBRATION if b = 0."""
+    """(kind, mu, miss): NONE, LIBRATION if b = 0, TRIGONOMETRIC where |g - (mu - 1) f (mu F + n)| <= miss."""
     b12, b31 = p[B12], p[B31]
     if p[D] == 0.0 and p[C23] == 0.0 and p[S2] == 0.0 and p[S3] == 0.0:
         return TRIGONOMETRIC, 1.0, 0.0
@@ -192,7 +190,7 @@ def start_trigonometric(p, phi0, w0, side, mu, miss, data):
 
 @inline
 def drift(data, theta, s, c, low):
-    """Integral of w(0)/w over the time 2 theta, over c^2 where `low` (hyperbolic, c = 1 and s = tanh/Delta) is 1/c^2."""
+    """Integral of w(0)/w over the time 2 theta; divided by cosh^2 where low = 1/cosh^2, c = 1 and s = tanh/Delta."""
     square, f, w0 = data[SQUARE], data[SLOPE], data[W0]
     z = square * theta * theta
     third = 2.0 / 3.0 * theta**3 * low if abs(z) < 1e-3 else (theta * low - s * c) / square
@@ -201,14 +199,14 @@ def drift(data, theta, s, c, low):
 
 @inline
 def trigonometric_at(data, t):
-    """x, w, bar x, bar w at t >= 0 (50): x = 2 arg((c - f0 s) + i w0 s), s = sin(Delta t/2)/Delta, w = w0/(y1^2 + y2^2)."""
+    """x, w and bars at t >= 0: tan(x/2) = y1/y2 = w0 s/(c - f0 s), s = sin(Delta t/2)/Delta, w = w0/(y1^2 + y2^2)."""
     w0, f, square = data[W0], data[SLOPE], data[SQUARE]
     theta, root = 0.5 * t, math.sqrt(abs(data[SQUARE]))
     if w0 == 0.0:
-        return 0.0, 0.0, data[MISS] * t * t, data[MISS] * t
+        return 0.0, 0.0, 0.0 if data[MISS] == 0.0 else math.inf, 0.0
     if data[F0] == 0.0 and f == 0.0:
-        x = w0 * t
-        return x, w0, 2.0 * UNIT * x + data[MISS] * t * t, data[MISS] * t
+        x, moved = w0 * t, misfit(data, t, w0)
+        return x, w0, 2.0 * UNIT * x + moved * t, moved
     turns, low = 0.0, 1.0
     s, c = theta, 1.0
     if square > 0.0:
@@ -227,7 +225,7 @@ def trigonometric_at(data, t):
     norm = y1 * y1 + y2 * y2
     x = 2.0 * (math.atan2(y1, y2) + turns * math.pi)
     w = w0 * low / norm
-    moved, _most = misfit(data, t, w)
+    moved = misfit(data, t, w)
     bar = (data[NOISE] + moved) * total / norm
     bar += 16.0 * UNIT * (abs(y1) * (abs(c) + abs(f * s)) + abs(y1 * y2)) / norm + 6.0 * UNIT * (w * t + abs(x))
     steep = math.hypot(data[F0], f)
@@ -237,19 +235,25 @@ def trigonometric_at(data, t):
 
 @inline
 def misfit(data, t, w):
-    """Bound of |w - (mu F + n)| after t, where parameters miss (61) by MISS, and the fastest w."""
-    most = max(data[W0] - data[F0], data[F0] - data[W0]) + math.hypot(data[F0], data[SLOPE])
-    if data[MISS] == 0.0 or data[GROWTH] == 0.0:
-        return data[MISS] * t, most
-    return data[MISS] * t * math.exp(min(2.0 * data[GROWTH] * min(t, 2.0 / max(min(w, data[W0]), 1e-300)), 700.0)), most
+    """Bound of e = w - (mu F + n) after t, where parameters miss (61) by MISS: e' = (1 - mu) f e + MISS.
+
+    |integral of f dt| is at most b t, and |change of F| / least w.
+    """
+    if data[MISS] == 0.0:
+        return 0.0
+    least = min(w, data[W0])
+    if data[SQUARE] > 0.0:  # = (n - mu b)(n + mu b)
+        least = data[SQUARE] / (abs(data[W0] - data[F0]) + math.hypot(data[F0], data[SLOPE]))
+    return data[MISS] * t * math.exp(min(data[GROWTH] * min(t, 2.0 / max(least, 1e-300)), 700.0))
 
 
 @inline
 def trigonometric_reach(data, x):
-    """(t, bar t) at which phi0 + x, x >= 0, is reached; t = inf beyond an equilibrium, NaN where rounding cannot tell."""
+    """(t, bar t) at which phi0 + x, x >= 0, is reached; inf beyond an equilibrium, NaN where rounding cannot tell."""
     w0, f, square = data[W0], data[SLOPE], data[SQUARE]
     if data[F0] == 0.0 and f == 0.0:
-        return x / w0, 2.0 * UNIT * x / w0 + data[MISS] * (x / w0) ** 2 / w0
+        t = x / w0
+        return t, (2.0 * UNIT + misfit(data, t, w0) / w0) * t
     root = math.sqrt(abs(square))
     turns = math.floor(0.5 * x / math.pi + 0.5)
     rest = 0.5 * x - turns * math.pi
@@ -276,7 +280,7 @@ def trigonometric_reach(data, x):
         total = drift(data, theta, s, math.cosh(root * theta), 1.0)
     t = 2.0 * theta
     # the formula is evaluated with rounded data, which moves Delta^2 as well
-    moved, _most = misfit(data, t, near)
+    moved = misfit(data, t, near)
     bar = (data[NOISE] + moved) * total / w0 + 2.0 * abs(y1) * blur / near + 6.0 * UNIT * t
     bar += 3.0 * UNIT * (abs(x) + 1.0) * w0 / near * 2.0
     return t, MARGIN * bar
@@ -313,7 +317,7 @@ def start_libration(data, pairs):
     data[QUARTER], data[LAST_MEAN] = quarter, means(data[KC], pairs)
     v = math.sin(0.5 * left) / math.sin(0.5 * right)
     chi = 2.0 * math.atan(math.sqrt(v / data[RATIO]))
-    data[CHI0], data[THETA0] = chi, first_kind(chi, kc2, quarter)
+    data[THETA0] = first_kind(chi, kc2, quarter)
     if left == 0.0:
         data[SLACK] = 0.0
         return True
@@ -361,7 +365,7 @@ def libration_at(data, pairs, t):
     late += tick
     bar_w = abs(w) * wider + slope * late + bend * late * (abs(w) * late + late * late * bend)
     turned = theta / (2.0 * data[QUARTER])
-    count = int(math.floor(turned))
+    count = math.floor(turned)
     near = abs(turned - math.floor(turned + 0.5)) * 2.0 * data[QUARTER] / data[OMEGA]
     certain = near > MARGIN * late or (math.floor(turned + 0.5) == 0.0 and t == 0.0)
     bar_x = abs(w) * late + bend * late * late + fixed
@@ -431,8 +435,7 @@ def start_rotation(data, pairs):
     data[LAST_MEAN], data[LEAST], data[MISFIT] = means(data[KC], pairs), least, misfit
     data[RHO], data[RHO_M] = 0.0, 0.0
     data[SLACK] = 16.0 * UNIT * (1.0 + 2.0 / (1.0 - abs(centre))) / data[KC]
-    data[CHI0] = mapped(data, 0.0)
-    data[THETA0] = first_kind(data[CHI0], kc2, data[QUARTER])
+    data[THETA0] = first_kind(mapped(data, 0.0), kc2, data[QUARTER])
     return True
 
 

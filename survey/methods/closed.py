@@ -15,6 +15,7 @@ from survey.kernels.jit import kernel
 
 ORDER = 0  # no steps
 SERVES = ("cylinder",)
+WHEN = {"question": ("trajectory", "abel")}
 FLOW_FINEST = 1.0  # nothing to refine
 FLOW_WORK = 1
 NO_FORM = 19  # as in the STATUS of scenes/gyrostat.py
@@ -78,7 +79,7 @@ def _trigonometric(data, w0, x, out):
     s = math.sin(0.5 * x)
     F, f = data[closed.F0], data[closed.SLOPE]
     w = w0 - 2.0 * s * (F * s - f * math.cos(0.5 * x))
-    moved, _most = closed.misfit(data, t, w)
+    moved = closed.misfit(data, t, w)
     bar = closed.MARGIN * (2.0 * data[closed.NOISE] + moved + 4.0 * UNIT * (w0 + abs(x) * math.hypot(F, f)))
     return _kept(out, w, t, bar, bar_t)
 

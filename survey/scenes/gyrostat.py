@@ -78,10 +78,10 @@ STATUS = {
     "turning": "the solution turns back before it reaches phi: phi_turning and t_turning say where and when",
     "equilibrium": "the solution runs into an equilibrium, in infinite time, before it reaches phi",
     "separatrix": "the error bar cannot tell on which side of a separatrix the solution passes",
-    "no_closed_form": "no closed form applies (b = 0, g = 0 or (61), and no fate or portrait): try another method",
+    "no_closed_form": "no closed form applies (they need b = 0, g = 0 or (61)): try another method",
     "too_many_cycles": "there are more cycles than places for them: the first are given",
 }
-_TURNING, _NO_CLOSED_FORM = 16, 19
+_TURNING = 16
 _FATES = {
     "undecided": -1, "focus_or_node": 0, "saddle": 1, "rotation_plus": 2, "rotation_minus": 3, "libration": 4,
     "spin_up_plus": 5, "spin_up_minus": 6, "periodic_rotation": 7, "periodic_libration": 8, "equilibrium_start": 9,
@@ -228,15 +228,12 @@ def _fate(point, method, rtol):
     group = np.broadcast_to(group, shape).ravel()
     starts = np.stack([np.broadcast_to(array, shape).ravel() for array in arrays[6:]], axis=-1)
     result = cylinder_fate.empty(len(starts), INVALID_PARAMETERS)
-    solves = hasattr(method, "flow_fates")
     order = np.argsort(group, kind="stable")
     cuts = np.flatnonzero(np.diff(group[order])) + 1
     for members in np.split(order, cuts):
         six = systems.reshape(-1, 6)[group[members[0]]]
         good = members[np.isfinite(starts[members]).all(axis=1)]
-        if np.isfinite(six).all() and not solves:
-            result["status"][good] = _NO_CLOSED_FORM
-        elif np.isfinite(six).all() and len(good):
+        if np.isfinite(six).all() and len(good):
             cylinder_fate.solve(method, six, starts[good], rtol, result, good)
     return {name: values.reshape(shape) for name, values in result.items()}
 
@@ -247,8 +244,6 @@ def _portrait(point, method, rtol):
     rows = systems.reshape(-1, 6)
     good = np.isfinite(rows).all(axis=1)
     result = cylinder_portrait.empty(len(rows), INVALID_PARAMETERS)
-    if not hasattr(method, "flow_fates"):
-        result["status"][good], good = _NO_CLOSED_FORM, good & False
     for name, values in cylinder_portrait.solve(method, rows[good], rtol).items():
         result[name][good] = values
     return {name: values.reshape(systems.shape[:-1] + values.shape[1:]) for name, values in result.items()}
