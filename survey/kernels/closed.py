@@ -9,6 +9,7 @@ kind 2) or on the complex roots (rotation, kind 3). Nothing lies at infinity, so
 All start with w0 >= 0 (the caller mirrors). `data` holds what `start_*` found out; `*_at` take it at any time.
 """
 
+import cmath
 import math
 
 import numpy as np
@@ -22,11 +23,11 @@ SIZE = 32
 SAME = 64.0 * UNIT  # how far, relative, parameters may miss the conditions of (61); the miss goes into the bars
 
 # places in data
-W0, A1, B1, A2, B2 = range(5)  # g(phi0 + x) = A1 cos x + B1 sin x + A2 cos 2x + B2 sin 2x
-F0, SLOPE, ALPHA, SQUARE, NOISE, MISS, GROWTH = range(5, 12)  # kind 1
-LEFT, RIGHT, BAR_LEFT, BAR_RIGHT, RATIO = range(5, 10)  # kind 2
-RHO, RHO_M, THETA0, OMEGA, KC, KC2, QUARTER, LAST_MEAN, SLACK = range(10, 19)  # kinds 2 and 3
-RE, IM, TILT, LEAST, MISFIT = range(19, 24)  # kind 3
+W0, A1, B1, A2, B2, ROUGH = range(6)  # g(phi0 + x) = A1 cos x + B1 sin x + A2 cos 2x + B2 sin 2x
+F0, SLOPE, ALPHA, SQUARE, NOISE, MISS, GROWTH = range(6, 13)  # kind 1
+LEFT, RIGHT, BAR_LEFT, BAR_RIGHT, RATIO = range(6, 11)  # kind 2
+RHO, RHO_M, THETA0, OMEGA, KC, KC2, QUARTER, LAST_MEAN, SLACK = range(11, 20)  # kinds 2 and 3
+RE, IM, TILT, LEAST, MISFIT = range(20, 25)  # kind 3
 MARGIN = 1.5
 
 
@@ -37,6 +38,7 @@ def local(p, phi0, side, data):
     s2, c2 = 2.0 * s * c, (c - s) * (c + s)
     a2, b2 = -p[C23], -0.5 * p[D]
     data[A1], data[B1] = side * (p[S2] * c - p[S3] * s), -p[S2] * s - p[S3] * c
+    data[ROUGH] = abs(p[S2] * c) + abs(p[S3] * s) + abs(a2 * c2) + abs(b2 * s2)  # what A1 and A2 are rounded against
     data[A2], data[B2] = side * (a2 * c2 + b2 * s2), b2 * c2 - a2 * s2
 
 
@@ -46,9 +48,9 @@ def square_of_w(data, x):
     s, c = math.sin(0.5 * x), math.cos(0.5 * x)
     sx, cx = 2.0 * s * c, (c - s) * (c + s)
     inner = 2.0 * c * (data[A1] + data[A2] * cx) + s * (2.0 * data[B1] + 4.0 * data[B2] * c * c)
-    first, second = abs(data[A1]) + abs(data[B1]), abs(data[A2]) + abs(data[B2])
+    first, second = math.hypot(data[A1], data[B1]), math.hypot(data[A2], data[B2])
     slope = data[A1] * cx + data[B1] * sx + data[A2] * (cx - sx) * (cx + sx) + 2.0 * data[B2] * sx * cx
-    noise = 4.0 * UNIT * (data[W0] ** 2 + 6.0 * abs(s) * (first + 2.0 * second))
+    noise = 4.0 * UNIT * (data[W0] ** 2 + 6.0 * abs(s) * (data[ROUGH] + abs(s) * (first + 2.0 * second)))
     return data[W0] ** 2 + 2.0 * s * inner, 2.0 * slope, noise
 
 
@@ -273,6 +275,8 @@ def trigonometric_reach(data, x):
         if margin <= 0.0:
             return (math.inf if margin < -1e3 * (blur + data[NOISE]) else math.nan), 0.0
         near = margin * (y2 + root * y1)
+        if root * y1 >= y2:
+            return math.nan, 0.0
         theta = math.atanh(root * y1 / y2) / root if root > 0.0 else y1 / y2
         if root * theta > 300.0:
             return math.nan, 0.0
@@ -322,7 +326,7 @@ def start_libration(data, pairs):
         data[SLACK] = 0.0
         return True
     edge = data[BAR_LEFT] / left + data[BAR_RIGHT] / right + rho + 8.0 * UNIT
-    data[SLACK] = 0.5 * math.sin(chi) * edge / math.sqrt(1.0 - (1.0 - kc2) * math.sin(chi) ** 2)
+    data[SLACK] = 0.5 * math.sin(chi) * edge / math.sqrt(math.cos(chi) ** 2 + kc2 * math.sin(chi) ** 2)
     return True
 
 
@@ -377,7 +381,7 @@ def flight(data, chi, slack):
     """(t, bar t) at which chi >= chi0 is reached; slack is the error of chi."""
     theta = first_kind(chi, data[KC2], data[QUARTER])
     slack += 8.0 * UNIT * (1.0 + abs(chi))
-    slack /= math.sqrt(1.0 - (1.0 - data[KC2]) * math.sin(chi) ** 2)
+    slack /= math.sqrt(math.cos(chi) ** 2 + data[KC2] * math.sin(chi) ** 2)
     return (theta - data[THETA0]) / data[OMEGA], MARGIN * (phase_bar(data, theta) + slack / data[OMEGA])
 
 
@@ -386,7 +390,7 @@ def libration_reach(data, x):
     """(t, bar t) at which phi0 + x, x in [0, RIGHT], is first reached."""
     ahead, behind = data[RIGHT] - x, data[LEFT] + x
     chi = 2.0 * math.atan2(math.sqrt(math.sin(0.5 * behind)), math.sqrt(data[RATIO] * math.sin(0.5 * ahead)))
-    blur = 4.0 * UNIT * (abs(x) + 1.0)
+    blur = 2.0 * UNIT * (data[LEFT] + data[RIGHT])
     edge = (data[BAR_LEFT] + blur) / behind if behind > 0.0 else 0.0
     edge += (data[BAR_RIGHT] + blur) / ahead if ahead > 0.0 else 0.0
     slack = 0.5 * math.sin(chi) * (edge + data[RHO])
@@ -395,26 +399,32 @@ def libration_reach(data, x):
 
 @inline
 def start_rotation(data, pairs):
-    """Complex roots zeta of w^2 (z = e^{ix}) within the circle, w^2 = kappa |z - zeta1|^2 |z - zeta2|^2, and the map.
+    """The complex roots of w^2 (z = e^{ix}) within the unit circle and the map; False where the digits are lost.
 
-    Weierstrass (Durand-Kerner) iteration on both roots; the other two are their mirror images. What the product
-    misses of the coefficients is carried as an error of w^2.
+    w^2 = kappa |z^2 - sigma z + pi|^2: pi and sigma follow from y = 2 kappa, the greatest root of one equation, that
+    Newton's method reaches from above. What the roots r, s miss of the coefficients is carried as an error of w^2.
     """
     a1, b1, a2, b2 = data[A1], data[B1], data[A2], data[B2]
     mean = data[W0] ** 2 + 2.0 * b1 + b2
     first, second = complex(-2.0 * b1, -2.0 * a1), complex(-b2, -a2)  # w^2 = mean + Re(first z + second z^2)
-    r, s = 0.31 + 0.17j, -0.23 + 0.29j
-    for _ in range(60):
-        kappa = mean / ((1.0 + abs2(r)) * (1.0 + abs2(s)) + 2.0 * (r * s.conjugate()).real)
-        move1 = quartic(mean, first, second, r) / (kappa * (r - s) * (1.0 - abs2(r)) * (1.0 - s.conjugate() * r))
-        r = inside(r - move1)
-        kappa = mean / ((1.0 + abs2(r)) * (1.0 + abs2(s)) + 2.0 * (r * s.conjugate()).real)
-        move2 = quartic(mean, first, second, s) / (kappa * (s - r) * (1.0 - abs2(s)) * (1.0 - r.conjugate() * s))
-        s = inside(s - move2)
-        if not abs2(move1) + abs2(move2) > 1e-31:
+    top, cross, tail = abs2(first), (second.conjugate() * first * first).real, abs2(second)
+    y = 2.0 * mean
+    for _ in range(100):
+        q = y * y - tail
+        number = top * (y * y + tail) - 2.0 * y * cross
+        value = 0.5 * (y + tail / y + y * number / (q * q)) - mean
+        slope = 0.5 - 0.5 * tail / (y * y) + 0.5 * (number + 2.0 * y * (y * top - cross)) / (q * q)
+        slope -= 2.0 * y * y * number / (q * q * q)
+        move = value / slope
+        if not move > 2.0 * UNIT * y:
             break
-    if r == s:
-        s = r + 1e-17
+        y -= move
+    q = y * y - tail
+    sigma, pi = (second.conjugate() * first - y * first.conjugate()) / q, second.conjugate() / y
+    spread = cmath.sqrt(0.25 * sigma * sigma - pi)
+    r, s = 0.5 * sigma + spread, 0.5 * sigma - spread
+    if not (abs2(r) < 1.0 and abs2(s) < 1.0 and q > 0.0):
+        return False
     kappa = mean / ((1.0 + abs2(r)) * (1.0 + abs2(s)) + 2.0 * (r * s.conjugate()).real)
     c1 = -2.0 * kappa * (r.conjugate() * (1.0 + abs2(s)) + s.conjugate() * (1.0 + abs2(r)))
     c2 = 2.0 * kappa * r.conjugate() * s.conjugate()
@@ -442,18 +452,6 @@ def start_rotation(data, pairs):
 @inline
 def abs2(z):
     return z.real * z.real + z.imag * z.imag
-
-
-@inline
-def inside(z):
-    """z, or its mirror image in the unit circle."""
-    return z if abs2(z) < 1.0 else 1.0 / z.conjugate()
-
-
-@inline
-def quartic(mean, first, second, z):
-    """z^2 w^2."""
-    return 0.5 * (((second * z + first) * z + 2.0 * mean) * z + first.conjugate()) * z + 0.5 * second.conjugate()
 
 
 @inline

@@ -44,7 +44,7 @@ def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, stat
             if bar_x < TRUST and bar_w < TRUST * (1.0 + abs(w)):
                 floats[i, j, 0], floats[i, j, 1] = phi0 + side * x, side * w
                 floats[i, j, 2], floats[i, j, 3] = bar_x + 2.0 * UNIT * abs(floats[i, j, 0]), bar_w
-                turnings[i, j] = count
+                turnings[i, j] = UNTOLD if kind == closed.TRIGONOMETRIC and w != 0.0 and w <= bar_w else count
             else:
                 turnings[i, j] = UNTOLD
 
