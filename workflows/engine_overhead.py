@@ -49,6 +49,7 @@ def main():
     parser.add_argument("--variables", default="discriminant,verdict")
     parser.add_argument("--points", default="2500x4000", metavar="KxRHO")
     given = parser.parse_args()
+    given.output.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=given.output) as folder:
         page = measure(given, Path(folder) / "map.nc")
     path = given.output / "engine_overhead.md"

@@ -54,7 +54,9 @@ def segments(level, top, order, rows, of_level, starts):
 
     Segment i is order[starts[i] : starts[i + 1]], all in row rows[i] and of level of_level[i].
     """
-    counts = np.zeros(top + 2, np.int64)
+    counts = np.empty(top + 2, np.int64)
+    for at in range(top + 2):
+        counts[at] = 0
     count = place = 0
     for r in range(level.shape[0]):
         low, high = top + 1, -1
@@ -73,7 +75,8 @@ def segments(level, top, order, rows, of_level, starts):
             if 0 <= at <= top:
                 order[counts[at]] = r * level.shape[1] + i
                 counts[at] += 1
-        counts[low : high + 1] = 0
+        for at in range(low, high + 1):
+            counts[at] = 0
     starts[count] = place
     return count
 
