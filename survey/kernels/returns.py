@@ -141,7 +141,7 @@ def fixed_points(image_of, kind, p, eqs, count, place, interval, xs, tolerance, 
         if differ(a, b) or followed_down(image_of, kind, p, eqs, count, place, a, b, tolerance, m):
             touching = not differ(a, b) and not differ(a, m)
             if touching:  # touches 0 within the error bar: one cycle or two or none
-                write_cycle(a, b, m, interval, cycles[found])
+                write_cycle(a, b, m, interval, steepness(kind, p, m[X]), cycles[found])
                 cycles[found, CYCLE_BAR] = max(cycles[found, CYCLE_BAR], 0.1 * (b[X] - a[X]))
                 cycles[found, CYCLE_CLASS] = -m[CLASS]
                 found += 1
@@ -250,11 +250,17 @@ def solved(image_of, kind, p, eqs, count, place, interval, a, b, tolerance, row)
         if abs(new - x) <= 1e-15 * abs(x) or abs(m[CHANGE]) <= 0.02 * m[ERROR]:
             break
         x = new if low < new < high else 0.5 * (low + high)
-    write_cycle(a, b, m, interval, row)
+    write_cycle(a, b, m, interval, steepness(kind, p, m[X]), row)
+
+
+@inline
+def steepness(kind, p, x):
+    """Relative change of map' per unit of D: of its factor w/w1, or g/g1."""
+    return 1.0 / x if kind == ROTATION else p[BOUND_DG] / (abs(values(p, x)[1]) + 1e-300)
 
 
 @kernel
-def write_cycle(a, b, m, interval, row):
+def write_cycle(a, b, m, interval, steep, row):
     """Note the cycle at node m between a and b; its bar from those of D and of the slope."""
     slope = m[SLOPE] - 1.0
     away = abs((b[CHANGE] - a[CHANGE]) / (b[X] - a[X]))
@@ -262,6 +268,7 @@ def write_cycle(a, b, m, interval, row):
     row[CYCLE_BAR] = 1.2 * (abs(m[CHANGE]) + m[ERROR]) / max(abs(slope), 1e-12) + 4e-16 * abs(m[X])
     bend = (abs(a[SLOPE] - m[SLOPE]) + abs(b[SLOPE] - m[SLOPE])) / max(b[X] - a[X], 1e-300) + away
     row[MULTIPLIER_BAR] = 1e-14 * (1.0 + m[SLOPE]) + 20.0 * m[ERROR] + 3.0 * bend * row[CYCLE_BAR]
+    row[MULTIPLIER_BAR] += 2.0 * m[SLOPE] * steep * (abs(m[CHANGE]) + m[ERROR])
     row[CYCLE_CLASS], row[INTERVAL] = m[CLASS], interval
     row[BELOW] = 1.0 if a[CHANGE] > 0.0 else -1.0
     row[ABOVE] = 1.0 if b[CHANGE] > 0.0 else -1.0
