@@ -28,17 +28,18 @@ LANES = 32
 _S, _C, _W = 0, ORDER + 1, 2 * (ORDER + 1)
 _SERIES = 3 * (ORDER + 1)
 _U1, _Z1, _U2, _Z2, _F, _DG = (_SERIES + i * (LOW + 1) for i in range(6))
-_ROWS = _DG + LOW + 1
+_TABLE = _DG + LOW + 1
 # Rows of the state that a step changes, ...
 (_PSI, _TURNS, _V, _T, _T_LOW, _RATE, _SAA, _SAB, _SBB, _STEPS, _SIGN, _UNSURE, _COUNT) = range(13)
 _STATE = 13
 # ... and of what it does not: the coefficients, their bounds, the next time asked for, a.
 (_P12, _P31, _PD, _P2, _P3, _PF, _PG, _PDG, _NEXT, _TURN) = range(10)
 _FIXED = 10
+ROWS = _TABLE + 2 * _STATE + _FIXED + 1
 
 _GOING, _AT, _LOST = 0.0, 1.0, 2.0  # what a step has made of a lane
-# What follows the last two terms, as a share of the larger one: x / (1 - x) at most, x < 0.2 the step over the radius.
-_REST = 0.25
+# Steps shorter than this have a share of the tolerance only: so many short steps add up to what few long ones do.
+_SHORT = 1.0 / 8.0
 _MANY = -1e9  # a count that stays below zero
 
 # Cody and Waite's reduction, and the polynomials of fdlibm's kernels for sin and cos in [-pi/4, pi/4].
@@ -178,6 +179,21 @@ def _series(T, state, fixed):
 
 
 @inline
+def split(work):
+    """The parts of the work array: series, state, state before the step, what stays fixed, what became of lanes."""
+    first, second = _TABLE + _STATE, _TABLE + 2 * _STATE
+    return work[:_TABLE], work[_TABLE:first], work[first:second], work[second : second + _FIXED], work[second + _FIXED]
+
+
+@inline
+def step(T, state, before, fixed, fate, tolerance):
+    """One step of every lane."""
+    _series(T, state, fixed)
+    _advance(T, state, before, fixed, fate, tolerance)
+    _turnings(state)
+
+
+@inline
 def _advance(T, state, before, fixed, fate, tolerance):
     """One step of every lane, to its next time where that lies within the step; `before` keeps the state before it."""
     for k in range(_STATE):
@@ -185,10 +201,11 @@ def _advance(T, state, before, fixed, fate, tolerance):
             before[k, i] = state[k, i]
     for i in range(LANES):
         w, last, previous = state[_V, i], abs(T[_W + ORDER, i]), abs(T[_W + ORDER - 1, i])
-        size = _REST * max(last, previous * state[_RATE, i]) / (tolerance * (1.0 + abs(w)))
+        size = max(last, previous * state[_RATE, i]) * max(1.0, _SHORT * state[_RATE, i])
+        size = size / (tolerance * (1.0 + abs(w)))
         # within `flow.longest_step` w has one zero at most
         square = fixed[_PDG, i] + fixed[_PF, i] * (abs(w) + 0.25 * fixed[_PF, i])
-        rate = np.sqrt(max(np.sqrt(np.sqrt(np.sqrt(size))), square) + 1e-300)
+        rate = math.sqrt(max(math.sqrt(math.sqrt(math.sqrt(size))), square) + 1e-300)
         h = 1.0 / rate
         rest = (fixed[_NEXT, i] - state[_T, i]) - state[_T_LOW, i]
         at = rest < h
@@ -206,7 +223,7 @@ def _advance(T, state, before, fixed, fate, tolerance):
         d2 = dt * dt
         d4 = d2 * d2
         d15 = d4 * d4 * d4 * d2 * dt
-        cut = _REST * d15 * max(last * dt, previous)
+        cut = d15 * max(last * dt, previous)
         speed = fixed[_PF, i] * abs(v) + fixed[_PG, i]
         e = cut * dt * (1.0 / ORDER) + UNIT * (4.0 + 3.0 * dt * (abs(v) + dt * speed))
         g = cut + UNIT * (1.5 * abs(v) + 8.0 * dt * speed)
@@ -224,11 +241,11 @@ def _advance(T, state, before, fixed, fate, tolerance):
 
 
 @inline
-def _turnings(state, fate):
+def _turnings(state):
     """Count the sign changes of w; where the bar reaches zero for more than two steps the count is lost."""
     for i in range(LANES):
         v, sign, unsure, count = state[_V, i], state[_SIGN, i], state[_UNSURE, i], state[_COUNT, i]
-        near = v * v <= 2.0402 * state[_STEPS, i] * state[_SBB, i]
+        near = not v * v > 2.0402 * state[_STEPS, i] * state[_SBB, i]
         lost = unsure > 2.0 and sign != 0.0
         passed = count + (1.0 if v * sign < 0.0 else 0.0)
         state[_COUNT, i] = count if near else (_MANY if lost else passed)
@@ -275,7 +292,7 @@ def _tell(state, before, fixed, i, floats, turnings):
 
 
 @kernel
-def _refill(P, starts, times, waiting, state, fixed, fate, row, column, status):
+def _refill(P, starts, times, waiting, state, fixed, row, column, status):
     """Give free lanes the rows that wait; returns the first that still waits."""
     for i in range(LANES):
         while waiting < len(P) and row[i] < 0:
@@ -318,16 +335,16 @@ def _collect(times, limit, state, before, fixed, fate, row, column, floats, turn
 def trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
     """phi, w, their bars and turnings at the ascending times >= 0 of each row, which end at its first infinity.
 
-    P (rows, 10) from `flow.coefficients`; as `along.trajectories`.
+    P (rows, 10) from `flow.coefficients`; as `along.trajectories`. Returns the number of steps
+    of lanes, free ones too.
     """
-    work = np.zeros((_ROWS + 2 * _STATE + _FIXED + 1, LANES))  # one array: LLVM sees that its rows do not overlap
-    T, state, before = work[:_ROWS], work[_ROWS : _ROWS + _STATE], work[_ROWS + _STATE : _ROWS + 2 * _STATE]
-    fixed, fate = work[_ROWS + 2 * _STATE : _ROWS + 2 * _STATE + _FIXED], work[_ROWS + 2 * _STATE + _FIXED]
+    work = np.zeros((ROWS, LANES))  # one array: LLVM sees that its rows do not overlap
+    T, state, before, fixed, fate = split(work)
     row, column = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
-    waiting = _refill(P, starts, times, 0, state, fixed, fate, row, column, status)
+    waiting, steps = _refill(P, starts, times, 0, state, fixed, row, column, status), 0
     while row.max() >= 0:
-        _series(T, state, fixed)
-        _advance(T, state, before, fixed, fate, tolerance)
-        _turnings(state, fate)
+        step(T, state, before, fixed, fate, tolerance)
+        steps += LANES
         if _collect(times, limit, state, before, fixed, fate, row, column, floats, turnings, status):
-            waiting = _refill(P, starts, times, waiting, state, fixed, fate, row, column, status)
+            waiting = _refill(P, starts, times, waiting, state, fixed, row, column, status)
+    return steps

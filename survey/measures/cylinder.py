@@ -11,6 +11,9 @@ from survey.kernels.flow import coefficients
 
 STEPS = 200_000  # budget of one solution; about 0.1 s with the Taylor method
 SHARE = 1e-3  # of the asked accuracy, for the truncation error of one step
+ATTEMPTS = (3e-4, 1e-5, 1e-7)  # the same for single solutions: most of what misses the accuracy misses it by little
+# of a step: above, the terms that follow the last are no smaller; below, the truncation is lost in the rounding
+COARSEST, FINEST = 1e-11, 2e-16
 
 
 def reverse(rows):
@@ -27,6 +30,12 @@ def tolerances(method, rtol):
     """Truncation per step, for the first attempt and for the second."""
     first = min(max(SHARE * rtol, method.FLOW_FINEST), 1e-6)
     return first, max(1e-4 * first, method.FLOW_FINEST)
+
+
+def attempts(method, rtol):
+    """Truncation per step of single solutions, ever finer."""
+    tolerances = [min(max(share * rtol, FINEST, method.FLOW_FINEST), COARSEST) for share in ATTEMPTS]
+    return [first for first, finer in zip(tolerances, [*tolerances[1:], 0.0], strict=True) if finer < 0.5 * first]
 
 
 def split(rows):
@@ -75,7 +84,7 @@ def _in_time(method, rows, places, rtol):
         status = np.where(np.isfinite(floats[..., 0]), OK, ends[:, None])
         return floats, turnings, status
 
-    return _unsorted(order, _twice(run, np.isfinite(places), method, rtol))
+    return _unsorted(order, _repeated(run, np.isfinite(places), method, rtol))
 
 
 def abel(method, rows, targets, rtol):
@@ -121,16 +130,18 @@ def _in_phi(method, rows, targets, rtol):
         method.flow_abels(P, starts, at, tolerance, budget, floats, status)
         return floats, status
 
-    return _unsorted(order, _twice(run, np.isfinite(targets), method, rtol))
+    return _unsorted(order, _repeated(run, np.isfinite(targets), method, rtol))
 
 
-def _twice(run, asked, method, rtol):
-    """Solve all rows, then once more, finer, those that miss the asked accuracy; keep the better of the two."""
-    first, second = tolerances(method, rtol)
+def _repeated(run, asked, method, rtol):
+    """Solve all rows, then again, finer, those that miss the asked accuracy; keep the better of two."""
+    first, *others = attempts(method, rtol)
     results = run(np.ones(len(asked), dtype=bool), first)
-    again = (_missed(results, rtol) & asked).any(axis=1)
-    if again.any() and second < first:
-        finer = run(again, second)
+    for tolerance in others:
+        again = (_missed(results, rtol) & asked).any(axis=1)
+        if not again.any():
+            break
+        finer = run(again, tolerance)
         kept = [result[again] for result in results]
         better = _badness(finer) <= _badness(kept)
         for result, old, new in zip(results, kept, finer, strict=True):

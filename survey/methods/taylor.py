@@ -49,7 +49,7 @@ def flow_at(p, T, dt):
 @kernel
 def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
     """See `lockstep.trajectories`."""
-    lockstep.trajectories(P, starts, times, tolerance, limit, floats, turnings, status)
+    return lockstep.trajectories(P, starts, times, tolerance, limit, floats, turnings, status)
 
 
 @kernel

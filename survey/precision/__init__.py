@@ -6,9 +6,10 @@ Everything that belongs to one scene lies in the file of its name beside this on
     references()           [(parameters, options, {output: exact value}, verdict or None), ...]
     works()                {name of the work: (point, options)}, what is timed; the arrays of `point` broadcast
     system(point, options) the same question as ODEs, for the peers in `survey.peers`
-    outcome(ends)          {ERROR: values, "verdict": values} from the states (points, n) at the ends of the spans
+    outcome(ends)          {ERROR: values} from the states (points, n) at the ends of the spans, and "verdict" if any
     LIMITED                the method whose operations, at the machine's peak rate, are the least time of the chart
     operations_of(run)     its operations while `run()` solves a work with it
+    MOST                   {method: number of points that it is timed on}, for those that need long (optional)
 """
 
 import csv
@@ -97,7 +98,8 @@ def measure(scene, case, peers=False, say=lambda line: None):
     """The records of every method (and, if asked, of every peer that is installed) at every setting."""
     module = modules.load(scenes, scene, "scene")
     methods = ["auto", *workflow.methods_of(module)]
-    runs = {(method, ""): (_solver(module, method, case.ERROR), None) for method in methods}
+    fewer = getattr(case, "MOST", {})
+    runs = {(method, ""): (_solver(module, method, case.ERROR), fewer.get(method)) for method in methods}
     for name in modules.names(programs) if peers else ():
         if importlib.util.find_spec(name):
             peer = modules.load(programs, name, "peer")

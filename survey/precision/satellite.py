@@ -60,7 +60,7 @@ def system(point, options):
     )
 
 
-def _slope(state, parameters):
+def _slope(state, parameters, _sin, _cos):
     square = state[0] ** 2
     z = square + (parameters[1] * state[0] + parameters[2])
     bend = state[0] * (parameters[0] - square)
