@@ -40,6 +40,7 @@ ROWS = _TABLE + 2 * _STATE + _FIXED + 1
 _GOING, _AT, _LOST = 0.0, 1.0, 2.0  # what a step has made of a lane
 # Steps shorter than this have a share of the tolerance only: so many short steps add up to what few long ones do.
 _SHORT = 1.0 / 8.0
+_COARSEST = 1e-11  # per step: above, the terms that follow the last two may be no smaller than these
 _MANY = -1e9  # a count that stays below zero
 
 # Cody and Waite's reduction, and the polynomials of fdlibm's kernels for sin and cos in [-pi/4, pi/4].
@@ -340,6 +341,7 @@ def trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
     """
     work = np.zeros((ROWS, LANES))  # one array: LLVM sees that its rows do not overlap
     T, state, before, fixed, fate = split(work)
+    tolerance = min(tolerance, _COARSEST)
     row, column = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
     waiting, steps = _refill(P, starts, times, 0, state, fixed, row, column, status), 0
     while row.max() >= 0:

@@ -11,9 +11,8 @@ from survey.kernels.flow import coefficients
 
 STEPS = 200_000  # budget of one solution; about 0.1 s with the Taylor method
 SHARE = 1e-3  # of the asked accuracy, for the truncation error of one step
-ATTEMPTS = (3e-4, 1e-5, 1e-7)  # the same for single solutions: most of what misses the accuracy misses it by little
-# of a step: above, the terms that follow the last are no smaller; below, the truncation is lost in the rounding
-COARSEST, FINEST = 1e-11, 2e-16
+ATTEMPTS = (3e-4, 1e-5, 1e-7)  # the same for trajectories: most of what misses the accuracy misses it by little
+FINEST = 2e-16  # of a step: below, the truncation is lost in the rounding
 
 
 def reverse(rows):
@@ -33,8 +32,8 @@ def tolerances(method, rtol):
 
 
 def attempts(method, rtol):
-    """Truncation per step of single solutions, ever finer."""
-    tolerances = [min(max(share * rtol, FINEST, method.FLOW_FINEST), COARSEST) for share in ATTEMPTS]
+    """Truncation per step of trajectories, ever finer."""
+    tolerances = [min(max(share * rtol, FINEST, method.FLOW_FINEST), 1e-6) for share in ATTEMPTS]
     return [first for first, finer in zip(tolerances, [*tolerances[1:], 0.0], strict=True) if finer < 0.5 * first]
 
 
@@ -84,7 +83,7 @@ def _in_time(method, rows, places, rtol):
         status = np.where(np.isfinite(floats[..., 0]), OK, ends[:, None])
         return floats, turnings, status
 
-    return _unsorted(order, _repeated(run, np.isfinite(places), method, rtol))
+    return _unsorted(order, _repeated(run, np.isfinite(places), attempts(method, rtol), rtol))
 
 
 def abel(method, rows, targets, rtol):
@@ -130,12 +129,12 @@ def _in_phi(method, rows, targets, rtol):
         method.flow_abels(P, starts, at, tolerance, budget, floats, status)
         return floats, status
 
-    return _unsorted(order, _repeated(run, np.isfinite(targets), method, rtol))
+    return _unsorted(order, _repeated(run, np.isfinite(targets), tolerances(method, rtol), rtol))
 
 
-def _repeated(run, asked, method, rtol):
+def _repeated(run, asked, ladder, rtol):
     """Solve all rows, then again, finer, those that miss the asked accuracy; keep the better of two."""
-    first, *others = attempts(method, rtol)
+    first, *others = ladder
     results = run(np.ones(len(asked), dtype=bool), first)
     for tolerance in others:
         again = (_missed(results, rtol) & asked).any(axis=1)

@@ -13,7 +13,7 @@ from survey.peers import System
 
 ERROR = "phi"
 LIMITED = "taylor"
-MOST = {"rk4": 100, "dop853": 600}  # points that a slow method is timed on
+MOST = {"rk4": 20, "dop853": 100}  # points that a slow method is timed on
 _NAMES = ("b12", "b31", "d", "c23", "s2", "s3", "phi0", "w0")
 _TIME = 20.0
 _POINTS = 20_000
