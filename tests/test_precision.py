@@ -84,3 +84,18 @@ def test_a_folder_that_cannot_be_or_a_missing_chart_is_refused(tmp_path):
         precision.write("satellite", tmp_path / "file" / "below")
     with pytest.raises(BadInput, match="unknown scene 'satelite'"):
         precision.write("satelite", tmp_path)
+
+
+def test_what_a_method_does_not_answer_is_not_in_the_chart(monkeypatch):
+    case = modules.load(folder, "gyrostat", "scene")
+    works = {name: ({key: v[:20] for key, v in point.items()}, o) for name, (point, o) in case.works().items()}
+    monkeypatch.setattr(precision, "SETTINGS", (1e-8,))
+    monkeypatch.setattr(precision, "REPEATS", 1)
+    monkeypatch.setattr(precision, "_cold", lambda *_: 0.0)
+    monkeypatch.setattr(case, "works", lambda: works)
+    records = precision.measure("gyrostat", case)
+    found = {(record.method, record.work) for record in records}
+    methods = {method for method, _ in found}
+    assert {"auto", "taylor", "dop853", "rk4", "closed", "full"} <= methods
+    assert found == {(method, work) for method in methods for work in works} - {("closed", "trajectory")}
+    assert all(record.error <= record.setting for record in records)

@@ -11,6 +11,8 @@ from survey.kernels.flow import coefficients
 
 STEPS = 200_000  # budget of one solution; about 0.1 s with the Taylor method
 SHARE = 1e-3  # of the asked accuracy, for the truncation error of one step
+ATTEMPTS = (3e-4, 1e-5, 1e-7)  # the same for trajectories: most of what misses the accuracy misses it by little
+FINEST = 2e-16  # of a step: below, the truncation is lost in the rounding
 
 
 def reverse(rows):
@@ -27,6 +29,12 @@ def tolerances(method, rtol):
     """Truncation per step, for the first attempt and for the second."""
     first = min(max(SHARE * rtol, method.FLOW_FINEST), 1e-6)
     return first, max(1e-4 * first, method.FLOW_FINEST)
+
+
+def attempts(method, rtol):
+    """Truncation per step of trajectories, ever finer."""
+    tolerances = [min(max(share * rtol, FINEST, method.FLOW_FINEST), 1e-6) for share in ATTEMPTS]
+    return [first for first, finer in zip(tolerances, [*tolerances[1:], 0.0], strict=True) if finer < 0.5 * first]
 
 
 def split(rows):
@@ -75,7 +83,7 @@ def _in_time(method, rows, places, rtol):
         status = np.where(np.isfinite(floats[..., 0]), OK, ends[:, None])
         return floats, turnings, status
 
-    return _unsorted(order, _twice(run, np.isfinite(places), method, rtol))
+    return _unsorted(order, _repeated(run, np.isfinite(places), attempts(method, rtol), rtol))
 
 
 def abel(method, rows, targets, rtol):
@@ -121,16 +129,18 @@ def _in_phi(method, rows, targets, rtol):
         method.flow_abels(P, starts, at, tolerance, budget, floats, status)
         return floats, status
 
-    return _unsorted(order, _twice(run, np.isfinite(targets), method, rtol))
+    return _unsorted(order, _repeated(run, np.isfinite(targets), tolerances(method, rtol), rtol))
 
 
-def _twice(run, asked, method, rtol):
-    """Solve all rows, then once more, finer, those that miss the asked accuracy; keep the better of the two."""
-    first, second = tolerances(method, rtol)
+def _repeated(run, asked, ladder, rtol):
+    """Solve all rows, then again, finer, those that miss the asked accuracy; keep the better of two."""
+    first, *others = ladder
     results = run(np.ones(len(asked), dtype=bool), first)
-    again = (missed(results, rtol) & asked).any(axis=1)
-    if again.any() and second < first:
-        finer = run(again, second)
+    for tolerance in others:
+        again = (missed(results, rtol) & asked).any(axis=1)
+        if not again.any() or tolerance >= first:
+            break
+        finer = run(again, tolerance)
         kept = [result[again] for result in results]
         better = badness(finer) <= badness(kept)
         for result, old, new in zip(results, kept, finer, strict=True):

@@ -5,7 +5,7 @@ software package for the numerical integration of ODEs by means of high-order Ta
 Mathematics 14 (2005) 99-117. Domain: every parameter value; explicit, so steps shrink as 1/|b| on stiff systems.
 """
 
-from survey.kernels import along, fate, returns
+from survey.kernels import along, fate, lockstep, returns
 from survey.kernels.flow import LAST, PHI, TRUNC_PHI, TRUNC_W, E, W, Y, longest_step, series
 from survey.kernels.flow import ORDER as _ORDER
 from survey.kernels.jit import inline, kernel
@@ -48,8 +48,8 @@ def flow_at(p, T, dt):
 
 @kernel
 def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
-    """See `along.trajectories`."""
-    along.trajectories(flow_setting, flow_begin, flow_at, P, starts, times, tolerance, limit, floats, turnings, status)
+    """See `lockstep.trajectories`."""
+    return lockstep.trajectories(P, starts, times, tolerance, limit, floats, turnings, status)
 
 
 @kernel

@@ -5,6 +5,7 @@ Measured: DOP853 and its newer Vern8 take the same time, Vern7 and Tsit5 more.
 """
 
 from functools import cache
+from math import cos, sin
 
 import numba
 import numpy as np
@@ -26,7 +27,7 @@ def _compiled(slope):
 
     @cyjit
     def fill(out, t, state, parameters):
-        slopes = slope(state, parameters)
+        slopes = slope(state, parameters, sin, cos)
         for i in range(len(slopes)):
             out[i] = slopes[i]
 

@@ -18,8 +18,9 @@ import numpy as np
 class System:
     """An autonomous system of ODEs at many points, each over its own span from 0.
 
-    `slope(state, parameters)` gives a tuple; it only indexes, adds, multiplies and squares, so that every peer can
-    take it as it is: as Python, compiled, traced or as symbols. Points of like `effort` take about as many steps.
+    `slope(state, parameters, sin, cos)` gives a tuple; it only indexes, adds, multiplies, squares and calls the sine
+    and cosine of the peer, so that every peer can take it as it is: as Python, compiled, traced or as symbols. Points
+    of like `effort` take about as many steps.
     """
 
     slope: Callable

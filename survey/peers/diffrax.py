@@ -33,9 +33,12 @@ def integrate(system, rtol):
 
 @cache
 def _compiled(slope):
+    def field(_, state, parameters):
+        return list(slope(state, parameters, jax.numpy.sin, jax.numpy.cos))
+
     def one(start, parameters, span, rtol):
         solved = diffrax.diffeqsolve(
-            diffrax.ODETerm(lambda _, state, own: list(slope(state, own))), diffrax.Dopri8(), 0.0, span, None, start,
+            diffrax.ODETerm(field), diffrax.Dopri8(), 0.0, span, None, start,
             args=parameters, stepsize_controller=diffrax.PIDController(rtol=rtol, atol=rtol),
             saveat=diffrax.SaveAt(t1=True), max_steps=None, throw=False,
         )  # fmt: skip

@@ -37,7 +37,7 @@ def integrate(system, rtol):
 @cache
 def _build(slope, states, parameters, lanes, rtol):
     names = heyoka.make_vars(*(f"y{i}" for i in range(states)))
-    slopes = slope(names, [heyoka.par[i] for i in range(parameters)])
+    slopes = slope(names, [heyoka.par[i] for i in range(parameters)], heyoka.sin, heyoka.cos)
     return heyoka.taylor_adaptive_batch(
         list(zip(names, slopes, strict=True)), np.zeros((states, lanes)), pars=np.zeros((parameters, lanes)),
         tol=rtol, fast_math=True,

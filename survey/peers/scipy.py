@@ -1,5 +1,7 @@
 """scipy's solve_ivp with DOP853, its method for high accuracy, one point after the other."""
 
+from math import cos, sin
+
 import numpy as np
 from scipy.integrate import solve_ivp
 
@@ -15,4 +17,4 @@ def integrate(system, rtol):
 
 
 def _slope(_, state, slope, parameters):
-    return slope(state, parameters)
+    return slope(state, parameters, sin, cos)

@@ -3,12 +3,13 @@
 Everything that belongs to one scene lies in the file of its name beside this one:
 
     ERROR                  the output whose error is charted
-    references()           [(parameters, options, {output: exact value}, verdict or None), ...]
+    references(work)       [(parameters, options, {output: exact value}, verdict or None), ...] like the work's points
     works()                {name of the work: (point, options)}, what is timed; the arrays of `point` broadcast
     system(point, options) the same question as ODEs, for the peers in `survey.peers`
-    outcome(ends)          {ERROR: values, "verdict": values} from the states (points, n) at the ends of the spans
+    outcome(ends)          {ERROR: values} from the states (points, n) at the ends of the spans, and "verdict" if any
     LIMITED                the method whose operations, at the machine's peak rate, are the least time of the chart
     operations_of(run)     its operations while `run()` solves a work with it
+    MOST                   {method: number of points that it is timed on}, for those that need long (optional)
 """
 
 import csv
@@ -94,17 +95,21 @@ def write(scene, directory, peers=False, say=lambda line: None):
 
 
 def measure(scene, case, peers=False, say=lambda line: None):
-    """The records of every method (and, if asked, of every peer that is installed) at every setting."""
+    """The records of every method (and, if asked, of every peer that is installed) at every setting.
+
+    A method is left out where it has no answer for a reference of the work (closed forms, where there is none).
+    """
     module = modules.load(scenes, scene, "scene")
-    methods = ["auto", *workflow.methods_of(module)]
-    runs = {(method, ""): (_solver(module, method, case.ERROR), None) for method in methods}
+    methods = ["auto", *workflow.methods_of(module, next(iter(case.works().values()))[1])]
+    fewer = getattr(case, "MOST", {})
+    runs = {(method, ""): (_solver(module, method, case.ERROR), fewer.get(method)) for method in methods}
     for name in modules.names(programs) if peers else ():
         if importlib.util.find_spec(name):
             peer = modules.load(programs, name, "peer")
             runs["", name] = _peer(case, peer), peer.POINTS
         else:
             say(f"{name} is not installed and is missing in the chart: pip install 'survey[bench]'")
-    references, whole = case.references(), case.works()
+    whole = case.works()
     thinned = {work: (_thinned(point), options) for work, (point, options) in whole.items()}
     records = []
     for (method, peer), (solve, most) in runs.items():
@@ -113,11 +118,13 @@ def measure(scene, case, peers=False, say=lambda line: None):
         for point, options in works.values() if method else ():  # every path is compiled before it is timed
             solve(point, options, SETTINGS[0])
         for setting in SETTINGS:
-            alone = _against(solve, references, case.ERROR, setting)
             for work, (point, options) in works.items():
-                # auto treats a dense row as a whole: its error is that of the references within such a row
-                inside = [_within(reference, point) for reference in references] if method == "auto" else None
-                error, wrong = _against(solve, inside, case.ERROR, setting) if inside else alone
+                references = case.references(work)
+                if method == "auto":  # it treats a dense row as a whole: its error is that within such a row
+                    references = [_within(reference, point) for reference in references]
+                error, wrong = _against(solve, references, case.ERROR, setting)
+                if np.isnan(error):
+                    continue
                 seconds = _per_point(solve, point, options, setting, most)
                 records.append(Record(work, method, peer, setting, error, seconds, wrong, compile_seconds))
         say(f"{scene}: {method or peer} measured")
@@ -212,12 +219,15 @@ def _first_call(solve, works, most=None):
 
 
 def _against(solve, references, name, rtol):
-    """(largest relative error, number of wrong verdicts) over the references; undecided is not wrong."""
+    """(largest relative error, NaN if there is one; number of wrong verdicts) over the references.
+
+    Undecided is not wrong.
+    """
     worst, wrong = 0.0, 0
     for parameters, options, exact, verdict in references:
         solved = solve(parameters, options, rtol)
         value = float(np.ravel(solved[name])[0])
-        worst = max(worst, abs(value - exact[name]) / (1 + abs(exact[name])))
+        worst = float(np.maximum(worst, abs(value - exact[name]) / (1 + abs(exact[name]))))
         if verdict is not None and "verdict" in solved:
             wrong += int(np.ravel(solved["verdict"])[0]) not in (-1, verdict)
     return worst, wrong

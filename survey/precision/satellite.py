@@ -1,6 +1,7 @@
 """The satellite's chart: a row and a map of prolate librations, scattered points; errors by 40-digit references."""
 
 import json
+from functools import cache
 from importlib import resources
 from unittest.mock import patch
 
@@ -18,8 +19,9 @@ LIMITED = "taylor16"
 _FAMILIES = {"PL": "prolate", "PR": "prolate", "OL": "oblate", "OR": "oblate"}
 
 
-def references():
-    """The reference cases (error of the JSON's own values below 1e-38)."""
+@cache
+def references(_work=None):
+    """The reference cases, the same for every work (error of the JSON's own values below 1e-38)."""
     data = json.loads(resources.files("survey.reference").joinpath("satellite.json").read_text())
     cases = []
     for row in data["libration"] + data["nasty"] + data["rotation"]:
@@ -60,7 +62,7 @@ def system(point, options):
     )
 
 
-def _slope(state, parameters):
+def _slope(state, parameters, _sin, _cos):
     square = state[0] ** 2
     z = square + (parameters[1] * state[0] + parameters[2])
     bend = state[0] * (parameters[0] - square)
