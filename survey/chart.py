@@ -20,11 +20,14 @@ def draw(records, machine, scene, name, path):
         _limit(axes, [entry for entry in machine["least"] if entry["work"] == work], own)
         for number, (method, peer) in enumerate(runs):
             look = {"marker": MARKERS[number % len(MARKERS)], "color": COLOURS[number % len(COLOURS)]}
-            _line(axes, [r for r in own if (r.method, r.peer) == (method, peer)], look)
+            mine = [r for r in own if (r.method, r.peer) == (method, peer)]
+            if mine:  # closed forms do not answer every work
+                _line(axes, mine, look)
         axes.set(title=work, xlabel="time per point on one thread (s)", xscale="log", yscale="log")
         axes.grid(alpha=0.3)
     panels[0, 0].set_ylabel(f"largest error of the {name}, relative to 1 + |value|")
-    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=5, fontsize=8)
+    named = {label: line for axes in panels[0] for line, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=5, fontsize=8)
     figure.suptitle(
         f"{scene}: error against time, lower left is better (beside points: wrong verdicts on the references)"
     )

@@ -13,7 +13,7 @@ from survey.peers import System
 
 ERROR = "phi"
 LIMITED = "taylor"
-MOST = {"rk4": 20, "dop853": 100}  # points that a slow method is timed on
+MOST = {"rk4": 20, "dop853": 100, "full": 100}  # points that a slow method is timed on
 _NAMES = ("b12", "b31", "d", "c23", "s2", "s3", "phi0", "w0")
 _TIME = 20.0
 _POINTS = 20_000
@@ -55,7 +55,8 @@ def system(point, options):
 
 
 def _slope(state, parameters, sin, cos):
-    b12, b31, d, c23, s2, s3 = (parameters[i] for i in range(6))
+    b12, b31, d = parameters[0], parameters[1], parameters[2]
+    c23, s2, s3 = parameters[3], parameters[4], parameters[5]
     s, c = sin(state[0]), cos(state[0])
     return state[1], (b12 * c - b31 * s) * state[1] - d * c * s - c23 * (c * c - s * s) + s2 * c - s3 * s
 
