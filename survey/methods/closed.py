@@ -101,7 +101,7 @@ def _elliptic(kind, side, data, phi0, x, out):
         return TURNING
     if kind == closed.LIBRATION:
         edge, right = data[closed.BAR_RIGHT] + 4.0 * UNIT * (abs(phi0) + abs(x)), data[closed.RIGHT]
-        if x > right + edge:
+        if x >= right - edge:
             t, bar = closed.flight(data, math.pi, 0.0)
             out[0], out[1], out[2], out[3] = phi0 + right, t, edge, bar + 2.0 * UNIT * t
             return TURNING

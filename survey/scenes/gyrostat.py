@@ -75,7 +75,8 @@ PARAMETERS = (
 )  # fmt: skip
 OPTIONS = (Option("question", _QUESTIONS, "what is asked of the solution, or of the system"),)
 STATUS = {
-    "turning": "the solution turns back before it reaches phi: phi_turning and t_turning say where and when",
+    "turning": "the solution turns back before it reaches phi, or within phi_turning_error of it: phi_turning and "
+    "t_turning say where and when",
     "equilibrium": "the solution runs into an equilibrium, in infinite time, before it reaches phi",
     "separatrix": "the error bar cannot tell on which side of a separatrix the solution passes",
     "no_closed_form": "no closed form applies (they need b = 0, g = 0 or (61)): try another method",
