@@ -382,7 +382,10 @@ def judge(plane, method, true, rtol=RTOL):
 
 def asked(plane, method, rtol):
     """The answers of `survey.evaluate`, (row, place)."""
-    columns = {name: xr.DataArray(values, dims="row") for name, values in zip((*NAMES, "phi0", "w0"), plane.rows.T, strict=True)}
+    columns = {
+        name: xr.DataArray(values, dims="row")
+        for name, values in zip((*NAMES, "phi0", "w0"), plane.rows.T, strict=True)
+    }
     place = {"phi" if plane.over_phi else "t": xr.DataArray(plane.places, dims=("row", "place"))}
     ds = survey.evaluate("gyrostat", question=plane.question, method=method, rtol=rtol, **columns, **place)
     return ds.transpose("row", "place")
