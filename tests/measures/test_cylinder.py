@@ -95,13 +95,13 @@ def test_reference_separatrix():
 
 
 def test_beside_a_turning_point_ok_is_certain_and_turning_holds_within_its_bar():
-    """A pendulum from the bottom turns at pi/3: targets a few ulp from it, before and beyond, each alone and together."""
+    """A pendulum from the bottom turns at pi/3: targets before and beyond, down to an ulp, together and alone."""
     places = np.pi / 3 + np.concatenate([-(10.0 ** np.arange(-8, -16, -0.25)), 10.0 ** np.arange(-15.75, -8, 0.25)])
     with mp.workdps(40):
         gaps = np.array([float(mp.mpf(x) - mp.pi / 3) for x in places])
         time = float(mp.ellipk(mp.mpf("0.25")))
+    row = np.array([[0, 0, 0, 0, 0, 1.0, 0.0, 1.0]])
     for method in (taylor, dop853, rk4, closed):
-        row = np.array([[0, 0, 0, 0, 0, 1.0, 0.0, 1.0]])
         floats, status = (part[0] for part in cylinder.abel(method, row, places[None], 1e-10))
         reached, turned = status == OK, status == TURNING
         assert reached.sum() > 10 and turned.sum() > 30 and np.isin(status, (OK, TURNING, NO_CONVERGENCE)).all()
@@ -113,10 +113,10 @@ def test_beside_a_turning_point_ok_is_certain_and_turning_holds_within_its_bar()
         back = -gaps[reached]  # w^2 = 2 (cos phi - 1/2)
         wanted = 2.0 * np.sqrt(np.sin(np.pi / 3 - back / 2) * np.sin(back / 2))
         assert (np.abs(floats[reached, 0] - wanted) <= floats[reached, 2]).all()
-        together = cylinder.abel(method, row, places[None], 1e-5)  # at which nothing is solved again
-        for j in range(0, len(places), 5):
-            alone = cylinder.abel(method, row, places[None, j : j + 1], 1e-5)
-            assert all(np.array_equal(a[0, 0], b[0, j], equal_nan=True) for a, b in zip(alone, together, strict=True))
+    together = cylinder.abel(taylor, row, places[None], 1e-5)  # at which nothing is solved again
+    for j in range(0, len(places), 5):
+        alone = cylinder.abel(taylor, row, places[None, j : j + 1], 1e-5)
+        assert all(np.array_equal(a[0, 0], b[0, j]) for a, b in zip(alone, together, strict=True))
 
 
 def exact(six, phi, w, t):

@@ -177,7 +177,7 @@ def test_long_integration_agrees(seed):
 
 
 def test_equilibrium_starts():
-    """Of binary64 angles only 0 is exactly an equilibrium; pi is not, and where the fall from it ends is not claimed."""
+    """Of binary64 angles only 0 is exactly an equilibrium; the fall from pi is not claimed to end anywhere."""
     pendulum = (0, 0, 0, 0, 0, 1.0)
     found = fates(pendulum, [[0, 0], [math.pi, 0], [-math.pi, 0], [7 * math.pi, 0], [1e-9, 0]])
     assert found["verdict"].tolist() == [START] + [UNDECIDED] * 3 + [SWINGS]
