@@ -11,7 +11,6 @@ import argparse
 import json
 import math
 import sys
-import textwrap
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -187,7 +186,7 @@ def checked(plane):
     high, low, codes = truth(plane.rows, plane.places, plane.over_phi)
     other, rest, others = truth(plane.rows, plane.places, plane.over_phi, COARSE)
     if not (np.isfinite(high).all() and np.array_equal(codes, others)):
-        raise RuntimeError(f"{plane.title}: the reference is no reference")
+        raise RuntimeError(f"{plane.name}: the reference is no reference")
     return high, low, codes, np.abs((high - other) + (low - rest))
 
 
@@ -223,6 +222,10 @@ class Plane:
     places: np.ndarray  # (n, m), ascending along m
     across: str = ""  # the axis along which places run, if they do
     over_phi: bool = False
+
+    @property
+    def name(self):
+        return self.title.replace("$", "").replace("\n", " ")
 
     @property
     def question(self):
@@ -290,7 +293,7 @@ def phase_plane(n=44):
     phi0, w0 = np.linspace(-np.pi, np.pi, n), np.linspace(-3.0, 3.0, 3 * n // 4)
     rows = system(phi0, w0[:, None], 0, 0, *SIX[2:])
     return Plane(
-        "b = 0: initial states, $t = 20$", plain("initial angle $\\varphi_0$", phi0),
+        "b = 0: initial states,\n$t = 20$", plain("initial angle $\\varphi_0$", phi0),
         plain("initial velocity $w_0$", w0), rows, np.full((len(rows), 1), 20.0),
     )  # fmt: skip
 
@@ -306,8 +309,8 @@ def roots(n=16):
         systems.append((0, 0, d, c23, a * c - b * s, -a * s - b * c))
         speeds.append(separatrix(systems[-1], phi0, place))
     rows = system(phi0, np.array(speeds)[:, None] + offsets, *np.array(systems).T[:, :, None])
-    y = logarithmic("distance to a fold, $g'$ at the saddle", gaps)
-    return Plane("b = 0: double and triple roots, $t = 20$", x, y, rows, np.full((len(rows), 1), 20.0))
+    y = logarithmic("distance to a fold,\n$g'$ at the saddle", gaps)
+    return Plane("b = 0: double and triple\nroots, $t = 20$", x, y, rows, np.full((len(rows), 1), 20.0))
 
 
 def beside(n=16):
@@ -315,7 +318,9 @@ def beside(n=16):
     x, offsets = two_sided("distance to the separatrix, $w_0 - w_s$", np.linspace(-15.0, -0.5, n))
     t = np.linspace(1.0, 40.0, 30)
     rows = system(3.5, threshold(SIX, 3.5, 1.85, 1.86) + offsets, *SIX)
-    return Plane("b = (0.7, -0.4): beside a separatrix", x, plain("time $t$", t), rows, np.tile(t, (len(rows), 1)), "y")
+    return Plane(
+        "b = (0.7, -0.4):\nbeside a separatrix", x, plain("time $t$", t), rows, np.tile(t, (len(rows), 1)), "y"
+    )
 
 
 def stiff(n=26):
@@ -325,7 +330,7 @@ def stiff(n=26):
     six = b12, b31, 0.25 * (b12 * b12 - b31 * b31), 0.25 * b12 * b31, -0.5 * b12, -0.5 * b31
     rows = system(0.5, 0.5 * (b12 * math.sin(0.5) + b31 * math.cos(0.5)) + 1.0, *six)
     return Plane(
-        "on $w = F/2 + 1$, (61): from conservative to stiff", logarithmic("size of b", b), logarithmic("time $t$", t),
+        "on $w = F/2 + 1$, (61):\nfrom conservative to stiff", logarithmic(r"size of b, $\sqrt{b_{12}^2 + b_{31}^2}$", b), logarithmic("time $t$", t),
         rows, np.tile(10.0**t, (n, 1)), "y",
     )  # fmt: skip
 
@@ -336,7 +341,7 @@ def turning(six, phi0, limit, title, n=16):
     gaps = np.linspace(-14.0, -1.0, 20)
     rows = system(phi0, limit - 10.0**gaps, *six)
     ends = truth(rows, np.full((len(rows), 1), np.inf), True, COARSE)[0][:, 0, 0]
-    y = logarithmic("distance to the separatrix, $w_s - w_0$", gaps)
+    y = logarithmic("distance to the separatrix,\n$w_s - w_0$", gaps)
     return Plane(title, x, y, rows, np.sort(ends[:, None] + offsets, axis=1), "x", over_phi=True)
 
 
@@ -348,8 +353,8 @@ def planes(share=1.0):
         "roots": roots(n),
         "beside": beside(n),
         "stiff": stiff(round(26 * share)),
-        "turning_still": turning(still, 0.3, separatrix(still, 0.3, 4.65), "b = 0: Abel solutions that turn", n),
-        "turning": turning(SIX, 3.5, threshold(SIX, 3.5, 1.85, 1.86), "b = (0.7, -0.4): Abel solutions that turn", n),
+        "turning_still": turning(still, 0.3, separatrix(still, 0.3, 4.65), "b = 0: Abel solutions\nthat turn", n),
+        "turning": turning(SIX, 3.5, threshold(SIX, 3.5, 1.85, 1.86), "b = (0.7, -0.4): Abel\nsolutions that turn", n),
     }
 
 
@@ -442,16 +447,16 @@ TABLE = """## {title}
 |---|---|---|---|---|---|---|
 {rows}
 """
-RULE = """1. A closed form where one applies. Over all states of a system with b = 0 it answers {closed:.1%} and has the smallest median
-   error, {closed_error:.0e} against {taylor_error:.0e} of `taylor`, at a cost free of t; (61) holds its digits as long as its parameters hold its
-   conditions, which they do to their rounding: on {kept:.0%} of the plane from conservative to stiff.
-2. Not where it loses its digits: next to a separatrix, where two roots of w^2 merge, it meets rtol down to a distance of {near:.0e}
-   where the saddle is far from a fold (g' = 1 there), and of {fold:.0e} where a third root is near (g' = 1e-6). `taylor` meets it down to {taylor_near:.0e} and {taylor_fold:.0e}.
-   Both say so by their bars, so `auto` compares bars: a closed form whose bar misses rtol, or that has no answer, is
-   replaced by `taylor`, if that does no worse.
+RULE = """1. A closed form where one applies. With b = 0 it meets rtol at {closed:.1%} of all states, with a median error of {closed_error:.0e} against
+   {taylor_error:.0e} of `taylor`, and its cost is free of t. (61) holds for parameters to their rounding only, and what they miss grows
+   with b t: it keeps its digits on {kept:.0%} of the plane from conservative to stiff.
+2. Not where it loses its digits. Next to a separatrix two roots of w^2 merge: it meets rtol down to a distance of {near:.0e} (g' = 1
+   at the saddle), or of {fold:.0e} where a third root is near (g' = 1e-6); `taylor` does down to {taylor_near:.0e}, or {taylor_fold:.0e}. Likewise next
+   to a turning point. Both say so by their bars, so `auto` goes by the bars: where the closed form has no answer, or its bar
+   misses rtol, `taylor` is asked, and its answer taken if its bar is no wider.
 3. No other method is needed. At {others} of {points} points `dop853`, `rk4` or `full` meets rtol where `taylor` does not; `auto` fails to
-   meet it at {lost} points where any method does. `rk4` runs out of steps (stiff systems: a step is about 1/b) and of digits first, `dop853` loses
-   {dop853:.1f} times as much to rounding as `taylor` (median over all points), and `full` also what its set's instability costs.
+   meet it at {lost} points where any method does. `rk4` runs out of steps on stiff systems and of digits first, the error of `dop853` is
+   {dop853:.1f} times that of `taylor` (median over all points), and `full` also pays for the instability of its set.
 4. Near enough to a stable separatrix or a turning point every method in binary64 fails: errors grow there as the solutions
    themselves part. No rule helps; the bars and `status` say so.
 """
@@ -467,7 +472,7 @@ def main():
     say("planes")
     maps, true, judged = planes(given.share), {}, {}
     for name, plane in maps.items():
-        say(plane.title)
+        say(plane.name)
         true[name] = checked(plane)
         judged[name] = {method: judge(plane, method, true[name]) for method in METHODS}
     (folder / "gyrostat_methods.md").write_text(page(maps, true, judged))
@@ -499,7 +504,7 @@ def table(plane, judged):
             f"| {method} | {j.answered.mean():.1%} | {j.met.mean():.1%} | {np.nanmedian(j.error):.0e} | {np.nanmax(j.error):.0e}"
             f" | {best} | {j.ratio.max():.2g} |"
         )
-    return TABLE.format(title=plane.title.replace("$", ""), rows="\n".join(rows))
+    return TABLE.format(title=plane.name, rows="\n".join(rows))
 
 
 def rule(maps, judged):
@@ -540,15 +545,15 @@ def draw(maps, judged, path):
     """A row per plane, a column per method: log10 of the true error."""
     figure, axes = plt.subplots(len(maps), len(METHODS), figsize=(13, 2.15 * len(maps) + 0.8), layout="constrained")
     norm = BoundaryNorm(np.arange(-17, -3), 256, extend="both")
+    for ax, method in zip(axes[0], METHODS, strict=True):
+        ax.set_title(method, fontsize=11)
     for line, (name, plane) in zip(axes, maps.items(), strict=True):
-        for ax, method in zip(line, METHODS, strict=True):
+        for i, (ax, method) in enumerate(zip(line, METHODS, strict=True)):
             shown = panel(ax, judged[name][method], norm)
             ax.set_xticks(list(plane.x.ticks), list(plane.x.ticks.values()), fontsize=6.5)
-            ax.set_yticks(list(plane.y.ticks), list(plane.y.ticks.values()) if ax is line[0] else [], fontsize=6.5)
+            ax.set_yticks(list(plane.y.ticks), [] if i else list(plane.y.ticks.values()), fontsize=6.5)
             ax.set(xlim=(-0.5, plane.x.size - 0.5), ylim=(-0.5, plane.y.size - 0.5))
-            if line is axes[0]:
-                ax.set_title(method, fontsize=11)
-        line[0].set_ylabel(f"{textwrap.fill(plane.title, 30)}\n\n{textwrap.fill(plane.y.label, 32)}", fontsize=8)
+        line[0].set_ylabel(f"{plane.title}\n\n{plane.y.label}", fontsize=8)
         line[2].set_xlabel(plane.x.label, fontsize=8, x=1.05)
     label = r"true error over $1 + |\mathrm{value}|$, $\log_{10}$"
     figure.colorbar(shown, ax=axes, label=label, location="right", aspect=60, fraction=0.02, pad=0.01)
@@ -561,8 +566,9 @@ def draw(maps, judged, path):
 def panel(ax, j, norm):
     """One method on one plane; returns what a colour bar needs."""
     ax.set_facecolor(GREY)
-    if j is None:
-        ax.text(0.5, 0.5, "not its question", transform=ax.transAxes, ha="center", va="center", fontsize=8)
+    if j is None or not j.answered.any():
+        why = "not its question" if j is None else "no closed form\napplies"
+        ax.text(0.5, 0.5, why, transform=ax.transAxes, ha="center", va="center", fontsize=8)
         return None
     look = {"origin": "lower", "aspect": "auto", "interpolation": "nearest", "norm": norm, "cmap": "viridis"}
     shown = ax.imshow(np.log10(np.maximum(j.error, 1e-30)), **look)
