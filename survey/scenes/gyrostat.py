@@ -25,8 +25,8 @@ exact equilibria only, and of binary64 angles none but phi0 = 0, where s2 = c23,
 An Abel solution has status `ok` where it certainly reaches phi, `turning` where it turns before phi or so near to it
 that phi lies within `phi_turning_error` of `phi_turning`.
 
-`auto` takes trajectories and Abel solutions in closed form where one applies and keeps its digits (method `closed`), else
-by Taylor series; `workflows/gyrostat_methods.py` maps where each method fails.
+`auto` takes trajectories and Abel solutions in closed form where one applies and keeps its digits (method `closed`),
+else by Taylor series; `workflows/gyrostat_methods.py` maps where each method fails.
 
 The method `full` solves the six equations (1)-(6) of a gyrostat whose invariant set is this motion; `survey verify`
 holds trajectories against it, and `workflows/gyrostat_deviation.py` measures how deviations from the set grow.
