@@ -450,10 +450,10 @@ TABLE = """## {title}
 RULE = """1. A closed form where one applies. With b = 0 it meets rtol at {closed:.1%} of all states, with a median error of {closed_error:.0e} against
    {taylor_error:.0e} of `taylor`, and its cost is free of t. (61) holds for parameters to their rounding only, and what they miss grows
    with b t: it keeps its digits on {kept:.0%} of the plane from conservative to stiff.
-2. Not where it loses its digits. Next to a separatrix two roots of w^2 merge: it meets rtol down to a distance of {near:.0e} (g' = 1
-   at the saddle), or of {fold:.0e} where a third root is near (g' = 1e-6); `taylor` does down to {taylor_near:.0e}, or {taylor_fold:.0e}. Likewise next
-   to a turning point. Both say so by their bars, so `auto` goes by the bars: where the closed form has no answer, or its bar
-   misses rtol, `taylor` is asked, and its answer taken if its bar is no wider.
+2. Not where it loses its digits. Next to a separatrix two roots of w^2 merge: it misses rtol up to a distance of {near:.0e} (g' = 1
+   at the saddle), or of {fold:.0e} where a third root is near (g' = 1e-6), mostly by its bar; `taylor` up to {taylor_near:.0e} and {taylor_fold:.0e}.
+   Likewise next to a turning point. So `auto` goes by the bars: where the closed form has no answer, or its bar misses rtol,
+   `taylor` is asked, and its answer taken if its bar is no wider.
 3. No other method is needed. At {others} of {points} points `dop853`, `rk4` or `full` meets rtol where `taylor` does not; `auto` fails to
    meet it at {lost} points where any method does. `rk4` runs out of steps on stiff systems and of digits first, the error of `dop853` is
    {dop853:.1f} times that of `taylor` (median over all points), and `full` also pays for the instability of its set.
@@ -519,7 +519,7 @@ def rule(maps, judged):
         points += rest.size
     both = [(plane["dop853"].error / plane["taylor"].error).ravel() for plane in judged.values()]
     reached = {
-        (method, k): nearest(maps["roots"], judged["roots"][method], k)
+        (method, k): furthest(maps["roots"], judged["roots"][method], k)
         for method in ("closed", "taylor")
         for k in (-1, 0)
     }
@@ -532,13 +532,11 @@ def rule(maps, judged):
     )  # fmt: skip
 
 
-def nearest(plane, judged, line):
-    """Smallest distance to the separatrix down to which a method meets rtol on a line of the picture, on both sides."""
+def furthest(plane, judged, line):
+    """Largest distance to the separatrix at which a method misses rtol, on a line of the picture; 0 if it does not."""
     speeds = plane.rows[:, 7].reshape(judged.met.shape)[line]
     middle = 0.5 * (speeds[len(speeds) // 2 - 1] + speeds[len(speeds) // 2])
-    missed = np.abs(speeds - middle)[~judged.met[line]]
-    further = np.abs(speeds - middle) > (missed.max() if missed.size else 0.0) * (1 + 1e-9)
-    return np.abs(speeds - middle)[further].min()
+    return np.abs(speeds - middle)[~judged.met[line]].max(initial=0.0)
 
 
 def draw(maps, judged, path):

@@ -301,7 +301,7 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
         bar_phi, bar_w = bar(n, saa), bar(n, sbb)
         edge = bar_phi * 1.1 + 4e-16 * abs(x1 + turns * TWO_PI)
         # from here on a turning point lies beyond x1
-        while doubt >= 0 and doubt < j and (targets[doubt] - turns * TWO_PI) - turns * TWO_PI_LOW < x1 - edge:
+        while doubt >= 0 and doubt < j and x1 - ((targets[doubt] - turns * TWO_PI) - turns * TWO_PI_LOW) > edge:
             doubt += 1
         if doubt == j:
             doubt = -1
@@ -312,7 +312,7 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
                 if i >= j or not told(floats[i]):
                     status[i] = ending
                     floats[i, 0], floats[i, 1] = x1 + turns * TWO_PI, t + (reach + t_low)
-                    floats[i, 2], floats[i, 3] = edge, bar_t * 1.2
+                    floats[i, 2], floats[i, 3] = edge + 4e-16 * abs(floats[i, 0]), bar_t * 1.2
             return
         phi, w = x1, v1
         high = t + h
