@@ -52,6 +52,22 @@ def test_every_error_lies_within_its_bar(maps, true, method):
         assert (j.error[j.met] < workflow.RTOL).all()
 
 
+def test_beside_turning_points_of_random_systems():
+    """From 0.1 down to an ulp before and beyond: `ok` is certain, `turning` holds within its bar."""
+    rows = np.random.default_rng(4).normal(size=(120, 8)) * [1, 1, 2, 2, 2, 2, 2, 3]
+    rows[:, 7] = np.abs(rows[:, 7]) + 1e-3
+    ends, _low, codes = workflow.truth(rows, rows[:, 6:7] + 30.0, True)
+    some = codes[:, 0] == workflow.TURNING
+    _axis, offsets = workflow.two_sided("", np.arange(-16.0, -0.5, 0.5))
+    places = np.sort(np.maximum(ends[some, :, 0] + offsets, rows[some, 6:7]), axis=1)
+    across = workflow.plain("", offsets), workflow.plain("", np.arange(some.sum()))
+    plane = workflow.Plane("", *across, rows[some], places, "x", over_phi=True)
+    true = workflow.checked(plane)
+    for method in ("taylor", "dop853"):
+        j = workflow.judge(plane, method, true)
+        assert some.sum() > 50 and j.answered.all() and not j.wrong.any() and j.ratio.max() < 1
+
+
 def test_a_wrong_answer_would_be_seen(maps, true):
     plane = maps["phase"]
     high, low, codes, doubt = true["phase"]
