@@ -77,7 +77,7 @@ def test_finished_blocks_are_used_again_and_give_the_same_bits(small, tmp_path, 
             kept.save(number, engine.solve_block(checked.scene, checked.request, checked.grid, blocks[number]))
         _flip(kept._file(3))
     seen = []
-    engine.run(checked, progress=lambda done, total, reused: seen.append((done, total, reused)))
+    engine.run(checked, progress=lambda done, total, reused, **_: seen.append((done, total, reused)))
     assert seen[0] == (2, 6, 2) and seen[-1] == (6, 6, 2)  # the damaged block was computed again
     xr.testing.assert_equal(whole.drop_attrs(), survey.open(checked.path).drop_attrs())
     assert not checked.path.with_name("again.nc.blocks").exists()
