@@ -5,7 +5,10 @@ A task is called once for each number; `finished(done, result)` hears of each as
 """
 
 import itertools
+import multiprocessing
 import os
+import signal
+import threading
 from concurrent.futures.process import BrokenProcessPool
 
 import dask
@@ -48,7 +51,7 @@ def on_processes(task, numbers, finished, died, workers):
         """The numbers that were under way when a worker died."""
         begun = set()
         try:
-            _compute(task, some, end, dask.multiprocessing.get, workers, begun.add)
+            _compute(task, some, end, dask.multiprocessing.get, workers, begun.add, initializer=_serve)
         except BrokenProcessPool:
             return sorted(begun - ended)
         return []
@@ -95,7 +98,18 @@ def client_of(address):
         raise Stopped(f"no dask scheduler answers at {address!r} ({error}); start one with dask scheduler") from None
 
 
-def _compute(task, numbers, ended, get, workers, begun=lambda number: None):
+def _serve():
+    """A worker process leaves the terminal's interrupt to its parent, and goes when that is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_follow, args=(multiprocessing.parent_process(),), daemon=True).start()
+
+
+def _follow(parent):
+    parent.join()
+    os._exit(1)
+
+
+def _compute(task, numbers, ended, get, workers, begun=lambda number: None, **more):
     """dask's own loop; it takes equals in the order of their names, the last first."""
     keys = {f"task-{-place % 10**9:09d}": number for place, number in enumerate(numbers, 1)}
     call = dask.delayed(task, pure=False, traverse=False)
@@ -105,7 +119,7 @@ def _compute(task, numbers, ended, get, workers, begun=lambda number: None):
     try:
         with callback:
             calls = [call(number, dask_key_name=key) for key, number in keys.items()]
-            dask.compute(*calls, scheduler=get, num_workers=workers, chunksize=1, optimize_graph=False)
+            dask.compute(*calls, scheduler=get, num_workers=workers, chunksize=1, optimize_graph=False, **more)
     except OSError as error:
         raise Stopped(f"the run stopped ({error}); run the command again to go on") from None
     except Exception as error:

@@ -187,6 +187,8 @@ def refused(path):
         raise
     except (OSError, RuntimeError) as error:  # netCDF4 raises RuntimeError on a full disk
         told = getattr(error, "strerror", None) or error
+        with contextlib.suppress(OSError):
+            told = f"{told}; {shutil.disk_usage(Path(path).parent).free:,} bytes are free"
         raise Stopped(f"{path}: writing failed ({told}); mend it and run the command again") from None
 
 

@@ -41,9 +41,9 @@ def test_a_task_that_fails_stops_all_with_its_own_error():
     def fails(number):
         raise Stopped("the disk is full") if number == 3 else ValueError
 
-    with pytest.raises(Stopped, match="^the disk is full$"):
+    with pytest.raises(Stopped, match=r"^the disk is full$"):
         dispatch.on_threads(fails, [3])
-    with pytest.raises(Stopped, match="^the disk is full$"):
+    with pytest.raises(Stopped, match=r"^the disk is full$"):
         dispatch.on_processes(fails, [3], Heard().finished, None, 1)
 
 
@@ -100,7 +100,7 @@ def test_a_cluster_ends_every_number_and_survives_deaths(cluster, tmp_path):
 def test_no_scheduler_is_told_in_one_line(monkeypatch):
     pytest.importorskip("distributed")
     monkeypatch.setattr(dispatch, "SCHEDULER_SECONDS", 1)
-    with pytest.raises(Stopped, match="no dask scheduler answers at 'tcp://127.0.0.1:9'"):
+    with pytest.raises(Stopped, match=r"no dask scheduler answers at 'tcp://127\.0\.0\.1:9'"):
         dispatch.client_of("tcp://127.0.0.1:9")
     with pytest.raises((BadInput, Stopped), match="nonsense"):
         dispatch.client_of("nonsense://x")
