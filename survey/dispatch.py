@@ -5,6 +5,7 @@ A task is called once for each number; `finished(done, result)` hears of each as
 """
 
 import itertools
+import logging
 import multiprocessing
 import os
 import signal
@@ -68,6 +69,7 @@ def on_cluster(task, numbers, finished, died, client):
     """Call the task for every number on the workers of a dask cluster."""
     from dask.distributed import KilledWorker, as_completed
 
+    address = client.scheduler.address
     done = itertools.count(1)
     finished(0)
     futures = dict(zip(client.map(task, numbers, pure=False, allow_other_workers=False), numbers, strict=True))
@@ -79,7 +81,9 @@ def on_cluster(task, numbers, finished, died, client):
         except SurveyError:
             raise
         except Exception as error:
-            raise Stopped(f"the cluster failed ({_brief(error)}); run the command again to go on") from None
+            raise Stopped(
+                f"the dask cluster at {address} failed ({_brief(error)}); start one and run the command again to go on"
+            ) from None
         del futures[future]
         future.release()
         finished(next(done), result)
@@ -93,7 +97,10 @@ def client_of(address):
         raise BadInput("--scheduler needs dask.distributed: pip install 'survey[cluster]'") from None
     try:
         where = {"scheduler_file": address} if os.path.exists(address) else {"address": address}
-        return Client(**where, timeout=SCHEDULER_SECONDS)
+        client = Client(**where, timeout=SCHEDULER_SECONDS)
+        for name in [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]:
+            logging.getLogger(name).setLevel(logging.CRITICAL)  # what they would log is told in one line
+        return client
     except (OSError, ValueError) as error:
         raise Stopped(f"no dask scheduler answers at {address!r} ({error}); start one with dask scheduler") from None
 
@@ -129,4 +136,6 @@ def _compute(task, numbers, ended, get, workers, begun=lambda number: None, **mo
 
 
 def _brief(error):
-    return f"{type(error).__name__}: {error}".splitlines()[0][:200]
+    """The first line of an error; of a lost connection not where it was lost."""
+    name = type(error).__name__
+    return name if name in ("CommClosedError", "CancelledError", "FutureCancelledError") else str(error).split("\n")[0]
