@@ -6,6 +6,7 @@ import pickle
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 import xarray as xr
@@ -91,3 +92,36 @@ def test_a_worker_with_other_code_is_refused(small, tmp_path):
     job = engine.Job(checked.scene, checked.request, checked.grid, [], None, engine._code() | {"sources": "other"})
     with pytest.raises(Stopped, match=r"has other code \(sources: \w+, this run: other\); install the same survey"):
         job(0)
+
+
+def queue(folder, *words):
+    """The batch script as a queue would start it on one machine, with stand-ins for the queue's own commands."""
+    commands = folder / "bin"
+    commands.mkdir(exist_ok=True)
+    for name, text in {"srun": 'exec "$@"', "scontrol": 'echo "$@" > requeued'}.items():
+        (commands / name).write_text(f"#!/bin/sh\n{text}\n")
+        (commands / name).chmod(0o755)
+    path = os.pathsep.join([str(commands), os.path.dirname(sys.executable), os.environ["PATH"]])
+    script = Path(__file__).parent.parent / "workflows" / "slurm.sh"
+    environment = os.environ | {"PATH": path, "SLURM_JOB_ID": "17"}
+    command = ["bash", str(script), "small.toml", *words]
+    return subprocess.Popen(command, cwd=folder, env=environment, stderr=subprocess.PIPE, text=True)
+
+
+def test_the_batch_script_runs_a_sweep(small, surveyed):
+    running = queue(small.parent)
+    told = running.communicate(timeout=180)[1]
+    assert running.returncode == 0, told
+    xr.testing.assert_equal(*(xr.load_dataset(path).drop_attrs() for path in (surveyed, small.with_suffix(".nc"))))
+    assert not list(small.parent.glob("scheduler-*")) and not (small.parent / "requeued").exists()
+
+
+def test_the_batch_script_stops_before_the_walltime_and_is_queued_again(small):
+    many = ("--set", "axes.w0.num=40000", "--set", "solver.method='dop853'")
+    running = queue(small.parent, *many)
+    blocks = small.parent / "small.nc.blocks"
+    wait_for(lambda: list(blocks.glob("*.block")))
+    running.terminate()
+    told = running.communicate(timeout=60)[1]
+    assert running.returncode == 143 and "finished blocks are safe" in told, told
+    assert (small.parent / "requeued").read_text() == "requeue 17\n" and list(blocks.glob("*.block"))
