@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from survey import dispatch, status, store
+from survey import dispatch, methods, modules, status, store
 from survey.dataset import Tally, attributes, command, coordinates, layout, now, round_up, variables
 from survey.dispatch import cpus
 from survey.errors import BadInput, Stopped
@@ -31,8 +31,11 @@ REGION_POINTS, REGION_BYTES = 2**20, 2**25
 
 
 def seconds_per_point(scene, request, grid):
-    """The scene's rough figure for this grid."""
-    return scene.cost(request.options, {name: values.size for name, (_, values) in grid.parameters.items()})
+    """The scene's rough figure for this grid, and the method's for this scene."""
+    seconds = scene.cost(request.options, {name: values.size for name, (_, values) in grid.parameters.items()})
+    if request.method == "auto":
+        return seconds
+    return seconds * getattr(modules.load(methods, request.method, "method"), "COST", {}).get(scene.FAMILY, 1.0)
 
 
 def points_per_block(scene, request, grid):
