@@ -198,7 +198,7 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
             if f"{socket.gethostname()} {os.getpid()}" in compiled:
                 compiled[f"{socket.gethostname()} {os.getpid()}"] -= before
             compiling = max(compiled.values(), default=0.0)  # processes compile side by side
-            further = extras(workflow, progress)
+            further = extras(workflow, kept.once, progress)
             beside = time.perf_counter() - computed
             told = {
                 "wall_time_s": round(time.perf_counter() - started, 3),
@@ -271,8 +271,8 @@ def _compiling_ahead(scene):
     return None
 
 
-def extras(workflow, progress=None):
-    """Datasets that go into the file beside the map, their attributes with its own."""
+def extras(workflow, once, progress=None):
+    """Datasets that go into the file beside the map, their attributes with its own; `once` as in `store.Blocks`."""
     further = []
     if workflow.boundaries:
         from survey import boundaries
@@ -281,7 +281,7 @@ def extras(workflow, progress=None):
             told = (lambda done, _=None: progress(done, len(numbers), 0, what)) if progress else (lambda *_: None)
             dispatch.on_threads(task, numbers, told)
 
-        further.append(boundaries.find(workflow, each))
+        further.append(boundaries.find(workflow, each, once))
     if workflow.refine:
         from survey import refine
 

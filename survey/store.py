@@ -89,6 +89,16 @@ class Blocks:
         with refused(self.path):
             write_atomically(self._file(number), content)
 
+    def once(self, name, make):
+        """The arrays that an earlier run kept under this name, else those of `make()`, kept from now on."""
+        file = self.folder / f"{name}.extra"
+        with contextlib.suppress(OSError, ValueError):
+            return unpack(file.read_bytes())
+        arrays = make()
+        with refused(self.path):
+            write_atomically(file, lambda opened: pack(arrays, opened))
+        return arrays
+
     def _reached(self):
         """Does this process see the very folder that the run's parent holds?"""
         with contextlib.suppress(OSError, ValueError):
