@@ -246,3 +246,20 @@ def test_the_same_bits_on_one_processor_and_on_all(folder, unbroken):
     assert code == 0
     same(folder, unbroken)
     assert np.isfinite(unbroken.w).all()
+
+
+@pytest.mark.slow
+def test_memory_is_bounded_by_blocks_not_by_the_map(tmp_path):
+    """10^5 and 10^8 points; asked: below 1 GiB, assembly included."""
+    workflow = Path(__file__).parent.parent / "workflows" / "satellite_prolate.toml"
+    peaks = []
+    for k, rho in ((100, 1000), (10_000, 10_000)):
+        command = [sys.executable, "-m", "survey", "run", str(workflow), "-o", "map.nc", "--quiet", "--fresh"]
+        asked = [f"axes.k.num={k}", f"axes.rho.num={rho}", "output.variables=['discriminant']", "output.figures=[]"]
+        command += [word for text in asked for word in ("--set", text)]
+        running = subprocess.Popen(command, cwd=tmp_path)
+        _, ended, usage = os.wait4(running.pid, 0)
+        running.returncode = os.waitstatus_to_exitcode(ended)
+        assert running.returncode == 0
+        peaks.append(usage.ru_maxrss / 1024)
+    assert peaks[1] < 1024 and peaks[1] - peaks[0] < 256, peaks
