@@ -113,9 +113,17 @@ def _sum(terms, c, bars):
 
 def on_ray(c, combined, omega):
     """M on the ray (alpha2, 1, beta2) of L = N = 0 (3.11) and its bar, where the ray lies in the octant; else NaN."""
-    (a20, a11, a02, D4, _), (da20, da11, da02, dD4, _) = combined
-    w1, w2 = omega
+    ray = np.full(omega.shape, np.nan)
+    (_, _, a02, D4, _), (_, _, da02, dD4, _) = combined
     inside = (a02 > da02) & (-D4 > dD4)
+    if inside.any():
+        ray[:, inside] = _inside(c[..., inside], combined[..., inside], *omega[:, inside])
+    return ray
+
+
+def _inside(c, combined, w1, w2):
+    """M on the ray and its bar, where a02 > 0 > D4."""
+    (a20, a11, a02, _, _), (da20, da11, da02, _, _) = combined
     # the root of a20 alpha^2 + a11 alpha + a02 that is 0 at mu_d; a11 < 0 < a20 here, so nothing cancels
     square = a11 * a11 - 4.0 * a20 * a02
     dsquare = 2.0 * abs(a11) * da11 + 4.0 * (abs(a20) * da02 + abs(a02) * da20)
@@ -126,8 +134,7 @@ def on_ray(c, combined, omega):
     dalpha = alpha * (da02 / a02 + (droot + da11) / divisor + 8.0 * UNIT)
     beta = w2 - alpha * w1
     dbeta = w1 * dalpha + 4.0 * UNIT * (w2 + alpha * w1)
-    value, bar = _cubic(*c, alpha, beta, dalpha, dbeta)
-    return np.where(inside & (divisor > 0.0), np.stack([value, bar]), np.nan)
+    return _cubic(*c, alpha, beta, dalpha, dbeta)
 
 
 def _cubic(c, bars, alpha, beta, dalpha, dbeta):
@@ -144,7 +151,7 @@ def _cubic(c, bars, alpha, beta, dalpha, dbeta):
         along_alpha = along_alpha + (i * c[row] * alpha ** (i - 1) * beta**k if i else 0.0)
         along_beta = along_beta + (k * c[row] * alpha**i * beta ** (k - 1) if k else 0.0)
     bar = bar + abs(along_alpha) * dalpha + abs(along_beta) * dbeta + ROUNDINGS * UNIT * size
-    return value, MARGIN * bar
+    return np.stack([value, MARGIN * bar])
 
 
 def verdict(mu, combined, ray):

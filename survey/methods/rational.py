@@ -24,7 +24,7 @@ def coefficients(mu, order):
 
 
 def combined(mu):
-    """All coefficients, then a20, a11, a02, D4 and D6, which have closed forms too: they do not lose by cancellation."""
+    """All coefficients, then a20, a11, a02, D4 and D6: in closed form too, so that nothing cancels."""
     return tabulate(closed_forms, mu, len(NAMES))
 
 
