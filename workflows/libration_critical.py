@@ -466,7 +466,7 @@ def page():
     c, d = float(named["mu_c"].mu), float(named["mu_d"].mu)
     ends = survey.evaluate("libration", mu=[np.nextafter(c, 1), np.nextafter(d, 0)], variables=["M_ray"]).M_ray
     text = PAGE.format(
-        error=ERROR,
+        error=f"{ERROR:.0e}",
         boundaries=table(first),
         intervals="\n".join(intervals(named)),
         share=100 * (named["mu_d"].mu - named["mu_c"].mu) / named["mu_R"].mu,

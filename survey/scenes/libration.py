@@ -1,6 +1,6 @@
 """Formal stability of the triangular libration points of the spatial circular restricted three-body problem.
 
-    H = L + N + M + ...,  L = omega1 r1 - omega2 r2 + r3,  N = sum c_ijk r1^i r2^j r3^k (i+j+k = 2),  M likewise (3)
+    H = L + N + M + ...,  L = omega1 r1 - omega2 r2 + r3,  N = sum c_ijk r1^i r2^j r3^k (i+j+k = 2),  M likewise (3.13)
 
 is the normal form at L4 (or L5: the same numbers) to order 6 in the coordinates; r1, r2 are the actions of the motions
 in the plane of the primaries, r3 that across it.
