@@ -1,0 +1,166 @@
+"""Birkhoff's normal form at the triangular libration points, many mu in lock step: the programs of `lie_plan`.
+
+A row is a coefficient in all lanes: real part, imaginary part, size and bar. `size` bounds its modulus, and `bar` the
+modulus of its error plus ROUND sizes, which covers the roundings of the products that the row enters; so a product of
+f and g adds |C| (size_f bar_g + bar_f size_g), and each addition to a sum the rounding of that partial sum (running
+error analysis: N. J. Higham, Accuracy and Stability of Numerical Algorithms, 3.3). Second-order products of bars are
+in it, as size includes the error. A lane's operations do not depend on its neighbours.
+"""
+
+from math import nan, sqrt
+
+import numpy as np
+
+from survey.kernels import double
+from survey.kernels.jit import inline, kernel
+from survey.kernels.lie_plan import CLEAR, DELTA, DIVIDE, ETA, FINISH, LINEAR, MULTIPLY, ONE, XI
+
+LANES = 16
+RE, IM, SIZE, BAR, WIDTH = 0, LANES, 2 * LANES, 3 * LANES, 4 * LANES
+UNIT = 2.0**-53
+ROUND = 5.0 * UNIT  # a product's roundings are 3 sqrt 2 UNIT of |C| |f| |g|, shared by two factors; a constant's, 2
+FORMS = 10.0 * UNIT  # the linear forms' relative error
+SLACK = 1.0 + 1e-9  # the roundings of the bars themselves
+NARROW = 1e-12  # a divisor below it is not divided by
+
+
+@kernel
+def normal_forms(code, places, numbers, harmonics, diagonal, rows, mu, values, norms):
+    """values (3, M, N): real part, imaginary part and bar of the M diagonal coefficients; norms (measured, 3, N).
+
+    NaN where mu lies outside (0, mu_R), and in what a divisor below NARROW would enter.
+    """
+    big, divisors = np.zeros((rows, WIDTH)), np.empty((len(harmonics), LANES))
+    for first in range(0, len(mu), LANES):
+        count = min(LANES, len(mu) - first)
+        for i in range(LANES):
+            _start(mu[first + min(i, count - 1)], i, harmonics, big, divisors)
+        _run(code, places, numbers, divisors, big, norms, first, count)
+        for d in range(len(diagonal)):
+            for i in range(count):
+                values[0, d, first + i] = big[diagonal[d], RE + i]
+                values[1, d, first + i] = big[diagonal[d], IM + i]
+                values[2, d, first + i] = big[diagonal[d], BAR + i] * SLACK
+
+
+@inline
+def frequencies(mu):
+    """(s, u, v, w1, w2) as double-doubles: s = u - v = sqrt(1 - 27 mu (1 - mu)), u = w1^2, v = w2^2."""
+    square = double.two_prod(mu, mu)
+    y = double.sub((mu, 0.0), square)
+    s = double.sqrt(double.sub((1.0, 0.0), double.times(y, 27.0)))
+    v = double.div(double.times(y, 13.5), double.add((1.0, 0.0), s))
+    u = double.sub((1.0, 0.0), v)
+    return s, u, v, double.sqrt(u), double.sqrt(v)
+
+
+@inline
+def _set(row, i, re, im, relative):
+    row[RE + i], row[IM + i] = re, im
+    size = sqrt(re * re + im * im)
+    row[SIZE + i] = size * (1.0 + relative)
+    row[BAR + i] = size * (relative + ROUND)
+
+
+@kernel
+def _start(mu, i, harmonics, big, divisors):
+    """Lane i: the linear forms of xi and eta in z1, z2 and conjugates, in the order of their keys, and the divisors."""
+    s, u, v, w1, w2 = frequencies(mu if mu > 0.0 and mu <= 0.5 else nan)
+    delta = 1.0 - 2.0 * mu
+    k = 0.75 * sqrt(3.0) * delta
+    for j in range(2):
+        omega, square = (w1[0], u[0]) if j == 0 else (-w2[0], v[0])
+        plus = square + 0.75
+        g = 1.0 / sqrt(2.0 * abs(omega) * s[0] * plus)
+        # keys ascend: zbar2, zbar1, z2, z1
+        _set(big[XI + 3 - j], i, k * g, 2.0 * omega * g, FORMS)
+        _set(big[XI + 1 - j], i, k * g, -2.0 * omega * g, FORMS)
+        _set(big[ETA + 3 - j], i, -plus * g, 0.0, FORMS)
+        _set(big[ETA + 1 - j], i, -plus * g, 0.0, FORMS)
+    _set(big[DELTA], i, delta, 0.0, UNIT)
+    _set(big[ONE], i, 1.0, 0.0, 0.0)
+    for n in range(len(harmonics)):
+        k1, k2, k3 = harmonics[n, 0], harmonics[n, 1], harmonics[n, 2]
+        divisor = double.add(double.sub(double.times(w1, k1), double.times(w2, k2)), (k3, 0.0))[0]
+        divisors[n, i] = divisor if abs(divisor) >= NARROW else nan
+
+
+@kernel
+def _run(code, places, numbers, divisors, big, norms, lane, count):
+    zero, lanes = np.uint64(0), np.uint64(LANES)
+    for c in range(len(code)):
+        operation, first, last = code[c, 0], code[c, 4], code[c, 5]
+        target, source, factor = np.uint64(code[c, 1]), np.uint64(code[c, 2]), np.uint64(code[c, 3])
+        if operation == MULTIPLY:
+            for t in range(first, last):
+                _multiply(big[target + places[0, t]], big[source + places[1, t]], big[factor + places[2, t]],
+                          numbers[0, t], numbers[1, t])  # fmt: skip
+        elif operation == LINEAR:
+            for t in range(first, last):
+                _linear(big[places[0, t]], big[places[1, t]], numbers[0, t])
+        elif operation == CLEAR:
+            for r in range(last):
+                row = big[target + np.uint64(r)]
+                for i in range(WIDTH):
+                    row[i] = 0.0
+        elif operation == FINISH:
+            for r in range(last):
+                _finish(big[target + np.uint64(r)])
+        elif operation == DIVIDE:
+            for t in range(first, last):
+                _divide(big[target + places[0, t]], big[source + places[1, t]], divisors[places[2, t]], numbers[0, t])
+        else:
+            for j in range(3):
+                for i in range(count):
+                    norms[target, j, lane + i] = _norm(big, source, places[j], first, last, i)
+
+
+@inline
+def _multiply(out, f, g, number, sign):
+    """out += number f g, f conjugated if sign = -1."""
+    other, size = number * sign, abs(number)
+    for i in range(LANES):
+        p, q = number * f[RE + i], other * f[IM + i]
+        re = out[RE + i] + (p * g[RE + i] - q * g[IM + i])
+        im = out[IM + i] + (p * g[IM + i] + q * g[RE + i])
+        bar = size * (f[SIZE + i] * g[BAR + i] + f[BAR + i] * g[SIZE + i])
+        out[RE + i], out[IM + i] = re, im
+        out[BAR + i] += bar + UNIT * (abs(re) + abs(im))
+
+
+@inline
+def _linear(out, f, number):
+    """out += number f."""
+    size = abs(number)
+    for i in range(LANES):
+        re, im = out[RE + i] + number * f[RE + i], out[IM + i] + number * f[IM + i]
+        out[RE + i], out[IM + i] = re, im
+        out[BAR + i] += size * f[BAR + i] + UNIT * (abs(re) + abs(im))
+
+
+@inline
+def _finish(row):
+    """The size of a sum, and its own roundings to come."""
+    for i in range(LANES):
+        size = sqrt(row[RE + i] * row[RE + i] + row[IM + i] * row[IM + i])
+        row[SIZE + i] = size + row[BAR + i]
+        row[BAR + i] += ROUND * row[SIZE + i]
+
+
+@inline
+def _divide(out, f, divisor, sign):
+    """out = sign f / divisor, f conjugated if sign = -1."""
+    for i in range(LANES):
+        scale = sign / divisor[i]
+        out[RE + i], out[IM + i] = scale * f[RE + i], scale * sign * f[IM + i]
+        out[SIZE + i] = abs(scale) * f[SIZE + i] * SLACK
+        out[BAR + i] = abs(scale) * f[BAR + i] + ROUND * out[SIZE + i]
+
+
+@inline
+def _norm(big, source, weights, first, last, i):
+    """Sum over a degree's monomials, both conjugates, of |k_j| |F|, rounded up."""
+    total = 0.0
+    for t in range(first, last):
+        total += 2.0 * float(weights[t]) * big[source + np.uint64(t - first), SIZE + i]
+    return total * SLACK

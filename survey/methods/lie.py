@@ -1,0 +1,63 @@
+"""Lie series at L4: the Birkhoff normal form of any even order, from the Taylor expansion of the Hamiltonian.
+
+Independent of the closed forms of orders 4 and 6; higher orders by `normal_form`, what the normalisation leaves by
+`remainders`. Bars: running error analysis (`kernels/lie.py`). Domain: 0 < mu < mu_R; NaN outside, and where a divisor
+of a generator is below 1e-12.
+
+Source: A. P. Markeev, Libration Points (1978), ch. 8; algorithm: `kernels/lie_plan.py`.
+"""
+
+import numpy as np
+
+from survey.kernels.lie import normal_forms
+from survey.kernels.lie_plan import program
+from survey.kernels.monomials import monomials
+
+ORDER = 0  # no steps: each order's sum is finite
+SERVES = ("normal_form",)
+COEFFICIENTS = 16
+
+
+def coefficients(mu, order=6):
+    """Values and bars (16, N) of c200, c110, c020, c101, c011, c002, c300, ..., c003; order 4: those of r^3 are NaN."""
+    found = np.full((2, COEFFICIENTS, len(mu)), np.nan)
+    values, bars = normal_form(mu, order)
+    count = min(COEFFICIENTS, len(values))
+    found[0, :count], found[1, :count] = values[:count], bars[:count]
+    return found[0], found[1]
+
+
+def labels(order):
+    """(i, j, k) of the coefficients of r1^i r2^j r3^k, of degrees 2, ..., order / 2, as `normal_form` gives them."""
+    found = []
+    for degree in range(4, order + 1, 2):
+        m = monomials(degree)
+        own = (m.harmonic == 0).all(axis=1)
+        found += [tuple(map(int, e[:3])) for e in m.exponents[own][np.argsort(m.row[own])]]
+    return found
+
+
+def normal_form(mu, order):
+    """Values and bars (M, N) of the M coefficients named by `labels(order)`, any even order >= 4, at N values of mu."""
+    values, _norms = solve(mu, order)
+    return values[0], values[2]
+
+
+def remainders(mu, order):
+    """{(r, d): norms (3, N)}: after normalisation to degree r, of the remainder's terms of degree d <= order + 1.
+
+    The norm for r_j is the sum over monomials of |k_j| |coefficient|, so that |dr_j/dt| <= norm rho^d from degree d
+    where all |z_j| <= rho. r = 2: before the first step.
+    """
+    _values, norms = solve(mu, order, True)
+    return dict(zip(program(order, True).measured, norms, strict=True))
+
+
+def solve(mu, order, remainders=False):
+    """(values (3, M, N), norms (., 3, N)) as `kernels.lie.normal_forms` gives them."""
+    what, mu = program(order, remainders), np.ascontiguousarray(mu, dtype=float)
+    code, places, numbers = what.arrays()
+    values, norms = np.empty((3, len(what.diagonal), len(mu))), np.empty((len(what.measured), 3, len(mu)))
+    harmonics = what.divisors.astype(float)
+    normal_forms(code, places, numbers, harmonics, np.asarray(what.diagonal), what.rows, mu, values, norms)
+    return values, norms
