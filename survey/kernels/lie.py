@@ -18,7 +18,8 @@ from survey.kernels.lie_plan import CLEAR, DELTA, DIVIDE, ETA, FINISH, LINEAR, M
 LANES = 16
 RE, IM, SIZE, BAR, WIDTH = 0, LANES, 2 * LANES, 3 * LANES, 4 * LANES
 UNIT = 2.0**-53
-ROUND = 5.0 * UNIT  # a product's roundings are 3 sqrt 2 UNIT of |C| |f| |g|, shared by two factors; a constant's, 2
+ROUND = 2.2 * UNIT  # a product's roundings are 3 sqrt 2 UNIT of |C| |f| |g|, shared by two factors
+CONSTANT = 3.0 * UNIT  # a constant's beyond ROUND: it has four, and its product one
 FORMS = 10.0 * UNIT  # the linear forms' relative error
 SLACK = 1.0 + 1e-9  # the roundings of the bars themselves
 NARROW = 1e-12  # a divisor below it is not divided by
@@ -87,7 +88,6 @@ def _start(mu, i, harmonics, big, divisors):
 
 @kernel
 def _run(code, places, numbers, divisors, big, norms, lane, count):
-    zero, lanes = np.uint64(0), np.uint64(LANES)
     for c in range(len(code)):
         operation, first, last = code[c, 0], code[c, 4], code[c, 5]
         target, source, factor = np.uint64(code[c, 1]), np.uint64(code[c, 2]), np.uint64(code[c, 3])
@@ -135,7 +135,7 @@ def _linear(out, f, number):
     for i in range(LANES):
         re, im = out[RE + i] + number * f[RE + i], out[IM + i] + number * f[IM + i]
         out[RE + i], out[IM + i] = re, im
-        out[BAR + i] += size * f[BAR + i] + UNIT * (abs(re) + abs(im))
+        out[BAR + i] += size * (f[BAR + i] + CONSTANT * f[SIZE + i]) + UNIT * (abs(re) + abs(im))
 
 
 @inline
