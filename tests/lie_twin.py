@@ -43,7 +43,7 @@ def combine(*parts):
 
 
 def modes(mu):
-    """(w1, -w2, 1) and the columns (xi, eta, zeta) and momenta of x1, x2, x3, y1, y2, y3 (digest of the linear system)."""
+    """(w1, -w2, 1) and the columns (xi, eta, zeta) and momenta of x1, x2, x3, y1, y2, y3."""
     x = mpf(27) / 4 * mu * (1 - mu)
     u = (1 + mp.sqrt(1 - 4 * x)) / 2
     omega = (mp.sqrt(u), -mp.sqrt(1 - u), mpf(1))
@@ -64,7 +64,9 @@ def hamiltonian(mu, top):
     """(omega, {degree: polynomial}), degrees 2 to `top`."""
     omega, columns = modes(mu)
     units = [tuple(int(i == j) for i in range(6)) for j in range(6)]
-    xi, eta, zeta = ({m: column[i] for m, column in zip(units, columns, strict=True) if column[i] != 0} for i in range(3))
+    xi, eta, zeta = (
+        {m: column[i] for m, column in zip(units, columns, strict=True) if column[i] != 0} for i in range(3)
+    )
     square = combine((1, multiply(xi, xi)), (1, multiply(eta, eta)), (1, multiply(zeta, zeta)))
     H = {2: {tuple(int(i % 3 == j) for i in range(6)): mpc(0, omega[j]) for j in range(3)}}
     for sign, mass in ((1, 1 - mu), (-1, mu)):

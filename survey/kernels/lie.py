@@ -15,13 +15,14 @@ from survey.kernels import double
 from survey.kernels.jit import inline, kernel
 from survey.kernels.lie_plan import CLEAR, DELTA, DIVIDE, ETA, FINISH, LINEAR, MULTIPLY, ONE, XI
 
-LANES = 16
+LANES = 32
 RE, IM, SIZE, BAR, WIDTH = 0, LANES, 2 * LANES, 3 * LANES, 4 * LANES
 UNIT = 2.0**-53
 ROUND = 2.2 * UNIT  # a product's roundings are 3 sqrt 2 UNIT of |C| |f| |g|, shared by two factors
 CONSTANT = 3.0 * UNIT  # a constant's beyond ROUND: it has four, and its product one
-FORMS = 10.0 * UNIT  # the linear forms' relative error
+FORMS = 1.01 * UNIT  # the linear forms' relative error: rounded double-doubles
 SLACK = 1.0 + 1e-9  # the roundings of the bars themselves
+K = (1.299038105676658, -3.5759170798963886e-17)  # 3 sqrt(3) / 4
 NARROW = 1e-12  # a divisor below it is not divided by
 
 
@@ -67,18 +68,21 @@ def _set(row, i, re, im, relative):
 def _start(mu, i, harmonics, big, divisors):
     """Lane i: the linear forms of xi and eta in z1, z2 and conjugates, in the order of their keys, and the divisors."""
     s, u, v, w1, w2 = frequencies(mu if mu > 0.0 and mu <= 0.5 else nan)
-    delta = 1.0 - 2.0 * mu
-    k = 0.75 * sqrt(3.0) * delta
+    delta = double.two_sum(1.0, -2.0 * mu)
+    k = double.mul(K, delta)
     for j in range(2):
-        omega, square = (w1[0], u[0]) if j == 0 else (-w2[0], v[0])
-        plus = square + 0.75
-        g = 1.0 / sqrt(2.0 * abs(omega) * s[0] * plus)
+        omega, square = (w1, u) if j == 0 else (w2, v)
+        sign = 1.0 if j == 0 else -1.0
+        plus = double.add(square, (0.75, 0.0))
+        h = double.sqrt(double.div(plus, double.times(double.mul(omega, s), 2.0)))
+        g = double.div(h, plus)
+        re, im = double.mul(k, g)[0], 2.0 * sign * double.mul(omega, g)[0]
         # keys ascend: zbar2, zbar1, z2, z1
-        _set(big[XI + 3 - j], i, k * g, 2.0 * omega * g, FORMS)
-        _set(big[XI + 1 - j], i, k * g, -2.0 * omega * g, FORMS)
-        _set(big[ETA + 3 - j], i, -plus * g, 0.0, FORMS)
-        _set(big[ETA + 1 - j], i, -plus * g, 0.0, FORMS)
-    _set(big[DELTA], i, delta, 0.0, UNIT)
+        _set(big[XI + 3 - j], i, re, im, FORMS)
+        _set(big[XI + 1 - j], i, re, -im, FORMS)
+        _set(big[ETA + 3 - j], i, -h[0], 0.0, FORMS)
+        _set(big[ETA + 1 - j], i, -h[0], 0.0, FORMS)
+    _set(big[DELTA], i, delta[0], 0.0, FORMS)
     _set(big[ONE], i, 1.0, 0.0, 0.0)
     for n in range(len(harmonics)):
         k1, k2, k3 = harmonics[n, 0], harmonics[n, 1], harmonics[n, 2]

@@ -1,7 +1,6 @@
 """Lie series at L4: the Birkhoff normal form of any even order, from the Taylor expansion of the Hamiltonian.
 
-Independent of the closed forms of orders 4 and 6; higher orders by `normal_form`, what the normalisation leaves by
-`remainders`. Bars: running error analysis (`kernels/lie.py`). Domain: 0 < mu < mu_R; NaN outside, and where a divisor
+Independent of the closed forms, and not bound to their orders 4 and 6; what normalisation leaves: `remainders`. Bars: running error analysis (`kernels/lie.py`). Domain: 0 < mu < mu_R; NaN outside, and where a divisor
 of a generator is below 1e-12.
 
 Source: A. P. Markeev, Libration Points (1978), ch. 8; algorithm: `kernels/lie_plan.py`.
@@ -15,32 +14,22 @@ from survey.kernels.monomials import monomials
 
 ORDER = 0  # no steps: each order's sum is finite
 SERVES = ("normal_form",)
-COEFFICIENTS = 16
 
 
-def coefficients(mu, order=6):
-    """Values and bars (16, N) of c200, c110, c020, c101, c011, c002, c300, ..., c003; order 4: those of r^3 are NaN."""
-    found = np.full((2, COEFFICIENTS, len(mu)), np.nan)
-    values, bars = normal_form(mu, order)
-    count = min(COEFFICIENTS, len(values))
-    found[0, :count], found[1, :count] = values[:count], bars[:count]
-    return found[0], found[1]
+def coefficients(mu, order):
+    """Values and bars (M, N) of the M coefficients named by `labels(order)`, any even order >= 4, at N values of mu."""
+    values, _norms = solve(mu, order)
+    return values[0], values[2]
 
 
 def labels(order):
-    """(i, j, k) of the coefficients of r1^i r2^j r3^k, of degrees 2, ..., order / 2, as `normal_form` gives them."""
+    """(i, j, k) of the coefficients of r1^i r2^j r3^k, of degrees 2, ..., order / 2, as `coefficients` gives them."""
     found = []
     for degree in range(4, order + 1, 2):
         m = monomials(degree)
         own = (m.harmonic == 0).all(axis=1)
         found += [tuple(map(int, e[:3])) for e in m.exponents[own][np.argsort(m.row[own])]]
     return found
-
-
-def normal_form(mu, order):
-    """Values and bars (M, N) of the M coefficients named by `labels(order)`, any even order >= 4, at N values of mu."""
-    values, _norms = solve(mu, order)
-    return values[0], values[2]
 
 
 def remainders(mu, order):
