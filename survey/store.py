@@ -233,6 +233,9 @@ class Output:
 
     def _define_map(self, coordinates, variables, layout, shape, tile):
         for name, (dims, values, meaning) in coordinates.items():
+            if np.asarray(values).dtype.kind == "U":  # CF knows labels of a dimension as arrays of characters only
+                dims, meaning = (*dims, f"{name}_length"), meaning | {"_Encoding": "utf-8"}
+                values = netCDF4.stringtochar(np.char.encode(values, "utf-8"))
             self.define(name, dims, np.shape(values), np.asarray(values).dtype, meaning)
             self.put(name, values)
         self.beside = {name: set(dims) for name, (dims, _, _) in coordinates.items() if name not in dims}
