@@ -36,8 +36,8 @@ def normal_forms(code, places, numbers, harmonics, diagonal, rows, mu, values, n
     for first in range(0, len(mu), LANES):
         count = min(LANES, len(mu) - first)
         for i in range(LANES):
-            _start(mu[first + min(i, count - 1)], i, harmonics, big, divisors)
-        _run(code, places, numbers, divisors, big, norms, first, count)
+            start(mu[first + min(i, count - 1)], i, harmonics, big, divisors)
+        run(code, places, numbers, divisors, big, norms, first, count)
         for d in range(len(diagonal)):
             for i in range(count):
                 values[0, d, first + i] = big[diagonal[d], RE + i]
@@ -65,7 +65,7 @@ def _set(row, i, re, im, relative):
 
 
 @kernel
-def _start(mu, i, harmonics, big, divisors):
+def start(mu, i, harmonics, big, divisors):
     """Lane i: the linear forms of xi and eta in z1, z2 and conjugates, in the order of their keys, and the divisors."""
     s, u, v, w1, w2 = frequencies(mu if mu > 0.0 and mu <= 0.5 else nan)
     delta = double.two_sum(1.0, -2.0 * mu)
@@ -91,7 +91,7 @@ def _start(mu, i, harmonics, big, divisors):
 
 
 @kernel
-def _run(code, places, numbers, divisors, big, norms, lane, count):
+def run(code, places, numbers, divisors, big, norms, lane, count):
     for c in range(len(code)):
         operation, first, last = code[c, 0], code[c, 4], code[c, 5]
         target, source, factor = np.uint64(code[c, 1]), np.uint64(code[c, 2]), np.uint64(code[c, 3])
