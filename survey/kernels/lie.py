@@ -28,9 +28,10 @@ NARROW = 1e-12  # a divisor below it is not divided by
 
 @kernel
 def normal_forms(code, places, numbers, harmonics, diagonal, rows, mu, values, norms):
-    """values (3, M, N): real part, imaginary part and bar of the M diagonal coefficients; norms (measured, 3, N).
+    """values (3, M, N): real and imaginary parts and bars of the M diagonal coefficients.
 
-    NaN where mu lies outside (0, mu_R), and in what a divisor below NARROW would enter.
+    norms (measured, 2, 3, N): values and bars. NaN where mu lies outside (0, mu_R), and in what a divisor below NARROW
+    would enter.
     """
     big, divisors = np.zeros((rows, WIDTH)), np.empty((len(harmonics), LANES))
     for first in range(0, len(mu), LANES):
@@ -114,9 +115,7 @@ def run(code, places, numbers, divisors, big, norms, lane, count):
             for t in range(first, last):
                 _divide(big[target + places[0, t]], big[source + places[1, t]], divisors[places[2, t]], numbers[0, t])
         else:
-            for j in range(3):
-                for i in range(count):
-                    norms[target, j, lane + i] = _norm(big, source, places[j], first, last, i)
+            _measure(big, source, places, first, last, norms[target, :, :, lane : lane + count])
 
 
 @inline
@@ -162,9 +161,16 @@ def _divide(out, f, divisor, sign):
 
 
 @inline
-def _norm(big, source, weights, first, last, i):
-    """Sum over a degree's monomials, both conjugates, of |k_j| |F|, rounded up."""
-    total = 0.0
+def _measure(big, source, weights, first, last, out):
+    """Sums over a degree's monomials, both conjugates, of |k_j| |F|, and their bars."""
+    out[:] = 0.0
     for t in range(first, last):
-        total += 2.0 * float(weights[t]) * big[source + np.uint64(t - first), SIZE + i]
-    return total * SLACK
+        row = big[source + np.uint64(t - first)]
+        for j in range(3):
+            weight = 2.0 * float(weights[j, t])
+            for i in range(out.shape[2]):
+                out[0, j, i] += weight * sqrt(row[RE + i] * row[RE + i] + row[IM + i] * row[IM + i])
+                out[1, j, i] += weight * row[BAR + i]
+    for j in range(3):
+        for i in range(out.shape[2]):
+            out[1, j, i] = out[1, j, i] * SLACK + (last - first + 4) * UNIT * out[0, j, i]

@@ -1,7 +1,8 @@
 """Lie series at L4: the Birkhoff normal form of any even order, from the Taylor expansion of the Hamiltonian.
 
-Independent of the closed forms, and not bound to their orders 4 and 6; what normalisation leaves: `remainders`. Bars: running error analysis (`kernels/lie.py`). Domain: 0 < mu < mu_R; NaN outside, and where a divisor
-of a generator is below 1e-12.
+Independent of the closed forms, and not bound to their orders 4 and 6; what the normalisation leaves: `remainders`.
+Bars: running error analysis (`kernels/lie.py`). Domain: 0 < mu < mu_R; NaN outside, and where a divisor of a generator
+is below 1e-12.
 
 Source: A. P. Markeev, Libration Points (1978), ch. 8; algorithm: `kernels/lie_plan.py`.
 """
@@ -33,20 +34,20 @@ def labels(order):
 
 
 def remainders(mu, order):
-    """{(r, d): norms (3, N)}: after normalisation to degree r, of the remainder's terms of degree d <= order + 1.
+    """{(r, d): (values, bars) (2, 3, N)}: after normalisation to degree r, norms of the terms of degree d <= order + 1.
 
-    The norm for r_j is the sum over monomials of |k_j| |coefficient|, so that |dr_j/dt| <= norm rho^d from degree d
-    where all |z_j| <= rho. r = 2: before the first step.
+    The norm for r_j is the sum over monomials of |k_j| |coefficient|, so that these terms change r_j by at most
+    norm rho^d per unit of time where all |z_j| <= rho, r_j = |z_j|^2. r = 2: before the first step.
     """
     _values, norms = solve(mu, order, True)
     return dict(zip(program(order, True).measured, norms, strict=True))
 
 
 def solve(mu, order, remainders=False):
-    """(values (3, M, N), norms (., 3, N)) as `kernels.lie.normal_forms` gives them."""
+    """(values (3, M, N), norms (., 2, 3, N)) as `kernels.lie.normal_forms` gives them."""
     what, mu = program(order, remainders), np.ascontiguousarray(mu, dtype=float)
     code, places, numbers = what.arrays()
-    values, norms = np.empty((3, len(what.diagonal), len(mu))), np.empty((len(what.measured), 3, len(mu)))
+    values, norms = np.empty((3, len(what.diagonal), mu.size)), np.empty((len(what.measured), 2, 3, mu.size))
     harmonics = what.divisors.astype(float)
-    normal_forms(code, places, numbers, harmonics, np.asarray(what.diagonal), what.rows, mu, values, norms)
+    normal_forms(code, places, numbers, harmonics, what.diagonal, what.rows, mu, values, norms)
     return values, norms

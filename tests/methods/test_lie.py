@@ -1,7 +1,7 @@
 """Lie series at L4: within the bars of the closed forms and of Deprit's triangle, and the algebra that it rests on."""
 
-import lie_twin
 import libration_exact as exact
+import lie_twin
 import numpy as np
 import pytest
 from mpmath import mp, mpf
@@ -75,7 +75,8 @@ def ratios(mu, order=6):
 
 @pytest.mark.parametrize("mu", [MASSES, NEAR, SMALL], ids=["random", "near the critical values", "small"])
 def test_the_bars_hold(mu):
-    assert ratios(mu).max() < 1.0
+    by_bar, _relative = ratios(mu)
+    assert by_bar.max() < 1.0
 
 
 def test_the_bars_are_not_absurd():
@@ -84,9 +85,14 @@ def test_the_bars_are_not_absurd():
     assert np.median(relative) < 1e-11
 
 
-# what float64 leaves of the digits: worst of order 4, worst of order 6 without c003, c003
-@pytest.mark.parametrize("mu, digits", [(1e-5, (8.2, 3.5, -0.2)), (9.5388e-4, (11.3, 8.2, 6.1)), (0.005, (12.4, 9.1, 8.3)),
-                                        (0.01, (12.3, 10.8, 9.4)), (0.02, (12.5, 11.4, 9.8)), (0.03, (12.3, 11.9, 9.7))])  # fmt: skip
+# what plain float64 leaves of the digits: worst of order 4, worst of order 6 without c003, c003
+DIGITS = {
+    1e-5: (8.2, 3.5, -0.2), 9.5388e-4: (11.3, 8.2, 6.1), 0.005: (12.4, 9.1, 8.3), 0.01: (12.3, 10.8, 9.4),
+    0.02: (12.5, 11.4, 9.8), 0.03: (12.3, 11.9, 9.7),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("mu, digits", DIGITS.items())
 def test_the_digits_that_cancellation_leaves(mu, digits):
     around = mu * (1 + 1e-3 * np.arange(-4, 5))  # a place's own digits are luck
     lost = np.log10(np.median(ratios(around)[1], axis=1))
@@ -155,7 +161,7 @@ def solved_exchanged(mu, order):
     w = np.array([[float(x) for x in exact.frequencies(one)] for one in mu])
     for lane, (w1, w2) in enumerate(w):
         divisors[:, lane] = -harmonics[:, 0] * w2 + harmonics[:, 1] * w1 + harmonics[:, 2]
-    kernel.run(code, places, numbers, divisors, big, np.empty((0, 3, len(mu))), 0, len(mu))
+    kernel.run(code, places, numbers, divisors, big, np.empty((0, 2, 3, len(mu))), 0, len(mu))
     rows = big[program.diagonal]
     for part, first in enumerate((kernel.RE, kernel.IM, kernel.BAR)):
         out[part] = rows[:, first : first + len(mu)]

@@ -1,0 +1,80 @@
+"""How far from an elliptic equilibrium motions stay for a stated time: the radius of effective stability.
+
+After normalisation to degree r the Hamiltonian is Z(r1, r2, r3) + R, R of degrees r + 1 and more, r_j = |z_j|^2; only R
+changes the actions r_j. Where all |z_i| <= rho, |dr_j/dt| <= B(rho) = max over j of the sum over d > r of A_dj rho^d,
+A_dj the sum over the monomials of degree d of |k_j| |coefficient|. Motions with all |z_i| <= rho_0 at first therefore
+keep r_i <= 2 rho_0^2 for the time
+
+    T_r(rho_0) = integral from rho_0 to sqrt(2) rho_0 of 2 rho / B(rho) d rho,
+
+and the radius is the largest rho_0, over the orders r that were computed, with T_r(rho_0) >= the time asked. The z_j
+are the variables after r - 2 Lie transforms, normalised to {z_j, zbar_j} = i; units as in the Hamiltonian.
+
+An estimate, not a proof: R is known up to degree D = order + 1 only. Its tail is taken as geometric, with the ratio of
+the last two terms, or, where three are known, the largest geometric mean of two successive ratios (even and odd degrees
+differ); where it is 1 or more the tail is infinite. So r goes up to D - 2. That the transforms exist on the polydisk is
+not shown either. Where r is the last one, more orders would give a larger radius. Where a generator's divisor is too
+small to divide by, r ends before it.
+
+Sources: N. N. Nekhoroshev, Russ. Math. Surv. 32 (1977) 6, 1; A. Giorgilli, A. Delshams, E. Fontich, L. Galgani,
+C. Simo, J. Diff. Eq. 77 (1989) 167; A. Giorgilli, C. Skokos, Astron. Astrophys. 317 (1997) 254.
+"""
+
+import numpy as np
+
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
+LARGEST, SMALLEST = 0.0, -60.0  # of log(rho_0)
+HALVINGS = 52  # of that interval
+RESOLUTION = 1e-12  # relative: what the halvings, the rule and the roundings here leave
+
+
+def radius(remainders, time):
+    """(radius, bar, r) at each mu: the radius for `time`, how much less rounding may make it, and the order r.
+
+    `remainders`: {(r, d): (values, bars) (2, 3, N)}, as a method's function of that name gives them. NaN and r = -1
+    where no order is known.
+    """
+    top = max(d for _r, d in remainders)
+    found = [(r, *_radius(r, top, remainders, time)) for r in range(2, top - 1)]
+    orders, values, safe = (np.array(part) for part in zip(*found, strict=True))
+    best = np.argmax(np.where(np.isfinite(safe), safe, -np.inf), axis=0)
+    pick = best, np.arange(values.shape[1])
+    known = np.isfinite(safe[pick])
+    value = np.where(known, values[pick], np.nan)
+    return value, np.maximum(value - safe[pick], 0.0) + RESOLUTION * value, np.where(known, orders[best], -1)
+
+
+def _radius(r, top, remainders, time):
+    """The radius by order r, from the norms, and from the norms with their bars added."""
+    norms = np.array([remainders[r, d] for d in range(r + 1, top + 1)])
+    return [_solve(r, np.moveaxis(n, 0, -1), time) for n in (norms[:, 0], norms[:, 0] + norms[:, 1])]
+
+
+def _solve(r, norms, time):
+    """The root of T(rho_0) = time by bisection in log(rho_0); `norms` (3, N, degrees)."""
+    low, high = np.full(norms.shape[1], SMALLEST), np.full(norms.shape[1], LARGEST)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        enough = escape_time(r, norms, np.exp(middle)) >= time
+        low, high = np.where(enough, middle, low), np.where(enough, high, middle)
+    return np.where(np.isfinite(norms).all(axis=(0, 2)), np.exp(low), np.nan)
+
+
+def escape_time(r, norms, start):
+    """T_r(rho_0) at rho_0 = `start` (N), by Gauss's rule in log(rho)."""
+    width = 0.5 * np.log(2.0)
+    rho = start[:, None] * np.exp(0.5 * width * (NODES + 1.0))
+    with np.errstate(over="ignore"):
+        return (WEIGHTS * rho**2 / bound(r, norms, rho)).sum(axis=1) * width
+
+
+def bound(r, norms, rho):
+    """B(rho) (N, points): the known degrees and the geometric tail."""
+    powers = rho[..., None] ** np.arange(r + 1, r + 1 + norms.shape[-1])
+    terms = norms[:, :, None, :] * powers
+    if terms.shape[-1] == 2:
+        ratio = terms[..., 1] / terms[..., 0]
+    else:
+        ratio = np.sqrt((terms[..., 2:] / terms[..., :-2]).max(axis=-1))
+    tail = np.where(ratio < 1.0, terms[..., -1] * ratio / np.where(ratio < 1.0, 1.0 - ratio, 1.0), np.inf)
+    return (terms.sum(axis=-1) + tail).max(axis=0)
