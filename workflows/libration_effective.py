@@ -13,7 +13,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from survey.figures import COLOURS
-from survey.kernels.lie import frequencies
 from survey.kernels.lie_plan import program
 from survey.measures import effective_stability
 from survey.measures.normal_form import MU_R
@@ -43,28 +42,34 @@ def radii(mu, order):
 
 def resonances(highest):
     """[(mu, k)]: where k1 w1 - k2 w2 + k3 = 0, k the shortest of its line, |k| <= highest, in the order of mu."""
-    vectors = program(highest, True).divisors
+    vectors, found = program(highest, True).divisors, {}
     vectors = vectors[np.lexsort((*vectors.T, abs(vectors).sum(axis=1)))]
-    found = {}
     for k in vectors:
-        ends = [distance(mu, k) for mu in GRID]
-        for low, high, a, b in zip(GRID, GRID[1:], ends, ends[1:], strict=False):
-            if a * b < 0.0:
-                root = bisect(k, low, high)
-                found.setdefault(round(root, 13), (root, tuple(map(int, k))))
+        values = distance(GRID, k)
+        for n in np.flatnonzero(values[1:] * values[:-1] < 0.0):
+            root = bisect(k, GRID[n], GRID[n + 1])
+            found.setdefault(round(root, 12), (root, tuple(map(int, k))))
     return [found[key] for key in sorted(found)]
 
 
-GRID = MU_R[0] * (1.0 - np.linspace(1.0 - 1e-9, 1e-9, 400) ** 2)
+GRID = MU_R[0] * (1.0 - np.linspace(1.0, 1e-5, 2000) ** 2)  # denser towards mu_R
+
+
+def frequencies(mu):
+    """s = w1^2 - w2^2, w1, w2."""
+    x = 6.75 * mu * (1.0 - mu)
+    s = np.sqrt(1.0 - 4.0 * x)
+    return s, np.sqrt(0.5 * (1.0 + s)), np.sqrt(2.0 * x / (1.0 + s))
 
 
 def distance(mu, k):
     """k . Omega."""
-    _s, _u, _v, w1, w2 = frequencies(float(mu))
-    return k[0] * w1[0] - k[1] * w2[0] + k[2]
+    _s, w1, w2 = frequencies(mu)
+    return k[0] * w1 - k[1] * w2 + k[2]
 
 
 def bisect(k, low, high):
+    """The root of k . Omega between low and high."""
     side = distance(low, k) > 0.0
     for _ in range(60):
         middle = 0.5 * (low + high)
@@ -73,25 +78,23 @@ def bisect(k, low, high):
 
 
 def semi_axes(mu):
-    """Greatest distance from L4, per unit of |z_j|, of the linear short- and long-period motions (the ellipses' axes)."""
-    s, u, v, w1, w2 = (part[0] for part in frequencies(mu))
-    k = 0.75 * np.sqrt(3.0) * (1.0 - 2.0 * mu)
-    axes = []
-    for omega, square in ((w1, u), (w2, v)):
-        g = 1.0 / np.sqrt(2.0 * omega * s * (square + 0.75))
-        form = np.array([[k * g, 2.0 * omega * g], [-(square + 0.75) * g, 0.0]])
-        axes.append(2.0 * np.linalg.norm(form, ord=2))
+    """Greatest distance from L4, per unit of |z_j|, of short- and long-period motions (linear): their semi-axes."""
+    s, *frequency = frequencies(mu)
+    k, axes = 0.75 * np.sqrt(3.0) * (1.0 - 2.0 * mu), []
+    for omega in frequency:
+        g = 1.0 / np.sqrt(2.0 * omega * s * (omega**2 + 0.75))
+        axes.append(2.0 * np.linalg.norm([[k * g, 2.0 * omega * g], [-(omega**2 + 0.75) * g, 0.0]], ord=2))
     return axes
 
 
 PAGE = """# Effective stability of the triangular libration points
 
 Made by `python workflows/libration_effective.py`. The radius rho is the greatest for which motions that start with all
-|z_j| <= rho, in the variables of the normal form (action r_j = |z_j|^2, unit distance, mass and mean motion), keep their
-actions below 2 rho^2 for the stated time, as the remainders of the series tell: degrees up to the order + 1, a geometric
-tail. r is the degree to which the Hamiltonian was normalised for it, of 2, ..., order - 1. It is an estimate from
-truncated series, not a proof; where r is the greatest that the order allows, higher orders would give a larger radius.
-The bars hold rounding only.
+|z_j| <= rho, in the variables of the normal form (action r_j = |z_j|^2, unit distance, mass and mean motion), keep
+their actions below 2 rho^2 for the stated time, as far as the remainders of the series tell: degrees up to the order
+plus 1, then a geometric tail (`survey/measures/effective_stability.py`). r, of 2, ..., order - 1, is the degree to
+which the Hamiltonian was normalised for it. It is an estimate from truncated series, not a proof; where r is the
+greatest that the order allows, higher orders would give a larger radius. The bars hold rounding only.
 
 ## By order, for 10^9 periods of the primaries
 
@@ -117,7 +120,7 @@ At k1 w1 - k2 w2 + k3 = 0 a generator of degree |k| cannot be had; r ends before
 a non-resonant normal form can say. Around it the divisor is small: the radius falls in a valley. rho for 10^9 periods,
 order {top}:
 
-| mu | k | r | rho | 1e-3 mu away |
+| mu | k | r | rho | rho at mu (1 + 1e-3) |
 |---|---|---|---|---|
 {at_resonances}
 
@@ -183,22 +186,23 @@ def page(mu, curves, at, low, on, beside):
 
 def draw(mu, curves, found, path):
     """Left: by order for the longest time; right: by time for the highest order, and the resonances."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(12.5, 5.6), sharey=True, layout="constrained")
-    top, long = ORDERS[-1], PERIODS[-1]
-    for order, colour in zip(ORDERS, COLOURS, strict=False):
+    figure, (left, right) = plt.subplots(1, 2, figsize=(12.5, 5.8), sharey=True, layout="constrained")
+    top, long, shades = ORDERS[-1], PERIODS[-1], [COLOURS[i] for i in (0, 6, 4, 5)]
+    for order, colour in zip(ORDERS, shades, strict=True):
         left.semilogy(mu, curves[order][long][0], color=colour, lw=1.1, label=f"order {order}")
     left.set(ylabel=r"radius $\rho$ of effective stability (of $|z_j|$)",
-             title=f"for $10^{{{round(np.log10(long))}}}$ periods of the primaries")  # fmt: skip
-    for periods, colour in zip(PERIODS, COLOURS, strict=False):
+             title=f"for $10^{{{round(np.log10(long))}}}$ periods of the primaries, by order")  # fmt: skip
+    for periods, colour in zip(PERIODS, shades, strict=False):
         label = f"$10^{{{round(np.log10(periods))}}}$ periods"
         right.semilogy(mu, curves[top][periods][0], color=colour, lw=1.1, label=label)
-    right.set(title=f"order {top}; ticks: resonances $k$ of order 3 to {top}, the longer the lower")
+    right.set(title=f"order {top}, by time; ticks: resonances $k$ of order 3 to {top}, the shorter the longer")
     for root, k in found:
         size = sum(map(abs, k))
-        right.axvline(root, ymin=1.0 - 0.45 / size, color="0.35", lw=0.8)
+        right.axvline(root, ymin=1.0 - 0.4 / size, color="0.35", lw=0.8)
         if size <= 5:
-            right.annotate(str(k).replace(" ", ""), (root, 1.0 - 0.45 / size), xycoords=("data", "axes fraction"),
+            right.annotate(str(k).replace(" ", ""), (root, 0.99 - 0.4 / size), xycoords=("data", "axes fraction"),
                            fontsize=7, rotation=90, ha="center", va="top")  # fmt: skip
+    right.set_ylim(right.get_ylim()[0], 1.0)  # room for the ticks
     for axes in (left, right):
         axes.set(xlabel=r"mass ratio $\mu$", xlim=(0.0, MU_R[0]))
         axes.grid(alpha=0.3)
