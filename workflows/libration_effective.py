@@ -188,21 +188,21 @@ def draw(mu, curves, found, path):
     """Left: by order for the longest time; right: by time for the highest order, and the resonances."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(12.5, 5.8), sharey=True, layout="constrained")
     top, long, shades = ORDERS[-1], PERIODS[-1], [COLOURS[i] for i in (0, 6, 4, 5)]
-    for order, colour in zip(ORDERS, shades, strict=True):
+    for order, colour in zip(ORDERS, shades, strict=False):
         left.semilogy(mu, curves[order][long][0], color=colour, lw=1.1, label=f"order {order}")
     left.set(ylabel=r"radius $\rho$ of effective stability (of $|z_j|$)",
              title=f"for $10^{{{round(np.log10(long))}}}$ periods of the primaries, by order")  # fmt: skip
     for periods, colour in zip(PERIODS, shades, strict=False):
         label = f"$10^{{{round(np.log10(periods))}}}$ periods"
         right.semilogy(mu, curves[top][periods][0], color=colour, lw=1.1, label=label)
-    right.set(title=f"order {top}, by time; ticks: resonances $k$ of order 3 to {top}, the shorter the longer")
+    right.set(title=f"order {top}, by time; ticks: resonances $k$ of order up to {top}")
     for root, k in found:
         size = sum(map(abs, k))
-        right.axvline(root, ymin=1.0 - 0.4 / size, color="0.35", lw=0.8)
+        right.axvline(root, ymin=1.0 - 0.5 / size, color="0.35", lw=0.8)
         if size <= 5:
-            right.annotate(str(k).replace(" ", ""), (root, 0.99 - 0.4 / size), xycoords=("data", "axes fraction"),
+            right.annotate(str(k).replace(" ", ""), (root, 0.99 - 0.5 / size), xycoords=("data", "axes fraction"),
                            fontsize=7, rotation=90, ha="center", va="top")  # fmt: skip
-    right.set_ylim(right.get_ylim()[0], 1.0)  # room for the ticks
+    right.set_ylim(1e-7, 0.1)  # room for the ticks and the legend
     for axes in (left, right):
         axes.set(xlabel=r"mass ratio $\mu$", xlim=(0.0, MU_R[0]))
         axes.grid(alpha=0.3)

@@ -22,7 +22,7 @@ C. Simo, J. Diff. Eq. 77 (1989) 167; A. Giorgilli, C. Skokos, Astron. Astrophys.
 
 import numpy as np
 
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 LARGEST, SMALLEST = 0.0, -60.0  # of log(rho_0)
 HALVINGS = 52  # of that interval
 RESOLUTION = 1e-12  # relative: what the halvings, the rule and the roundings here leave
@@ -35,19 +35,15 @@ def radius(remainders, time):
     where no order is known.
     """
     top = max(d for _r, d in remainders)
-    found = [(r, *_radius(r, top, remainders, time)) for r in range(2, top - 1)]
-    orders, values, safe = (np.array(part) for part in zip(*found, strict=True))
-    best = np.argmax(np.where(np.isfinite(safe), safe, -np.inf), axis=0)
-    pick = best, np.arange(values.shape[1])
-    known = np.isfinite(safe[pick])
-    value = np.where(known, values[pick], np.nan)
-    return value, np.maximum(value - safe[pick], 0.0) + RESOLUTION * value, np.where(known, orders[best], -1)
-
-
-def _radius(r, top, remainders, time):
-    """The radius by order r, from the norms, and from the norms with their bars added."""
-    norms = np.array([remainders[r, d] for d in range(r + 1, top + 1)])
-    return [_solve(r, np.moveaxis(n, 0, -1), time) for n in (norms[:, 0], norms[:, 0] + norms[:, 1])]
+    orders = np.arange(2, top - 1)
+    norms = {r: np.moveaxis([remainders[r, d] for d in range(r + 1, top + 1)], 0, -1) for r in orders}
+    safe = np.array([_solve(r, values + bars, time) for r, (values, bars) in norms.items()])
+    known = np.isfinite(safe).any(axis=0)
+    best = np.where(known, orders[np.argmax(np.where(np.isfinite(safe), safe, -1.0), axis=0)], -1)
+    radius, least = np.full(known.shape, np.nan), safe.max(axis=0, initial=-1.0, where=np.isfinite(safe))
+    for r in np.unique(best[known]):
+        radius[best == r] = _solve(r, norms[r][0][:, best == r], time)
+    return radius, np.maximum(radius - least, 0.0) + RESOLUTION * radius, best
 
 
 def _solve(r, norms, time):
@@ -70,8 +66,8 @@ def escape_time(r, norms, start):
 
 def bound(r, norms, rho):
     """B(rho) (N, points): the known degrees and the geometric tail."""
-    powers = rho[..., None] ** np.arange(r + 1, r + 1 + norms.shape[-1])
-    terms = norms[:, :, None, :] * powers
+    powers = np.cumprod(np.broadcast_to(rho[..., None], (*rho.shape, norms.shape[-1])), axis=-1)
+    terms = norms[:, :, None, :] * (powers * rho[..., None] ** r)
     if terms.shape[-1] == 2:
         ratio = terms[..., 1] / terms[..., 0]
     else:
