@@ -408,7 +408,7 @@ The intervals of the source's theorem:
 L4 and L5 are formally stable in the intervals (3.1). In (3.2), which are {share:.3f} % of the interval of linear
 stability, the form M of order 6 does not vanish on the one ray that order 4 leaves open: it is {below:.6f} just above
 mu_c, {above:.6f} just below mu_d, and has its only pole at mu2. That proves formal stability but where omega1 and
-omega2 are both rational (`survey/scenes/libration.md`, section 5).
+omega2 are both rational, which no float64 mu makes them (`survey/scenes/libration.md`, section 5).
 
 ## Certified by exact arithmetic
 
@@ -466,7 +466,7 @@ def page():
     c, d = float(named["mu_c"].mu), float(named["mu_d"].mu)
     ends = survey.evaluate("libration", mu=[np.nextafter(c, 1), np.nextafter(d, 0)], variables=["M_ray"]).M_ray
     text = PAGE.format(
-        error=ERROR,
+        error=f"{ERROR:.0e}",
         boundaries=table(first),
         intervals="\n".join(intervals(named)),
         share=100 * (named["mu_d"].mu - named["mu_c"].mu) / named["mu_R"].mu,

@@ -13,7 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from survey.figures import COLOURS
-from survey.kernels.lie_plan import program
+from survey.kernels.lie_plan import plan
 from survey.measures import effective_stability
 from survey.measures.normal_form import MU_R
 from survey.methods import lie
@@ -42,7 +42,7 @@ def radii(mu, order):
 
 def resonances(highest):
     """[(mu, k)]: where k1 w1 - k2 w2 + k3 = 0, k the shortest of its line, |k| <= highest, in the order of mu."""
-    vectors, found = program(highest, True).divisors, {}
+    vectors, found = plan(highest, True).harmonics, {}
     vectors = vectors[np.lexsort((*vectors.T, abs(vectors).sum(axis=1)))]
     for k in vectors:
         values = distance(GRID, k)

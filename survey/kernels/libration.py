@@ -40,9 +40,9 @@ def put(f, which, number):
     f[0, which], f[1, which] = number
 
 
-@inline
+@kernel
 def factors(mu, f):
-    """The FACTORS (2.2)-(2.6) in double-double, f[:, factor]; True where 0 < mu < mu_R, else nothing is done."""
+    """The FACTORS (F1)-(F6) in double-double, f[:, factor]; True where 0 < mu < mu_R, else nothing is done."""
     square = dd.times(gap(mu, MU_R), -27.0)  # s^2 = 1 - 4x
     if not (mu > 0.0 and square[0] > 0.0):
         return False

@@ -1,4 +1,4 @@
-"""Birkhoff's normal form at the triangular libration points, many mu in lock step: the programs of `lie_plan`.
+"""Birkhoff's normal form at the triangular libration points, many mu in lock step: the plans of `lie_plan`.
 
 A row is a coefficient in all lanes: real part, imaginary part, size and bar. `size` bounds its modulus, and `bar` the
 modulus of its error plus ROUND sizes, which covers the roundings of the products that the row enters; so a product of

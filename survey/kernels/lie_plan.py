@@ -13,24 +13,32 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache
 from math import comb, factorial, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
 from survey.kernels.monomials import brackets, monomials, norm, products
 
 CLEAR, MULTIPLY, LINEAR, FINISH, DIVIDE, MEASURE = range(6)
-XI, ETA, DELTA, ONE, WORK = 0, 4, 8, 9, 10  # rows that are there before the program starts, and the first other one
+XI, ETA, DELTA, ONE, WORK = 0, 4, 8, 9, 10  # the rows set before the first operation, and the first other one
 NONE = -1
 
 
-@dataclass
-class Program:
-    """What the kernel runs.
+class Plan(NamedTuple):
+    """What the kernel runs: arrays."""
 
-    `code` (n, 6): operation, rows of the target, source and factor, first and last of the terms. `places` (3, T) and
-    `numbers` (2, T): the terms. `divisors` (m, 3): harmonics. `diagonal`: rows of the normal form's coefficients;
-    `measured`: (stage, degree) of the norms.
-    """
+    code: np.ndarray  # (n, 6): operation; rows of target, source and factor; first and last of the terms
+    places: np.ndarray  # (3, T) of the terms
+    numbers: np.ndarray  # (2, T)
+    harmonics: np.ndarray  # (m, 3) of the divisors
+    diagonal: np.ndarray  # rows of the normal form's coefficients
+    rows: int
+    measured: list  # (stage, degree) of the norms
+
+
+@dataclass
+class Draft:
+    """A plan in the making."""
 
     rows: int = WORK
     code: list = field(default_factory=list)
@@ -38,7 +46,6 @@ class Program:
     numbers: list = field(default_factory=list)
     terms: int = 0
     divisors: np.ndarray | None = None
-    diagonal: list = field(default_factory=list)
     measured: list = field(default_factory=list)
     kept: dict = field(default_factory=dict)
 
@@ -72,9 +79,10 @@ class Program:
             first, last = self.hold((target + at, source + at, zero), (zero + float(number), zero))
             self.add(LINEAR, 0, 0, 0, first, last)
 
-    def arrays(self):
-        places = np.concatenate(self.places, axis=1).astype(np.uint64)
-        return np.array(self.code, np.int64), places, np.concatenate(self.numbers, axis=1)
+    def plan(self, diagonal):
+        places, numbers = (np.concatenate(part, axis=1) for part in (self.places, self.numbers))
+        code, harmonics = np.array(self.code, np.int64), self.divisors.astype(float)
+        return Plan(code, places.astype(np.uint64), numbers, harmonics, diagonal, self.rows, self.measured)
 
 
 def chain(stage, degree):
@@ -110,14 +118,14 @@ def sources(stage, degree, limit):
 
 
 @cache
-def program(order, remainders=False):
-    """The `Program` for the normal form of degrees 4, 6, ..., `order`.
+def plan(order, remainders=False):
+    """The `Plan` for the normal form of degrees 4, 6, ..., `order`.
 
     With `remainders` all terms up to degree order + 1 are kept through all stages, and their norms measured.
     """
     if order < 4 or order % 2:
         raise ValueError("the order of a normal form is even, and at least 4")
-    need, out = cutoffs(order, remainders), Program()
+    need, out = cutoffs(order, remainders), Draft()
     top, last = order + remainders, max(need)
     F = {d: out.allocate(rows(d, need[2][d])) for d in range(3, top + 1)}
     expand(out, F, need[2])
@@ -131,8 +139,7 @@ def program(order, remainders=False):
         for degree in range(top, stage, -1):
             transform(out, stage, degree, need[stage][degree], F, chi, parts)
         measure(out, stage, top, F, remainders)
-    out.diagonal = np.concatenate([F[d] + np.arange(rows(d, 0)) for d in range(4, order + 1, 2)])
-    return out
+    return out.plan(np.concatenate([F[d] + np.arange(rows(d, 0)) for d in range(4, order + 1, 2)]))
 
 
 def rows(degree, cutoff):

@@ -10,7 +10,7 @@ Source: A. P. Markeev, Libration Points (1978), ch. 8; algorithm: `kernels/lie_p
 import numpy as np
 
 from survey.kernels.lie import normal_forms
-from survey.kernels.lie_plan import program
+from survey.kernels.lie_plan import plan
 from survey.kernels.monomials import monomials
 
 ORDER = 0  # no steps: each order's sum is finite
@@ -40,14 +40,12 @@ def remainders(mu, order):
     norm rho^d per unit of time where all |z_j| <= rho, r_j = |z_j|^2. r = 2: before the first step.
     """
     _values, norms = solve(mu, order, True)
-    return dict(zip(program(order, True).measured, norms, strict=True))
+    return dict(zip(plan(order, True).measured, norms, strict=True))
 
 
 def solve(mu, order, remainders=False):
     """(values (3, M, N), norms (., 2, 3, N)) as `kernels.lie.normal_forms` gives them."""
-    what, mu = program(order, remainders), np.ascontiguousarray(mu, dtype=float)
-    code, places, numbers = what.arrays()
+    what, mu = plan(order, remainders), np.ascontiguousarray(mu, dtype=float)
     values, norms = np.empty((3, len(what.diagonal), mu.size)), np.empty((len(what.measured), 2, 3, mu.size))
-    harmonics = what.divisors.astype(float)
-    normal_forms(code, places, numbers, harmonics, what.diagonal, what.rows, mu, values, norms)
+    normal_forms(*what[:6], mu, values, norms)
     return values, norms

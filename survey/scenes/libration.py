@@ -1,6 +1,6 @@
 """Formal stability of the triangular libration points of the spatial circular restricted three-body problem.
 
-    H = L + N + M + ...,  L = omega1 r1 - omega2 r2 + r3,  N = sum c_ijk r1^i r2^j r3^k (i+j+k = 2),  M likewise (3)
+    H = L + N + M + ...,  L = omega1 r1 - omega2 r2 + r3,  N = sum c_ijk r1^i r2^j r3^k (i+j+k = 2),  M likewise (3.13)
 
 is the normal form at L4 (or L5: the same numbers) to order 6 in the coordinates; r1, r2 are the actions of the motions
 in the plane of the primaries, r3 that across it.
@@ -17,7 +17,8 @@ What is proved, and what is not. Verdict 1 is proved for every such mu: L and H 
 frequencies, and L^4 + (H - L)^2 is definite. Verdict 2 is proved where omega1, omega2, 1 satisfy at most one
 independent relation k . omega = 0 over the integers. Where they satisfy two (omega1 and omega2 both rational: a
 countable, dense set of mu, the rank-2 resonances), only L and H are sure to be formal integrals, no function of them is
-definite, and "M is not 0" does not settle the point: there verdict 2 says that the test of order 6 is passed, no more.
+definite, and "M is not 0" does not settle the point. No float64 is such a mu (`libration.md`, section 5), so verdict 2
+is proved for the very number given, and not for all real mu beside it.
 The closed forms of order 6 were found by exact rational reconstruction and hold at 110 rational points and against
 Lie series to 90 digits; they are not derived symbolically. Formal stability is not Lyapunov stability.
 
@@ -77,7 +78,7 @@ OUTPUTS = (
            applies=_BELOW + "; (2, 0, -2) and (1, 1, 0), met at mu = 0 and mu_R, count too"),
     Output("verdict", "formal stability", flags=VERDICTS,
            applies="by order 6 is proved unless omega1 and omega2 are both rational (rank-2 resonances: countable, "
-           "dense), where it says only that M is not 0 on the ray; formal stability is not Lyapunov stability"),
+           "dense, but no float64 mu is one), where M != 0 settles nothing; formal is not Lyapunov stability"),
 )  # fmt: skip
 
 

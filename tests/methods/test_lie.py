@@ -148,12 +148,10 @@ def test_exchanging_the_modes_exchanges_the_indices():
 
 
 def solved_exchanged(mu, order):
-    """The program run on rows in which z1 and z2 have changed places."""
-    program = lie_plan.program(order)
-    out = np.empty((3, len(program.diagonal), len(mu)))
-    code, places, numbers = program.arrays()
-    harmonics = program.divisors.astype(float)
-    big, divisors = np.zeros((program.rows, kernel.WIDTH)), np.empty((len(harmonics), kernel.LANES))
+    """The plan run on rows in which z1 and z2 have changed places."""
+    code, places, numbers, harmonics, diagonal, rows, _measured = lie_plan.plan(order)
+    out = np.empty((3, len(diagonal), len(mu)))
+    big, divisors = np.zeros((rows, kernel.WIDTH)), np.empty((len(harmonics), kernel.LANES))
     for lane in range(kernel.LANES):
         kernel.start(mu[min(lane, len(mu) - 1)], lane, harmonics, big, divisors)
     for form in (lie_plan.XI, lie_plan.ETA):
@@ -162,9 +160,9 @@ def solved_exchanged(mu, order):
     for lane, (w1, w2) in enumerate(w):
         divisors[:, lane] = -harmonics[:, 0] * w2 + harmonics[:, 1] * w1 + harmonics[:, 2]
     kernel.run(code, places, numbers, divisors, big, np.empty((0, 2, 3, len(mu))), 0, len(mu))
-    rows = big[program.diagonal]
+    found = big[diagonal]
     for part, first in enumerate((kernel.RE, kernel.IM, kernel.BAR)):
-        out[part] = rows[:, first : first + len(mu)]
+        out[part] = found[:, first : first + len(mu)]
     return out
 
 

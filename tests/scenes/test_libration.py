@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from math import isqrt
 from pathlib import Path
 
 import libration_exact as exact
@@ -52,6 +53,15 @@ def test_lazy_input():
     lazy = survey.evaluate("libration", mu=mu.chunk(one=1))
     assert lazy.c.dims == ("one", "two", "monomial")
     np.testing.assert_array_equal(lazy.c.values, survey.evaluate("libration", mu=mu).c.values)
+
+
+def test_no_binary_fraction_is_a_resonance_of_rank_2():
+    """omega1 omega2 = sqrt(27 m (2^k - m)) / 2^(k+1) at mu = m / 2^k is irrational below mu_R; at 1/4 it is not."""
+    for k in range(2, 15):
+        for m in range(1, int(0.0386 * 2**k) + 1):
+            square = 27 * m * (2**k - m)
+            assert isqrt(square) ** 2 != square
+    assert isqrt(27 * 3) ** 2 == 27 * 3
 
 
 def test_what_is_not_proved_is_said():
