@@ -19,10 +19,11 @@ LANES = 32
 RE, IM, SIZE, BAR, WIDTH = 0, LANES, 2 * LANES, 3 * LANES, 4 * LANES
 UNIT = 2.0**-53
 ROUND = 2.2 * UNIT  # a product's roundings are 3 sqrt 2 UNIT of |C| |f| |g|, shared by two factors
-CONSTANT = 3.0 * UNIT  # a constant's beyond ROUND: it has four, and its product one
+CONSTANT = 3.0 * UNIT  # beyond ROUND: a constant has four, and its product one; a quotient by a divisor, three
 FORMS = 1.01 * UNIT  # the linear forms' relative error: rounded double-doubles
 SLACK = 1.0 + 1e-9  # the roundings of the bars themselves
 K = (1.299038105676658, -3.5759170798963886e-17)  # 3 sqrt(3) / 4
+LEAST = 3e-7  # s below it, which is mu within 4e-15 of mu_R, has not all digits in double-double
 NARROW = 1e-12  # a divisor below it is not divided by
 
 
@@ -30,8 +31,8 @@ NARROW = 1e-12  # a divisor below it is not divided by
 def normal_forms(code, places, numbers, harmonics, diagonal, rows, mu, values, norms):
     """values (3, M, N): real and imaginary parts and bars of the M diagonal coefficients.
 
-    norms (measured, 2, 3, N): values and bars. NaN where mu lies outside (0, mu_R), and in what a divisor below NARROW
-    would enter.
+    norms (measured, 2, 3, N): values and bars. NaN where mu lies outside (0, mu_R) or next to mu_R, and in what a
+    divisor below NARROW would enter.
     """
     big, divisors = np.zeros((rows, WIDTH)), np.empty((len(harmonics), LANES))
     for first in range(0, len(mu), LANES):
@@ -69,6 +70,8 @@ def _set(row, i, re, im, relative):
 def start(mu, i, harmonics, big, divisors):
     """Lane i: the linear forms of xi and eta in z1, z2 and conjugates, in the order of their keys, and the divisors."""
     s, u, v, w1, w2 = frequencies(mu if mu > 0.0 and mu <= 0.5 else nan)
+    if not s[0] > LEAST:
+        s = (nan, nan)
     delta = double.two_sum(1.0, -2.0 * mu)
     k = double.mul(K, delta)
     for j in range(2):
@@ -157,7 +160,7 @@ def _divide(out, f, divisor, sign):
         scale = sign / divisor[i]
         out[RE + i], out[IM + i] = scale * f[RE + i], scale * sign * f[IM + i]
         out[SIZE + i] = abs(scale) * f[SIZE + i] * SLACK
-        out[BAR + i] = abs(scale) * f[BAR + i] + ROUND * out[SIZE + i]
+        out[BAR + i] = abs(scale) * f[BAR + i] + (CONSTANT + ROUND) * out[SIZE + i]
 
 
 @inline

@@ -132,7 +132,7 @@ def plan(order, remainders=False):
     harmonics = np.concatenate([monomials(s).harmonic[monomials(s).sign > 0] for s in range(3, last + 1)])
     out.divisors = np.unique(harmonics[norm(harmonics) > 0], axis=0)
     chi = out.allocate(max(len(monomials(s).keys) for s in range(3, last + 1)))
-    parts = [out.allocate(max(rows(d, need[2][d] + 3) for d in range(3, top + 1))) for _ in range(2)]
+    parts = [out.allocate(max(rows(d, need[2][d]) for d in range(3, top + 1))) for _ in range(2)]
     measure(out, 2, top, F, remainders)
     for stage in range(3, last + 1):
         divide(out, stage, chi, F[stage])

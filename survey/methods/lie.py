@@ -1,8 +1,8 @@
 """Lie series at L4: the Birkhoff normal form of any even order, from the Taylor expansion of the Hamiltonian.
 
 Independent of the closed forms, and not bound to their orders 4 and 6; what the normalisation leaves: `remainders`.
-Bars: running error analysis (`kernels/lie.py`). Domain: 0 < mu < mu_R; NaN outside, and where a divisor of a generator
-is below 1e-12.
+Bars: running error analysis (`kernels/lie.py`). Domain: 0 < mu < mu_R - 4e-15; NaN outside, and where a divisor of a
+generator is below 1e-12.
 
 Source: A. P. Markeev, Libration Points (1978), ch. 8; algorithm: `kernels/lie_plan.py`.
 """
