@@ -431,7 +431,8 @@ arithmetic with the methods. It is solved twice, with another order and other st
 48 trajectories of 30 digits in `survey/reference` it differs by at most {mpmath:.0e}.
 
 Hatched: the method's own error bar misses rtol. Grey: it gives no answer, and says why in `status`. {wrong} of {answers} answers say
-that the solution has turned where it has not, or the other way round, and no true error exceeds its bar: the largest is {ratio:.2g} of it.
+that the solution has turned where it has not, or the other way round, and {outside} have
+a true error beyond their bar: the largest is {ratio:.2g} of it.
 
 ![true errors of each method](gyrostat_methods.png)
 
@@ -487,7 +488,8 @@ def page(maps, true, judged):
         rtol=RTOL, order=FINE[0], mpmath=max(held()),
         differ=max((doubt / (1 + np.abs(high))).max() for high, _low, _codes, doubt in true.values()),
         shaky=max(j.shaky.max() for j in every), ratio=max(j.ratio.max() for j in every),
-        wrong=sum(int(j.wrong.sum()) for j in every), answers=f"{sum(int(j.answered.sum()) for j in every):,}",
+        wrong=sum(int(j.wrong.sum()) for j in every),
+        outside=sum(int((j.ratio > 1).sum()) for j in every), answers=f"{sum(int(j.answered.sum()) for j in every):,}",
         tables="\n".join(table(maps[name], plane) for name, plane in judged.items()), rule=rule(maps, judged),
     )  # fmt: skip
 
