@@ -309,5 +309,5 @@ def enter(T, i, p, phi0, w0, t):
 
 @inline
 def lanes():
-    """An empty work array."""
-    return np.zeros((ROWS, LANES))
+    """A work array; lanes that are never entered hold numbers without meaning that divide by no zero."""
+    return np.ones((ROWS, LANES))
