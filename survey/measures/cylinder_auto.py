@@ -18,9 +18,11 @@ from survey.methods import closed
 def trajectories(method, rows, times, rtol):
     """As `cylinder.trajectories`: in closed form, and by `method` where that has no answer or too wide a bar."""
     results = cylinder.trajectories(closed, rows, times, rtol)
-    missed = cylinder.missed(results, rtol) | (results[1] == UNTOLD)
-    results[0][missed & (results[1] == UNTOLD)] = np.nan
-    results[2][missed & (results[1] == UNTOLD) & (results[2] == OK)] = closed.NO_CONVERGENCE
+    missed, untold = cylinder.missed(results, rtol), results[1] == UNTOLD
+    if untold.any():
+        missed |= untold
+        results[0][untold] = np.nan
+        results[2][untold & (results[2] == OK)] = closed.NO_CONVERGENCE
     return _completed(results, missed, lambda some, at: cylinder.trajectories(method, some, at, rtol), rows, times)
 
 
