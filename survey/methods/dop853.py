@@ -159,14 +159,14 @@ def flow_at(p, T, dt):
 
 
 @inline
-def _flow_estimate(T, h, row):
-    """The error estimate of dop853.f for one component, from the stages in T."""
+def _flow_estimate(T, h, row, doubt):
+    """The error estimate of dop853.f for one component, from the stages in T; it must not vanish by chance."""
     e5 = e3 = 0.0
     for i in range(STAGES):
         e5 += E5[i] * T[_FIRST + i, row]
         e3 += E3[i] * T[_FIRST + i, row]
     size = math.sqrt(e5 * e5 + 0.01 * e3 * e3)
-    return abs(h) * e5 * e5 / size if size > 0.0 else 0.0
+    return abs(h) * (e5 * e5 / (size + 1e-300) + doubt * abs(e5))
 
 
 @kernel
@@ -177,7 +177,10 @@ def flow_begin(p, phi, w, tolerance, T):
     h = T[LAST, STEP] if T[LAST, STEP] > 0.0 else 0.1 / rate
     for _ in range(50):
         _x, w1, _e, _y = flow_at(p, T, h)
-        dphi, dw = _flow_estimate(T, h, PHI), _flow_estimate(T, h, W)
+        doubt, speed = 4.0 * DOUBT * (h * rate) ** 3, max(rate, 1.0 / h)
+        dphi, dw = _flow_estimate(T, h, PHI, doubt), _flow_estimate(T, h, W, doubt)
+        # where the motion starts at rest, one of the two may vanish by symmetry: each speaks for both
+        dphi, dw = max(dphi, dw / speed), max(dw, dphi * speed)
         error = max(dphi, dw / (1.0 + abs(w))) / tolerance
         factor = min(max(0.9 * (error + 1e-30) ** -0.125, 0.2), 4.0)
         if error <= 1.0:
