@@ -1,0 +1,143 @@
+"""Trace invariants of a reversible linear Hamiltonian system with two degrees of freedom, point by point.
+
+With (P, S; Q, T) the propagator over half the period in canonical coordinates X, Y that the reflection maps to X, -Y:
+
+    A = det P, B = det T, C = det Q, D = det S, t = tr T'P,     A B - C D = t - 1
+    a = 4 t - 4,   b = 6 - 8 t + 16 A B = 8 t - 10 + 16 C D,   K = t^2 - 4 A B = (t - 2)^2 - 4 C D
+
+lambda + 1 / lambda = 2 + 4 w for the two eigenvalues w of S'Q, whose discriminant is K (`survey.measures.danby`).
+"""
+
+from math import acos, isfinite, pi, sqrt
+
+import numpy as np
+
+from survey.kernels.jit import inline, kernel
+
+EPS = 2.3e-16
+LARGEST = float(np.finfo(np.float32).max)  # bars are kept as float32
+UNDECIDED, UNSTABLE, STABLE = -1, 0, 1
+NONE, MINUS_ONE, KREIN = 0, 1, 2
+RESULTS = 10  # A, B, C, D, t and the bound of each
+PLACES = 24  # of a row's series
+TILE = 64
+
+
+@kernel
+def measure(results, rtol, overflow, floats, verdict, collision, late, status):
+    """a, its bar, b, its bar (4, N), verdict and collision from `results` (N, 10), and who misses `rtol` or is late.
+
+    Points whose `status` is not 0 are passed over; those that leave the range of floats get the status `overflow`.
+    """
+    for i in range(len(results)):
+        late[i] = False
+        if status[i] != 0:
+            continue
+        t, t_bar = results[i, 4], results[i, 9]
+        ab, ab_bar = product(results[i, 0], results[i, 1], results[i, 5], results[i, 6])
+        cd, cd_bar = product(results[i, 2], results[i, 3], results[i, 7], results[i, 8])
+        a, a_bar = 4.0 * t - 4.0, 4.0 * t_bar + EPS * (4.0 * abs(t) + 4.0)
+        by_ab = ab_bar <= cd_bar
+        b = 6.0 - 8.0 * t + 16.0 * ab if by_ab else 8.0 * t - 10.0 + 16.0 * cd
+        b_bar = 16.0 * min(ab_bar, cd_bar) + 8.0 * t_bar
+        b_bar += EPS * (16.0 * abs(ab if by_ab else cd) + 16.0 * abs(t) + 20.0)
+        if not (isfinite(a) and isfinite(b) and a_bar < LARGEST and b_bar < LARGEST):
+            status[i] = overflow
+            floats[0, i] = floats[1, i] = floats[2, i] = floats[3, i] = np.nan
+            verdict[i] = collision[i] = UNDECIDED
+            continue
+        floats[0, i], floats[1, i], floats[2, i], floats[3, i] = a, a_bar, b, b_bar
+        k, k_bar = discriminant(t, ab, cd, t_bar, ab_bar, cd_bar)
+        verdict[i] = decide(t, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar)
+        collision[i] = UNDECIDED
+        if verdict[i] == UNSTABLE:
+            collision[i] = lost(t, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar)
+        elif verdict[i] == STABLE:
+            definite = (results[i, 1] > 0.0) == (results[i, 3] > 0.0)
+            collision[i] = MINUS_ONE if definite else nearest(t, k, t_bar, k_bar)
+        late[i] = verdict[i] == UNDECIDED
+        late[i] |= not (a_bar <= rtol * (1.0 + abs(a)) and b_bar <= rtol * (1.0 + abs(b)))
+
+
+@inline
+def product(a, b, ea, eb):
+    """a b and its error bound, the rounding of the product included."""
+    return a * b, ea * abs(b) + eb * abs(a) + ea * eb + EPS * abs(a * b)
+
+
+@inline
+def discriminant(t, ab, cd, t_bar, ab_bar, cd_bar):
+    """K and its bar, from whichever of its two forms has the smaller one."""
+    near, far = abs(t), abs(t - 2.0)
+    by_ab = 2.0 * near * t_bar + 4.0 * ab_bar <= 2.0 * far * t_bar + 4.0 * cd_bar
+    root = t if by_ab else t - 2.0
+    other, bar = (ab, ab_bar) if by_ab else (cd, cd_bar)
+    k = root * root - 4.0 * other
+    rounding = EPS * (2.0 * root * root + 4.0 * abs(other) + (0.0 if by_ab else 4.0 * abs(root)))
+    return k, 2.0 * abs(root) * t_bar + t_bar * t_bar + 4.0 * bar + rounding
+
+
+@inline
+def decide(t, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar):
+    """Stable: both w real, different and in (-1, 0). Certain only where the bars exclude the other answer."""
+    if ab < -ab_bar or cd < -cd_bar or k < -k_bar or t < -t_bar or t > 2.0 + t_bar:
+        return UNSTABLE
+    if ab > ab_bar and cd > cd_bar and k > k_bar and t > t_bar and t < 2.0 - t_bar:
+        return STABLE
+    return UNDECIDED
+
+
+@inline
+def lost(t, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar):
+    """Which multipliers are off the circle: a complex quadruple, a negative pair, or positive ones alone."""
+    if k < -k_bar:
+        return KREIN
+    if ab < -ab_bar or (k > k_bar and t < -t_bar):
+        return MINUS_ONE
+    if k > k_bar and ab > ab_bar and (cd < -cd_bar or t > 2.0 + t_bar):
+        return NONE
+    return UNDECIDED
+
+
+@inline
+def nearest(t, k, t_bar, k_bar):
+    """Which arc of the unit circle is the shorter: from one pair to the other, or through -1 within one pair?
+
+    w = -sin^2(theta / 2): the arcs are theta2 - theta1 and 2 (pi - theta2).
+    """
+    root, low = sqrt(max(k, 0.0)), sqrt(max(k - k_bar, 0.0))
+    bar = 0.5 * (t_bar + max(sqrt(k + k_bar) - root, root - low))
+    w1, w2 = 0.5 * (t - 2.0 + root), 0.5 * (t - 2.0 - root)
+    most = 3.0 * _angle(w2 - bar) - _angle(w1 + bar)
+    least = 3.0 * _angle(w2 + bar) - _angle(w1 - bar)
+    if least > 2.0 * pi:
+        return MINUS_ONE
+    return KREIN if most < 2.0 * pi else UNDECIDED
+
+
+@inline
+def _angle(w):
+    return acos(min(max(1.0 + 2.0 * w, -1.0), 1.0))
+
+
+@kernel
+def evaluate(series, bars, places, out):
+    """Results (R, L, 10) from Chebyshev series (R, 5, PLACES) in `places` (R, L), with the same `bars` (R, 5) in a row."""
+    ahead, here, x = np.empty((2, TILE)), np.empty(TILE), np.empty(TILE)
+    for r in range(len(series)):
+        for first in range(0, places.shape[1], TILE):
+            count = min(TILE, places.shape[1] - first)
+            for i in range(count):
+                x[i] = places[r, first + i]
+            for j in range(5):
+                for i in range(count):
+                    ahead[0, i] = ahead[1, i] = 0.0
+                for n in range(PLACES - 1, 0, -1):  # Clenshaw
+                    c = series[r, j, n]
+                    for i in range(count):
+                        value = c + 2.0 * x[i] * ahead[0, i] - ahead[1, i]
+                        ahead[1, i], ahead[0, i] = ahead[0, i], value
+                for i in range(count):
+                    here[i] = series[r, j, 0] + x[i] * ahead[0, i] - ahead[1, i]
+                for i in range(count):
+                    out[r, first + i, j], out[r, first + i, 5 + j] = here[i], bars[r, j]
