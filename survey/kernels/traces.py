@@ -122,7 +122,7 @@ def _angle(w):
 
 @kernel
 def evaluate(series, bars, places, out):
-    """Results (R, L, 10) from Chebyshev series (R, 5, PLACES) in `places` (R, L), with the same `bars` (R, 5) in a row."""
+    """Results (R, L, 10) from Chebyshev series (R, 5, PLACES) in `places` (R, L); `bars` (R, 5) hold for the row."""
     ahead, here, x = np.empty((2, TILE)), np.empty(TILE), np.empty(TILE)
     for r in range(len(series)):
         for first in range(0, places.shape[1], TILE):

@@ -15,9 +15,8 @@ from functools import lru_cache
 import numpy as np
 
 from survey import methods, modules, status
-from survey.kernels.traces import (
-    EPS, KREIN, MINUS_ONE, NONE, PLACES, RESULTS, STABLE, UNDECIDED, UNSTABLE, evaluate, measure
-)  # fmt: skip
+from survey.kernels import traces
+from survey.kernels.traces import EPS, KREIN, MINUS_ONE, NONE, PLACES, RESULTS, STABLE, UNDECIDED, UNSTABLE
 from survey.methods import taylor16
 from survey.scene import Output
 
@@ -52,9 +51,8 @@ class Answers:
 
     def judge(self, results, rtol):
         """Answer every point whose status is ok from its results (N, 10)."""
-        measure(
-            results, rtol, status.OVERFLOW, self.floats, self.verdict, self.collision, self.late, self.status
-        )  # fmt: skip
+        answers = self.floats, self.verdict, self.collision, self.late, self.status
+        traces.measure(results, rtol, status.OVERFLOW, *answers)
 
     def put(self, places, other):
         """The answers of the points `places` are those of `other`, in that order."""
@@ -116,7 +114,7 @@ def _by_series(e, mu, rtol, answers, left):
     bars[~sound] = np.inf
     places = 4.0 * np.sqrt(1.0 - 3.0 * mu[rows] * (1.0 - mu[rows])) - 3.0
     out = np.empty((*places.shape, RESULTS))
-    evaluate(np.ascontiguousarray(series), bars, places, out)
+    traces.evaluate(np.ascontiguousarray(series), bars, places, out)
     own = Answers(places.size)
     own.status[:] = np.where(left.reshape(mu.shape)[rows].reshape(-1), status.OK, status.PENDING)
     own.judge(out.reshape(-1, RESULTS), rtol)

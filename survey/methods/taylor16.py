@@ -205,7 +205,8 @@ def hill_scatter(samples, c2, h, p, order, starts, out):
 
 def danby_steps(e, rtol):
     """Steps of half a period for accuracy rtol."""
-    return max(rtol, 1e-14) ** (-1 / ORDER) * (0.9 + 1.0 * np.sqrt(-np.log1p(-e)))
+    x = -np.log1p(-e)
+    return max(rtol, 1e-14) ** (-1 / ORDER) * (0.6 + 1.15 * np.sqrt(x) + 0.4 * x)
 
 
 @splice
@@ -230,7 +231,6 @@ def _danby_row(v, k, work, count):
         for i in range(count):
             work[OWN + TAIL, i] += abs(series[HALF - 1, i])
             work[OWN + SIZE, i] += abs(series[HALF - 2, i])
-
     for i in range(count):  # those left out, at the rate at which the last four fall
         tail = work[OWN + TAIL, i]
         work[OWN + TAIL, i] = tail * (2.0 * tail / (work[OWN + SIZE, i] + 1e-150) + 0.004)

@@ -1,6 +1,7 @@
 """Triangular libration points of the elliptic restricted three-body problem: Danby's map of linear stability.
 
-    xi'' - 2 eta' = d1 r xi,   eta'' + 2 xi' = d2 r eta,   r = 1 / (1 + e cos f),   d1, d2 = (3/2)(1 +- sqrt(1 - 3 mu (1 - mu)))
+    xi'' - 2 eta' = d1 r xi,   eta'' + 2 xi' = d2 r eta,   r = 1 / (1 + e cos f),
+    d1, d2 = (3/2)(1 +- s),   s = sqrt(1 - 3 mu (1 - mu))
 
 in the true anomaly f, period 2 pi, in pulsating axes along the principal directions of the potential; out of the plane
 zeta'' + zeta = 0, which is stable.
@@ -19,7 +20,7 @@ shorter: 2 (pi - theta2), at -1, or theta2 - theta1, between the pairs; pairs of
 meet without harm, so there it is 1. It is -1 where the error bars leave it open.
 
 What is known. e = 0 is the circular problem: a = 2 cos 2 pi w1 + 2 cos 2 pi w2, stable for 27 mu (1 - mu) < 1 (Routh).
-mu = 0 is Kepler's problem: a = 4, b = 6, unstable by a secular term. a and b are even in e, and unchanged by mu -> 1 - mu.
+mu = 0 is Kepler's problem: a = 4, b = 6, unstable by a secular term. a and b are even in e, and the same at 1 - mu.
 Verdicts need 1 - cos theta1 and its kin above rounding, so they are -1 for mu below about 1e-7.
 
 Source: J. M. A. Danby, Astron. J. 69 (1964) 165; checked and completed in `libration_elliptic.md` beside this file.
