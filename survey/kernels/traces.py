@@ -25,38 +25,44 @@ TILE = 64
 
 @kernel
 def measure(results, rtol, overflow, floats, verdict, collision, late, status):
-    """a, its bar, b, its bar (4, N), verdict and collision from `results` (N, 10), and who misses `rtol` or is late.
+    """a, its bar, b, its bar (4, N), verdict and collision from `results` (N, 10); who misses `rtol` is `late`.
 
     Points whose `status` is not 0 are passed over; those that leave the range of floats get the status `overflow`.
     """
     for i in range(len(results)):
-        late[i] = False
-        if status[i] != 0:
-            continue
-        t, t_bar = results[i, 4], results[i, 9]
-        ab, ab_bar = product(results[i, 0], results[i, 1], results[i, 5], results[i, 6])
-        cd, cd_bar = product(results[i, 2], results[i, 3], results[i, 7], results[i, 8])
-        a, a_bar = 4.0 * t - 4.0, 4.0 * t_bar + EPS * (4.0 * abs(t) + 4.0)
-        by_ab = ab_bar <= cd_bar
-        b = 6.0 - 8.0 * t + 16.0 * ab if by_ab else 8.0 * t - 10.0 + 16.0 * cd
-        b_bar = 16.0 * min(ab_bar, cd_bar) + 8.0 * t_bar
-        b_bar += EPS * (16.0 * abs(ab if by_ab else cd) + 16.0 * abs(t) + 20.0)
-        if not (isfinite(a) and isfinite(b) and a_bar < LARGEST and b_bar < LARGEST):
-            status[i] = overflow
-            floats[0, i] = floats[1, i] = floats[2, i] = floats[3, i] = np.nan
-            verdict[i] = collision[i] = UNDECIDED
-            continue
-        floats[0, i], floats[1, i], floats[2, i], floats[3, i] = a, a_bar, b, b_bar
-        k, k_bar = discriminant(t, ab, cd, t_bar, ab_bar, cd_bar)
-        verdict[i] = decide(t, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar)
-        collision[i] = UNDECIDED
-        if verdict[i] == UNSTABLE:
-            collision[i] = lost(t, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar)
-        elif verdict[i] == STABLE:
-            definite = (results[i, 1] > 0.0) == (results[i, 3] > 0.0)
-            collision[i] = MINUS_ONE if definite else nearest(t, k, t_bar, k_bar)
-        late[i] = verdict[i] == UNDECIDED
-        late[i] |= not (a_bar <= rtol * (1.0 + abs(a)) and b_bar <= rtol * (1.0 + abs(b)))
+        if status[i] == 0:
+            _judge(results[i, :5], results[i, 5:], i, rtol, overflow, floats, verdict, collision, late, status)
+
+
+@inline
+def _judge(values, bars, i, rtol, overflow, floats, verdict, collision, late, status):
+    """Answer point i from its A, B, C, D, t and their bars."""
+    late[i] = False
+    t, t_bar = values[4], bars[4]
+    ab, ab_bar = product(values[0], values[1], bars[0], bars[1])
+    cd, cd_bar = product(values[2], values[3], bars[2], bars[3])
+    a, a_bar = 4.0 * t - 4.0, 4.0 * t_bar + EPS * (4.0 * abs(t) + 4.0)
+    by_ab = ab_bar <= cd_bar
+    b = 6.0 - 8.0 * t + 16.0 * ab if by_ab else 8.0 * t - 10.0 + 16.0 * cd
+    b_bar = 16.0 * min(ab_bar, cd_bar) + 8.0 * t_bar
+    b_bar += EPS * (16.0 * abs(ab if by_ab else cd) + 16.0 * abs(t) + 20.0)
+    if not (isfinite(a) and isfinite(b) and a_bar < LARGEST and b_bar < LARGEST):
+        status[i] = overflow
+        floats[0, i] = floats[1, i] = floats[2, i] = floats[3, i] = np.nan
+        verdict[i] = collision[i] = UNDECIDED
+        late[i] = True
+        return
+    floats[0, i], floats[1, i], floats[2, i], floats[3, i] = a, a_bar, b, b_bar
+    k, k_bar = discriminant(t, ab, cd, t_bar, ab_bar, cd_bar)
+    verdict[i] = decide(t, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar)
+    collision[i] = UNDECIDED
+    if verdict[i] == UNSTABLE:
+        collision[i] = lost(t, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar)
+    elif verdict[i] == STABLE:
+        definite = (values[1] > 0.0) == (values[3] > 0.0)
+        collision[i] = MINUS_ONE if definite else nearest(t, k, t_bar, k_bar)
+    missed = not (a_bar <= rtol * (1.0 + abs(a)) and b_bar <= rtol * (1.0 + abs(b)))
+    late[i] = missed or verdict[i] == UNDECIDED
 
 
 @inline
@@ -121,14 +127,18 @@ def _angle(w):
 
 
 @kernel
-def evaluate(series, bars, places, out):
-    """Results (R, L, 10) from Chebyshev series (R, 5, PLACES) in `places` (R, L); `bars` (R, 5) hold for the row."""
-    ahead, here, x = np.empty((2, TILE)), np.empty(TILE), np.empty(TILE)
-    for r in range(len(series)):
-        for first in range(0, places.shape[1], TILE):
-            count = min(TILE, places.shape[1] - first)
+def dense(series, bars, rows, mu, rtol, overflow, floats, verdict, collision, late, status):
+    """Answer the late points of `rows` of mu (R, L) from their Chebyshev series in 4 s - 3 (rows, 5, PLACES).
+
+    `bars` (rows, 5) hold for the whole row; late stays who misses `rtol` or is undecided.
+    """
+    ahead, here, x = np.empty((2, TILE)), np.empty((5, TILE)), np.empty(TILE)
+    for r in range(len(rows)):
+        for first in range(0, mu.shape[1], TILE):
+            count = min(TILE, mu.shape[1] - first)
             for i in range(count):
-                x[i] = places[r, first + i]
+                m = mu[rows[r], first + i]
+                x[i] = 4.0 * sqrt(1.0 - 3.0 * m * (1.0 - m)) - 3.0
             for j in range(5):
                 for i in range(count):
                     ahead[0, i] = ahead[1, i] = 0.0
@@ -138,6 +148,8 @@ def evaluate(series, bars, places, out):
                         value = c + 2.0 * x[i] * ahead[0, i] - ahead[1, i]
                         ahead[1, i], ahead[0, i] = ahead[0, i], value
                 for i in range(count):
-                    here[i] = series[r, j, 0] + x[i] * ahead[0, i] - ahead[1, i]
-                for i in range(count):
-                    out[r, first + i, j], out[r, first + i, 5 + j] = here[i], bars[r, j]
+                    here[j, i] = series[r, j, 0] + x[i] * ahead[0, i] - ahead[1, i]
+            for i in range(count):
+                at = rows[r] * mu.shape[1] + first + i
+                if late[at]:
+                    _judge(here[:, i], bars[r], at, rtol, overflow, floats, verdict, collision, late, status)

@@ -45,14 +45,18 @@ class Answers:
     """a, b and their bars (4, N), `verdict`, `collision`, `status`, and who is `late`: undecided, or bars too wide."""
 
     def __init__(self, size):
-        self.floats = np.full((4, size), np.nan)
+        self.floats = np.empty((4, size))
         self.verdict, self.collision = (np.full(size, UNDECIDED, np.int8) for _ in range(2))
         self.status, self.late = np.zeros(size, np.int8), np.zeros(size, np.bool_)
 
+    @property
+    def all(self):
+        """What the kernels fill, in their order."""
+        return self.floats, self.verdict, self.collision, self.late, self.status
+
     def judge(self, results, rtol):
         """Answer every point whose status is ok from its results (N, 10)."""
-        answers = self.floats, self.verdict, self.collision, self.late, self.status
-        traces.measure(results, rtol, status.OVERFLOW, *answers)
+        traces.measure(results, rtol, status.OVERFLOW, *self.all)
 
     def put(self, places, other):
         """The answers of the points `places` are those of `other`, in that order."""
@@ -66,20 +70,20 @@ def solve(e, mu, method="auto", rtol=1e-10, dense=False):
 
     `dense`: the rows are long enough for series (see DENSE), wherever they are cut.
     """
-    flat_e, flat_mu = np.repeat(e, mu.shape[1]), mu.reshape(-1)
-    answers = Answers(flat_mu.size)
-    answers.status[~np.isfinite(flat_e + flat_mu)] = status.INVALID_PARAMETERS
-    left = answers.status == status.OK
-    if method == "auto":
-        left &= (flat_e > 0) & (flat_mu > 0)
-        closed = ~left & (answers.status == status.OK)
-        if closed.any():
-            answers.put(np.flatnonzero(closed), closed_form(flat_e[closed], flat_mu[closed], rtol))
-        if dense and left.any():
-            left = _by_series(e, mu, rtol, answers, left)
+    answers = Answers(mu.size)
+    valid = np.isfinite(e)[:, None] & np.isfinite(mu)
+    left = valid & ((e > 0)[:, None] & (mu > 0) | (method != "auto"))
+    closed = valid & ~left
+    if closed.any():
+        answers.put(np.flatnonzero(closed), closed_form(mu[closed]))
+    if method == "auto" and dense:
+        left = _by_series(e, mu, rtol, answers, left)
     if left.any():
         used = taylor16 if method == "auto" else modules.load(methods, method, "method")
-        answers.put(np.flatnonzero(left), _point_by_point(flat_e[left], *rates(flat_mu[left]), used, rtol))
+        places = np.flatnonzero(left)
+        answers.put(places, _point_by_point(e[places // mu.shape[1]], *rates(mu[left]), used, rtol))
+    answers.status[~valid.reshape(-1)] = status.INVALID_PARAMETERS
+    answers.floats[:, answers.status != status.OK] = np.nan
     names = ("a", "a_error", "b", "b_error")
     out = dict(zip(names, answers.floats.reshape(4, *mu.shape), strict=True))
     return out | {name: getattr(answers, name).reshape(mu.shape) for name in ("verdict", "collision", "status")}
@@ -100,32 +104,20 @@ def factors(e, mu, rtol=1e-13):
 
 
 def _by_series(e, mu, rtol, answers, left):
-    """Answer the points `left` from their rows' series; returns those that are late."""
-    rows = np.flatnonzero(left.reshape(mu.shape).any(axis=1))
+    """Answer the points `left` (R, L) from their rows' series; returns those that are late."""
+    rows = np.flatnonzero(left.any(axis=1))
     s = 0.75 + 0.25 * np.cos(_ANGLES)
     d1, d2 = np.tile(1.5 * (1.0 + s), rows.size), np.tile(1.5 * (1.0 - s), rows.size)
     results = np.empty((rows.size * PLACES, RESULTS))
     nodes = _point_by_point(np.repeat(e[rows], PLACES), d1, d2, taylor16, max(SHARE * rtol, 1e-13), results)
     results = results.reshape(rows.size, PLACES, RESULTS)
-    sound = (nodes.status == status.OK).reshape(rows.size, PLACES).all(axis=1)
-    series = np.swapaxes(TO_SERIES @ results[..., :5], 1, 2)
+    series = np.ascontiguousarray(np.swapaxes(TO_SERIES @ results[..., :5], 1, 2))
     tail = abs(series[..., -2:]).sum(axis=-1)
     bars = LEBESGUE * results[..., 5:].max(axis=1) + tail + 16 * EPS * abs(series).sum(axis=-1)
-    bars[~sound] = np.inf
-    places = 4.0 * np.sqrt(1.0 - 3.0 * mu[rows] * (1.0 - mu[rows])) - 3.0
-    out = np.empty((*places.shape, RESULTS))
-    traces.evaluate(np.ascontiguousarray(series), bars, places, out)
-    own = Answers(places.size)
-    own.status[:] = np.where(left.reshape(mu.shape)[rows].reshape(-1), status.OK, status.PENDING)
-    own.judge(out.reshape(-1, RESULTS), rtol)
-    served = np.zeros(left.shape, np.bool_)
-    answered = (own.status == status.OK) & ~own.late
-    there = (rows[:, None] * mu.shape[1] + np.arange(mu.shape[1])).reshape(-1)[answered]
-    for name in ("verdict", "collision", "status", "late"):
-        getattr(answers, name)[there] = getattr(own, name)[answered]
-    answers.floats[:, there] = own.floats[:, answered]
-    served[there] = True
-    return left & ~served
+    sound = (nodes.status == status.OK).reshape(rows.size, PLACES).all(axis=1)
+    answers.late[:] = left.reshape(-1)
+    traces.dense(series[sound], bars[sound], rows[sound], mu, rtol, status.OVERFLOW, *answers.all)
+    return answers.late.reshape(mu.shape)
 
 
 def _point_by_point(e, d1, d2, method, rtol, results=None):
@@ -151,12 +143,12 @@ def _point_by_point(e, d1, d2, method, rtol, results=None):
         run(method, e, d1, d2, level, left, results)
         better = _bar(results[left]) < bar
         results[left[~better]] = old[~better]
-        answers.status[left] = status.OK
         again = Answers(left.size)
         again.judge(results[left], rtol)
         answers.put(left, again)
         # Truncation falls by far more than 2 each time; where the bar does not halve, rounding rules.
-        left = left[again.late & (_bar(results[left]) < 0.5 * bar)]
+        new = _bar(results[left])
+        left = left[again.late & ((new < 0.5 * bar) | np.isinf(new))]
     return answers
 
 
@@ -209,7 +201,7 @@ def mesh(steps, grade, nodes):
     return 2.0 * np.sin(0.5 * (y[:-1, None] - h[:, None] * np.array(nodes))) ** 2, h
 
 
-def closed_form(e, mu, rtol):
+def closed_form(mu):
     """Answers where mu = 0 (all multipliers 1, and a secular term) or e = 0 (frequencies of the circular problem)."""
     answers = Answers(mu.size)
     x = 6.75 * mu * (1.0 - mu)

@@ -259,7 +259,7 @@ def _danby_step(e, d1, d2, angle, h, slopes, state, work):
             size += abs(value)
             work[one + i, 0], work[one + 4 + i, 0] = value, 1.0 if i == c else 0.0
         worst = max(worst, error)
-        work[one + 8, 0] = error + 8.0 * danby.ROUNDING * size  # the stages pass through sums that cancel
+        work[one + 8, 0] = error + danby.ROUNDING * size  # the stages pass through sums that cancel
     return worst
 
 
