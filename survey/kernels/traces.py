@@ -8,7 +8,7 @@ With (P, S; Q, T) the propagator over half the period in canonical coordinates X
 lambda + 1 / lambda = 2 + 4 w for the two eigenvalues w of S'Q, whose discriminant is K (`survey.measures.danby`).
 """
 
-from math import acos, isfinite, pi, sqrt
+from math import isfinite, sqrt
 
 import numpy as np
 
@@ -31,7 +31,9 @@ def measure(results, rtol, overflow, floats, verdict, collision, late, status):
     """
     for i in range(len(results)):
         if status[i] == 0:
-            _judge(results[i, :5], results[i, 5:], i, rtol, overflow, floats, verdict, collision, late, status)
+            values = results[i, 0], results[i, 1], results[i, 2], results[i, 3], results[i, 4]
+            bars = results[i, 5], results[i, 6], results[i, 7], results[i, 8], results[i, 9]
+            _judge(values, bars, i, rtol, overflow, floats, verdict, collision, late, status)
 
 
 @inline
@@ -109,21 +111,16 @@ def lost(t, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar):
 def nearest(t, k, t_bar, k_bar):
     """Which arc of the unit circle is the shorter: from one pair to the other, or through -1 within one pair?
 
-    w = -sin^2(theta / 2): the arcs are theta2 - theta1 and 2 (pi - theta2).
+    cos theta = 1 + 2 w; the arcs are theta2 - theta1 and 2 (pi - theta2), and the second is the shorter where
+    theta1 < 3 theta2 - 2 pi: where theta2 > 2 pi / 3 and cos theta1 > cos 3 theta2.
     """
     root, low = sqrt(max(k, 0.0)), sqrt(max(k - k_bar, 0.0))
-    bar = 0.5 * (t_bar + max(sqrt(k + k_bar) - root, root - low))
-    w1, w2 = 0.5 * (t - 2.0 + root), 0.5 * (t - 2.0 - root)
-    most = 3.0 * _angle(w2 - bar) - _angle(w1 + bar)
-    least = 3.0 * _angle(w2 + bar) - _angle(w1 - bar)
-    if least > 2.0 * pi:
+    bar = t_bar + max(sqrt(k + k_bar) - root, root - low) + 4.0 * EPS
+    one, two = t - 1.0 + root, t - 1.0 - root
+    gap, margin = one - two * (4.0 * two * two - 3.0), bar * (1.0 + abs(12.0 * two * two - 3.0) + 24.0 * bar)
+    if gap > margin and two < -0.5 - bar:
         return MINUS_ONE
-    return KREIN if most < 2.0 * pi else UNDECIDED
-
-
-@inline
-def _angle(w):
-    return acos(min(max(1.0 + 2.0 * w, -1.0), 1.0))
+    return KREIN if gap < -margin or two > -0.5 + bar else UNDECIDED
 
 
 @kernel
@@ -132,24 +129,22 @@ def dense(series, bars, rows, mu, rtol, overflow, floats, verdict, collision, la
 
     `bars` (rows, 5) hold for the whole row; late stays who misses `rtol` or is undecided.
     """
-    ahead, here, x = np.empty((2, TILE)), np.empty((5, TILE)), np.empty(TILE)
+    here, x = np.empty((5, TILE)), np.empty(TILE)
     for r in range(len(rows)):
+        bar = bars[r, 0], bars[r, 1], bars[r, 2], bars[r, 3], bars[r, 4]
         for first in range(0, mu.shape[1], TILE):
             count = min(TILE, mu.shape[1] - first)
             for i in range(count):
                 m = mu[rows[r], first + i]
                 x[i] = 4.0 * sqrt(1.0 - 3.0 * m * (1.0 - m)) - 3.0
             for j in range(5):
-                for i in range(count):
-                    ahead[0, i] = ahead[1, i] = 0.0
-                for n in range(PLACES - 1, 0, -1):  # Clenshaw
-                    c = series[r, j, n]
-                    for i in range(count):
-                        value = c + 2.0 * x[i] * ahead[0, i] - ahead[1, i]
-                        ahead[1, i], ahead[0, i] = ahead[0, i], value
-                for i in range(count):
-                    here[j, i] = series[r, j, 0] + x[i] * ahead[0, i] - ahead[1, i]
+                for i in range(count):  # Clenshaw; PLACES is a constant, so that the inner loop is unrolled
+                    ahead = further = 0.0
+                    for n in range(PLACES - 1, 0, -1):
+                        ahead, further = series[r, j, n] + 2.0 * x[i] * ahead - further, ahead
+                    here[j, i] = series[r, j, 0] + x[i] * ahead - further
             for i in range(count):
                 at = rows[r] * mu.shape[1] + first + i
                 if late[at]:
-                    _judge(here[:, i], bars[r], at, rtol, overflow, floats, verdict, collision, late, status)
+                    values = here[0, i], here[1, i], here[2, i], here[3, i], here[4, i]
+                    _judge(values, bar, at, rtol, overflow, floats, verdict, collision, late, status)
