@@ -6,8 +6,8 @@ xi' - eta, -eta) (the scene's notes, section 2):
     x' = p - m      m' = x - q      q' = -x' - d2 r m      p' = -m' + d1 r x
 
 X = (x, q), Y = (p, m) are canonical, so that the inverse of a propagator (P, S; Q, T) is (T', -S'; -Q', P'). A step's
-propagator is forward @ inverse(backward), two matrices whose columns a method gives with a bound of the sum of each
-column's errors. Beside the product goes the matrix V of its error ellipse, V <- G V G' + diag(d^2) with d the
+propagator is forward @ inverse(backward), two matrices whose columns a method gives with a bound of each column's
+errors. Beside the product goes the matrix V of its error ellipse, V <- G V G' + diag(d^2) with d the
 largest local error of a column; |error| <= sqrt(n V_ii) after n steps, to first order (as in `kernels.lanes`).
 """
 
@@ -21,9 +21,9 @@ EPS = 2.3e-16
 ROUNDING = 4.4e-16
 WORST = 300.0
 # Rows of the working table, lanes innermost: the propagator so far (4 x 4), V (upper triangle), the sum of local
-# errors; of each lane d1, d2, e; of each column forward (4), backward (4) and its error; a method's own.
-V, SUM, D1, D2, E, COLUMNS, OWN = 16, 26, 27, 28, 29, 30, 66
-COLUMN = 9
+# errors; of each lane d1, d2, e; of each column forward (4), backward (4) and the error of each; a method's own.
+V, SUM, D1, D2, E, COLUMNS, OWN = 16, 26, 27, 28, 29, 30, 70
+COLUMN = 10
 # What a chain gives of each point: A, B, C, D, t and the bound of each.
 RESULTS = 10
 
@@ -66,13 +66,13 @@ def start(work, count):
 
 @splice
 def copy(work, first, column, count):
-    """Column `column` of the step from rows first.. : forward (4) and error, backward being the identity."""
+    """Column `column` of the step from rows first.. : forward (4) and its error, backward being the identity."""
     to = COLUMNS + COLUMN * column
     for i in range(count):
         for j in range(4):
             work[to + j, i] = work[first + j, i]
             work[to + 4 + j, i] = 1.0 * (j == column)
-        work[to + 8, i] = work[first + 4, i]
+        work[to + 8, i], work[to + 9, i] = work[first + 4, i], 0.0
 
 
 @inline
@@ -81,13 +81,17 @@ def advance(work, i):
     # fmt: off
     # forward F, backward B: columns 0, 1 start in X, 2, 3 in Y
     f00, f10, f20, f30 = work[30, i], work[31, i], work[32, i], work[33, i]
-    b00, b10, b20, b30, t0 = work[34, i], work[35, i], work[36, i], work[37, i], work[38, i]
-    f01, f11, f21, f31 = work[39, i], work[40, i], work[41, i], work[42, i]
-    b01, b11, b21, b31, t1 = work[43, i], work[44, i], work[45, i], work[46, i], work[47, i]
-    f02, f12, f22, f32 = work[48, i], work[49, i], work[50, i], work[51, i]
-    b02, b12, b22, b32, t2 = work[52, i], work[53, i], work[54, i], work[55, i], work[56, i]
-    f03, f13, f23, f33 = work[57, i], work[58, i], work[59, i], work[60, i]
-    b03, b13, b23, b33, t3 = work[61, i], work[62, i], work[63, i], work[64, i], work[65, i]
+    b00, b10, b20, b30 = work[34, i], work[35, i], work[36, i], work[37, i]
+    t0, s0 = work[38, i], work[39, i]
+    f01, f11, f21, f31 = work[40, i], work[41, i], work[42, i], work[43, i]
+    b01, b11, b21, b31 = work[44, i], work[45, i], work[46, i], work[47, i]
+    t1, s1 = work[48, i], work[49, i]
+    f02, f12, f22, f32 = work[50, i], work[51, i], work[52, i], work[53, i]
+    b02, b12, b22, b32 = work[54, i], work[55, i], work[56, i], work[57, i]
+    t2, s2 = work[58, i], work[59, i]
+    f03, f13, f23, f33 = work[60, i], work[61, i], work[62, i], work[63, i]
+    b03, b13, b23, b33 = work[64, i], work[65, i], work[66, i], work[67, i]
+    t3, s3 = work[68, i], work[69, i]
     # G = F B^-1, by rows; B^-1 = (b22, b32, -b02, -b12; b23, b33, -b03, -b13; -b20, -b30, b00, b10; -b21, ...)
     g00, g01, g02, g03 = _row(f00, f01, f02, f03, b00, b10, b20, b30, b01, b11, b21, b31,
                               b02, b12, b22, b32, b03, b13, b23, b33)
@@ -102,10 +106,10 @@ def advance(work, i):
     y1 = t0 * abs(b32) + t1 * abs(b33) + t2 * abs(b30) + t3 * abs(b31)
     y2 = t0 * abs(b02) + t1 * abs(b03) + t2 * abs(b00) + t3 * abs(b01)
     y3 = t0 * abs(b12) + t1 * abs(b13) + t2 * abs(b10) + t3 * abs(b11)
-    x0 = t2 * abs(f00) + t3 * abs(f01) + t0 * abs(f02) + t1 * abs(f03)
-    x1 = t2 * abs(f10) + t3 * abs(f11) + t0 * abs(f12) + t1 * abs(f13)
-    x2 = t2 * abs(f20) + t3 * abs(f21) + t0 * abs(f22) + t1 * abs(f23)
-    x3 = t2 * abs(f30) + t3 * abs(f31) + t0 * abs(f32) + t1 * abs(f33)
+    x0 = s2 * abs(f00) + s3 * abs(f01) + s0 * abs(f02) + s1 * abs(f03)
+    x1 = s2 * abs(f10) + s3 * abs(f11) + s0 * abs(f12) + s1 * abs(f13)
+    x2 = s2 * abs(f20) + s3 * abs(f21) + s0 * abs(f22) + s1 * abs(f23)
+    x3 = s2 * abs(f30) + s3 * abs(f31) + s0 * abs(f32) + s1 * abs(f33)
     # fmt: on
     by_y, by_x, r0, r1, r2, r3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(4):

@@ -254,11 +254,12 @@ def _danby_step(e, d1, d2, angle, h, slopes, state, work):
                 fifth += E5[j] * slope
                 third += E3[j] * slope
             # an error of order h^9 is h^3 of the estimate of order h^6
-            error += abs(h) * (fifth * fifth / (math.sqrt(fifth * fifth + 0.01 * third * third) + 1e-300))
-            error += abs(h) ** 4 * DOUBT * abs(fifth)
+            local = abs(h) * (fifth * fifth / (math.sqrt(fifth * fifth + 0.01 * third * third) + 1e-300))
+            error = max(error, local + abs(h) ** 4 * DOUBT * abs(fifth))
             size += abs(value)
             work[one + i, 0], work[one + 4 + i, 0] = value, 1.0 if i == c else 0.0
         worst = max(worst, error)
+        work[one + 9, 0] = 0.0
         work[one + 8, 0] = error + danby.ROUNDING * size  # the stages pass through sums that cancel
     return worst
 

@@ -200,7 +200,7 @@ def danby_columns(v, h, work, count):
             x1, q1, p1, m1 = _danby_step(r2, r3, r4, 0.5 * h, d1, d2, x1, q1, p1, m1)
             x2, q2, p2, m2 = _danby_step(r0, r2, r4, h, d1, d2, x, q, p, m)
             work[ENDS, i], work[ENDS + 1, i], work[ENDS + 2, i], work[ENDS + 3, i] = x1, q1, p1, m1
-            error = abs(x1 - x2) + abs(q1 - q2) + abs(p1 - p2) + abs(m1 - m2)
+            error = max(max(abs(x1 - x2), abs(q1 - q2)), max(abs(p1 - p2), abs(m1 - m2)))
             work[ENDS + 4, i] = error * (2.0 / 15.0)
         copy(work, ENDS, c, count)
 

@@ -333,7 +333,7 @@ def _danby_column(f, i, k, d1, d2, x0, q0, p0, m0):
     error += 4.0 * d1 * f[OWN + TAIL, i] * (abs(x9) + abs(x10) + abs(m9) + abs(m10))
     return (
         x_even + x_odd, q_even + q_odd, p_even + p_odd, m_even + m_odd,
-        x_even - x_odd, q_even - q_odd, p_even - p_odd, m_even - m_odd, error,
+        x_even - x_odd, q_even - q_odd, p_even - p_odd, m_even - m_odd, error, error,
     )  # fmt: skip
 
 

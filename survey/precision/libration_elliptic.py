@@ -1,0 +1,126 @@
+"""The chart of Danby's map: a row, a map and scattered points up to e = 0.7; errors of b by 30-digit references."""
+
+import json
+from functools import cache
+from importlib import resources
+from unittest.mock import patch
+
+import numpy as np
+
+from survey.kernels import danby as lanes
+from survey.measures import danby
+from survey.methods import taylor16
+from survey.peak import Counted
+from survey.peers import System
+
+ERROR = "b"
+LIMITED = "taylor16"
+LARGEST = 0.7  # of e
+MOST = {"dop853": 200, "rk4": 2000}
+
+
+@cache
+def references(_work=None):
+    """The reference points in the range of the works, the same for every work (error below 1e-31)."""
+    data = json.loads(resources.files("survey.reference").joinpath("libration_elliptic.json").read_text())
+    return [
+        ({"mu": row["mu"], "e": row["e"]}, {}, {ERROR: float(row["b"])}, row["stable"])
+        for row in data["points"]
+        if row["e"] <= LARGEST
+    ]
+
+
+def works():
+    """A row, a map, and points that share nothing."""
+    random = np.random.default_rng(1)
+    scattered = {"mu": random.uniform(0.0, 0.05, 30_000), "e": random.uniform(0.0, LARGEST, 30_000)}
+    row, whole = _map(np.array([0.3]), 10_000), _map(np.linspace(0.0, LARGEST, 400), 600)
+    return {"row": (row, {}), "map 400x600": (whole, {}), "scattered": (scattered, {})}
+
+
+def _map(e, number):
+    return {"e": e[:, None], "mu": np.linspace(0.0, 0.05, number)[None, :]}
+
+
+def system(point, options):
+    """Half a period, by symmetry, of the four columns in f; cos f and sin f are states too.
+
+    Measured with heyoka: in the eccentric anomaly it takes a fifth longer.
+    """
+    e, mu = (np.ravel(values) for values in np.broadcast_arrays(point["e"], point["mu"]))
+    start = np.concatenate([[1.0, 0.0], np.eye(4).ravel()])
+    return System(
+        slope=_slope,
+        start=np.tile(start, (e.size, 1)),
+        parameters=np.column_stack([e, *danby.rates(mu)]),
+        span=np.full(e.size, np.pi),
+        effort=e + mu,
+    )
+
+
+def _slope(state, parameters, _sin, _cos):
+    e, d1, d2 = parameters[0], parameters[1], parameters[2]
+    r = 1.0 / (1.0 + e * state[0])
+    first = _column(d1, d2, r, state[2], state[3], state[4], state[5])
+    second = _column(d1, d2, r, state[6], state[7], state[8], state[9])
+    third = _column(d1, d2, r, state[10], state[11], state[12], state[13])
+    fourth = _column(d1, d2, r, state[14], state[15], state[16], state[17])
+    return (-1.0 * state[1], state[0], *first, *second, *third, *fourth)
+
+
+def _column(d1, d2, r, x, q, p, m):
+    dx, dm = p - m, x - q
+    return dx, -1.0 * dx - d2 * (r * m), d1 * (r * x) - dm, dm
+
+
+def outcome(ends):
+    """b and, as a user of an integrator would have it, the verdict by a and b."""
+    columns = ends[:, 2:].reshape(-1, 4, 4)
+    first, last = columns[:, :2, :2], columns[:, 2:, 2:]
+    t = (first * last).sum(axis=(1, 2))
+    product = np.linalg.det(first) * np.linalg.det(last)
+    a, b = 4 * t - 4, 6 - 8 * t + 16 * product
+    stable = (b + 2 * a + 2 > 0) & (b - 2 * a + 2 > 0) & (a * a - 4 * b + 8 > 0) & (abs(a) < 4)
+    return {ERROR: b, "verdict": stable.astype(int)}
+
+
+class _Counted(Counted):
+    """Takes part in comparisons too."""
+
+    def __lt__(self, other):
+        return False
+
+    __gt__ = __lt__
+
+
+def operations_of(run):
+    """Operations of midpoint Taylor's steps, counted from their formulas, while `run()` solves a work."""
+    steps = []
+    chain = taylor16.danby_chain
+
+    def counting(v, h, e, d1, d2, out):
+        steps.append(h.size * e.size)
+        chain(v, h, e, d1, d2, out)
+
+    with patch.object(taylor16, "danby_chain", counting):
+        run()
+    return sum(steps) * _one_step()
+
+
+def _one_step():
+    """All that `kernels.danby.chain` does per lane and step."""
+    number = _Counted()
+    work = np.full((lanes.OWN + taylor16.WIDTH + lanes.COLUMN, 1), number, dtype=object)
+
+    def plain(module):
+        return {name: value.py_func for name, value in vars(module).items() if hasattr(value, "py_func")}
+
+    def empty(shape):
+        return np.full(shape, number, dtype=object)
+
+    Counted.operations = 0
+    with patch.multiple(taylor16, **plain(taylor16)), patch.multiple(lanes, **plain(lanes)):
+        with patch.object(taylor16.np, "empty", empty):
+            taylor16.danby_columns(np.full(10, 0.5), 0.1, work, 1)
+        lanes.advance(work, 0)
+    return Counted.operations
