@@ -1,6 +1,9 @@
 """Danby's map against 30-digit references, the curves' known points, the full period, and the circular problem."""
 
 import json
+import os
+import subprocess
+import sys
 from importlib import resources
 
 import numpy as np
@@ -179,3 +182,24 @@ def test_eccentricities_near_one_keep_honest_bars():
         bars = ds[f"{name}_error"].astype(float) + other[f"{name}_error"]
         assert (abs(ds[name] - other[name]) <= bars).where(ok, True).all()
     assert ok.sum() >= 3 and (ds.verdict.where(ds.verdict != -1, 0) == 0).all()
+
+
+PLAIN = """
+import numpy as np
+from survey.measures import danby
+e, mu = np.array([0.1, 0.93]), np.array([[0.02, 0.3], [1e-4, 0.5]])
+for method, rtol in (("auto", 1e-9), ("dop853", 1e-3), ("rk4", 1e-3)):
+    out = danby.solve(e, mu, method, rtol)
+    print(method, *(value.hex() for name in ("a", "b", "b_error") for value in out[name].ravel()), out["collision"])
+print(*(v.hex() for v in danby.solve(np.array([0.3]), np.linspace(0, 0.5, 75)[None, 1:], "auto", 1e-9, True)["b"][0]))
+"""
+
+
+def test_plain_python_gives_the_same_bits():
+    told = [
+        subprocess.run(
+            [sys.executable, "-c", PLAIN], capture_output=True, text=True, env=os.environ | {"NUMBA_DISABLE_JIT": off}
+        ).stdout
+        for off in ("0", "1")
+    ]
+    assert told[0] == told[1] and told[0].count("0x1.") > 100
