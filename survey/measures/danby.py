@@ -34,7 +34,8 @@ FINEST = 1e-14
 TOLERANCES = 10.0 ** -np.arange(4.0, 16.0)
 # A series pays from so many points in the row on; of the asked accuracy for its values.
 DENSE, SHARE = 3 * PLACES, 0.05
-CALL_WORK = 3_000_000
+# Keep a kernel call below about a second: steps, or points of an adaptive method.
+CALL_WORK, WALKS = 3_000_000, 500
 ATTEMPTS = 5  # to meet the accuracy, each with steps 1.7 times as many
 _ANGLES = np.pi * (np.arange(PLACES) + 0.5) / PLACES
 TO_SERIES = 2 / PLACES * np.cos(np.outer(np.arange(PLACES), _ANGLES))
@@ -180,9 +181,11 @@ def _chain(method, e, d1, d2, level, left, results):
 
 def _walk(method, e, d1, d2, level, left, results):
     """Points of their own, each with its tolerance."""
-    out = np.empty((left.size, RESULTS))
-    method.danby_walk(e[left], d1[left], d2[left], TOLERANCES[level[left]], out)
-    results[left] = out
+    for first in range(0, left.size, WALKS):
+        some = left[first : first + WALKS]
+        out = np.empty((some.size, RESULTS))
+        method.danby_walk(e[some], d1[some], d2[some], TOLERANCES[level[some]], out)
+        results[some] = out
 
 
 def grading(e):

@@ -16,7 +16,7 @@ from survey.peers import System
 ERROR = "b"
 LIMITED = "taylor16"
 LARGEST = 0.7  # of e
-MOST = {"dop853": 200, "rk4": 2000}
+MOST = {"dop853": 200, "rk4": 300}
 
 
 @cache
