@@ -59,18 +59,23 @@ def system(point, options):
 
 
 def _slope(state, parameters, _sin, _cos):
+    """The columns (x, q, p, m) one after the other; written out, as every peer compiles it by itself."""
+    c, s = state[0], state[1]
+    x1, q1, p1, m1 = state[2], state[3], state[4], state[5]
+    x2, q2, p2, m2 = state[6], state[7], state[8], state[9]
+    x3, q3, p3, m3 = state[10], state[11], state[12], state[13]
+    x4, q4, p4, m4 = state[14], state[15], state[16], state[17]
     e, d1, d2 = parameters[0], parameters[1], parameters[2]
-    r = 1.0 / (1.0 + e * state[0])
-    first = _column(d1, d2, r, state[2], state[3], state[4], state[5])
-    second = _column(d1, d2, r, state[6], state[7], state[8], state[9])
-    third = _column(d1, d2, r, state[10], state[11], state[12], state[13])
-    fourth = _column(d1, d2, r, state[14], state[15], state[16], state[17])
-    return (-1.0 * state[1], state[0], *first, *second, *third, *fourth)
-
-
-def _column(d1, d2, r, x, q, p, m):
-    dx, dm = p - m, x - q
-    return dx, -1.0 * dx - d2 * (r * m), d1 * (r * x) - dm, dm
+    r = 1.0 / (1.0 + e * c)
+    dx1, dx2, dx3, dx4 = p1 - m1, p2 - m2, p3 - m3, p4 - m4
+    dm1, dm2, dm3, dm4 = x1 - q1, x2 - q2, x3 - q3, x4 - q4
+    return (
+        -1.0 * s, c,
+        dx1, -1.0 * dx1 - d2 * (r * m1), d1 * (r * x1) - dm1, dm1,
+        dx2, -1.0 * dx2 - d2 * (r * m2), d1 * (r * x2) - dm2, dm2,
+        dx3, -1.0 * dx3 - d2 * (r * m3), d1 * (r * x3) - dm3, dm3,
+        dx4, -1.0 * dx4 - d2 * (r * m4), d1 * (r * x4) - dm4, dm4,
+    )  # fmt: skip
 
 
 def outcome(ends):
