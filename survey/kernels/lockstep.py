@@ -257,7 +257,7 @@ def _turnings(state):
 @inline
 def _enter(p, phi0, w0, state, fixed, i):
     """Set lane i to the start of a solution, in axes where c23 = 0."""
-    angle, wide, tall = 0.0, p[D], 2.0 * p[C23]
+    angle, wide, tall = 0.0, p[D] + 0.0, 2.0 * p[C23]  # no negative zero: its sign is taken
     if tall != 0.0:
         angle = 0.5 * math.atan2(-tall if wide >= 0.0 else tall, abs(wide))
         wide = math.copysign(math.sqrt(wide * wide + tall * tall), wide)

@@ -138,3 +138,11 @@ def test_exact_equilibria_stay():
     """g = 0 exactly at phi = 0, for either sign of d."""
     rows = [[-0.5, 0.2, d, 0.0, 0.0, 1.0, 0.0, 0.0] for d in (2.0, -0.9, 0.0)]
     assert np.array_equal(solved(rows, [1e3])[0][:, 0, :2], np.zeros((3, 2)))
+
+
+def test_a_negative_zero_is_a_zero():
+    rows = drawn(4, 9)
+    rows[:, 2] = 0.0
+    other = rows * [1, 1, -1, 1, 1, 1, 1, 1]
+    for one, two in zip(solved(rows, [2.0]), solved(other, [2.0]), strict=True):
+        assert np.array_equal(one, two)
