@@ -123,7 +123,11 @@ def test_an_interrupted_run_can_be_resumed(program, small, name, code):
     many = ("axes.w0.num=4000", "axes.t.num=40", "axes.t.stop=40")
     command = ["run", "small.toml", *[word for text in many for word in ("--set", text)]]
     running = subprocess.Popen(
-        [sys.executable, "-m", "survey", *command], cwd=program.folder, stderr=subprocess.PIPE, text=True
+        [sys.executable, "-m", "survey", *command],
+        cwd=program.folder,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background job ignores it
     )
     blocks = program.folder / "small.nc.blocks"
     deadline = time.time() + 60

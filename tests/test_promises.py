@@ -137,7 +137,8 @@ def test_a_killed_worker_is_replaced(folder, unbroken):
 
 @pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143)])
 def test_workers_stop_promptly_with_the_run(folder, name, code):
-    running = start(folder, "--workers", "2", stderr=subprocess.PIPE)
+    heeding = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731  (a background job ignores it)
+    running = start(folder, "--workers", "2", stderr=subprocess.PIPE, preexec_fn=heeding)
     wait_for(lambda: len(blocks(folder)) > 3)
     children = psutil.Process(running.pid).children(recursive=True)
     running.send_signal(getattr(signal, name))

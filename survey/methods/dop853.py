@@ -32,6 +32,7 @@ SMALLEST, LARGEST = 0.2, 5.0
 LONGEST = 2.0
 STEP_LIMIT = 200_000
 DOUBT = 0.01
+OTHER = 0.3
 
 
 @inline
@@ -178,10 +179,10 @@ def flow_begin(p, phi, w, tolerance, T):
     h = T[LAST, STEP] if T[LAST, STEP] > 0.0 else 0.1 / rate
     for _ in range(50):
         _x, w1, _e, _y = flow_at(p, T, h)
-        doubt, speed = 4.0 * DOUBT * (h * rate) ** 3, max(rate, 1.0 / h)
+        doubt, speed = 8.0 * DOUBT * (h * rate) ** 3, max(rate, 1.0 / h)
         dphi, dw = _flow_estimate(T, h, PHI, doubt), _flow_estimate(T, h, W, doubt)
-        # where the motion starts at rest, one of the two may vanish by symmetry: each speaks for both
-        dphi, dw = max(dphi, dw / speed), max(dw, dphi * speed)
+        # where the motion starts at rest, one of the two may vanish by symmetry: each speaks for both, less loudly
+        dphi, dw = max(dphi, OTHER * dw / speed), max(dw, OTHER * dphi * speed)
         error = max(dphi, dw / (1.0 + abs(w))) / tolerance
         factor = min(max(0.9 * (error + 1e-30) ** -0.125, 0.2), 4.0)
         if error <= 1.0:
