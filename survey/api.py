@@ -332,7 +332,10 @@ def _output_line(o):
 
 
 def _only(when):
-    return "".join(f"; only when {key} = {' | '.join(allowed)}" for key, allowed in when.items())
+    conditions = (
+        f"when {key} = {' | '.join(allowed)}" if any(allowed) else f"without {key}" for key, allowed in when.items()
+    )
+    return "".join(f"; only {condition}" for condition in conditions)
 
 
 def _method_line(name):

@@ -135,6 +135,8 @@ def check(data, text="", output=None, default_path="survey.nc", near=None):
     except ValidationError as error:
         raise BadInput(_one_line(error)) from None
     name, scene = own.find(given_scene, near)
+    numbers = {p.name for p in scene.PARAMETERS if p.number_option and _is_number(file.options.get(p.name))}
+    file.axes |= {key: float(file.options.pop(key)) for key in numbers - set(file.axes)}
     options = check_options(scene, file.options, file.axes, "options.")
     given = {key: _values(f"axes.{key}", axis) for key, axis in file.axes.items()}
     parameters = check_parameters(scene, name, options, given, "axes.")
@@ -161,6 +163,10 @@ def check(data, text="", output=None, default_path="survey.nc", near=None):
         boundaries=_check_boundaries(scene, name, file.boundaries, given),
         refine=_check_refine(scene, name, file, given),
     )
+
+
+def _is_number(value):
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
 def _check_boundaries(scene, name, asked, given):
@@ -301,7 +307,7 @@ def methods_of(scene, options=None):
 
 
 def _fits(method, options):
-    return all(options.get(name) in allowed for name, allowed in getattr(method, "WHEN", {}).items())
+    return all(options.get(name, "") in allowed for name, allowed in getattr(method, "WHEN", {}).items())
 
 
 def check_path(path):

@@ -1,0 +1,329 @@
+"""The wells of A^2 u'^2 = P(u) = (1 - u^2)(L + k u^2) - (a^2 + b^2 - 2 a b u), |u| <= 1: turning points and what follows.
+
+Everything that may cancel is done in double-double: the polynomial about u = 0 and about the poles, v = 1 - u and
+w = 1 + u, its roots, and its factor Q where P = (u - ul)(uh - u) Q, Q = k u^2 + k S u + q0, S = ul + uh. A row of a well
+then holds float64 numbers that are right to the last digits. Equation numbers: `scenes/brun.md`.
+"""
+
+from math import nan, sqrt
+
+import numpy as np
+
+from survey.kernels import double as dd
+from survey.kernels.jit import inline, kernel
+from survey.kernels.quartic import UNIT, root, slope, slopes, value
+from survey.kernels.sines import sin_cos
+
+# places in a row: turning points (1 - u and 1 + u of each), Q there and at the poles, b - a and b + a, the rest of P
+LOW, HIGH, LOW_PLUS, LOW_MINUS, HIGH_PLUS, HIGH_MINUS, WIDTH, SUM = range(8)
+Q_LOW, Q_HIGH, Q_PLUS, Q_MINUS, BEND, MIDDLE = range(8, 14)  # BEND: 4 q0 - k S^2; MIDDLE: s of (S5)
+K, L, MINUS, PLUS, LEVEL = range(14, 19)  # k, L, b - a, b + a, L - (k ul uh + q0)/2
+BAR_LOW, BAR_HIGH, NOISE_LOW, NOISE_HIGH, NOISE_BEND = range(
+    19, 24
+)  # of the turning points and, relative, of Q and BEND
+SIZE = 24
+# kinds of wells
+NONE, LOST, SEPARATRIX, NUTATION, PRECESSION, PASSAGE = -2, -1, 0, 1, 2, 3
+NEWTON = 60
+EPS = 2.0**-53
+TINY = 1e-300
+
+
+@kernel
+def of_state(size_a, size_c, epsilon, theta, p_theta, b, a):
+    """k, L, L + k - a b and L + k + a b as pairs, and u (S1); the last is False outside the domain."""
+    sine, cosine = sin_cos(0.5 * theta)
+    k = dd.mul(dd.two_prod(epsilon, size_a), dd.two_sum(size_a, -size_c))
+    if sine[0] == 0.0 and a != b:
+        return k, k, k, k, 1.0, False
+    high, low = dd.mul(cosine, cosine), dd.mul(sine, sine)  # (1 + u)/2, (1 - u)/2
+    double = dd.times(dd.mul(sine, cosine), 2.0)
+    minus, plus = dd.two_sum(b, -a), dd.two_sum(b, a)
+    x = (0.0, 0.0)
+    if sine[0] != 0.0:
+        x = dd.div(dd.add(dd.mul(minus, high), dd.mul(plus, low)), double)
+    kinetic = dd.add(dd.two_prod(p_theta, p_theta), dd.mul(x, x))
+    common = dd.add(kinetic, dd.mul(k, dd.mul(double, double)))
+    at_plus = dd.sub(common, dd.times(minus, a))
+    at_minus = dd.add(common, dd.times(plus, a))
+    u = dd.mul(dd.sub(cosine, sine), dd.add(cosine, sine))
+    level = dd.add(dd.sub(kinetic, dd.mul(k, dd.mul(u, u))), dd.two_prod(a, a))
+    return k, level, at_plus, at_minus, u[0], True
+
+
+@inline
+def about_pole(square, at, level, k):
+    """P in the distance from a pole: `square` = (b -+ a)^2, `at` = L + k -+ a b."""
+    c2 = dd.neg(dd.add(level, dd.times(k, 5.0)))
+    return dd.neg(square), dd.times(at, 2.0), c2, dd.times(k, 4.0), dd.neg(k)
+
+
+@inline
+def about_equator(a, b, level, k):
+    """P in u (S2)."""
+    c0 = dd.sub(level, dd.add(dd.two_prod(a, a), dd.two_prod(b, b)))
+    return c0, dd.times(dd.two_prod(a, b), 2.0), dd.sub(k, level), (0.0, 0.0), dd.neg(k)
+
+
+@inline
+def torque(u, a, b, k):
+    """F = (a - b u)(b - a u) + k u (1 - u^2)^2, which has the sign of -W', and F'. W is the effective potential."""
+    rest = (1.0 - u) * (1.0 + u)
+    value = (a - b * u) * (b - a * u) + k * u * rest * rest
+    return value, -b * (b - a * u) - a * (a - b * u) + k * rest * (1.0 - 5.0 * u * u)
+
+
+@inline
+def saddle(a, b, k):
+    """(u, F' there) of the greatest W between two least ones; F' = 0 where there is none. k > 0, |u| < 1/3."""
+    if k <= 0.0:
+        return 0.0, 0.0
+    u, bend = 0.0, a * b / k
+    for _ in range(NEWTON):  # the greatest F', where 10 u^3 - 6 u + a b / k = 0
+        move = (u * (10.0 * u * u - 6.0) + bend) / (30.0 * u * u - 6.0)
+        u = min(max(u - move, -0.4), 0.4)
+        if abs(move) < 1e-12:
+            break
+    level, rise = torque(u, a, b, k)
+    for _ in range(NEWTON):  # from there F is convex towards its zero, if it has one
+        if not rise > 0.0:
+            return 0.0, 0.0
+        move = level / rise
+        u -= move
+        level, rise = torque(u, a, b, k)
+        if abs(move) <= 4.0 * EPS * abs(u):
+            break
+    return (u, rise) if rise > 1e-12 * k and abs(u) < 0.4 else (0.0, 0.0)
+
+
+@inline
+def lowest(square, product, k, most):
+    """The distance from the pole of the least W, between the pole and `most`: v^2 B(v) = (b - a)^2 (1 - v).
+
+    B = a b + k (1 - v)(2 - v)^2; 0 where W is least at the pole itself.
+    """
+    start = product + 4.0 * k
+    if square == 0.0 and start >= 0.0:
+        return 0.0
+    low, high = 0.0, most
+    v = min(sqrt(square / start), 0.5 * most) if start > 0.0 else 0.5 * most
+    for _ in range(2 * NEWTON):
+        rest, other = 1.0 - v, 2.0 - v
+        b, slope = product + k * rest * other * other, -k * other * (other + 2.0 * rest)
+        # (b - a)^2 = 0 is divided by v^2
+        level = v * v * b - square * rest if square > 0.0 else b
+        rise = v * (2.0 * b + v * slope) + square if square > 0.0 else slope
+        if level == 0.0:
+            break
+        low, high = (low, v) if level > 0.0 else (v, high)
+        move = level / rise
+        new = v - move
+        if not low < new < high:
+            new = 0.5 * (low + high)
+        if abs(new - v) <= 2.0 * EPS * v:
+            return new
+        v = new
+    return v
+
+
+@inline
+def peak(c, y, at):
+    """(place, P, bound of its error) of the greatest P near y, which matters where it is next to nothing.
+
+    At a pole (y = 0) that the motion may reach P is 0, and half its slope `at` speaks instead.
+    """
+    if y == 0.0:
+        return y, at, 4.0 * UNIT * (abs(c[4][0]) + abs(c[2][0]))
+    level, size = value(c, (y, 0.0))
+    _first, second = slopes(c, y)
+    if level[0] < 1e-14 * size and second < 0.0:
+        move = slope(c, (y, 0.0))[0] / second
+        if abs(move) < 1e-3 * y:
+            y -= move
+            level, size = value(c, (y, 0.0))
+    return y, level[0], 4.0 * UNIT * size
+
+
+@inline
+def at_pole(gap, at, inside, c):
+    """The turning point between `inside` and a pole, in the distance from it; and its bar. `gap` is b -+ a."""
+    if gap == 0.0 and at > 0.0:
+        return (0.0, 0.0), 0.0  # through the pole
+    return root(c, inside, 0.0)
+
+
+@inline
+def hill_at_pole(gap, product, k, at):
+    """L above W at a pole that the motion may reach (b -+ a = 0) and where W is greatest, and its bar; or NaN."""
+    if gap == 0.0 and product + 4.0 * k < 0.0:
+        return at, 4.0 * UNIT * (abs(product) + abs(k) + abs(at))
+    return nan, 0.0
+
+
+@inline
+def fill(gaps, k, level, ats, v, bar_v, w, bar_w, row):
+    """A row from the turning points uh = 1 - v and ul = w - 1."""
+    minus, plus = gaps
+    two = (2.0, 0.0)
+    vl, wh = dd.sub(two, w), dd.sub(two, v)
+    uh, ul = dd.sub((1.0, 0.0), v), dd.sub(w, (1.0, 0.0))
+    total = dd.sub(w, v)
+    product, square = dd.mul(ul, uh), dd.mul(total, total)
+    q0 = dd.add(dd.sub(level, k), dd.mul(k, dd.sub(square, product)))
+    width = dd.sub(vl, v)[0]
+    row[LOW], row[HIGH], row[WIDTH], row[SUM] = ul[0], uh[0], max(width, 0.0), total[0]
+    row[LOW_PLUS], row[LOW_MINUS], row[HIGH_PLUS], row[HIGH_MINUS] = vl[0], w[0], v[0], wh[0]
+    row[BAR_HIGH], row[BAR_LOW] = bar_v + EPS * abs(uh[0]), bar_w + EPS * abs(ul[0])
+    row[K], row[L], row[MINUS], row[PLUS] = k[0], level[0], minus[0], plus[0]
+    row[MIDDLE] = dd.add(dd.sub(level, k), dd.times(dd.mul(k, square), 1.5))[0]
+    row[BEND] = dd.sub(dd.times(q0, 4.0), dd.mul(k, square))[0]
+    row[LEVEL] = dd.sub(level, dd.times(dd.add(dd.mul(k, product), q0), 0.5))[0]
+    # Q about the poles: P's slope there is 2 (L + k -+ a b)
+    tilt_plus = dd.neg(dd.mul(k, dd.add(two, total)))
+    tilt_minus = dd.mul(k, dd.sub(total, two))
+    q_plus = dd.div(dd.add(dd.times(ats[0], 2.0), dd.mul(dd.mul(v, vl), tilt_plus)), dd.add(v, vl))
+    q_minus = dd.div(dd.add(dd.times(ats[1], 2.0), dd.mul(dd.mul(w, wh), tilt_minus)), dd.add(w, wh))
+    row[Q_HIGH] = beside(q_plus, tilt_plus, k, v) if uh[0] >= 0.0 else beside(q_minus, tilt_minus, k, wh)
+    row[Q_LOW] = beside(q_plus, tilt_plus, k, vl) if ul[0] >= 0.0 else beside(q_minus, tilt_minus, k, w)
+    row[Q_PLUS] = q_plus[0] if minus[0] == 0.0 else minus[0] * minus[0] / (v[0] * vl[0])
+    row[Q_MINUS] = q_minus[0] if plus[0] == 0.0 else plus[0] * plus[0] / (w[0] * wh[0])
+    moved = 8.0 * abs(k[0]) * (bar_v + bar_w) + 8.0 * UNIT * (abs(level[0]) + 4.0 * abs(k[0]))
+    row[NOISE_HIGH] = noise(
+        ats[0] if uh[0] >= 0.0 else ats[1], v if uh[0] >= 0.0 else wh, moved, bar_v + bar_w, row[Q_HIGH]
+    )
+    row[NOISE_LOW] = noise(
+        ats[0] if ul[0] >= 0.0 else ats[1], vl if ul[0] >= 0.0 else w, moved, bar_v + bar_w, row[Q_LOW]
+    )
+    row[NOISE_BEND] = moved / max(abs(row[BEND]), TINY)
+
+
+@inline
+def beside(q, tilt, k, y):
+    """Q at y from a pole, from its value and slope there."""
+    return dd.add(q, dd.mul(y, dd.add(tilt, dd.mul(k, y))))[0]
+
+
+@inline
+def noise(at, y, moved, bar, q):
+    """Relative error of Q at y from a pole; `moved` and `bar` are errors of k S and of the turning points."""
+    return (moved + 8.0 * UNIT * abs(at[0]) + abs(q) * bar / max(y[0], TINY)) / max(q, TINY)
+
+
+@inline
+def still(gaps, k, level, ats, v, w, row):
+    """A row of a regular precession."""
+    fill(gaps, k, level, ats, v, EPS * abs(v[0]), w, EPS * abs(w[0]), row)
+    row[WIDTH] = 0.0
+
+
+@inline
+def above(row, g):
+    """s + g of (S5), whose terms cancel where the motion nearly stops between its turning points."""
+    s = row[MIDDLE]
+    return s + g if s >= 0.0 else 0.25 * row[K] * row[WIDTH] ** 2 * row[BEND] / (g - s)
+
+
+@kernel
+def find(a, b, k, level, at_plus, at_minus, rows, kinds):
+    """Fill `rows` (2, SIZE) and `kinds` (2) with the wells, lower u first; returns (L above the separatrix, its bar).
+
+    NaN where there is no separatrix at these a and b. Kinds: NUTATION, PRECESSION (the turning points coincide), PASSAGE
+    (through a pole), SEPARATRIX (within the error), NONE.
+    """
+    kinds[0] = kinds[1] = NONE
+    gaps, ats = (dd.two_sum(b, -a), dd.two_sum(b, a)), (at_plus, at_minus)
+    minus, plus, product, size_k = gaps[0][0], gaps[1][0], a * b, k[0]
+    polar = about_pole(dd.mul(gaps[0], gaps[0]), at_plus, level, k)
+    antipolar = about_pole(dd.mul(gaps[1], gaps[1]), at_minus, level, k)
+    equatorial = about_equator(a, b, level, k)
+    between, rise = saddle(a, b, size_k)
+    distance, bar = nan, 0.0
+    if rise > 0.0:
+        height, size = value(equatorial, (between, 0.0))
+        rest = (1.0 - between) * (1.0 + between)
+        distance = height[0] / rest
+        bar = 4.0 * UNIT * size + (8.0 * EPS * (size_k + a * a + b * b)) ** 2 / rise
+    elif size_k < 0.0:
+        distance, bar = hill_at_pole(minus, product, size_k, at_plus[0])
+        if bar == 0.0:
+            distance, bar = hill_at_pole(plus, -product, size_k, at_minus[0])
+    if abs(distance) <= bar:
+        kinds[0] = SEPARATRIX
+        return distance, bar
+    v = w = top = bottom = -1.0
+    hum = murmur = 0.0
+    if rise > 0.0 or product >= 0.0:
+        v = lowest(minus * minus, product, size_k, 1.0 - max(between, 0.0))
+        v, top, hum = peak(polar, v, at_plus[0])
+    if rise > 0.0 or product < 0.0:
+        w = lowest(plus * plus, -product, size_k, 1.0 + min(between, 0.0))
+        w, bottom, murmur = peak(antipolar, w, at_minus[0])
+    if rise > 0.0 and distance < 0.0:
+        place = 0
+        if bottom > murmur:
+            y, bar_y = at_pole(plus, at_minus[0], w, antipolar)
+            u, bar_u = root(equatorial, w - 1.0, between)
+            fill(gaps, k, level, ats, dd.sub((1.0, 0.0), u), bar_u, y, bar_y, rows[0])
+            kinds[0] = PASSAGE if y[0] == 0.0 else NUTATION
+            place = 1
+        elif bottom >= -murmur:
+            still(gaps, k, level, ats, dd.two_sum(2.0, -w), (w, 0.0), rows[0])
+            kinds[0], place = PRECESSION, 1
+        if top > hum:
+            y, bar_y = at_pole(minus, at_plus[0], v, polar)
+            u, bar_u = root(equatorial, 1.0 - v, between)
+            fill(gaps, k, level, ats, y, bar_y, dd.add((1.0, 0.0), u), bar_u, rows[place])
+            kinds[place] = PASSAGE if y[0] == 0.0 else NUTATION
+        elif top >= -hum:
+            still(gaps, k, level, ats, (v, 0.0), dd.two_sum(2.0, -v), rows[place])
+            kinds[place] = PRECESSION
+        return distance, bar
+    if max(top - hum, bottom - murmur) > 0.0:
+        right, bar_right = at_pole(minus, at_plus[0], v if v >= 0.0 else 2.0 - w, polar)
+        left, bar_left = at_pole(plus, at_minus[0], w if w >= 0.0 else 2.0 - v, antipolar)
+        fill(gaps, k, level, ats, right, bar_right, left, bar_left, rows[0])
+        kinds[0] = PASSAGE if right[0] == 0.0 or left[0] == 0.0 else NUTATION
+    elif v >= 0.0 and top >= -hum:
+        still(gaps, k, level, ats, (v, 0.0), dd.two_sum(2.0, -v), rows[0])
+        kinds[0] = PRECESSION
+    elif w >= 0.0 and bottom >= -murmur:
+        still(gaps, k, level, ats, dd.two_sum(2.0, -w), (w, 0.0), rows[0])
+        kinds[0] = PRECESSION
+    return distance, bar
+
+
+@kernel
+def of_states(points, rows, kinds, count, heights):
+    """The well of each initial state (A, C, epsilon, theta0, p_theta0, p_psi, p_phi).
+
+    Fills rows (n, SIZE), kinds (n) (LOST outside the domain), the number of wells (-1 on a separatrix) and heights (n, 3):
+    L above the separatrix, its bar, |k|.
+    """
+    both, two = np.empty((2, SIZE)), np.empty(2, np.int64)
+    for i in range(len(points)):
+        size_a, size_c, epsilon, theta, p_theta, b, a = points[i]
+        k, level, at_plus, at_minus, u, inside = of_state(size_a, size_c, epsilon, theta, p_theta, b, a)
+        if not inside:
+            kinds[i] = LOST
+            continue
+        heights[i, 0], heights[i, 1] = find(a, b, k, level, at_plus, at_minus, both, two)
+        heights[i, 2] = abs(k[0])
+        place = 1 if two[1] != NONE and u > 0.5 * (both[0, HIGH] + both[1, LOW]) else 0
+        count[i] = (two[0] != NONE) + (two[1] != NONE) if two[0] != SEPARATRIX else -1
+        kinds[i] = two[place] if two[place] != NONE else LOST
+        rows[i] = both[place]
+
+
+@kernel
+def of_integrals(points, sign, rows, kinds, heights):
+    """The wells at (l, alpha, beta), in units where A = 1 and k = `sign`: as `of_states`, rows (n, 2, SIZE), kinds (n, 2)."""
+    k = (sign, 0.0)
+    for i in range(len(points)):
+        level, a, b = points[i]
+        product = dd.two_prod(a, b)
+        high = dd.two_sum(level, sign)
+        pair = level, 0.0
+        heights[i, 0], heights[i, 1] = find(
+            a, b, k, pair, dd.sub(high, product), dd.add(high, product), rows[i], kinds[i]
+        )
+        heights[i, 2] = 1.0

@@ -1,0 +1,59 @@
+"""Closed forms of nutations by Carlson's R_F, R_J and duplication: a few dozen square roots.
+
+Domain: every motion between turning points. Precessions that nearly cancel keep an absolute accuracy only.
+
+Source: B. C. Carlson, Numer. Algorithms 10 (1995) 13-26; formulas (S5), (S6), (S15) of `scenes/brun.md`.
+"""
+
+from math import pi, sqrt
+
+from survey.kernels import nutation as nu
+from survey.kernels.carlson import rf, rj
+from survey.kernels.jit import inline, kernel
+
+ORDER = 0  # no steps
+SERVES = ("nutation",)
+EPS = nu.EPS
+
+
+@inline
+def advance(gap, near, far, width, q, time, s, g):
+    """(b -+ a) J/A (S6): J has its turning point far from the pole as origin; `time` is R_F."""
+    if gap == 0.0:
+        return 0.0
+    third = rj(0.0, s, g, q * near / far)
+    return gap * (2.0 * time / far + 2.0 * width * q / (3.0 * far * far) * third)
+
+
+@inline
+def second_kind(first, y, z, g):
+    """R_G(0, X, Y), g^2 = X Y, from `first` = R_F and the means of sqrt X, sqrt Y, squared (DLMF 19.22.2, 19.21.10)."""
+    y, z = max(y, z), min(y, z)
+    return (z - 0.5 * g) * first + z * (y - z) / 3.0 * rj(0.0, 0.5 * (y + z), sqrt(y) * sqrt(z), z)
+
+
+@inline
+def periods_of(row, out):
+    """See `agm.periods_of`."""
+    width, k, s = row[nu.WIDTH], row[nu.K], row[nu.MIDDLE]
+    low, high = row[nu.Q_LOW], row[nu.Q_HIGH]
+    g = sqrt(low) * sqrt(high)
+    time = rf(0.0, s, g)
+    up = advance(row[nu.MINUS], row[nu.HIGH_PLUS], row[nu.LOW_PLUS], width, low, time, s, g)
+    down = advance(row[nu.PLUS], row[nu.LOW_MINUS], row[nu.HIGH_MINUS], width, high, time, s, g)
+    noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + 8.0 * EPS * g / nu.above(row, g)
+    out[0], out[1], out[2] = 4.0 * time, up + down, down - up
+    out[4] = (32.0 * EPS + noise) * out[0]
+    out[5] = out[6] = (48.0 * EPS + 4.0 * noise) * (abs(up) + abs(down))
+    square = second_kind(time, 0.5 * nu.above(row, g), g, g)
+    parts = out[0] * row[nu.LEVEL], 4.0 * square, row[nu.MINUS] * up, row[nu.PLUS] * down
+    out[3] = (parts[0] + parts[1] - parts[2] - parts[3]) / (2.0 * pi)
+    out[7] = (48.0 * EPS + 4.0 * noise) * (abs(parts[0]) + parts[1] + abs(parts[2]) + abs(parts[3])) / (2.0 * pi)
+
+
+@kernel
+def nutation_periods(rows, kinds, tolerance, out):
+    """See `agm.nutation_periods`."""
+    for i in range(len(rows)):
+        if kinds[i] >= nu.NUTATION:
+            periods_of(rows[i], out[i])
