@@ -5,7 +5,7 @@ w = 1 + u, its roots, and its factor Q where P = (u - ul)(uh - u) Q, Q = k u^2 +
 then holds float64 numbers that are right to the last digits. Equation numbers: `scenes/brun.md`.
 """
 
-from math import nan, sqrt
+from math import cos, nan, sin, sqrt
 
 import numpy as np
 
@@ -145,11 +145,20 @@ def peak(c, y, at):
 
 
 @inline
-def at_pole(gap, at, inside, c):
-    """The turning point between `inside` and a pole, in the distance from it; and its bar. `gap` is b -+ a."""
+def beyond(gap, at, inside, inside_far, near, far, equator):
+    """(distance from the pole, from the other pole, bar) of the turning point on that side of `inside`.
+
+    `near` and `far` are P about the pole and about the other one (`inside_far` from there), `gap` = b -+ a, `equator` is
+    P(0): the turning point is found from the pole of its own hemisphere.
+    """
+    two = (2.0, 0.0)
+    if inside > 1.0 and equator <= 0.0:
+        y, bar = root(far, inside_far, 1.0)
+        return dd.sub(two, y), y, bar
     if gap == 0.0 and at > 0.0:
-        return (0.0, 0.0), 0.0  # through the pole
-    return root(c, inside, 0.0)
+        return (0.0, 0.0), two, 0.0  # through the pole
+    y, bar = root(near, min(inside, 1.0), 0.0)
+    return y, dd.sub(two, y), bar
 
 
 @inline
@@ -161,16 +170,18 @@ def hill_at_pole(gap, product, k, at):
 
 
 @inline
-def fill(gaps, k, level, ats, v, bar_v, w, bar_w, row):
-    """A row from the turning points uh = 1 - v and ul = w - 1."""
+def fill(gaps, k, level, ats, right, left, row):
+    """A row from the turning points, each (distance from its pole, from the other pole, bar)."""
     minus, plus = gaps
-    two = (2.0, 0.0)
-    vl, wh = dd.sub(two, w), dd.sub(two, v)
-    uh, ul = dd.sub((1.0, 0.0), v), dd.sub(w, (1.0, 0.0))
-    total = dd.sub(w, v)
+    v, wh, bar_v = right
+    w, vl, bar_w = left
+    one, two = (1.0, 0.0), (2.0, 0.0)
+    uh = dd.sub(one, v) if v[0] < 1.0 else dd.sub(wh, one)
+    ul = dd.sub(w, one) if w[0] < 1.0 else dd.sub(one, vl)
+    total = dd.add(ul, uh)
     product, square = dd.mul(ul, uh), dd.mul(total, total)
     q0 = dd.add(dd.sub(level, k), dd.mul(k, dd.sub(square, product)))
-    width = dd.sub(vl, v)[0]
+    width = dd.sub(vl, v)[0] if vl[0] < 1.0 else dd.sub(wh, w)[0]
     row[LOW], row[HIGH], row[WIDTH], row[SUM] = ul[0], uh[0], max(width, 0.0), total[0]
     row[LOW_PLUS], row[LOW_MINUS], row[HIGH_PLUS], row[HIGH_MINUS] = vl[0], w[0], v[0], wh[0]
     row[BAR_HIGH], row[BAR_LOW] = bar_v + EPS * abs(uh[0]), bar_w + EPS * abs(ul[0])
@@ -187,14 +198,15 @@ def fill(gaps, k, level, ats, v, bar_v, w, bar_w, row):
     row[Q_LOW] = beside(q_plus, tilt_plus, k, vl) if ul[0] >= 0.0 else beside(q_minus, tilt_minus, k, w)
     row[Q_PLUS] = q_plus[0] if minus[0] == 0.0 else minus[0] * minus[0] / (v[0] * vl[0])
     row[Q_MINUS] = q_minus[0] if plus[0] == 0.0 else plus[0] * plus[0] / (w[0] * wh[0])
-    moved = 8.0 * abs(k[0]) * (bar_v + bar_w) + 8.0 * UNIT * (abs(level[0]) + 4.0 * abs(k[0]))
-    row[NOISE_HIGH] = noise(
-        ats[0] if uh[0] >= 0.0 else ats[1], v if uh[0] >= 0.0 else wh, moved, bar_v + bar_w, row[Q_HIGH]
-    )
-    row[NOISE_LOW] = noise(
-        ats[0] if ul[0] >= 0.0 else ats[1], vl if ul[0] >= 0.0 else w, moved, bar_v + bar_w, row[Q_LOW]
-    )
-    row[NOISE_BEND] = moved / max(abs(row[BEND]), TINY)
+    # errors: of Q, what the pole's slope and the turning points leave
+    bar = bar_v + bar_w
+    moved = abs(k[0]) * (bar + 16.0 * UNIT)
+    plus_side = (8.0 * UNIT * abs(ats[0][0]) + (abs(row[Q_PLUS]) + 4.0 * abs(k[0])) * bar) / (v[0] + vl[0])
+    minus_side = (8.0 * UNIT * abs(ats[1][0]) + (abs(row[Q_MINUS]) + 4.0 * abs(k[0])) * bar) / (w[0] + wh[0])
+    plus_side, minus_side = plus_side + 8.0 * moved * (v[0] + vl[0]), minus_side + 8.0 * moved * (w[0] + wh[0])
+    row[NOISE_HIGH] = (plus_side if uh[0] >= 0.0 else minus_side) / max(row[Q_HIGH], TINY)
+    row[NOISE_LOW] = (plus_side if ul[0] >= 0.0 else minus_side) / max(row[Q_LOW], TINY)
+    row[NOISE_BEND] = 8.0 * (moved + UNIT * (abs(level[0]) + abs(k[0]))) / max(abs(row[BEND]), TINY)
 
 
 @inline
@@ -204,15 +216,14 @@ def beside(q, tilt, k, y):
 
 
 @inline
-def noise(at, y, moved, bar, q):
-    """Relative error of Q at y from a pole; `moved` and `bar` are errors of k S and of the turning points."""
-    return (moved + 8.0 * UNIT * abs(at[0]) + abs(q) * bar / max(y[0], TINY)) / max(q, TINY)
-
-
-@inline
-def still(gaps, k, level, ats, v, w, row):
-    """A row of a regular precession."""
-    fill(gaps, k, level, ats, v, EPS * abs(v[0]), w, EPS * abs(w[0]), row)
+def still(gaps, k, level, ats, y, plus, row):
+    """A row of a regular precession at the distance y from the pole +1 (`plus`) or -1."""
+    bar = EPS * y
+    near, far = ((y, 0.0), dd.two_sum(2.0, -y), bar), (dd.two_sum(2.0, -y), (y, 0.0), bar)
+    if plus:
+        fill(gaps, k, level, ats, near, far, row)
+    else:
+        fill(gaps, k, level, ats, far, near, row)
     row[WIDTH] = 0.0
 
 
@@ -261,43 +272,66 @@ def find(a, b, k, level, at_plus, at_minus, rows, kinds):
     if rise > 0.0 and distance < 0.0:
         place = 0
         if bottom > murmur:
-            y, bar_y = at_pole(plus, at_minus[0], w, antipolar)
+            left = beyond(plus, at_minus[0], w, 2.0 - w, antipolar, polar, -1.0)
             u, bar_u = root(equatorial, w - 1.0, between)
-            fill(gaps, k, level, ats, dd.sub((1.0, 0.0), u), bar_u, y, bar_y, rows[0])
-            kinds[0] = PASSAGE if y[0] == 0.0 else NUTATION
+            fill(gaps, k, level, ats, (dd.sub((1.0, 0.0), u), dd.add((1.0, 0.0), u), bar_u), left, rows[0])
+            kinds[0] = PASSAGE if left[0][0] == 0.0 else NUTATION
             place = 1
         elif bottom >= -murmur:
-            still(gaps, k, level, ats, dd.two_sum(2.0, -w), (w, 0.0), rows[0])
+            still(gaps, k, level, ats, w, False, rows[0])
             kinds[0], place = PRECESSION, 1
         if top > hum:
-            y, bar_y = at_pole(minus, at_plus[0], v, polar)
+            right = beyond(minus, at_plus[0], v, 2.0 - v, polar, antipolar, -1.0)
             u, bar_u = root(equatorial, 1.0 - v, between)
-            fill(gaps, k, level, ats, y, bar_y, dd.add((1.0, 0.0), u), bar_u, rows[place])
-            kinds[place] = PASSAGE if y[0] == 0.0 else NUTATION
+            fill(gaps, k, level, ats, right, (dd.add((1.0, 0.0), u), dd.sub((1.0, 0.0), u), bar_u), rows[place])
+            kinds[place] = PASSAGE if right[0][0] == 0.0 else NUTATION
         elif top >= -hum:
-            still(gaps, k, level, ats, (v, 0.0), dd.two_sum(2.0, -v), rows[place])
+            still(gaps, k, level, ats, v, True, rows[place])
             kinds[place] = PRECESSION
-        return distance, bar
-    if max(top - hum, bottom - murmur) > 0.0:
-        right, bar_right = at_pole(minus, at_plus[0], v if v >= 0.0 else 2.0 - w, polar)
-        left, bar_left = at_pole(plus, at_minus[0], w if w >= 0.0 else 2.0 - v, antipolar)
-        fill(gaps, k, level, ats, right, bar_right, left, bar_left, rows[0])
-        kinds[0] = PASSAGE if right[0] == 0.0 or left[0] == 0.0 else NUTATION
+    elif max(top - hum, bottom - murmur) > 0.0:
+        equator = equatorial[0][0]
+        v, w = (v if v >= 0.0 else 2.0 - w), (w if w >= 0.0 else 2.0 - v)
+        right = beyond(minus, at_plus[0], v, w, polar, antipolar, equator)
+        left = beyond(plus, at_minus[0], w, v, antipolar, polar, equator)
+        fill(gaps, k, level, ats, right, left, rows[0])
+        kinds[0] = PASSAGE if right[0][0] == 0.0 or left[0][0] == 0.0 else NUTATION
     elif v >= 0.0 and top >= -hum:
-        still(gaps, k, level, ats, (v, 0.0), dd.two_sum(2.0, -v), rows[0])
+        still(gaps, k, level, ats, v, True, rows[0])
         kinds[0] = PRECESSION
     elif w >= 0.0 and bottom >= -murmur:
-        still(gaps, k, level, ats, dd.two_sum(2.0, -w), (w, 0.0), rows[0])
+        still(gaps, k, level, ats, w, False, rows[0])
         kinds[0] = PRECESSION
     return distance, bar
 
 
+@inline
+def phase(row, theta, p_theta, start):
+    """start = (u0 - ul)/(uh - ul), 1 - that, and the sign of u'; the smaller part from P(u0) = (sin theta p_theta)^2."""
+    sine, cosine = sin(0.5 * theta), cos(0.5 * theta)
+    v, w = 2.0 * sine * sine, 2.0 * cosine * cosine
+    width = row[WIDTH]
+    start[0], start[1], start[2] = 0.0, 1.0, 1.0 if p_theta <= 0.0 else -1.0
+    if not width > 0.0:
+        return
+    done = min(max((row[LOW_PLUS] - v if v < 1.0 else w - row[LOW_MINUS]) / width, 0.0), 1.0)
+    left = min(max((v - row[HIGH_PLUS] if v < 1.0 else row[HIGH_MINUS] - w) / width, 0.0), 1.0)
+    q = row[Q_LOW] * left + row[Q_HIGH] * done - row[K] * width * width * left * done
+    other = (2.0 * sine * cosine * p_theta / width) ** 2 / q
+    if done < left:
+        done = min(other / left, 1.0)
+        left = 1.0 - done
+    else:
+        left = min(other / done, 1.0)
+        done = 1.0 - left
+    start[0], start[1] = done, left
+
+
 @kernel
-def of_states(points, rows, kinds, count, heights):
+def of_states(points, rows, kinds, count, heights, starts):
     """The well of each initial state (A, C, epsilon, theta0, p_theta0, p_psi, p_phi).
 
-    Fills rows (n, SIZE), kinds (n) (LOST outside the domain), the number of wells (-1 on a separatrix) and heights (n, 3):
-    L above the separatrix, its bar, |k|.
+    Fills rows (n, SIZE), kinds (n) (LOST outside the domain), the number of wells (-1 on a separatrix), heights (n, 3):
+    L above the separatrix, its bar, |k|; and starts (n, 3), see `phase`.
     """
     both, two = np.empty((2, SIZE)), np.empty(2, np.int64)
     for i in range(len(points)):
@@ -312,6 +346,8 @@ def of_states(points, rows, kinds, count, heights):
         count[i] = (two[0] != NONE) + (two[1] != NONE) if two[0] != SEPARATRIX else -1
         kinds[i] = two[place] if two[place] != NONE else LOST
         rows[i] = both[place]
+        if kinds[i] >= NUTATION:
+            phase(rows[i], theta, p_theta, starts[i])
 
 
 @kernel

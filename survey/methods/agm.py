@@ -10,7 +10,9 @@ from math import copysign, pi, sqrt
 import numpy as np
 
 from survey.kernels import nutation as nu
+from survey.kernels.elliptic import jacobi
 from survey.kernels.jit import inline, kernel
+from survey.kernels.nutation_time import motion
 from survey.kernels.third_kind import mean, third
 
 ORDER = 0  # no steps
@@ -107,3 +109,21 @@ def nutation_periods(rows, kinds, tolerance, out):
     for i in range(len(rows)):
         if kinds[i] >= nu.NUTATION:
             periods_of(rows[i], out[i])
+
+
+@inline
+def cosine(z, kc, quarter, pairs, last):
+    """(1 + c)/2 and (1 - c)/2, c = cn z, for z in [0, 2 K]."""
+    over = z > quarter
+    sn, cn, _dn = jacobi(2.0 * quarter - z if over else z, pairs, last)
+    cn = abs(cn)
+    near, far = 0.5 * (1.0 + cn), 0.5 * sn * sn / (1.0 + cn)
+    return (far, near) if over else (near, far)
+
+
+@kernel
+def nutation_motions(rows, kinds, starts, periods, times, out):
+    """Fill `out` (n, m, 6): u, psi, phi less the drift, and bars, at `times` (n, m) in units of A."""
+    for i in range(len(rows)):
+        if kinds[i] >= nu.NUTATION:
+            motion(cosine, rows[i], starts[i], periods[i], times[i], out[i])

@@ -5,15 +5,17 @@ Domain: every motion between turning points. Precessions that nearly cancel keep
 Source: B. C. Carlson, Numer. Algorithms 10 (1995) 13-26; formulas (S5), (S6), (S15) of `scenes/brun.md`.
 """
 
-from math import pi, sqrt
+from math import cos, hypot, pi, sin, sqrt
 
 from survey.kernels import nutation as nu
 from survey.kernels.carlson import rf, rj
 from survey.kernels.jit import inline, kernel
+from survey.kernels.nutation_time import first_kind, motion
 
 ORDER = 0  # no steps
 SERVES = ("nutation",)
 EPS = nu.EPS
+STEPS = 60
 
 
 @inline
@@ -57,3 +59,29 @@ def nutation_periods(rows, kinds, tolerance, out):
     for i in range(len(rows)):
         if kinds[i] >= nu.NUTATION:
             periods_of(rows[i], out[i])
+
+
+@inline
+def cosine(z, kc, quarter, pairs, last):
+    """As `agm.cosine`: F(chi) = z by Newton's method, from the side where F, convex or concave, lets it be monotone."""
+    over = z > quarter
+    z = 2.0 * quarter - z if over else z
+    chi = min(z, 0.5 * pi)
+    for _ in range(STEPS):
+        sine, cosine = sin(0.5 * chi), cos(0.5 * chi)
+        low, high = cosine * cosine, sine * sine
+        delta = hypot(low - high, kc * 2.0 * sine * cosine)
+        move = (first_kind(low, high, kc) - z) * delta
+        chi = min(max(chi - move, 0.0), 0.5 * pi)
+        if abs(move) <= 1e-15 * chi:
+            break
+    low, high = cos(0.5 * chi) ** 2, sin(0.5 * chi) ** 2
+    return (high, low) if over else (low, high)
+
+
+@kernel
+def nutation_motions(rows, kinds, starts, periods, times, out):
+    """See `agm.nutation_motions`."""
+    for i in range(len(rows)):
+        if kinds[i] >= nu.NUTATION:
+            motion(cosine, rows[i], starts[i], periods[i], times[i], out[i])

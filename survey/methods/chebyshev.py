@@ -6,7 +6,7 @@ needs many nodes; `no_convergence` beyond MOST. The independent check.
 Source: DLMF 3.5(v); integrals (S3), (S4), (S15) of `scenes/brun.md`.
 """
 
-from math import cos, exp, inf, log1p, pi, sqrt
+from math import atan2, cos, exp, floor, inf, log1p, pi, sin, sqrt
 
 import numpy as np
 
@@ -17,6 +17,7 @@ ORDER = 0  # no steps: convergence is exponential
 SERVES = ("nutation",)
 EPS = nu.EPS
 FIRST, MOST = 8, 2**15
+LONGEST = 512  # terms of the series in time
 FULL = 38.0  # the first neglected coefficient is exp(-FULL)
 
 
@@ -93,3 +94,103 @@ def nutation_periods(rows, kinds, tolerance, out):
                 n *= 2
             if n <= MOST:
                 periods_of(rows[i], n, speed, half, whole, out[i])
+
+
+@inline
+def integrands(row, x, out):
+    """dt/dx / A at u = ul + (uh - ul) sin^2(x/2), the rates of both angles, u and Q."""
+    s, c = sin(0.5 * x) ** 2, cos(0.5 * x) ** 2
+    q = row[nu.Q_LOW] * c + row[nu.Q_HIGH] * s - row[nu.K] * row[nu.WIDTH] ** 2 * s * c
+    to_plus = row[nu.LOW_PLUS] * c + row[nu.HIGH_PLUS] * s
+    to_minus = row[nu.LOW_MINUS] * c + row[nu.HIGH_MINUS] * s
+    out[0] = 1.0 / sqrt(q)
+    out[1] = 0.5 * row[nu.MINUS] / to_plus * out[0] if row[nu.MINUS] != 0.0 else 0.0
+    out[2] = 0.5 * row[nu.PLUS] / to_minus * out[0] if row[nu.PLUS] != 0.0 else 0.0
+    out[3], out[4] = 1.0 - to_plus if to_plus < to_minus else to_minus - 1.0, q
+
+
+@inline
+def series(row, n, waves, value):
+    """Coefficients of the integrals from 0 to x: waves[:, 0] x + sum of waves[:, j] sin j x."""
+    waves[:, :n] = 0.0
+    for i in range(n):
+        x = (i + 0.5) * pi / n
+        integrands(row, x, value)
+        for j in range(n):
+            wave = cos(j * x) * (2.0 / n if j else 1.0 / n) / (j if j else 1.0)
+            for m in range(3):
+                waves[m, j] += wave * value[m]
+
+
+@inline
+def integrals(waves, n, x, out):
+    """t/A and both angles at x in [0, pi] since u = ul."""
+    for m in range(3):
+        total = 0.0
+        for j in range(n - 1, 0, -1):
+            total += waves[m, j] * sin(j * x)
+        out[m] = waves[m, 0] * x + total
+
+
+@inline
+def when(row, waves, n, time, value, out):
+    """x at which `time` is reached, by Newton's method between brackets; `out` as `integrals`."""
+    low, high = 0.0, pi
+    x = pi * time / (pi * waves[0, 0])
+    for _ in range(100):
+        integrals(waves, n, x, out)
+        integrands(row, x, value)
+        move = (out[0] - time) / value[0]
+        low, high = (low, x) if move > 0.0 else (x, high)
+        new = x - move
+        if not low <= new <= high:
+            new = 0.5 * (low + high)
+        if abs(new - x) <= 4.0 * EPS * x:
+            break
+        x = new
+    return x
+
+
+@inline
+def motion(row, start, n, noise, times, waves, out):
+    """See `nutation_time.motion`."""
+    value, here = np.empty(5), np.empty(3)
+    series(row, n, waves, value)
+    half = pi * waves[0, 0]
+    size = pi * (abs(waves[1, 0]) + abs(waves[2, 0]))
+    x = 2.0 * atan2(sqrt(start[0]), sqrt(start[1]))
+    integrals(waves, n, x, here)
+    first, base_up, base_down = start[2] * here[0], start[2] * here[1], start[2] * here[2]
+    for j in range(len(times)):
+        turns = floor((first + times[j]) / (2.0 * half) + 0.5)
+        time = first + times[j] - turns * 2.0 * half
+        side = 1.0 if time >= 0.0 else -1.0
+        x = when(row, waves, n, min(abs(time), half), value, here)
+        integrands(row, x, value)
+        up = side * here[1] - base_up + 2.0 * pi * turns * waves[1, 0]
+        down = side * here[2] - base_down + 2.0 * pi * turns * waves[2, 0]
+        late = 2.0 * noise * (abs(times[j]) + half)
+        wide, bend = (
+            row[nu.WIDTH],
+            row[nu.WIDTH] * (row[nu.Q_LOW] + row[nu.Q_HIGH] + 4.0 * abs(row[nu.K]) * row[nu.WIDTH]),
+        )
+        speed = wide * abs(sin(0.5 * x) * cos(0.5 * x)) / value[0]
+        out[j, 0], out[j, 1], out[j, 2] = value[3], up + down, down - up
+        out[j, 3] = speed * late + bend * late * late + 3.0 * (row[nu.BAR_LOW] + row[nu.BAR_HIGH]) + 8.0 * EPS * wide
+        moved = (abs(value[1]) + abs(value[2])) / value[0] * late
+        out[j, 4] = out[j, 5] = moved + 2.0 * noise * (1.0 + abs(turns)) * 2.0 * size
+
+
+@kernel
+def nutation_motions(rows, kinds, starts, periods, times, out):
+    """See `agm.nutation_motions`; by Fourier series of the integrals, of at most LONGEST terms."""
+    waves = np.empty((3, LONGEST))
+    for i in range(len(rows)):
+        if kinds[i] >= nu.NUTATION:
+            speed = rate(rows[i])
+            n = FIRST
+            while 2.0 * n * speed < 2.0 * FULL and n <= LONGEST:
+                n *= 2
+            if n <= LONGEST:
+                noise = periods[i, 4] / periods[i, 0] + 4.0 * EPS * n
+                motion(rows[i], starts[i], n, noise, times[i], waves, out[i])

@@ -30,6 +30,7 @@ import numpy as np
 from survey import methods
 from survey.kernels import nutation as nu
 from survey.measures import nutation
+from survey.measures.rows import Rows
 from survey.modules import load
 from survey.scene import Option, Output, Parameter
 from survey.status import INVALID_PARAMETERS, NO_CONVERGENCE, OK
@@ -45,7 +46,8 @@ STATUS = {
     "no_motion": "no motion has these integrals: l lies below the least effective potential",
 }
 _NO_MOTION = 16
-_STATE, _SCALED = {"sign": ("",)}, {"sign": ("1", "-1")}
+_STATE, _SCALED, _MOTION = {"sign": ("",)}, {"sign": ("1", "-1")}, {"motion": ("at_t",)}
+_HARMLESS = (1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0)
 _LARGE = {"minimum": -1e25, "maximum": 1e25}  # products of four such numbers are floats
 DIMENSIONS = {"well": np.array([1, 2])}
 
@@ -58,13 +60,17 @@ PARAMETERS = (
     Parameter("p_theta0", "initial momentum conjugate to theta", r"p_{\theta 0}", when=_STATE, **_LARGE),
     Parameter("p_psi", "momentum of the precession angle, b", r"p_\psi", when=_STATE, **_LARGE),
     Parameter("p_phi", "momentum of the spin angle, a", r"p_\varphi", when=_STATE, **_LARGE),
+    Parameter("t", "time since the initial state", "t", when=_MOTION, whole=True, **_LARGE),
     Parameter("l", "scaled energy L / |k|", "l", when=_SCALED, **_LARGE),
     Parameter("alpha", "scaled momentum p_phi / sqrt|k|", r"\alpha", when=_SCALED, **_LARGE),
     Parameter("beta", "scaled momentum p_psi / sqrt|k|", r"\beta", when=_SCALED, **_LARGE),
     Parameter("ratio", "inertia ratio C / A", "C/A", default=0.5, minimum=0.0, open_minimum=True, maximum=2.0,
               when=_SCALED, number_option=True),
 )  # fmt: skip
-OPTIONS = (Option("sign", ("1", "-1"), "sign of k = epsilon A (A - C)", only_with="l"),)
+OPTIONS = (
+    Option("sign", ("1", "-1"), "sign of k = epsilon A (A - C)", only_with="l"),
+    Option("motion", ("at_t",), "with t: u, psi and phi at t, too", only_with="t"),
+)
 
 _TURNS = "off separatrices; at verdict 0 the period is infinite"
 
@@ -81,7 +87,11 @@ def _outputs(when, dims):
     )
 
 
+_ANGLE = {"units": "rad", "when": _MOTION, "applies": f"{_TURNS}; without the jumps of pi in passing a pole"}
 OUTPUTS = (
+    Output("u", "u = cos theta at t", "u", when=_MOTION, applies=_TURNS),
+    Output("psi", "angle of precession at t, 0 at first, unwrapped", r"\psi", **_ANGLE),
+    Output("phi", "angle of spin at t, 0 at first, unwrapped", r"\varphi", **_ANGLE),
     *_outputs(_STATE, ()),
     *_outputs(_SCALED, ("well",)),
     Output("separatrix_distance", "L less its value on the separatrix at the same p_psi, p_phi, over |k|", r"\Delta l",
@@ -100,40 +110,63 @@ def cost(options, sizes):
 def solve(point, request):
     """All outputs of a block (see `survey.scenes`)."""
     method = load(methods, "agm" if request.method == "auto" else request.method, "method")
-    names = [p.name for p in PARAMETERS if p.name in point]
-    arrays = np.broadcast_arrays(*(np.asarray(point[name], dtype=float) for name in names))
-    given = dict(zip(names, (array.ravel() for array in arrays), strict=True))
+    shared = {p.name: point[p.name] for p in PARAMETERS if p.name in point and p.name != "t"}
+    block = Rows(tuple(shared.values()), *([point["t"]] if "t" in point else []))
+    given = {name: block.per_row(values) for name, values in shared.items()}
     valid = np.isfinite(np.column_stack(list(given.values()))).all(axis=1)
     if "l" in given:
         out = _scaled(given, valid, int(request.options["sign"]), method, request.rtol)
     else:
-        out = _state(given, valid & (given["C"] <= 2.0 * given["A"]), method, request.rtol)
-    return {name: values.reshape(arrays[0].shape + values.shape[1:]) for name, values in out.items()}
+        times = block.per_point(point["t"]) if "t" in point else None
+        out = _state(given, valid & (given["C"] <= 2.0 * given["A"]), method, request.rtol, times)
+    return {name: _back(block, values) for name, values in out.items()}
 
 
-def _state(given, valid, method, rtol):
+def _back(block, values):
+    """Values per row, per row and time, or (rows, 1, wells), in the block's shape."""
+    if values.ndim == 3:
+        return np.stack([block.back(values[..., i]) for i in range(values.shape[-1])], axis=-1)
+    return block.back(values.reshape(block.rows, -1))
+
+
+def _state(given, valid, method, rtol, times):
     points = np.column_stack([given[p.name] for p in PARAMETERS[:7]])
-    points[~valid] = (1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0)
-    rows, kinds, count, heights = nutation.of_states(points)
-    a, c = points[:, 0], points[:, 1]
+    points[~valid] = _HARMLESS
+    rows, kinds, count, heights, starts = nutation.of_states(points)
     valid &= kinds != nu.LOST
-    out, kinds = nutation.solve(method, rows, kinds, a, points[:, 6] * ((a - c) / (a * c)), rtol)
+    a, c = points[:, 0], points[:, 1]
+    drift = points[:, 6] * ((a - c) / (a * c))
+    periods, kinds = nutation.periods(method, rows, kinds, rtol)
+    out = nutation.outputs(rows, periods, a, drift)
     out["verdict"] = nutation.verdicts(rows, kinds)
     status = np.where(kinds == nu.LOST, NO_CONVERGENCE, OK)
-    return _finished(out, status, valid, count, heights)
+    out = _finished(out, status, valid, count, heights)
+    return _with_motion(out, valid, kinds, times, lambda at: nutation.motions(
+        method, rows, kinds, starts, periods, at, a, drift)) if times is not None else out  # fmt: skip
+
+
+def _with_motion(out, valid, kinds, times, motions):
+    """`out` at each of the times, with u, psi and phi there."""
+    good = np.isfinite(times)
+    at_t = motions(np.where(good, times, 0.0))
+    lost = (kinds >= nu.NUTATION)[:, None] & np.isnan(at_t["u"])
+    out = {name: np.repeat(values[:, None], times.shape[1], axis=1) for name, values in out.items()} | at_t
+    out["status"] = np.where(good, np.where(valid[:, None] & lost, NO_CONVERGENCE, out["status"]), INVALID_PARAMETERS)
+    return _emptied(out, out["status"] == INVALID_PARAMETERS)
 
 
 def _scaled(given, valid, sign, method, rtol):
     points = np.column_stack([given["l"], given["alpha"], given["beta"]])
     points[~valid] = 1.0
     rows, kinds, count, heights = nutation.of_integrals(points, sign)
-    drift = np.repeat(points[:, 1] * (1.0 / np.where(valid, given["ratio"], 1.0) - 1.0), 2)
-    flat, known = nutation.solve(
-        method, rows.reshape(-1, nu.SIZE), kinds.ravel(), np.ones(2 * len(points)), drift, rtol
-    )
-    out, known = {name: values.reshape(-1, 2) for name, values in flat.items()}, known.reshape(-1, 2)
+    ratio = np.where(valid, given["ratio"], 1.0)
+    drift = np.repeat(points[:, 1] * ((1.0 - ratio) / ratio), 2)
+    flat = np.ascontiguousarray(rows.reshape(-1, nu.SIZE))
+    periods, known = nutation.periods(method, flat, kinds.ravel(), rtol)
+    out = nutation.outputs(flat, periods, 1.0, drift)
+    out, known = {name: values.reshape(-1, 1, 2) for name, values in out.items()}, known.reshape(-1, 2)
     lost = (known == nu.LOST).any(axis=1)
-    out["verdict"] = np.where(lost, nutation.UNDECIDED, nutation.verdicts(rows, known).max(axis=1))
+    out["verdict"] = nutation.verdicts(rows, known).max(axis=1)
     status = np.where(lost, NO_CONVERGENCE, np.where((known == nu.NONE).all(axis=1), _NO_MOTION, OK))
     return _finished(out, status, valid, count, heights)
 
@@ -143,9 +176,14 @@ def _finished(out, status, valid, count, heights):
     out["separatrix_distance"], out["separatrix_distance_error"] = nutation.distance(heights)
     out["wells"] = count
     out["status"] = np.where(valid, status, INVALID_PARAMETERS)
-    for name, values in out.items():
+    return _emptied(out, ~valid)
+
+
+def _emptied(out, where):
+    """`out` with nothing at the points `where`, and a verdict only where the status is ok."""
+    for values in out.values():
         if values.dtype.kind == "f":
-            values[~valid] = np.nan
+            values[where] = np.nan
     out["verdict"] = np.where(out["status"] == OK, out["verdict"], nutation.UNDECIDED)
-    out["wells"] = np.where(valid, out["wells"], -1)
+    out["wells"] = np.where(where, -1, out["wells"])
     return out
