@@ -1,7 +1,7 @@
-"""The wells of A^2 u'^2 = P(u) = (1 - u^2)(L + k u^2) - (a^2 + b^2 - 2 a b u), |u| <= 1: turning points and what follows.
+"""The wells of A^2 u'^2 = P(u) = (1 - u^2)(L + k u^2) - (a^2 + b^2 - 2 a b u), |u| <= 1: their turning points.
 
 Everything that may cancel is done in double-double: the polynomial about u = 0 and about the poles, v = 1 - u and
-w = 1 + u, its roots, and its factor Q where P = (u - ul)(uh - u) Q, Q = k u^2 + k S u + q0, S = ul + uh. A row of a well
+w = 1 + u, its roots, and its factor Q where P = (u - ul)(uh - u) Q, Q = k u^2 + k S u + q0, S = ul + uh. A well's row
 then holds float64 numbers that are right to the last digits. Equation numbers: `scenes/brun.md`.
 """
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from survey.kernels import double as dd
 from survey.kernels.jit import inline, kernel
-from survey.kernels.quartic import UNIT, root, slope, slopes, value
+from survey.kernels.quartic import ROUGH, UNIT, root, roughly, slope, slopes, value
 from survey.kernels.sines import sin_cos
 
 # places in a row: turning points (1 - u and 1 + u of each), Q there and at the poles, b - a and b + a, the rest of P
@@ -134,22 +134,22 @@ def peak(c, y, at):
     """
     if y == 0.0:
         return y, at, 4.0 * UNIT * (abs(c[4][0]) + abs(c[2][0]))
-    level, size = value(c, (y, 0.0))
+    height, size = roughly(c, y)
     _first, second = slopes(c, y)
-    if level[0] < 1e-14 * size and second < 0.0:
+    if height < ROUGH * size and second < 0.0:
         move = slope(c, (y, 0.0))[0] / second
         if abs(move) < 1e-3 * y:
             y -= move
-            level, size = value(c, (y, 0.0))
-    return y, level[0], 4.0 * UNIT * size
+            height, size = roughly(c, y)
+    return y, height, 4.0 * UNIT * size
 
 
 @inline
 def beyond(gap, at, inside, inside_far, near, far, equator):
     """(distance from the pole, from the other pole, bar) of the turning point on that side of `inside`.
 
-    `near` and `far` are P about the pole and about the other one (`inside_far` from there), `gap` = b -+ a, `equator` is
-    P(0): the turning point is found from the pole of its own hemisphere.
+    `near` and `far` are P about the pole and about the other one (`inside_far` from there), `gap` = b -+ a, `equator`
+    = P(0): the turning point is found from the pole of its own hemisphere.
     """
     two = (2.0, 0.0)
     if inside > 1.0 and equator <= 0.0:
@@ -238,8 +238,8 @@ def above(row, g):
 def find(a, b, k, level, at_plus, at_minus, rows, kinds):
     """Fill `rows` (2, SIZE) and `kinds` (2) with the wells, lower u first; returns (L above the separatrix, its bar).
 
-    NaN where there is no separatrix at these a and b. Kinds: NUTATION, PRECESSION (the turning points coincide), PASSAGE
-    (through a pole), SEPARATRIX (within the error), NONE.
+    NaN where there is no separatrix at these a and b. Kinds: NUTATION, PRECESSION (the turning points coincide),
+    PASSAGE (through a pole), SEPARATRIX (within the error), NONE.
     """
     kinds[0] = kinds[1] = NONE
     gaps, ats = (dd.two_sum(b, -a), dd.two_sum(b, a)), (at_plus, at_minus)
@@ -306,7 +306,7 @@ def find(a, b, k, level, at_plus, at_minus, rows, kinds):
 
 @inline
 def phase(row, theta, p_theta, start):
-    """start = (u0 - ul)/(uh - ul), 1 - that, and the sign of u'; the smaller part from P(u0) = (sin theta p_theta)^2."""
+    """start = (u0 - ul)/(uh - ul), 1 - that, the sign of u'; the smaller from P(u0) = (sin theta p_theta)^2."""
     sine, cosine = sin(0.5 * theta), cos(0.5 * theta)
     v, w = 2.0 * sine * sine, 2.0 * cosine * cosine
     width = row[WIDTH]
@@ -352,7 +352,7 @@ def of_states(points, rows, kinds, count, heights, starts):
 
 @kernel
 def of_integrals(points, sign, rows, kinds, heights):
-    """The wells at (l, alpha, beta), in units where A = 1 and k = `sign`: as `of_states`, rows (n, 2, SIZE), kinds (n, 2)."""
+    """As `of_states`, at (l, alpha, beta), where A = 1 and k = `sign`: both wells, rows (n, 2, SIZE), kinds (n, 2)."""
     k = (sign, 0.0)
     for i in range(len(points)):
         level, a, b = points[i]

@@ -51,8 +51,8 @@ def place(row, low, high, roots, out):
 
 
 @inline
-def angles(row, tau, half, up, down, at):
-    """(b - a) G- / 2 and (b + a) G+ / 2 at the time tau in [0, half] since u = ul, up and down being those at `half`."""
+def angles(row, tau, half, down, at):
+    """(b - a) G- / 2 and (b + a) G+ / 2 at the time tau in [0, half] since u = ul; `down` is the latter at `half`."""
     width, s = row[nu.WIDTH], row[nu.MIDDLE]
     first = second = 0.0
     if row[nu.MINUS] != 0.0:
@@ -83,7 +83,7 @@ def motion(cosine, row, start, period, times, out):
     low, high = left / (done + left), done / (done + left)
     z0 = first_kind(low, high, kc) if high <= low else 2.0 * quarter - first_kind(high, low, kc)
     place(row, low, high, roots, at)
-    first, second = angles(row, z0 / rate, half, up, down, at)
+    first, second = angles(row, z0 / rate, half, down, at)
     base_up, base_down = start[2] * first, start[2] * second
     z0 *= start[2]
     relative = period[4] / period[0]
@@ -96,7 +96,7 @@ def motion(cosine, row, start, period, times, out):
         z = min(abs(z), 2.0 * quarter)
         low, high = cosine(z, kc, quarter, pairs, last)
         place(row, low, high, roots, at)
-        first, second = angles(row, z / rate, half, up, down, at)
+        first, second = angles(row, z / rate, half, down, at)
         first, second = side * first - base_up, side * second - base_down
         all_up, all_down = first + 2.0 * n * up, second + 2.0 * n * down
         late = (relative + 4.0 * EPS) * abs(times[j]) + (16.0 * EPS + relative) * (1.0 + quarter) / rate

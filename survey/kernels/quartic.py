@@ -7,7 +7,10 @@ from survey.kernels.jit import inline, kernel
 
 UNIT = 2.0**-98  # of the sum of |terms|: the rounding of a value, the coefficients' own included
 STEPS = 200
-SAME = 1e-10  # steps that are smaller, relative, need no bracket
+ROUGH = 1e-14  # relative: below, float64 has no digits of a sum left
+SAME = 1e-8  # steps that are smaller, relative, need no bracket
+CLOSE = 1e-15  # and these are the last in float64
+FINE = 8
 
 
 @kernel
@@ -18,6 +21,19 @@ def value(c, y):
         r = add(mul(r, y), c[3 - i])
         size = size * abs(y[0]) + abs(c[3 - i][0])
     return r, size
+
+
+@inline
+def roughly(c, y):
+    """c(y) to a few digits at least, and the sum of |terms|: in float64 where that has them."""
+    c0, c1, c2, c3, c4 = c[0][0], c[1][0], c[2][0], c[3][0], c[4][0]
+    r = c0 + y * (c1 + y * (c2 + y * (c3 + y * c4)))
+    x = abs(y)
+    size = abs(c0) + x * (abs(c1) + x * (abs(c2) + x * (abs(c3) + x * abs(c4))))
+    if abs(r) > ROUGH * size:
+        return r, size
+    fine, _size = value(c, (y, 0.0))
+    return fine[0], size
 
 
 @inline
@@ -61,32 +77,39 @@ def root(c, inside, outside):
     Newton's method between brackets, from the nearer of the zeros of the parabolas at the ends.
     """
     side, room = (1.0, outside - inside) if outside > inside else (-1.0, inside - outside)
-    high, _size = value(c, (inside, 0.0))
-    low, _size = value(c, (outside, 0.0))
+    high, _size = roughly(c, inside)
+    low, _size = roughly(c, outside)
     first, second = slopes(c, inside)
-    from_inside = near(high[0], first, second, side, room)
+    from_inside = near(high, first, second, side, room)
     first, second = slopes(c, outside)
-    from_outside = near(low[0], first, second, -side, room)
+    from_outside = near(low, first, second, -side, room)
     y = inside + side * room * from_inside if from_inside < from_outside else outside - side * room * from_outside
-    y = (y if y != inside else 0.5 * (inside + outside), 0.0)
+    y = y if y != inside else 0.5 * (inside + outside)
     for _ in range(STEPS):
-        level, size = value(c, y)
-        first, second = slopes(c, y[0])
-        if level[0] > 0.0:
-            inside = y[0]
+        height, _size = roughly(c, y)
+        first, second = slopes(c, y)
+        if height > 0.0:
+            inside = y
         else:
-            outside = y[0]
-        move = level[0] / first
-        new = y[0] - move
-        if abs(move) > SAME * abs(y[0]) and not (min(inside, outside) < new < max(inside, outside)):
-            middle = 0.5 * (inside + outside)
-            if middle == inside or middle == outside:
+            outside = y
+        move = height / first
+        new = y - move
+        if abs(move) > SAME * abs(y) and not (min(inside, outside) < new < max(inside, outside)):
+            new = 0.5 * (inside + outside)
+            if new == inside or new == outside:
                 break
-            y = (middle, 0.0)
-            continue
-        y = add(y, (-move, 0.0))
-        if abs(move * move * second) <= UNIT * abs(y[0] * first) or abs(level[0]) <= 0.01 * UNIT * size:
+        elif abs(move) <= CLOSE * abs(y) or new == y:
+            y = new
             break
-    level, size = value(c, y)
-    first, second = slopes(c, y[0])
-    return y, 2.0 * UNIT * (size / abs(first) + abs(y[0])) if first != 0.0 else 1.0
+        y = new
+    pair, size = (y, 0.0), 0.0
+    for _ in range(FINE):
+        fine, size = value(c, pair)
+        first, second = slopes(c, pair[0])
+        move = fine[0] / first
+        if not abs(move) < SAME * abs(pair[0]):
+            break
+        pair = add(pair, (-move, 0.0))
+        if abs(move * move * second) <= UNIT * abs(pair[0] * first):
+            break
+    return pair, 2.0 * UNIT * (size / abs(first) + abs(pair[0])) if first != 0.0 else 1.0

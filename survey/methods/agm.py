@@ -77,14 +77,14 @@ def periods_of(row, out):
     period = 2.0 * pi / middle
     incline = 2.0 * k * row[nu.SUM] / (root_low + root_high)
     bend = 0.5 * k * row[nu.BEND] / above
-    turns_up, up, size_up = advance(
-        row[nu.MINUS], row[nu.HIGH_PLUS], row[nu.LOW_PLUS], width, root_high, root_low, incline, row[nu.Q_PLUS], bend,
-        period, x, y,
-    )  # fmt: skip
+    minus, plus = (
+        (row[nu.MINUS], row[nu.HIGH_PLUS], row[nu.LOW_PLUS]),
+        (row[nu.PLUS], row[nu.LOW_MINUS], row[nu.HIGH_MINUS]),
+    )
+    turns_up, up, size_up = advance(*minus, width, root_high, root_low, incline, row[nu.Q_PLUS], bend, period, x, y)
     turns_down, down, size_down = advance(
-        row[nu.PLUS], row[nu.LOW_MINUS], row[nu.HIGH_MINUS], width, root_low, root_high, -incline, row[nu.Q_MINUS], bend,
-        period, x, y,
-    )  # fmt: skip
+        *plus, width, root_low, root_high, -incline, row[nu.Q_MINUS], bend, period, x, y
+    )
     noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + (row[nu.NOISE_BEND] if row[nu.MIDDLE] < 0.0 else 0.0)
     out[0], out[4] = period, (12.0 * EPS + noise) * period
     precession, spin = pi * (turns_down + turns_up), pi * (turns_down - turns_up)

@@ -37,7 +37,7 @@ def second_kind(first, y, z, g):
 @inline
 def periods_of(row, out):
     """See `agm.periods_of`."""
-    width, k, s = row[nu.WIDTH], row[nu.K], row[nu.MIDDLE]
+    width, s = row[nu.WIDTH], row[nu.MIDDLE]
     low, high = row[nu.Q_LOW], row[nu.Q_HIGH]
     g = sqrt(low) * sqrt(high)
     time = rf(0.0, s, g)

@@ -1,7 +1,8 @@
 """Gauss-Chebyshev quadrature of nutations between their turning points, u = middle + half width cos x.
 
-The nearest singularities (the other roots of P, the poles) tell how many nodes are needed. Domain: away from separatrices and near passages of poles, where it
-needs many nodes; `no_convergence` beyond MOST. The independent check.
+The nearest singularities (the other roots of P, the poles) tell how many nodes are needed. Domain: away from
+separatrices and near passages of poles, where it needs many nodes; `no_convergence` beyond MOST, and in time beyond
+LONGEST. The independent check.
 
 Source: DLMF 3.5(v); integrals (S3), (S4), (S15) of `scenes/brun.md`.
 """

@@ -1,4 +1,4 @@
-"""Rotation of an axisymmetric body (A = B, any C) about its fixed centre of mass in a far Newtonian field (Brun, Clebsch).
+"""Rotation of an axisymmetric body (A = B) about its fixed centre of mass in a Newtonian field (Brun, Clebsch).
 
 With theta the angle between the axis and the direction of the attracting centre, u = cos theta, p_psi and p_phi
 conserved, k = epsilon A (A - C) and L = 2 A h - (A/C) p_phi^2 - epsilon A^2 + p_phi^2 (h the energy):
@@ -52,8 +52,10 @@ _LARGE = {"minimum": -1e25, "maximum": 1e25}  # products of four such numbers ar
 DIMENSIONS = {"well": np.array([1, 2])}
 
 PARAMETERS = (
-    Parameter("A", "equatorial moment of inertia A = B", "A", minimum=0.0, open_minimum=True, maximum=1e25, when=_STATE),
-    Parameter("C", "axial moment of inertia, at most 2 A", "C", minimum=0.0, open_minimum=True, maximum=2e25, when=_STATE),
+    Parameter("A", "equatorial moment of inertia A = B", "A", minimum=0.0, open_minimum=True, maximum=1e25,
+              when=_STATE),
+    Parameter("C", "axial moment of inertia, at most 2 A", "C", minimum=0.0, open_minimum=True, maximum=2e25,
+              when=_STATE),
     Parameter("epsilon", "strength of the field, 3 mu / R^3", r"\varepsilon", when=_STATE, **_LARGE),
     Parameter("theta0", "initial angle between the axis and the vertical", r"\theta_0", units="rad", minimum=0.0,
               maximum=pi, when=_STATE),

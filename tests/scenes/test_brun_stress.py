@@ -1,0 +1,44 @@
+"""Hard cases of every kind against 60 digits: errors within the bars, and near what half-ulp changes of the inputs do."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from brun_truth import HALF_ULP, NAMES, OUTPUTS, draw, truth
+from mpmath import mp, mpf
+
+import survey
+
+
+def evaluate(points, method="auto"):
+    arrays = {name: xr.DataArray(np.array(column), dims="point") for name, column in zip(NAMES, points.T, strict=True)}
+    return survey.evaluate("brun", method=method, **arrays)
+
+
+def misses(seed, number):
+    """Complaints: an error outside its bar, or above 100 times the floor (of a rounded output at least)."""
+    random = np.random.default_rng(seed)
+    kinds, points = zip(*(draw(random) for _ in range(number)), strict=True)
+    ds, told = evaluate(np.array(points)), []
+    for i, (kind, point) in enumerate(zip(kinds, points, strict=True)):
+        one = ds.isel(point=i)
+        if one.status != 0 or one.verdict == 0:
+            told.append((kind, point.tolist(), int(one.status), int(one.verdict)))
+            continue
+        exact, floor = truth(point)
+        for name, value, least in zip(OUTPUTS, exact, floor, strict=True):
+            error = abs(mpf(float(one[name])) - value)
+            if error > float(one[f"{name}_error"]) or error > 100 * max(least, HALF_ULP * abs(value)):
+                told.append((kind, name, point.tolist(), float(error), float(one[f"{name}_error"]), float(least)))
+    return told
+
+
+def test_hard_cases():
+    with mp.workdps(60):
+        assert misses(1, 200) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(2, 12))
+def test_many_hard_cases(seed):
+    with mp.workdps(60):
+        assert misses(seed, 1000) == []
