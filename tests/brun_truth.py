@@ -1,4 +1,6 @@
-"""Brun's problem in multiprecision: (S1)-(S6) of `survey/scenes/brun.md`, and what half an ulp of the inputs changes."""
+"""Brun's problem in multiprecision: (S1)-(S6) of `scenes/brun.md`, and what half an ulp of the inputs changes."""
+
+import warnings
 
 import numpy as np
 from mpmath import mp, mpf
@@ -23,14 +25,18 @@ def quartic(k, L, a, b):
 
 
 def turning_points(state):
-    """The real roots of P next to u0 on both sides."""
+    """The real roots of P next to u0 on both sides: the nearest is the lower one where P rises."""
     k, L, u = integrals(state)
     c = quartic(k, L, state[6], state[5])
     while c[0] == 0:
         c = c[1:]
-    roots = [r.real for r in mp.polyroots(c, maxsteps=400, extraprec=300) if abs(r.imag) < mpf(10) ** -35]
-    slack = mpf(10) ** -30
-    return max(r for r in roots if r <= u + slack), min(r for r in roots if r >= u - slack)
+    with warnings.catch_warnings():  # mpmath 1.4 asks for another order of coefficients, which 1.3 does not know
+        warnings.simplefilter("ignore")
+        roots = sorted(r.real for r in mp.polyroots(c, maxsteps=400, extraprec=300) if abs(r.imag) < mpf(10) ** -35)
+    near = min(roots, key=lambda r: abs(r - u))
+    at = roots.index(near)
+    slope = sum(n * x * near ** (n - 1) for n, x in enumerate(reversed(c)) if n)
+    return (near, roots[at + 1]) if slope > 0 else (roots[at - 1], near)
 
 
 def polished(state, ends):
@@ -40,7 +46,9 @@ def polished(state, ends):
     found = []
     for u in ends:
         for _ in range(12):
-            value, slope = mp.polyval(c, u, derivative=True)
+            value = slope = mpf(0)
+            for x in c:
+                value, slope = value * u + x, slope * u + value
             u -= value / slope
         found.append(u)
     return found

@@ -21,7 +21,8 @@ K, L, MINUS, PLUS, LEVEL = range(14, 19)  # k, L, b - a, b + a, L - (k ul uh + q
 BAR_LOW, BAR_HIGH, NOISE_LOW, NOISE_HIGH, NOISE_BEND = range(
     19, 24
 )  # of the turning points and, relative, of Q and BEND
-SIZE = 24
+REST = 24  # from here on what float64 leaves of each number
+SIZE = 2 * REST
 # kinds of wells
 NONE, LOST, SEPARATRIX, NUTATION, PRECESSION, PASSAGE = -2, -1, 0, 1, 2, 3
 NEWTON = 60
@@ -170,6 +171,17 @@ def hill_at_pole(gap, product, k, at):
 
 
 @inline
+def put(row, place, pair):
+    row[place], row[place + REST] = pair
+
+
+@inline
+def pair(row, place):
+    """A number of the row with all its digits."""
+    return row[place], row[place + REST]
+
+
+@inline
 def fill(gaps, k, level, ats, right, left, row):
     """A row from the turning points, each (distance from its pole, from the other pole, bar)."""
     minus, plus = gaps
@@ -182,20 +194,28 @@ def fill(gaps, k, level, ats, right, left, row):
     product, square = dd.mul(ul, uh), dd.mul(total, total)
     q0 = dd.add(dd.sub(level, k), dd.mul(k, dd.sub(square, product)))
     width = dd.sub(vl, v)[0] if vl[0] < 1.0 else dd.sub(wh, w)[0]
-    row[LOW], row[HIGH], row[WIDTH], row[SUM] = ul[0], uh[0], max(width, 0.0), total[0]
-    row[LOW_PLUS], row[LOW_MINUS], row[HIGH_PLUS], row[HIGH_MINUS] = vl[0], w[0], v[0], wh[0]
+    row[LOW], row[HIGH], row[WIDTH] = ul[0], uh[0], max(width, 0.0)
+    put(row, SUM, total)
+    put(row, LOW_PLUS, vl)
+    put(row, LOW_MINUS, w)
+    put(row, HIGH_PLUS, v)
+    put(row, HIGH_MINUS, wh)
     row[BAR_HIGH], row[BAR_LOW] = bar_v + EPS * abs(uh[0]), bar_w + EPS * abs(ul[0])
-    row[K], row[L], row[MINUS], row[PLUS] = k[0], level[0], minus[0], plus[0]
-    row[MIDDLE] = dd.add(dd.sub(level, k), dd.times(dd.mul(k, square), 1.5))[0]
-    row[BEND] = dd.sub(dd.times(q0, 4.0), dd.mul(k, square))[0]
+    put(row, K, k)
+    put(row, L, level)
+    put(row, MINUS, minus)
+    put(row, PLUS, plus)
+    bow = dd.mul(k, square)
+    put(row, MIDDLE, dd.add(dd.sub(level, k), dd.times(bow, 1.5)))
+    put(row, BEND, dd.sub(dd.times(q0, 4.0), bow))
     row[LEVEL] = dd.sub(level, dd.times(dd.add(dd.mul(k, product), q0), 0.5))[0]
     # Q about the poles: P's slope there is 2 (L + k -+ a b)
     tilt_plus = dd.neg(dd.mul(k, dd.add(two, total)))
     tilt_minus = dd.mul(k, dd.sub(total, two))
     q_plus = dd.div(dd.add(dd.times(ats[0], 2.0), dd.mul(dd.mul(v, vl), tilt_plus)), dd.add(v, vl))
     q_minus = dd.div(dd.add(dd.times(ats[1], 2.0), dd.mul(dd.mul(w, wh), tilt_minus)), dd.add(w, wh))
-    row[Q_HIGH] = beside(q_plus, tilt_plus, k, v) if uh[0] >= 0.0 else beside(q_minus, tilt_minus, k, wh)
-    row[Q_LOW] = beside(q_plus, tilt_plus, k, vl) if ul[0] >= 0.0 else beside(q_minus, tilt_minus, k, w)
+    put(row, Q_HIGH, beside(q_plus, tilt_plus, k, v) if uh[0] >= 0.0 else beside(q_minus, tilt_minus, k, wh))
+    put(row, Q_LOW, beside(q_plus, tilt_plus, k, vl) if ul[0] >= 0.0 else beside(q_minus, tilt_minus, k, w))
     row[Q_PLUS] = q_plus[0] if minus[0] == 0.0 else minus[0] * minus[0] / (v[0] * vl[0])
     row[Q_MINUS] = q_minus[0] if plus[0] == 0.0 else plus[0] * plus[0] / (w[0] * wh[0])
     # errors: of Q, what the pole's slope and the turning points leave
@@ -212,7 +232,7 @@ def fill(gaps, k, level, ats, right, left, row):
 @inline
 def beside(q, tilt, k, y):
     """Q at y from a pole, from its value and slope there."""
-    return dd.add(q, dd.mul(y, dd.add(tilt, dd.mul(k, y))))[0]
+    return dd.add(q, dd.mul(y, dd.add(tilt, dd.mul(k, y))))
 
 
 @inline

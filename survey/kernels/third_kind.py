@@ -7,10 +7,12 @@ Source: DLMF 19.8(i), 19.22(ii).
 
 from math import sqrt
 
-from survey.kernels.jit import inline
+from survey.kernels import double as dd
+from survey.kernels.jit import inline, kernel
 
 MEANS = 60
 SMALL = 1e-17
+TINIEST = 1e-34
 
 
 @inline
@@ -48,3 +50,28 @@ def third(x, y, square):
         p = 0.5 * size / p
         x, y = 0.5 * (x + y), sqrt(xy)
     return total
+
+
+@kernel
+def third_double(x, y, square):
+    """R and the mean, as `third` and `mean`, of pairs in double-double."""
+    xy = dd.mul(x, y)
+    low = square[0] < xy[0]
+    if low:
+        square = dd.mul(xy, dd.div(xy, square))
+    p, weight, total, going = dd.sqrt(square), (1.0, 0.0), (0.0, 0.0), True
+    for _ in range(MEANS):
+        if going:
+            squared = dd.mul(p, p)
+            size = dd.add(squared, xy)
+            e = dd.div(dd.sub(squared, xy), size)
+            total = dd.add(total, dd.mul(weight, dd.div(dd.times(xy, 2.0), size)) if low else weight)
+            weight = dd.times(dd.mul(weight, e), 0.5)
+            p = dd.div(size, dd.times(p, 2.0))
+            going = abs(weight[0]) > TINIEST * total[0]
+        near = abs(x[0] - y[0]) <= SMALL * x[0]
+        x, y = dd.times(dd.add(x, y), 0.5), dd.sqrt(xy)
+        if near and not going:
+            break
+        xy = dd.mul(x, y)
+    return total, dd.times(dd.add(x, y), 0.5)

@@ -9,17 +9,20 @@ from math import copysign, pi, sqrt
 
 import numpy as np
 
+from survey.kernels import double as dd
 from survey.kernels import nutation as nu
 from survey.kernels.elliptic import jacobi
 from survey.kernels.jit import inline, kernel
 from survey.kernels.nutation_time import motion
-from survey.kernels.third_kind import mean, third
+from survey.kernels.third_kind import mean, third, third_double
 
 ORDER = 0  # no steps
 SERVES = ("nutation",)
 EPS = nu.EPS
 NODES = 16
 _COSINES = np.cos((np.arange(NODES) + 0.5) * pi / NODES)
+CANCELLED = 0.02  # advances that are a smaller part of their terms are computed in double-double
+FINE = 2.0**-94
 SLANT = 0.25  # where the line through the roots of Q is lower at the pole, relative, pi is not split off
 
 
@@ -43,6 +46,35 @@ def advance(gap, near, far, width, root_near, root_far, incline, q, bend, period
     second = 0.25 * level * bend * ratio / q
     part = 0.5 * gap * period / line
     return copysign(1.0, gap), part * (incline + second), abs(part) * (abs(incline) + abs(second))
+
+
+@inline
+def fine_part(gap, near, far, root_near, root_far, incline, bend, x, y):
+    """What `advance` splits off pi, times 2 / T, and the mean of x and y: pairs, in double-double."""
+    line = dd.add(root_near, dd.mul(incline, near))
+    q = dd.div(dd.mul(gap, gap), dd.mul(near, far))
+    ratio = dd.div(y, line)
+    ratio, middle = third_double(x, y, dd.mul(q, dd.mul(ratio, ratio)))
+    level = dd.add(dd.mul(root_far, near), dd.mul(root_near, far))
+    second = dd.times(dd.div(dd.mul(dd.mul(level, bend), ratio), q), 0.25)
+    return dd.mul(dd.div(gap, line), dd.add(incline, second)), middle
+
+
+@kernel
+def fine_parts(row):
+    """The sum of the parts of both poles and their difference, where one of these is next to nothing (fast spin)."""
+    k, total, near, far = nu.pair(row, nu.K), nu.pair(row, nu.SUM), nu.pair(row, nu.Q_HIGH), nu.pair(row, nu.Q_LOW)
+    high, low = dd.sqrt(near), dd.sqrt(far)
+    g = dd.mul(high, low)
+    above = dd.add(nu.pair(row, nu.MIDDLE), g)
+    incline = dd.times(dd.div(dd.mul(k, total), dd.add(high, low)), 2.0)
+    bend = dd.times(dd.div(dd.mul(k, nu.pair(row, nu.BEND)), above), 0.5)
+    x, y = dd.sqrt(dd.times(above, 0.5)), dd.sqrt(g)
+    plus = nu.pair(row, nu.MINUS), nu.pair(row, nu.HIGH_PLUS), nu.pair(row, nu.LOW_PLUS)
+    minus = nu.pair(row, nu.PLUS), nu.pair(row, nu.LOW_MINUS), nu.pair(row, nu.HIGH_MINUS)
+    up, middle = fine_part(*plus, high, low, incline, bend, x, y)
+    down, middle = fine_part(*minus, low, high, dd.neg(incline), bend, x, y)
+    return dd.add(down, up)[0] * (pi / middle[0]), dd.sub(down, up)[0] * (pi / middle[0])
 
 
 @inline
@@ -77,20 +109,24 @@ def periods_of(row, out):
     period = 2.0 * pi / middle
     incline = 2.0 * k * row[nu.SUM] / (root_low + root_high)
     bend = 0.5 * k * row[nu.BEND] / above
-    minus, plus = (
-        (row[nu.MINUS], row[nu.HIGH_PLUS], row[nu.LOW_PLUS]),
-        (row[nu.PLUS], row[nu.LOW_MINUS], row[nu.HIGH_MINUS]),
-    )
-    turns_up, up, size_up = advance(*minus, width, root_high, root_low, incline, row[nu.Q_PLUS], bend, period, x, y)
+    plus = row[nu.MINUS], row[nu.HIGH_PLUS], row[nu.LOW_PLUS]  # what the pole u = 1 asks for
+    minus = row[nu.PLUS], row[nu.LOW_MINUS], row[nu.HIGH_MINUS]
+    turns_up, up, size_up = advance(*plus, width, root_high, root_low, incline, row[nu.Q_PLUS], bend, period, x, y)
     turns_down, down, size_down = advance(
-        *plus, width, root_low, root_high, -incline, row[nu.Q_MINUS], bend, period, x, y
+        *minus, width, root_low, root_high, -incline, row[nu.Q_MINUS], bend, period, x, y
     )
     noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + (row[nu.NOISE_BEND] if row[nu.MIDDLE] < 0.0 else 0.0)
     out[0], out[4] = period, (12.0 * EPS + noise) * period
-    precession, spin = pi * (turns_down + turns_up), pi * (turns_down - turns_up)
-    out[1], out[2] = precession + (down + up), spin + (down - up)
-    error = (24.0 * EPS + 4.0 * noise) * (size_up + size_down)
-    out[5], out[6] = error + 2.0 * EPS * abs(precession), error + 2.0 * EPS * abs(spin)
+    total, difference, size = down + up, down - up, size_up + size_down
+    error, rounding = (24.0 * EPS + 4.0 * noise) * size, 2.0 * EPS
+    cancelled = min(abs(total), abs(difference)) < CANCELLED * size
+    if cancelled and turns_up * turns_down != 0.0 and row[nu.MIDDLE] > 0.0:
+        total, difference = fine_parts(row)
+        error, rounding = (FINE + 4.0 * noise) * size, 12.0 * EPS
+    out[1], out[2] = pi * (turns_down + turns_up) + total, pi * (turns_down - turns_up) + difference
+    turned = 2.0 * EPS * pi
+    out[5] = error + rounding * abs(total) + turned * abs(turns_down + turns_up)
+    out[6] = error + rounding * abs(difference) + turned * abs(turns_down - turns_up)
     up, down = row[nu.MINUS] * (pi * turns_up + up), row[nu.PLUS] * (pi * turns_down + down)
     rest = 0.5 * (0.5 * above - series)
     out[3] = (period * (row[nu.LEVEL] + rest) - up - down) / (2.0 * pi)

@@ -1,4 +1,4 @@
-"""Hard cases of every kind against 60 digits: errors within the bars, and near what half-ulp changes of the inputs do."""
+"""Hard cases of every kind against 60 digits: errors within the bars, and near what half-ulp changes of inputs do."""
 
 import numpy as np
 import pytest
