@@ -26,6 +26,7 @@ SIZE = 2 * REST
 # kinds of wells
 NONE, LOST, SEPARATRIX, NUTATION, PRECESSION, PASSAGE = -2, -1, 0, 1, 2, 3
 NEWTON = 60
+LOST_DIGITS = 1e-18
 EPS = 2.0**-53
 TINY = 1e-300
 
@@ -182,7 +183,7 @@ def pair(row, place):
 
 
 @inline
-def fill(gaps, k, level, ats, right, left, row):
+def fill(gaps, k, level, ats, equatorial, right, left, row):
     """A row from the turning points, each (distance from its pole, from the other pole, bar)."""
     minus, plus = gaps
     v, wh, bar_v = right
@@ -212,8 +213,13 @@ def fill(gaps, k, level, ats, right, left, row):
     # Q about the poles: P's slope there is 2 (L + k -+ a b)
     tilt_plus = dd.neg(dd.mul(k, dd.add(two, total)))
     tilt_minus = dd.mul(k, dd.sub(total, two))
-    q_plus = dd.div(dd.add(dd.times(ats[0], 2.0), dd.mul(dd.mul(v, vl), tilt_plus)), dd.add(v, vl))
-    q_minus = dd.div(dd.add(dd.times(ats[1], 2.0), dd.mul(dd.mul(w, wh), tilt_minus)), dd.add(w, wh))
+    at_pole = dd.add(k, q0)  # a double root at a pole
+    q_plus, q_minus = dd.add(at_pole, dd.mul(k, total)), dd.sub(at_pole, dd.mul(k, total))
+    from_plus, from_minus = dd.add(v, vl), dd.add(w, wh)
+    if from_plus[0] > 0.0:
+        q_plus = dd.div(dd.add(dd.times(ats[0], 2.0), dd.mul(dd.mul(v, vl), tilt_plus)), from_plus)
+    if from_minus[0] > 0.0:
+        q_minus = dd.div(dd.add(dd.times(ats[1], 2.0), dd.mul(dd.mul(w, wh), tilt_minus)), from_minus)
     put(row, Q_HIGH, beside(q_plus, tilt_plus, k, v) if uh[0] >= 0.0 else beside(q_minus, tilt_minus, k, wh))
     put(row, Q_LOW, beside(q_plus, tilt_plus, k, vl) if ul[0] >= 0.0 else beside(q_minus, tilt_minus, k, w))
     row[Q_PLUS] = q_plus[0] if minus[0] == 0.0 else minus[0] * minus[0] / (v[0] * vl[0])
@@ -221,11 +227,14 @@ def fill(gaps, k, level, ats, right, left, row):
     # errors: of Q, what the pole's slope and the turning points leave
     bar = bar_v + bar_w
     moved = abs(k[0]) * (bar + 16.0 * UNIT)
-    plus_side = (8.0 * UNIT * abs(ats[0][0]) + (abs(row[Q_PLUS]) + 4.0 * abs(k[0])) * bar) / (v[0] + vl[0])
-    minus_side = (8.0 * UNIT * abs(ats[1][0]) + (abs(row[Q_MINUS]) + 4.0 * abs(k[0])) * bar) / (w[0] + wh[0])
-    plus_side, minus_side = plus_side + 8.0 * moved * (v[0] + vl[0]), minus_side + 8.0 * moved * (w[0] + wh[0])
+    near, far = from_plus[0], from_minus[0]
+    plus_side = (8.0 * UNIT * abs(ats[0][0]) + (abs(row[Q_PLUS]) + 4.0 * abs(k[0])) * bar) / max(near, TINY)
+    minus_side = (8.0 * UNIT * abs(ats[1][0]) + (abs(row[Q_MINUS]) + 4.0 * abs(k[0])) * bar) / max(far, TINY)
+    plus_side, minus_side = plus_side + 8.0 * moved * near, minus_side + 8.0 * moved * far
     row[NOISE_HIGH] = (plus_side if uh[0] >= 0.0 else minus_side) / max(row[Q_HIGH], TINY)
     row[NOISE_LOW] = (plus_side if ul[0] >= 0.0 else minus_side) / max(row[Q_LOW], TINY)
+    beside_saddle(equatorial, uh, bar_v, -1.0, row, Q_HIGH, NOISE_HIGH)
+    beside_saddle(equatorial, ul, bar_w, 1.0, row, Q_LOW, NOISE_LOW)
     row[NOISE_BEND] = 8.0 * (moved + UNIT * (abs(level[0]) + abs(k[0]))) / max(abs(row[BEND]), TINY)
 
 
@@ -236,14 +245,27 @@ def beside(q, tilt, k, y):
 
 
 @inline
-def still(gaps, k, level, ats, y, plus, row):
+def beside_saddle(equatorial, u, bar, side, row, place, error):
+    """Q where digits of it were lost: P'/(uh - ul) at a turning point beside a saddle, from P about the equator."""
+    if row[error] < LOST_DIGITS or abs(u[0]) > 0.5 or row[WIDTH] < 1e-3:
+        return
+    steep = slope(equatorial, u)
+    _first, second = slopes(equatorial, u[0])
+    terms = abs(equatorial[1][0]) + abs(u[0]) * (2.0 * abs(equatorial[2][0]) + 4.0 * abs(equatorial[4][0]) * u[0] ** 2)
+    if side * steep[0] > 0.0:
+        put(row, place, dd.over(steep, side * row[WIDTH]))
+        row[error] = (4.0 * UNIT * terms + abs(second) * bar) / abs(steep[0]) + 2.0 * EPS
+
+
+@inline
+def still(gaps, k, level, ats, equatorial, y, plus, row):
     """A row of a regular precession at the distance y from the pole +1 (`plus`) or -1."""
     bar = EPS * y
     near, far = ((y, 0.0), dd.two_sum(2.0, -y), bar), (dd.two_sum(2.0, -y), (y, 0.0), bar)
     if plus:
-        fill(gaps, k, level, ats, near, far, row)
+        fill(gaps, k, level, ats, equatorial, near, far, row)
     else:
-        fill(gaps, k, level, ats, far, near, row)
+        fill(gaps, k, level, ats, equatorial, far, near, row)
     row[WIDTH] = 0.0
 
 
@@ -273,7 +295,8 @@ def find(a, b, k, level, at_plus, at_minus, rows, kinds):
         height, size = value(equatorial, (between, 0.0))
         rest = (1.0 - between) * (1.0 + between)
         distance = height[0] / rest
-        bar = 4.0 * UNIT * size + (8.0 * EPS * (size_k + a * a + b * b)) ** 2 / rise
+        rough = (abs(a) + abs(b * between)) * (abs(b) + abs(a * between)) + size_k * abs(between)
+        bar = 4.0 * UNIT * size + (8.0 * EPS * rough) ** 2 / rise  # the saddle's place is as good as F there
     elif size_k < 0.0:
         distance, bar = hill_at_pole(minus, product, size_k, at_plus[0])
         if bar == 0.0:
@@ -294,32 +317,41 @@ def find(a, b, k, level, at_plus, at_minus, rows, kinds):
         if bottom > murmur:
             left = beyond(plus, at_minus[0], w, 2.0 - w, antipolar, polar, -1.0)
             u, bar_u = root(equatorial, w - 1.0, between)
-            fill(gaps, k, level, ats, (dd.sub((1.0, 0.0), u), dd.add((1.0, 0.0), u), bar_u), left, rows[0])
+            fill(gaps, k, level, ats, equatorial, (dd.sub((1.0, 0.0), u), dd.add((1.0, 0.0), u), bar_u), left, rows[0])
             kinds[0] = PASSAGE if left[0][0] == 0.0 else NUTATION
             place = 1
         elif bottom >= -murmur:
-            still(gaps, k, level, ats, w, False, rows[0])
+            still(gaps, k, level, ats, equatorial, w, False, rows[0])
             kinds[0], place = PRECESSION, 1
         if top > hum:
             right = beyond(minus, at_plus[0], v, 2.0 - v, polar, antipolar, -1.0)
             u, bar_u = root(equatorial, 1.0 - v, between)
-            fill(gaps, k, level, ats, right, (dd.add((1.0, 0.0), u), dd.sub((1.0, 0.0), u), bar_u), rows[place])
+            fill(
+                gaps,
+                k,
+                level,
+                ats,
+                equatorial,
+                right,
+                (dd.add((1.0, 0.0), u), dd.sub((1.0, 0.0), u), bar_u),
+                rows[place],
+            )
             kinds[place] = PASSAGE if right[0][0] == 0.0 else NUTATION
         elif top >= -hum:
-            still(gaps, k, level, ats, v, True, rows[place])
+            still(gaps, k, level, ats, equatorial, v, True, rows[place])
             kinds[place] = PRECESSION
     elif max(top - hum, bottom - murmur) > 0.0:
         equator = equatorial[0][0]
         v, w = (v if v >= 0.0 else 2.0 - w), (w if w >= 0.0 else 2.0 - v)
         right = beyond(minus, at_plus[0], v, w, polar, antipolar, equator)
         left = beyond(plus, at_minus[0], w, v, antipolar, polar, equator)
-        fill(gaps, k, level, ats, right, left, rows[0])
+        fill(gaps, k, level, ats, equatorial, right, left, rows[0])
         kinds[0] = PASSAGE if right[0][0] == 0.0 or left[0][0] == 0.0 else NUTATION
     elif v >= 0.0 and top >= -hum:
-        still(gaps, k, level, ats, v, True, rows[0])
+        still(gaps, k, level, ats, equatorial, v, True, rows[0])
         kinds[0] = PRECESSION
     elif w >= 0.0 and bottom >= -murmur:
-        still(gaps, k, level, ats, w, False, rows[0])
+        still(gaps, k, level, ats, equatorial, w, False, rows[0])
         kinds[0] = PRECESSION
     return distance, bar
 

@@ -60,7 +60,7 @@ def near(level, first, second, side, room):
     below = level <= 0.0
     level, first, second = (-level, -first, -second) if below else (level, first, second)
     square = first * first - 2.0 * second * level
-    if square < 0.0 or room == 0.0:
+    if square < 0.0 or room == 0.0 or level == 0.0:
         return 1.0
     root = sqrt(square)
     if first > 0.0:

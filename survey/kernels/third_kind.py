@@ -31,7 +31,7 @@ def mean(x, y):
 
 @inline
 def third(x, y, square):
-    """R = 1 + e_0/2 (1 + e_1/2 (1 + ..)), e = (p^2 - x y)/(p^2 + x y), p^2 = `square`: all terms positive.
+    """R = 1 + e_0/2 (1 + e_1/2 (1 + ..)), e = (p^2 - x y)/(p^2 + x y), p^2 = `square`, without cancellation.
 
     Where p^2 < x y the sum that is complementary, with x^2 y^2 / p^2 for p^2.
     """
@@ -45,7 +45,7 @@ def third(x, y, square):
         e = (p - sqrt(xy)) * (p + sqrt(xy)) / size
         total += weight * (2.0 * xy / size if low else 1.0)
         weight *= 0.5 * e
-        if weight <= SMALL * total:
+        if abs(weight) <= SMALL * total:
             break
         p = 0.5 * size / p
         x, y = 0.5 * (x + y), sqrt(xy)

@@ -9,7 +9,7 @@ import numpy as np
 from survey.kernels import nutation as nu
 
 PERIOD, PRECESSION, SPIN, ACTION = range(4)
-TRUST = 1e-3  # relative errors beyond are no errors of first order
+TRUST = 0.03  # relative errors beyond are no errors of first order
 UNDECIDED = -1
 
 

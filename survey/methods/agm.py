@@ -81,6 +81,8 @@ def fine_parts(row):
 def smooth_action(row, root_low, root_high):
     """The action by Gauss-Chebyshev quadrature, or -1 where singularities are too near for its few nodes."""
     k, width, total, bend = row[nu.K], row[nu.WIDTH], row[nu.SUM], row[nu.BEND]
+    if width == 0.0:
+        return 0.0
     if min(row[nu.HIGH_PLUS], row[nu.LOW_MINUS]) < 0.5 * width:
         return -1.0
     if k * bend < 0.0:
