@@ -113,6 +113,20 @@ class Request:
         return self.lines.get(name)
 
 
+def condition(scene, when, own=""):
+    """When `own` exists, in words: `; only with l; only when question = fate | portrait`; or nothing."""
+    words, options = [], {option.name: option for option in scene.OPTIONS}
+    for name, allowed in when.items():
+        beside = options[name].only_with
+        if not any(allowed):
+            words.append(f"without {beside or name}")
+        elif beside and set(allowed) == set(options[name].choices):
+            words += [f"with {beside}"] * (beside != own)
+        else:
+            words.append(f"when {name} = {' | '.join(allowed)}")
+    return "".join(f"; only {word}" for word in words)
+
+
 def exists(item, options):
     """Does this parameter or output exist under these option values?"""
     return all(options.get(name, "") in allowed for name, allowed in item.when.items())

@@ -15,7 +15,7 @@ import survey.methods
 from survey import modules, own
 from survey.errors import BadInput
 from survey.grid import Grid, check_axis, coordinates
-from survey.scene import Request, exists
+from survey.scene import Request, condition, exists
 
 MOST = 10**8  # coordinates on one axis
 FINEST = 1e-6  # width of a cell as a fraction of its axis
@@ -256,12 +256,15 @@ def check_options(scene, given, parameters=(), table=""):
 
 def check_parameters(scene, name, options, given, table=""):
     """{name: Parameter} in use, given ones first; raises BadInput for one that is unknown, missing or said twice."""
-    known = {p.name: p for p in scene.PARAMETERS if exists(p, options)}
+    all_of = {p.name: p for p in scene.PARAMETERS}
+    known = {key: p for key, p in all_of.items() if exists(p, options)}
     replaced = {}
     for key in given:
         if key not in known:
             if key in {option.name for option in scene.OPTIONS}:
                 raise BadInput(f"{table}{key} is an option of {name}, not a parameter; put it under [options]")
+            if key in all_of:
+                raise BadInput(f"{table}{key} does not go with the rest{condition(scene, all_of[key].when, key)}")
             raise BadInput(f"{table}{key}: {modules.unknown(f'parameter of {name}', key, list(known))}")
         original = known[key].instead_of or key
         if original in replaced:

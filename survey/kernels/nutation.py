@@ -75,7 +75,7 @@ def torque(u, a, b, k):
     return value, -b * (b - a * u) - a * (a - b * u) + k * rest * (1.0 - 5.0 * u * u)
 
 
-@inline
+@kernel
 def saddle(a, b, k):
     """(u, F' there) of the greatest W between two least ones; F' = 0 where there is none. k > 0, |u| < 1/3."""
     if k <= 0.0:
@@ -98,7 +98,7 @@ def saddle(a, b, k):
     return (u, rise) if rise > 1e-12 * k and abs(u) < 0.4 else (0.0, 0.0)
 
 
-@inline
+@kernel
 def lowest(square, product, k, most):
     """The distance from the pole of the least W, between the pole and `most`: v^2 B(v) = (b - a)^2 (1 - v).
 
@@ -128,7 +128,7 @@ def lowest(square, product, k, most):
     return v
 
 
-@inline
+@kernel
 def peak(c, y, at):
     """(place, P, bound of its error) of the greatest P near y, which matters where it is next to nothing.
 
@@ -146,7 +146,7 @@ def peak(c, y, at):
     return y, height, 4.0 * UNIT * size
 
 
-@inline
+@kernel
 def beyond(gap, at, inside, inside_far, near, far, equator):
     """(distance from the pole, from the other pole, bar) of the turning point on that side of `inside`.
 
@@ -182,7 +182,7 @@ def pair(row, place):
     return row[place], row[place + REST]
 
 
-@inline
+@kernel
 def fill(gaps, k, level, ats, equatorial, right, left, row):
     """A row from the turning points, each (distance from its pole, from the other pole, bar)."""
     minus, plus = gaps
@@ -244,7 +244,7 @@ def beside(q, tilt, k, y):
     return dd.add(q, dd.mul(y, dd.add(tilt, dd.mul(k, y))))
 
 
-@inline
+@kernel
 def beside_saddle(equatorial, u, bar, side, row, place, error):
     """Q where digits of it were lost: P'/(uh - ul) at a turning point beside a saddle, from P about the equator."""
     if row[error] < LOST_DIGITS or abs(u[0]) > 0.5 or row[WIDTH] < 1e-3:
@@ -257,7 +257,7 @@ def beside_saddle(equatorial, u, bar, side, row, place, error):
         row[error] = (4.0 * UNIT * terms + abs(second) * bar) / abs(steep[0]) + 2.0 * EPS
 
 
-@inline
+@kernel
 def still(gaps, k, level, ats, equatorial, y, plus, row):
     """A row of a regular precession at the distance y from the pole +1 (`plus`) or -1."""
     bar = EPS * y
@@ -356,7 +356,7 @@ def find(a, b, k, level, at_plus, at_minus, rows, kinds):
     return distance, bar
 
 
-@inline
+@kernel
 def phase(row, theta, p_theta, start):
     """start = (u0 - ul)/(uh - ul), 1 - that, the sign of u'; the smaller from P(u0) = (sin theta p_theta)^2."""
     sine, cosine = sin(0.5 * theta), cos(0.5 * theta)
@@ -397,7 +397,8 @@ def of_states(points, rows, kinds, count, heights, starts):
         place = 1 if two[1] != NONE and u > 0.5 * (both[0, HIGH] + both[1, LOW]) else 0
         count[i] = (two[0] != NONE) + (two[1] != NONE) if two[0] != SEPARATRIX else -1
         kinds[i] = two[place] if two[place] != NONE else LOST
-        rows[i] = both[place]
+        for j in range(SIZE):
+            rows[i, j] = both[place, j]
         if kinds[i] >= NUTATION:
             phase(rows[i], theta, p_theta, starts[i])
 

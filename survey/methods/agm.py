@@ -26,7 +26,7 @@ FINE = 2.0**-94
 SLANT = 0.25  # where the line through the roots of Q is lower at the pole, relative, pi is not split off
 
 
-@inline
+@kernel
 def advance(gap, near, far, width, root_near, root_far, incline, q, bend, period, x, y):
     """(b -+ a) J/A, J the time integral of 1/(1 -+ u) over half a period (S11), (S13).
 
@@ -48,7 +48,7 @@ def advance(gap, near, far, width, root_near, root_far, incline, q, bend, period
     return copysign(1.0, gap), part * (incline + second), abs(part) * (abs(incline) + abs(second))
 
 
-@inline
+@kernel
 def fine_part(gap, near, far, root_near, root_far, incline, bend, x, y):
     """What `advance` splits off pi, times 2 / T, and the mean of x and y: pairs, in double-double."""
     line = dd.add(root_near, dd.mul(incline, near))
@@ -77,7 +77,7 @@ def fine_parts(row):
     return dd.add(down, up)[0] * (pi / middle[0]), dd.sub(down, up)[0] * (pi / middle[0])
 
 
-@inline
+@kernel
 def smooth_action(row, root_low, root_high):
     """The action by Gauss-Chebyshev quadrature, or -1 where singularities are too near for its few nodes."""
     k, width, total, bend = row[nu.K], row[nu.WIDTH], row[nu.SUM], row[nu.BEND]
