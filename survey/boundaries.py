@@ -17,31 +17,36 @@ RTOL = 1e-13
 MARGIN = 1e-3  # of an axis: how near curves come to a value that is no parameter, such as k = 1
 
 
-def find(workflow, each=None):
+def find(workflow, each=None, once=lambda name, make: make()):
     """The dataset of the workflow's edges, and of their curves where there are two axes.
 
-    `each(task, numbers, what)` calls the task for every number, in any order, on threads if it likes.
+    `each(task, numbers, what)` calls the task for every number, in any order, on threads if it likes;
+    `once(name, make)` gives the arrays of `make()`, or those that an earlier run has kept under this name.
     """
     each = each or hill_curves.in_turn
     grid, axis = workflow.grid, workflow.boundaries
     other = [dim for dim in grid.sizes if dim != axis]
-    edges = _edges(workflow, axis, grid.sizes[other[0]] if other else 1, each)
+    edges = _edges(workflow, axis, grid.sizes[other[0]] if other else 1, each, once)
     found = _rows(workflow, axis, other, edges)
     if other:
         found |= _curves(workflow, other[0], axis, edges, each)
     return xr.Dataset(found, attrs={"boundaries": axis})
 
 
-def _edges(workflow, axis, rows, each):
+def _edges(workflow, axis, rows, each, once):
     """All Edges of all rows, a few rows at a time."""
     ends = np.asarray(workflow.grid.parameters[axis][1])[[0, -1]]
     parts = [None] * -(-rows // ROWS)
 
-    def task(number):
-        some = np.arange(number * ROWS, min((number + 1) * ROWS, rows))
+    def make(some):
         own = hill_edges.find(_row_solver(workflow, axis, some), some.size, *sorted(ends))
         own.row += some[0]
-        parts[number] = own
+        return vars(own)
+
+    def task(number):
+        some = np.arange(number * ROWS, min((number + 1) * ROWS, rows))
+        name = f"edges-{axis}-{some[0]}-{some.size}"
+        parts[number] = hill_edges.Edges(**once(name, lambda: make(some)))
 
     each(task, range(len(parts)), "parts of the edges")
     names = ("row", "position", "error", "kind", "index", "complete")

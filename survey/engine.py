@@ -1,39 +1,41 @@
-"""Blocks through dask -> dataset: the only place that knows dask."""
+"""Blocks -> dataset: what is solved where and when, what is kept, what the file gets."""
 
 import hashlib
-import itertools
 import json
 import os
 import shutil
+import socket
 import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from importlib.metadata import version
 from math import prod
-from typing import Any
+from typing import Any, NamedTuple
 
-import dask
-import dask.multiprocessing
-import dask.threaded
 import numpy as np
-from dask.callbacks import Callback
 
-from survey import store
-from survey.dataset import Tally, attributes, command, coordinates, layout, now, provenance, round_up, variables
-from survey.errors import BadInput, Stopped, SurveyError
+from survey import dispatch, methods, modules, status, store
+from survey.dataset import Tally, attributes, command, coordinates, layout, now, round_up, variables
+from survey.dispatch import cpus
+from survey.errors import BadInput, Stopped
 from survey.kernels import jit
 from survey.kernels.jit import compile_seconds
 
 BLOCK_SECONDS = 0.5
 BLOCK_POINTS = 2**17
+SAMPLES = 16  # blocks from all over the map that are solved first
 # what the writer holds at a time: enough for the tiles to be square, little beside what else a process takes
 REGION_POINTS, REGION_BYTES = 2**20, 2**25
 
 
 def seconds_per_point(scene, request, grid):
-    """The scene's rough figure for this grid."""
-    return scene.cost(request.options, {name: values.size for name, (_, values) in grid.parameters.items()})
+    """The scene's rough figure for this grid, and the method's for this scene."""
+    seconds = scene.cost(request.options, {name: values.size for name, (_, values) in grid.parameters.items()})
+    if request.method == "auto":
+        return seconds
+    return seconds * getattr(modules.load(methods, request.method, "method"), "COST", {}).get(scene.FAMILY, 1.0)
 
 
 def points_per_block(scene, request, grid):
@@ -55,8 +57,11 @@ def blocks_of(workflow):
 
 def solve_block(scene, request, grid, block):
     """The variables of `layout` in one block of the grid."""
-    shape = tuple(len(range(*cut.indices(size))) for cut, size in zip(block, grid.shape, strict=True))
-    return solve_point(scene, replace(request, lines=grid.lines), grid.point(block), shape)
+    return solve_point(scene, replace(request, lines=grid.lines), grid.point(block), _shape(grid, block))
+
+
+def _shape(grid, block):
+    return tuple(len(range(*cut.indices(size))) for cut, size in zip(block, grid.shape, strict=True))
 
 
 def solve_point(scene, request, point, shape):
@@ -92,7 +97,7 @@ def compute(grid, scene, request, threads=None):
     if len(blocks) == 1:
         task(blocks[0])
     else:
-        _through_dask(lambda number: task(blocks[number]), range(len(blocks)), threads=threads)
+        dispatch.on_threads(lambda number: task(blocks[number]), range(len(blocks)), threads=threads)
     return result
 
 
@@ -108,46 +113,92 @@ class Finished:
     writing: float
 
 
+class Solved(NamedTuple):
+    """What a worker tells of a block: its process, the seconds it has compiled in all, those of this block; and the
+    block itself where the worker cannot write it beside the output."""
+
+    number: int
+    process: str
+    compiling: float
+    seconds: float
+    content: bytes | None = None
+
+
+@dataclass(frozen=True)
+class Job:
+    """All that a worker needs; called with the number of a block, it solves and keeps it."""
+
+    scene: Any
+    request: Any
+    grid: Any
+    blocks: list
+    kept: store.Blocks
+    code: dict[str, str]
+
+    def __call__(self, number):
+        _refuse_other_code(self.code)
+        began, before = time.perf_counter(), compile_seconds()
+        content = self.kept.keep(number, solve_block(self.scene, self.request, self.grid, self.blocks[number]))
+        compiled = compile_seconds()
+        seconds = time.perf_counter() - began - (compiled - before)
+        return Solved(number, f"{socket.gethostname()} {os.getpid()}", compiled, max(seconds, 0.0), content)
+
+    def died(self, number):
+        """Keep block `number` with the status of points whose worker died again and again."""
+        shape = _shape(self.grid, self.blocks[number])
+        table = layout(self.scene, self.request)
+        arrays = {name: np.full(shape + extra, fill, kind) for name, (kind, fill, extra) in table.items()}
+        arrays["status"][...] = status.WORKER_DIED
+        self.kept.save(number, arrays)
+        return Solved(number, "", 0.0, 0.0)
+
+
 def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
     """Run or resume the survey and write its netCDF file; returns what was Finished.
 
     A part of the file is written as soon as the blocks of its region are there, while others are computed.
-    `progress(done, total, reused)` is called as blocks finish, and with what they are as parts of the boundaries do.
-    Raises BadInput, Damaged or Stopped.
+    `progress(done, total, reused, what, left)` is called as blocks finish, and as parts of the boundaries do;
+    `left()` estimates the seconds that are left. Raises BadInput, Damaged or Stopped.
     """
     started = time.perf_counter()
     _refuse_too_large(workflow)
-    scheduler = _client(scheduler) if scheduler else None
+    client = dispatch.client_of(scheduler) if scheduler else None
     tile, regions = regions_of(workflow)
     blocks = [block for _, blocks in regions for block in blocks]
     with store.Blocks(workflow.path, fingerprint(workflow), fresh) as kept:
         reused = kept.sound()
-        todo = [number for number in range(len(blocks)) if number not in reused]
+        job = Job(workflow.scene, workflow.request, workflow.grid, blocks, kept, _code())
+        left = Remaining(workflow.grid.shape, blocks, reused)
         helper = _compiling_ahead(workflow.scene)
         compiled = {}
 
-        def task(number):
-            kept.save(number, solve_block(workflow.scene, workflow.request, workflow.grid, blocks[number]))
-            return number, os.getpid(), compile_seconds()
-
         with Assembly(workflow, kept, tile, regions) as assembly:
 
-            def finished(done, result=None):
-                if result:
-                    number, process, compiled[process] = result
-                    assembly.has(number)
+            def finished(done, solved=None):
+                if solved:
+                    compiled[solved.process] = solved.compiling
+                    if solved.content is not None:
+                        kept.put(solved.number, solved.content)
+                    left.took(solved.number, solved.seconds)
+                    assembly.has(solved.number)
                 if progress:
-                    progress(len(reused) + done, len(blocks), len(reused))
+                    progress(len(reused) + done, len(blocks), len(reused), left=left)
 
             before, began = compile_seconds(), time.perf_counter()
             for number in sorted(reused):
                 assembly.has(number)
-            _through_dask(task, todo, workers, scheduler, finished)
+            todo = _spread([number for number in range(len(blocks)) if number not in reused])
+            if client:
+                dispatch.on_cluster(job, todo, finished, job.died, client)
+            elif workers:
+                dispatch.on_processes(job, todo, finished, job.died, workers)
+            else:
+                dispatch.on_threads(job, todo, finished)
             computed = time.perf_counter()
-            if os.getpid() in compiled:
-                compiled[os.getpid()] -= before
+            if f"{socket.gethostname()} {os.getpid()}" in compiled:
+                compiled[f"{socket.gethostname()} {os.getpid()}"] -= before
             compiling = max(compiled.values(), default=0.0)  # processes compile side by side
-            further = extras(workflow, progress)
+            further = extras(workflow, kept.once, progress)
             beside = time.perf_counter() - computed
             told = {
                 "wall_time_s": round(time.perf_counter() - started, 3),
@@ -164,6 +215,53 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
     return Finished(written, assembly.tally.counts, compiling, computing, beside if further else 0.0, writing)
 
 
+def _spread(numbers):
+    """The numbers in order, but first some from all over the map, so that the time it takes can be told soon."""
+    first = numbers[:: max(1, len(numbers) // SAMPLES)] if len(numbers) > 4 * SAMPLES else []
+    return first + sorted(set(numbers) - set(first))
+
+
+class Remaining:
+    """The seconds that are left, when called: each block costs, a point, what the nearest block took that is known."""
+
+    def __init__(self, shape, blocks, reused):
+        self.points = np.array([prod(cut.stop - cut.start for cut in block) for block in blocks], float)
+        self.places = np.array([[(cut.start + cut.stop) / 2 for cut in block] for block in blocks], float)
+        self.places /= np.array(shape, float)
+        self.open = np.ones(len(blocks), bool)
+        self.open[list(reused)] = False
+        self.nearest, self.cost = np.full(len(blocks), np.inf), np.zeros(len(blocks))
+        self.began, self.worked = time.perf_counter(), 0.0
+
+    def took(self, number, seconds):
+        """Block `number` took so many seconds of one worker."""
+        self.open[number] = False
+        self.worked += seconds
+        distance = ((self.places - self.places[number]) ** 2).sum(axis=1)
+        nearer = distance < self.nearest
+        self.nearest[nearer], self.cost[nearer] = distance[nearer], seconds / self.points[number]
+
+    def __call__(self):
+        workers = max(self.worked / (time.perf_counter() - self.began), 1e-9)  # as many as have been at work
+        return float((self.cost * self.points)[self.open].sum() / workers)
+
+
+def _code():
+    """What names the code that solves blocks: it must be the same on every worker, the processor need not."""
+    return {"survey": version("survey"), "sources": jit.SOURCE_HASH}
+
+
+def _refuse_other_code(code):
+    """Raise Stopped unless this process runs the code that the run was started with."""
+    own = _code()
+    for what, value in code.items():
+        if own[what] != value:
+            raise Stopped(
+                f"the worker on {socket.gethostname()} has other code ({what}: {own[what]}, this run: {value}); "
+                "install the same survey, numba and llvmlite there and run the command again to go on"
+            )
+
+
 def _compiling_ahead(scene):
     """On a new machine, a process that compiles the kernels needed last while this one compiles those needed first."""
     ahead = getattr(scene, "AHEAD", None)
@@ -173,17 +271,17 @@ def _compiling_ahead(scene):
     return None
 
 
-def extras(workflow, progress=None):
-    """Datasets that go into the file beside the map, their attributes with its own."""
+def extras(workflow, once, progress=None):
+    """Datasets that go into the file beside the map, their attributes with its own; `once` as in `store.Blocks`."""
     further = []
     if workflow.boundaries:
         from survey import boundaries
 
         def each(task, numbers, what):
-            told = progress and (lambda done, _=None: progress(done, len(numbers), 0, what))
-            _through_dask(task, numbers, finished=told)
+            told = (lambda done, _=None: progress(done, len(numbers), 0, what)) if progress else (lambda *_: None)
+            dispatch.on_threads(task, numbers, told)
 
-        further.append(boundaries.find(workflow, each))
+        further.append(boundaries.find(workflow, each, once))
     if workflow.refine:
         from survey import refine
 
@@ -314,57 +412,13 @@ def fingerprint(workflow):
         "rtol": request.rtol,
         "variables": sorted(request.variables),
         "blocks": len(blocks_of(workflow)),
-        "kernels": provenance()["kernel_hash"],
+        "kernels": jit.SOURCE_HASH,
         "scene_hash": getattr(workflow.scene, "HASH", ""),
     }
-
-
-def cpus():
-    """Processors this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _through_dask(task, numbers, workers=None, scheduler=None, finished=None, threads=None):
-    """Call the task for every number: on threads of this machine, on worker processes, or on a dask cluster."""
-    done = itertools.count(1)
-    callback = Callback(posttask=lambda key, result, *_: finished(next(done), result) if finished else None)
-    call = dask.delayed(task, pure=False, traverse=False)
-    if scheduler:
-        where = {"scheduler": scheduler}
-    elif workers:
-        where = {"scheduler": dask.multiprocessing.get, "num_workers": workers}
-    else:  # the function itself: by its name, dask imports all of distributed before
-        where = {"scheduler": dask.threaded.get, "num_workers": threads or cpus()}
-    if finished:
-        finished(0)
-    try:
-        with callback:
-            # dask takes equals in the order of their names
-            dask.compute(*[call(number, dask_key_name=f"block-{number:09d}") for number in numbers], **where)
-    except OSError as error:
-        raise Stopped(f"the run stopped ({error}); run the command again to go on") from None
-    except Exception as error:
-        if isinstance(error, SurveyError):
-            raise getattr(error, "exception", error) from None  # dask adds a worker's traceback to the message
-        if type(error).__name__ in ("BrokenProcessPool", "KilledWorker", "CommClosedError"):
-            raise Stopped(f"a worker died ({error}); run the command again to go on") from None
-        raise
 
 
 def _each(task, items):
     """[task(item) for item in items], on the threads of this machine."""
     results = [None] * len(items)
-    _through_dask(lambda at: results.__setitem__(at, task(items[at])), range(len(items)))
+    dispatch.on_threads(lambda at: results.__setitem__(at, task(items[at])), range(len(items)))
     return results
-
-
-def _client(address):
-    """A client of the dask cluster at `address` (or in a scheduler file)."""
-    try:
-        from dask.distributed import Client
-    except ImportError:
-        raise BadInput("--scheduler needs dask.distributed: pip install 'survey[cluster]'") from None
-    try:
-        return Client(scheduler_file=address, timeout=10) if os.path.exists(address) else Client(address, timeout=10)
-    except (OSError, ValueError) as error:
-        raise Stopped(f"no dask scheduler answers at {address!r} ({error}); start one with dask scheduler") from None

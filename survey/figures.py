@@ -254,8 +254,10 @@ def _title(ds, variable):
     lines = [ds.attrs.get("title", ""), variable.attrs.get("long_name", variable.name)]
     fixed = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "fi"]
     fixed = [c for c in fixed if c.name in ds.dims or float(c) != 0]
-    of = {c.name: f" (1 of {ds.sizes[c.name]})" for c in fixed if c.name in ds.dims}
-    numbers = ", ".join(f"${c.attrs.get('symbol') or c.name} = {float(c):.6g}${of.get(c.name, '')}" for c in fixed)
+    of = {name: f" (1 of {ds.sizes[name]})" for name in variable.coords if name in ds.dims}
+    numbers = [f"${c.attrs.get('symbol') or c.name} = {float(c):.6g}${of.get(c.name, '')}" for c in fixed]
+    labels = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "UO"]
+    numbers = ", ".join(numbers + [f"{c.name} {c.item()}{of.get(c.name, '')}" for c in labels])
     lines[1] += f" ({ds.attrs['options']})" if ds.attrs.get("options") else ""
     return "\n".join([*lines, numbers] if numbers else lines)
 

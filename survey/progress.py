@@ -2,10 +2,11 @@
 
 import time
 
-from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
 
 LOG_SECONDS = 60
+SHOWN_SECONDS = 0.2
 
 
 class Progress:
@@ -24,9 +25,7 @@ class Progress:
                 MofNCompleteColumn(),
                 TextColumn("{task.fields[what]}"),
             )
-            self.bar = Bar(
-                *columns, TimeElapsedColumn(), TextColumn("ETA"), TimeRemainingColumn(), console=self.console
-            )
+            self.bar = Bar(*columns, TimeElapsedColumn(), TextColumn("ETA {task.fields[eta]}"), console=self.console)
             self.bar.start()
         return self
 
@@ -34,25 +33,29 @@ class Progress:
         if self.bar:
             self.bar.stop()
 
-    def __call__(self, done, total, reused, what="blocks"):
+    def __call__(self, done, total, reused, what="blocks", left=None):
+        """`left()` estimates the seconds that are left; without it, what is done tells how fast the rest will be."""
         if self.silent:
             return
         if done == reused:
             self._begin(total, reused, what)
+        elapsed = time.monotonic() - self.started
         if self.bar:
-            self.bar.update(self.task, completed=done)
+            if time.monotonic() - self.logged > SHOWN_SECONDS or done == total:
+                self.logged = time.monotonic()
+                eta = time.strftime("%H:%M:%S", time.gmtime(_left(done, total, reused, elapsed, left)))
+                self.bar.update(self.task, completed=done, eta=eta)
         elif done != reused and (done == total or time.monotonic() - self.logged > LOG_SECONDS):
             self.logged = time.monotonic()
-            elapsed = self.logged - self.started
-            left = elapsed / (done - reused) * (total - done)
-            self._line(f"{done} of {total} {what}, {elapsed:.0f} s elapsed, ETA {left:.0f} s")
+            eta = _left(done, total, reused, elapsed, left)
+            self._line(f"{done} of {total} {what}, {elapsed:.0f} s elapsed, ETA {eta:.0f} s")
         if done == total and what == "blocks":
             self._line(f"computed {done - reused}, reused {reused} of {total} blocks")
 
     def _begin(self, total, reused, what):
         self.started = self.logged = time.monotonic()
         if self.bar:
-            self.task = self.bar.add_task(self.workflow.name, total=total, what=what)
+            self.task = self.bar.add_task(self.workflow.name, total=total, completed=reused, what=what, eta="-")
         if what == "blocks":
             self._line(f"{self.workflow.grid.points:,} points in {total} blocks, {reused} already done")
 
@@ -69,3 +72,7 @@ class Progress:
 
     def _line(self, text):
         self.console.print(f"{self.workflow.name}: {text}", markup=False)
+
+
+def _left(done, total, reused, elapsed, left):
+    return left() if left else elapsed / max(done - reused, 1) * (total - done)

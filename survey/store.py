@@ -2,10 +2,12 @@
 
 import contextlib
 import hashlib
+import io
 import json
 import os
 import shutil
 import socket
+import uuid
 import zlib
 from math import prod
 from pathlib import Path
@@ -41,6 +43,7 @@ class Blocks:
         self.fingerprint = {"format": FORMAT, **fingerprint}
         self.fresh = fresh
         self.lock = filelock.FileLock(f"{path}.lock", timeout=0)
+        self.holder = {"host": socket.gethostname(), "pid": os.getpid(), "run": uuid.uuid4().hex}
 
     def __enter__(self):
         with refused(self.path):
@@ -56,7 +59,8 @@ class Blocks:
         self.lock.release()
 
     def __getstate__(self):
-        return self.__dict__ | {"lock": None}  # a worker process saves blocks; only the parent holds the lock
+        # a worker saves blocks, wherever it runs; only the parent holds the lock
+        return self.__dict__ | {"lock": None, "folder": self.folder.absolute()}
 
     def done(self):
         """Numbers of the blocks that are finished."""
@@ -70,6 +74,36 @@ class Blocks:
         """Keep the arrays of block `number`; once this returns, a power cut does not lose them."""
         with refused(self.path):
             write_atomically(self._file(number), lambda file: pack(arrays, file))
+
+    def keep(self, number, arrays):
+        """Save the block where this process reaches the run's folder; else return the bytes that `put` saves there."""
+        if self._reached():
+            self.save(number, arrays)
+            return None
+        file = io.BytesIO()
+        pack(arrays, file)
+        return file.getvalue()
+
+    def put(self, number, content):
+        """Save a block that `keep` returned elsewhere."""
+        with refused(self.path):
+            write_atomically(self._file(number), content)
+
+    def once(self, name, make):
+        """The arrays that an earlier run kept under this name, else those of `make()`, kept from now on."""
+        file = self.folder / f"{name}.extra"
+        with contextlib.suppress(OSError, ValueError):
+            return unpack(file.read_bytes())
+        arrays = make()
+        with refused(self.path):
+            write_atomically(file, lambda opened: pack(arrays, opened))
+        return arrays
+
+    def _reached(self):
+        """Does this process see the very folder that the run's parent holds?"""
+        with contextlib.suppress(OSError, ValueError):
+            return json.loads((self.folder / "holder.json").read_text()) == self.holder
+        return False
 
     def load(self, number):
         """The arrays of block `number`; raises Damaged (and removes the block) if its checksum fails."""
@@ -99,7 +133,7 @@ class Blocks:
             shutil.rmtree(self.folder, ignore_errors=True)
         self.folder.mkdir(exist_ok=True)
         self._same_survey()
-        write_atomically(self.folder / "holder.json", json.dumps(_holder()).encode())
+        write_atomically(self.folder / "holder.json", json.dumps(self.holder).encode())
 
     def _hold(self):
         try:
@@ -163,6 +197,8 @@ def refused(path):
         raise
     except (OSError, RuntimeError) as error:  # netCDF4 raises RuntimeError on a full disk
         told = getattr(error, "strerror", None) or error
+        with contextlib.suppress(OSError):
+            told = f"{told}; {shutil.disk_usage(Path(path).parent).free:,} bytes are free"
         raise Stopped(f"{path}: writing failed ({told}); mend it and run the command again") from None
 
 
@@ -233,6 +269,9 @@ class Output:
 
     def _define_map(self, coordinates, variables, layout, shape, tile):
         for name, (dims, values, meaning) in coordinates.items():
+            if np.asarray(values).dtype.kind == "U":  # CF knows labels of a dimension as arrays of characters only
+                dims, meaning = (*dims, f"{name}_length"), meaning | {"_Encoding": "utf-8"}
+                values = netCDF4.stringtochar(np.char.encode(values, "utf-8"))
             self.define(name, dims, np.shape(values), np.asarray(values).dtype, meaning)
             self.put(name, values)
         self.beside = {name: set(dims) for name, (dims, _, _) in coordinates.items() if name not in dims}
@@ -346,10 +385,6 @@ def _digest_holds(path):
         raise BadInput(f"{path}: {what}; name the netCDF file that survey run wrote")
     with open(path, "rb") as file:
         return not beside.exists() or hashlib.file_digest(file, "sha256").hexdigest() in beside.read_text()
-
-
-def _holder():
-    return {"host": socket.gethostname(), "pid": os.getpid()}
 
 
 def _short(value):

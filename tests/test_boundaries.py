@@ -9,6 +9,7 @@ import xarray as xr
 
 import survey
 from survey import boundaries, figures, store
+from survey.errors import Stopped
 from survey.workflow import check
 
 WORKFLOW = {
@@ -123,3 +124,16 @@ def test_a_row_of_its_own(tmp_path):
 def test_what_cannot_be_is_refused(changes, words):
     with pytest.raises(survey.BadInput, match=words):
         survey.run(WORKFLOW | {"output": {}} | changes)
+
+
+def test_rows_whose_edges_are_known_are_kept_by_a_run_that_stops(path, tmp_path, monkeypatch):
+    def stop(*_):
+        raise Stopped("a power cut")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(boundaries.hill_curves, "trace", stop)
+        with pytest.raises(Stopped, match="power cut"):
+            survey.run(WORKFLOW, output=tmp_path / "map.nc")
+    monkeypatch.setattr(boundaries, "_row_solver", stop)  # none is to be found again
+    again = survey.run(WORKFLOW, output=tmp_path / "map.nc")
+    xr.testing.assert_equal(again.drop_attrs(), xr.load_dataset(path).drop_attrs())

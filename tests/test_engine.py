@@ -89,3 +89,22 @@ def test_what_compiling_kernels_and_file_took_is_told_apart(surveyed, small, tmp
     finished = engine.run(workflow.read(small, output=tmp_path / "o.nc"))
     assert min(finished.compiling, finished.computing, finished.beside, finished.writing) >= 0
     assert 0 <= xr.load_dataset(surveyed).attrs["compile_time_s"] <= xr.load_dataset(surveyed).attrs["wall_time_s"]
+
+
+def test_what_is_left_follows_the_cost_of_each_region():
+    """Blocks of the left half take 1 s, those of the right 9 s: known once one of each is done."""
+    blocks = [(slice(0, 4), slice(10 * i, 10 * i + 10)) for i in range(10)]
+    left = engine.Remaining((4, 100), blocks, reused={9})
+    left.began -= 5.0  # ten seconds of work in five: two workers
+    left.took(0, 1.0)
+    left.took(7, 9.0)
+    # open: 1, 2, 3 nearer to block 0, and 4, 5, 6, 8 nearer to block 7
+    assert left() == pytest.approx((3 * 1.0 + 4 * 9.0) / 2, rel=1e-3)
+
+
+def test_blocks_from_all_over_the_map_come_first():
+    numbers = list(range(3, 1003))
+    spread = engine._spread(numbers)
+    assert sorted(spread) == numbers and np.diff(sorted(spread[:16])).max() <= 63
+    rest = [number for number in spread if number not in spread[: 1000 // 62 + 1]]
+    assert rest == sorted(rest) and engine._spread([4, 2, 9]) == [2, 4, 9]

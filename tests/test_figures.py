@@ -77,6 +77,13 @@ def test_a_third_axis_is_named_with_its_place(surveyed):
     plt.close(figure)
 
 
+def test_a_labelled_dimension_is_named_with_its_place(surveyed):
+    ds = survey.open(surveyed).expand_dims(monomial=["200", "110"], axis=2)
+    figure = figures.draw(ds, "w")
+    assert "monomial 200 (1 of 2)" in figure.axes[0].get_title()
+    plt.close(figure)
+
+
 def test_a_row_of_verdicts_is_drawn_by_its_names(toy):
     figure = figures.draw(toy.isel(rho=0))
     names = [label.get_text() for label in figure.axes[0].get_yticklabels()]

@@ -77,7 +77,7 @@ def test_finished_blocks_are_used_again_and_give_the_same_bits(small, tmp_path, 
             kept.save(number, engine.solve_block(checked.scene, checked.request, checked.grid, blocks[number]))
         _flip(kept._file(3))
     seen = []
-    engine.run(checked, progress=lambda done, total, reused: seen.append((done, total, reused)))
+    engine.run(checked, progress=lambda done, total, reused, **_: seen.append((done, total, reused)))
     assert seen[0] == (2, 6, 2) and seen[-1] == (6, 6, 2)  # the damaged block was computed again
     xr.testing.assert_equal(whole.drop_attrs(), survey.open(checked.path).drop_attrs())
     assert not checked.path.with_name("again.nc.blocks").exists()
@@ -180,3 +180,34 @@ def test_a_disk_that_refuses_leaves_the_old_file(copy, small, monkeypatch, where
     assert copy.read_bytes() == before and store.check(copy) == []
     assert [file.name for file in copy.parent.rglob("*") if file.name.endswith((".part", "output.nc"))] == []
     assert survey.run(small, output=copy).status.size == 24  # the lock is free, and what is there is of use
+
+
+CALLS = [(os, "fsync"), (os, "replace"), (store, "pack"), (store.Output, "put"), (store.Output, "define")]
+
+
+@pytest.mark.parametrize(("where", "name"), CALLS, ids=lambda value: getattr(value, "__name__", value))
+def test_an_error_at_each_write_call_in_turn_loses_nothing(copy, small, surveyed, monkeypatch, where, name):
+    """The k-th call fails, k = 1, 2, ...: the old file stands, or the new one does; the next run goes on."""
+    monkeypatch.setattr(engine, "BLOCK_POINTS", 8)
+    call, real, fail = 0, getattr(where, name), 0
+
+    def failing(*given, **named):
+        nonlocal call
+        call += 1
+        if call == fail:
+            raise OSError(5, "Input/output error")
+        return real(*given, **named)
+
+    monkeypatch.setattr(where, name, failing)
+    for fail in range(1, 100):
+        call = 0
+        try:
+            survey.run(small, output=copy)
+        except Stopped as error:
+            assert "Input/output error" in str(error) and "\n" not in str(error)
+            assert store.check(copy) == []
+        if call < fail:
+            break
+    assert 2 < fail < 99
+    assert store.check(copy) == []
+    xr.testing.assert_equal(survey.open(copy).drop_attrs(), survey.open(surveyed).drop_attrs())

@@ -22,17 +22,23 @@ SOURCES = ("kernels", "methods", "measures", "scenes")
 
 
 def source_hash():
-    """Hash of all sources that can reach a kernel, the compiler versions and the CPU (16 hex digits)."""
+    """Hash of all sources that can reach a kernel and of the compiler versions (16 hex digits)."""
     root = Path(__file__).parent.parent
-    digest = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__} {llvm.get_host_cpu_name()}".encode())
-    digest.update(llvm.get_host_cpu_features().flatten().encode())
+    digest = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__}".encode())
     for folder in SOURCES:
         for path in sorted((root / folder).glob("*.py")):
             digest.update(f"{folder}/{path.name}\0".encode() + path.read_bytes() + b"\0")
     return digest.hexdigest()[:16]
 
 
-KERNEL_HASH = source_hash()
+def kernel_hash():
+    """Hash of the sources and of the CPU that they are compiled for (16 hex digits)."""
+    cpu = f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
+    return hashlib.sha256(f"{SOURCE_HASH} {cpu}".encode()).hexdigest()[:16]
+
+
+SOURCE_HASH = source_hash()
+KERNEL_HASH = kernel_hash()
 
 
 def _cache_directory():

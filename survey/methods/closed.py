@@ -16,6 +16,7 @@ from survey.kernels.jit import kernel
 ORDER = 0  # no steps
 SERVES = ("cylinder",)
 WHEN = {"question": ("trajectory", "abel")}
+COST = {"cylinder": 0.2}  # time, relative to the default method
 FLOW_FINEST = 1.0  # nothing to refine
 FLOW_WORK = 1
 NO_FORM = 19  # as in the STATUS of scenes/gyrostat.py

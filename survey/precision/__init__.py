@@ -3,7 +3,8 @@
 Everything that belongs to one scene lies in the file of its name beside this one:
 
     ERROR                  the output whose error is charted
-    references(work)       [(parameters, options, {output: exact value}, verdict or None), ...] like the work's points
+    references(work)       [(parameters, options, {output: exact value}, verdict or None), ...] like the work's points,
+                           the very same list for works that share it
     works()                {name of the work: (point, options)}, what is timed; the arrays of `point` broadcast
     system(point, options) the same question as ODEs, for the peers in `survey.peers`
     outcome(ends)          {ERROR: values} from the states (points, n) at the ends of the spans, and "verdict" if any
@@ -118,11 +119,14 @@ def measure(scene, case, peers=False, say=lambda line: None):
         for point, options in works.values() if method else ():  # every path is compiled before it is timed
             solve(point, options, SETTINGS[0])
         for setting in SETTINGS:
+            judged = {}
             for work, (point, options) in works.items():
                 references = case.references(work)
                 if method == "auto":  # it treats a dense row as a whole: its error is that within such a row
-                    references = [_within(reference, point) for reference in references]
-                error, wrong = _against(solve, references, case.ERROR, setting)
+                    judged, references = {}, [_within(reference, point) for reference in references]
+                if id(references) not in judged:
+                    judged[id(references)] = _against(solve, references, case.ERROR, setting)
+                error, wrong = judged[id(references)]
                 if np.isnan(error):
                     continue
                 seconds = _per_point(solve, point, options, setting, most)

@@ -1,6 +1,7 @@
 """The gyrostat's chart: trajectories to t = 20 of random systems and states; errors by references of 30 digits."""
 
 import json
+from functools import cache
 from importlib import resources
 from unittest.mock import patch
 
@@ -20,6 +21,7 @@ _POINTS = 20_000
 _QUESTION = {"question": "trajectory"}
 
 
+@cache
 def references(work):
     """The reference cases of the work's kind (error of the JSON's own values below 1e-29)."""
     data = json.loads(resources.files("survey.reference").joinpath("gyrostat_trajectories.json").read_text())

@@ -153,7 +153,7 @@ def cost(options, sizes):
     if options["question"] == "portrait":
         return 8e-3
     if options["question"] != "fate":
-        return 7e-5 / sizes.get("t", sizes.get("phi", 1)) + 2e-7
+        return 7e-6 / sizes.get("t", sizes.get("phi", 1)) + 2e-7
     return 1.3e-4 + 6e-3 / (sizes["phi0"] * sizes["w0"])
 
 

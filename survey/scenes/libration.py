@@ -1,0 +1,95 @@
+"""Formal stability of the triangular libration points of the spatial circular restricted three-body problem.
+
+    H = L + N + M + ...,  L = omega1 r1 - omega2 r2 + r3,  N = sum c_ijk r1^i r2^j r3^k (i+j+k = 2),  M likewise (3.13)
+
+is the normal form at L4 (or L5: the same numbers) to order 6 in the coordinates; r1, r2 are the actions of the motions
+in the plane of the primaries, r3 that across it.
+
+Parameter: mu (mass of the smaller primary over that of both, 1e-100 <= mu <= 1/2), taken as the float64 it is. Unit of
+time: the primaries turn by one radian.
+
+What is known. Linearly stable for mu < mu_R = (1 - sqrt(23/27))/2 = 0.0385208965... The c_ijk have closed forms,
+singular only at mu_R, at omega1 = 2 omega2 (mu1 = 0.0242938971...) and, for two of order 6, at omega1 = 3 omega2
+(mu2 = 0.0135160160...); at mu1 and mu2 L4 is unstable. By order 4 it is formally stable outside mu_c <= mu <= mu_d =
+0.0109136676..., 0.0163767553...; there M decides on the one ray of L = N = 0 with r >= 0, and M is not 0 on it.
+
+What is proved, and what is not. Verdict 1 is proved for every such mu: L and H - L are formal integrals whatever the
+frequencies, and L^4 + (H - L)^2 is definite. Verdict 2 is proved where omega1, omega2, 1 satisfy at most one
+independent relation k . omega = 0 over the integers. Where they satisfy two (omega1 and omega2 both rational: a
+countable, dense set of mu, the rank-2 resonances), only L and H are sure to be formal integrals, no function of them is
+definite, and "M is not 0" does not settle the point. No float64 is such a mu (`libration.md`, section 5), so verdict 2
+is proved for the very number given, and not for all real mu beside it.
+The closed forms of order 6 were found by exact rational reconstruction and hold at 110 rational points and against
+Lie series to 90 digits; they are not derived symbolically. Formal stability is not Lyapunov stability.
+
+Verdict 3 means that the half-ulp interval of mu contains mu1 or mu2, 4 that it contains mu_R.
+
+Source: A. P. Markeev, Libration Points in Celestial Mechanics and Cosmodynamics (1978), chapter 8, section 3, checked
+and corrected in `libration.md` beside this file, whose equation numbers are used; planar coefficients: A. Deprit, A.
+Deprit-Bartholome, Astronomical Journal 72 (1967) 173; K. R. Meyer, D. S. Schmidt, J. Differential Equations 62 (1986).
+
+`auto` takes closed forms in float64, and in double-double where `rtol` is missed or the verdict is left open.
+"""
+
+import numpy as np
+
+from survey.kernels.libration_forms import LABELS
+from survey.measures import normal_form
+from survey.scene import Output, Parameter
+
+TITLE = "Formal stability of the triangular libration points"
+FAMILY = "normal_form"
+AUDIT = ("rational_double", "lie")
+OPTIONS = ()
+STATUS = {
+    "overflow": "the method lost every digit, so near a resonance or an end of the interval: try rational_double",
+}
+REFERENCES = (
+    "A. P. Markeev (1978): Libration Points in Celestial Mechanics and Cosmodynamics (Nauka), chapter 8",
+    "A. Deprit, A. Deprit-Bartholome, Astronomical Journal 72 (1967) 173",
+    "K. R. Meyer, D. S. Schmidt, Journal of Differential Equations 62 (1986) 222",
+)
+PARAMETERS = (Parameter("mu", "mass of the smaller primary over that of both", r"\mu", minimum=1e-100, maximum=0.5),)
+DIMENSIONS = {"monomial": np.array(LABELS)}
+VERDICTS = {
+    "undecided": normal_form.UNDECIDED,
+    "linearly_unstable": normal_form.UNSTABLE,
+    "formally_stable_by_order_4": normal_form.ORDER_4,
+    "formally_stable_by_order_6": normal_form.ORDER_6,
+    "unstable_by_resonance": normal_form.RESONANT,
+    "boundary": normal_form.BOUNDARY,
+}
+_BELOW = "at mu < mu_R = 0.0385208965..."
+OUTPUTS = (
+    Output("omega1", "greater frequency in the plane", r"\omega_1", applies=_BELOW),
+    Output("omega2", "smaller frequency in the plane (of negative energy)", r"\omega_2", applies=_BELOW),
+    Output("c", "coefficient of r1^i r2^j r3^k, monomial ijk, in the normal form", "c_{ijk}", dims=("monomial",),
+           applies=_BELOW + "; analytic in mu but for poles: not the whole normal form at a resonance"),
+    Output("a20", "coefficient of r1^2 in N where L = 0", "a_{20}", applies=_BELOW),
+    Output("a11", "coefficient of r1 r2 in N where L = 0", "a_{11}", applies=_BELOW),
+    Output("a02", "coefficient of r2^2 in N where L = 0", "a_{02}", applies=_BELOW),
+    Output("D4", "N at r = (omega2, omega1, 0)", "D_4", applies=_BELOW),
+    Output("D6", "M at r = (omega2, omega1, 0)", "D_6", applies=_BELOW),
+    Output("M_ray", "M on the ray r = (alpha2, 1, beta2) of L = N = 0", r"M(\alpha_2, 1, \beta_2)",
+           applies="where that ray lies in the octant r >= 0: a02 > 0 > D4"),
+    Output("resonance_order", "order |k1| + |k2| + |k3| of the nearest resonance with even k3, up to order 8",
+           integer=True, applies=_BELOW),
+    Output("resonance_distance", "distance |k1 omega1 - k2 omega2 + k3| of that resonance", r"|k \cdot \omega|",
+           applies=_BELOW + "; (2, 0, -2) and (1, 1, 0), met at mu = 0 and mu_R, count too"),
+    Output("verdict", "formal stability", flags=VERDICTS,
+           applies="by order 6 is proved unless omega1 and omega2 are both rational (rank-2 resonances: countable, "
+           "dense, but no float64 mu is one), where M != 0 settles nothing; formal is not Lyapunov stability"),
+)  # fmt: skip
+
+
+def cost(options, sizes):
+    """Seconds per point, roughly."""
+    return 4e-6
+
+
+def solve(point, request):
+    """All outputs of a block (see `survey.scenes`)."""
+    shape = np.shape(point["mu"])
+    mu = np.array(point["mu"], dtype=float).ravel()
+    answer = normal_form.solve(mu, request.method, request.rtol)
+    return {name: values.reshape(shape + values.shape[1:]) for name, values in answer.items()}

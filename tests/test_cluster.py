@@ -1,0 +1,127 @@
+"""A sweep on a dask cluster: dask's own commands, with a shared folder and without, workers and schedulers that die."""
+
+import dataclasses
+import os
+import pickle
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+from survey import engine, store, workflow
+from survey.errors import Stopped
+
+pytest.importorskip("distributed")
+PROGRAM = "import survey.engine; survey.engine.BLOCK_POINTS = 2; from survey.cli import main; main()"
+
+
+def dask(*words, cwd):
+    command = [sys.executable, "-m", "dask", *map(str, words)]
+    return subprocess.Popen(command, cwd=cwd, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    """(path of the scheduler's file, the processes of scheduler and workers); workers live in another folder."""
+    away = tmp_path / "away"
+    away.mkdir()
+    file = tmp_path / "scheduler.json"
+    processes = [dask("scheduler", "--scheduler-file", file, "--port", 0, "--no-dashboard", cwd=tmp_path)]
+    wait_for(file.exists)
+    for _ in range(2):
+        processes.append(dask("worker", "--scheduler-file", file, "--nthreads", 1, "--no-dashboard", cwd=away))
+    yield file, processes
+    for process in reversed(processes):
+        process.kill()
+        process.wait()
+
+
+def wait_for(what, seconds=60.0):
+    deadline = time.monotonic() + seconds
+    while not what():
+        assert time.monotonic() < deadline, "waited too long"
+        time.sleep(0.01)
+
+
+def start(folder, file, *words):
+    command = [sys.executable, "-c", PROGRAM, "run", "small.toml", "--scheduler", str(file), *words]
+    return subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True)
+
+
+def test_a_cluster_gives_the_same_file(cluster, small, surveyed):
+    running = start(small.parent, cluster[0])
+    told = running.communicate(timeout=180)[1]
+    assert running.returncode == 0 and "computed 6, reused 0 of 6 blocks" in told, told
+    assert store.check(small.with_suffix(".nc")) == []
+    xr.testing.assert_equal(*(xr.load_dataset(path).drop_attrs() for path in (surveyed, small.with_suffix(".nc"))))
+
+
+def test_a_lost_scheduler_is_told_and_the_run_can_go_on(cluster, small):
+    many = ("--set", "axes.w0.num=1000", "--set", "solver.method='dop853'")
+    running = start(small.parent, cluster[0], *many)
+    blocks = small.parent / "small.nc.blocks"
+    wait_for(lambda: len(list(blocks.glob("*.block"))) > 5)
+    cluster[1][0].kill()
+    told = running.communicate(timeout=120)[1]
+    assert running.returncode == 4 and told.splitlines()[-1].startswith("survey: the dask cluster at tcp://"), told
+    assert len(list(blocks.glob("*.block"))) > 5
+
+
+def test_blocks_travel_where_no_folder_is_shared(small, tmp_path):
+    checked = workflow.read(small, output=tmp_path / "o.nc")
+    with store.Blocks(checked.path, engine.fingerprint(checked)) as kept:
+        blocks = engine.blocks_of(checked)
+        job = engine.Job(checked.scene, checked.request, checked.grid, blocks, kept, engine._code())
+        far = pickle.loads(pickle.dumps(kept))
+        assert far.folder.is_absolute()
+        assert job(0).content is None and kept.done() == {0}
+        os.rename(kept.folder, tmp_path / "elsewhere")  # as a worker sees it that has another disk
+        content = dataclasses.replace(job, kept=far)(0).content
+        os.rename(tmp_path / "elsewhere", kept.folder)
+        whole = (kept.folder / "00000000.block").read_bytes()
+        assert content == whole
+        kept.put(0, content)
+        assert kept.sound() == {0}
+
+
+def test_a_worker_with_other_code_is_refused(small, tmp_path):
+    checked = workflow.read(small, output=tmp_path / "o.nc")
+    job = engine.Job(checked.scene, checked.request, checked.grid, [], None, engine._code() | {"sources": "other"})
+    with pytest.raises(Stopped, match=r"has other code \(sources: \w+, this run: other\); install the same survey"):
+        job(0)
+
+
+def queue(folder, *words):
+    """The batch script as a queue would start it on one machine, with stand-ins for the queue's own commands."""
+    commands = folder / "bin"
+    commands.mkdir(exist_ok=True)
+    for name, text in {"srun": 'exec "$@"', "scontrol": 'echo "$@" > requeued'}.items():
+        (commands / name).write_text(f"#!/bin/sh\n{text}\n")
+        (commands / name).chmod(0o755)
+    path = os.pathsep.join([str(commands), os.path.dirname(sys.executable), os.environ["PATH"]])
+    script = Path(__file__).parent.parent / "workflows" / "slurm.sh"
+    environment = os.environ | {"PATH": path, "SLURM_JOB_ID": "17"}
+    command = ["bash", str(script), "small.toml", *words]
+    return subprocess.Popen(command, cwd=folder, env=environment, stderr=subprocess.PIPE, text=True)
+
+
+def test_the_batch_script_runs_a_sweep(small, surveyed):
+    running = queue(small.parent)
+    told = running.communicate(timeout=180)[1]
+    assert running.returncode == 0, told
+    xr.testing.assert_equal(*(xr.load_dataset(path).drop_attrs() for path in (surveyed, small.with_suffix(".nc"))))
+    assert not list(small.parent.glob("scheduler-*")) and not (small.parent / "requeued").exists()
+
+
+def test_the_batch_script_stops_before_the_walltime_and_is_queued_again(small):
+    many = ("--set", "axes.w0.num=40000", "--set", "solver.method='dop853'")
+    running = queue(small.parent, *many)
+    blocks = small.parent / "small.nc.blocks"
+    wait_for(lambda: list(blocks.glob("*.block")))
+    running.terminate()
+    told = running.communicate(timeout=60)[1]
+    assert running.returncode == 143 and "finished blocks are safe" in told, told
+    assert (small.parent / "requeued").read_text() == "requeue 17\n" and list(blocks.glob("*.block"))

@@ -1,0 +1,106 @@
+"""Tasks on threads, on processes that die, on a cluster: each number once, deaths told of the task that caused them."""
+
+import os
+import signal
+import time
+
+import pytest
+
+from survey import dispatch
+from survey.errors import BadInput, Stopped
+
+NUMBERS = list(range(12))
+
+
+class Heard:
+    """What `finished` and `died` are told."""
+
+    def __init__(self):
+        self.results, self.counts, self.dead = [], [], []
+
+    def finished(self, done, result=None):
+        self.counts.append(done)
+        self.results += [result] if done else []
+
+    def died(self, number):
+        self.dead.append(number)
+        return -number
+
+
+def squares(number):
+    return number * number
+
+
+def test_threads_end_every_number_once_in_their_order_at_first():
+    heard = Heard()
+    dispatch.on_threads(squares, NUMBERS, heard.finished, threads=1)
+    assert heard.results == [n * n for n in NUMBERS] and heard.counts == list(range(13))
+
+
+def test_a_task_that_fails_stops_all_with_its_own_error():
+    def fails(number):
+        raise Stopped("the disk is full") if number == 3 else ValueError
+
+    with pytest.raises(Stopped, match=r"^the disk is full$"):
+        dispatch.on_threads(fails, [3])
+    with pytest.raises(Stopped, match=r"^the disk is full$"):
+        dispatch.on_processes(fails, [3], Heard().finished, None, 1)
+
+
+def test_a_task_that_kills_its_worker_costs_itself_alone(tmp_path):
+    def deadly(number):
+        (tmp_path / f"{number}-{time.time_ns()}").touch()
+        if number == 4:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return number * number
+
+    heard = Heard()
+    dispatch.on_processes(deadly, NUMBERS, heard.finished, heard.died, 2)
+    assert heard.dead == [4] and heard.counts == list(range(13))
+    assert sorted(heard.results) == sorted(n * n if n != 4 else -4 for n in NUMBERS)
+    assert len(list(tmp_path.glob("4-*"))) == 1 + dispatch.DEATHS
+
+
+def test_a_worker_killed_from_outside_costs_nothing(tmp_path):
+    def unlucky(number):
+        once = tmp_path / f"killed-{number}"
+        if number % 5 == 2 and not once.exists():
+            once.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return number * number
+
+    heard = Heard()
+    dispatch.on_processes(unlucky, NUMBERS, heard.finished, heard.died, 2)
+    assert heard.dead == [] and sorted(heard.results) == [n * n for n in NUMBERS]
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        yield cluster
+
+
+def test_a_cluster_ends_every_number_and_survives_deaths(cluster, tmp_path):
+    def deadly(number):
+        once = tmp_path / f"killed-{number}"
+        if number == 4 or (number == 7 and not once.exists()):
+            once.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return number * number
+
+    heard = Heard()
+    with dispatch.client_of(cluster.scheduler_address) as client:
+        dispatch.on_cluster(deadly, NUMBERS, heard.finished, heard.died, client)
+    assert 4 in heard.dead and sorted(heard.counts) == list(range(13))
+    innocent = {n * n for n in NUMBERS if n not in heard.dead}
+    assert innocent <= set(heard.results)
+
+
+def test_no_scheduler_is_told_in_one_line(monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(dispatch, "SCHEDULER_SECONDS", 1)
+    with pytest.raises(Stopped, match=r"no dask scheduler answers at 'tcp://127\.0\.0\.1:9'"):
+        dispatch.client_of("tcp://127.0.0.1:9")
+    with pytest.raises((BadInput, Stopped), match="nonsense"):
+        dispatch.client_of("nonsense://x")
