@@ -358,23 +358,31 @@ def find(a, b, k, level, at_plus, at_minus, rows, kinds):
 
 @kernel
 def phase(row, theta, p_theta, start):
-    """start = (u0 - ul)/(uh - ul), 1 - that, the sign of u'; the smaller from P(u0) = (sin theta p_theta)^2."""
+    """start = (u0 - ul)/(uh - ul), 1 - that, the sign of u', the error of u0 in them.
+
+    The smaller part comes from P(u0) = (sin theta p_theta)^2 where that loses fewer digits than the difference does.
+    """
     sine, cosine = sin(0.5 * theta), cos(0.5 * theta)
     v, w = 2.0 * sine * sine, 2.0 * cosine * cosine
     width = row[WIDTH]
-    start[0], start[1], start[2] = 0.0, 1.0, 1.0 if p_theta <= 0.0 else -1.0
+    start[0], start[1], start[2], start[3] = 0.0, 1.0, 1.0 if p_theta <= 0.0 else -1.0, 0.0
     if not width > 0.0:
         return
     done = min(max((row[LOW_PLUS] - v if v < 1.0 else w - row[LOW_MINUS]) / width, 0.0), 1.0)
     left = min(max((v - row[HIGH_PLUS] if v < 1.0 else row[HIGH_MINUS] - w) / width, 0.0), 1.0)
-    q = row[Q_LOW] * left + row[Q_HIGH] * done - row[K] * width * width * left * done
-    other = (2.0 * sine * cosine * p_theta / width) ** 2 / q
-    if done < left:
-        done = min(other / left, 1.0)
-        left = 1.0 - done
-    else:
-        left = min(other / done, 1.0)
-        done = 1.0 - left
+    bow = row[K] * width * width * left * done
+    size = row[Q_LOW] * left + row[Q_HIGH] * done
+    start[3] = 8.0 * EPS * min(v, w)
+    q, moved = size - bow, (abs(row[Q_HIGH] - row[Q_LOW]) + abs(row[K]) * width * width) * start[3] / width
+    rough = 16.0 * EPS * (size + abs(bow)) + moved
+    if q > 4.0 * rough:  # done left = c, done + left = 1
+        c = (2.0 * sine * cosine * p_theta / width) ** 2 / q
+        root = sqrt(max(1.0 - 4.0 * c, 0.0))
+        other = 2.0 * c / (1.0 + root)
+        error = width * other * (16.0 * EPS + rough / q) / max(root, TINY)
+        if error < start[3]:
+            start[3] = error
+            done, left = (other, 1.0 - other) if done < left else (1.0 - other, other)
     start[0], start[1] = done, left
 
 
@@ -383,7 +391,7 @@ def of_states(points, rows, kinds, count, heights, starts):
     """The well of each initial state (A, C, epsilon, theta0, p_theta0, p_psi, p_phi).
 
     Fills rows (n, SIZE), kinds (n) (LOST outside the domain), the number of wells (-1 on a separatrix), heights (n, 3):
-    L above the separatrix, its bar, |k|; and starts (n, 3), see `phase`.
+    L above the separatrix, its bar, |k|; and starts (n, 4), see `phase`.
     """
     both, two = np.empty((2, SIZE)), np.empty(2, np.int64)
     for i in range(len(points)):

@@ -4,7 +4,7 @@ u = (ul wl + uh wh)/(wl + wh), wl = sqrt Q(uh) (1 + c)/2, wh = sqrt Q(ul) (1 - c
 (s + g)/(2 g), of any size (S17): real roots and conjugate ones are one case.
 """
 
-from math import floor, sqrt
+from math import floor, hypot, sqrt
 
 import numpy as np
 
@@ -25,29 +25,30 @@ def first_kind(low, high, kc):
 
 
 @inline
-def since(far, near, origin, ratio, rest, q_origin, q, width):
+def since(far, near, origin, ratio, rest, q_origin, root, width):
     """The integral of dt/(distance from a pole) since u was at the turning point `origin`, less t/far.
 
-    far, near: the distances from the pole of that turning point and of u; ratio = |u - origin|/width, rest = 1 - ratio.
+    far, near: the distances from the pole of that turning point and of u; ratio = |u - that|/width, rest = 1 - ratio;
+    root = sqrt Q(u).
     """
     if ratio < 1e-290:
         return 0.0
     x = q_origin * rest / ratio
-    third = rj(x, x + origin, sqrt(q_origin) * sqrt(q) / ratio, q_origin * near / (ratio * far))
+    third = rj(x, x + origin, sqrt(q_origin) * root / ratio, q_origin * near / (ratio * far))
     return 2.0 * width * q_origin / (3.0 * far * far) * third
 
 
 @inline
-def place(row, low, high, roots, out):
-    """out = u, 1 - u, 1 + u, (u - ul)/(uh - ul), 1 - that, Q(u)."""
+def place(row, low, high, roots, kc, out):
+    """out = u, 1 - u, 1 + u, (u - ul)/(uh - ul), 1 - that, sqrt Q(u) = g dn/(wl + wh)."""
     left, right = roots[1] * low, roots[0] * high
     total = left + right
     left, right = left / total, right / total
     out[1] = row[nu.LOW_PLUS] * left + row[nu.HIGH_PLUS] * right
     out[2] = row[nu.LOW_MINUS] * left + row[nu.HIGH_MINUS] * right
-    out[0] = 1.0 - out[1] if out[1] < out[2] else out[2] - 1.0
+    out[0] = row[nu.LOW] * left + row[nu.HIGH] * right
     out[3], out[4] = right, left
-    out[5] = row[nu.Q_LOW] * left + row[nu.Q_HIGH] * right - row[nu.K] * row[nu.WIDTH] ** 2 * left * right
+    out[5] = roots[0] * roots[1] * hypot(low - high, 2.0 * kc * sqrt(low * high)) / total
 
 
 @inline
@@ -82,9 +83,10 @@ def motion(cosine, row, start, period, times, out):
     done, left = start[0] * roots[1], start[1] * roots[0]
     low, high = left / (done + left), done / (done + left)
     z0 = first_kind(low, high, kc) if high <= low else 2.0 * quarter - first_kind(high, low, kc)
-    place(row, low, high, roots, at)
+    place(row, low, high, roots, kc, at)
     first, second = angles(row, z0 / rate, half, down, at)
     base_up, base_down = start[2] * first, start[2] * second
+    early = start[3] / max(row[nu.WIDTH] * sqrt(at[3] * at[4]) * at[5], nu.TINY)
     z0 *= start[2]
     relative = period[4] / period[0]
     for j in range(len(times)):
@@ -95,12 +97,13 @@ def motion(cosine, row, start, period, times, out):
         side = 1.0 if z >= 0.0 else -1.0
         z = min(abs(z), 2.0 * quarter)
         low, high = cosine(z, kc, quarter, pairs, last)
-        place(row, low, high, roots, at)
+        place(row, low, high, roots, kc, at)
         first, second = angles(row, z / rate, half, down, at)
         first, second = side * first - base_up, side * second - base_down
         all_up, all_down = first + 2.0 * n * up, second + 2.0 * n * down
         late = (relative + 4.0 * EPS) * abs(times[j]) + (16.0 * EPS + relative) * (1.0 + quarter) / rate
-        speed = row[nu.WIDTH] * sqrt(at[3] * at[4] * at[5])
+        late += early
+        speed = row[nu.WIDTH] * sqrt(at[3] * at[4]) * at[5]
         bend = row[nu.WIDTH] * max(row[nu.Q_LOW], row[nu.Q_HIGH]) + 4.0 * abs(row[nu.K]) * row[nu.WIDTH] ** 2
         out[j, 0], out[j, 1], out[j, 2] = at[0], all_up + all_down, all_down - all_up
         out[j, 3] = (

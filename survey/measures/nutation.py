@@ -14,10 +14,10 @@ UNDECIDED = -1
 
 
 def of_states(points):
-    """rows (n, SIZE), kinds (n), numbers of wells (n), heights (n, 3) and starts (n, 3) of initial states (n, 7)."""
+    """rows (n, SIZE), kinds (n), numbers of wells (n), heights (n, 3) and starts (n, 4) of initial states (n, 7)."""
     n = len(points)
     rows, kinds, count = np.zeros((n, nu.SIZE)), np.zeros(n, np.int64), np.full(n, -1)
-    heights, starts = np.full((n, 3), np.nan), np.zeros((n, 3))
+    heights, starts = np.full((n, 3), np.nan), np.zeros((n, 4))
     nu.of_states(np.ascontiguousarray(points), rows, kinds, count, heights, starts)
     return rows, kinds, count, heights, starts
 

@@ -107,7 +107,7 @@ def integrands(row, x, out):
     out[0] = 1.0 / sqrt(q)
     out[1] = 0.5 * row[nu.MINUS] / to_plus * out[0] if row[nu.MINUS] != 0.0 else 0.0
     out[2] = 0.5 * row[nu.PLUS] / to_minus * out[0] if row[nu.PLUS] != 0.0 else 0.0
-    out[3], out[4] = 1.0 - to_plus if to_plus < to_minus else to_minus - 1.0, q
+    out[3], out[4] = row[nu.LOW] * c + row[nu.HIGH] * s, q
 
 
 @inline
@@ -161,6 +161,8 @@ def motion(row, start, n, noise, times, waves, out):
     size = pi * (abs(waves[1, 0]) + abs(waves[2, 0]))
     x = 2.0 * atan2(sqrt(start[0]), sqrt(start[1]))
     integrals(waves, n, x, here)
+    integrands(row, x, value)
+    early = start[3] * value[0] / max(row[nu.WIDTH] * abs(sin(0.5 * x) * cos(0.5 * x)), nu.TINY)
     first, base_up, base_down = start[2] * here[0], start[2] * here[1], start[2] * here[2]
     for j in range(len(times)):
         turns = floor((first + times[j]) / (2.0 * half) + 0.5)
@@ -170,7 +172,7 @@ def motion(row, start, n, noise, times, waves, out):
         integrands(row, x, value)
         up = side * here[1] - base_up + 2.0 * pi * turns * waves[1, 0]
         down = side * here[2] - base_down + 2.0 * pi * turns * waves[2, 0]
-        late = 2.0 * noise * (abs(times[j]) + half)
+        late = 2.0 * noise * (abs(times[j]) + half) + early
         wide, bend = (
             row[nu.WIDTH],
             row[nu.WIDTH] * (row[nu.Q_LOW] + row[nu.Q_HIGH] + 4.0 * abs(row[nu.K]) * row[nu.WIDTH]),
