@@ -370,6 +370,7 @@ def phase(row, theta, p_theta, start):
         return
     done = min(max((row[LOW_PLUS] - v if v < 1.0 else w - row[LOW_MINUS]) / width, 0.0), 1.0)
     left = min(max((v - row[HIGH_PLUS] if v < 1.0 else row[HIGH_MINUS] - w) / width, 0.0), 1.0)
+    done, left = (done, 1.0 - done) if done < left else (1.0 - left, left)
     bow = row[K] * width * width * left * done
     size = row[Q_LOW] * left + row[Q_HIGH] * done
     start[3] = 8.0 * EPS * min(v, w)
@@ -380,6 +381,8 @@ def phase(row, theta, p_theta, start):
         root = sqrt(max(1.0 - 4.0 * c, 0.0))
         other = 2.0 * c / (1.0 + root)
         error = width * other * (16.0 * EPS + rough / q) / max(root, TINY)
+        if width * root < start[3]:  # on which side of the middle?
+            error += 2.0 * width * root
         if error < start[3]:
             start[3] = error
             done, left = (other, 1.0 - other) if done < left else (1.0 - other, other)

@@ -67,6 +67,13 @@ def angles(row, tau, half, down, at):
 
 
 @inline
+def rates(row, at):
+    """(b - a)/(2(1 - u)) and (b + a)/(2(1 + u))."""
+    up = 0.5 * row[nu.MINUS] / at[1] if row[nu.MINUS] != 0.0 else 0.0
+    return up, (0.5 * row[nu.PLUS] / at[2] if row[nu.PLUS] != 0.0 else 0.0)
+
+
+@inline
 def motion(cosine, row, start, period, times, out):
     """u, the angles (less the drift of phi) and bars (m, 6) at `times` (m) in units of A, from the values `period` (8).
 
@@ -87,6 +94,7 @@ def motion(cosine, row, start, period, times, out):
     first, second = angles(row, z0 / rate, half, down, at)
     base_up, base_down = start[2] * first, start[2] * second
     early = start[3] / max(row[nu.WIDTH] * sqrt(at[3] * at[4]) * at[5], nu.TINY)
+    first_up, first_down = rates(row, at)  # the phase of the start moves it and what follows alike
     z0 *= start[2]
     relative = period[4] / period[0]
     for j in range(len(times)):
@@ -102,21 +110,15 @@ def motion(cosine, row, start, period, times, out):
         first, second = side * first - base_up, side * second - base_down
         all_up, all_down = first + 2.0 * n * up, second + 2.0 * n * down
         late = (relative + 4.0 * EPS) * abs(times[j]) + (16.0 * EPS + relative) * (1.0 + quarter) / rate
+        rate_up, rate_down = rates(row, at)
+        moved = (abs(rate_up) + abs(rate_down)) * late + (abs(rate_up - first_up) + abs(rate_down - first_down)) * early
         late += early
         speed = row[nu.WIDTH] * sqrt(at[3] * at[4]) * at[5]
         bend = row[nu.WIDTH] * max(row[nu.Q_LOW], row[nu.Q_HIGH]) + 4.0 * abs(row[nu.K]) * row[nu.WIDTH] ** 2
+        rounding = 3.0 * (row[nu.BAR_LOW] + row[nu.BAR_HIGH]) + 8.0 * EPS * row[nu.WIDTH]
         out[j, 0], out[j, 1], out[j, 2] = at[0], all_up + all_down, all_down - all_up
-        out[j, 3] = (
-            speed * late + bend * late * late + 3.0 * (row[nu.BAR_LOW] + row[nu.BAR_HIGH]) + 8.0 * EPS * row[nu.WIDTH]
-        )
-        rates = 0.0
-        if row[nu.MINUS] != 0.0:
-            rates += abs(row[nu.MINUS]) / at[1]
-        if row[nu.PLUS] != 0.0:
-            rates += abs(row[nu.PLUS]) / at[2]
+        out[j, 3] = speed * late + bend * late * late + rounding
         size = abs(first) + abs(second) + abs(base_up) + abs(base_down) + abs(up) + abs(down)
-        moved = 0.5 * rates * late
-        out[j, 4] = (
-            moved + (24.0 * EPS + 2.0 * relative) * size + abs(n) * (period[5] + 4.0 * EPS * (abs(up) + abs(down)))
-        )
+        turned = abs(n) * (period[5] + 4.0 * EPS * (abs(up) + abs(down)))
+        out[j, 4] = moved + (24.0 * EPS + 2.0 * relative) * size + turned
         out[j, 5] = out[j, 4]

@@ -163,6 +163,7 @@ def motion(row, start, n, noise, times, waves, out):
     integrals(waves, n, x, here)
     integrands(row, x, value)
     early = start[3] * value[0] / max(row[nu.WIDTH] * abs(sin(0.5 * x) * cos(0.5 * x)), nu.TINY)
+    first_up, first_down = value[1] / value[0], value[2] / value[0]
     first, base_up, base_down = start[2] * here[0], start[2] * here[1], start[2] * here[2]
     for j in range(len(times)):
         turns = floor((first + times[j]) / (2.0 * half) + 0.5)
@@ -172,15 +173,17 @@ def motion(row, start, n, noise, times, waves, out):
         integrands(row, x, value)
         up = side * here[1] - base_up + 2.0 * pi * turns * waves[1, 0]
         down = side * here[2] - base_down + 2.0 * pi * turns * waves[2, 0]
-        late = 2.0 * noise * (abs(times[j]) + half) + early
+        late = 2.0 * noise * (abs(times[j]) + half)
         wide, bend = (
             row[nu.WIDTH],
             row[nu.WIDTH] * (row[nu.Q_LOW] + row[nu.Q_HIGH] + 4.0 * abs(row[nu.K]) * row[nu.WIDTH]),
         )
         speed = wide * abs(sin(0.5 * x) * cos(0.5 * x)) / value[0]
+        rate_up, rate_down = value[1] / value[0], value[2] / value[0]
+        moved = (abs(rate_up) + abs(rate_down)) * late + (abs(rate_up - first_up) + abs(rate_down - first_down)) * early
+        late += early
         out[j, 0], out[j, 1], out[j, 2] = value[3], up + down, down - up
         out[j, 3] = speed * late + bend * late * late + 3.0 * (row[nu.BAR_LOW] + row[nu.BAR_HIGH]) + 8.0 * EPS * wide
-        moved = (abs(value[1]) + abs(value[2])) / value[0] * late
         out[j, 4] = out[j, 5] = moved + 2.0 * noise * (1.0 + abs(turns)) * 2.0 * size
 
 

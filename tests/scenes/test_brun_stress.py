@@ -9,9 +9,9 @@ from mpmath import mp, mpf
 import survey
 
 
-def evaluate(points, method="auto"):
+def evaluate(points, method="auto", **more):
     arrays = {name: xr.DataArray(np.array(column), dims="point") for name, column in zip(NAMES, points.T, strict=True)}
-    return survey.evaluate("brun", method=method, **arrays)
+    return survey.evaluate("brun", method=method, **arrays, **more)
 
 
 def misses(seed, number):
@@ -37,6 +37,23 @@ def misses(seed, number):
 def test_hard_cases():
     with mp.workdps(60):
         assert misses(1, 200) == []
+
+
+def test_motions_of_hard_cases():
+    """Jacobi's functions, R_F inverted and Fourier series agree within the bars; at t = 0 the state is the given one."""
+    random = np.random.default_rng(3)
+    points = np.array([draw(random)[1] for _ in range(400)])
+    times = np.array([-30.0, -1.0, 0.0, 0.3, 7.0, 100.0])
+    one = evaluate(points, t=times)
+    start = one.sel(t=0.0)
+    off = abs(start.u - np.cos(one.theta0))
+    assert (off <= start.u_error + 2.0**-52).where(start.status == 0, True).all()
+    for method in ("carlson", "chebyshev"):
+        other = evaluate(points, method, t=times)
+        for name in ("u", "psi", "phi"):
+            fits = abs(one[name] - other[name]) <= one[f"{name}_error"] + other[f"{name}_error"]
+            known = one[name].notnull() & other[name].notnull()
+            assert fits.where(known, True).all() and known.mean() > 0.4, (method, name)
 
 
 @pytest.mark.slow
