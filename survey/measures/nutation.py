@@ -6,6 +6,7 @@ a (1/C - 1/A) T, the action, and their bars; and from these, at given times, u, 
 
 import numpy as np
 
+from survey.kernels import brun
 from survey.kernels import nutation as nu
 
 PERIOD, PRECESSION, SPIN, ACTION = range(4)
@@ -18,7 +19,7 @@ def of_states(points):
     n = len(points)
     rows, kinds, count = np.zeros((n, nu.SIZE)), np.zeros(n, np.int64), np.full(n, -1)
     heights, starts = np.full((n, 3), np.nan), np.zeros((n, 4))
-    nu.of_states(np.ascontiguousarray(points), rows, kinds, count, heights, starts)
+    brun.of_states(np.ascontiguousarray(points), rows, kinds, count, heights, starts)
     return rows, kinds, count, heights, starts
 
 
@@ -26,7 +27,7 @@ def of_integrals(points, sign):
     """The same but starts for (l, alpha, beta) (n, 3): rows (n, 2, SIZE), kinds (n, 2)."""
     n = len(points)
     rows, kinds, heights = np.zeros((n, 2, nu.SIZE)), np.zeros((n, 2), np.int64), np.full((n, 3), np.nan)
-    nu.of_integrals(np.ascontiguousarray(points), float(sign), rows, kinds, heights)
+    brun.of_integrals(np.ascontiguousarray(points), float(sign), rows, kinds, heights)
     count = np.where((kinds == nu.SEPARATRIX).any(axis=1), -1, (kinds >= nu.NUTATION).sum(axis=1))
     return rows, kinds, count, heights
 

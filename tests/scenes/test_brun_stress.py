@@ -40,7 +40,7 @@ def test_hard_cases():
 
 
 def test_motions_of_hard_cases():
-    """Jacobi's functions, R_F inverted and Fourier series agree within the bars; at t = 0 the state is the given one."""
+    """Jacobi's functions, R_F inverted and Fourier series agree; at t = 0 the state is the given one."""
     random = np.random.default_rng(3)
     points = np.array([draw(random)[1] for _ in range(400)])
     times = np.array([-30.0, -1.0, 0.0, 0.3, 7.0, 100.0])
