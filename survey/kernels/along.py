@@ -244,8 +244,9 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
     """The solution from (phi0, w0 >= 0) at ascending targets >= phi0, forward in time.
 
     Fills floats[j] = w, t, bar w, bar t at targets[j] with status OK, or phi, t, bar phi, bar t of the turning point
-    before it with TURNING; EQUILIBRIUM where the solution runs into one first, SEPARATRIX where the error bar cannot
-    tell whether it turns.
+    before it, or within bar phi of it, with TURNING; EQUILIBRIUM where the solution runs into one first, SEPARATRIX
+    where the error bar cannot tell whether it turns. OK is certain: a target that is reached with no certain w is in
+    doubt until the solution has left it behind.
     """
     T = table()
     how = setting(p, w0, tolerance)
@@ -253,7 +254,7 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
     w, t, t_low, n, started = w0, 0.0, 0.0, 0, w0 > 0.0
     slip = UNIT * 4.0 * (turns != 0.0)
     saa, sab, sbb = slip * slip, 0.0, 0.0
-    j, size = 0, len(targets)
+    j, size, doubt = 0, len(targets), -1  # doubt: the first target in doubt
     ending = OK
     if w0 == 0.0 and start_sign(p, phi, w0) <= 0:
         ending = TURNING if start_sign(p, phi, w0) < 0 else EQUILIBRIUM
@@ -265,7 +266,7 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
             status[i] = ending
             floats[i, 0], floats[i, 1], floats[i, 2], floats[i, 3] = phi0, 0.0, 0.0, 0.0
         return
-    while j < size:
+    while j < size or doubt >= 0:
         if n >= limit:
             ending = STEP_LIMIT
             break
@@ -293,17 +294,26 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
             usable = bar(n, a) < TRUST and floats[j, 2] < TRUST * (1.0 + abs(v))
             usable = usable and floats[j, 3] < TRUST * (1.0 + floats[j, 1])
             status[j] = OK if usable else NO_CONVERGENCE
+            if doubt < 0 and not told(floats[j]):
+                doubt = j
             j += 1
         saa, sab, sbb = carried(p, T, reach, v1, saa, sab, sbb)
         bar_phi, bar_w = bar(n, saa), bar(n, sbb)
+        edge = bar_phi * 1.1 + 4e-16 * abs(x1 + turns * TWO_PI)
+        # from here on a turning point lies beyond x1
+        while doubt >= 0 and doubt < j and x1 - ((targets[doubt] - turns * TWO_PI) - turns * TWO_PI_LOW) > edge:
+            doubt += 1
+        if doubt == j:
+            doubt = -1
         if turned:
             ending = TURNING if clean_turning(p, x1, bar_phi, bar_w) else SEPARATRIX
             bar_t = bar_w / abs(values(p, x1)[1]) + 3e-16 * t if ending == TURNING else 0.0
-            for i in range(j, size):
-                floats[i, 0], floats[i, 1] = x1 + turns * TWO_PI, t + (reach + t_low)
-                floats[i, 2] = bar_phi * 1.1 + 4e-16 * abs(x1 + turns * TWO_PI)
-                floats[i, 3] = bar_t * 1.2
-            break
+            for i in range(doubt if doubt >= 0 else j, size):
+                if i >= j or not told(floats[i]):
+                    status[i] = ending
+                    floats[i, 0], floats[i, 1] = x1 + turns * TWO_PI, t + (reach + t_low)
+                    floats[i, 2], floats[i, 3] = edge + 4e-16 * abs(floats[i, 0]), bar_t * 1.2
+            return
         phi, w = x1, v1
         high = t + h
         t_low += h - (high - t)
@@ -323,8 +333,15 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
             if gap > 0.0 and (targets[j] - turns * TWO_PI) - turns * TWO_PI_LOW >= phi + gap:
                 ending = EQUILIBRIUM
                 break
-    for i in range(j, size):
-        status[i] = ending
+    for i in range(doubt if doubt >= 0 else j, size):
+        if i >= j or not told(floats[i]):
+            status[i] = ending
+
+
+@inline
+def told(row):
+    """Is w so certain, at a target, that a turning point is further away than the bar of phi?"""
+    return row[2] < 0.1 * row[0]
 
 
 @inline

@@ -1,4 +1,4 @@
-"""Solutions in closed form of the flow on the cylinder where g = 0 or alike, or where b = 0.
+"""Solutions in closed form of the flow on the cylinder where g = 0 or alike; where b = 0, the time at an angle.
 
 Trigonometric, kind 1: w = mu F(phi) + n is an invariant curve, g = (mu - 1) f (mu F + n); mu = 1 is g = 0 (50), other
 mu are (61). With u = tan(x/2), x = phi - phi0, du/dt is quadratic in u: one formula in Delta^2 = n^2 - (mu b)^2.
@@ -6,7 +6,9 @@ Elliptic, b = 0: w^2 = w0^2 + 2 (V(phi0) - V(phi)), a trigonometric polynomial o
 theta = Omega t + theta0, after a real projective map of tan(phi/2) that is centred on the turning points (libration,
 kind 2) or on the complex roots (rotation, kind 3). Nothing lies at infinity, so no variant of (66) needs its own case.
 
-All start with w0 >= 0 (the caller mirrors). `data` holds what `start_*` found out; `*_at` take it at any time.
+For phi and w at a time where b = 0 see `weierstrass`.
+
+All start with w0 >= 0 (the caller mirrors). `data` holds what `start_*` found out; `*_at` and `*_reach` take it.
 """
 
 import cmath
@@ -14,7 +16,7 @@ import math
 
 import numpy as np
 
-from survey.kernels.elliptic import MEANS, complete, jacobi, means
+from survey.kernels.elliptic import complete
 from survey.kernels.flow import B12, B31, C23, S2, S3, TWO_PI, UNIT, D
 from survey.kernels.jit import inline, kernel
 
@@ -24,9 +26,9 @@ SAME = 64.0 * UNIT  # how far, relative, parameters may miss the conditions of (
 
 # places in data
 W0, A1, B1, A2, B2, ROUGH = range(6)  # g(phi0 + x) = A1 cos x + B1 sin x + A2 cos 2x + B2 sin 2x
-F0, SLOPE, ALPHA, SQUARE, NOISE, MISS, GROWTH = range(6, 13)  # kind 1
+F0, SLOPE, ALPHA, SQUARE, NOISE, MISS, GROWTH, POWER = range(6, 14)  # kind 1
 LEFT, RIGHT, BAR_LEFT, BAR_RIGHT, RATIO = range(6, 11)  # kind 2
-RHO, RHO_M, THETA0, OMEGA, KC, KC2, QUARTER, LAST_MEAN, SLACK = range(11, 20)  # kinds 2 and 3
+RHO, RHO_M, THETA0, OMEGA, KC, KC2, QUARTER, SLACK = range(11, 19)  # kinds 2 and 3
 RE, IM, TILT, LEAST, MISFIT = range(20, 25)  # kind 3
 MARGIN = 1.5
 
@@ -88,14 +90,6 @@ def reach(data, side):
 
 
 @inline
-def amplitude(pairs, last, quarter, theta):
-    """am(theta), sn, cn, dn at the rest of theta after multiples of 2 K, and that multiple."""
-    j = math.floor(theta / (2.0 * quarter) + 0.5)
-    sn, cn, dn = jacobi(theta - j * 2.0 * quarter, pairs, last)
-    return j * math.pi + math.atan2(sn, cn), sn, cn, dn, j
-
-
-@inline
 def carlson(x, y, z):
     """R_F(x, y, z), by duplication (DLMF 19.36.1)."""
     for _ in range(40):
@@ -151,7 +145,7 @@ def applies(p, phi0, w0):
 
 
 @kernel
-def start(p, phi0, w0, data, pairs):
+def start(p, phi0, w0, data):
     """Fill data for the solution from (phi0, w0); returns (kind, side): x and w are to be multiplied by side."""
     kind, mu, miss = applies(p, phi0, w0)
     side = 1.0 if w0 >= 0.0 else -1.0
@@ -167,7 +161,7 @@ def start(p, phi0, w0, data, pairs):
     data[W0] = abs(w0)
     right, bar_right = reach(data, 1.0)
     if right == math.inf:
-        return (ROTATION if start_rotation(data, pairs) else LOST), side
+        return (ROTATION if start_rotation(data) else LOST), side
     if w0 == 0.0:
         left, bar_left = 0.0, 0.0
     else:
@@ -175,7 +169,7 @@ def start(p, phi0, w0, data, pairs):
     if not (math.isfinite(left) and math.isfinite(right)):
         return LOST, side
     data[LEFT], data[RIGHT], data[BAR_LEFT], data[BAR_RIGHT] = left, right, bar_left, bar_right
-    return (LIBRATION if start_libration(data, pairs) else LOST), side
+    return (LIBRATION if start_libration(data) else LOST), side
 
 
 @inline
@@ -187,7 +181,7 @@ def start_trigonometric(p, phi0, w0, side, mu, miss, data):
     data[ALPHA] = abs(w0) - 2.0 * F
     data[SQUARE] = data[ALPHA] * abs(w0) - f * f  # n^2 - (mu b)^2
     data[NOISE] = 6.0 * UNIT * abs(mu) * b + (4.0 * UNIT * abs(w0) if b > 0.0 else 0.0)
-    data[MISS], data[GROWTH] = miss, b * abs(1.0 - mu)
+    data[MISS], data[GROWTH], data[POWER] = miss, b * abs(1.0 - mu), (1.0 - mu) / mu if mu != 0.0 else math.inf
 
 
 @inline
@@ -239,14 +233,18 @@ def trigonometric_at(data, t):
 def misfit(data, t, w):
     """Bound of e = w - (mu F + n) after t, where parameters miss (61) by MISS: e' = (1 - mu) f e + MISS.
 
-    |integral of f dt| is at most b t, and |change of F| / least w.
+    w' = mu f w, so e(t) is the integral of MISS (w(t)/w(s))^((1 - mu)/mu) over s; and |integral of f dt| is at most
+    b t, and |change of F| / least w, which serves near mu = 0.
     """
     if data[MISS] == 0.0:
         return 0.0
+    most = abs(data[W0] - data[F0]) + math.hypot(data[F0], data[SLOPE])
     least = min(w, data[W0])
     if data[SQUARE] > 0.0:  # = (n - mu b)(n + mu b)
-        least = data[SQUARE] / (abs(data[W0] - data[F0]) + math.hypot(data[F0], data[SLOPE]))
-    return data[MISS] * t * math.exp(min(data[GROWTH] * min(t, 2.0 / max(least, 1e-300)), 700.0))
+        least = data[SQUARE] / most
+    least = max(least, 1e-300)
+    power = data[POWER] * math.log(w / least if data[POWER] > 0.0 else w / most)
+    return data[MISS] * t * math.exp(min(data[GROWTH] * min(t, 2.0 / least), max(power, 0.0), 700.0))
 
 
 @inline
@@ -284,14 +282,14 @@ def trigonometric_reach(data, x):
         total = drift(data, theta, s, math.cosh(root * theta), 1.0)
     t = 2.0 * theta
     # the formula is evaluated with rounded data, which moves Delta^2 as well
-    moved = misfit(data, t, near)
+    moved = misfit(data, t, near / w0)  # near = w0 w
     bar = (data[NOISE] + moved) * total / w0 + 2.0 * abs(y1) * blur / near + 6.0 * UNIT * t
     bar += 3.0 * UNIT * (abs(x) + 1.0) * w0 / near * 2.0
     return t, MARGIN * bar
 
 
 @inline
-def start_libration(data, pairs):
+def start_libration(data):
     """Turning points, parameter m and phase of the libration; False where the digits are lost."""
     left, right = data[LEFT], data[RIGHT]
     middle, half = 0.5 * (right - left), 0.5 * (right + left)
@@ -318,7 +316,7 @@ def start_libration(data, pairs):
     data[RATIO], data[RHO], data[RHO_M] = math.sqrt(qa / qb), rho, bar / kc2
     data[OMEGA], data[KC2], data[KC] = 0.5 * math.sqrt(product), kc2, math.sqrt(kc2)
     quarter, _second = complete(0.0, data[KC])
-    data[QUARTER], data[LAST_MEAN] = quarter, means(data[KC], pairs)
+    data[QUARTER] = quarter
     v = math.sin(0.5 * left) / math.sin(0.5 * right)
     chi = 2.0 * math.atan(math.sqrt(v / data[RATIO]))
     data[THETA0] = first_kind(chi, kc2, quarter)
@@ -336,44 +334,6 @@ def phase_bar(data, theta):
     whole = theta + data[THETA0]
     relative = 0.25 * data[RHO] * theta + 0.5 * data[RHO_M] * whole + 12.0 * UNIT * (whole + 1.0)
     return (relative + data[SLACK]) / data[OMEGA]
-
-
-@inline
-def libration_at(data, pairs, t):
-    """x, w, bar x, bar w, turnings at t >= 0."""
-    theta = data[OMEGA] * t + data[THETA0]
-    _chi, sn, cn, dn, j = amplitude(pairs, int(data[LAST_MEAN]), data[QUARTER], theta)
-    sign = -1.0 if j % 2 else 1.0
-    sn, cn = sign * sn, sign * cn  # of chi itself
-    half, r = 0.5 * (data[LEFT] + data[RIGHT]), data[RATIO]
-    sh, ch = math.sin(half), math.cos(half)
-    low, high = 0.5 * (1.0 + cn), 0.5 * (1.0 - cn)
-    if cn > 0.0:
-        high = 0.5 * sn * sn / (1.0 + cn)
-    else:
-        low = 0.5 * sn * sn / (1.0 - cn)
-    size = (low - r * high) ** 2 + 4.0 * r * low * high * math.cos(0.5 * half) ** 2
-    x = -data[LEFT] + 2.0 * math.atan2(r * high * sh, low + r * high * ch)
-    w = sh * r * data[OMEGA] * sn * dn / size
-    slope = 0.5 * abs(square_of_w(data, x)[1])
-    late = phase_bar(data, theta)
-    # dx/dln r at a fixed chi is 2 r low high sin h / size
-    shape = 0.5 * data[RHO] + data[BAR_LEFT] + data[BAR_RIGHT] + 8.0 * UNIT
-    fixed = data[BAR_LEFT] + data[BAR_RIGHT] + 2.0 * r * low * high * sh / size * shape
-    fixed += 8.0 * UNIT * (1.0 + data[LEFT] + half)
-    cancelled = (low + r * high) ** 2 / size
-    wider = cancelled * (shape + data[RHO]) + data[RHO_M] + data[RHO] + 12.0 * UNIT
-    wider += (data[BAR_LEFT] + data[BAR_RIGHT]) / sh
-    tick = 12.0 * UNIT / (data[OMEGA] * dn)
-    bend = 2.0 * (math.hypot(data[A1], data[B1]) + math.hypot(data[A2], data[B2]))
-    late += tick
-    bar_w = abs(w) * wider + slope * late + bend * late * (abs(w) * late + late * late * bend)
-    turned = theta / (2.0 * data[QUARTER])
-    count = math.floor(turned)
-    near = abs(turned - math.floor(turned + 0.5)) * 2.0 * data[QUARTER] / data[OMEGA]
-    certain = near > MARGIN * late or (math.floor(turned + 0.5) == 0.0 and t == 0.0)
-    bar_x = abs(w) * late + bend * late * late + fixed
-    return x, w, MARGIN * bar_x, MARGIN * bar_w, count if certain else -2
 
 
 @inline
@@ -398,7 +358,7 @@ def libration_reach(data, x):
 
 
 @inline
-def start_rotation(data, pairs):
+def start_rotation(data):
     """The complex roots of w^2 (z = e^{ix}) within the unit circle and the map; False where the digits are lost.
 
     w^2 = kappa |z^2 - sigma z + pi|^2: pi and sigma follow from y = 2 kappa, the greatest root of one equation, that
@@ -442,7 +402,7 @@ def start_rotation(data, pairs):
     data[KC2], data[KC] = kc2, math.sqrt(kc2)
     data[RE], data[IM], data[TILT] = centre.real, centre.imag, math.atan2(image.imag, image.real) + 0.5 * math.pi
     data[QUARTER], _second = complete(0.0, data[KC])
-    data[LAST_MEAN], data[LEAST], data[MISFIT] = means(data[KC], pairs), least, misfit
+    data[LEAST], data[MISFIT] = least, misfit
     data[RHO], data[RHO_M] = 0.0, 0.0
     data[SLACK] = 16.0 * UNIT * (1.0 + 2.0 / (1.0 - abs(centre))) / data[KC]
     data[THETA0] = first_kind(mapped(data, 0.0), kc2, data[QUARTER])
@@ -460,24 +420,6 @@ def mapped(data, x):
     c = complex(data[RE], data[IM])
     v = 1.0 - c * complex(math.cos(x), -math.sin(x))
     return x + 2.0 * math.atan2(v.imag, v.real) - data[TILT]
-
-
-@inline
-def rotation_at(data, pairs, t):
-    """x, w, bar x, bar w at t >= 0."""
-    theta = data[OMEGA] * t + data[THETA0]
-    chi, _sn, _cn, dn, _j = amplitude(pairs, int(data[LAST_MEAN]), data[QUARTER], theta)
-    angle = chi + data[TILT]
-    v = 1.0 + complex(data[RE], -data[IM]) * complex(math.cos(angle), math.sin(angle))
-    x = angle - 2.0 * math.atan2(v.imag, v.real)
-    w = data[OMEGA] * dn * (1.0 - data[RE] ** 2 - data[IM] ** 2) / abs2(v)
-    late = rotation_bar(data, abs(theta - data[THETA0]), t)
-    slope = 0.5 * abs(square_of_w(data, x)[1]) / w
-    centre = math.hypot(data[RE], data[IM])
-    bar = w * late + 8.0 * UNIT * (abs(x) + w / (data[OMEGA] * dn) + 2.0 / (1.0 - centre))
-    bend = 2.0 * (math.hypot(data[A1], data[B1]) + math.hypot(data[A2], data[B2])) / w
-    bar += bend * late * late * w
-    return x, w, MARGIN * bar, MARGIN * (slope * bar + bend * bar * bar + 0.5 * data[MISFIT] / w + 12.0 * UNIT * w)
 
 
 @inline
@@ -500,5 +442,5 @@ def rotation_reach(data, x):
 
 @inline
 def scratch():
-    """Empty data and pairs."""
-    return np.zeros(SIZE), np.zeros((2, MEANS))
+    """Empty data."""
+    return np.zeros(SIZE)

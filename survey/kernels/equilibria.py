@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from survey.kernels.flow import BOUND_DDG, BOUND_DG, BOUND_F, BOUND_G, TWO_PI, UNIT, values
+from survey.kernels.flow import BOUND_DDG, BOUND_DG, BOUND_F, BOUND_G, C23, S2, TWO_PI, UNIT, values
 from survey.kernels.jit import inline, kernel
 
 MOST = 12  # rows of a table of equilibria: 4 at most, and degenerate ones
@@ -115,6 +115,23 @@ def offset(phi, angle):
     x = phi - angle
     turns = math.floor(x / TWO_PI + 0.5)
     return x - turns * TWO_PI, turns
+
+
+@kernel
+def resting(p, table, count, phi0):
+    """The row of the equilibrium that phi0 is exactly, or -1.
+
+    Of binary64 angles only 0 can be one: at any other exp(i phi0) is transcendental (Lindemann), so it is no root of a
+    polynomial with rational coefficients, as which g can be written.
+    """
+    best, least = -1, math.inf
+    if phi0 != 0.0 or p[S2] != p[C23]:
+        return best
+    for i in range(count):
+        away = abs(offset(phi0, table[i, ANGLE])[0])
+        if away < least:
+            best, least = i, away
+    return best
 
 
 @kernel

@@ -18,7 +18,7 @@ from survey.kernels.along import (
     start_sign,
     time_of_turning,
 )
-from survey.kernels.equilibria import ANGLE, BAR, DG, FOCUS, KIND, NODE, STABLE, F, captured, offset, settled
+from survey.kernels.equilibria import ANGLE, BAR, DG, FOCUS, KIND, NODE, STABLE, F, captured, offset, resting, settled
 from survey.kernels.flow import TWO_PI, TWO_PI_LOW, UNIT, reduced, table, values
 from survey.kernels.jit import inline, kernel
 from survey.kernels.returns import (
@@ -52,8 +52,8 @@ def place_of(cycles, size, x, error):
 
 @inline
 def attracts(cycle):
-    """Does the cycle attract on both sides?"""
-    return cycle[BELOW] > 0.0 and cycle[ABOVE] < 0.0
+    """Does the cycle certainly attract on both sides?"""
+    return cycle[CYCLE_CLASS] >= 0.0 and cycle[BELOW] > 0.0 and cycle[ABOVE] < 0.0
 
 
 @kernel
@@ -168,16 +168,23 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
     phi0, w0 = start[0], start[1]
     phi, turns = reduced(phi0)
     w, slip = w0, start[2] + 4.0 * UNIT * (turns != 0.0)
+    sign = start_sign(p, phi, w)
     if w == 0.0:
-        for i in range(count):
-            x, k = offset(phi, eqs[i, ANGLE])
-            if abs(x) <= eqs[i, BAR] + 4e-16 * (1.0 + abs(phi0)):
-                out[0], out[1], out[2], out[3] = EQUILIBRIUM_START, i, 0, turns + k
+        row = resting(p, eqs, count, phi0)
+        if row >= 0:
+            out[0], out[1], out[2], out[3] = EQUILIBRIUM_START, row, 0, offset(phi, eqs[row, ANGLE])[1]
+            return
+        if sign == 0:  # beside an equilibrium, within rounding
+            row = captured(eqs, count, phi, w, slip + 16.0 * UNIT)
+            if row < 0:
+                out[4] = SEPARATRIX
                 return
+            out[0], out[1], out[3] = EQUILIBRIUM, row, turns + offset(phi, eqs[row, ANGLE])[1]
+            out[2] = INFINITE if eqs[row, KIND] == FOCUS else UNTOLD
+            return
     T = table()
     how = setting(p, w0, tolerance)
     saa, sab, sbb, n, turnings = slip * slip, 0.0, start[3] * start[3], 0, 0
-    sign = start_sign(p, phi, w)
     before, before_bar = -1.0, 0.0  # last passage of the section without a turning since
     right, right_bar, left = math.nan, 0.0, math.nan  # last turning points, unwrapped from `turns` = base
     spacing = TWO_PI if stratum == GENERIC else math.pi

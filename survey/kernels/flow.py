@@ -36,6 +36,17 @@ def coefficients(b12, b31, d, c23, s2, s3):
 
 
 @kernel
+def spread(rows, P, starts):
+    """Fill P with the `coefficients` of rows of eight numbers, and starts with their phi0, w0."""
+    for i in range(len(rows)):
+        for k in range(6):
+            P[i, k] = rows[i, k]
+        b, c, s = math.hypot(P[i, 0], P[i, 1]), math.hypot(0.5 * P[i, 2], P[i, 3]), math.hypot(P[i, 4], P[i, 5])
+        P[i, BOUND_F], P[i, BOUND_G], P[i, BOUND_DG], P[i, BOUND_DDG] = b, c + s, 2.0 * c + s, 4.0 * c + s
+        starts[i, 0], starts[i, 1] = rows[i, 6], rows[i, 7]
+
+
+@kernel
 def values(p, phi):
     """f, g, g' at phi."""
     s, c = math.sin(phi), math.cos(phi)

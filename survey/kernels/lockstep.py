@@ -41,6 +41,7 @@ _GOING, _AT, _LOST = 0.0, 1.0, 2.0  # what a step has made of a lane
 # Steps shorter than this have a share of the tolerance only: so many short steps add up to what few long ones do.
 _SHORT = 1.0 / 8.0
 _COARSEST = 1e-11  # per step: above, the terms that follow the last two may be no smaller than these
+_FALL = 1.0 / 50.0  # by more, two terms further on, no series is trusted to fall
 _MANY = -1e9  # a count that stays below zero
 
 # Cody and Waite's reduction, and the polynomials of fdlibm's kernels for sin and cos in [-pi/4, pi/4].
@@ -202,7 +203,11 @@ def _advance(T, state, before, fixed, fate, tolerance):
             before[k, i] = state[k, i]
     for i in range(LANES):
         w, last, previous = state[_V, i], abs(T[_W + ORDER, i]), abs(T[_W + ORDER - 1, i])
-        size = max(last, previous * state[_RATE, i]) * max(1.0, _SHORT * state[_RATE, i])
+        # a term that vanishes, as every second does where the motion starts at rest, tells nothing: two more are asked
+        fall = _FALL * state[_RATE, i] * state[_RATE, i]
+        size = max(last, fall * abs(T[_W + ORDER - 2, i]))
+        size = max(size, max(previous, fall * abs(T[_W + ORDER - 3, i])) * state[_RATE, i])
+        size = size * max(1.0, _SHORT * state[_RATE, i])
         size = size / (tolerance * (1.0 + abs(w)))
         # within `flow.longest_step` w has one zero at most
         square = fixed[_PDG, i] + fixed[_PF, i] * (abs(w) + 0.25 * fixed[_PF, i])
@@ -223,8 +228,9 @@ def _advance(T, state, before, fixed, fate, tolerance):
         # the last terms, and what follows them
         d2 = dt * dt
         d4 = d2 * d2
-        d15 = d4 * d4 * d4 * d2 * dt
-        cut = d15 * max(last * dt, previous)
+        d13 = d4 * d4 * d4 * dt
+        last = max(last * d2, _FALL * abs(T[_W + ORDER - 2, i]))
+        cut = d13 * max(last * dt, max(previous * d2, _FALL * abs(T[_W + ORDER - 3, i])))
         speed = fixed[_PF, i] * abs(v) + fixed[_PG, i]
         e = cut * dt * (1.0 / ORDER) + UNIT * (4.0 + 3.0 * dt * (abs(v) + dt * speed))
         g = cut + UNIT * (1.5 * abs(v) + 8.0 * dt * speed)
@@ -257,7 +263,7 @@ def _turnings(state):
 @inline
 def _enter(p, phi0, w0, state, fixed, i):
     """Set lane i to the start of a solution, in axes where c23 = 0."""
-    angle, wide, tall = 0.0, p[D], 2.0 * p[C23]
+    angle, wide, tall = 0.0, p[D] + 0.0, 2.0 * p[C23]  # no negative zero: its sign is taken
     if tall != 0.0:
         angle = 0.5 * math.atan2(-tall if wide >= 0.0 else tall, abs(wide))
         wide = math.copysign(math.sqrt(wide * wide + tall * tall), wide)

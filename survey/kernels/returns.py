@@ -251,6 +251,9 @@ def solved(image_of, kind, p, eqs, count, place, interval, a, b, tolerance, row)
             break
         x = new if low < new < high else 0.5 * (low + high)
     write_cycle(a, b, m, interval, steepness(kind, p, m[X]), row)
+    below, above = abs(a[CHANGE]) > a[ERROR], abs(b[CHANGE]) > b[ERROR]
+    if not (below and above):  # D may change sign by its rounding alone
+        row[CYCLE_CLASS], row[BELOW], row[ABOVE] = -m[CLASS], row[BELOW] * below, row[ABOVE] * above
 
 
 @inline

@@ -7,7 +7,7 @@ asked accuracy is solved again with smaller steps, and the better answer is kept
 import numpy as np
 
 from survey.kernels.along import OK, TURNING, UNTOLD
-from survey.kernels.flow import coefficients
+from survey.kernels.flow import spread
 
 STEPS = 200_000  # budget of one solution; about 0.1 s with the Taylor method
 SHARE = 1e-3  # of the asked accuracy, for the truncation error of one step
@@ -39,7 +39,9 @@ def attempts(method, rtol):
 
 def split(rows):
     """Rows of eight numbers as the kernels take them: coefficients and initial states."""
-    return np.ascontiguousarray(coefficients(*rows[:, :6].T)), np.ascontiguousarray(rows[:, 6:])
+    P, starts = np.empty((len(rows), 10)), np.empty((len(rows), 2))
+    spread(np.ascontiguousarray(rows, dtype=float), P, starts)
+    return P, starts
 
 
 def trajectories(method, rows, times, rtol):
@@ -47,43 +49,45 @@ def trajectories(method, rows, times, rtol):
 
     turnings counts the sign changes of w between 0 and t; it is -2 where the error bar cannot tell.
     """
-    floats = np.full((*times.shape, 4), np.nan)
-    turnings = np.full(times.shape, UNTOLD, dtype=np.int64)
-    status = np.zeros(times.shape, dtype=np.int64)
-    for past in (False, True):
-        mine = times < 0 if past else times >= 0
+    past = times < 0
+    if not past.any():
+        return _in_time(method, rows, times, rtol)
+    results = _nothing(times.shape)
+    for mine, back in ((~past, False), (past, True)):
         picked = mine.any(axis=1)
         if not picked.any():
             continue
         places = np.where(mine, np.abs(times), np.inf)[picked]
-        f, n, s = _in_time(method, reverse(rows[picked]) if past else rows[picked], places, rtol)
-        if past:
-            f[..., 1] *= -1.0
+        parts = _in_time(method, reverse(rows[picked]) if back else rows[picked], places, rtol)
+        if back:
+            parts[0][..., 1] *= -1.0
         take = mine[picked]
-        for whole, part in ((floats, f), (turnings, n), (status, s)):
+        for whole, part in zip(results, parts, strict=True):
             held = whole[picked]
             held[take] = part[take]
             whole[picked] = held
-    return floats, turnings, status
+    return results
+
+
+def _nothing(shape):
+    """floats, turnings and status before anything is known."""
+    return np.full((*shape, 4), np.nan), np.full(shape, UNTOLD, dtype=np.int64), np.zeros(shape, dtype=np.int64)
 
 
 def _in_time(method, rows, places, rtol):
-    order = np.argsort(places, axis=1, kind="stable")
-    places = np.ascontiguousarray(np.take_along_axis(places, order, axis=1))
-
+    places, back = _sorted(places)
     budget = STEPS * min(method.FLOW_WORK, 10)
 
     def run(pick, tolerance):
         P, starts = split(rows[pick])
-        floats = np.full((*places[pick].shape, 4), np.nan)
-        turnings = np.full(places[pick].shape, UNTOLD, dtype=np.int64)
-        ends = np.zeros(len(P), dtype=np.int64)
         at = np.ascontiguousarray(places[pick])
+        floats, turnings, status = _nothing(at.shape)
+        ends = np.zeros(len(P), dtype=np.int64)
         method.flow_trajectories(P, starts, at, tolerance, budget, floats, turnings, ends)
-        status = np.where(np.isfinite(floats[..., 0]), OK, ends[:, None])
+        np.copyto(status, ends[:, None], where=~np.isfinite(floats[..., 0]))  # else OK
         return floats, turnings, status
 
-    return _unsorted(order, _repeated(run, np.isfinite(places), attempts(method, rtol), rtol))
+    return back(_repeated(run, np.isfinite(places), attempts(method, rtol), rtol))
 
 
 def abel(method, rows, targets, rtol):
@@ -116,9 +120,7 @@ def abel(method, rows, targets, rtol):
 
 
 def _in_phi(method, rows, targets, rtol):
-    order = np.argsort(targets, axis=1, kind="stable")
-    targets = np.ascontiguousarray(np.take_along_axis(targets, order, axis=1))
-
+    targets, back = _sorted(targets)
     budget = STEPS * min(method.FLOW_WORK, 10)
 
     def run(pick, tolerance):
@@ -129,13 +131,13 @@ def _in_phi(method, rows, targets, rtol):
         method.flow_abels(P, starts, at, tolerance, budget, floats, status)
         return floats, status
 
-    return _unsorted(order, _repeated(run, np.isfinite(targets), tolerances(method, rtol), rtol))
+    return back(_repeated(run, np.isfinite(targets), tolerances(method, rtol), rtol))
 
 
 def _repeated(run, asked, ladder, rtol):
     """Solve all rows, then again, finer, those that miss the asked accuracy; keep the better of two."""
     first, *others = ladder
-    results = run(np.ones(len(asked), dtype=bool), first)
+    results = run(slice(None), first)
     for tolerance in others:
         again = (missed(results, rtol) & asked).any(axis=1)
         if not again.any() or tolerance >= first:
@@ -150,10 +152,12 @@ def _repeated(run, asked, ladder, rtol):
 
 
 def missed(results, rtol):
+    """Where the answer misses the asked accuracy, or there is none."""
     floats, status = results[0], results[-1]
-    values, bars = floats[..., :2], floats[..., 2:]
-    met = (bars <= rtol * (1.0 + np.abs(values))).all(axis=-1)
-    return ~(met & (status >= 0)) & ((status == OK) | (status == TURNING)) | (status > OK) & (status != TURNING)
+    good = (status == OK) | (status == TURNING)
+    for i in (0, 1):
+        good &= floats[..., 2 + i] <= rtol * (1.0 + np.abs(floats[..., i]))
+    return ~good
 
 
 def badness(results):
@@ -162,9 +166,16 @@ def badness(results):
     return worst + np.where((status == OK) | (status == TURNING), 0.0, 1e300)
 
 
-def _unsorted(order, results):
-    """Undo the sorting of the columns."""
+def _sorted(places):
+    """`places` in ascending columns, and the function that brings results back into their order."""
+    if (places[:, 1:] >= places[:, :-1]).all():
+        return places, lambda results: results
+    order = np.argsort(places, axis=1, kind="stable")
     back = np.argsort(order, axis=1)
-    return tuple(
-        np.take_along_axis(result, back[..., None] if result.ndim == 3 else back, axis=1) for result in results
-    )
+
+    def undone(results):
+        return tuple(
+            np.take_along_axis(result, back[..., None] if result.ndim == 3 else back, axis=1) for result in results
+        )
+
+    return np.take_along_axis(places, order, axis=1), undone

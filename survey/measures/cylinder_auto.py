@@ -1,4 +1,12 @@
-"""Method "auto" for flows on the cylinder: closed forms where they apply and keep their digits, point by point."""
+"""Method "auto" for flows on the cylinder: closed forms where they apply and keep their digits, point by point.
+
+The rule is read off the true errors that `workflows/gyrostat_methods.py` maps (rtol = 1e-10). Of all initial states of
+a system with b = 0 a closed form serves 97 %, with a median error of 6e-16 against 2e-14 of the Taylor series and at a
+cost free of t. Next to double and triple roots (separatrices, folds) it serves 16 % of the plane, the series 85 %; on
+(61), from conservative to stiff, 55 % and 100 %. The bars tell where: so `method`, the Taylor series, is asked where no
+closed form answers or its bar misses rtol, and its answer is taken where its bar is no wider. No third method is
+needed: dop853, rk4 or full alone serve 4 points of 4776.
+"""
 
 import numpy as np
 
@@ -10,9 +18,11 @@ from survey.methods import closed
 def trajectories(method, rows, times, rtol):
     """As `cylinder.trajectories`: in closed form, and by `method` where that has no answer or too wide a bar."""
     results = cylinder.trajectories(closed, rows, times, rtol)
-    missed = cylinder.missed(results, rtol) | (results[1] == UNTOLD)
-    results[0][missed & (results[1] == UNTOLD)] = np.nan
-    results[2][missed & (results[1] == UNTOLD) & (results[2] == OK)] = closed.NO_CONVERGENCE
+    missed, untold = cylinder.missed(results, rtol), results[1] == UNTOLD
+    if untold.any():
+        missed |= untold
+        results[0][untold] = np.nan
+        results[2][untold & (results[2] == OK)] = closed.NO_CONVERGENCE
     return _completed(results, missed, lambda some, at: cylinder.trajectories(method, some, at, rtol), rows, times)
 
 

@@ -200,8 +200,9 @@ def _rotations(method, six, eqs, section, K, L):
     found = method.flow_cycles(rt.ROTATION, p, eqs, len(eqs), section, 0, xs, fine, table, 0, edges)
     border, start, untold = edges[:2].copy(), edges[4], edges[6]
     end = np.sign(K) if K != 0.0 else np.sign(L)
-    top, change, error = xs[-1], edges[2], edges[3]
+    top, change, error, last = xs[-1], edges[2], edges[3], 0.0
     while change * end < 0.0 and abs(change) > 4.0 * error and top < 1e5 * scale and found < len(table) - 1:
+        last = np.sign(change)
         xs = top * np.array([1.0, 1.3, 1.7, 2.2, 3.0])
         before = found
         found = method.flow_cycles(rt.ROTATION, p, eqs, len(eqs), section, 0, xs, fine, table, found, edges)
@@ -210,7 +211,8 @@ def _rotations(method, six, eqs, section, K, L):
             break
         top, change, error = xs[-1], edges[2], edges[3]
     cycles = table[:found]
-    last = cycles[-1, rt.ABOVE] if found else np.sign(change)
+    last = np.sign(change) if abs(change) > error else last  # the last certain sign of D
+    last = cycles[-1, rt.ABOVE] if found else last
     if last * end < 0.0 and K != 0.0:
         cycles = np.vstack([cycles, _far_cycle(p, section, K, L, scale)])
     # where every turn is completed, D tends to w_d > 0 as w -> 0: cycles below the lattice need w_d below it too
@@ -314,8 +316,7 @@ def _conservative(s, starts):
     out[:, 3] = np.where(rotates, kf.NO_TURNS, 0)
     out[near, 0], out[near, 2], out[near, 3], out[near, 4] = kf.UNDECIDED, kf.UNTOLD, kf.NO_TURNS, SEPARATRIX
     for i in np.flatnonzero(w == 0.0):
-        for j, row in enumerate(s.equilibria):
-            turns = round((phi[i] - row[eq.ANGLE]) / (2 * math.pi))
-            if abs(phi[i] - row[eq.ANGLE] - 2 * math.pi * turns) <= row[eq.BAR] + 4e-16 * (1 + abs(phi[i])):
-                out[i] = kf.EQUILIBRIUM_START, j, 0, turns, 0
+        row = eq.resting(s.p, s.equilibria, len(s.equilibria), phi[i])
+        if row >= 0:
+            out[i] = kf.EQUILIBRIUM_START, row, 0, round((phi[i] - s.equilibria[row, eq.ANGLE]) / (2 * math.pi)), 0
     return out

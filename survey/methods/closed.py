@@ -8,10 +8,13 @@ Source: M. E. Lesina, Ya. V. Zinovyeva (2004), (50), (61)-(68), as corrected in 
 
 import math
 
-from survey.kernels import closed
+import numpy as np
+
+from survey.kernels import closed, weierstrass
 from survey.kernels.along import EQUILIBRIUM, NO_CONVERGENCE, OK, TRUST, TURNING, UNTOLD, finite
 from survey.kernels.flow import UNIT
-from survey.kernels.jit import kernel
+from survey.kernels.jit import inline, kernel
+from survey.kernels.weierstrass import LANES
 
 ORDER = 0  # no steps
 SERVES = ("cylinder",)
@@ -25,38 +28,75 @@ NO_FORM = 19  # as in the STATUS of scenes/gyrostat.py
 @kernel
 def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
     """See `along.trajectories`; tolerance and limit have no meaning here."""
-    data, pairs = closed.scratch()
-    for i in range(len(P)):
-        phi0, size = starts[i, 0], finite(times[i])
-        kind, side = closed.start(P[i], phi0, starts[i, 1], data, pairs)
+    T, row, column = weierstrass.lanes(), np.empty(LANES, np.int64), np.empty(LANES, np.int64)
+    place, waiting = np.zeros(2, np.int64), LANES
+    while waiting == LANES:
+        waiting = _fill(P, starts, times, place, T, row, column, floats, turnings, status)
+        weierstrass.solve(T)
+        _collect(T, waiting, row, column, starts, floats, turnings)
+
+
+@kernel
+def _fill(P, starts, times, place, T, row, column, floats, turnings, status):
+    """From `place` (row, column) on: lanes for solutions with b = 0 until all are taken, the others at once.
+
+    Returns the number of lanes that are taken.
+    """
+    data, waiting, first = closed.scratch(), 0, place[1]
+    for i in range(place[0], len(P)):
+        p, phi0, w0 = P[i], starts[i, 0], starts[i, 1]
+        kind, mu, miss = closed.applies(p, phi0, w0)
         status[i] = NO_FORM if kind == closed.NONE else NO_CONVERGENCE
-        if kind == closed.NONE or kind == closed.LOST:
-            continue
-        for j in range(size):
-            count, t = 0, times[i, j]
-            if kind == closed.TRIGONOMETRIC:
-                x, w, bar_x, bar_w = closed.trigonometric_at(data, t)
-            elif kind == closed.LIBRATION:
-                x, w, bar_x, bar_w, count = closed.libration_at(data, pairs, t)
-            else:
-                x, w, bar_x, bar_w = closed.rotation_at(data, pairs, t)
+        side = 1.0 if w0 >= 0.0 else -1.0
+        if kind == closed.TRIGONOMETRIC:
+            closed.start_trigonometric(p, phi0, w0, side, mu, miss, data)
+        for j in range(first, finite(times[i]) if kind != closed.NONE else 0):
+            t = times[i, j]
             if t == 0.0:
-                x, w, bar_x, bar_w, count = 0.0, side * starts[i, 1], 0.0, 0.0, 0
-            if bar_x < TRUST and bar_w < TRUST * (1.0 + abs(w)):
-                floats[i, j, 0], floats[i, j, 1] = phi0 + side * x, side * w
-                floats[i, j, 2], floats[i, j, 3] = bar_x + 2.0 * UNIT * abs(floats[i, j, 0]), bar_w
-                turnings[i, j] = UNTOLD if kind == closed.TRIGONOMETRIC and w != 0.0 and w <= bar_w else count
+                _tell(floats[i, j], phi0, 0.0, w0, 0.0, 0.0)
+                turnings[i, j] = 0
+            elif kind == closed.TRIGONOMETRIC:
+                x, w, bar_x, bar_w = closed.trigonometric_at(data, t)
+                if _tell(floats[i, j], phi0, side * x, side * w, bar_x, bar_w):
+                    # where (61) is met exactly w keeps its sign
+                    turnings[i, j] = UNTOLD if miss > 0.0 and w != 0.0 and w <= bar_w else 0
+            elif waiting == LANES:
+                place[0], place[1] = i, j
+                return waiting
             else:
-                turnings[i, j] = UNTOLD
+                row[waiting], column[waiting] = i, j
+                weierstrass.enter(T, waiting, p, phi0, w0, t)
+                waiting += 1
+        first = 0
+    place[0] = len(P)
+    return waiting
+
+
+@inline
+def _tell(out, phi0, x, w, bar_x, bar_w):
+    """Write down one solution at one time; False where the bars are too wide to be bounds."""
+    if not (bar_x < TRUST and bar_w < TRUST * (1.0 + abs(w))):
+        return False
+    out[0], out[1], out[2], out[3] = phi0 + x, w, bar_x + 2.0 * UNIT * abs(phi0 + x), bar_w
+    return True
+
+
+@kernel
+def _collect(T, count, row, column, starts, floats, turnings):
+    """Write down what the first `count` lanes have found."""
+    for k in range(count):
+        i, j, w, bar_w = row[k], column[k], T[weierstrass.W, k], T[weierstrass.BAR_W, k]
+        if _tell(floats[i, j], starts[i, 0], T[weierstrass.X, k], w, T[weierstrass.BAR_X, k], bar_w):
+            turnings[i, j] = int(T[weierstrass.COUNT, k]) if abs(w) > bar_w else UNTOLD
 
 
 @kernel
 def flow_abels(P, starts, targets, tolerance, limit, floats, status):
     """See `along.abels`; tolerance and limit have no meaning here."""
-    data, pairs = closed.scratch()
+    data = closed.scratch()
     for i in range(len(P)):
         phi0, w0 = starts[i, 0], starts[i, 1]
-        kind, side = closed.start(P[i], phi0, w0, data, pairs)
+        kind, side = closed.start(P[i], phi0, w0, data)
         for j in range(finite(targets[i])):
             out, x = floats[i, j], targets[i, j] - phi0
             if kind == closed.NONE or kind == closed.LOST:
@@ -102,9 +142,10 @@ def _elliptic(kind, side, data, phi0, x, out):
         return TURNING
     if kind == closed.LIBRATION:
         edge, right = data[closed.BAR_RIGHT] + 4.0 * UNIT * (abs(phi0) + abs(x)), data[closed.RIGHT]
-        if x > right + edge:
+        if x >= right - edge:
             t, bar = closed.flight(data, math.pi, 0.0)
-            out[0], out[1], out[2], out[3] = phi0 + right, t, edge, bar + 2.0 * UNIT * t
+            out[0], out[1], out[2] = phi0 + right, t, edge + 4.0 * UNIT * (abs(phi0) + right)
+            out[3] = bar + 2.0 * UNIT * t
             return TURNING
         if x > right - 4.0 * edge:
             return NO_CONVERGENCE

@@ -11,7 +11,8 @@ import math
 
 import numpy as np
 
-from survey.kernels import along, fate, returns
+from survey.kernels import along, danby, fate, returns
+from survey.kernels.danby import COLUMN, COLUMNS
 from survey.kernels.dop853 import E3, E5, STAGES, A, B, C
 from survey.kernels.flow import BOUND_DG, BOUND_F, LAST, LOW, PHI, STEP, TRUNC_PHI, TRUNC_W, W, series, values
 from survey.kernels.jit import inline, kernel
@@ -19,8 +20,8 @@ from survey.kernels.lanes import bars, column, relative
 from survey.kernels.matrix import rounding
 
 ORDER = 8
-SERVES = ("cylinder", "hill")
-COST = {"cylinder": 60.0, "hill": 80.0}  # time, relative to the default of each family
+SERVES = ("cylinder", "danby", "hill")
+COST = {"cylinder": 60.0, "danby": 2500.0, "hill": 80.0}  # time, relative to the default of each family
 FLOW_FINEST = 1e-16  # useful tolerance for flows on the cylinder
 FLOW_WORK = 4  # steps, relative to the Taylor method
 _FIRST = LOW + 1  # stages lie in the lines of the table after the low series
@@ -159,14 +160,14 @@ def flow_at(p, T, dt):
 
 
 @inline
-def _flow_estimate(T, h, row):
-    """The error estimate of dop853.f for one component, from the stages in T."""
+def _flow_estimate(T, h, row, doubt):
+    """The error estimate of dop853.f for one component, from the stages in T; it must not vanish by chance."""
     e5 = e3 = 0.0
     for i in range(STAGES):
         e5 += E5[i] * T[_FIRST + i, row]
         e3 += E3[i] * T[_FIRST + i, row]
     size = math.sqrt(e5 * e5 + 0.01 * e3 * e3)
-    return abs(h) * e5 * e5 / size if size > 0.0 else 0.0
+    return abs(h) * (e5 * e5 / (size + 1e-300) + doubt * abs(e5))
 
 
 @kernel
@@ -177,7 +178,10 @@ def flow_begin(p, phi, w, tolerance, T):
     h = T[LAST, STEP] if T[LAST, STEP] > 0.0 else 0.1 / rate
     for _ in range(50):
         _x, w1, _e, _y = flow_at(p, T, h)
-        dphi, dw = _flow_estimate(T, h, PHI), _flow_estimate(T, h, W)
+        doubt, speed = 4.0 * DOUBT * (h * rate) ** 3, max(rate, 1.0 / h)
+        dphi, dw = _flow_estimate(T, h, PHI, doubt), _flow_estimate(T, h, W, doubt)
+        # where the motion starts at rest, one of the two may vanish by symmetry: each speaks for both
+        dphi, dw = max(dphi, dw / speed), max(dw, dphi * speed)
         error = max(dphi, dw / (1.0 + abs(w))) / tolerance
         factor = min(max(0.9 * (error + 1e-30) ** -0.125, 0.2), 4.0)
         if error <= 1.0:
@@ -218,3 +222,70 @@ def flow_fates(p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance
     fate.fates(
         flow_setting, flow_begin, flow_at, p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out
     )
+
+
+@inline
+def _danby_slope(e, d1, d2, angle, state, out):
+    """Slopes in the eccentric anomaly: df = sqrt(1 - e^2) / (1 - e cos E) dE, r df = dE / sqrt(1 - e^2)."""
+    small, scale = math.sin(0.5 * angle), math.sqrt((1.0 - e) * (1.0 + e))
+    turn = scale / ((1.0 - e) + 2.0 * e * small * small)
+    for c in range(4):
+        x, q, p, m = state[4 * c], state[4 * c + 1], state[4 * c + 2], state[4 * c + 3]
+        dx, dm = turn * (p - m), turn * (x - q)
+        out[4 * c], out[4 * c + 1] = dx, -dx - d2 / scale * m
+        out[4 * c + 2], out[4 * c + 3] = d1 / scale * x - dm, dm
+
+
+@kernel
+def _danby_step(e, d1, d2, angle, h, slopes, state, work):
+    """Columns of the step's propagator and their errors into `work`; returns the largest error."""
+    for i in range(STAGES):
+        for k in range(16):
+            value = 1.0 if k % 5 == 0 else 0.0
+            for j in range(i):
+                value += h * A[i, j] * slopes[j, k]
+            state[k] = value
+        _danby_slope(e, d1, d2, angle + C[i] * h, state, slopes[i])
+    worst = 0.0
+    for c in range(4):
+        one = COLUMNS + COLUMN * c
+        error = size = 0.0
+        for i in range(4):
+            value, fifth, third = 1.0 if i == c else 0.0, 0.0, 0.0
+            for j in range(STAGES):
+                slope = slopes[j, 4 * c + i]
+                value += h * B[j] * slope
+                fifth += E5[j] * slope
+                third += E3[j] * slope
+            # an error of order h^9 is h^3 of the estimate of order h^6
+            local = abs(h) * (fifth * fifth / (math.sqrt(fifth * fifth + 0.01 * third * third) + 1e-300))
+            error = max(error, local + abs(h) ** 4 * DOUBT * abs(fifth))
+            size += abs(value)
+            work[one + i, 0], work[one + 4 + i, 0] = value, 1.0 if i == c else 0.0
+        worst = max(worst, error)
+        work[one + 9, 0] = 0.0
+        work[one + 8, 0] = error + danby.ROUNDING * size  # the stages pass through sums that cancel
+    return worst
+
+
+@kernel
+def danby_walk(e, d1, d2, tolerance, out):
+    """Points (N each), each with its tolerance, in steps of the eccentric anomaly; see `kernels.danby.chain`."""
+    work, slopes, state = np.empty((danby.OWN, 1)), np.empty((STAGES, 16)), np.empty(16)
+    for i in range(len(e)):
+        danby.start(work, 1)
+        angle, h, steps = 0.0, 0.1 * math.sqrt(1.0 - e[i]), 0
+        for _ in range(STEP_LIMIT):
+            last = angle + 1.01 * h >= math.pi
+            h = math.pi - angle if last else h
+            error = _danby_step(e[i], d1[i], d2[i], angle, h, slopes, state, work)
+            if error <= tolerance[i]:
+                danby.advance(work, 0)
+                angle, steps = angle + h, steps + 1
+                if last:
+                    break
+            h *= min(LARGEST, max(SMALLEST, 0.9 * (tolerance[i] / (error + 1e-300)) ** 0.125))
+            h = min(h, 1.0)
+        danby.finish(work, 0, steps, out[i])
+        if not last:
+            out[i, :] = np.nan

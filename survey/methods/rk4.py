@@ -8,15 +8,18 @@ Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equat
 
 import math
 
-from survey.kernels import along, fate, returns
+import numpy as np
+
+from survey.kernels import along, danby, fate, returns
+from survey.kernels.danby import D1, D2, OWN, E, copy
 from survey.kernels.flow import BOUND_DG, BOUND_F, LAST, LOW, PHI, TRUNC_PHI, TRUNC_W, W, series, values
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.lanes import chain, scatter
 from survey.kernels.matrix import doubled, samples_only
 
 ORDER = 4
-SERVES = ("cylinder", "hill")
-COST = {"cylinder": 3000.0, "hill": 13.0}  # time, relative to the default of each family
+SERVES = ("cylinder", "danby", "hill")
+COST = {"cylinder": 3000.0, "danby": 5000.0, "hill": 13.0}  # time, relative to the default of each family
 FLOW_FINEST = 1e-13  # useful tolerance for flows on the cylinder
 FLOW_WORK = 50  # steps, relative to the Taylor method
 NODES = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -149,3 +152,61 @@ def flow_fates(p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance
     fate.fates(
         flow_setting, flow_begin, flow_at, p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out
     )
+
+
+ENDS = OWN + len(NODES)
+
+
+def danby_steps(e, rtol):
+    """Steps of half a period for accuracy rtol."""
+    return max(rtol, 1e-13) ** (-1 / ORDER) * (8.0 + 8.0 * np.sqrt(-np.log1p(-e)))
+
+
+@inline
+def _danby_step(r0, r1, r2, h, d1, d2, x, q, p, m):
+    """One classical step of x' = p - m, m' = x - q, q' = -x' - d2 r m, p' = -m' + d1 r x."""
+    half, sixth = 0.5 * h, h / 6.0
+    ax, am = p - m, x - q
+    aq, ap = -ax - d2 * r0 * m, d1 * r0 * x - am
+    x2, q2, p2, m2 = x + half * ax, q + half * aq, p + half * ap, m + half * am
+    bx, bm = p2 - m2, x2 - q2
+    bq, bp = -bx - d2 * r1 * m2, d1 * r1 * x2 - bm
+    x2, q2, p2, m2 = x + half * bx, q + half * bq, p + half * bp, m + half * bm
+    cx, cm = p2 - m2, x2 - q2
+    cq, cp = -cx - d2 * r1 * m2, d1 * r1 * x2 - cm
+    x2, q2, p2, m2 = x + h * cx, q + h * cq, p + h * cp, m + h * cm
+    dx, dm = p2 - m2, x2 - q2
+    dq, dp = -dx - d2 * r2 * m2, d1 * r2 * x2 - dm
+    return (
+        x + sixth * (ax + 2.0 * (bx + cx) + dx),
+        q + sixth * (aq + 2.0 * (bq + cq) + dq),
+        p + sixth * (ap + 2.0 * (bp + cp) + dp),
+        m + sixth * (am + 2.0 * (bm + cm) + dm),
+    )
+
+
+@splice
+def danby_columns(v, h, work, count):
+    """See `kernels.danby.chain`: two half steps, and their error by Richardson with a margin of 2."""
+    for j in range(len(NODES)):
+        for i in range(count):
+            e = work[E, i]
+            work[OWN + j, i] = 1.0 / ((1.0 - e) + e * v[j])
+    for c in range(4):
+        x, q, p, m = 1.0 * (c == 0), 1.0 * (c == 1), 1.0 * (c == 2), 1.0 * (c == 3)
+        for i in range(count):
+            r0, r1, r2, r3, r4 = work[OWN, i], work[OWN + 1, i], work[OWN + 2, i], work[OWN + 3, i], work[OWN + 4, i]
+            d1, d2 = work[D1, i], work[D2, i]
+            x1, q1, p1, m1 = _danby_step(r0, r1, r2, 0.5 * h, d1, d2, x, q, p, m)
+            x1, q1, p1, m1 = _danby_step(r2, r3, r4, 0.5 * h, d1, d2, x1, q1, p1, m1)
+            x2, q2, p2, m2 = _danby_step(r0, r2, r4, h, d1, d2, x, q, p, m)
+            work[ENDS, i], work[ENDS + 1, i], work[ENDS + 2, i], work[ENDS + 3, i] = x1, q1, p1, m1
+            error = max(max(abs(x1 - x2), abs(q1 - q2)), max(abs(p1 - p2), abs(m1 - m2)))
+            work[ENDS + 4, i] = error * (2.0 / 15.0)
+        copy(work, ENDS, c, count)
+
+
+@kernel
+def danby_chain(v, h, e, d1, d2, out):
+    """See `kernels.danby.chain`."""
+    danby.chain(danby_columns, len(NODES) + 5, v, h, e, d1, d2, out)

@@ -5,6 +5,8 @@ software package for the numerical integration of ODEs by means of high-order Ta
 Mathematics 14 (2005) 99-117. Domain: every parameter value; explicit, so steps shrink as 1/|b| on stiff systems.
 """
 
+import math
+
 from survey.kernels import along, fate, lockstep, returns
 from survey.kernels.flow import LAST, PHI, TRUNC_PHI, TRUNC_W, E, W, Y, longest_step, series
 from survey.kernels.flow import ORDER as _ORDER
@@ -12,6 +14,7 @@ from survey.kernels.jit import inline, kernel
 
 ORDER = 20
 SERVES = ("cylinder",)
+FALL = 1.0 / 50.0  # by more, two terms further on, no series is trusted to fall
 FLOW_FINEST = 1e-17  # useful truncation error of a step
 FLOW_WORK = 1  # steps, relative to this method
 
@@ -27,9 +30,12 @@ def flow_begin(p, phi, w, tolerance, T):
     """Expand at (phi, w); returns the step that keeps the last two terms below the tolerance."""
     series(p, phi, w, T, _ORDER)
     scale = 1.0 / (1.0 + abs(w))
-    last = max(abs(T[_ORDER, PHI]), scale * abs(T[_ORDER, W])) + 1e-300
-    before = max(abs(T[_ORDER - 1, PHI]), scale * abs(T[_ORDER - 1, W])) + 1e-300
-    h = min((tolerance / last) ** (1.0 / _ORDER), (tolerance / before) ** (1.0 / (_ORDER - 1)))
+    h = math.inf
+    for n in range(_ORDER - 3, _ORDER + 1):
+        # a last term that happens to vanish tells nothing, so those two before it are asked, less strictly
+        share = 1.0 if n > _ORDER - 2 else FALL
+        term = share * max(abs(T[n, PHI]), scale * abs(T[n, W])) + 1e-300
+        h = min(h, (tolerance / term) ** (1.0 / n))
     shorter = min(1.0, longest_step(p, w) / h)  # the last terms, and what follows them, at the step that is taken
     fourth = (shorter * shorter) ** 2
     error = tolerance * (fourth * fourth) ** 2 * shorter * shorter * shorter

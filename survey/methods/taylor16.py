@@ -12,11 +12,14 @@ II.7 (why Gauss points give twice the order).
 import numpy as np
 from numpy.polynomial import legendre
 
+from survey.kernels import danby
+from survey.kernels.danby import COLUMN, COLUMNS, D1, D2, OWN, TILE, E
 from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.lanes import chain, scatter
 
 ORDER = 16
-SERVES = ("hill",)
+SERVES = ("danby", "hill")
+COST = {"danby": 10.0}  # time, relative to the default of each family
 
 DEGREE = 9
 _POINTS, _WEIGHTS = legendre.leggauss(DEGREE + 1)
@@ -33,6 +36,7 @@ TO_POWERS = np.stack([TO_POWERS[parity::2, parity::2] for parity in (0, 1)])
 WIDTH = DEGREE + 3
 TAIL, SIZE = DEGREE + 1, DEGREE + 2
 ROUNDING = 4.4e-16
+ENDS = OWN + WIDTH
 
 
 def hill_density(rtol):
@@ -198,3 +202,170 @@ def hill_chain(samples, c2, h, p, order, starts, ends, out):
 @kernel
 def hill_scatter(samples, c2, h, p, order, starts, out):
     scatter(hill_row, hill_step, WIDTH, samples, c2, h, p, order, starts, out)
+
+
+def danby_steps(e, rtol):
+    """Steps of half a period for accuracy rtol."""
+    x = -np.log1p(-e)
+    return max(rtol, 1e-14) ** (-1 / ORDER) * (0.6 + 1.15 * np.sqrt(x) + 0.4 * x)
+
+
+@splice
+def _danby_row(v, k, work, count):
+    """Powers of x in k r(f) (rows OWN to OWN + 9), and a bound of the Legendre coefficients left out (OWN + 10)."""
+    paired, series = np.empty((HALF, TILE)), np.empty((HALF, TILE))
+    for i in range(count):
+        work[OWN + TAIL, i] = work[OWN + SIZE, i] = 0.0
+    for parity in range(2):
+        sign = 1.0 - 2.0 * parity
+        for j in range(HALF):
+            left, right = v[HALF - 1 - j], v[HALF + j]
+            for i in range(count):
+                e = work[E, i]
+                paired[j, i] = k / ((1.0 - e) + e * right) + sign * (k / ((1.0 - e) + e * left))
+        for j in range(HALF):
+            for i in range(count):
+                series[j, i] = _product(TO_LEGENDRE[parity], j, paired, i)
+        for j in range(HALF):
+            for i in range(count):
+                work[OWN + 2 * j + parity, i] = _product(TO_POWERS[parity], j, series, i)
+        for i in range(count):
+            work[OWN + TAIL, i] += abs(series[HALF - 1, i])
+            work[OWN + SIZE, i] += abs(series[HALF - 2, i])
+    for i in range(count):  # those left out, at the rate at which the last four fall
+        tail = work[OWN + TAIL, i]
+        work[OWN + TAIL, i] = tail * (2.0 * tail / (work[OWN + SIZE, i] + 1e-150) + 0.004)
+
+
+@inline
+def _danby_column(f, i, k, d1, d2, x0, q0, p0, m0):
+    """A column of Y at both ends of a step, and the bound of its errors."""
+    r0, r1, r2, r3, r4 = f[OWN, i], f[OWN + 1, i], f[OWN + 2, i], f[OWN + 3, i], f[OWN + 4, i]
+    r5, r6, r7, r8, r9 = f[OWN + 5, i], f[OWN + 6, i], f[OWN + 7, i], f[OWN + 8, i], f[OWN + 9, i]
+    # fmt: off
+    x1 = k * (p0 - m0)
+    m1 = k * (x0 - q0)
+    q1 = -x1 - d2 * (r0 * m0)
+    p1 = d1 * (r0 * x0) - m1
+    x2 = k * (p1 - m1) * (1 / 2)
+    m2 = k * (x1 - q1) * (1 / 2)
+    q2 = -x2 - d2 * (r1 * m0 + r0 * m1) * (1 / 2)
+    p2 = d1 * (r1 * x0 + r0 * x1) * (1 / 2) - m2
+    x3 = k * (p2 - m2) * (1 / 3)
+    m3 = k * (x2 - q2) * (1 / 3)
+    q3 = -x3 - d2 * (r2 * m0 + r1 * m1 + r0 * m2) * (1 / 3)
+    p3 = d1 * (r2 * x0 + r1 * x1 + r0 * x2) * (1 / 3) - m3
+    x4 = k * (p3 - m3) * (1 / 4)
+    m4 = k * (x3 - q3) * (1 / 4)
+    q4 = -x4 - d2 * (r3 * m0 + r2 * m1 + r1 * m2 + r0 * m3) * (1 / 4)
+    p4 = d1 * (r3 * x0 + r2 * x1 + r1 * x2 + r0 * x3) * (1 / 4) - m4
+    x5 = k * (p4 - m4) * (1 / 5)
+    m5 = k * (x4 - q4) * (1 / 5)
+    q5 = -x5 - d2 * (r4 * m0 + r3 * m1 + r2 * m2 + r1 * m3 + r0 * m4) * (1 / 5)
+    p5 = d1 * (r4 * x0 + r3 * x1 + r2 * x2 + r1 * x3 + r0 * x4) * (1 / 5) - m5
+    x6 = k * (p5 - m5) * (1 / 6)
+    m6 = k * (x5 - q5) * (1 / 6)
+    q6 = -x6 - d2 * (r5 * m0 + r4 * m1 + r3 * m2 + r2 * m3 + r1 * m4 + r0 * m5) * (1 / 6)
+    p6 = d1 * (r5 * x0 + r4 * x1 + r3 * x2 + r2 * x3 + r1 * x4 + r0 * x5) * (1 / 6) - m6
+    x7 = k * (p6 - m6) * (1 / 7)
+    m7 = k * (x6 - q6) * (1 / 7)
+    q7 = -x7 - d2 * (r6 * m0 + r5 * m1 + r4 * m2 + r3 * m3 + r2 * m4 + r1 * m5 + r0 * m6) * (1 / 7)
+    p7 = d1 * (r6 * x0 + r5 * x1 + r4 * x2 + r3 * x3 + r2 * x4 + r1 * x5 + r0 * x6) * (1 / 7) - m7
+    x8 = k * (p7 - m7) * (1 / 8)
+    m8 = k * (x7 - q7) * (1 / 8)
+    q8 = -x8 - d2 * (r7 * m0 + r6 * m1 + r5 * m2 + r4 * m3 + r3 * m4 + r2 * m5 + r1 * m6 + r0 * m7) * (1 / 8)
+    p8 = d1 * (r7 * x0 + r6 * x1 + r5 * x2 + r4 * x3 + r3 * x4 + r2 * x5 + r1 * x6 + r0 * x7) * (1 / 8) - m8
+    x9 = k * (p8 - m8) * (1 / 9)
+    m9 = k * (x8 - q8) * (1 / 9)
+    q9 = -x9 - d2 * (r8 * m0 + r7 * m1 + r6 * m2 + r5 * m3 + r4 * m4 + r3 * m5 + r2 * m6 + r1 * m7 + r0 * m8) * (1 / 9)
+    p9 = d1 * (r8 * x0 + r7 * x1 + r6 * x2 + r5 * x3 + r4 * x4 + r3 * x5 + r2 * x6 + r1 * x7 + r0 * x8) * (1 / 9) - m9
+    x10 = k * (p9 - m9) * (1 / 10)
+    m10 = k * (x9 - q9) * (1 / 10)
+    q10 = -x10 - d2 * (r9 * m0 + r8 * m1 + r7 * m2 + r6 * m3 + r5 * m4 + r4 * m5 + r3 * m6 + r2 * m7 + r1 * m8
+             + r0 * m9) * (1 / 10)
+    p10 = d1 * (r9 * x0 + r8 * x1 + r7 * x2 + r6 * x3 + r5 * x4 + r4 * x5 + r3 * x6 + r2 * x7 + r1 * x8
+             + r0 * x9) * (1 / 10) - m10
+    x11 = k * (p10 - m10) * (1 / 11)
+    m11 = k * (x10 - q10) * (1 / 11)
+    q11 = -x11 - d2 * (r9 * m1 + r8 * m2 + r7 * m3 + r6 * m4 + r5 * m5 + r4 * m6 + r3 * m7 + r2 * m8 + r1 * m9
+             + r0 * m10) * (1 / 11)
+    p11 = d1 * (r9 * x1 + r8 * x2 + r7 * x3 + r6 * x4 + r5 * x5 + r4 * x6 + r3 * x7 + r2 * x8 + r1 * x9
+             + r0 * x10) * (1 / 11) - m11
+    x12 = k * (p11 - m11) * (1 / 12)
+    m12 = k * (x11 - q11) * (1 / 12)
+    q12 = -x12 - d2 * (r9 * m2 + r8 * m3 + r7 * m4 + r6 * m5 + r5 * m6 + r4 * m7 + r3 * m8 + r2 * m9 + r1 * m10
+             + r0 * m11) * (1 / 12)
+    p12 = d1 * (r9 * x2 + r8 * x3 + r7 * x4 + r6 * x5 + r5 * x6 + r4 * x7 + r3 * x8 + r2 * x9 + r1 * x10
+             + r0 * x11) * (1 / 12) - m12
+    x13 = k * (p12 - m12) * (1 / 13)
+    m13 = k * (x12 - q12) * (1 / 13)
+    q13 = -x13 - d2 * (r9 * m3 + r8 * m4 + r7 * m5 + r6 * m6 + r5 * m7 + r4 * m8 + r3 * m9 + r2 * m10 + r1 * m11
+             + r0 * m12) * (1 / 13)
+    p13 = d1 * (r9 * x3 + r8 * x4 + r7 * x5 + r6 * x6 + r5 * x7 + r4 * x8 + r3 * x9 + r2 * x10 + r1 * x11
+             + r0 * x12) * (1 / 13) - m13
+    x14 = k * (p13 - m13) * (1 / 14)
+    m14 = k * (x13 - q13) * (1 / 14)
+    q14 = -x14 - d2 * (r9 * m4 + r8 * m5 + r7 * m6 + r6 * m7 + r5 * m8 + r4 * m9 + r3 * m10 + r2 * m11 + r1 * m12
+             + r0 * m13) * (1 / 14)
+    p14 = d1 * (r9 * x4 + r8 * x5 + r7 * x6 + r6 * x7 + r5 * x8 + r4 * x9 + r3 * x10 + r2 * x11 + r1 * x12
+             + r0 * x13) * (1 / 14) - m14
+    x15 = k * (p14 - m14) * (1 / 15)
+    m15 = k * (x14 - q14) * (1 / 15)
+    q15 = -x15 - d2 * (r9 * m5 + r8 * m6 + r7 * m7 + r6 * m8 + r5 * m9 + r4 * m10 + r3 * m11 + r2 * m12 + r1 * m13
+             + r0 * m14) * (1 / 15)
+    p15 = d1 * (r9 * x5 + r8 * x6 + r7 * x7 + r6 * x8 + r5 * x9 + r4 * x10 + r3 * x11 + r2 * x12 + r1 * x13
+             + r0 * x14) * (1 / 15) - m15
+    x16 = k * (p15 - m15) * (1 / 16)
+    m16 = k * (x15 - q15) * (1 / 16)
+    q16 = -x16 - d2 * (r9 * m6 + r8 * m7 + r7 * m8 + r6 * m9 + r5 * m10 + r4 * m11 + r3 * m12 + r2 * m13 + r1 * m14
+             + r0 * m15) * (1 / 16)
+    p16 = d1 * (r9 * x6 + r8 * x7 + r7 * x8 + r6 * x9 + r5 * x10 + r4 * x11 + r3 * x12 + r2 * x13 + r1 * x14
+             + r0 * x15) * (1 / 16) - m16
+    # fmt: on
+    x_even, x_odd = x0 + _sum(x2, x4, x6, x8, x10, x12, x14, x16), _sum(x1, x3, x5, x7, x9, x11, x13, x15)
+    q_even, q_odd = q0 + _sum(q2, q4, q6, q8, q10, q12, q14, q16), _sum(q1, q3, q5, q7, q9, q11, q13, q15)
+    p_even, p_odd = p0 + _sum(p2, p4, p6, p8, p10, p12, p14, p16), _sum(p1, p3, p5, p7, p9, p11, p13, p15)
+    m_even, m_odd = m0 + _sum(m2, m4, m6, m8, m10, m12, m14, m16), _sum(m1, m3, m5, m7, m9, m11, m13, m15)
+    # Truncation: the next two coefficients, at the rate at which the last four fall, with a margin of 2.
+    last, before = _largest(x15, q15, p15, m15) + _largest(x16, q16, p16, m16), _largest(x13, q13, p13, m13)
+    before += _largest(x14, q14, p14, m14) + 1e-150
+    error = last * (2.0 * last / before + 0.004)
+    # What the projection left out acts only through the solutions' own components of that degree.
+    error += 4.0 * d1 * f[OWN + TAIL, i] * (abs(x9) + abs(x10) + abs(m9) + abs(m10))
+    return (
+        x_even + x_odd, q_even + q_odd, p_even + p_odd, m_even + m_odd,
+        x_even - x_odd, q_even - q_odd, p_even - p_odd, m_even - m_odd, error, error,
+    )  # fmt: skip
+
+
+@inline
+def _sum(a, b, c, d, e, f, g, h):
+    """The sum, from the small end."""
+    return a + (b + (c + (d + (e + (f + (g + h))))))
+
+
+@inline
+def _largest(a, b, c, d):
+    return max(max(abs(a), abs(b)), max(abs(c), abs(d)))
+
+
+@splice
+def danby_columns(v, h, work, count):
+    """See `kernels.danby.chain`."""
+    k = 0.5 * h
+    _danby_row(v, k, work, count)
+    for c in range(4):
+        x, q, p, m = 1.0 * (c == 0), 1.0 * (c == 1), 1.0 * (c == 2), 1.0 * (c == 3)
+        for i in range(count):  # into rows that are constants, else it would not become vector code
+            ends = _danby_column(work, i, k, work[D1, i], work[D2, i], x, q, p, m)
+            for j in range(COLUMN):
+                work[ENDS + j, i] = ends[j]
+        for j in range(COLUMN):
+            for i in range(count):
+                work[COLUMNS + COLUMN * c + j, i] = work[ENDS + j, i]
+
+
+@kernel
+def danby_chain(v, h, e, d1, d2, out):
+    """See `kernels.danby.chain`."""
+    danby.chain(danby_columns, WIDTH + COLUMN, v, h, e, d1, d2, out)

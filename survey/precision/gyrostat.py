@@ -19,6 +19,7 @@ _NAMES = ("b12", "b31", "d", "c23", "s2", "s3", "phi0", "w0")
 _TIME = 20.0
 _POINTS = 20_000
 _QUESTION = {"question": "trajectory"}
+_CASES = {"trajectory": "trajectories", "b = 0": "still", "g = 0": "free", "(61)": "trigonometric"}
 
 
 @cache
@@ -26,7 +27,7 @@ def references(work):
     """The reference cases of the work's kind (error of the JSON's own values below 1e-29)."""
     data = json.loads(resources.files("survey.reference").joinpath("gyrostat_trajectories.json").read_text())
     cases = []
-    for row in data["still" if work == "b = 0" else "trajectories"]:
+    for row in data[_CASES[work]]:
         numbers = map(float.fromhex, (*row["p_hex"], row["phi0_hex"], row["w0_hex"]))
         point = dict(zip(_NAMES, numbers, strict=True)) | {"t": float(row["t"])}
         cases.append((point, _QUESTION, {ERROR: float(row[ERROR])}, None))
@@ -34,13 +35,24 @@ def references(work):
 
 
 def works():
-    """Systems and states that share nothing: any, and those without the Barnett-London effect (b = 0)."""
+    """Systems and states that share nothing: any, and those which have a closed form."""
     random = np.random.default_rng(1)
     rows = random.normal(size=(8, _POINTS))
     rows[6] = random.uniform(-np.pi, np.pi, _POINTS)
     point = dict(zip(_NAMES, rows, strict=True)) | {"t": np.array([_TIME])}
     still = point | {"b12": np.zeros(1), "b31": np.zeros(1)}
-    return {"trajectory": (point, _QUESTION), "b = 0": (still, _QUESTION)}
+    free = point | dict.fromkeys(("d", "c23", "s2", "s3"), np.zeros(1))
+    points = (point, still, free, _trigonometric(random))
+    return {work: (point, _QUESTION) for work, point in zip(_CASES, points, strict=True)}
+
+
+def _trigonometric(random):
+    """Rotations that meet (61) with mu = 3/2 exactly: b12, b31 and n are multiples of 1/64 and phi0 is 0."""
+    b12, b31 = random.integers(-64, 65, (2, _POINTS)) / 64.0
+    n = np.ceil(64.0 * (1.6 * np.hypot(b12, b31) + random.uniform(0.1, 2.0, _POINTS))) / 64.0
+    n *= random.choice([-1.0, 1.0], _POINTS)
+    values = (b12, b31, -0.75 * (b12**2 - b31**2), -0.75 * b12 * b31, 0.5 * n * b12, 0.5 * n * b31)
+    return dict(zip(_NAMES, (*values, np.zeros(1), 1.5 * b31 + n), strict=True)) | {"t": np.array([_TIME])}
 
 
 def system(point, options):

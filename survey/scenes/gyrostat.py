@@ -17,10 +17,16 @@ Source: M. E. Lesina, Ya. V. Zinovyeva, "The gyrostat with Barnett-London effect
 
 A fate is decided by the monotone return maps and by proven regions of attraction, never by a limit of steps; the
 cycles are those that a lattice of return maps shows, with dips followed down to folds. b = 0 and g = 0 are taken
-exactly, K = 0 and L = 0 within the rounding of the parameters. `multiplier` and cycles carry error bars; verdicts near
-a stable separatrix are -1 (status `separatrix`).
+exactly, K = 0 and L = 0 within the rounding of the parameters; where K is larger than that, but the return maps do not
+show their change beside rounding, verdicts are -1. `multiplier` and cycles carry error bars; verdicts near a stable
+separatrix are -1 (status `separatrix`), also those of starts at rest beside a saddle: `equilibrium_start` is given to
+exact equilibria only, and of binary64 angles none but phi0 = 0, where s2 = c23, is one (if g is not 0 throughout).
 
-`auto` takes trajectories and Abel solutions in closed form where one applies (method `closed`), else by Taylor series.
+An Abel solution has status `ok` where it certainly reaches phi, `turning` where it turns before phi or so near to it
+that phi lies within `phi_turning_error` of `phi_turning`.
+
+`auto` takes trajectories and Abel solutions in closed form where one applies and keeps its digits (method `closed`),
+else by Taylor series; `workflows/gyrostat_methods.py` maps where each method fails.
 
 The method `full` solves the six equations (1)-(6) of a gyrostat whose invariant set is this motion; `survey verify`
 holds trajectories against it, and `workflows/gyrostat_deviation.py` measures how deviations from the set grow.
@@ -75,7 +81,8 @@ PARAMETERS = (
 )  # fmt: skip
 OPTIONS = (Option("question", _QUESTIONS, "what is asked of the solution, or of the system"),)
 STATUS = {
-    "turning": "the solution turns back before it reaches phi: phi_turning and t_turning say where and when",
+    "turning": "the solution turns back before it reaches phi, or within phi_turning_error of it: phi_turning and "
+    "t_turning say where and when",
     "equilibrium": "the solution runs into an equilibrium, in infinite time, before it reaches phi",
     "separatrix": "the error bar cannot tell on which side of a separatrix the solution passes",
     "no_closed_form": "no closed form applies (they need b = 0, g = 0 or (61)): try another method",

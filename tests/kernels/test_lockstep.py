@@ -10,7 +10,7 @@ import pytest
 from survey.kernels import along, lockstep
 from survey.kernels.jit import fresh
 from survey.measures import cylinder
-from survey.methods import taylor
+from survey.methods import closed, dop853, taylor
 from survey.precision import gyrostat
 
 TURN = lockstep.LANES + 3  # more rows than lanes
@@ -138,3 +138,30 @@ def test_exact_equilibria_stay():
     """g = 0 exactly at phi = 0, for either sign of d."""
     rows = [[-0.5, 0.2, d, 0.0, 0.0, 1.0, 0.0, 0.0] for d in (2.0, -0.9, 0.0)]
     assert np.array_equal(solved(rows, [1e3])[0][:, 0, :2], np.zeros((3, 2)))
+
+
+def test_a_negative_zero_is_a_zero():
+    rows = drawn(4, 9)
+    rows[:, 2] = 0.0
+    other = rows * [1, 1, -1, 1, 1, 1, 1, 1]
+    for one, two in zip(solved(rows, [2.0]), solved(other, [2.0]), strict=True):
+        assert np.array_equal(one, two)
+
+
+def test_bars_hold_where_every_second_coefficient_vanishes():
+    """At rest with b = 0, w is odd in t; where one more coefficient is small by chance, the last two tell nothing."""
+    rows = drawn(3000, 9, (0, 0, 1, 1, 1, 1, 1, 0))
+    times = np.tile([0.2, 0.5, 1.0], (len(rows), 1))
+    exact, _, known = cylinder.trajectories(closed, rows, times, 1e-10)
+    for method in (taylor, dop853):
+        found, _, status = cylinder.trajectories(method, rows, times, 1e-8)
+        good = (known == along.OK) & (status == along.OK)
+        assert good.mean() > 0.95
+        bars = found[..., 2:] + exact[..., 2:]
+        assert (abs(found[..., :2] - exact[..., :2]) <= bars)[good].all(), method
+    targets = rows[:, 6:7] + np.sign(exact[:, :1, 0] - rows[:, 6:7]) * [[1e-3, 1e-2]]
+    exact, known = cylinder.abel(closed, rows, targets, 1e-10)
+    found, status = cylinder.abel(taylor, rows, targets, 1e-8)
+    good = (known == along.OK) & (status == along.OK)
+    assert good.mean() > 0.5
+    assert (abs(found - exact)[..., :2] <= (found + exact)[..., 2:])[good].all()

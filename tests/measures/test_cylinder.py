@@ -8,9 +8,9 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from survey.kernels.along import EQUILIBRIUM, OK, SEPARATRIX, TURNING
+from survey.kernels.along import EQUILIBRIUM, NO_CONVERGENCE, OK, SEPARATRIX, TURNING
 from survey.measures import cylinder
-from survey.methods import taylor
+from survey.methods import closed, dop853, rk4, taylor
 
 REFERENCE = json.loads((files("survey.reference") / "gyrostat.json").read_text())
 SIX = (0.7, -0.4, 1.1, 0.3, 0.5, -0.2)
@@ -92,6 +92,31 @@ def test_reference_separatrix():
     floats, status = in_phi(SIX, phi, w, [saddle - 0.01])
     slope = float(case["slope_at_saddle"])
     assert floats[0, 0] == pytest.approx(-0.01 * slope, rel=0.02)
+
+
+def test_beside_a_turning_point_ok_is_certain_and_turning_holds_within_its_bar():
+    """A pendulum from the bottom turns at pi/3: targets before and beyond, down to an ulp, together and alone."""
+    places = np.pi / 3 + np.concatenate([-(10.0 ** np.arange(-8, -16, -0.25)), 10.0 ** np.arange(-15.75, -8, 0.25)])
+    with mp.workdps(40):
+        gaps = np.array([float(mp.mpf(x) - mp.pi / 3) for x in places])
+        time = float(mp.ellipk(mp.mpf("0.25")))
+    row = np.array([[0, 0, 0, 0, 0, 1.0, 0.0, 1.0]])
+    for method in (taylor, dop853, rk4, closed):
+        floats, status = (part[0] for part in cylinder.abel(method, row, places[None], 1e-10))
+        reached, turned = status == OK, status == TURNING
+        assert reached.sum() > 10 and turned.sum() > 30 and np.isin(status, (OK, TURNING, NO_CONVERGENCE)).all()
+        assert (gaps[reached] < 0).all() and turned[gaps > 1e-13].all()
+        assert (np.abs(floats[turned, 0] - np.pi / 3) <= floats[turned, 2]).all()
+        assert (np.abs(floats[turned, 1] - time) <= floats[turned, 3]).all()
+        early = turned & (gaps < 0)
+        assert (np.abs(floats[early, 0] - places[early]) <= floats[early, 2]).all()
+        back = -gaps[reached]  # w^2 = 2 (cos phi - 1/2)
+        wanted = 2.0 * np.sqrt(np.sin(np.pi / 3 - back / 2) * np.sin(back / 2))
+        assert (np.abs(floats[reached, 0] - wanted) <= floats[reached, 2]).all()
+    together = cylinder.abel(taylor, row, places[None], 1e-5)  # at which nothing is solved again
+    for j in range(0, len(places), 5):
+        alone = cylinder.abel(taylor, row, places[None, j : j + 1], 1e-5)
+        assert all(np.array_equal(a[0, 0], b[0, j]) for a, b in zip(alone, together, strict=True))
 
 
 def exact(six, phi, w, t):
@@ -235,8 +260,6 @@ def test_a_lost_trajectory_is_not_answered():
 
 @pytest.mark.slow
 def test_many_against_dop853():
-    from survey.methods import dop853
-
     random = np.random.default_rng(21)
     rows = random.normal(size=(2000, 8)) * [1, 1, 2, 2, 2, 2, 2, 3]
     times = np.tile([-5.0, 3.0, 20.0], (2000, 1))

@@ -177,11 +177,38 @@ def test_long_integration_agrees(seed):
 
 
 def test_equilibrium_starts():
+    """Of binary64 angles only 0 is exactly an equilibrium; the fall from pi is not claimed to end anywhere."""
     pendulum = (0, 0, 0, 0, 0, 1.0)
     found = fates(pendulum, [[0, 0], [math.pi, 0], [-math.pi, 0], [7 * math.pi, 0], [1e-9, 0]])
-    assert found["verdict"].tolist() == [START] * 4 + [SWINGS]
-    found = fates(SIX, [[row[eq.ANGLE], 0.0] for row in cf.skeleton(taylor, SIX).equilibria])
-    assert found["verdict"].tolist() == [START] * 4 and (found["limit_phi_error"] < 1e-14).all()
+    assert found["verdict"].tolist() == [START] + [UNDECIDED] * 3 + [SWINGS]
+    for s3 in (1.0, -1.0):  # g(0) = s2 - c23 = 0: a focus, a saddle
+        found = fates((0.3, 0.2, 0.5, 0.7, 0.7, s3), [[0.0, 0.0], [5e-324, 0.0], [0.0, 1e-300]])
+        assert found["verdict"].tolist() == [START, UNDECIDED, UNDECIDED] and found["limit_phi"][0] == 0.0
+
+
+def test_a_start_beside_an_equilibrium_is_not_at_it():
+    """One ulp and less from a focus that attracts it is reached; from one that does not, and from saddles, untold."""
+    s = cf.skeleton(taylor, SIX)
+    for row in s.equilibria:
+        x = row[eq.ANGLE]
+        found = fates(SIX, [[np.nextafter(x, -9), 0], [x, 0], [np.nextafter(x, 9), 0], [x + 1e-12, 0]])
+        attracts = row[eq.KIND] != eq.SADDLE and row[eq.STABLE] < 0
+        assert found["verdict"].tolist() == [REST if attracts else UNDECIDED] * 4
+        assert (found["turnings"] == (-1 if attracts else -2)).all()
+        assert (found["status"] == (0 if attracts else 18)).all()
+
+
+@pytest.mark.parametrize("ulps", [9, 18, 45, 450, 1e10])
+def test_a_small_K_is_not_taken_as_none(ulps):
+    """Beside the stratum I2: nothing periodic, and no cycles out of the rounding of D: spin-up, or undecided."""
+    for side in (1, -1):
+        six = (0.7, -0.4, 0.0, 0.0, 0.7, -0.4 * (1 + side * ulps * 2.0**-52))
+        assert cf.stratum_of(*six) == cf.G
+        s = cf.skeleton(taylor, six)
+        assert np.sign(s.K) == -side and all(row[rt.CYCLE_CLASS] < 0 for row in (*s.plus, *s.minus))
+        found = fates(six, [[1.0, 3.0], [1.0, -3.0], [1.0, 20.0], [1.0, 80.0]])
+        sure = [UNDECIDED] if side > 0 else [UNDECIDED, UP, DOWN]
+        assert np.isin(found["verdict"], sure).all()
 
 
 def test_stratum_I0():

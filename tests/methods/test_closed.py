@@ -10,6 +10,7 @@ import pytest
 import survey
 from survey.measures import cylinder, cylinder_auto
 from survey.methods import closed, taylor
+from survey.precision import gyrostat as precision
 from survey.scene import Request
 from survey.scenes import gyrostat
 
@@ -68,6 +69,14 @@ def test_61(case):
     assert status[0] == NO_FORM
 
 
+@pytest.mark.parametrize("work", ["g = 0", "(61)"])
+def test_references_to_t_20(work):
+    for point, _options, wanted, _verdict in precision.references(work):
+        found, turnings, status = at([point[name] for name in precision._NAMES], 20.0)
+        assert status[0] == 0 and turnings[0] == 0
+        assert abs(found[0, 0] - wanted["phi"]) <= found[0, 2] < 1e-12 * (1 + abs(wanted["phi"]))
+
+
 def exact50(b12, b31, phi0, w0, t):
     """phi, w by the matrix exponential of the linear system whose ratio is tan(x/2)."""
     b12, b31, phi0, w0, t = map(mp.mpf, (b12, b31, phi0, w0, t))
@@ -110,6 +119,11 @@ def test_aperiodic_motion_ends_at_the_equilibrium_of_50():
     with mp.workdps(30):
         t = mp.quad(lambda x: 1 / (mp.mpf(0.8) * mp.sin(x) + mp.mpf(0.4)), [0, 1, 2, 3])
     check(found[0], [0.8 * np.sin(3.0) + 0.4, float(t)], 1e-13)
+
+
+def test_where_g_is_0_w_keeps_its_sign_however_small():
+    found, turnings, status = at([0.8, 0, 0, 0, 0, 0, 0.0, 0.4], 60.0)
+    assert status[0] == 0 and found[0, 1] < found[0, 3] and turnings[0] == 0
 
 
 ELLIPTIC = {  # d, c23, s2, s3, phi0, w0 with the roots of the quartic

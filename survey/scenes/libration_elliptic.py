@@ -1,0 +1,63 @@
+"""Triangular libration points of the elliptic restricted three-body problem: Danby's map of linear stability.
+
+    xi'' - 2 eta' = d1 r xi,   eta'' + 2 xi' = d2 r eta,   r = 1 / (1 + e cos f),
+    d1, d2 = (3/2)(1 +- s),   s = sqrt(1 - 3 mu (1 - mu))
+
+in the true anomaly f, period 2 pi, in pulsating axes along the principal directions of the potential; out of the plane
+zeta'' + zeta = 0, which is stable.
+
+Parameters, in order: mu (mass ratio of the lesser primary, 0 to 1/2) and e (eccentricity, 0 <= e < 1), without units.
+
+Outputs: a and b, the coefficients of the monodromy's characteristic polynomial l^4 - a l^3 + b l^2 - a l + 1; the
+verdict; and `collision`. The motion is stable below the curve B(e) and, for e < 0.31450715975493514, between the curves
+A(e) and KC(e), a strip that narrows to nothing at the tip mu = 0.04699080701821065, where A and KC are tangent. On A
+and B two multipliers meet at -1, on KC two pairs of unlike Krein sign meet on the circle.
+
+`collision` says how stability is lost nearest. Where it is lost: 1 if a pair of multipliers is real and negative, 2 if
+the four are complex and off the circle, 0 (none of the two) if real positive ones alone are off it, or at mu = 0. At a
+stable point the multipliers exp(+-i theta1), exp(+-i theta2), theta1 < theta2, lose it by the meeting whose arc is the
+shorter: 2 (pi - theta2), at -1, or theta2 - theta1, between the pairs; pairs of like Krein sign (B D > 0) may
+meet without harm, so there it is 1. It is -1 where the error bars leave it open.
+
+What is known. e = 0 is the circular problem: a = 2 cos 2 pi w1 + 2 cos 2 pi w2, stable for 27 mu (1 - mu) < 1 (Routh).
+mu = 0 is Kepler's problem: a = 4, b = 6, unstable by a secular term. a and b are even in e, and the same at 1 - mu.
+As e -> 1 the multipliers grow like (1 - e)^-5 and more: values are given to about 1 - e = 1e-10 (then `overflow`), the
+accuracy asked to about e = 0.95. For mu below about 1e-13 all is too near Kepler's problem for a verdict.
+
+Source: J. M. A. Danby, Astron. J. 69 (1964) 165; checked and completed in `libration_elliptic.md` beside this file.
+"""
+
+from survey.measures import danby
+from survey.measures.rows import Rows
+from survey.scene import Parameter
+
+TITLE = "Stability of the triangular libration points of the elliptic problem"
+FAMILY = "danby"
+STATUS = {}
+AUDIT = ("dop853",)
+REFERENCES = (
+    "J. M. A. Danby, Astronomical Journal 69 (1964) 165",
+    "A. P. Markeev, Libration points in celestial mechanics and cosmodynamics (1978)",
+)
+PARAMETERS = (
+    Parameter("mu", "mass ratio of the lesser primary", r"\mu", minimum=0.0, maximum=0.5),
+    Parameter("e", "eccentricity of the primaries' orbits", "e", minimum=0.0, maximum=1.0, open_maximum=True),
+)
+OPTIONS = ()
+OUTPUTS = danby.OUTPUTS
+
+
+def cost(options, sizes):
+    """Seconds per point, roughly: a series for every row of one e, its values and their verdicts."""
+    return 4e-5 / sizes["mu"] + 1e-7 if sizes["mu"] >= danby.DENSE else 2e-6
+
+
+def solve(point, request):
+    """All outputs of a block (see `survey.scenes`)."""
+    block = Rows((point["e"],), point["mu"])
+    line = request.line("mu")
+    dense = line is not None and line[0] >= danby.DENSE
+    out = danby.solve(
+        block.per_row(point["e"]), block.per_point(point["mu"]), request.method, request.rtol, dense
+    )  # fmt: skip
+    return {name: block.back(values) for name, values in out.items()}

@@ -1,0 +1,205 @@
+"""Danby's map against 30-digit references, the curves' known points, the full period, and the circular problem."""
+
+import json
+import os
+import subprocess
+import sys
+from importlib import resources
+
+import numpy as np
+import pytest
+import xarray as xr
+from mpmath import mp, mpf
+from scipy.integrate import solve_ivp
+
+import survey
+from survey import engine
+from survey.measures import danby
+
+REFERENCE = json.loads(resources.files("survey.reference").joinpath("libration_elliptic.json").read_text())
+POINTS, BOUNDARY = REFERENCE["points"], REFERENCE["boundary"]
+STABLE_BELOW = {"A": False, "B": True, "KC": True}
+
+
+def points(mu, e, **more):
+    mu, e = np.broadcast_arrays(mu, e)
+    return survey.evaluate("libration_elliptic", mu=xr.DataArray(mu, dims="p"), e=xr.DataArray(e, dims="p"), **more)
+
+
+@pytest.mark.parametrize(("method", "rtol"), [("auto", 1e-6), ("auto", 1e-12), ("dop853", 1e-9), ("rk4", 1e-6)])
+def test_references_lie_within_the_bars(method, rtol):
+    ds = points([row["mu"] for row in POINTS], [row["e"] for row in POINTS], method=method, rtol=rtol)
+    with mp.workdps(30):
+        for name in "ab":
+            exact = [mpf(row[name]) for row in POINTS]
+            error = [abs(float(mpf(v) - x)) for v, x in zip(ds[name].values.tolist(), exact, strict=True)]
+            assert (error <= ds[f"{name}_error"].values).all()
+            size = np.array([1 + abs(float(x)) for x in exact])
+            near = np.array([row["e"] < 0.7 for row in POINTS])
+            assert (ds[f"{name}_error"].values < max(rtol, 1e-10) * size)[near].all()
+    decided = ds.verdict.values != -1
+    assert (ds.verdict.values == [row["stable"] for row in POINTS])[decided].all()
+    assert decided.all() or method != "auto"
+
+
+def test_factors_within_their_bars():
+    values, bars = danby.factors(np.array([row["e"] for row in POINTS]), np.array([row["mu"] for row in POINTS]))
+    exact = np.array([[float(row[name]) for name in ("A", "B", "C", "D", "t")] for row in POINTS])
+    assert (abs(values - exact) <= bars + np.spacing(abs(exact))).all()
+    assert np.median(bars / (abs(values - exact) + np.spacing(abs(exact)))) < 1000
+
+
+@pytest.mark.parametrize("row", [r for r in BOUNDARY if r["e"] != "0"], ids=lambda r: f"{r['curve']}-{r['e']}")
+def test_the_verdict_changes_across_the_curves(row):
+    edge = float(row["mu"])
+    ds = points([edge - 1e-12, edge + 1e-12], float(row["e"]), rtol=1e-13)
+    below = STABLE_BELOW[row["curve"]]
+    assert ds.verdict.values.tolist() == [below, not below]
+    assert (ds.collision == (2 if row["curve"] == "KC" else 1)).all()
+
+
+def test_all_multipliers_are_minus_one_at_the_tip():
+    mu, e = (float(REFERENCE["tip"][name]) for name in ("mu", "e"))
+    ds = points([mu], [e], rtol=1e-13)
+    assert abs(float(ds.a[0]) + 4) <= ds.a_error[0] + 100 * np.spacing(1.0)  # mu and e are rounded
+    assert abs(float(ds.b[0]) - 6) <= ds.b_error[0] + 100 * np.spacing(1.0)
+    assert int(ds.verdict[0]) == -1
+
+
+def test_the_strip_is_there_up_to_the_tip():
+    """In the middle between A and KC, as the kept curves have them at e = 0.3."""
+    a, kc = (float(r["mu"]) for r in BOUNDARY if r["e"] == "0.3" and r["curve"] != "B")
+    ds = points([2 * a - kc, 0.5 * (a + kc), 2 * kc - a], 0.3)
+    assert ds.verdict.values.tolist() == [0, 1, 0] and ds.collision.values[2] == 2
+
+
+def monodromy(mu, e):
+    """Over the full period, in the variables of (1), by scipy."""
+    s = np.sqrt(1 - 3 * mu * (1 - mu))
+
+    def slope(f, y):
+        xi, eta, dxi, deta = y.reshape(4, 4)
+        r = 1.5 / (1 + e * np.cos(f))
+        return np.concatenate([dxi, deta, 2 * deta + (1 + s) * r * xi, (1 - s) * r * eta - 2 * dxi])
+
+    return solve_ivp(slope, (0, 2 * np.pi), np.eye(4).ravel(), "DOP853", rtol=1e-12, atol=1e-12).y[:, -1].reshape(4, 4)
+
+
+def test_half_the_period_gives_the_monodromy_of_the_whole_and_the_collision_its_multipliers():
+    random = np.random.default_rng(3)
+    mu, e = random.uniform(0.001, 0.05, 24), random.uniform(0.0, 0.5, 24)
+    mu[:6], e[:6] = [0.031, 0.034, 0.0365, 0.038, 0.042, 0.0455], [0.02, 0.06, 0.05, 0.06, 0.21, 0.29]
+    ds = points(mu, e)
+    codes = set()
+    for i in range(mu.size):
+        matrix = monodromy(mu[i], e[i])
+        polynomial, found = np.poly(matrix)[1:4], np.array([-ds.a[i], ds.b[i], -ds.a[i]])
+        np.testing.assert_allclose(polynomial, found, rtol=0, atol=1e-8 * (1 + abs(found).max()))
+        codes.add((expected := by_multipliers(matrix), int(ds.verdict[i])))
+        assert expected == int(ds.collision[i])
+    assert codes == {(1, 0), (1, 1), (2, 0), (2, 1)}
+
+
+CANONICAL = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, -1, 1, 0], [1, 0, 0, 1]])  # xi, eta, xi' - eta, eta' + xi
+FORM = np.block([[np.zeros((2, 2)), np.eye(2)], [-np.eye(2), np.zeros((2, 2))]])
+
+
+def by_multipliers(matrix):
+    """The code of `collision` by the multipliers and their Krein signs."""
+    multipliers, vectors = np.linalg.eig(matrix)
+    off = abs(abs(multipliers) - 1) > 1e-5
+    if off.any():
+        return 1 if (abs(multipliers[off].imag) < 1e-6).all() else 2
+    upper = np.flatnonzero(multipliers.imag > 0)
+    theta, z = np.sort(np.angle(multipliers[upper])), CANONICAL @ vectors[:, upper]
+    signs = np.sign(np.einsum("ik,ij,jk->k", z.conj(), FORM, z).imag)
+    return 2 if signs[0] != signs[1] and theta[1] - theta[0] < 2 * (np.pi - theta[1]) else 1
+
+
+def circular(mu):
+    """a and b at e = 0 from the frequencies, in 30 digits."""
+    with mp.workdps(30):
+        x = mpf(27) / 4 * mpf(mu) * (1 - mpf(mu))
+        root = mp.sqrt(1 - 4 * x)
+        f, g = (mp.cos(2 * mp.pi * mp.sqrt((1 + sign * root) / 2)) for sign in (1, -1))
+        return float(mp.re(2 * (f + g))), float(mp.re(2 + 4 * f * g))
+
+
+def test_the_circular_problem():
+    routh, half = (float(r["mu"]) for r in BOUNDARY if r["e"] == "0" and r["curve"] in ("KC", "B"))
+    mu = np.array([1e-9, 1e-3, half, 0.036, routh - 1e-15, routh + 1e-15, 0.1, 0.5])
+    ds = points(mu, 0.0)
+    exact = np.array([circular(value) for value in mu]).T
+    for name, values in zip("ab", exact, strict=True):
+        assert (abs(ds[name] - values) <= ds[f"{name}_error"].astype(float) + np.spacing(abs(values))).all()
+        assert (ds[f"{name}_error"] < 1e-12 * (1 + abs(ds[name]))).all()
+    assert ds.verdict.values.tolist() == [1, 1, 1, 1, 1, 0, 0, 0]
+    assert ds.collision.values.tolist() == [1, 1, 1, 2, 2, 2, 2, 2]
+    other = points(mu, 0.0, method="taylor16")
+    for name in "ab":
+        assert (abs(ds[name] - other[name]) <= ds[f"{name}_error"].astype(float) + other[f"{name}_error"]).all()
+
+
+def test_the_curves_leave_the_circular_problem_as_known():
+    e, half, routh = 1e-4, 0.0285954792089683171, 0.0385208965045513971
+    slope, bend = 0.056416933365573, 0.0802573
+    for curve, at in (("B", half - slope * e), ("A", half + slope * e), ("KC", routh + bend * e * e)):
+        width = 1e-12 if curve == "KC" else 2e-8  # what the next terms move
+        ds = points([at - width, at + width], e)
+        below = STABLE_BELOW[curve]
+        assert ds.verdict.values.tolist() == [below, not below], curve
+
+
+def test_without_a_lesser_primary_it_is_keplers_problem():
+    ds = points(0.0, [0.0, 0.3, 0.9])
+    assert (ds.a == 4).all() and (ds.b == 6).all() and (ds.verdict == 0).all() and (ds.collision == 0).all()
+    near = points(1e-6, [0.0, 0.3, 0.9])
+    assert (near.verdict == 1).all() and (abs(near.a - 4) < 0.05).all()
+
+
+def test_a_dense_row_is_that_of_its_points():
+    mu, e = np.linspace(0.0, 0.5, 120), np.array([0.05, 0.4, 0.8, 0.97])
+    row, alone = (survey.evaluate("libration_elliptic", mu=mu, e=e, **more) for more in ({}, {"method": "taylor16"}))
+    for name in "ab":
+        assert (abs(row[name] - alone[name]) <= row[f"{name}_error"].astype(float) + alone[f"{name}_error"]).all()
+        assert (row[name] != alone[name]).any()  # it is another way
+    decided = (alone.verdict != -1) & (row.verdict != -1)
+    assert (row.verdict == alone.verdict).where(decided, True).all() and decided.mean() > 0.95
+
+
+def test_a_dense_map_has_the_same_bits_in_any_block(monkeypatch):
+    given = {"mu": np.linspace(0.0, 0.05, 90), "e": np.array([0.0, 0.2, 0.314, 0.9])}
+    whole = survey.evaluate("libration_elliptic", **given)
+    monkeypatch.setattr(engine, "BLOCK_POINTS", 17)
+    xr.testing.assert_identical(whole.drop_attrs(), survey.evaluate("libration_elliptic", **given).drop_attrs())
+
+
+def test_eccentricities_near_one_keep_honest_bars():
+    e = 1 - 10.0 ** -np.arange(2, 9)
+    ds, other = points(0.1, e), points(0.1, e, method="dop853")
+    ok = (ds.status == 0) & (other.status == 0)
+    for name in "ab":
+        bars = ds[f"{name}_error"].astype(float) + other[f"{name}_error"]
+        assert (abs(ds[name] - other[name]) <= bars).where(ok, True).all()
+    assert ok.sum() >= 3 and (ds.verdict.where(ds.verdict != -1, 0) == 0).all()
+
+
+PLAIN = """
+import numpy as np
+from survey.measures import danby
+e, mu = np.array([0.1, 0.93]), np.array([[0.02, 0.3], [1e-4, 0.5]])
+for method, rtol in (("auto", 1e-9), ("dop853", 1e-3), ("rk4", 1e-3)):
+    out = danby.solve(e, mu, method, rtol)
+    print(method, *(value.hex() for name in ("a", "b", "b_error") for value in out[name].ravel()), out["collision"])
+print(*(v.hex() for v in danby.solve(np.array([0.3]), np.linspace(0, 0.5, 75)[None, 1:], "auto", 1e-9, True)["b"][0]))
+"""
+
+
+def test_plain_python_gives_the_same_bits():
+    told = [
+        subprocess.run(
+            [sys.executable, "-c", PLAIN], capture_output=True, text=True, env=os.environ | {"NUMBA_DISABLE_JIT": off}
+        ).stdout
+        for off in ("0", "1")
+    ]
+    assert told[0] == told[1] and told[0].count("0x1.") > 100
