@@ -14,7 +14,7 @@ from survey import workflow as workflows
 from survey.dataset import count, counts, describe, error_bars, layout, percent
 from survey.errors import BadInput
 from survey.grid import Grid, line
-from survey.scene import exists
+from survey.scene import condition, exists
 
 
 def run(workflow, output=None, workers=None, scheduler=None, fresh=False):
@@ -222,17 +222,17 @@ def scene(name):
         "name": name,
         "title": module.TITLE,
         "about": inspect.cleandoc(module.__doc__),
-        "parameters": {p.name: _parameter_line(p) for p in module.PARAMETERS},
+        "parameters": {p.name: _parameter_line(module, p) for p in module.PARAMETERS},
         "options": {
             o.name: f"{o.long_name}: {' | '.join(o.choices)} (default {o.default}){_beside(o)}" for o in module.OPTIONS
         },
         "outputs": {
-            o.name: " | ".join(_output_line(other) for other in module.OUTPUTS if other.name == o.name)
+            o.name: _outputs_line(module, [other for other in module.OUTPUTS if other.name == o.name])
             for o in module.OUTPUTS
         },
         "status": {key: sentence for key, (_, sentence) in status.table(module).items()},
         "methods": {"auto": "the method of each region, chosen for you (default)"}
-        | {m: _method_line(m) for m in workflows.methods_of(module)},
+        | {m: _method_line(module, m) for m in workflows.methods_of(module)},
         "references": list(module.REFERENCES),
     }
 
@@ -313,29 +313,35 @@ def _beside(option):
     return words + (f"; not beside {option.said_by}, which says it" if option.said_by else "")
 
 
-def _parameter_line(p):
+def _parameter_line(module, p):
     unit = " (no unit)" if p.units == "1" else f" ({p.units})"
     need = (
         f"default {p.default:g}"
         if p.default is not None
         else f"instead of {p.instead_of}"
         if p.instead_of
+        else "optional"
+        if p.name in {option.only_with for option in module.OPTIONS}
         else "required"
     )
-    return f"{p.long_name}{unit}; {p.domain}; {need}{_only(p.when)}"
+    return f"{p.long_name}{unit}; {p.domain}; {need}{condition(module, p.when, p.name)}"
 
 
-def _output_line(o):
+def _outputs_line(module, same):
+    """One line for the outputs of a name; those that differ in their dimensions alone are told once."""
+    texts = list(dict.fromkeys(_output_text(o) for o in same))
+    if len(texts) < len(same):
+        return texts[0]
+    return " | ".join(_output_text(o) + condition(module, o.when) for o in same)
+
+
+def _output_text(o):
     what = ", ".join(f"{name} {code}" for name, code in o.flags.items()) if o.flags is not None else ""
     unit = "" if o.flags is not None or o.integer else " (no unit)" if o.units == "1" else f" ({o.units})"
-    return "; ".join(part for part in (f"{o.long_name}{unit}", what, o.applies) if part) + _only(o.when)
+    return "; ".join(part for part in (f"{o.long_name}{unit}", what, o.applies) if part)
 
 
-def _only(when):
-    return "".join(f"; only when {key} = {' | '.join(allowed)}" for key, allowed in when.items())
-
-
-def _method_line(name):
+def _method_line(module, name):
     method = modules.load(method_folder, name, "method")
-    first, when = inspect.cleandoc(method.__doc__).splitlines()[0], _only(getattr(method, "WHEN", {}))
+    first, when = inspect.cleandoc(method.__doc__).splitlines()[0], condition(module, getattr(method, "WHEN", {}))
     return first.removesuffix(".") + when if when else first

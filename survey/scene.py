@@ -13,7 +13,8 @@ class Parameter:
 
     `symbol` is TeX. `default=None` says that it must be given. `excluded` and the open ends are not part of the domain.
     `instead_of` names the parameter that this one replaces when it is given. `when` holds the option
-    values for which the parameter exists. An axis of a `whole` parameter is never cut into blocks.
+    values for which the parameter exists ("": where the option does not). An axis of a `whole` parameter is never cut
+    into blocks. One that is `number_option` may also stand among the options, as one number.
     """
 
     name: str
@@ -29,6 +30,7 @@ class Parameter:
     instead_of: str | None = None
     when: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     whole: bool = False
+    number_option: bool = False
 
     def holds(self, values):
         """True where `values` (any shape) lie in the domain; NaN and infinities do not."""
@@ -111,6 +113,20 @@ class Request:
         return self.lines.get(name)
 
 
+def condition(scene, when, own=""):
+    """When `own` exists, in words: `; only with l; only when question = fate | portrait`; or nothing."""
+    words, options = [], {option.name: option for option in scene.OPTIONS}
+    for name, allowed in when.items():
+        beside = options[name].only_with
+        if not any(allowed):
+            words.append(f"without {beside or name}")
+        elif beside and set(allowed) == set(options[name].choices):
+            words += [f"with {beside}"] * (beside != own)
+        else:
+            words.append(f"when {name} = {' | '.join(allowed)}")
+    return "".join(f"; only {word}" for word in words)
+
+
 def exists(item, options):
     """Does this parameter or output exist under these option values?"""
-    return all(options.get(name) in allowed for name, allowed in item.when.items())
+    return all(options.get(name, "") in allowed for name, allowed in item.when.items())

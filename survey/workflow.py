@@ -15,7 +15,7 @@ import survey.methods
 from survey import modules, own
 from survey.errors import BadInput
 from survey.grid import Grid, check_axis, coordinates
-from survey.scene import Request, exists
+from survey.scene import Request, condition, exists
 
 MOST = 10**8  # coordinates on one axis
 FINEST = 1e-6  # width of a cell as a fraction of its axis
@@ -135,6 +135,8 @@ def check(data, text="", output=None, default_path="survey.nc", near=None):
     except ValidationError as error:
         raise BadInput(_one_line(error)) from None
     name, scene = own.find(given_scene, near)
+    numbers = {p.name for p in scene.PARAMETERS if p.number_option and _is_number(file.options.get(p.name))}
+    file.axes |= {key: float(file.options.pop(key)) for key in numbers - set(file.axes)}
     options = check_options(scene, file.options, file.axes, "options.")
     given = {key: _values(f"axes.{key}", axis) for key, axis in file.axes.items()}
     parameters = check_parameters(scene, name, options, given, "axes.")
@@ -161,6 +163,10 @@ def check(data, text="", output=None, default_path="survey.nc", near=None):
         boundaries=_check_boundaries(scene, name, file.boundaries, given),
         refine=_check_refine(scene, name, file, given),
     )
+
+
+def _is_number(value):
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
 def _check_boundaries(scene, name, asked, given):
@@ -250,12 +256,15 @@ def check_options(scene, given, parameters=(), table=""):
 
 def check_parameters(scene, name, options, given, table=""):
     """{name: Parameter} in use, given ones first; raises BadInput for one that is unknown, missing or said twice."""
-    known = {p.name: p for p in scene.PARAMETERS if exists(p, options)}
+    all_of = {p.name: p for p in scene.PARAMETERS}
+    known = {key: p for key, p in all_of.items() if exists(p, options)}
     replaced = {}
     for key in given:
         if key not in known:
             if key in {option.name for option in scene.OPTIONS}:
                 raise BadInput(f"{table}{key} is an option of {name}, not a parameter; put it under [options]")
+            if key in all_of:
+                raise BadInput(f"{table}{key} does not go with the rest{condition(scene, all_of[key].when, key)}")
             raise BadInput(f"{table}{key}: {modules.unknown(f'parameter of {name}', key, list(known))}")
         original = known[key].instead_of or key
         if original in replaced:
@@ -301,7 +310,7 @@ def methods_of(scene, options=None):
 
 
 def _fits(method, options):
-    return all(options.get(name) in allowed for name, allowed in getattr(method, "WHEN", {}).items())
+    return all(options.get(name, "") in allowed for name, allowed in getattr(method, "WHEN", {}).items())
 
 
 def check_path(path):

@@ -20,8 +20,14 @@ def questions():
         choices = [
             [(option.name, choice) for choice in option.choices] for option in scene.OPTIONS if not option.only_with
         ]
-        for combination in itertools.product(*choices):
+        also = [[(o.name, choice)] for o in scene.OPTIONS if _is_primary(scene, o.only_with) for choice in o.choices]
+        for combination in [*itertools.product(*choices), *also]:
             yield pytest.param(scene, dict(combination), id="-".join([name, *(value for _, value in combination)]))
+
+
+def _is_primary(scene, name):
+    """Is there a parameter of that name which replaces no other?"""
+    return any(p.name == name and not p.instead_of for p in scene.PARAMETERS)
 
 
 def draw(scene, options, seed):

@@ -1,0 +1,124 @@
+"""Initial states and scaled integrals of Brun's problem -> the wells of `kernels/nutation.py`, all in double-double."""
+
+from math import cos, sin, sqrt
+
+import numpy as np
+
+from survey.kernels import double as dd
+from survey.kernels.jit import kernel
+from survey.kernels.nutation import (
+    EPS,
+    HIGH,
+    HIGH_MINUS,
+    HIGH_PLUS,
+    LOST,
+    LOW,
+    LOW_MINUS,
+    LOW_PLUS,
+    NONE,
+    NUTATION,
+    Q_HIGH,
+    Q_LOW,
+    SEPARATRIX,
+    SIZE,
+    TINY,
+    WIDTH,
+    K,
+    find,
+)
+from survey.kernels.sines import sin_cos
+
+
+@kernel
+def of_state(size_a, size_c, epsilon, theta, p_theta, b, a):
+    """k, L, L + k - a b and L + k + a b as pairs, and u (S1); the last is False outside the domain."""
+    sine, cosine = sin_cos(0.5 * theta)
+    k = dd.mul(dd.two_prod(epsilon, size_a), dd.two_sum(size_a, -size_c))
+    if sine[0] == 0.0 and a != b:
+        return k, k, k, k, 1.0, False
+    high, low = dd.mul(cosine, cosine), dd.mul(sine, sine)  # (1 + u)/2, (1 - u)/2
+    double = dd.times(dd.mul(sine, cosine), 2.0)
+    minus, plus = dd.two_sum(b, -a), dd.two_sum(b, a)
+    x = (0.0, 0.0)
+    if sine[0] != 0.0:
+        x = dd.div(dd.add(dd.mul(minus, high), dd.mul(plus, low)), double)
+    kinetic = dd.add(dd.two_prod(p_theta, p_theta), dd.mul(x, x))
+    common = dd.add(kinetic, dd.mul(k, dd.mul(double, double)))
+    at_plus = dd.sub(common, dd.times(minus, a))
+    at_minus = dd.add(common, dd.times(plus, a))
+    u = dd.mul(dd.sub(cosine, sine), dd.add(cosine, sine))
+    level = dd.add(dd.sub(kinetic, dd.mul(k, dd.mul(u, u))), dd.two_prod(a, a))
+    return k, level, at_plus, at_minus, u[0], True
+
+
+@kernel
+def phase(row, theta, p_theta, start):
+    """start = (u0 - ul)/(uh - ul), 1 - that, the sign of u', the error of u0 in them.
+
+    The smaller part comes from P(u0) = (sin theta p_theta)^2 where that loses fewer digits than the difference does.
+    """
+    sine, cosine = sin(0.5 * theta), cos(0.5 * theta)
+    v, w = 2.0 * sine * sine, 2.0 * cosine * cosine
+    width = row[WIDTH]
+    start[0], start[1], start[2], start[3] = 0.0, 1.0, 1.0 if p_theta <= 0.0 else -1.0, 0.0
+    if not width > 0.0:
+        return
+    done = min(max((row[LOW_PLUS] - v if v < 1.0 else w - row[LOW_MINUS]) / width, 0.0), 1.0)
+    left = min(max((v - row[HIGH_PLUS] if v < 1.0 else row[HIGH_MINUS] - w) / width, 0.0), 1.0)
+    done, left = (done, 1.0 - done) if done < left else (1.0 - left, left)
+    bow = row[K] * width * width * left * done
+    size = row[Q_LOW] * left + row[Q_HIGH] * done
+    start[3] = 8.0 * EPS * min(v, w)
+    q, moved = size - bow, (abs(row[Q_HIGH] - row[Q_LOW]) + abs(row[K]) * width * width) * start[3] / width
+    rough = 16.0 * EPS * (size + abs(bow)) + moved
+    if q > 4.0 * rough:  # done left = c, done + left = 1
+        c = (2.0 * sine * cosine * p_theta / width) ** 2 / q
+        root = sqrt(max(1.0 - 4.0 * c, 0.0))
+        other = 2.0 * c / (1.0 + root)
+        error = width * other * (16.0 * EPS + rough / q) / max(root, TINY)
+        if width * root < start[3]:  # on which side of the middle?
+            error += 2.0 * width * root
+        if error < start[3]:
+            start[3] = error
+            done, left = (other, 1.0 - other) if done < left else (1.0 - other, other)
+    start[0], start[1] = done, left
+
+
+@kernel
+def of_states(points, rows, kinds, count, heights, starts):
+    """The well of each initial state (A, C, epsilon, theta0, p_theta0, p_psi, p_phi).
+
+    Fills rows (n, SIZE), kinds (n) (LOST outside the domain), the number of wells (-1 on a separatrix), heights (n, 3):
+    L above the separatrix, its bar, |k|; and starts (n, 4), see `phase`.
+    """
+    both, two = np.empty((2, SIZE)), np.empty(2, np.int64)
+    for i in range(len(points)):
+        size_a, size_c, epsilon, theta, p_theta, b, a = points[i]
+        k, level, at_plus, at_minus, u, inside = of_state(size_a, size_c, epsilon, theta, p_theta, b, a)
+        if not inside:
+            kinds[i] = LOST
+            continue
+        heights[i, 0], heights[i, 1] = find(a, b, k, level, at_plus, at_minus, both, two)
+        heights[i, 2] = abs(k[0])
+        place = 1 if two[1] != NONE and u > 0.5 * (both[0, HIGH] + both[1, LOW]) else 0
+        count[i] = (two[0] != NONE) + (two[1] != NONE) if two[0] != SEPARATRIX else -1
+        kinds[i] = two[place] if two[place] != NONE else LOST
+        for j in range(SIZE):
+            rows[i, j] = both[place, j]
+        if kinds[i] >= NUTATION:
+            phase(rows[i], theta, p_theta, starts[i])
+
+
+@kernel
+def of_integrals(points, sign, rows, kinds, heights):
+    """As `of_states`, at (l, alpha, beta), where A = 1 and k = `sign`: both wells, rows (n, 2, SIZE), kinds (n, 2)."""
+    k = (sign, 0.0)
+    for i in range(len(points)):
+        level, a, b = points[i]
+        product = dd.two_prod(a, b)
+        high = dd.two_sum(level, sign)
+        pair = level, 0.0
+        heights[i, 0], heights[i, 1] = find(
+            a, b, k, pair, dd.sub(high, product), dd.add(high, product), rows[i], kinds[i]
+        )
+        heights[i, 2] = 1.0

@@ -1,0 +1,96 @@
+"""Nutations between turning points: period, advances and action of each well, as arrays.
+
+A method fills, for each well (a row of `kernels/nutation.py`), eight numbers: T/A, the precession, the spin less
+a (1/C - 1/A) T, the action, and their bars; and from these, at given times, u, psi and phi with their bars.
+"""
+
+import numpy as np
+
+from survey.kernels import brun
+from survey.kernels import nutation as nu
+
+PERIOD, PRECESSION, SPIN, ACTION = range(4)
+TRUST = 0.03  # relative errors beyond are no errors of first order
+UNDECIDED = -1
+
+
+def of_states(points):
+    """rows (n, SIZE), kinds (n), numbers of wells (n), heights (n, 3) and starts (n, 4) of initial states (n, 7)."""
+    n = len(points)
+    rows, kinds, count = np.zeros((n, nu.SIZE)), np.zeros(n, np.int64), np.full(n, -1)
+    heights, starts = np.full((n, 3), np.nan), np.zeros((n, 4))
+    brun.of_states(np.ascontiguousarray(points), rows, kinds, count, heights, starts)
+    return rows, kinds, count, heights, starts
+
+
+def of_integrals(points, sign):
+    """The same but starts for (l, alpha, beta) (n, 3): rows (n, 2, SIZE), kinds (n, 2)."""
+    n = len(points)
+    rows, kinds, heights = np.zeros((n, 2, nu.SIZE)), np.zeros((n, 2), np.int64), np.full((n, 3), np.nan)
+    brun.of_integrals(np.ascontiguousarray(points), float(sign), rows, kinds, heights)
+    count = np.where((kinds == nu.SEPARATRIX).any(axis=1), -1, (kinds >= nu.NUTATION).sum(axis=1))
+    return rows, kinds, count, heights
+
+
+def periods(method, rows, kinds, rtol):
+    """The eight numbers of each well (n, 8), NaN where there is no nutation, and the kinds, LOST where there should be.
+
+    An error is trusted as one of first order only where it is small.
+    """
+    rows, kinds = np.ascontiguousarray(rows), np.ascontiguousarray(kinds)
+    out = np.full((len(rows), 8), np.nan)
+    method.nutation_periods(rows, kinds, rtol, out)
+    turning = kinds >= nu.NUTATION
+    good = turning & np.isfinite(out).all(axis=1) & (out[:, 4] < TRUST * out[:, PERIOD])
+    out[~good] = np.nan
+    return out, np.where(turning & ~good, nu.LOST, kinds)
+
+
+def outputs(rows, out, inertia, drift):
+    """{name: values, name_error: bars} of wells from `periods`; inertia is A, drift a (1/C - 1/A) to 8 roundings."""
+    values, bars, good = out[:, :4], out[:, 4:], np.isfinite(out[:, 0])
+    period = inertia * values[:, PERIOD]
+    bar = inertia * bars[:, PERIOD] + 2.0 * nu.EPS * period
+    spin = values[:, SPIN] + drift * period
+    spin_bar = bars[:, SPIN] + np.abs(drift) * (bar + 8.0 * nu.EPS * period) + nu.EPS * np.abs(spin)
+    found = {
+        "u_min": (rows[:, nu.LOW], rows[:, nu.BAR_LOW]),
+        "u_max": (rows[:, nu.HIGH], rows[:, nu.BAR_HIGH]),
+        "period": (period, bar),
+        "precession": (values[:, PRECESSION], bars[:, PRECESSION]),
+        "spin": (spin, spin_bar),
+        "action": (values[:, ACTION], bars[:, ACTION]),
+    }
+    result = {}
+    for name, (value, error) in found.items():
+        result[name], result[f"{name}_error"] = np.where(good, value, np.nan), np.where(good, error, np.nan)
+    return result
+
+
+def motions(method, rows, kinds, starts, out, times, inertia, drift):
+    """{name: values, name_error: bars} of u, psi and phi at `times` (n, m)."""
+    here = np.full((*times.shape, 6), np.nan)
+    rows, kinds = np.ascontiguousarray(rows), np.ascontiguousarray(kinds)
+    method.nutation_motions(rows, kinds, starts, out, times / inertia[:, None], here)
+    turned = drift[:, None] * times
+    phi = here[..., 2] + turned
+    bar = here[..., 5] + 12.0 * nu.EPS * np.abs(turned) + nu.EPS * np.abs(phi)
+    found = {"u": (here[..., 0], here[..., 3]), "psi": (here[..., 1], here[..., 4]), "phi": (phi, bar)}
+    good = np.isfinite(here).all(axis=-1)
+    result = {}
+    for name, (value, error) in found.items():
+        result[name], result[f"{name}_error"] = np.where(good, value, np.nan), np.where(good, error, np.nan)
+    return result
+
+
+def verdicts(rows, kinds):
+    """The verdict of each well: its kind, and a regular precession also where the turning points' bars overlap."""
+    one = (kinds == nu.NUTATION) & (rows[..., nu.WIDTH] <= rows[..., nu.BAR_LOW] + rows[..., nu.BAR_HIGH])
+    return np.where(one, nu.PRECESSION, np.maximum(kinds, UNDECIDED))
+
+
+def distance(heights):
+    """(L - L of the separatrix)/|k| and its bar; NaN where there is no separatrix."""
+    value = heights[:, 0] / heights[:, 2]
+    bar = np.where(np.isfinite(value), heights[:, 1] / heights[:, 2] + 4.0 * nu.EPS * np.abs(value), np.nan)
+    return np.where(np.isfinite(value), value, np.nan), bar

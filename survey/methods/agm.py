@@ -1,0 +1,167 @@
+"""Closed forms of nutations by the arithmetic-geometric mean, the advances of pi split off: no steps, a few means.
+
+Domain: every motion between turning points; near separatrices and poles too. Bars are a few roundings.
+
+Source: DLMF 19.8(i), 19.22(ii); formulas (S5), (S10)-(S14) of `scenes/brun.md`.
+"""
+
+from math import copysign, pi, sqrt
+
+import numpy as np
+
+from survey.kernels import double as dd
+from survey.kernels import nutation as nu
+from survey.kernels.elliptic import jacobi
+from survey.kernels.jit import inline, kernel
+from survey.kernels.nutation_time import motion
+from survey.kernels.third_kind import mean, third, third_double
+
+ORDER = 0  # no steps
+SERVES = ("nutation",)
+EPS = nu.EPS
+NODES = 16
+_COSINES = np.cos((np.arange(NODES) + 0.5) * pi / NODES)
+CANCELLED = 0.02  # advances that are a smaller part of their terms are computed in double-double
+FINE = 2.0**-94
+SLANT = 0.25  # where the line through the roots of Q is lower at the pole, relative, pi is not split off
+
+
+@kernel
+def advance(gap, near, far, width, root_near, root_far, incline, q, bend, period, x, y):
+    """(b -+ a) J/A, J the time integral of 1/(1 -+ u) over half a period (S11), (S13).
+
+    As whole multiples of pi, the rest, and the size of its terms.
+    """
+    if gap == 0.0:
+        return 0.0, 0.0, 0.0
+    line = root_near + incline * near
+    if line <= SLANT * root_near:
+        p = root_far * sqrt(near / far)
+        half = 0.5 * (p + y * y / p)
+        ratio = 1.0 + 0.5 * (p - y) * (p + y) / (p * p + y * y) * third(x, y, half * half)
+        value = 0.5 * gap * period / far * (1.0 + 0.5 * width * ratio / near)
+        return 0.0, value, abs(value)
+    level = root_far * near + root_near * far
+    ratio = third(x, y, q * (y / line) ** 2)
+    second = 0.25 * level * bend * ratio / q
+    part = 0.5 * gap * period / line
+    return copysign(1.0, gap), part * (incline + second), abs(part) * (abs(incline) + abs(second))
+
+
+@kernel
+def fine_part(gap, near, far, root_near, root_far, incline, bend, x, y):
+    """What `advance` splits off pi, times 2 / T, and the mean of x and y: pairs, in double-double."""
+    line = dd.add(root_near, dd.mul(incline, near))
+    q = dd.div(dd.mul(gap, gap), dd.mul(near, far))
+    ratio = dd.div(y, line)
+    ratio, middle = third_double(x, y, dd.mul(q, dd.mul(ratio, ratio)))
+    level = dd.add(dd.mul(root_far, near), dd.mul(root_near, far))
+    second = dd.times(dd.div(dd.mul(dd.mul(level, bend), ratio), q), 0.25)
+    return dd.mul(dd.div(gap, line), dd.add(incline, second)), middle
+
+
+@kernel
+def fine_parts(row):
+    """The sum of the parts of both poles and their difference, where one of these is next to nothing (fast spin)."""
+    k, total, near, far = nu.pair(row, nu.K), nu.pair(row, nu.SUM), nu.pair(row, nu.Q_HIGH), nu.pair(row, nu.Q_LOW)
+    high, low = dd.sqrt(near), dd.sqrt(far)
+    g = dd.mul(high, low)
+    above = dd.add(nu.pair(row, nu.MIDDLE), g)
+    incline = dd.times(dd.div(dd.mul(k, total), dd.add(high, low)), 2.0)
+    bend = dd.times(dd.div(dd.mul(k, nu.pair(row, nu.BEND)), above), 0.5)
+    x, y = dd.sqrt(dd.times(above, 0.5)), dd.sqrt(g)
+    plus = nu.pair(row, nu.MINUS), nu.pair(row, nu.HIGH_PLUS), nu.pair(row, nu.LOW_PLUS)
+    minus = nu.pair(row, nu.PLUS), nu.pair(row, nu.LOW_MINUS), nu.pair(row, nu.HIGH_MINUS)
+    up, middle = fine_part(*plus, high, low, incline, bend, x, y)
+    down, middle = fine_part(*minus, low, high, dd.neg(incline), bend, x, y)
+    return dd.add(down, up)[0] * (pi / middle[0]), dd.sub(down, up)[0] * (pi / middle[0])
+
+
+@kernel
+def smooth_action(row, root_low, root_high):
+    """The action by Gauss-Chebyshev quadrature, or -1 where singularities are too near for its few nodes."""
+    k, width, total, bend = row[nu.K], row[nu.WIDTH], row[nu.SUM], row[nu.BEND]
+    if width == 0.0:
+        return 0.0
+    if min(row[nu.HIGH_PLUS], row[nu.LOW_MINUS]) < 0.5 * width:
+        return -1.0
+    if k * bend < 0.0:
+        far = abs(sqrt(-0.25 * bend / k) - abs(total))
+    else:
+        far = sqrt(total * total + 0.25 * bend / k) if k != 0.0 else 2.0
+    if far < 1.1 * width:
+        return -1.0
+    low, high, result = root_low * root_low, root_high * root_high, 0.0
+    for i in range(NODES):
+        up, down = 0.5 * (1.0 + _COSINES[i]), 0.5 * (1.0 - _COSINES[i])
+        q = low * down + high * up - k * width * width * up * down
+        rest = (row[nu.LOW_PLUS] * down + row[nu.HIGH_PLUS] * up) * (row[nu.LOW_MINUS] * down + row[nu.HIGH_MINUS] * up)
+        result += up * down * sqrt(q) / rest
+    return width * width * result / NODES
+
+
+@inline
+def periods_of(row, out):
+    """T / A, the precession, the spin less a (1/C - 1/A) T, the action, and their bars; of one well."""
+    root_low, root_high = sqrt(row[nu.Q_LOW]), sqrt(row[nu.Q_HIGH])
+    g = root_low * root_high
+    k, width, above = row[nu.K], row[nu.WIDTH], nu.above(row, g)
+    x, y = sqrt(0.5 * above), sqrt(g)
+    middle, series = mean(x, y)
+    period = 2.0 * pi / middle
+    incline = 2.0 * k * row[nu.SUM] / (root_low + root_high)
+    bend = 0.5 * k * row[nu.BEND] / above
+    plus = row[nu.MINUS], row[nu.HIGH_PLUS], row[nu.LOW_PLUS]  # what the pole u = 1 asks for
+    minus = row[nu.PLUS], row[nu.LOW_MINUS], row[nu.HIGH_MINUS]
+    turns_up, up, size_up = advance(*plus, width, root_high, root_low, incline, row[nu.Q_PLUS], bend, period, x, y)
+    turns_down, down, size_down = advance(
+        *minus, width, root_low, root_high, -incline, row[nu.Q_MINUS], bend, period, x, y
+    )
+    noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + (row[nu.NOISE_BEND] if row[nu.MIDDLE] < 0.0 else 0.0)
+    out[0], out[4] = period, (12.0 * EPS + noise) * period
+    total, difference, size = down + up, down - up, size_up + size_down
+    error, rounding = (24.0 * EPS + 4.0 * noise) * size, 2.0 * EPS
+    cancelled = min(abs(total), abs(difference)) < CANCELLED * size
+    if cancelled and turns_up * turns_down != 0.0 and row[nu.MIDDLE] > 0.0:
+        total, difference = fine_parts(row)
+        error, rounding = (FINE + 4.0 * noise) * size, 12.0 * EPS
+    out[1], out[2] = pi * (turns_down + turns_up) + total, pi * (turns_down - turns_up) + difference
+    turned = 2.0 * EPS * pi
+    out[5] = error + rounding * abs(total) + turned * abs(turns_down + turns_up)
+    out[6] = error + rounding * abs(difference) + turned * abs(turns_down - turns_up)
+    up, down = row[nu.MINUS] * (pi * turns_up + up), row[nu.PLUS] * (pi * turns_down + down)
+    rest = 0.5 * (0.5 * above - series)
+    out[3] = (period * (row[nu.LEVEL] + rest) - up - down) / (2.0 * pi)
+    size = period * (abs(row[nu.LEVEL]) + abs(rest))
+    size += abs(row[nu.MINUS]) * (pi + size_up) + abs(row[nu.PLUS]) * (pi + size_down)
+    out[7] = (24.0 * EPS + 4.0 * noise) * size / (2.0 * pi)
+    if out[7] > 1e-14 * abs(out[3]):
+        action = smooth_action(row, root_low, root_high)
+        if action >= 0.0:
+            out[3], out[7] = action, (64.0 * EPS + noise) * action
+
+
+@kernel
+def nutation_periods(rows, kinds, tolerance, out):
+    """Fill `out` (n, 8) for the wells `rows` (n, SIZE): values, then bars; a well of another kind is left alone."""
+    for i in range(len(rows)):
+        if kinds[i] >= nu.NUTATION:
+            periods_of(rows[i], out[i])
+
+
+@inline
+def cosine(z, kc, quarter, pairs, last):
+    """(1 + c)/2 and (1 - c)/2, c = cn z, for z in [0, 2 K]."""
+    over = z > quarter
+    sn, cn, _dn = jacobi(2.0 * quarter - z if over else z, pairs, last)
+    cn = abs(cn)
+    near, far = 0.5 * (1.0 + cn), 0.5 * sn * sn / (1.0 + cn)
+    return (far, near) if over else (near, far)
+
+
+@kernel
+def nutation_motions(rows, kinds, starts, periods, times, out):
+    """Fill `out` (n, m, 6): u, psi, phi less the drift, and bars, at `times` (n, m) in units of A."""
+    for i in range(len(rows)):
+        if kinds[i] >= nu.NUTATION:
+            motion(cosine, rows[i], starts[i], periods[i], times[i], out[i])

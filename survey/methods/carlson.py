@@ -1,0 +1,87 @@
+"""Closed forms of nutations by Carlson's R_F, R_J and duplication: a few dozen square roots.
+
+Domain: every motion between turning points. Precessions that nearly cancel keep an absolute accuracy only.
+
+Source: B. C. Carlson, Numer. Algorithms 10 (1995) 13-26; formulas (S5), (S6), (S15) of `scenes/brun.md`.
+"""
+
+from math import cos, hypot, pi, sin, sqrt
+
+from survey.kernels import nutation as nu
+from survey.kernels.carlson import rf, rj
+from survey.kernels.jit import inline, kernel
+from survey.kernels.nutation_time import first_kind, motion
+
+ORDER = 0  # no steps
+SERVES = ("nutation",)
+EPS = nu.EPS
+STEPS = 60
+
+
+@inline
+def advance(gap, near, far, width, q, time, s, g):
+    """(b -+ a) J/A (S6): J has its turning point far from the pole as origin; `time` is R_F."""
+    if gap == 0.0:
+        return 0.0
+    third = rj(0.0, s, g, q * near / far)
+    return gap * (2.0 * time / far + 2.0 * width * q / (3.0 * far * far) * third)
+
+
+@inline
+def second_kind(first, y, z, g):
+    """R_G(0, X, Y), g^2 = X Y, from `first` = R_F and the means of sqrt X, sqrt Y, squared (DLMF 19.22.2, 19.21.10)."""
+    y, z = max(y, z), min(y, z)
+    return (z - 0.5 * g) * first + z * (y - z) / 3.0 * rj(0.0, 0.5 * (y + z), sqrt(y) * sqrt(z), z)
+
+
+@inline
+def periods_of(row, out):
+    """See `agm.periods_of`."""
+    width, s = row[nu.WIDTH], row[nu.MIDDLE]
+    low, high = row[nu.Q_LOW], row[nu.Q_HIGH]
+    g = sqrt(low) * sqrt(high)
+    time = rf(0.0, s, g)
+    up = advance(row[nu.MINUS], row[nu.HIGH_PLUS], row[nu.LOW_PLUS], width, low, time, s, g)
+    down = advance(row[nu.PLUS], row[nu.LOW_MINUS], row[nu.HIGH_MINUS], width, high, time, s, g)
+    noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + 8.0 * EPS * g / nu.above(row, g)
+    out[0], out[1], out[2] = 4.0 * time, up + down, down - up
+    out[4] = (32.0 * EPS + noise) * out[0]
+    out[5] = out[6] = (48.0 * EPS + 4.0 * noise) * (abs(up) + abs(down))
+    square = second_kind(time, 0.5 * nu.above(row, g), g, g)
+    parts = out[0] * row[nu.LEVEL], 4.0 * square, row[nu.MINUS] * up, row[nu.PLUS] * down
+    out[3] = (parts[0] + parts[1] - parts[2] - parts[3]) / (2.0 * pi)
+    out[7] = (48.0 * EPS + 4.0 * noise) * (abs(parts[0]) + parts[1] + abs(parts[2]) + abs(parts[3])) / (2.0 * pi)
+
+
+@kernel
+def nutation_periods(rows, kinds, tolerance, out):
+    """See `agm.nutation_periods`."""
+    for i in range(len(rows)):
+        if kinds[i] >= nu.NUTATION:
+            periods_of(rows[i], out[i])
+
+
+@inline
+def cosine(z, kc, quarter, pairs, last):
+    """As `agm.cosine`: F(chi) = z by Newton's method, from the side where F, convex or concave, lets it be monotone."""
+    over = z > quarter
+    z = 2.0 * quarter - z if over else z
+    chi = min(z, 0.5 * pi)
+    for _ in range(STEPS):
+        sine, cosine = sin(0.5 * chi), cos(0.5 * chi)
+        low, high = cosine * cosine, sine * sine
+        delta = hypot(low - high, kc * 2.0 * sine * cosine)
+        move = (first_kind(low, high, kc) - z) * delta
+        chi = min(max(chi - move, 0.0), 0.5 * pi)
+        if abs(move) <= 1e-15 * chi:
+            break
+    low, high = cos(0.5 * chi) ** 2, sin(0.5 * chi) ** 2
+    return (high, low) if over else (low, high)
+
+
+@kernel
+def nutation_motions(rows, kinds, starts, periods, times, out):
+    """See `agm.nutation_motions`."""
+    for i in range(len(rows)):
+        if kinds[i] >= nu.NUTATION:
+            motion(cosine, rows[i], starts[i], periods[i], times[i], out[i])

@@ -1,0 +1,202 @@
+"""Gauss-Chebyshev quadrature of nutations between their turning points, u = middle + half width cos x.
+
+The nearest singularities (the other roots of P, the poles) tell how many nodes are needed. Domain: away from
+separatrices and near passages of poles, where it needs many nodes; `no_convergence` beyond MOST, and in time beyond
+LONGEST. The independent check.
+
+Source: DLMF 3.5(v); integrals (S3), (S4), (S15) of `scenes/brun.md`.
+"""
+
+from math import atan2, cos, exp, floor, inf, log1p, pi, sin, sqrt
+
+import numpy as np
+
+from survey.kernels import nutation as nu
+from survey.kernels.jit import inline, kernel
+
+ORDER = 0  # no steps: convergence is exponential
+SERVES = ("nutation",)
+EPS = nu.EPS
+FIRST, MOST = 8, 2**15
+LONGEST = 512  # terms of the series in time
+FULL = 38.0  # the first neglected coefficient is exp(-FULL)
+
+
+@inline
+def rate(row):
+    """Logarithm of the sum of the half axes of the ellipse about [ul, uh], scaled to [-1, 1], without singularities."""
+    width, total, k, bend = row[nu.WIDTH], row[nu.SUM], row[nu.K], row[nu.BEND]
+    if width <= 0.0:
+        return inf
+    poles = 2.0 * min(row[nu.HIGH_PLUS] if row[nu.MINUS] != 0.0 else 2.0,
+                      row[nu.LOW_MINUS] if row[nu.PLUS] != 0.0 else 2.0) / width  # fmt: skip
+    least = log1p(poles + sqrt(poles * (2.0 + poles)))
+    if k == 0.0:
+        return least
+    if k * bend < 0.0:  # real roots of Q: their distances from the ends, each from their product
+        spread = sqrt(-bend / k)
+        high, low = 2.0 * row[nu.HIGH] + total, 2.0 * row[nu.LOW] + total
+        near = min(row[nu.Q_HIGH] / (abs(high) + spread), row[nu.Q_LOW] / (abs(low) + spread)) * 2.0 / abs(k)
+        gap = 2.0 * near / width
+        return min(least, log1p(gap + sqrt(gap * (2.0 + gap))))
+    y = sqrt(bend / k) / width
+    x = 2.0 * abs(total) / width
+    sides = 0.5 * (sqrt((x + 1.0) ** 2 + y * y) + sqrt((x - 1.0) ** 2 + y * y))
+    height = sides - 1.0 if sides - 1.0 > 1e-6 else 0.5 * y * y
+    return min(least, log1p(height + sqrt(height * (2.0 + height))))
+
+
+@inline
+def sums(row, n, out):
+    """T/A, the halves of the advances, the action, and the rounding of Q relative to it, by n nodes in x = 0..pi."""
+    low, high, bow = row[nu.Q_LOW], row[nu.Q_HIGH], row[nu.K] * row[nu.WIDTH] ** 2
+    minus, plus = row[nu.MINUS], row[nu.PLUS]
+    time = up = down = action = rough = 0.0
+    for i in range(n):
+        c = cos((i + 0.5) * (0.5 * pi / n))  # of x/2: both weights without cancellation
+        s = cos((n - i - 0.5) * (0.5 * pi / n))
+        c, s = c * c, s * s
+        square = low * s + high * c - bow * s * c
+        root = sqrt(square)
+        to_plus = row[nu.LOW_PLUS] * s + row[nu.HIGH_PLUS] * c
+        to_minus = row[nu.LOW_MINUS] * s + row[nu.HIGH_MINUS] * c
+        time += 1.0 / root
+        up += 1.0 / (to_plus * root) if minus != 0.0 else 0.0
+        down += 1.0 / (to_minus * root) if plus != 0.0 else 0.0
+        action += s * c * root / (to_plus * to_minus)
+        rough = max(rough, (low * s + high * c + abs(bow) * s * c) / square)
+    step = pi / n
+    out[0], out[1], out[2] = 2.0 * step * time, step * up * minus, step * down * plus
+    out[3], out[4] = row[nu.WIDTH] ** 2 * step * action / pi, rough
+
+
+@inline
+def periods_of(row, n, speed, half, whole, out):
+    """See `agm.periods_of`; the error of n nodes follows from the difference to half of them."""
+    sums(row, n // 2, half)
+    sums(row, n, whole)
+    noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + (16.0 + 2.0 * sqrt(float(n))) * EPS * whole[4]
+    seen, missed = exp(-speed * n), exp(-2.0 * speed * n)
+    for i in range(4):
+        half[i] = 10.0 * (abs(whole[i] - half[i]) * seen + abs(whole[i]) * missed) + noise * abs(whole[i])
+    out[0], out[1], out[2], out[3] = whole[0], whole[1] + whole[2], whole[2] - whole[1], whole[3]
+    out[4], out[5], out[6], out[7] = half[0], half[1] + half[2], half[1] + half[2], half[3]
+
+
+@kernel
+def nutation_periods(rows, kinds, tolerance, out):
+    """See `agm.nutation_periods`."""
+    half, whole = np.empty(5), np.empty(5)
+    for i in range(len(rows)):
+        if kinds[i] >= nu.NUTATION:
+            speed = rate(rows[i])
+            n = FIRST
+            while 2.0 * n * speed < FULL and n <= MOST:
+                n *= 2
+            if n <= MOST:
+                periods_of(rows[i], n, speed, half, whole, out[i])
+
+
+@inline
+def integrands(row, x, out):
+    """dt/dx / A at u = ul + (uh - ul) sin^2(x/2), the rates of both angles, u and Q."""
+    s, c = sin(0.5 * x) ** 2, cos(0.5 * x) ** 2
+    q = row[nu.Q_LOW] * c + row[nu.Q_HIGH] * s - row[nu.K] * row[nu.WIDTH] ** 2 * s * c
+    to_plus = row[nu.LOW_PLUS] * c + row[nu.HIGH_PLUS] * s
+    to_minus = row[nu.LOW_MINUS] * c + row[nu.HIGH_MINUS] * s
+    out[0] = 1.0 / sqrt(q)
+    out[1] = 0.5 * row[nu.MINUS] / to_plus * out[0] if row[nu.MINUS] != 0.0 else 0.0
+    out[2] = 0.5 * row[nu.PLUS] / to_minus * out[0] if row[nu.PLUS] != 0.0 else 0.0
+    out[3], out[4] = row[nu.LOW] * c + row[nu.HIGH] * s, q
+
+
+@inline
+def series(row, n, waves, value):
+    """Coefficients of the integrals from 0 to x: waves[:, 0] x + sum of waves[:, j] sin j x."""
+    waves[:, :n] = 0.0
+    for i in range(n):
+        x = (i + 0.5) * pi / n
+        integrands(row, x, value)
+        for j in range(n):
+            wave = cos(j * x) * (2.0 / n if j else 1.0 / n) / (j if j else 1.0)
+            for m in range(3):
+                waves[m, j] += wave * value[m]
+
+
+@inline
+def integrals(waves, n, x, out):
+    """t/A and both angles at x in [0, pi] since u = ul."""
+    for m in range(3):
+        total = 0.0
+        for j in range(n - 1, 0, -1):
+            total += waves[m, j] * sin(j * x)
+        out[m] = waves[m, 0] * x + total
+
+
+@inline
+def when(row, waves, n, time, value, out):
+    """x at which `time` is reached, by Newton's method between brackets; `out` as `integrals`."""
+    low, high = 0.0, pi
+    x = pi * time / (pi * waves[0, 0])
+    for _ in range(100):
+        integrals(waves, n, x, out)
+        integrands(row, x, value)
+        move = (out[0] - time) / value[0]
+        low, high = (low, x) if move > 0.0 else (x, high)
+        new = x - move
+        if not low <= new <= high:
+            new = 0.5 * (low + high)
+        if abs(new - x) <= 4.0 * EPS * x:
+            break
+        x = new
+    return x
+
+
+@inline
+def motion(row, start, n, noise, times, waves, out):
+    """See `nutation_time.motion`."""
+    value, here = np.empty(5), np.empty(3)
+    series(row, n, waves, value)
+    half = pi * waves[0, 0]
+    size = pi * (abs(waves[1, 0]) + abs(waves[2, 0]))
+    x = 2.0 * atan2(sqrt(start[0]), sqrt(start[1]))
+    integrals(waves, n, x, here)
+    integrands(row, x, value)
+    early = start[3] * value[0] / max(row[nu.WIDTH] * abs(sin(0.5 * x) * cos(0.5 * x)), nu.TINY)
+    first_up, first_down = value[1] / value[0], value[2] / value[0]
+    first, base_up, base_down = start[2] * here[0], start[2] * here[1], start[2] * here[2]
+    for j in range(len(times)):
+        turns = floor((first + times[j]) / (2.0 * half) + 0.5)
+        time = first + times[j] - turns * 2.0 * half
+        side = 1.0 if time >= 0.0 else -1.0
+        x = when(row, waves, n, min(abs(time), half), value, here)
+        integrands(row, x, value)
+        up = side * here[1] - base_up + 2.0 * pi * turns * waves[1, 0]
+        down = side * here[2] - base_down + 2.0 * pi * turns * waves[2, 0]
+        late = 2.0 * noise * (abs(times[j]) + half)
+        wide, bend = (
+            row[nu.WIDTH],
+            row[nu.WIDTH] * (row[nu.Q_LOW] + row[nu.Q_HIGH] + 4.0 * abs(row[nu.K]) * row[nu.WIDTH]),
+        )
+        speed = wide * abs(sin(0.5 * x) * cos(0.5 * x)) / value[0]
+        rate_up, rate_down = value[1] / value[0], value[2] / value[0]
+        moved = (abs(rate_up) + abs(rate_down)) * late + (abs(rate_up - first_up) + abs(rate_down - first_down)) * early
+        late += early
+        out[j, 0], out[j, 1], out[j, 2] = value[3], up + down, down - up
+        out[j, 3] = speed * late + bend * late * late + 3.0 * (row[nu.BAR_LOW] + row[nu.BAR_HIGH]) + 8.0 * EPS * wide
+        out[j, 4] = out[j, 5] = moved + 2.0 * noise * (1.0 + abs(turns)) * 2.0 * size
+
+
+@kernel
+def nutation_motions(rows, kinds, starts, periods, times, out):
+    """See `agm.nutation_motions`; by Fourier series of the integrals, of at most LONGEST terms."""
+    waves = np.empty((3, LONGEST))
+    for i in range(len(rows)):
+        if kinds[i] >= nu.NUTATION:
+            speed = rate(rows[i])
+            n = FIRST
+            while 2.0 * n * speed < 2.0 * FULL and n <= LONGEST:
+                n *= 2
+            if n <= LONGEST:
+                noise = periods[i, 4] / periods[i, 0] + 4.0 * EPS * n
+                motion(rows[i], starts[i], n, noise, times[i], waves, out[i])

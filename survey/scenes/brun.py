@@ -1,0 +1,190 @@
+"""Rotation of an axisymmetric body (A = B) about its fixed centre of mass in a Newtonian field (Brun, Clebsch).
+
+With theta the angle between the axis and the direction of the attracting centre, u = cos theta, p_psi and p_phi
+conserved, k = epsilon A (A - C) and L = 2 A h - (A/C) p_phi^2 - epsilon A^2 + p_phi^2 (h the energy):
+
+    A^2 u'^2 = (1 - u^2)(L + k u^2) - (p_phi^2 + p_psi^2 - 2 p_psi p_phi u)                            (S2)
+    psi' = [(p_psi - p_phi)/(1 - u) + (p_psi + p_phi)/(1 + u)] / (2 A)                                 (S4)
+
+Parameters, in order: A > 0 and C (0 < C <= 2 A), moments of inertia; epsilon = 3 mu / R^3, any sign; an initial state:
+theta0 in [0, pi], p_theta0, p_psi, p_phi; and, if wanted, t (psi = phi = 0 at t = 0). Or, instead of all these, the
+scaled integrals l = L/|k|, alpha = p_phi/sqrt|k|, beta = p_psi/sqrt|k| with the option `sign` (of k) and ratio = C/A,
+which only the spin needs; then every well of the effective potential has its place, lower u first, and time is in units
+of A/sqrt|k|, action in units of sqrt|k|.
+
+Per period of the nutation psi advances by `precession` and phi by `spin`; these are not reduced modulo 2 pi. They jump
+by 2 pi where p_psi -+ p_phi changes its sign on motions that pass a pole, u = +-1; on such a motion they have the mean
+of both limits.
+
+Known: T, precession and reduced spin are symmetric in p_psi <-> p_phi; both wells have the same T; without field
+(epsilon = 0, or A = C) the advances are multiples of pi; T = 2 pi / omega_n at regular precessions; near a separatrix T
+grows as the logarithm of the distance.
+
+Source: Bekov, Shinibaev et al., on quadratures of Kobb's type, checked and corrected in `brun.md` beside this file.
+"""
+
+from math import pi
+
+import numpy as np
+
+from survey import methods
+from survey.kernels import nutation as nu
+from survey.measures import nutation
+from survey.measures.rows import Rows
+from survey.modules import load
+from survey.scene import Option, Output, Parameter
+from survey.status import INVALID_PARAMETERS, NO_CONVERGENCE, OK
+
+TITLE = "Rotation of an axisymmetric body in a Newtonian field (Brun's problem)"
+FAMILY = "nutation"
+AUDIT = ("chebyshev",)
+REFERENCES = (
+    "Bekov, Shinibaev et al.: quadratures of Kobb's type, a body in a Newtonian field (errata: survey/scenes/brun.md)",
+)
+STATUS = {
+    "no_motion": "no motion has these integrals: l lies below the least effective potential",
+}
+_NO_MOTION = 16
+_STATE, _SCALED, _MOTION = {"sign": ("",)}, {"sign": ("1", "-1")}, {"motion": ("at_t",)}
+_HARMLESS = (1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0)
+_LARGE = {"minimum": -1e25, "maximum": 1e25}  # products of four such numbers are floats
+DIMENSIONS = {"well": np.array([1, 2])}
+
+PARAMETERS = (
+    Parameter("A", "equatorial moment of inertia A = B", "A", minimum=0.0, open_minimum=True, maximum=1e25,
+              when=_STATE),
+    Parameter("C", "axial moment of inertia, at most 2 A", "C", minimum=0.0, open_minimum=True, maximum=2e25,
+              when=_STATE),
+    Parameter("epsilon", "strength of the field, 3 mu / R^3", r"\varepsilon", when=_STATE, **_LARGE),
+    Parameter("theta0", "initial angle between the axis and the vertical", r"\theta_0", units="rad", minimum=0.0,
+              maximum=pi, when=_STATE),
+    Parameter("p_theta0", "initial momentum conjugate to theta", r"p_{\theta 0}", when=_STATE, **_LARGE),
+    Parameter("p_psi", "momentum of the precession angle, b", r"p_\psi", when=_STATE, **_LARGE),
+    Parameter("p_phi", "momentum of the spin angle, a", r"p_\varphi", when=_STATE, **_LARGE),
+    Parameter("t", "time since the initial state", "t", when=_MOTION | _STATE, whole=True, **_LARGE),
+    Parameter("l", "scaled energy L / |k|", "l", when=_SCALED, **_LARGE),
+    Parameter("alpha", "scaled momentum p_phi / sqrt|k|", r"\alpha", when=_SCALED, **_LARGE),
+    Parameter("beta", "scaled momentum p_psi / sqrt|k|", r"\beta", when=_SCALED, **_LARGE),
+    Parameter("ratio", "inertia ratio C / A", "C/A", default=0.5, minimum=0.0, open_minimum=True, maximum=2.0,
+              when=_SCALED, number_option=True),
+)  # fmt: skip
+OPTIONS = (
+    Option("sign", ("1", "-1"), "sign of k = epsilon A (A - C)", only_with="l"),
+    Option("motion", ("at_t",), "with t: u, psi and phi at t, too", only_with="t"),
+)
+
+_TURNS = "off separatrices, where the period is infinite"
+
+
+def _outputs(when, dims):
+    applies = {"when": when, "dims": dims, "applies": _TURNS}
+    return (
+        Output("u_min", "lower turning point of u = cos theta", r"u_{\min}", **applies),
+        Output("u_max", "upper turning point of u = cos theta", r"u_{\max}", **applies),
+        Output("period", "period of the nutation", "T", **applies),
+        Output("precession", "advance of psi in a period", r"\Delta\psi", units="rad", **applies),
+        Output("spin", "advance of phi in a period", r"\Delta\varphi", units="rad", **applies),
+        Output("action", "action of the nutation, (1 / 2 pi) times the integral of p_theta d theta", "J_u", **applies),
+    )
+
+
+_ANGLE = {"units": "rad", "when": _MOTION, "applies": f"{_TURNS}; without the jumps of pi in passing a pole"}
+OUTPUTS = (
+    Output("u", "u = cos theta at t", "u", when=_MOTION, applies=_TURNS),
+    Output("psi", "angle of precession at t, 0 at first, unwrapped", r"\psi", **_ANGLE),
+    Output("phi", "angle of spin at t, 0 at first, unwrapped", r"\varphi", **_ANGLE),
+    *_outputs(_STATE, ()),
+    *_outputs(_SCALED, ("well",)),
+    Output("separatrix_distance", "L less its value on the separatrix at the same p_psi, p_phi, over |k|", r"\Delta l",
+           applies="where these momenta have a separatrix: negative within a well, positive outside"),
+    Output("wells", "number of wells of motion at these integrals", integer=True, applies="off separatrices"),
+    Output("verdict", "what the motion is (scaled integrals: the last of these that a well holds)",
+           flags={"undecided": -1, "separatrix": 0, "regular_nutation": 1, "regular_precession": 2, "pole_passage": 3}),
+)  # fmt: skip
+
+
+def cost(options, sizes):
+    """Seconds per point, rough."""
+    return 2.5e-6
+
+
+def solve(point, request):
+    """All outputs of a block (see `survey.scenes`)."""
+    method = load(methods, "agm" if request.method == "auto" else request.method, "method")
+    shared = {p.name: point[p.name] for p in PARAMETERS if p.name in point and p.name != "t"}
+    block = Rows(tuple(shared.values()), *([point["t"]] if "t" in point else []))
+    given = {name: block.per_row(values) for name, values in shared.items()}
+    valid = np.isfinite(np.column_stack(list(given.values()))).all(axis=1)
+    if "l" in given:
+        out = _scaled(given, valid, int(request.options["sign"]), method, request.rtol)
+    else:
+        times = block.per_point(point["t"]) if "t" in point else None
+        out = _state(given, valid & (given["C"] <= 2.0 * given["A"]), method, request.rtol, times)
+    return {name: _back(block, values) for name, values in out.items()}
+
+
+def _back(block, values):
+    """Values per row, per row and time, or (rows, 1, wells), in the block's shape."""
+    if values.ndim == 3:
+        return np.stack([block.back(values[..., i]) for i in range(values.shape[-1])], axis=-1)
+    return block.back(values.reshape(block.rows, -1))
+
+
+def _state(given, valid, method, rtol, times):
+    points = np.column_stack([given[p.name] for p in PARAMETERS[:7]])
+    points[~valid] = _HARMLESS
+    rows, kinds, count, heights, starts = nutation.of_states(points)
+    valid &= kinds != nu.LOST
+    a, c = points[:, 0], points[:, 1]
+    drift = points[:, 6] * ((a - c) / (a * c))
+    periods, kinds = nutation.periods(method, rows, kinds, rtol)
+    out = nutation.outputs(rows, periods, a, drift)
+    out["verdict"] = nutation.verdicts(rows, kinds)
+    status = np.where(kinds == nu.LOST, NO_CONVERGENCE, OK)
+    out = _finished(out, status, valid, count, heights)
+    return _with_motion(out, valid, kinds, times, lambda at: nutation.motions(
+        method, rows, kinds, starts, periods, at, a, drift)) if times is not None else out  # fmt: skip
+
+
+def _with_motion(out, valid, kinds, times, motions):
+    """`out` at each of the times, with u, psi and phi there."""
+    good = np.isfinite(times)
+    at_t = motions(np.where(good, times, 0.0))
+    lost = (kinds >= nu.NUTATION)[:, None] & np.isnan(at_t["u"])
+    out = {name: np.repeat(values[:, None], times.shape[1], axis=1) for name, values in out.items()} | at_t
+    out["status"] = np.where(good, np.where(valid[:, None] & lost, NO_CONVERGENCE, out["status"]), INVALID_PARAMETERS)
+    return _emptied(out, out["status"] == INVALID_PARAMETERS)
+
+
+def _scaled(given, valid, sign, method, rtol):
+    points = np.column_stack([given["l"], given["alpha"], given["beta"]])
+    points[~valid] = 1.0
+    rows, kinds, count, heights = nutation.of_integrals(points, sign)
+    ratio = np.where(valid, given["ratio"], 1.0)
+    drift = np.repeat(points[:, 1] * ((1.0 - ratio) / ratio), 2)
+    flat = np.ascontiguousarray(rows.reshape(-1, nu.SIZE))
+    periods, known = nutation.periods(method, flat, kinds.ravel(), rtol)
+    out = nutation.outputs(flat, periods, 1.0, drift)
+    out, known = {name: values.reshape(-1, 1, 2) for name, values in out.items()}, known.reshape(-1, 2)
+    lost = (known == nu.LOST).any(axis=1)
+    out["verdict"] = nutation.verdicts(rows, known).max(axis=1)
+    status = np.where(lost, NO_CONVERGENCE, np.where((known == nu.NONE).all(axis=1), _NO_MOTION, OK))
+    return _finished(out, status, valid, count, heights)
+
+
+def _finished(out, status, valid, count, heights):
+    """`out` with what is one per point, and nothing where the parameters are not valid."""
+    out["separatrix_distance"], out["separatrix_distance_error"] = nutation.distance(heights)
+    out["wells"] = count
+    out["status"] = np.where(valid, status, INVALID_PARAMETERS)
+    return _emptied(out, ~valid)
+
+
+def _emptied(out, where):
+    """`out` with nothing at the points `where`, and a verdict only where the status is ok."""
+    for values in out.values():
+        if values.dtype.kind == "f":
+            values[where] = np.nan
+    out["verdict"] = np.where(out["status"] == OK, out["verdict"], nutation.UNDECIDED)
+    out["wells"] = np.where(where, -1, out["wells"])
+    return out

@@ -1,0 +1,63 @@
+"""Hard cases of every kind against 60 digits: errors within the bars, and near what half-ulp changes of inputs do."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from brun_truth import HALF_ULP, NAMES, OUTPUTS, draw, truth
+from mpmath import mp, mpf
+
+import survey
+
+
+def evaluate(points, method="auto", **more):
+    arrays = {name: xr.DataArray(np.array(column), dims="point") for name, column in zip(NAMES, points.T, strict=True)}
+    return survey.evaluate("brun", method=method, **arrays, **more)
+
+
+def misses(seed, number):
+    """Complaints: an error outside its bar, or above 100 times the floor (of a rounded output at least)."""
+    random = np.random.default_rng(seed)
+    kinds, points = zip(*(draw(random) for _ in range(number)), strict=True)
+    ds, told = evaluate(np.array(points)), []
+    for i, (kind, point) in enumerate(zip(kinds, points, strict=True)):
+        one = ds.isel(point=i)
+        if (one.status != 0 or one.verdict == 0) and abs(one.separatrix_distance) < 1e-20:
+            continue  # which says why there is no answer; a change of an input by 1e-16 is far more
+        if one.status != 0 or one.verdict < 1:
+            told.append((kind, point.tolist(), int(one.status), int(one.verdict)))
+            continue
+        exact, floor = truth(point)
+        for name, value, least in zip(OUTPUTS, exact, floor, strict=True):
+            error = abs(mpf(float(one[name])) - value)
+            if error > float(one[f"{name}_error"]) or error > 100 * max(least, HALF_ULP * abs(value)):
+                told.append((kind, name, point.tolist(), float(error), float(one[f"{name}_error"]), float(least)))
+    return told
+
+
+def test_hard_cases():
+    with mp.workdps(60):
+        assert misses(1, 200) == []
+
+
+def test_motions_of_hard_cases():
+    """Jacobi's functions, R_F inverted and Fourier series agree; at t = 0 the state is the given one."""
+    random = np.random.default_rng(3)
+    points = np.array([draw(random)[1] for _ in range(400)])
+    times = np.array([-30.0, -1.0, 0.0, 0.3, 7.0, 100.0])
+    one = evaluate(points, t=times)
+    start = one.sel(t=0.0)
+    off = abs(start.u - np.cos(one.theta0))
+    assert (off <= start.u_error + 2.0**-52).where(start.status == 0, True).all()
+    for method in ("carlson", "chebyshev"):
+        other = evaluate(points, method, t=times)
+        for name in ("u", "psi", "phi"):
+            fits = abs(one[name] - other[name]) <= one[f"{name}_error"] + other[f"{name}_error"]
+            known = one[name].notnull() & other[name].notnull()
+            assert fits.where(known, True).all() and known.mean() > 0.4, (method, name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(2, 12))
+def test_many_hard_cases(seed):
+    with mp.workdps(60):
+        assert misses(seed, 1000) == []
