@@ -14,7 +14,7 @@ from survey.peers import System
 
 ERROR = "phi"
 LIMITED = "taylor"
-MOST = {"rk4": 20, "dop853": 100, "full": 100}  # points that a slow method is timed on
+MOST = {"rk4": 4, "dop853": 40, "full": 20}  # points that a slow method is timed on
 _NAMES = ("b12", "b31", "d", "c23", "s2", "s3", "phi0", "w0")
 _TIME = 20.0
 _POINTS = 20_000
