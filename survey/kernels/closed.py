@@ -16,6 +16,7 @@ import math
 
 import numpy as np
 
+from survey.kernels.carlson import rf
 from survey.kernels.elliptic import complete
 from survey.kernels.flow import B12, B31, C23, S2, S3, TWO_PI, UNIT, D
 from survey.kernels.jit import inline, kernel
@@ -91,29 +92,13 @@ def reach(data, side):
 
 
 @inline
-def carlson(x, y, z):
-    """R_F(x, y, z), by duplication (DLMF 19.36.1)."""
-    for _ in range(40):
-        mean = (x + y + z) / 3.0
-        if max(abs(x - mean), max(abs(y - mean), abs(z - mean))) < 2e-3 * mean:
-            break
-        shift = math.sqrt(x) * math.sqrt(y) + math.sqrt(y) * math.sqrt(z) + math.sqrt(z) * math.sqrt(x)
-        x, y, z = 0.25 * (x + shift), 0.25 * (y + shift), 0.25 * (z + shift)
-    mean = (x + y + z) / 3.0
-    a, b = 1.0 - x / mean, 1.0 - y / mean
-    c = -a - b
-    e2, e3 = a * b - c * c, a * b * c
-    fourth = e2 * e2 / 24.0 - 3.0 * e2 * e3 / 44.0 - 5.0 * e2**3 / 208.0 + 3.0 * e3 * e3 / 104.0 + e2 * e2 * e3 / 16.0
-    return (1.0 - e2 / 10.0 + e3 / 14.0 + fourth) / math.sqrt(mean)
-
-
-@inline
 def first_kind(chi, kc2, quarter):
     """F(chi | m), 1 - m = kc2, for any chi (DLMF 19.25.5)."""
     j = math.floor(chi / math.pi + 0.5)
     s, c = math.sin(chi), math.cos(chi)
     s = -s if j % 2 else s
-    return 2.0 * quarter * j + s * carlson(c * c, c * c + kc2 * s * s, 1.0)
+    square = c * c + kc2 * s * s
+    return 2.0 * quarter * j + s * rf(c * c, 0.5 * (1.0 + square), math.sqrt(square))
 
 
 @inline
