@@ -110,9 +110,10 @@ def _lattice(T):
         # the error of m moves both invariants at once: by its derivatives
         by_m = mean * (1.0 / 6.0) - share
         by_m = (root * m * (1.0 / 6.0) + (-by_m if flipped else by_m)) / slope
-        d_root = (root * d_g2 + d_g3 + 2.0 * UNIT * ((8.0 * square + abs(g2)) * root + height)) / slope + UNIT * root
-        q4 = g2 - 3.0 * square  # (difference of the other two)^2
-        d_q4 = d_g2 + 6.0 * root * d_root + UNIT * (abs(g2) + 6.0 * square)
+        d_value = d_g3 + UNIT * (4.0 * root * square + 2.0 * height)
+        d_root = (root * d_g2 + d_value) / slope + UNIT * root
+        q4 = g2 - 3.0 * square  # (difference of the other two)^2; an error of g2 moves the root too
+        d_q4 = (abs(slope - 6.0 * square) * d_g2 + 6.0 * root * d_value) / slope + UNIT * (abs(q4) + 12.0 * square)
         d_q4 += abs(m * (1.0 / 6.0) - 6.0 * root * by_m) * d_m
         d_root += abs(by_m) * d_m
         apart = flipped and q4 > 0.0
