@@ -52,6 +52,10 @@ def number(dice):
     return dice.choice((-1, 1)) * (mpf(3) + 10 * mpf(dice.random())) / 10
 
 
+def numbers(dice, count):
+    return [number(dice) for _ in range(count)]
+
+
 def cross(a, b):
     return matrix([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
@@ -75,7 +79,7 @@ def worst(values):
 
 def harmonics(dice):
     """(25): the third equation on rotations about axis 1."""
-    b, theta, phi, w = Body(dice, A12=0, A31=0), number(dice), number(dice), number(dice)
+    b, theta, phi, w = Body(dice, A12=0, A31=0), *numbers(dice, 3)
     c, s = cos(theta), sin(theta)
 
     def equation(last):
@@ -134,8 +138,8 @@ def abel(six, w, slope, phi):
 
 def polynomial(dice):
     """(59): the polynomial of w = l cos phi + m sin phi + n."""
-    b12, b31, d, c23, s2, s3 = six = [number(dice) for _ in range(6)]
-    m, k, n, phi = (number(dice) for _ in range(4))  # k is the paper's l
+    b12, b31, d, c23, s2, s3 = six = numbers(dice, 6)
+    m, k, n, phi = numbers(dice, 4)  # k is the paper's l
     w, slope = k * cos(phi) + m * sin(phi) + n, -k * sin(phi) + m * cos(phi)
     true = abel(six, w, slope, phi)
 
@@ -163,68 +167,52 @@ def trigonometric(dice, sign=-1, constant=lambda mu, b, n: n, root=lambda b: Non
     return abs(abel(six, w, mu * (b.B12 * cos(phi) - b.B31 * sin(phi)) / b.A11, phi))
 
 
-def both_roots(dice):
-    """mu by A11 C23 / (B12 B31), + and -."""
-    state, found = dice.getstate(), []
-    for sign in (1, -1):
-        dice.setstate(state)
-        found.append(
-            trigonometric(
-                dice, root=lambda b, s=sign: mpf("0.5") + s * sqrt(mpf("0.25") - b.A11 * b.C23 / (b.B12 * b.B31))
-            )
-        )
-    return max(found)
+def root_of(inertia, sign):
+    """mu by sqrt(1/4 - inertia C23 / (B12 B31))."""
+    return lambda b: mpf("0.5") + sign * sqrt(mpf("0.25") - getattr(b, inertia) * b.C23 / (b.B12 * b.B31))
 
 
-def same_dice(dice, *functions):
-    """The functions' values, each with the same random numbers."""
-    state, values = dice.getstate(), []
-    for function in functions:
-        dice.setstate(state)
-        values.append(function(dice))
-    return tuple(values)
+def with_root(*root):
+    return lambda dice: trigonometric(dice, root=root_of(*root))
 
 
-def mu_sign(dice):
-    return same_dice(dice, lambda d: trigonometric(d, 1), trigonometric)
+def constant_61(dice):
+    """The printed constant of (61)."""
+    return trigonometric(dice, constant=lambda mu, b, n: mu * b.C23 / (b.B12 * b.B31))
 
 
-def mu_constant(dice):
-    def printed(mu, b, n):
-        return mu * b.C23 / (b.B12 * b.B31)
+def same_dice(printed, *right):
+    """Residuals of the formula as printed and, the worst, of the right ones, with the same random numbers."""
 
-    return same_dice(dice, lambda d: trigonometric(d, constant=printed), trigonometric)
+    def test(dice):
+        state, values = dice.getstate(), []
+        for function in (printed, *right):
+            dice.setstate(state)
+            values.append(function(dice))
+        return values[0], worst(values[1:])
 
-
-def mu_root(dice):
-    def printed(b):
-        return mpf("0.5") + sqrt(mpf("0.25") - b.B11 * b.C23 / (b.B12 * b.B31))
-
-    return same_dice(dice, lambda d: trigonometric(d, root=printed), both_roots)
+    return test
 
 
 def energy(dice):
     """(63) and what follows: parameters d, c23, s2, s3, n over A11, and the square of phi'."""
-    d, c23, s2, s3 = (number(dice) for _ in range(4))
+    d, c23, s2, s3 = numbers(dice, 4)
     n = 4 + abs(number(dice))
-    return (
-        d,
-        c23,
-        s2,
-        s3,
-        n,
-    ), lambda phi: d * cos(2 * phi) / 2 - c23 * sin(2 * phi) + 2 * s2 * sin(phi) + 2 * s3 * cos(phi) + n
+
+    def square(phi):
+        return d * cos(2 * phi) / 2 - c23 * sin(2 * phi) + 2 * s2 * sin(phi) + 2 * s3 * cos(phi) + n
+
+    return (d, c23, s2, s3, n), square
 
 
 def velocity(dice):
     """phi' = +-sqrt(...): the second derivative that follows from it, against (57) with b = 0; phi = sqrt(...) instead."""
     (d, c23, s2, s3, _n), square = energy(dice)
     phi = number(dice)
-    found = [
-        abel((0, 0, d, c23, s2, s3), w, diff(square, phi) / (2 * w), phi)
-        for w in (sqrt(square(phi)), -sqrt(square(phi)))
-    ]
-    return abs(phi - sqrt(square(phi))), worst(found)
+    root = sqrt(square(phi))
+    return abs(phi - root), worst(
+        abel((0, 0, d, c23, s2, s3), w, diff(square, phi) / (2 * w), phi) for w in (root, -root)
+    )
 
 
 def quartic(a, u):
@@ -240,7 +228,7 @@ def with_double_root(a0, a1, a2, u1):
 
 def bracket(dice):
     """(66)."""
-    a0, a1, a2, u1, u = (number(dice) for _ in range(5))
+    a0, a1, a2, u1, u = numbers(dice, 5)
     true = quartic(with_double_root(a0, a1, a2, u1), u)
     printed = a0 * u * u + (a0 * u1 + 3 * a1) * u + a0 * u1**2 + 3 * a1 * u1 + 3 * a2
     right = a0 * u * u + 2 * (a0 * u1 + 2 * a1) * u + 3 * a0 * u1**2 + 8 * a1 * u1 + 6 * a2
@@ -286,10 +274,12 @@ def motion(a, u1, u, t):
     return abs(diff(u, t) ** 2 - quartic(with_double_root(*a, u1), u(t)) / 4)
 
 
-def factors(variant):
+def variant_of(variant, *cases):
+    """Residuals of the variant, as printed and right, by the arguments of `elementary`."""
+
     def test(dice):
         a, u1, u0 = multiple(dice, variant)
-        return tuple(motion(a, u1, elementary(variant, a, u1, u0, f), mpf("0.2")) for f in ((3, 3), (4, 6)))
+        return tuple(motion(a, u1, elementary(variant, a, u1, u0, **case), mpf("0.2")) for case in cases)
 
     return test
 
@@ -298,11 +288,6 @@ def condition(dice):
     """(a0 u1 + a1)^2 + 3 (a0 a2 - a1^2) where P4 has two double roots."""
     (a0, a1, a2), u1, _u0 = multiple(dice, 2)
     return tuple(abs((a0 * u1 + a1) ** 2 + k * (a0 * a2 - a1**2)) for k in (4, 3))
-
-
-def third_variant(dice):
-    a, u1, u0 = multiple(dice, 3)
-    return tuple(motion(a, u1, elementary(3, a, u1, u0, third=f), mpf("0.2")) for f in (sinh, sin))
 
 
 def signs(dice):
@@ -362,28 +347,24 @@ def elliptic(dice, half=True):
     return abs(diff(u, t) ** 2 - quartic(a, u(t)) / 4)
 
 
-def argument(dice):
-    return same_dice(dice, lambda d: elliptic(d, False), elliptic)
-
-
 ERRATA = (
     ("(25), (35)", "`-(1/2) C31 sin th cos th sin 2phi`", "`-(1/2) C31 sin^2 th sin 2phi`; (35) then repeats (36)", harmonics),
     ("(40), (41)", "for `cos th = 1` alone", "for `cos th = -1`: `l2 = B12`, `l3 = B31`, `s2 = -C12`, `s3 = -C31`", downwards),
     ("(49)", "`A11 phi' = (B12 cos phi - B31 sin phi) sin th + n`", "`(B12 sin phi + B31 cos phi) sin th + n`", first_integral),
     ("line after (49)", "the same bracket", "the same correction", areas),
     ("(59)", "sin 2phi term and constant without 1/2", "a factor 1/2 before both; (60) is unharmed", polynomial),
-    ("after (60)", "`mu^2 - mu = c23 / (b12 b31)`", "`mu^2 - mu = -c23 / (b12 b31)`", mu_sign),
-    ("(61), constant", "`mu A11 C23 / (B12 B31)`", "`A11 n*`, and n* is fixed by s", mu_constant),
-    ("after (61)", "`mu = 1/2 + sqrt(1/4 - B11 C23 / (B12 B31))`", "`1/2 +- sqrt(1/4 - A11 C23 / (B12 B31))`: both roots", mu_root),
+    ("after (60)", "`mu^2 - mu = c23 / (b12 b31)`", "`mu^2 - mu = -c23 / (b12 b31)`", same_dice(lambda d: trigonometric(d, 1), trigonometric)),
+    ("(61), constant", "`mu A11 C23 / (B12 B31)`", "`A11 n*`, and n* is fixed by s", same_dice(constant_61, trigonometric)),
+    ("after (61)", "`mu = 1/2 + sqrt(1/4 - B11 C23 / (B12 B31))`", "`1/2 +- sqrt(1/4 - A11 C23 / (B12 B31))`: both roots", same_dice(with_root("B11", 1), with_root("A11", 1), with_root("A11", -1))),
     ("after (63)", "`phi = sqrt(...)`", "`phi' = +-sqrt(...)`", velocity),
     ("(66) and the integral", "`a0 u^2 + (a0 u1 + 3 a1) u + a0 u1^2 + 3 a1 u1 + 3 a2`", "`a0 u^2 + 2 (a0 u1 + 2 a1) u + 3 a0 u1^2 + 8 a1 u1 + 6 a2`", bracket),
-    ("b and c, in variant 1", "`b = 3 (a0 u1 + a1)`, `c = 3 (a0 u1^2 + 2 a1 u1 + a2)`", "`b = 4 (...)`, `c = 6 (...)`", factors(1)),
-    ("b and c, in variant 2", "the same", "the same", factors(2)),
-    ("b and c, in variant 3", "the same (with sin)", "the same", factors(3)),
+    ("b and c, in variant 1", "`b = 3 (a0 u1 + a1)`, `c = 3 (a0 u1^2 + 2 a1 u1 + a2)`", "`b = 4 (...)`, `c = 6 (...)`", variant_of(1, {"factors": (3, 3)}, {})),
+    ("b and c, in variant 2", "the same", "the same", variant_of(2, {"factors": (3, 3)}, {})),
+    ("b and c, in variant 3", "the same (with sin)", "the same", variant_of(3, {"factors": (3, 3)}, {})),
     ("conditions of the variants", "`(a0 u1 + a1)^2 + 4 (a0 a2 - a1^2)`", "`(a0 u1 + a1)^2 + 3 (a0 a2 - a1^2)`; at two double roots", condition),
-    ("variant 3", "`sh tau` beside `cos tau`", "`sin tau`", third_variant),
+    ("variant 3", "`sh tau` beside `cos tau`", "`sin tau`", variant_of(3, {"third": sinh}, {})),
     ("variants 1-3, sign", "one sign of the root", "a factor e = sgn u'(0) sgn z0; at e = -1", signs),
-    ("end", "rational in `P(t)` (Weierstrass)", "rational in `P(t/2)` and `P'(t/2)`", argument),
+    ("end", "rational in `P(t)` (Weierstrass)", "rational in `P(t/2)` and `P'(t/2)`", same_dice(lambda d: elliptic(d, False), elliptic)),
 )  # fmt: skip
 
 
@@ -393,7 +374,7 @@ ERRATA = (
 def full_equations(dice):
     """(1)-(3), component by component, against the vector form."""
     b = Body(dice)
-    w, nu = matrix([number(dice) for _ in range(3)]), matrix([number(dice) for _ in range(3)])
+    w, nu = (matrix(numbers(dice, 3)) for _ in range(2))
     (w1, w2, w3), (v1, v2, v3) = w, nu
     printed = [
         (b.A12 * w1 + b.A22 * w2 + b.A23 * w3) * w3 - (b.A31 * w1 + b.A23 * w2 + b.A33 * w3) * w2
@@ -415,7 +396,7 @@ def full_equations(dice):
 def integrals(dice):
     """(7), (8): derivatives along (1)-(6)."""
     b = Body(dice)
-    w, nu = matrix([number(dice) for _ in range(3)]), matrix([number(dice) for _ in range(3)])
+    w, nu = (matrix(numbers(dice, 3)) for _ in range(2))
     turn = cross(nu, w)
     momentum = b.tensor("A") * w + matrix([b.l1, b.l2, b.l3])
     return worst([(b.moment(w, nu).T * nu + momentum.T * turn)[0], 2 * (nu.T * turn)[0]])
@@ -423,7 +404,7 @@ def integrals(dice):
 
 def rotation(dice):
     """(10)-(12) with (19), (20), and (21), (22), which eliminate w1'."""
-    b, theta, phi, w = Body(dice), number(dice), number(dice), number(dice)
+    b, theta, phi, w = Body(dice), *numbers(dice, 3)
     v1, v2, v3 = vertical(theta, phi)
     p2, p3 = b.C12 * v1 + b.C22 * v2 + b.C23 * v3, b.C31 * v1 + b.C23 * v2 + b.C33 * v3
     p1 = b.C11 * v1 + b.C12 * v2 + b.C31 * v3
@@ -441,7 +422,7 @@ def rotation(dice):
 
 def second_equation(dice):
     """(24)."""
-    b, theta, phi, w = Body(dice, A12=0, A31=0), number(dice), number(dice), number(dice)
+    b, theta, phi, w = Body(dice, A12=0, A31=0), *numbers(dice, 3)
     c, s = cos(theta), sin(theta)
     value = (
         (b.B31 * c + b.l3 - b.B11 * s * cos(phi)) * w + (b.s3 - b.C31 * c) * c + b.C31 * s * s / 2
@@ -554,7 +535,7 @@ def set_b(dice):
 
 def system_60(dice):
     """(60) for l, m, n* with s, c23, d from it: (57) holds."""
-    b12, b31, n, mu, phi = (number(dice) for _ in range(5))
+    b12, b31, n, mu, phi = numbers(dice, 5)
     k, m = mu * b31, mu * b12
     d, c23 = -(m * m - k * k - m * b12 + k * b31), -(2 * k * m - k * b12 - m * b31) / 2
     six = b12, b31, d, c23, n * (m - b12), n * (k - b31)
@@ -629,7 +610,7 @@ def any_start(dice):
 
 def general_solution(dice):
     """d : c23 = b12^2 - b31^2 : b12 b31 and s || b: |w - mu2 X|^mu2 / |w - mu1 X|^mu1 is constant along (57)."""
-    b12, b31, sigma, phi, w = (number(dice) for _ in range(5))
+    b12, b31, sigma, phi, w = numbers(dice, 5)
     mu1 = mpf("1.2") + abs(number(dice))
     mu2 = 1 - mu1
     delta = mu1 * mu2
@@ -645,23 +626,21 @@ def general_solution(dice):
 
 def triple_root(dice):
     """c = 0: z = 16 z0 / (16 - 8 e sqrt(a0 z0^2 + b z0) t + b z0 t^2)."""
-    a0, b, z0 = (abs(number(dice)) for _ in range(3))
+    (a0, b, z0), t = map(abs, numbers(dice, 3)), mpf("0.2")
 
     def z(t):
         return 16 * z0 / (16 - 8 * sqrt(a0 * z0**2 + b * z0) * t + b * z0 * t**2)
 
-    t = mpf("0.2")
     return abs(diff(z, t) ** 2 - z(t) ** 3 * (a0 * z(t) + b) / 4)
 
 
 def quadruple_root(dice):
     """b = c = 0: 1 / z = 1 / z0 - sgn u'(0) sqrt(a0) t / 2."""
-    a0, z0 = abs(number(dice)), number(dice)
+    a0, z0, t = abs(number(dice)), number(dice), mpf("0.2")
 
     def z(t):
         return 1 / (1 / z0 - sqrt(a0) * t / 2)
 
-    t = mpf("0.2")
     return abs(diff(z, t) - sqrt(a0) * z(t) ** 2 / 2)
 
 
