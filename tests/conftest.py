@@ -1,5 +1,6 @@
 """A small real survey that several tests look at, and the program as a user runs it."""
 
+import gc
 import os
 import subprocess
 import sys
@@ -27,6 +28,7 @@ path    = "small.nc"
 figures = ["w"]
 """
 
+gc.set_threshold(100_000)  # as the program does: a tenth of the time in which kernels are compiled
 # Coverage's tracer would look at each line of numba's compiler: a kernel takes half as long again with it.
 _compile = Dispatcher.compile
 
