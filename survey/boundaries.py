@@ -49,18 +49,26 @@ def find(workflow, each=None, once=lambda name, make: make()):
 
 
 def _closed(workflow, measure):
-    """The variables of curves in closed form."""
-    names = list(workflow.grid.sizes)
-    square = _square(workflow, *names)
-    fixed = {name: float(value) for name, (dims, value) in workflow.grid.parameters.items() if not dims}
-    curves = measure.closed(square, names, fixed, workflow.request.options)
-    variables = _of_curves(workflow, names, curves.count, _flags(measure.TITLE, measure.CLASSES, curves.kind),
-                           curves.places, curves.error, "on the curve")  # fmt: skip
+    """The variables of curves in closed form: on one map, or on each of those that a third axis makes a stack of."""
+    grid = workflow.grid
+    names, fixed = (
+        list(grid.sizes),
+        {name: float(values) for name, (dims, values) in grid.parameters.items() if not dims},
+    )
+    square, third = _square(workflow, *names[:2]), names[2:]
+    planes = [{third[0]: float(value)} for value in grid.parameters[third[0]][1]] if third else [{}]
+    found = [measure.closed(square, names[:2], fixed | plane, workflow.request.options) for plane in planes]
+    count, kind, flat, error = (
+        np.concatenate([getattr(curves, name) for curves in found]) for name in ("count", "kind", "places", "error")
+    )
+    points = [curves.count.sum() for curves in found]
+    places = np.column_stack([flat, *(np.repeat([plane[name] for plane in planes], points) for name in third)])
+    kind = _flags(measure.TITLE, measure.CLASSES, kind)
+    variables = _of_curves(workflow, names, count, kind, places, error, "on the curve")
     for output in measure.ALONG:
-        values, errors = curves.along[output.name]
-        told = meaning(output)
-        variables[f"curve_{output.name}"] = ("curve_point", values, told | {
-            "ancillary_variables": f"curve_{output.name}_error"})  # fmt: skip
+        values, errors = (np.concatenate([curves.along[output.name][i] for curves in found]) for i in (0, 1))
+        told = meaning(output) | {"ancillary_variables": f"curve_{output.name}_error"}
+        variables[f"curve_{output.name}"] = ("curve_point", values, told)
         variables[f"curve_{output.name}_error"] = ("curve_point", errors, {
             "long_name": f"error bound of curve_{output.name}", "units": output.units})  # fmt: skip
     return variables

@@ -96,13 +96,25 @@ def _map(axes, ds, variable, state):
         handles = _marks(axes, x, y, failed, "failed") + _marks(axes, x, y, outside, "outside the domain")
         handles += [Patch(color="#dddddd", label="does not apply")] if shown.mask.any() else []
     if "curve_count" in ds:
-        handles += _curves(axes, ds, x, y)
+        handles += _curves(axes, _in_plane(ds, variable), x, y)
     if handles:
         _legend(axes, handles)
     for axis, coord in ((axes.xaxis, x), (axes.yaxis, y)):
         axis.set_label_text(_label(coord))
         if logarithmic(coord.values):
             (axes.set_xscale if axis is axes.xaxis else axes.set_yscale)("log")
+
+
+def _in_plane(ds, variable):
+    """The curves of the plane that is drawn, where a third axis makes a stack of planes."""
+    deeper = [c for c in variable.coords.values() if c.ndim == 0 and c.name in ds.dims and f"curve_{c.name}" in ds]
+    if not deeper:
+        return ds
+    here = np.repeat(True, ds.sizes["curve_point"])
+    for coordinate in deeper:
+        here &= ds[f"curve_{coordinate.name}"].values == float(coordinate)
+    firsts = np.cumsum(ds.curve_count.values) - ds.curve_count.values
+    return ds.isel(curve_point=here, curve=here[firsts])
 
 
 def _curves(axes, ds, x, y):

@@ -85,7 +85,7 @@ def brackets(theta, phi, momenta, sign):
     return x * sin(phi) + p_theta * cos(phi), x * cos(phi) + sign * p_theta * sin(phi)
 
 
-def hamiltonian(m, state, factor=mpf(1) / 2, sign=-1):
+def hamiltonian(m, state, factor=0.5, sign=-1):
     """(6)."""
     theta, phi, _psi, *momenta = state
     first, second = brackets(theta, phi, momenta, sign)

@@ -32,7 +32,7 @@ ALONG = (
     Output("u", "u = cos theta of the regular precession", "u", applies="not to curves of the class pole_passage"),
     Output("precession_rate", "d psi / dt of the regular precession, times A / sqrt|k|", "y",
            applies="to regular precessions off the poles"),
-    Output("spin_rate", "d phi / dt - p_phi (1/C - 1/A) of the regular precession, times A / sqrt|k|", "z",
+    Output("reduced_spin_rate", "d phi / dt - p_phi (1/C - 1/A) of the regular precession, times A / sqrt|k|", "z",
            applies="to regular precessions off the poles"),
     Output("nutation_square", "squared frequency of small nutations, times A^2 / |k|; negative: unstable",
            r"\omega_n^2", applies="not to curves of the class pole_passage"),
@@ -66,9 +66,9 @@ class Part:
 
 def refusal(axes):
     """Why there are no curves on a map of these axes, in words; None if there are."""
-    if len(axes) == 2 and set(axes) <= set(AXES):
+    if len(axes) in (2, 3) and set(axes) <= set(AXES):
         return None
-    return f"curves are known on two axes of {', '.join(AXES)}, the third a number, not on {', '.join(axes) or 'none'}"
+    return f"curves are known on two axes of {', '.join(AXES)}, or all three, not on {', '.join(axes) or 'none'}"
 
 
 def closed(square, axes, fixed, options):
@@ -96,7 +96,7 @@ def surface(y, z, ry, rz, s):
         "beta": (y * (1.0 - s * zz), abs(y) * ((ry + 4.0 * EPS) * (1.0 + zz) + 2.0 * zz * rz)),
         "u": (u, abs(u) * (ry + rz + EPS)),
         "precession_rate": (y, abs(y) * ry),
-        "spin_rate": (z, abs(z) * rz),
+        "reduced_spin_rate": (z, abs(z) * rz),
         "nutation_square": (
             yy + zz - s * (1.0 - 3.0 * yy * zz),
             2.0 * (yy * (ry + 2.0 * EPS) + zz * (rz + 2.0 * EPS) + 3.0 * yy * zz * both + EPS),

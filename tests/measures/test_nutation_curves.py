@@ -151,7 +151,7 @@ def test_duality():
     """p_psi and p_phi exchanged: the same curves, and psi' for the reduced phi'."""
     one = found(1, ("alpha", 0.3), {"l": (-1.0, 2.0), "beta": (-1.5, 1.6)})
     other = found(1, ("beta", 0.3), {"l": (-1.0, 2.0), "alpha": (-1.5, 1.6)})
-    for name, dual in (("beta", "alpha"), ("l", "l"), ("u", "u"), ("precession_rate", "spin_rate")):
+    for name, dual in (("beta", "alpha"), ("l", "l"), ("u", "u"), ("precession_rate", "reduced_spin_rate")):
         lines = [np.concatenate([ds[f"curve_{n}"].values[own] for _, own in runs(ds)])
                  for ds, n in ((one, name), (other, dual))]  # fmt: skip
         np.testing.assert_allclose(*lines, rtol=0, atol=3e-15)
@@ -210,6 +210,20 @@ def test_they_are_in_the_file_and_in_the_picture(tmp_path):
     plt.close(figure)
 
 
+def test_three_axes_make_a_stack_of_maps():
+    axes = {"l": {"start": -1.0, "stop": 2.0, "num": 9}, "beta": {"start": -1.5, "stop": 1.6, "num": 7},
+            "alpha": {"values": [-0.4, 0.1]}}  # fmt: skip
+    workflow = check({"scene": "brun", "axes": axes, "boundaries": {}})
+    ds, one = boundaries.find(workflow), found(1, ("alpha", 0.1), {"l": (-1.0, 2.0), "beta": (-1.5, 1.6)})
+    upper = np.flatnonzero(ds.curve_alpha.values == 0.1)
+    assert upper.size == one.sizes["curve_point"] and set(ds.curve_alpha.values) == {-0.4, 0.1}
+    np.testing.assert_array_equal(ds.curve_beta.values[upper], one.curve_beta.values)
+    with_map = survey.evaluate("brun", **{name: workflow.grid.parameters[name][1] for name in axes}).merge(ds)
+    figure = figures.draw(with_map.isel(alpha=[1, 0]), "period")
+    assert len(figure.axes[0].lines) == one.sizes["curve"]
+    plt.close(figure)
+
+
 def test_a_logarithmic_axis():
     axes = {
         "l": {"start": 0.01, "stop": 10.0, "num": 5, "spacing": "log"},
@@ -226,7 +240,7 @@ def test_a_logarithmic_axis():
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"axes": {"l": 0.1, "alpha": 0.1, "beta": {"values": [1.0, 2.0]}}}, "two axes of l, alpha, beta"),
+        ({"axes": {"l": 0.1, "alpha": 0.1, "beta": {"values": [1.0, 2.0]}}}, "not on beta"),
         ({"boundaries": {"axis": "beta"}}, "closed forms, no axis is searched"),
         ({"axes": {n: {"values": [0.1, 0.2]} for n in ("theta0", "p_psi")} | {"A": 2.0, "C": 1.0, "epsilon": 0.6,
           "p_theta0": 0.0, "p_phi": 1.0}}, "not on theta0, p_psi"),
