@@ -180,7 +180,7 @@ def _check_boundaries(scene, name, asked, given):
     if measure is None:
         raise BadInput(f"boundaries: of the scene {name} no boundary curves are known; leave the table out")
     if hasattr(measure, "closed"):
-        return _check_closed(measure, name, asked, axes)
+        return _check_closed(measure, name, asked, {key: given[key].size for key in axes})
     _check_even(scene, name, "boundaries")
     if not 1 <= len(axes) <= 2:
         raise BadInput(f"boundaries: they are drawn on one axis or two, and there are {len(axes)}; fix the others")
@@ -189,13 +189,17 @@ def _check_boundaries(scene, name, asked, given):
     return asked.axis or axes[-1]
 
 
-def _check_closed(measure, name, asked, axes):
-    """The last axis; raises BadInput where the measure knows no curves on these, or one is to be searched."""
+def _check_closed(measure, name, asked, sizes):
+    """The last of the axes {name: number of values}; raises BadInput where the measure knows no curves on these."""
+    axes = list(sizes)
     refusal = measure.refusal(axes)
     if refusal:
         raise BadInput(f"boundaries: of {name} {refusal}; change the axes, or leave the table out")
     if asked.axis is not None:
         raise BadInput(f"boundaries.axis: the curves of {name} are closed forms, no axis is searched; leave it out")
+    for key in axes[:2]:
+        if sizes[key] < 2:
+            raise BadInput(f"boundaries: the axis {key} has one value, and curves need a range; give two or more")
     return axes[-1]
 
 

@@ -15,7 +15,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from survey.measures.nutation_curves import surface
+from survey.measures.nutation_sheets import surface
 
 ALONG, ACROSS = 161, 31
 HIGHEST = {1: 1.6, -1: 5.5}  # l

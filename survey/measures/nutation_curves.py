@@ -1,17 +1,12 @@
 """The bifurcation set of nutations on a map of two of the scaled integrals l, alpha, beta, in closed form.
 
-Regular precessions are the double roots u, |u| <= 1, of P (S2). With s = sgn k, and y = A psi', z = A phi' (reduced)
-there, both in units of sqrt|k|, they are the surface (S18)
+Regular precessions are the surface (S18) of `nutation_sheets`, which a map cuts in curves. They are stable, and a well
+begins, where A^2 omega_n^2 / |k| = y^2 + z^2 - s (1 - 3 y^2 z^2) is positive; where it is negative they are saddles,
+the separatrices; where it is 0 the sheets meet in cusps (k > 0). The surface ends, and for k < 0 threads go on without
+it, at the upright rotations, alpha = +-beta, l = alpha^2 - s; with the same alpha and beta and a greater l the motion
+passes the pole, where the advances jump. Equation numbers: `scenes/brun.md`.
 
-    alpha = z (1 - s y^2),  beta = y (1 - s z^2),  l = y^2 + z^2 - 3 s y^2 z^2,  u = -s y z
-
-and A^2 omega_n^2 / |k| = y^2 + z^2 - s (1 - 3 y^2 z^2) is positive where they are stable: there a well begins. Where it
-is negative they are saddles, the separatrices; where it is 0 the sheets meet in cusps (k > 0). The surface ends, and
-for k < 0 threads go on without it, at the upright rotations, alpha = +-beta, l = alpha^2 - s; with the same alpha and
-beta and a greater l the motion passes the pole, where the advances jump.
-
-A map cuts the surface where one of l, alpha, beta is a number: (S19)-(S21), in parts that one parameter runs through,
-each without cancellation, so that errors are those of a few roundings. Equation numbers: `scenes/brun.md`.
+Curves are sampled until chords are short and near them, cut where they leave the map or become unstable.
 """
 
 from dataclasses import dataclass
@@ -20,6 +15,7 @@ from itertools import pairwise, product
 import numpy as np
 
 from survey.kernels.nutation import EPS, TINY
+from survey.measures.nutation_sheets import parts, surface
 from survey.scene import Output
 
 CLASSES = {
@@ -55,15 +51,6 @@ class Curves:
     along: dict
 
 
-@dataclass
-class Part:
-    """A curve (y, z) = at(t), low <= t <= high; `at` gives their relative errors, too."""
-
-    at: callable
-    low: float
-    high: float
-
-
 def refusal(axes):
     """Why there are no curves on a map of these axes, in words; None if there are."""
     if len(axes) in (2, 3) and set(axes) <= set(AXES):
@@ -81,166 +68,6 @@ def closed(square, axes, fixed, options):
         found += _traced(part, square, axes, s)
     found += _uprights(third, value, s, square, axes) + _passages(third, value, s, square, axes)
     return _joined(found, square, axes)
-
-
-def surface(y, z, ry, rz, s):
-    """(S18): {name: (value, error bound)} of AXES and ALONG at y, z with relative errors `ry`, `rz`."""
-    yy, zz, both = y * y, z * z, ry + rz + 3.0 * EPS
-    u = np.clip(-s * y * z, -1.0, 1.0)
-    return {
-        "l": (
-            yy + zz - 3.0 * s * yy * zz,
-            2.0 * (yy * (ry + 2.0 * EPS) + zz * (rz + 2.0 * EPS) + 3.0 * yy * zz * both),
-        ),
-        "alpha": (z * (1.0 - s * yy), abs(z) * ((rz + 4.0 * EPS) * (1.0 + yy) + 2.0 * yy * ry)),
-        "beta": (y * (1.0 - s * zz), abs(y) * ((ry + 4.0 * EPS) * (1.0 + zz) + 2.0 * zz * rz)),
-        "u": (u, abs(u) * (ry + rz + EPS)),
-        "precession_rate": (y, abs(y) * ry),
-        "reduced_spin_rate": (z, abs(z) * rz),
-        "nutation_square": (
-            yy + zz - s * (1.0 - 3.0 * yy * zz),
-            2.0 * (yy * (ry + 2.0 * EPS) + zz * (rz + 2.0 * EPS) + 3.0 * yy * zz * both + EPS),
-        ),
-    }
-
-
-def parts(third, value, s, most):
-    """The Parts of the surface where the parameter `third` has this value; |y| and |z| up to about `most` at least."""
-    if third == "l":
-        return _of_energy(value, s)
-    own = _of_momentum(value, s, 1.0 + most)
-    return own if third == "alpha" else [_swapped(part) for part in own]
-
-
-def _of_momentum(a, s, most):
-    """alpha = a (S19), (S20)."""
-    if s < 0.0:
-        low, high = _ranges(a)
-        inner = [(-low, low)] if low < high else []
-        ranges = [*inner, (-most, -high), (high, most)] if low < high else [(-most, most)]
-        return [Part(_oblate(a), *np.arcsinh(ends)) for ends in ranges if ends[0] < ends[1]]
-    if abs(a) < TINY:
-        return [Part(lambda t: (t, 0.0 * t, EPS, EPS), -most, most)] + [
-            Part(lambda t, y=y: (y + 0.0 * t, t, EPS, EPS), -1.0, 1.0) for y in (1.0, -1.0)
-        ]
-    last, first = np.arcsinh(2.0 / abs(a)), 2.0 * np.arctanh(1.0 / most)
-    outer = [Part(_far(a, side), first, last) for side in (1.0, -1.0)] if first < last else []
-    return [Part(_between(a), -last, last), *outer]
-
-
-def _ranges(a):
-    """y between which |u| > 1 (s = -1): (y-, y+), equal where there are none."""
-    if abs(a) <= 2.0:
-        return 1.0, 1.0
-    low = 2.0 / (abs(a) + np.sqrt((abs(a) - 2.0) * (abs(a) + 2.0)))
-    return low, 1.0 / low
-
-
-def _oblate(a):
-    """y = sinh t, z = a / (1 + y^2)."""
-
-    def at(t):
-        y = np.sinh(t)
-        return y, a / (1.0 + y * y), 0.0 * y, 3.0 * EPS + 0.0 * y
-
-    return at
-
-
-def _root(a, t):
-    """u = (|a|/2) sinh t, and Z = (|a| + sqrt(a^2 + 4 u^2))/2."""
-    u = np.clip(0.5 * abs(a) * np.sinh(t), -1.0, 1.0)
-    return u, 0.5 * (abs(a) + np.hypot(a, 2.0 * u))
-
-
-def _between(a):
-    """|y| < 1: z = sgn(a) Z, y = -u/z (S19)."""
-
-    def at(t):
-        u, root = _root(a, t)
-        z = np.copysign(root, a)
-        return -u / z, z, 4.0 * EPS, 3.0 * EPS
-
-    return at
-
-
-def _far(a, side):
-    """|y| > 1: z = -sgn(a) u^2/Z, y = -u/z."""
-
-    def at(t):
-        u, root = _root(a, t)
-        return np.copysign(1.0, a) * side * root / u, -np.copysign(u * (u / root), a), 4.0 * EPS, 5.0 * EPS
-
-    return at
-
-
-def _of_energy(l, s):  # noqa: E741
-    """l given (S21): the lesser (or, on some parts, the greater) of |y|, |z| as parameter, both ways and signs."""
-    partner = _partner(l, s)
-    found = []
-    for kind, low, high in _energy_ranges(l, s):
-        both_signs = kind == "lesser"
-        low, high = (-np.sqrt(high), np.sqrt(high)) if both_signs else (np.sqrt(low), np.sqrt(high))
-        for own, other in product((1.0,) if both_signs else (1.0, -1.0), (1.0, -1.0)):
-            part = Part(_signed(partner, own, other), low, high)
-            found += [part, _swapped(part)]
-    return found
-
-
-def _energy_ranges(l, s):  # noqa: E741
-    """(which of |y|, |z| is the parameter, least, greatest square of it)."""
-    if s < 0.0:
-        if l < 0.0:
-            return []
-        equal = l / (1.0 + np.sqrt(1.0 + 3.0 * l))
-        return [("lesser", 0.0, min(equal, _pole(l - 3.0)) if l > 5.0 else equal)]
-    if l < -1.0:
-        return []
-    square = _less_thrice(l)
-    pole, rest = _pole(l + 3.0), np.sqrt(abs(square))
-    if square > 0.0:
-        inner = [("lesser", 0.0, l / (1.0 + rest))] if l >= 0.0 else []
-        return [*inner, ("greater", (1.0 + rest) / 3.0, 1.0 / pole)]
-    if rest < 1.0:  # past the corner of the hyperbola
-        return [("lesser", 0.0, (1.0 - rest) / 3.0), ("greater", (1.0 + rest) / 3.0, 1.0 / pole)]
-    return [("lesser", 0.0, pole)]
-
-
-def _less_thrice(x):
-    """1 - 3 x, exact where terms cancel."""
-    return (0.5 - x) + (0.5 - 2.0 * x)
-
-
-def _pole(half):
-    """The lesser root of X^2 - `half` X + 1, where |u| = 1."""
-    return 2.0 / (half + np.sqrt(max((half - 2.0) * (half + 2.0), 0.0)))
-
-
-def _partner(l, s):  # noqa: E741
-    """The other of |y|, |z|, exact but for 3 roundings at a place half a rounding from x."""
-
-    def at(x):
-        with np.errstate(all="ignore"):
-            other = np.sqrt(np.maximum((l - x * x) / _less_thrice(s * x * x), 0.0))
-        return np.where(np.isfinite(other), other, 0.0)
-
-    return at
-
-
-def _signed(partner, own, other):
-    def at(t):
-        return own * t, other * partner(t), EPS, 4.0 * EPS
-
-    return at
-
-
-def _swapped(part):
-    """Duality: y and z, alpha and beta exchanged."""
-
-    def at(t):
-        z, y, rz, ry = part.at(t)
-        return y, z, ry, rz
-
-    return Part(at, part.low, part.high)
 
 
 def _furthest(square, axes):
@@ -322,10 +149,7 @@ def _uprights(third, value, s, square, axes):
     """Upright rotations u = 1 (alpha = beta) and u = -1 (alpha = -beta), l = alpha^2 - s, on the map."""
     found = []
     for p, side in product(_momenta(third, value, s), (1.0, -1.0)):
-        if third == "alpha":
-            a, b = p, side * p
-        else:
-            a, b = side * p, p
+        a, b = (p, side * p) if third == "alpha" else (side * p, p)
         square_p = (value + s if third == "l" else p * p) + 4.0 * s
         here = _nowhere(1) | {
             "l": (np.array([value if third == "l" else p * p - s]), np.array([2.0 * EPS * (p * p + 1.0)])),
@@ -343,7 +167,9 @@ def _momenta(third, value, s):
     """alpha (or beta, where that is given) of upright rotations."""
     if third != "l":
         return [value]
-    return [] if value + s < 0.0 else [np.sqrt(value + s), -np.sqrt(value + s)] if value + s > 0.0 else [0.0]
+    if value + s <= 0.0:
+        return [0.0] if value + s == 0.0 else []
+    return [np.sqrt(value + s), -np.sqrt(value + s)]
 
 
 def _passages(third, value, s, square, axes):
