@@ -1,6 +1,6 @@
 """The regular precessions of nutations as a surface over l, alpha, beta, and where one of these is a number, as curves.
 
-Scaled, s = sgn k, y = A psi', z = A phi' (reduced), both in units of sqrt|k|: the double roots u, |u| <= 1, of P (S2) are
+Scaled, s = sgn k, y = A psi', z = A phi' (reduced), both in units of sqrt|k|: double roots u, |u| <= 1, of P (S2) are
 
     alpha = z (1 - s y^2),  beta = y (1 - s z^2),  l = y^2 + z^2 - 3 s y^2 z^2,  u = -s y z                  (S18)
 
