@@ -6,14 +6,12 @@ The surface (S18) of regular precessions in closed form (survey/scenes/brun.md),
 stable and unstable sheets, the cusp curve where they meet, and the threads of upright rotations.
 """
 
-import argparse
-from pathlib import Path
-
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.colors import to_rgb
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from script import parser
 
 from survey.measures.nutation_sheets import surface
 
@@ -113,11 +111,7 @@ def draw():
 
 
 def main():
-    words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    words.add_argument("-o", "--output", default="results", metavar="DIR", help="where the picture goes")
-    folder = Path(words.parse_args().output)
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / "brun_bifurcations.png"
+    path = parser(__doc__, "the picture").parse_args().output / "brun_bifurcations.png"
     draw().savefig(path, dpi=130)
     print(path)
 

@@ -8,19 +8,8 @@ derivatives along the motion. The corrections are derived in survey/scenes/brun.
 """
 
 # ruff: noqa: E501  (the rows of the page's tables)
-import argparse
-import random
-from pathlib import Path
-
-from mpmath import cos, diff, matrix, mp, mpf, sin, sqrt
-
-DIGITS = 40
-TRIALS = 5
-
-
-def number(dice):
-    """A random number of size 0.3 to 1.3: none is 0 or 1, or a missing factor would hide."""
-    return dice.choice((-1, 1)) * (mpf(3) + 10 * mpf(dice.random())) / 10
+from errata import number, write
+from mpmath import cos, diff, matrix, mpf, sin, sqrt
 
 
 class Motion:
@@ -350,43 +339,5 @@ The slip of (6) and (7) is gone in (8). After (5), mu is G times the attracting 
 """
 
 
-def trials(function, seed=0):
-    """The values of `function` at TRIALS random instants, in DIGITS digits."""
-    with mp.workdps(DIGITS):
-        return [function(random.Random(seed + i)) for i in range(TRIALS)]
-
-
-def erratum(function):
-    """(least residual as printed, worst residual corrected)."""
-    found = trials(function)
-    return float(min(abs(a) for a, _ in found)), float(max(b for _, b in found))
-
-
-def residual(function):
-    return float(max(trials(function)))
-
-
-def short(value):
-    return f"{value:.0e}" if value else "0"
-
-
-def main():
-    words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    words.add_argument("-o", "--output", default="results", metavar="DIR", help="where the page goes")
-    folder = Path(words.parse_args().output)
-    folder.mkdir(parents=True, exist_ok=True)
-    errata = [(place, a, b, *erratum(test)) for place, a, b, test in ERRATA]
-    page = PAGE.format(
-        digits=DIGITS,
-        trials=TRIALS,
-        errata="\n".join(f"| {place} | {a} | {b} | {x:.1g} | {short(y)} |" for place, a, b, x, y in errata),
-        right="\n".join(f"| {place} | {what} | {short(residual(test))} |" for place, what, test in RIGHT),
-        gaps="\n".join(f"| {place} | {what} | {short(residual(test))} |" for place, what, test in GAPS),
-    )
-    path = folder / "brun_errata.md"
-    path.write_text(page)
-    print(path)
-
-
 if __name__ == "__main__":
-    main()
+    write(__doc__, "brun_errata", PAGE, {"errata": ERRATA, "right": RIGHT, "gaps": GAPS})
