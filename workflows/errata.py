@@ -35,7 +35,7 @@ def short(value):
 
 
 def write(doc, name, page, tables):
-    """Write NAME.md: `page` with tables: errata (place, printed, correct, test), right and gaps (place, words, test)."""
+    """Write NAME.md: `page` with tables: errata (place, printed, correct, test), right, gaps (place, words, test)."""
     folder = parser(doc, "the page").parse_args().output
     say("printed against corrected")
     rows = [(place, a, b, *erratum(test)) for place, a, b, test in tables["errata"]]
