@@ -8,8 +8,10 @@ survey/scenes/gyrostat.md.
 """
 
 # ruff: noqa: E501  (the rows of the page's tables)
-from errata import number, write
-from mpmath import cos, cosh, diff, exp, log, matrix, mp, mpf, pi, sin, sinh, sqrt, tan
+import gyrostat_elliptic as elliptic
+from errata import number, numbers, same_dice, worst, write
+from gyrostat_elliptic import abel
+from mpmath import cos, cosh, diff, exp, log, matrix, mpf, pi, sin, sinh, sqrt, tan
 
 DEFINED = ("A11", "A22", "A33", "A23", "A12", "A31", "B11", "B22", "B33", "B12", "B31", "B23", "C11", "C22", "C33",
            "C12", "C31", "C23", "l1", "l2", "l3", "s1", "s2", "s3")  # fmt: skip
@@ -42,10 +44,6 @@ class Body:
         return [x / self.A11 for x in six]
 
 
-def numbers(dice, count):
-    return [number(dice) for _ in range(count)]
-
-
 def cross(a, b):
     return matrix([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
@@ -58,10 +56,6 @@ def vertical(theta, phi):
 def about_first(body, theta, phi, w):
     """A w' of a body that turns about axis 1 at the rate w."""
     return body.moment(matrix([w, 0, 0]), vertical(theta, phi))
-
-
-def worst(values):
-    return max(abs(v) for v in values)
 
 
 # the printed formulas that need correction: each function gives (residual as printed, residual corrected)
@@ -119,13 +113,6 @@ def areas(dice):
     return abs(wrong * sin(theta) + rest), abs(right * sin(theta) + rest)
 
 
-def abel(six, w, slope, phi):
-    """w w_phi - f w - g of (57), everything over A11; zero for a solution."""
-    b12, b31, d, c23, s2, s3 = six
-    f = b12 * cos(phi) - b31 * sin(phi)
-    return w * slope - f * w + d * cos(phi) * sin(phi) + c23 * cos(2 * phi) - s2 * cos(phi) + s3 * sin(phi)
-
-
 def polynomial(dice):
     """(59): the polynomial of w = l cos phi + m sin phi + n."""
     b12, b31, d, c23, s2, s3 = six = numbers(dice, 6)
@@ -171,172 +158,6 @@ def constant_61(dice):
     return trigonometric(dice, constant=lambda mu, b, n: mu * b.C23 / (b.B12 * b.B31))
 
 
-def same_dice(printed, *right):
-    """Residuals of the formula as printed and, the worst, of the right ones, with the same random numbers."""
-
-    def test(dice):
-        state, values = dice.getstate(), []
-        for function in (printed, *right):
-            dice.setstate(state)
-            values.append(function(dice))
-        return values[0], worst(values[1:])
-
-    return test
-
-
-def energy(dice):
-    """(63) and what follows: parameters d, c23, s2, s3, n over A11, and the square of phi'."""
-    d, c23, s2, s3 = numbers(dice, 4)
-    n = 4 + abs(number(dice))
-
-    def square(phi):
-        return d * cos(2 * phi) / 2 - c23 * sin(2 * phi) + 2 * s2 * sin(phi) + 2 * s3 * cos(phi) + n
-
-    return (d, c23, s2, s3, n), square
-
-
-def velocity(dice):
-    """phi' = +-sqrt(...): the second derivative that follows from it, against (57) with b = 0; phi = sqrt(...) instead."""
-    (d, c23, s2, s3, _n), square = energy(dice)
-    phi = number(dice)
-    root = sqrt(square(phi))
-    return abs(phi - root), worst(
-        abel((0, 0, d, c23, s2, s3), w, diff(square, phi) / (2 * w), phi) for w in (root, -root)
-    )
-
-
-def quartic(a, u):
-    return a[0] * u**4 + 4 * a[1] * u**3 + 6 * a[2] * u**2 + 4 * a[3] * u + a[4]
-
-
-def with_double_root(a0, a1, a2, u1):
-    """a0..a4 so that u1 is a root of P4 and of its derivative."""
-    a3 = -(a0 * u1**3 + 3 * a1 * u1**2 + 3 * a2 * u1)
-    a4 = -(a0 * u1**4 + 4 * a1 * u1**3 + 6 * a2 * u1**2 + 4 * a3 * u1)
-    return a0, a1, a2, a3, a4
-
-
-def bracket(dice):
-    """(66)."""
-    a0, a1, a2, u1, u = numbers(dice, 5)
-    true = quartic(with_double_root(a0, a1, a2, u1), u)
-    printed = a0 * u * u + (a0 * u1 + 3 * a1) * u + a0 * u1**2 + 3 * a1 * u1 + 3 * a2
-    right = a0 * u * u + 2 * (a0 * u1 + 2 * a1) * u + 3 * a0 * u1**2 + 8 * a1 * u1 + 6 * a2
-    return abs((u - u1) ** 2 * printed - true), abs((u - u1) ** 2 * right - true)
-
-
-def multiple(dice, variant):
-    """a0..a2 and u1 of a P4 with the double root u1 for variant 1, 2 or 3, and u0 near u1 where P4 > 0."""
-    a0, u1, z0 = abs(number(dice)), number(dice), mpf("0.2") + mpf(dice.random()) / 5
-    roots = {1: (3, 4), 2: (2, 2), 3: (-2, 3)}[variant]  # of the quadratic factor, in z = u - u1
-    p, q = (mpf(r) + mpf(dice.random()) / 3 for r in roots)
-    q = p if variant == 2 else q
-    b, c = -a0 * (p + q), a0 * p * q
-    z0 = z0 + (q if c < 0 else 0)  # where P4 > 0
-    a1 = (b / 4) - a0 * u1
-    a2 = c / 6 - a0 * u1**2 - 2 * a1 * u1
-    return (a0, a1, a2), u1, u1 + z0
-
-
-def shortened(a, u1, factors=(4, 6)):
-    """b and c, printed with the factors 3 and 3."""
-    a0, a1, a2 = a
-    return factors[0] * (a0 * u1 + a1), factors[1] * (a0 * u1**2 + 2 * a1 * u1 + a2)
-
-
-def elementary(variant, a, u1, u0, factors=(4, 6), e=1, third=sin):
-    """u(t) by variant 1, 2 or 3; `third` is the function of the second term of variant 3 (printed sh)."""
-    b, c = shortened(a, u1, factors)
-    z0 = u0 - u1
-    head, q = 2 * c + b * z0, a[0] * z0**2 + b * z0 + c
-    if variant == 1:
-        return lambda t: (
-            u1 + 2 * c * z0 / (head * cosh(sqrt(c) * t / 2) - 2 * e * sqrt(c * q) * sinh(sqrt(c) * t / 2) - b * z0)
-        )
-    if variant == 2:
-        return lambda t: u1 + 2 * c * z0 / (head * exp(-e * mp.sign(head) * sqrt(c) * t / 2) - b * z0)
-    root = sqrt(-c)
-    return lambda t: u1 + 2 * c * z0 / (head * cos(root * t / 2) + 2 * e * sqrt(-c * q) * third(root * t / 2) - b * z0)
-
-
-def motion(a, u1, u, t):
-    """u'^2 - P4(u) / 4."""
-    return abs(diff(u, t) ** 2 - quartic(with_double_root(*a, u1), u(t)) / 4)
-
-
-def variant_of(variant, *cases):
-    """Residuals of the variant, as printed and right, by the arguments of `elementary`."""
-
-    def test(dice):
-        a, u1, u0 = multiple(dice, variant)
-        return tuple(motion(a, u1, elementary(variant, a, u1, u0, **case), mpf("0.2")) for case in cases)
-
-    return test
-
-
-def condition(dice):
-    """(a0 u1 + a1)^2 + 3 (a0 a2 - a1^2) where P4 has two double roots."""
-    (a0, a1, a2), u1, _u0 = multiple(dice, 2)
-    return tuple(abs((a0 * u1 + a1) ** 2 + k * (a0 * a2 - a1**2)) for k in (4, 3))
-
-
-def signs(dice):
-    """u'(0) of the branch e = -1 of variants 1 to 3."""
-    printed, right = [], []
-    for variant in (1, 2, 3):
-        a, u1, u0 = multiple(dice, variant)
-        wanted = -mp.sign(u0 - u1) * sqrt(quartic(with_double_root(*a, u1), u0)) / 2
-        found = [abs(diff(elementary(variant, a, u1, u0, e=e), 0) - wanted) for e in (1, -1)]
-        printed, right = [*printed, found[0]], [*right, found[1]]
-    return min(printed), max(right)
-
-
-@mp.extradps(20)  # which the doublings lose
-def weierstrass(z, g2, g3, terms=24, doublings=6):
-    """P(z) and P'(z): the Laurent series at z / 64, doubled six times (DLMF 23.9, 23.10)."""
-    c = [0, 0, g2 / 20, g3 / 28]
-    for n in range(4, terms):
-        c.append(3 * sum(c[m] * c[n - m] for m in range(2, n - 1)) / ((2 * n + 1) * (n - 3)))
-    x = z / 2**doublings
-    value = x**-2 + sum(c[n] * x ** (2 * n - 2) for n in range(2, terms))
-    slope = -2 * x**-3 + sum((2 * n - 2) * c[n] * x ** (2 * n - 3) for n in range(2, terms))
-    for _ in range(doublings):
-        second = 6 * value**2 - g2 / 2
-        value, slope = (
-            -2 * value + (second / (2 * slope)) ** 2,
-            (-4 * slope**4 + 12 * value * slope**2 * second - second**3) / (4 * slope**3),
-        )
-    return value, slope
-
-
-def coefficients(d, c23, s2, s3, n):
-    """(65)."""
-    return d / 2 + n - 2 * s3, s2 + c23, (-3 * d + 2 * n) / 6, s2 - c23, d / 2 + n + 2 * s3
-
-
-def invariants(a):
-    """(67)."""
-    return a[0] * a[4] - 4 * a[1] * a[3] + 3 * a[2] ** 2, (
-        a[0] * a[2] * a[4] + 2 * a[1] * a[2] * a[3] - a[2] ** 3 - a[4] * a[1] ** 2 - a[0] * a[3] ** 2
-    )
-
-
-def elliptic(dice, half=True):
-    """u'^2 - P4(u) / 4 of the Biermann-Weierstrass formula, in P(t / 2) or, as the paper has it, in P(t)."""
-    a = coefficients(*energy(dice)[0])
-    g2, g3 = invariants(a)
-    u0 = number(dice)
-    R = [quartic(a, u0), *(diff(lambda x: quartic(a, x), u0, k) for k in (1, 2, 3, 4))]
-
-    def u(t):
-        p, slope = weierstrass(t / 2 if half else t, g2, g3)
-        above = -sqrt(R[0]) * slope + R[1] * (p - R[2] / 24) / 2 + R[0] * R[3] / 24
-        return u0 + above / (2 * (p - R[2] / 24) ** 2 - R[0] * R[4] / 48)
-
-    t = mpf("0.3")
-    return abs(diff(u, t) ** 2 - quartic(a, u(t)) / 4)
-
-
 ERRATA = (
     ("(25), (35)", "`-(1/2) C31 sin th cos th sin 2phi`", "`-(1/2) C31 sin^2 th sin 2phi`; (35) then repeats (36)", harmonics),
     ("(40), (41)", "for `cos th = 1` alone", "for `cos th = -1`: `l2 = B12`, `l3 = B31`, `s2 = -C12`, `s3 = -C31`", downwards),
@@ -346,15 +167,15 @@ ERRATA = (
     ("after (60)", "`mu^2 - mu = c23 / (b12 b31)`", "`mu^2 - mu = -c23 / (b12 b31)`", same_dice(lambda d: trigonometric(d, 1), trigonometric)),
     ("(61), constant", "`mu A11 C23 / (B12 B31)`", "`A11 n*`, and n* is fixed by s", same_dice(constant_61, trigonometric)),
     ("after (61)", "`mu = 1/2 + sqrt(1/4 - B11 C23 / (B12 B31))`", "`1/2 +- sqrt(1/4 - A11 C23 / (B12 B31))`: both roots", same_dice(with_root("B11", 1), with_root("A11", 1), with_root("A11", -1))),
-    ("after (63)", "`phi = sqrt(...)`", "`phi' = +-sqrt(...)`", velocity),
-    ("(66) and the integral", "`a0 u^2 + (a0 u1 + 3 a1) u + a0 u1^2 + 3 a1 u1 + 3 a2`", "`a0 u^2 + 2 (a0 u1 + 2 a1) u + 3 a0 u1^2 + 8 a1 u1 + 6 a2`", bracket),
-    ("b and c, in variant 1", "`b = 3 (a0 u1 + a1)`, `c = 3 (a0 u1^2 + 2 a1 u1 + a2)`", "`b = 4 (...)`, `c = 6 (...)`", variant_of(1, {"factors": (3, 3)}, {})),
-    ("b and c, in variant 2", "the same", "the same", variant_of(2, {"factors": (3, 3)}, {})),
-    ("b and c, in variant 3", "the same (with sin)", "the same", variant_of(3, {"factors": (3, 3)}, {})),
-    ("conditions of the variants", "`(a0 u1 + a1)^2 + 4 (a0 a2 - a1^2)`", "`(a0 u1 + a1)^2 + 3 (a0 a2 - a1^2)`; at two double roots", condition),
-    ("variant 3", "`sh tau` beside `cos tau`", "`sin tau`", variant_of(3, {"third": sinh}, {})),
-    ("variants 1-3, sign", "one sign of the root", "a factor e = sgn u'(0) sgn z0; at e = -1", signs),
-    ("end", "rational in `P(t)` (Weierstrass)", "rational in `P(t/2)` and `P'(t/2)`", same_dice(lambda d: elliptic(d, False), elliptic)),
+    ("after (63)", "`phi = sqrt(...)`", "`phi' = +-sqrt(...)`", elliptic.velocity),
+    ("(66) and the integral", "`a0 u^2 + (a0 u1 + 3 a1) u + a0 u1^2 + 3 a1 u1 + 3 a2`", "`a0 u^2 + 2 (a0 u1 + 2 a1) u + 3 a0 u1^2 + 8 a1 u1 + 6 a2`", elliptic.bracket),
+    ("b and c, in variant 1", "`b = 3 (a0 u1 + a1)`, `c = 3 (a0 u1^2 + 2 a1 u1 + a2)`", "`b = 4 (...)`, `c = 6 (...)`", elliptic.variant_of(1, {"factors": (3, 3)}, {})),
+    ("b and c, in variant 2", "the same", "the same", elliptic.variant_of(2, {"factors": (3, 3)}, {})),
+    ("b and c, in variant 3", "the same (with sin)", "the same", elliptic.variant_of(3, {"factors": (3, 3)}, {})),
+    ("conditions of the variants", "`(a0 u1 + a1)^2 + 4 (a0 a2 - a1^2)`", "`(a0 u1 + a1)^2 + 3 (a0 a2 - a1^2)`; at two double roots", elliptic.condition),
+    ("variant 3", "`sh tau` beside `cos tau`", "`sin tau`", elliptic.variant_of(3, {"third": sinh}, {})),
+    ("variants 1-3, sign", "one sign of the root", "a factor e = sgn u'(0) sgn z0; at e = -1", elliptic.signs),
+    ("end", "rational in `P(t)` (Weierstrass)", "rational in `P(t/2)` and `P'(t/2)`", same_dice(lambda d: elliptic.elliptic(d, False), elliptic.elliptic)),
 )  # fmt: skip
 
 
@@ -532,38 +353,6 @@ def system_60(dice):
     return abs(abel(six, k * cos(phi) + m * sin(phi) + n, -k * sin(phi) + m * cos(phi), phi))
 
 
-def level(dice):
-    """(63): its derivative by phi, with w^2 for A11 w^2 over A11."""
-    (d, c23, s2, s3, _), square = energy(dice)
-    phi = number(dice)
-    return abs(abel((0, 0, d, c23, s2, s3), 1, diff(square, phi) / 2, phi))
-
-
-def substitution(dice):
-    """(64), (65): P4(u) = (1 + u^2)^2 phi'^2."""
-    values, square = energy(dice)
-    phi = number(dice)
-    u = tan(phi / 2)
-    return abs(quartic(coefficients(*values), u) - (1 + u * u) ** 2 * square(phi))
-
-
-def expanded(dice):
-    """The expanded g2, g3 and 27 G, and (67), (68) by the discriminant of P4 = 256 G."""
-    d, c23, s2, s3, n = values = energy(dice)[0]
-    a = coefficients(*values)
-    g2, g3 = invariants(a)
-    long = (
-        8 * n**3 - 18 * n * (d * d + 4 * c23**2 + 2 * (s2**2 + s3**2)) - 54 * d * (s2**2 - s3**2) - 216 * c23 * s2 * s3
-    )
-    G = (4 * n * n + 3 * d * d + 12 * (c23**2 - s2**2 - s3**2)) ** 3 - long**2
-    whole = [a[0], 4 * a[1], 6 * a[2], 4 * a[3], a[4]]
-    slope = [4 * a[0], 12 * a[1], 12 * a[2], 4 * a[3]]
-    rows = [[0] * i + whole + [0] * (2 - i) for i in range(3)] + [[0] * i + slope + [0] * (3 - i) for i in range(4)]
-    discriminant = mp.det(matrix(rows)) / a[0]  # Sylvester's resultant of P4 and its derivative
-    short = d * d + 4 * n * n / 3 + 4 * (c23**2 - s2**2 - s3**2)
-    return worst([short - g2, long / 27 - g3, G / 27 - (g2**3 - 27 * g3**2), discriminant / 256 - (g2**3 - 27 * g3**2)])
-
-
 RIGHT = (
     ("(1)-(6)", "equal the vector form", full_equations),
     ("(7), (8)", "are integrals", integrals),
@@ -575,9 +364,9 @@ RIGHT = (
     ("after (50)", "its three closed forms and the limit in case 2", three_cases),
     ("(53)-(57), k = 0", "case B is invariant; Abel's equation", set_b),
     ("(60)", "conditions of the trigonometric solution", system_60),
-    ("(63)", "energy at b = 0", level),
-    ("(64), (65)", "the quartic", substitution),
-    ("(67), (68), expanded g2, g3, 27 G", "invariants; disc P4 = 256 G", expanded),
+    ("(63)", "energy at b = 0", elliptic.level),
+    ("(64), (65)", "the quartic", elliptic.substitution),
+    ("(67), (68), expanded g2, g3, 27 G", "invariants; disc P4 = 256 G", elliptic.expanded),
 )
 
 
@@ -614,34 +403,14 @@ def general_solution(dice):
     return abs(diff(value, (phi, w), (1, 0)) + slope * diff(value, (phi, w), (0, 1)))
 
 
-def triple_root(dice):
-    """c = 0: z = 16 z0 / (16 - 8 e sqrt(a0 z0^2 + b z0) t + b z0 t^2)."""
-    (a0, b, z0), t = map(abs, numbers(dice, 3)), mpf("0.2")
-
-    def z(t):
-        return 16 * z0 / (16 - 8 * sqrt(a0 * z0**2 + b * z0) * t + b * z0 * t**2)
-
-    return abs(diff(z, t) ** 2 - z(t) ** 3 * (a0 * z(t) + b) / 4)
-
-
-def quadruple_root(dice):
-    """b = c = 0: 1 / z = 1 / z0 - sgn u'(0) sqrt(a0) t / 2."""
-    a0, z0, t = abs(number(dice)), number(dice), mpf("0.2")
-
-    def z(t):
-        return 1 / (1 / z0 - sqrt(a0) * t / 2)
-
-    return abs(diff(z, t) - sqrt(a0) * z(t) ** 2 / 2)
-
-
 GAPS = (
     ("after (42)", "About the vertical the rotation is uniform for an axis that is not principal too, if only `A31 m^2 + (B31 + l3) m - C31 + s3 = 0` and `A12 m^2 + (B12 + l2) m - C12 + s2 = 0`.", inclined),
     ("(26)-(36)", "They are necessary and sufficient for the whole set w2 = w3 = 0, nu1 = cos th to be invariant, not for single motions on it: the line above is one that breaks (23).", inclined),
     ("after (50)", "The forms start at phi = 0: in case 2 real t0 reach only the arc between the equilibria that holds phi = 0. From any u0, `u = (u0 D + (n + Q + P u0) T) / (D - (P + (n - Q) u0) T)` with P = B12 sin th, Q = B31 sin th, D^2 = abs(n^2 - P^2 - Q^2), T = tan or th of D t / (2 A11).", any_start),
     ("(58)-(61)", "Not one solution but all: under the same two conditions (57) is `w dw/dF = w + sigma - delta F`, and `abs(w - mu2 X)^mu2 / abs(w - mu1 X)^mu1` is constant, X = F - sigma / delta, mu1 + mu2 = 1, mu1 mu2 = delta (delta < 1/4), F = b12 sin phi + b31 cos phi.", general_solution),
-    ("(66)", "The triple root c = 0 is left out.", triple_root),
-    ("(66)", "The quadruple root is left out.", quadruple_root),
-    ("(68)", "Nothing needs G != 0, but P' is needed unless u0 is a root of P4; P4 may also have its double roots off the real axis, where w is the trigonometric solution.", elliptic),
+    ("(66)", "The triple root c = 0 is left out.", elliptic.triple_root),
+    ("(66)", "The quadruple root is left out.", elliptic.quadruple_root),
+    ("(68)", "Nothing needs G != 0, but P' is needed unless u0 is a root of P4; P4 may also have its double roots off the real axis, where w is the trigonometric solution.", elliptic.elliptic),
 )  # fmt: skip
 
 
