@@ -14,6 +14,27 @@ def number(dice):
     return dice.choice((-1, 1)) * (mpf(3) + 10 * mpf(dice.random())) / 10
 
 
+def numbers(dice, count):
+    return [number(dice) for _ in range(count)]
+
+
+def worst(values):
+    return max(abs(v) for v in values)
+
+
+def same_dice(printed, *right):
+    """Residuals of the formula as printed and, the worst, of the right ones, with the same random numbers."""
+
+    def test(dice):
+        state, values = dice.getstate(), []
+        for function in (printed, *right):
+            dice.setstate(state)
+            values.append(function(dice))
+        return values[0], worst(values[1:])
+
+    return test
+
+
 def trials(function, seed=0):
     """The values of `function` at TRIALS random parameters, in DIGITS digits."""
     with mp.workdps(DIGITS):

@@ -8,8 +8,10 @@ survey/scenes/gyrostat.md.
 """
 
 # ruff: noqa: E501  (the rows of the page's tables)
-from errata import number, write
-from mpmath import cos, cosh, diff, exp, log, matrix, mp, mpf, pi, sin, sinh, sqrt, tan
+import gyrostat_elliptic as elliptic
+from errata import number, numbers, same_dice, worst, write
+from gyrostat_elliptic import abel
+from mpmath import cos, cosh, diff, exp, log, matrix, mpf, pi, sin, sinh, sqrt, tan
 
 DEFINED = ("A11", "A22", "A33", "A23", "A12", "A31", "B11", "B22", "B33", "B12", "B31", "B23", "C11", "C22", "C33",
            "C12", "C31", "C23", "l1", "l2", "l3", "s1", "s2", "s3")  # fmt: skip
@@ -56,16 +58,12 @@ def about_first(body, theta, phi, w):
     return body.moment(matrix([w, 0, 0]), vertical(theta, phi))
 
 
-def worst(values):
-    return max(abs(v) for v in values)
-
-
 # the printed formulas that need correction: each function gives (residual as printed, residual corrected)
 
 
 def harmonics(dice):
     """(25): the third equation on rotations about axis 1."""
-    b, theta, phi, w = Body(dice, A12=0, A31=0), number(dice), number(dice), number(dice)
+    b, theta, phi, w = Body(dice, A12=0, A31=0), *numbers(dice, 3)
     c, s = cos(theta), sin(theta)
 
     def equation(last):
@@ -115,17 +113,10 @@ def areas(dice):
     return abs(wrong * sin(theta) + rest), abs(right * sin(theta) + rest)
 
 
-def abel(six, w, slope, phi):
-    """w w_phi - f w - g of (57), everything over A11; zero for a solution."""
-    b12, b31, d, c23, s2, s3 = six
-    f = b12 * cos(phi) - b31 * sin(phi)
-    return w * slope - f * w + d * cos(phi) * sin(phi) + c23 * cos(2 * phi) - s2 * cos(phi) + s3 * sin(phi)
-
-
 def polynomial(dice):
     """(59): the polynomial of w = l cos phi + m sin phi + n."""
-    b12, b31, d, c23, s2, s3 = six = [number(dice) for _ in range(6)]
-    m, k, n, phi = (number(dice) for _ in range(4))  # k is the paper's l
+    b12, b31, d, c23, s2, s3 = six = numbers(dice, 6)
+    m, k, n, phi = numbers(dice, 4)  # k is the paper's l
     w, slope = k * cos(phi) + m * sin(phi) + n, -k * sin(phi) + m * cos(phi)
     true = abel(six, w, slope, phi)
 
@@ -153,207 +144,18 @@ def trigonometric(dice, sign=-1, constant=lambda mu, b, n: n, root=lambda b: Non
     return abs(abel(six, w, mu * (b.B12 * cos(phi) - b.B31 * sin(phi)) / b.A11, phi))
 
 
-def both_roots(dice):
-    """mu by A11 C23 / (B12 B31), + and -."""
-    state, found = dice.getstate(), []
-    for sign in (1, -1):
-        dice.setstate(state)
-        found.append(
-            trigonometric(
-                dice, root=lambda b, s=sign: mpf("0.5") + s * sqrt(mpf("0.25") - b.A11 * b.C23 / (b.B12 * b.B31))
-            )
-        )
-    return max(found)
+def root_of(inertia, sign):
+    """mu by sqrt(1/4 - inertia C23 / (B12 B31))."""
+    return lambda b: mpf("0.5") + sign * sqrt(mpf("0.25") - getattr(b, inertia) * b.C23 / (b.B12 * b.B31))
 
 
-def same_dice(dice, *functions):
-    """The functions' values, each with the same random numbers."""
-    state, values = dice.getstate(), []
-    for function in functions:
-        dice.setstate(state)
-        values.append(function(dice))
-    return tuple(values)
+def with_root(*root):
+    return lambda dice: trigonometric(dice, root=root_of(*root))
 
 
-def mu_sign(dice):
-    return same_dice(dice, lambda d: trigonometric(d, 1), trigonometric)
-
-
-def mu_constant(dice):
-    def printed(mu, b, n):
-        return mu * b.C23 / (b.B12 * b.B31)
-
-    return same_dice(dice, lambda d: trigonometric(d, constant=printed), trigonometric)
-
-
-def mu_root(dice):
-    def printed(b):
-        return mpf("0.5") + sqrt(mpf("0.25") - b.B11 * b.C23 / (b.B12 * b.B31))
-
-    return same_dice(dice, lambda d: trigonometric(d, root=printed), both_roots)
-
-
-def energy(dice):
-    """(63) and what follows: parameters d, c23, s2, s3, n over A11, and the square of phi'."""
-    d, c23, s2, s3 = (number(dice) for _ in range(4))
-    n = 4 + abs(number(dice))
-    return (
-        d,
-        c23,
-        s2,
-        s3,
-        n,
-    ), lambda phi: d * cos(2 * phi) / 2 - c23 * sin(2 * phi) + 2 * s2 * sin(phi) + 2 * s3 * cos(phi) + n
-
-
-def velocity(dice):
-    """phi' = +-sqrt(...): the second derivative that follows from it, against (57) with b = 0; phi = sqrt(...) instead."""
-    (d, c23, s2, s3, _n), square = energy(dice)
-    phi = number(dice)
-    found = [
-        abel((0, 0, d, c23, s2, s3), w, diff(square, phi) / (2 * w), phi)
-        for w in (sqrt(square(phi)), -sqrt(square(phi)))
-    ]
-    return abs(phi - sqrt(square(phi))), worst(found)
-
-
-def quartic(a, u):
-    return a[0] * u**4 + 4 * a[1] * u**3 + 6 * a[2] * u**2 + 4 * a[3] * u + a[4]
-
-
-def with_double_root(a0, a1, a2, u1):
-    """a0..a4 so that u1 is a root of P4 and of its derivative."""
-    a3 = -(a0 * u1**3 + 3 * a1 * u1**2 + 3 * a2 * u1)
-    a4 = -(a0 * u1**4 + 4 * a1 * u1**3 + 6 * a2 * u1**2 + 4 * a3 * u1)
-    return a0, a1, a2, a3, a4
-
-
-def bracket(dice):
-    """(66)."""
-    a0, a1, a2, u1, u = (number(dice) for _ in range(5))
-    true = quartic(with_double_root(a0, a1, a2, u1), u)
-    printed = a0 * u * u + (a0 * u1 + 3 * a1) * u + a0 * u1**2 + 3 * a1 * u1 + 3 * a2
-    right = a0 * u * u + 2 * (a0 * u1 + 2 * a1) * u + 3 * a0 * u1**2 + 8 * a1 * u1 + 6 * a2
-    return abs((u - u1) ** 2 * printed - true), abs((u - u1) ** 2 * right - true)
-
-
-def multiple(dice, variant):
-    """a0..a2 and u1 of a P4 with the double root u1 for variant 1, 2 or 3, and u0 near u1 where P4 > 0."""
-    a0, u1, z0 = abs(number(dice)), number(dice), mpf("0.2") + mpf(dice.random()) / 5
-    roots = {1: (3, 4), 2: (2, 2), 3: (-2, 3)}[variant]  # of the quadratic factor, in z = u - u1
-    p, q = (mpf(r) + mpf(dice.random()) / 3 for r in roots)
-    q = p if variant == 2 else q
-    b, c = -a0 * (p + q), a0 * p * q
-    z0 = z0 + (q if c < 0 else 0)  # where P4 > 0
-    a1 = (b / 4) - a0 * u1
-    a2 = c / 6 - a0 * u1**2 - 2 * a1 * u1
-    return (a0, a1, a2), u1, u1 + z0
-
-
-def shortened(a, u1, factors=(4, 6)):
-    """b and c, printed with the factors 3 and 3."""
-    a0, a1, a2 = a
-    return factors[0] * (a0 * u1 + a1), factors[1] * (a0 * u1**2 + 2 * a1 * u1 + a2)
-
-
-def elementary(variant, a, u1, u0, factors=(4, 6), e=1, third=sin):
-    """u(t) by variant 1, 2 or 3; `third` is the function of the second term of variant 3 (printed sh)."""
-    b, c = shortened(a, u1, factors)
-    z0 = u0 - u1
-    head, q = 2 * c + b * z0, a[0] * z0**2 + b * z0 + c
-    if variant == 1:
-        return lambda t: (
-            u1 + 2 * c * z0 / (head * cosh(sqrt(c) * t / 2) - 2 * e * sqrt(c * q) * sinh(sqrt(c) * t / 2) - b * z0)
-        )
-    if variant == 2:
-        return lambda t: u1 + 2 * c * z0 / (head * exp(-e * mp.sign(head) * sqrt(c) * t / 2) - b * z0)
-    root = sqrt(-c)
-    return lambda t: u1 + 2 * c * z0 / (head * cos(root * t / 2) + 2 * e * sqrt(-c * q) * third(root * t / 2) - b * z0)
-
-
-def motion(a, u1, u, t):
-    """u'^2 - P4(u) / 4."""
-    return abs(diff(u, t) ** 2 - quartic(with_double_root(*a, u1), u(t)) / 4)
-
-
-def factors(variant):
-    def test(dice):
-        a, u1, u0 = multiple(dice, variant)
-        return tuple(motion(a, u1, elementary(variant, a, u1, u0, f), mpf("0.2")) for f in ((3, 3), (4, 6)))
-
-    return test
-
-
-def condition(dice):
-    """(a0 u1 + a1)^2 + 3 (a0 a2 - a1^2) where P4 has two double roots."""
-    (a0, a1, a2), u1, _u0 = multiple(dice, 2)
-    return tuple(abs((a0 * u1 + a1) ** 2 + k * (a0 * a2 - a1**2)) for k in (4, 3))
-
-
-def third_variant(dice):
-    a, u1, u0 = multiple(dice, 3)
-    return tuple(motion(a, u1, elementary(3, a, u1, u0, third=f), mpf("0.2")) for f in (sinh, sin))
-
-
-def signs(dice):
-    """u'(0) of the branch e = -1 of variants 1 to 3."""
-    printed, right = [], []
-    for variant in (1, 2, 3):
-        a, u1, u0 = multiple(dice, variant)
-        wanted = -mp.sign(u0 - u1) * sqrt(quartic(with_double_root(*a, u1), u0)) / 2
-        found = [abs(diff(elementary(variant, a, u1, u0, e=e), 0) - wanted) for e in (1, -1)]
-        printed, right = [*printed, found[0]], [*right, found[1]]
-    return min(printed), max(right)
-
-
-@mp.extradps(20)  # which the doublings lose
-def weierstrass(z, g2, g3, terms=24, doublings=6):
-    """P(z) and P'(z): the Laurent series at z / 64, doubled six times (DLMF 23.9, 23.10)."""
-    c = [0, 0, g2 / 20, g3 / 28]
-    for n in range(4, terms):
-        c.append(3 * sum(c[m] * c[n - m] for m in range(2, n - 1)) / ((2 * n + 1) * (n - 3)))
-    x = z / 2**doublings
-    value = x**-2 + sum(c[n] * x ** (2 * n - 2) for n in range(2, terms))
-    slope = -2 * x**-3 + sum((2 * n - 2) * c[n] * x ** (2 * n - 3) for n in range(2, terms))
-    for _ in range(doublings):
-        second = 6 * value**2 - g2 / 2
-        value, slope = (
-            -2 * value + (second / (2 * slope)) ** 2,
-            (-4 * slope**4 + 12 * value * slope**2 * second - second**3) / (4 * slope**3),
-        )
-    return value, slope
-
-
-def coefficients(d, c23, s2, s3, n):
-    """(65)."""
-    return d / 2 + n - 2 * s3, s2 + c23, (-3 * d + 2 * n) / 6, s2 - c23, d / 2 + n + 2 * s3
-
-
-def invariants(a):
-    """(67)."""
-    return a[0] * a[4] - 4 * a[1] * a[3] + 3 * a[2] ** 2, (
-        a[0] * a[2] * a[4] + 2 * a[1] * a[2] * a[3] - a[2] ** 3 - a[4] * a[1] ** 2 - a[0] * a[3] ** 2
-    )
-
-
-def elliptic(dice, half=True):
-    """u'^2 - P4(u) / 4 of the Biermann-Weierstrass formula, in P(t / 2) or, as the paper has it, in P(t)."""
-    a = coefficients(*energy(dice)[0])
-    g2, g3 = invariants(a)
-    u0 = number(dice)
-    R = [quartic(a, u0), *(diff(lambda x: quartic(a, x), u0, k) for k in (1, 2, 3, 4))]
-
-    def u(t):
-        p, slope = weierstrass(t / 2 if half else t, g2, g3)
-        above = -sqrt(R[0]) * slope + R[1] * (p - R[2] / 24) / 2 + R[0] * R[3] / 24
-        return u0 + above / (2 * (p - R[2] / 24) ** 2 - R[0] * R[4] / 48)
-
-    t = mpf("0.3")
-    return abs(diff(u, t) ** 2 - quartic(a, u(t)) / 4)
-
-
-def argument(dice):
-    return same_dice(dice, lambda d: elliptic(d, False), elliptic)
+def constant_61(dice):
+    """The printed constant of (61)."""
+    return trigonometric(dice, constant=lambda mu, b, n: mu * b.C23 / (b.B12 * b.B31))
 
 
 ERRATA = (
@@ -362,18 +164,18 @@ ERRATA = (
     ("(49)", "`A11 phi' = (B12 cos phi - B31 sin phi) sin th + n`", "`(B12 sin phi + B31 cos phi) sin th + n`", first_integral),
     ("line after (49)", "the same bracket", "the same correction", areas),
     ("(59)", "sin 2phi term and constant without 1/2", "a factor 1/2 before both; (60) is unharmed", polynomial),
-    ("after (60)", "`mu^2 - mu = c23 / (b12 b31)`", "`mu^2 - mu = -c23 / (b12 b31)`", mu_sign),
-    ("(61), constant", "`mu A11 C23 / (B12 B31)`", "`A11 n*`, and n* is fixed by s", mu_constant),
-    ("after (61)", "`mu = 1/2 + sqrt(1/4 - B11 C23 / (B12 B31))`", "`1/2 +- sqrt(1/4 - A11 C23 / (B12 B31))`: both roots", mu_root),
-    ("after (63)", "`phi = sqrt(...)`", "`phi' = +-sqrt(...)`", velocity),
-    ("(66) and the integral", "`a0 u^2 + (a0 u1 + 3 a1) u + a0 u1^2 + 3 a1 u1 + 3 a2`", "`a0 u^2 + 2 (a0 u1 + 2 a1) u + 3 a0 u1^2 + 8 a1 u1 + 6 a2`", bracket),
-    ("b and c, in variant 1", "`b = 3 (a0 u1 + a1)`, `c = 3 (a0 u1^2 + 2 a1 u1 + a2)`", "`b = 4 (...)`, `c = 6 (...)`", factors(1)),
-    ("b and c, in variant 2", "the same", "the same", factors(2)),
-    ("b and c, in variant 3", "the same (with sin)", "the same", factors(3)),
-    ("conditions of the variants", "`(a0 u1 + a1)^2 + 4 (a0 a2 - a1^2)`", "`(a0 u1 + a1)^2 + 3 (a0 a2 - a1^2)`; at two double roots", condition),
-    ("variant 3", "`sh tau` beside `cos tau`", "`sin tau`", third_variant),
-    ("variants 1-3, sign", "one sign of the root", "a factor e = sgn u'(0) sgn z0; at e = -1", signs),
-    ("end", "rational in `P(t)` (Weierstrass)", "rational in `P(t/2)` and `P'(t/2)`", argument),
+    ("after (60)", "`mu^2 - mu = c23 / (b12 b31)`", "`mu^2 - mu = -c23 / (b12 b31)`", same_dice(lambda d: trigonometric(d, 1), trigonometric)),
+    ("(61), constant", "`mu A11 C23 / (B12 B31)`", "`A11 n*`, and n* is fixed by s", same_dice(constant_61, trigonometric)),
+    ("after (61)", "`mu = 1/2 + sqrt(1/4 - B11 C23 / (B12 B31))`", "`1/2 +- sqrt(1/4 - A11 C23 / (B12 B31))`: both roots", same_dice(with_root("B11", 1), with_root("A11", 1), with_root("A11", -1))),
+    ("after (63)", "`phi = sqrt(...)`", "`phi' = +-sqrt(...)`", elliptic.velocity),
+    ("(66) and the integral", "`a0 u^2 + (a0 u1 + 3 a1) u + a0 u1^2 + 3 a1 u1 + 3 a2`", "`a0 u^2 + 2 (a0 u1 + 2 a1) u + 3 a0 u1^2 + 8 a1 u1 + 6 a2`", elliptic.bracket),
+    ("b and c, in variant 1", "`b = 3 (a0 u1 + a1)`, `c = 3 (a0 u1^2 + 2 a1 u1 + a2)`", "`b = 4 (...)`, `c = 6 (...)`", elliptic.variant_of(1, {"factors": (3, 3)}, {})),
+    ("b and c, in variant 2", "the same", "the same", elliptic.variant_of(2, {"factors": (3, 3)}, {})),
+    ("b and c, in variant 3", "the same (with sin)", "the same", elliptic.variant_of(3, {"factors": (3, 3)}, {})),
+    ("conditions of the variants", "`(a0 u1 + a1)^2 + 4 (a0 a2 - a1^2)`", "`(a0 u1 + a1)^2 + 3 (a0 a2 - a1^2)`; at two double roots", elliptic.condition),
+    ("variant 3", "`sh tau` beside `cos tau`", "`sin tau`", elliptic.variant_of(3, {"third": sinh}, {})),
+    ("variants 1-3, sign", "one sign of the root", "a factor e = sgn u'(0) sgn z0; at e = -1", elliptic.signs),
+    ("end", "rational in `P(t)` (Weierstrass)", "rational in `P(t/2)` and `P'(t/2)`", same_dice(lambda d: elliptic.elliptic(d, False), elliptic.elliptic)),
 )  # fmt: skip
 
 
@@ -383,7 +185,7 @@ ERRATA = (
 def full_equations(dice):
     """(1)-(3), component by component, against the vector form."""
     b = Body(dice)
-    w, nu = matrix([number(dice) for _ in range(3)]), matrix([number(dice) for _ in range(3)])
+    w, nu = (matrix(numbers(dice, 3)) for _ in range(2))
     (w1, w2, w3), (v1, v2, v3) = w, nu
     printed = [
         (b.A12 * w1 + b.A22 * w2 + b.A23 * w3) * w3 - (b.A31 * w1 + b.A23 * w2 + b.A33 * w3) * w2
@@ -405,7 +207,7 @@ def full_equations(dice):
 def integrals(dice):
     """(7), (8): derivatives along (1)-(6)."""
     b = Body(dice)
-    w, nu = matrix([number(dice) for _ in range(3)]), matrix([number(dice) for _ in range(3)])
+    w, nu = (matrix(numbers(dice, 3)) for _ in range(2))
     turn = cross(nu, w)
     momentum = b.tensor("A") * w + matrix([b.l1, b.l2, b.l3])
     return worst([(b.moment(w, nu).T * nu + momentum.T * turn)[0], 2 * (nu.T * turn)[0]])
@@ -413,7 +215,7 @@ def integrals(dice):
 
 def rotation(dice):
     """(10)-(12) with (19), (20), and (21), (22), which eliminate w1'."""
-    b, theta, phi, w = Body(dice), number(dice), number(dice), number(dice)
+    b, theta, phi, w = Body(dice), *numbers(dice, 3)
     v1, v2, v3 = vertical(theta, phi)
     p2, p3 = b.C12 * v1 + b.C22 * v2 + b.C23 * v3, b.C31 * v1 + b.C23 * v2 + b.C33 * v3
     p1 = b.C11 * v1 + b.C12 * v2 + b.C31 * v3
@@ -431,7 +233,7 @@ def rotation(dice):
 
 def second_equation(dice):
     """(24)."""
-    b, theta, phi, w = Body(dice, A12=0, A31=0), number(dice), number(dice), number(dice)
+    b, theta, phi, w = Body(dice, A12=0, A31=0), *numbers(dice, 3)
     c, s = cos(theta), sin(theta)
     value = (
         (b.B31 * c + b.l3 - b.B11 * s * cos(phi)) * w + (b.s3 - b.C31 * c) * c + b.C31 * s * s / 2
@@ -544,43 +346,11 @@ def set_b(dice):
 
 def system_60(dice):
     """(60) for l, m, n* with s, c23, d from it: (57) holds."""
-    b12, b31, n, mu, phi = (number(dice) for _ in range(5))
+    b12, b31, n, mu, phi = numbers(dice, 5)
     k, m = mu * b31, mu * b12
     d, c23 = -(m * m - k * k - m * b12 + k * b31), -(2 * k * m - k * b12 - m * b31) / 2
     six = b12, b31, d, c23, n * (m - b12), n * (k - b31)
     return abs(abel(six, k * cos(phi) + m * sin(phi) + n, -k * sin(phi) + m * cos(phi), phi))
-
-
-def level(dice):
-    """(63): its derivative by phi, with w^2 for A11 w^2 over A11."""
-    (d, c23, s2, s3, _), square = energy(dice)
-    phi = number(dice)
-    return abs(abel((0, 0, d, c23, s2, s3), 1, diff(square, phi) / 2, phi))
-
-
-def substitution(dice):
-    """(64), (65): P4(u) = (1 + u^2)^2 phi'^2."""
-    values, square = energy(dice)
-    phi = number(dice)
-    u = tan(phi / 2)
-    return abs(quartic(coefficients(*values), u) - (1 + u * u) ** 2 * square(phi))
-
-
-def expanded(dice):
-    """The expanded g2, g3 and 27 G, and (67), (68) by the discriminant of P4 = 256 G."""
-    d, c23, s2, s3, n = values = energy(dice)[0]
-    a = coefficients(*values)
-    g2, g3 = invariants(a)
-    long = (
-        8 * n**3 - 18 * n * (d * d + 4 * c23**2 + 2 * (s2**2 + s3**2)) - 54 * d * (s2**2 - s3**2) - 216 * c23 * s2 * s3
-    )
-    G = (4 * n * n + 3 * d * d + 12 * (c23**2 - s2**2 - s3**2)) ** 3 - long**2
-    whole = [a[0], 4 * a[1], 6 * a[2], 4 * a[3], a[4]]
-    slope = [4 * a[0], 12 * a[1], 12 * a[2], 4 * a[3]]
-    rows = [[0] * i + whole + [0] * (2 - i) for i in range(3)] + [[0] * i + slope + [0] * (3 - i) for i in range(4)]
-    discriminant = mp.det(matrix(rows)) / a[0]  # Sylvester's resultant of P4 and its derivative
-    short = d * d + 4 * n * n / 3 + 4 * (c23**2 - s2**2 - s3**2)
-    return worst([short - g2, long / 27 - g3, G / 27 - (g2**3 - 27 * g3**2), discriminant / 256 - (g2**3 - 27 * g3**2)])
 
 
 RIGHT = (
@@ -594,9 +364,9 @@ RIGHT = (
     ("after (50)", "its three closed forms and the limit in case 2", three_cases),
     ("(53)-(57), k = 0", "case B is invariant; Abel's equation", set_b),
     ("(60)", "conditions of the trigonometric solution", system_60),
-    ("(63)", "energy at b = 0", level),
-    ("(64), (65)", "the quartic", substitution),
-    ("(67), (68), expanded g2, g3, 27 G", "invariants; disc P4 = 256 G", expanded),
+    ("(63)", "energy at b = 0", elliptic.level),
+    ("(64), (65)", "the quartic", elliptic.substitution),
+    ("(67), (68), expanded g2, g3, 27 G", "invariants; disc P4 = 256 G", elliptic.expanded),
 )
 
 
@@ -619,7 +389,7 @@ def any_start(dice):
 
 def general_solution(dice):
     """d : c23 = b12^2 - b31^2 : b12 b31 and s || b: |w - mu2 X|^mu2 / |w - mu1 X|^mu1 is constant along (57)."""
-    b12, b31, sigma, phi, w = (number(dice) for _ in range(5))
+    b12, b31, sigma, phi, w = numbers(dice, 5)
     mu1 = mpf("1.2") + abs(number(dice))
     mu2 = 1 - mu1
     delta = mu1 * mu2
@@ -633,36 +403,14 @@ def general_solution(dice):
     return abs(diff(value, (phi, w), (1, 0)) + slope * diff(value, (phi, w), (0, 1)))
 
 
-def triple_root(dice):
-    """c = 0: z = 16 z0 / (16 - 8 e sqrt(a0 z0^2 + b z0) t + b z0 t^2)."""
-    a0, b, z0 = (abs(number(dice)) for _ in range(3))
-
-    def z(t):
-        return 16 * z0 / (16 - 8 * sqrt(a0 * z0**2 + b * z0) * t + b * z0 * t**2)
-
-    t = mpf("0.2")
-    return abs(diff(z, t) ** 2 - z(t) ** 3 * (a0 * z(t) + b) / 4)
-
-
-def quadruple_root(dice):
-    """b = c = 0: 1 / z = 1 / z0 - sgn u'(0) sqrt(a0) t / 2."""
-    a0, z0 = abs(number(dice)), number(dice)
-
-    def z(t):
-        return 1 / (1 / z0 - sqrt(a0) * t / 2)
-
-    t = mpf("0.2")
-    return abs(diff(z, t) - sqrt(a0) * z(t) ** 2 / 2)
-
-
 GAPS = (
     ("after (42)", "About the vertical the rotation is uniform for an axis that is not principal too, if only `A31 m^2 + (B31 + l3) m - C31 + s3 = 0` and `A12 m^2 + (B12 + l2) m - C12 + s2 = 0`.", inclined),
     ("(26)-(36)", "They are necessary and sufficient for the whole set w2 = w3 = 0, nu1 = cos th to be invariant, not for single motions on it: the line above is one that breaks (23).", inclined),
     ("after (50)", "The forms start at phi = 0: in case 2 real t0 reach only the arc between the equilibria that holds phi = 0. From any u0, `u = (u0 D + (n + Q + P u0) T) / (D - (P + (n - Q) u0) T)` with P = B12 sin th, Q = B31 sin th, D^2 = abs(n^2 - P^2 - Q^2), T = tan or th of D t / (2 A11).", any_start),
     ("(58)-(61)", "Not one solution but all: under the same two conditions (57) is `w dw/dF = w + sigma - delta F`, and `abs(w - mu2 X)^mu2 / abs(w - mu1 X)^mu1` is constant, X = F - sigma / delta, mu1 + mu2 = 1, mu1 mu2 = delta (delta < 1/4), F = b12 sin phi + b31 cos phi.", general_solution),
-    ("(66)", "The triple root c = 0 is left out.", triple_root),
-    ("(66)", "The quadruple root is left out.", quadruple_root),
-    ("(68)", "Nothing needs G != 0, but P' is needed unless u0 is a root of P4; P4 may also have its double roots off the real axis, where w is the trigonometric solution.", elliptic),
+    ("(66)", "The triple root c = 0 is left out.", elliptic.triple_root),
+    ("(66)", "The quadruple root is left out.", elliptic.quadruple_root),
+    ("(68)", "Nothing needs G != 0, but P' is needed unless u0 is a root of P4; P4 may also have its double roots off the real axis, where w is the trigonometric solution.", elliptic.elliptic),
 )  # fmt: skip
 
 

@@ -16,7 +16,6 @@ from survey.kernels.flow import (
     BOUND_F,
     BOUND_G,
     LAST,
-    LOW,
     TRUNC_PHI,
     TRUNC_W,
     TWO_PI,
@@ -25,7 +24,6 @@ from survey.kernels.flow import (
     jacobian,
     longest_step,
     reduced,
-    series,
     table,
     values,
     variation,
@@ -71,12 +69,6 @@ def expand(begin, p, phi, w, how, T):
     h = begin(p, phi, w, how, T)
     variation(p, T)
     return min(h, longest_step(p, w))
-
-
-@inline
-def low_series(p, phi, w, T):
-    """For methods without series: what the variational equation needs."""
-    series(p, phi, w, T, LOW)
 
 
 @inline

@@ -6,7 +6,7 @@ Elliptic, b = 0: w^2 = w0^2 + 2 (V(phi0) - V(phi)), a trigonometric polynomial o
 theta = Omega t + theta0, after a real projective map of tan(phi/2) that is centred on the turning points (libration,
 kind 2) or on the complex roots (rotation, kind 3). Nothing lies at infinity, so no variant of (66) needs its own case.
 
-For phi and w at a time where b = 0 see `weierstrass`.
+For phi and w at a time see `trigonometric` and `weierstrass`.
 
 All start with w0 >= 0 (the caller mirrors). `data` holds what `start_*` found out; `*_at` and `*_reach` take it.
 """
@@ -16,9 +16,11 @@ import math
 
 import numpy as np
 
+from survey.kernels.carlson import rf
 from survey.kernels.elliptic import complete
 from survey.kernels.flow import B12, B31, C23, S2, S3, TWO_PI, UNIT, D
 from survey.kernels.jit import inline, kernel
+from survey.kernels.trigonometric import deviation, drift, misfit
 
 NONE, TRIGONOMETRIC, LIBRATION, ROTATION, LOST = 0, 1, 2, 3, 4
 SIZE = 32
@@ -26,7 +28,7 @@ SAME = 64.0 * UNIT  # how far, relative, parameters may miss the conditions of (
 
 # places in data
 W0, A1, B1, A2, B2, ROUGH = range(6)  # g(phi0 + x) = A1 cos x + B1 sin x + A2 cos 2x + B2 sin 2x
-F0, SLOPE, ALPHA, SQUARE, NOISE, MISS, GROWTH, POWER = range(6, 14)  # kind 1
+F0, SLOPE, SQUARE, NOISE, OFFSET, MISS, GAIN, MU, OTHER = range(6, 15)  # kind 1
 LEFT, RIGHT, BAR_LEFT, BAR_RIGHT, RATIO = range(6, 11)  # kind 2
 RHO, RHO_M, THETA0, OMEGA, KC, KC2, QUARTER, SLACK = range(11, 19)  # kinds 2 and 3
 RE, IM, TILT, LEAST, MISFIT = range(20, 25)  # kind 3
@@ -90,34 +92,18 @@ def reach(data, side):
 
 
 @inline
-def carlson(x, y, z):
-    """R_F(x, y, z), by duplication (DLMF 19.36.1)."""
-    for _ in range(40):
-        mean = (x + y + z) / 3.0
-        if max(abs(x - mean), max(abs(y - mean), abs(z - mean))) < 2e-3 * mean:
-            break
-        shift = math.sqrt(x) * math.sqrt(y) + math.sqrt(y) * math.sqrt(z) + math.sqrt(z) * math.sqrt(x)
-        x, y, z = 0.25 * (x + shift), 0.25 * (y + shift), 0.25 * (z + shift)
-    mean = (x + y + z) / 3.0
-    a, b = 1.0 - x / mean, 1.0 - y / mean
-    c = -a - b
-    e2, e3 = a * b - c * c, a * b * c
-    fourth = e2 * e2 / 24.0 - 3.0 * e2 * e3 / 44.0 - 5.0 * e2**3 / 208.0 + 3.0 * e3 * e3 / 104.0 + e2 * e2 * e3 / 16.0
-    return (1.0 - e2 / 10.0 + e3 / 14.0 + fourth) / math.sqrt(mean)
-
-
-@inline
 def first_kind(chi, kc2, quarter):
     """F(chi | m), 1 - m = kc2, for any chi (DLMF 19.25.5)."""
     j = math.floor(chi / math.pi + 0.5)
     s, c = math.sin(chi), math.cos(chi)
     s = -s if j % 2 else s
-    return 2.0 * quarter * j + s * carlson(c * c, c * c + kc2 * s * s, 1.0)
+    square = c * c + kc2 * s * s
+    return 2.0 * quarter * j + s * rf(c * c, 0.5 * (1.0 + square), math.sqrt(square))
 
 
 @inline
 def applies(p, phi0, w0):
-    """(kind, mu, miss): NONE, LIBRATION if b = 0, TRIGONOMETRIC where |g - (mu - 1) f (mu F + n)| <= miss."""
+    """(kind, mu, 1 - mu): NONE, LIBRATION if b = 0, TRIGONOMETRIC where g = (mu - 1) f (mu F + n) but for roundings."""
     b12, b31 = p[B12], p[B31]
     if p[D] == 0.0 and p[C23] == 0.0 and p[S2] == 0.0 and p[S3] == 0.0:
         return TRIGONOMETRIC, 1.0, 0.0
@@ -135,22 +121,23 @@ def applies(p, phi0, w0):
         return NONE, 0.0, 0.0
     root = math.sqrt(inner) if inner > SAME else 0.0
     for i in range(2):
-        mu = 0.5 + root if i == 0 else (delta / (0.5 + root))
+        one, two = 0.5 + root, delta / (0.5 + root)
+        mu, other = (one, two) if i == 0 else (two, one)
         n = w0 - mu * F
-        miss = rest + b * (abs((mu - 1.0) * n - sigma) + b * abs(delta - mu * (1.0 - mu)))
-        size = b * (abs(sigma) + abs(delta) * b + abs(mu - 1.0) * (abs(w0) + abs(mu) * b))
+        miss = rest + b * (abs(other * n + sigma) + b * abs(delta - mu * other))
+        size = b * (abs(sigma) + abs(delta) * b + abs(other) * (abs(w0) + abs(mu) * b))
         if miss <= SAME * size:
-            return TRIGONOMETRIC, mu, miss + 8.0 * UNIT * size
+            return TRIGONOMETRIC, mu, other
     return NONE, 0.0, 0.0
 
 
 @kernel
 def start(p, phi0, w0, data):
     """Fill data for the solution from (phi0, w0); returns (kind, side): x and w are to be multiplied by side."""
-    kind, mu, miss = applies(p, phi0, w0)
+    kind, mu, other = applies(p, phi0, w0)
     side = 1.0 if w0 >= 0.0 else -1.0
     if kind == TRIGONOMETRIC:
-        start_trigonometric(p, phi0, w0, side, mu, miss, data)
+        start_trigonometric(p, phi0, w0, side, mu, other, data)
         return kind, side
     if kind == NONE:
         return kind, side
@@ -173,78 +160,22 @@ def start(p, phi0, w0, data):
 
 
 @inline
-def start_trigonometric(p, phi0, w0, side, mu, miss, data):
+def start_trigonometric(p, phi0, w0, side, mu, other, data):
     s, c = math.sin(phi0), math.cos(phi0)
-    F, f = side * mu * (p[B12] * s + p[B31] * c), mu * (p[B12] * c - p[B31] * s)
-    b = math.hypot(p[B12], p[B31])
-    data[W0], data[F0], data[SLOPE] = abs(w0), F, f
-    data[ALPHA] = abs(w0) - 2.0 * F
-    data[SQUARE] = data[ALPHA] * abs(w0) - f * f  # n^2 - (mu b)^2
-    data[NOISE] = 6.0 * UNIT * abs(mu) * b + (4.0 * UNIT * abs(w0) if b > 0.0 else 0.0)
-    data[MISS], data[GROWTH], data[POWER] = miss, b * abs(1.0 - mu), (1.0 - mu) / mu if mu != 0.0 else math.inf
+    F, f, b = mu * (p[B12] * s + p[B31] * c), mu * (p[B12] * c - p[B31] * s), math.hypot(p[B12], p[B31])
+    data[W0], data[F0], data[SLOPE], data[MU], data[OTHER] = abs(w0), side * F, f, mu, other
+    data[SQUARE] = (abs(w0) - 2.0 * side * F) * abs(w0) - f * f  # n^2 - (mu b)^2
+    offset, miss, blur = misfit(p[B12], p[B31], p[D], p[C23], p[S2], p[S3], mu, other, w0, F)
+    slack = 6.0 * UNIT * abs(mu) * b
+    data[NOISE] = slack + (4.0 * UNIT * abs(w0) + 2.0 * b * blur if b > 0.0 else 0.0)
+    data[OFFSET], data[MISS], data[GAIN] = offset + (0.0 if other == 0.0 else slack), miss, b * abs(other)
 
 
 @inline
-def drift(data, theta, s, c, low):
-    """Integral of w(0)/w over the time 2 theta; divided by cosh^2 where low = 1/cosh^2, c = 1 and s = tanh/Delta."""
-    square, f, w0 = data[SQUARE], data[SLOPE], data[W0]
-    z = square * theta * theta
-    third = 2.0 / 3.0 * theta**3 * low if abs(z) < 1e-3 else (theta * low - s * c) / square
-    return theta * low + s * c - 2.0 * f * s * s + (w0 * w0 + f * f) * abs(third)
-
-
-@inline
-def trigonometric_at(data, t):
-    """x, w and bars at t >= 0: tan(x/2) = y1/y2 = w0 s/(c - f0 s), s = sin(Delta t/2)/Delta, w = w0/(y1^2 + y2^2)."""
-    w0, f, square = data[W0], data[SLOPE], data[SQUARE]
-    theta, root = 0.5 * t, math.sqrt(abs(data[SQUARE]))
-    if w0 == 0.0:
-        return 0.0, 0.0, 0.0 if data[MISS] == 0.0 else math.inf, 0.0
-    if data[F0] == 0.0 and f == 0.0:
-        x, moved = w0 * t, misfit(data, t, w0)
-        return x, w0, 2.0 * UNIT * x + moved * t, moved
-    turns, low = 0.0, 1.0
-    s, c = theta, 1.0
-    if square > 0.0:
-        turns = math.floor(root * theta / math.pi + 0.5)
-        phase = root * theta - turns * math.pi
-        s, c = math.sin(phase) / root, math.cos(phase)
-        whole, wide = math.sin(root * theta) / root, math.cos(root * theta)
-        total = drift(data, theta, whole, wide, 1.0)
-    elif square < 0.0:
-        s = math.tanh(root * theta) / root
-        low = 1.0 / math.cosh(root * theta) ** 2 if root * theta < 350.0 else 0.0
-        total = drift(data, theta, s, 1.0, low)
-    else:
-        total = drift(data, theta, s, c, 1.0)
-    y1, y2 = w0 * s, c - f * s
-    norm = y1 * y1 + y2 * y2
-    x = 2.0 * (math.atan2(y1, y2) + turns * math.pi)
-    w = w0 * low / norm
-    moved = misfit(data, t, w)
-    bar = (data[NOISE] + moved) * total / norm
-    bar += 16.0 * UNIT * (abs(y1) * (abs(c) + abs(f * s)) + abs(y1 * y2)) / norm + 6.0 * UNIT * (w * t + abs(x))
-    steep = math.hypot(data[F0], f)
-    slope = abs(f * math.cos(x) - data[F0] * math.sin(x)) + steep * bar
-    return x, w, MARGIN * bar, MARGIN * (slope * bar + moved + 4.0 * data[NOISE] + 4.0 * UNIT * w)
-
-
-@inline
-def misfit(data, t, w):
-    """Bound of e = w - (mu F + n) after t, where parameters miss (61) by MISS: e' = (1 - mu) f e + MISS.
-
-    w' = mu f w, so e(t) is the integral of MISS (w(t)/w(s))^((1 - mu)/mu) over s; and |integral of f dt| is at most
-    b t, and |change of F| / least w, which serves near mu = 0.
-    """
-    if data[MISS] == 0.0:
-        return 0.0
-    most = abs(data[W0] - data[F0]) + math.hypot(data[F0], data[SLOPE])
-    least = min(w, data[W0])
-    if data[SQUARE] > 0.0:  # = (n - mu b)(n + mu b)
-        least = data[SQUARE] / most
-    least = max(least, 1e-300)
-    power = data[POWER] * math.log(w / least if data[POWER] > 0.0 else w / most)
-    return data[MISS] * t * math.exp(min(data[GROWTH] * min(t, 2.0 / least), max(power, 0.0), 700.0))
+def deviating(data, t, w):
+    """Bound of w - (mu F + n) until t, where w is reached: see `trigonometric.deviation`."""
+    return deviation(data[OFFSET], data[MISS], data[GAIN], data[MU], data[OTHER], data[W0], data[F0], data[SLOPE],
+                     data[SQUARE], w, t)  # fmt: skip
 
 
 @inline
@@ -253,7 +184,7 @@ def trigonometric_reach(data, x):
     w0, f, square = data[W0], data[SLOPE], data[SQUARE]
     if data[F0] == 0.0 and f == 0.0:
         t = x / w0
-        return t, (2.0 * UNIT + misfit(data, t, w0) / w0) * t
+        return t, (2.0 * UNIT + deviating(data, t, w0) / w0) * t
     root = math.sqrt(abs(square))
     turns = math.floor(0.5 * x / math.pi + 0.5)
     rest = 0.5 * x - turns * math.pi
@@ -263,7 +194,7 @@ def trigonometric_reach(data, x):
         theta = (math.atan2(root * y1, y2) + turns * math.pi) / root
         near = y2 * y2 + square * y1 * y1
         s, c = math.sin(root * theta) / root, math.cos(root * theta)
-        total = drift(data, theta, s, c, 1.0)
+        total = drift(w0, f, square, theta, s, c, 1.0)
     else:
         if x >= TWO_PI:
             return math.inf, 0.0
@@ -279,10 +210,10 @@ def trigonometric_reach(data, x):
         if root * theta > 300.0:
             return math.nan, 0.0
         s = math.sinh(root * theta) / root if root > 0.0 else theta
-        total = drift(data, theta, s, math.cosh(root * theta), 1.0)
+        total = drift(w0, f, square, theta, s, math.cosh(root * theta), 1.0)
     t = 2.0 * theta
     # the formula is evaluated with rounded data, which moves Delta^2 as well
-    moved = misfit(data, t, near / w0)  # near = w0 w
+    moved = deviating(data, t, near / w0)  # near = w0 w
     bar = (data[NOISE] + moved) * total / w0 + 2.0 * abs(y1) * blur / near + 6.0 * UNIT * t
     bar += 3.0 * UNIT * (abs(x) + 1.0) * w0 / near * 2.0
     return t, MARGIN * bar
@@ -388,9 +319,9 @@ def start_rotation(data):
     kappa = mean / ((1.0 + abs2(r)) * (1.0 + abs2(s)) + 2.0 * (r * s.conjugate()).real)
     c1 = -2.0 * kappa * (r.conjugate() * (1.0 + abs2(s)) + s.conjugate() * (1.0 + abs2(r)))
     c2 = 2.0 * kappa * r.conjugate() * s.conjugate()
-    misfit = abs(c1 - first) + abs(c2 - second) + 12.0 * UNIT * (abs(mean) + abs(first) + abs(second))
+    gaps = abs(c1 - first) + abs(c2 - second) + 12.0 * UNIT * (abs(mean) + abs(first) + abs(second))
     least = kappa * ((1.0 - abs(r)) * (1.0 - abs(s))) ** 2
-    if not (mean > 0.0 and least > 30.0 * misfit):
+    if not (mean > 0.0 and least > 30.0 * gaps):
         return False
     gap = (s - r) / (1.0 - r.conjugate() * s)
     kc2 = (1.0 - abs2(r)) * (1.0 - abs2(s)) / abs2(1.0 - r.conjugate() * s)
@@ -402,7 +333,7 @@ def start_rotation(data):
     data[KC2], data[KC] = kc2, math.sqrt(kc2)
     data[RE], data[IM], data[TILT] = centre.real, centre.imag, math.atan2(image.imag, image.real) + 0.5 * math.pi
     data[QUARTER], _second = complete(0.0, data[KC])
-    data[LEAST], data[MISFIT] = least, misfit
+    data[LEAST], data[MISFIT] = least, gaps
     data[RHO], data[RHO_M] = 0.0, 0.0
     data[SLACK] = 16.0 * UNIT * (1.0 + 2.0 / (1.0 - abs(centre))) / data[KC]
     data[THETA0] = first_kind(mapped(data, 0.0), kc2, data[QUARTER])

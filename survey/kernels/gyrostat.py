@@ -20,6 +20,7 @@ ORDER = 20
 LAST = ORDER + 1  # T[LAST, 0]: truncation error of the step, relative
 _W, _NU, _L, _U = 0, 3, 6, 9
 _INVERSE, _B, _C, _LAMBDA, _S = 3, 6, 9, 12, 13
+FALL = 1.0 / 50.0  # by more, two terms further on, no series is trusted to fall
 FIRST_ORDER = 1e-5  # accuracy of the variational equation, which only carries errors and growth
 A11 = 1.5
 
@@ -134,18 +135,28 @@ def begin(G, state, tolerance, T, V):
     """Expand at `state`; returns the step: the last two terms below `tolerance`, relative; of V below FIRST_ORDER."""
     series(G, state, T, ORDER)
     variation(G, T, V)
-    size, last, before, tangent = 1.0, 1e-300, 1e-300, 1e-300
+    size, tangent, h = 1.0, 1e-300, math.inf
     for i in range(3):
         size = max(size, abs(state[i]))
+    for n in range(ORDER - 3, ORDER + 1):
+        # where the last terms happen to vanish, as from rest, those two before them are asked, less strictly
+        term = 1e-300
+        for i in range(6):
+            term = max(term, abs(T[n, i]) * (1.0 / size if i < 3 else 1.0))
+        h = min(h, (tolerance / (term if n > ORDER - 2 else FALL * term)) ** (1.0 / n))
     for i in range(6):
-        scale = 1.0 / size if i < 3 else 1.0
-        last = max(last, scale * abs(T[ORDER, i]))
-        before = max(before, scale * abs(T[ORDER - 1, i]))
         for c in range(6):
-            tangent = max(tangent, scale * abs(V[LOW, c, i]) * (size if c < 3 else 1.0))
+            tangent = max(tangent, abs(V[LOW, c, i]) * (1.0 / size if i < 3 else 1.0) * (size if c < 3 else 1.0))
     T[LAST, 0] = tolerance
-    h = min((tolerance / last) ** (1.0 / ORDER), (tolerance / before) ** (1.0 / (ORDER - 1)))
-    return min(h, (FIRST_ORDER / tangent) ** (1.0 / LOW))
+    return shortened(T, h, (FIRST_ORDER / tangent) ** (1.0 / LOW))
+
+
+@inline
+def shortened(T, h, most):
+    """The step h, or `most` if that is shorter; then the truncation error is less too."""
+    if most < h:
+        T[LAST, 0] *= (most / h) ** (ORDER - 1)
+    return min(h, most)
 
 
 @kernel

@@ -21,6 +21,7 @@ import math
 import numpy as np
 
 from survey.kernels import flow
+from survey.kernels.along import UNTOLD
 from survey.kernels.flow import TWO_PI, TWO_PI_LOW, UNIT, reduced
 from survey.kernels.jit import inline
 from survey.kernels.lockstep import sine_cosine
@@ -29,9 +30,9 @@ LANES = 32
 _LEVELS = 7  # of the means: enough for 1e-6 <= b1/a1 <= 1e6
 _HALLEY = 5
 
-# Rows of the work array: what is asked, what comes out, what the stages hand on, and the means.
-D, C23, S2, S3, PHI, SLIP, W0, TIME = range(8)
-X, W, BAR_X, BAR_W, COUNT = range(8, 13)
+# Rows of the work array: what comes out, what is asked, what the stages hand on, and the means.
+X, W, BAR_X, BAR_W, COUNT = range(5)
+D, C23, S2, S3, PHI, SLIP, W0, TIME = range(5, 13)
 _SIDE, _M, _P, _Q, _R, _O, _D_M, _D_1, _D_2, _BEND = range(13, 23)
 _E1, _D_E1, _H2, _E_H, _Q4, _D_Q4 = range(23, 29)
 _LATE, _TURNS, _PHASE, _XI_P, _XI_Q, _Y = range(29, 35)
@@ -109,9 +110,10 @@ def _lattice(T):
         # the error of m moves both invariants at once: by its derivatives
         by_m = mean * (1.0 / 6.0) - share
         by_m = (root * m * (1.0 / 6.0) + (-by_m if flipped else by_m)) / slope
-        d_root = (root * d_g2 + d_g3 + 2.0 * UNIT * ((8.0 * square + abs(g2)) * root + height)) / slope + UNIT * root
-        q4 = g2 - 3.0 * square  # (difference of the other two)^2
-        d_q4 = d_g2 + 6.0 * root * d_root + UNIT * (abs(g2) + 6.0 * square)
+        d_value = d_g3 + UNIT * (4.0 * root * square + 2.0 * height)
+        d_root = (root * d_g2 + d_value) / slope + UNIT * root
+        q4 = g2 - 3.0 * square  # (difference of the other two)^2; an error of g2 moves the root too
+        d_q4 = (abs(slope - 6.0 * square) * d_g2 + 6.0 * root * d_value) / slope + UNIT * (abs(q4) + 12.0 * square)
         d_q4 += abs(m * (1.0 / 6.0) - 6.0 * root * by_m) * d_m
         d_root += abs(by_m) * d_m
         apart = flipped and q4 > 0.0
@@ -277,14 +279,15 @@ def _formula(T):
         lost = T[_LOST, i] != 0.0 or not (known and norm > _LEAST)
         T[X, i], T[W, i] = T[_SIDE, i] * x, T[_SIDE, i] * w
         T[BAR_X, i], T[BAR_W, i] = math.inf if lost else _SAFE * bar_x, _SAFE * bar_w
-        T[COUNT, i] = 2.0 * turns + (0.0 if w > 0.0 else half) if swings else 0.0
+        passed = 2.0 * turns + (0.0 if w > 0.0 else half) if swings else 0.0
+        T[COUNT, i] = passed if abs(w) > T[BAR_W, i] else float(UNTOLD)
 
 
 @inline
 def solve(T):
     """Rows X to COUNT of T (ROWS, LANES) from rows D to TIME, |PHI| <= pi and off by SLIP, TIME > 0; W0 is changed.
 
-    BAR_X is infinite where the digits are lost. COUNT is right where |W| > BAR_W, and for rotations.
+    BAR_X is infinite where the digits are lost. COUNT is UNTOLD where |W| <= BAR_W.
     """
     _energy(T)
     _lattice(T)
@@ -297,8 +300,8 @@ def solve(T):
 
 
 @inline
-def enter(T, i, p, phi0, w0, t):
-    """Set lane i to one solution of the coefficients p at one time."""
+def enter(T, i, p, phi0, w0, t, curve):
+    """Set lane i to one solution of the coefficients p at one time; `curve` has no meaning here."""
     rest, slip = phi0, 0.0
     if abs(phi0) > math.pi:
         rest, _turns = reduced(phi0)

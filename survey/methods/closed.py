@@ -10,11 +10,11 @@ import math
 
 import numpy as np
 
-from survey.kernels import closed, weierstrass
-from survey.kernels.along import EQUILIBRIUM, NO_CONVERGENCE, OK, TRUST, TURNING, UNTOLD, finite
+from survey.kernels import closed, trigonometric, weierstrass
+from survey.kernels.along import EQUILIBRIUM, NO_CONVERGENCE, OK, TRUST, TURNING, finite
 from survey.kernels.flow import UNIT
 from survey.kernels.jit import inline, kernel
-from survey.kernels.weierstrass import LANES
+from survey.kernels.weierstrass import BAR_W, BAR_X, COUNT, LANES, W, X
 
 ORDER = 0  # no steps
 SERVES = ("cylinder",)
@@ -25,51 +25,58 @@ FLOW_WORK = 1
 NO_FORM = 19  # as in the STATUS of scenes/gyrostat.py
 
 
-@kernel
 def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
-    """See `along.trajectories`; tolerance and limit have no meaning here."""
-    T, row, column = weierstrass.lanes(), np.empty(LANES, np.int64), np.empty(LANES, np.int64)
-    place, waiting = np.zeros(2, np.int64), LANES
-    while waiting == LANES:
-        waiting = _fill(P, starts, times, place, T, row, column, floats, turnings, status)
-        weierstrass.solve(T)
-        _collect(T, waiting, row, column, starts, floats, turnings)
+    """See `along.trajectories`; tolerance and limit have no meaning here. Only the forms that apply are compiled."""
+    forms, curves = np.zeros(times.shape, np.int8), np.empty((len(P), 2))
+    _sort(P, starts, times, forms, curves, floats, turnings, status)
+    for form, solve in ((closed.LIBRATION, _elliptics), (closed.TRIGONOMETRIC, _trigonometrics)):
+        places = np.flatnonzero(forms == form)
+        if places.size > 0:
+            solve(places, P, starts, curves, times, floats, turnings)
 
 
 @kernel
-def _fill(P, starts, times, place, T, row, column, floats, turnings, status):
-    """From `place` (row, column) on: lanes for solutions with b = 0 until all are taken, the others at once.
-
-    Returns the number of lanes that are taken.
-    """
-    data, waiting, first = closed.scratch(), 0, place[1]
-    for i in range(place[0], len(P)):
-        p, phi0, w0 = P[i], starts[i, 0], starts[i, 1]
-        kind, mu, miss = closed.applies(p, phi0, w0)
+def _sort(P, starts, times, forms, curves, floats, turnings, status):
+    """Fill `forms` (as times) with the closed form that is to be evaluated there, curves with its mu and 1 - mu."""
+    for i in range(len(P)):
+        kind, curves[i, 0], curves[i, 1] = closed.applies(P[i], starts[i, 0], starts[i, 1])
         status[i] = NO_FORM if kind == closed.NONE else NO_CONVERGENCE
-        side = 1.0 if w0 >= 0.0 else -1.0
-        if kind == closed.TRIGONOMETRIC:
-            closed.start_trigonometric(p, phi0, w0, side, mu, miss, data)
-        for j in range(first, finite(times[i]) if kind != closed.NONE else 0):
-            t = times[i, j]
-            if t == 0.0:
-                _tell(floats[i, j], phi0, 0.0, w0, 0.0, 0.0)
-                turnings[i, j] = 0
-            elif kind == closed.TRIGONOMETRIC:
-                x, w, bar_x, bar_w = closed.trigonometric_at(data, t)
-                if _tell(floats[i, j], phi0, side * x, side * w, bar_x, bar_w):
-                    # where (61) is met exactly w keeps its sign
-                    turnings[i, j] = UNTOLD if miss > 0.0 and w != 0.0 and w <= bar_w else 0
-            elif waiting == LANES:
-                place[0], place[1] = i, j
-                return waiting
-            else:
-                row[waiting], column[waiting] = i, j
-                weierstrass.enter(T, waiting, p, phi0, w0, t)
-                waiting += 1
-        first = 0
-    place[0] = len(P)
-    return waiting
+        for j in range(finite(times[i]) if kind != closed.NONE else 0):
+            if times[i, j] != 0.0:
+                forms[i, j] = kind
+                continue
+            _tell(floats[i, j], starts[i, 0], 0.0, starts[i, 1], 0.0, 0.0)
+            turnings[i, j] = 0
+
+
+@kernel
+def _elliptics(places, P, starts, curves, times, floats, turnings):
+    """b = 0."""
+    T = weierstrass.lanes()
+    _solve(weierstrass.enter, weierstrass.solve, T, places, P, starts, curves, times, floats, turnings)
+
+
+@kernel
+def _trigonometrics(places, P, starts, curves, times, floats, turnings):
+    """g = 0 and (61)."""
+    T = trigonometric.lanes()
+    _solve(trigonometric.enter, trigonometric.solve, T, places, P, starts, curves, times, floats, turnings)
+
+
+@inline
+def _solve(enter, solve, T, places, P, starts, curves, times, floats, turnings):
+    """The solutions at `places` of the flattened `times`, as many at once as there are lanes."""
+    columns = times.shape[1]
+    for first in range(0, len(places), LANES):
+        some = places[first : first + LANES]
+        for k in range(len(some)):
+            i, j = some[k] // columns, some[k] % columns
+            enter(T, k, P[i], starts[i, 0], starts[i, 1], times[i, j], curves[i])
+        solve(T)
+        for k in range(len(some)):
+            i, j = some[k] // columns, some[k] % columns
+            if _tell(floats[i, j], starts[i, 0], T[X, k], T[W, k], T[BAR_X, k], T[BAR_W, k]):
+                turnings[i, j] = int(T[COUNT, k])
 
 
 @inline
@@ -79,15 +86,6 @@ def _tell(out, phi0, x, w, bar_x, bar_w):
         return False
     out[0], out[1], out[2], out[3] = phi0 + x, w, bar_x + 2.0 * UNIT * abs(phi0 + x), bar_w
     return True
-
-
-@kernel
-def _collect(T, count, row, column, starts, floats, turnings):
-    """Write down what the first `count` lanes have found."""
-    for k in range(count):
-        i, j, w, bar_w = row[k], column[k], T[weierstrass.W, k], T[weierstrass.BAR_W, k]
-        if _tell(floats[i, j], starts[i, 0], T[weierstrass.X, k], w, T[weierstrass.BAR_X, k], bar_w):
-            turnings[i, j] = int(T[weierstrass.COUNT, k]) if abs(w) > bar_w else UNTOLD
 
 
 @kernel
@@ -113,14 +111,14 @@ def flow_abels(P, starts, targets, tolerance, limit, floats, status):
 def _trigonometric(data, w0, x, out):
     """w and t where phi0 + x is passed, on w = mu F + n."""
     if w0 == 0.0:
-        return EQUILIBRIUM if data[closed.MISS] == 0.0 else NO_CONVERGENCE
+        return EQUILIBRIUM if data[closed.OTHER] == 0.0 else NO_CONVERGENCE
     t, bar_t = closed.trigonometric_reach(data, x)
     if t == math.inf:
-        return EQUILIBRIUM if data[closed.MISS] == 0.0 else NO_CONVERGENCE
+        return EQUILIBRIUM if data[closed.OTHER] == 0.0 else NO_CONVERGENCE
     s = math.sin(0.5 * x)
     F, f = data[closed.F0], data[closed.SLOPE]
     w = w0 - 2.0 * s * (F * s - f * math.cos(0.5 * x))
-    moved = closed.misfit(data, t, w)
+    moved = closed.deviating(data, t, w)
     bar = closed.MARGIN * (2.0 * data[closed.NOISE] + moved + 4.0 * UNIT * (w0 + abs(x) * math.hypot(F, f)))
     return _kept(out, w, t, bar, bar_t)
 

@@ -62,7 +62,7 @@ def trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
     for n in range(1, limit + 1):
         if j == size:
             return OK
-        h = min(gyrostat.begin(G, state, tolerance, T, V), longest_step(p, w))
+        h = gyrostat.shortened(T, gyrostat.begin(G, state, tolerance, T, V), longest_step(p, w))
         if not (h > 0.0 and math.isfinite(h)):
             return OVERFLOW
         while j < size and (times[j] - t) - t_low < h:

@@ -197,8 +197,12 @@ def _dense(point, name):
 
 def _valid(rows, places):
     """Rows and places with NaN made harmless, and where all are numbers."""
-    good = np.isfinite(rows).all(axis=1)[:, None] & np.isfinite(places)
-    return np.where(np.isfinite(rows).all(axis=1)[:, None], rows, 0.0), np.where(good, places, 0.0), good
+    numbers, fine = np.isfinite(rows), np.isfinite(places)
+    if numbers.all() and fine.all():
+        return rows, places, fine
+    numbers = numbers.all(axis=1)[:, None]
+    good = numbers & fine
+    return np.where(numbers, rows, 0.0), np.where(good, places, 0.0), good
 
 
 def _trajectory(point, measure, method, rtol):
@@ -206,8 +210,8 @@ def _trajectory(point, measure, method, rtol):
     rows, times, good = _valid(rows, times)
     floats, turnings, status = measure.trajectories(method, rows, times, rtol)
     status = np.where(good, status, INVALID_PARAMETERS)
-    floats[status != OK] = np.nan
-    turnings[status != OK] = -2
+    lost = status != OK
+    floats[lost], turnings[lost] = np.nan, -2
     names = ("phi", "w", "phi_error", "w_error")
     results = {name: back(floats[..., i]) for i, name in enumerate(names)}
     return results | {"turnings": back(turnings), "status": back(status)}

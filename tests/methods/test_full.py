@@ -191,3 +191,14 @@ def test_bars_hold_on_random_points():
     assert np.median(mine[both][:, 2:]) < 1e-10
     told = both & (count >= 0) & (truth >= 0)
     assert told.mean() > 0.9 and np.array_equal(count[told], truth[told])
+
+
+@pytest.mark.parametrize("scale", [(1, 1, 1, 1, 1, 1, 3, 0), (0, 0, 1, 0, 0, 1, 3, 0), (10, 10, 1, 1, 1, 1, 3, 1)])
+def test_bars_hold_and_are_narrow_at_coarse_tolerances(scale):
+    """From rest every second term vanishes; steps are shorter than the tolerance asks, and the bars know."""
+    rows, times = np.random.default_rng(8).normal(size=(20, 8)) * scale, np.tile([0.3, 2.0, 8.0], (20, 1))
+    mine, _count, ok = cylinder.trajectories(full, rows, times, 1e-4)
+    best, _truth, fine = cylinder.trajectories(taylor, rows, times, 1e-13)
+    assert (ok == 0).all() and (fine == 0).all()
+    assert (np.abs(mine - best)[..., :2] <= mine[..., 2:] + best[..., 2:]).all()
+    assert np.median(mine[..., 2:]) < 1e-11
