@@ -170,18 +170,37 @@ def _is_number(value):
 
 
 def _check_boundaries(scene, name, asked, given):
-    """The axis along which edges of tongues are sought, the last one by default; None if none are asked for."""
+    """The axis along which edges are sought, the last one by default; None if no boundaries are asked for."""
     if asked is None:
         return None
+    from survey.boundaries import measure_of
+
     axes = [key for key, values in given.items() if np.ndim(values)]
-    if scene.FAMILY != "hill":
-        raise BadInput(f"boundaries: the scene {name} has no tongues; leave the table out")
+    measure = measure_of(scene)
+    if measure is None:
+        raise BadInput(f"boundaries: of the scene {name} no boundary curves are known; leave the table out")
+    if hasattr(measure, "closed"):
+        return _check_closed(measure, name, asked, {key: given[key].size for key in axes})
     _check_even(scene, name, "boundaries")
     if not 1 <= len(axes) <= 2:
         raise BadInput(f"boundaries: they are drawn on one axis or two, and there are {len(axes)}; fix the others")
     if asked.axis is not None and asked.axis not in axes:
         raise BadInput(f"boundaries.axis: {modules.unknown('axis', asked.axis, axes)}")
     return asked.axis or axes[-1]
+
+
+def _check_closed(measure, name, asked, sizes):
+    """The last of the axes {name: number of values}; raises BadInput where the measure knows no curves on these."""
+    axes = list(sizes)
+    refusal = measure.refusal(axes)
+    if refusal:
+        raise BadInput(f"boundaries: of {name} {refusal}; change the axes, or leave the table out")
+    if asked.axis is not None:
+        raise BadInput(f"boundaries.axis: the curves of {name} are closed forms, no axis is searched; leave it out")
+    for key in axes[:2]:
+        if sizes[key] < 2:
+            raise BadInput(f"boundaries: the axis {key} has one value, and curves need a range; give two or more")
+    return axes[-1]
 
 
 def _check_even(scene, name, table):
