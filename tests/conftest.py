@@ -2,6 +2,7 @@
 
 import gc
 import os
+import shutil
 import subprocess
 import sys
 
@@ -75,3 +76,11 @@ def surveyed(tmp_path_factory):
     (folder / "small.toml").write_text(SMALL)
     survey.run(folder / "small.toml", output=folder / "small.nc")
     return folder / "small.nc"
+
+
+@pytest.fixture
+def ran(small, surveyed):
+    """The path of the small workflow's netCDF file, as if it had been run in that folder."""
+    for name in ("small.nc", "small.nc.sha256"):
+        shutil.copy(surveyed.with_name(name), small.parent)
+    return small.with_suffix(".nc")

@@ -76,8 +76,7 @@ def test_plan_counts_what_run_does_and_calls_no_kernel(program, small):
     assert [f.name for f in program.folder.iterdir()] == ["small.toml"]
 
 
-def test_info_verify_and_plot(program, small):
-    program("run", "small.toml", "--quiet")
+def test_info_verify_and_plot(program, ran):
     told = json.loads(program("info", "small.nc", "--json").stdout)
     assert told["counts"]["status"]["ok"] == 24 and told["provenance"]["kernel_hash"]
     assert "phi0" in program("info", "small.nc").stdout
@@ -89,8 +88,7 @@ def test_info_verify_and_plot(program, small):
     assert program("plot", "small.nc", "-o", "t.docx").returncode == 2
 
 
-def test_verify_finds_a_flipped_bit(program, small):
-    program("run", "small.toml", "--quiet")
+def test_verify_finds_a_flipped_bit(program, ran):
     path = program.folder / "small.nc"
     bits = bytearray(path.read_bytes())
     bits[len(bits) // 2] ^= 1
@@ -99,8 +97,7 @@ def test_verify_finds_a_flipped_bit(program, small):
     assert found.returncode == 3 and "digest" in found.stderr and found.stderr.count("\n") == 1
 
 
-def test_verify_finds_a_wrong_value_by_solving_again(program, small):
-    program("run", "small.toml", "--quiet")
+def test_verify_finds_a_wrong_value_by_solving_again(program, ran):
     (program.folder / "small.nc.sha256").unlink()
     with netCDF4.Dataset(program.folder / "small.nc", "a") as file:
         file["w"][3, 2] += 1e-6
@@ -118,8 +115,7 @@ def test_scenes_tell_all_that_is_needed(program):
     assert json.loads(program("scenes", "gyrostat", "--json").stdout)["name"] == "gyrostat"
 
 
-def test_no_color_is_honoured(program, small):
-    program("run", "small.toml", "--quiet")
+def test_no_color_is_honoured(program, ran):
     assert "\x1b" not in program("info", "small.nc", env={"NO_COLOR": "1", "FORCE_COLOR": "1"}).stdout
 
 
