@@ -113,6 +113,16 @@ class Request:
         return self.lines.get(name)
 
 
+@dataclass(frozen=True)
+class Trajectory:
+    """One point solved in time: `data` as xarray.Dataset takes it, {name: (dimensions, values, attributes)}, and how
+    `survey.analysis.portrait` draws it: `panels`, each its kind and the names of the variables that it shows.
+    """
+
+    data: Mapping[str, tuple]
+    panels: tuple[tuple[str, ...], ...]
+
+
 def condition(scene, when, own=""):
     """When `own` exists, in words: `; only with l; only when question = fate | portrait`; or nothing."""
     words, options = [], {option.name: option for option in scene.OPTIONS}

@@ -46,7 +46,7 @@ from survey import methods
 from survey.measures import cylinder, cylinder_auto, cylinder_fate, cylinder_portrait
 from survey.measures.cylinder_fate import NO_TURNS
 from survey.modules import load
-from survey.scene import Option, Output, Parameter
+from survey.scene import Option, Output, Parameter, Request, Trajectory
 from survey.status import INVALID_PARAMETERS, OK
 
 TITLE = "Gyrostat with Barnett-London effect, rotation about axis 1"
@@ -96,6 +96,7 @@ _FATES = {
 _ENDS = {"repelling": 0, "neutral": 1, "attracting": 2}
 _TYPES = ("none", "saddle", "attracting_node", "weak_node", "repelling_node", "attracting_focus", "weak_focus",
           "repelling_focus", "degenerate")  # fmt: skip
+AROUND, ORBIT_POINTS = np.arange(0, 2 * np.pi, np.pi / 3), 2001  # of the phase portrait
 DIMENSIONS = {
     "equilibrium": np.arange(1, cylinder_portrait.EQUILIBRIA + 1),
     "cycle": np.arange(1, cylinder_portrait.CYCLES + 1),
@@ -172,6 +173,23 @@ def solve(point, request):
         return {"fate": _fate, "portrait": _portrait}[question](point, method, request.rtol)
     measure = cylinder_auto if request.method == "auto" else cylinder
     return {"trajectory": _trajectory, "abel": _abel}[question](point, measure, method, request.rtol)
+
+
+def trajectory(point, answer, options, time=None):
+    """The orbit on the cylinder and some of its neighbours, from `phi0`, `w0` (see `survey.scenes`)."""
+    time = 40.0 if time is None else float(time)
+    own = point.get("phi0", 0.0), point.get("w0", 1.0)
+    starts = np.array([own, *[(phi, w) for phi in AROUND for w in (-1.5, -0.5, 0.0, 0.5, 1.5)]])
+    t = np.linspace(0.0, time, ORBIT_POINTS)
+    asked = {name: np.full((1, 1), point[name]) for name in _SYSTEM} | {"t": t[None]}
+    asked |= {"phi0": starts[:, :1], "w0": starts[:, 1:] * np.where(np.arange(len(starts)) > 0, max(1.0, abs(own[1])), 1)[:, None]}
+    out = solve(asked, Request({"question": "trajectory"}, rtol=1e-9))
+    named = {o.name: {"long_name": o.long_name, "symbol": o.symbol, "units": o.units} for o in OUTPUTS if o.name in out}
+    data = {"t": ("t", t, {"long_name": "time", "symbol": "t", "units": "1"})}
+    for name in ("phi", "w"):
+        data[name], data[f"{name}_error"] = (("t", out[name][0], named[name]), ("t", out[f"{name}_error"][0], named[name] | {"long_name": f"error bound of {name}"}))
+        data[f"{name}_nearby"] = (("start", "t"), out[name][1:], named[name])
+    return Trajectory(data, (("cylinder", "phi", "w"), ("lines", "t", "w")))
 
 
 def _dense(point, name):
