@@ -146,6 +146,18 @@ def plot(path, output, var):
 
 
 @program.command()
+@click.argument("path", metavar="OUT.nc")
+@click.option("--port", type=click.IntRange(0, 65535), default=5006, show_default=True, help="0 for any that is free.")
+@click.option("--link", default="", help="The address of an earlier view, to see it again.")
+@click.option("--no-browser", is_flag=True, help="Only print the address.")
+def view(path, port, link, no_browser):
+    """Show the map in the browser, to this machine alone: zoom, values with error bars, the motion of a point."""
+    from survey.viewer.server import serve
+
+    serve(path, port, link, lambda line: err.print(line, markup=False), None if no_browser else click.launch)
+
+
+@program.command()
 @click.argument("name", required=False)
 @click.option("--json", "as_json", is_flag=True, help="For a program to read.")
 def scenes(name, as_json):

@@ -182,12 +182,18 @@ def trajectory(point, answer, options, time=None):
     starts = np.array([own, *[(phi, w) for phi in AROUND for w in (-1.5, -0.5, 0.0, 0.5, 1.5)]])
     t = np.linspace(0.0, time, ORBIT_POINTS)
     asked = {name: np.full((1, 1), point[name]) for name in _SYSTEM} | {"t": t[None]}
-    asked |= {"phi0": starts[:, :1], "w0": starts[:, 1:] * np.where(np.arange(len(starts)) > 0, max(1.0, abs(own[1])), 1)[:, None]}
+    asked |= {
+        "phi0": starts[:, :1],
+        "w0": starts[:, 1:] * np.where(np.arange(len(starts)) > 0, max(1.0, abs(own[1])), 1)[:, None],
+    }
     out = solve(asked, Request({"question": "trajectory"}, rtol=1e-9))
     named = {o.name: {"long_name": o.long_name, "symbol": o.symbol, "units": o.units} for o in OUTPUTS if o.name in out}
     data = {"t": ("t", t, {"long_name": "time", "symbol": "t", "units": "1"})}
     for name in ("phi", "w"):
-        data[name], data[f"{name}_error"] = (("t", out[name][0], named[name]), ("t", out[f"{name}_error"][0], named[name] | {"long_name": f"error bound of {name}"}))
+        data[name], data[f"{name}_error"] = (
+            ("t", out[name][0], named[name]),
+            ("t", out[f"{name}_error"][0], named[name] | {"long_name": f"error bound of {name}"}),
+        )
         data[f"{name}_nearby"] = (("start", "t"), out[name][1:], named[name])
     return Trajectory(data, (("cylinder", "phi", "w"), ("lines", "t", "w")))
 

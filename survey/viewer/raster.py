@@ -12,15 +12,15 @@ import numpy as np
 from matplotlib import colormaps
 
 from survey import status
-from survey.figures import _flags, _palette
+from survey.figures import _flags, _limits, _palette
 from survey.grid import logarithmic
 
 DIRECT = 2**22  # points: a smaller window is read from the file, a larger one from the overview
 OVERVIEW = 4096  # cells along an axis of the overview, at most
-WHITE, UNKNOWN = "#FFFFFF", "#444444"
+LIMITS = 512  # cells along an axis from which the colours' limits are taken
+WHITE, UNKNOWN, NOT_APPLY, LINE = "#FFFFFF", "#444444", "#DDDDDD", "#777777"
 NO_ANSWER = ("outside the domain", "failed")
 HATCH = 6  # pixels from line to line
-NONE_RGBA, LINE_RGBA = (0xDD, 0xDD, 0xDD, 255), (0x77, 0x77, 0x77, 255)
 UNIONS = np.bitwise_or, np.maximum  # of masks, of ranks
 viridis = colormaps["viridis"]
 
@@ -52,6 +52,11 @@ class Axis:
         """The map's two ends, half a cell beyond its outermost points."""
         return tuple(float(end) for end in self.unscaled(self.cells[[0, -1]]))
 
+    @property
+    def told(self):
+        """Its range, for a message."""
+        return f"{self.values[0]:g} to {self.values[-1]:g}"
+
     def nearest(self, value):
         """Place of the point in whose cell `value` lies; None outside the map."""
         if self.log and value <= 0:
@@ -73,27 +78,35 @@ class Axis:
         middles = 0.5 * (edges[1:] + edges[:-1])
         near = np.clip(np.searchsorted(self.cells, middles, side="right") - 1, 0, self.values.size - 1)
         starts = np.where(inside[1:] > inside[:-1], inside[:-1], near)
-        return Pixels(
-            starts, max(int(inside[-1]), int(starts[-1]) + 1), tuple(self.unscaled(np.array(seen)).tolist()), edges
-        )
+        return Pixels(self, edges, starts, max(int(inside[-1]), int(starts[-1]) + 1))
 
 
 @dataclass(frozen=True)
 class Pixels:
-    """Pixels along an axis: pixel i shows the points from starts[i] to the next start, or the last to `stop`.
+    """Pixels along an axis: pixel i, from edges[i] to edges[i + 1] on the scale, shows the points from starts[i].
 
-    `ends`: the coordinates at which the pixels begin and end; `edges` (n + 1,): on the axis' scale.
+    They go to the next start, or the last to `stop`.
     """
 
+    axis: Axis
+    edges: np.ndarray
     starts: np.ndarray
     stop: int
-    ends: tuple
-    edges: np.ndarray
 
     @property
     def span(self):
         """The points that are shown."""
         return slice(int(self.starts[0]), self.stop)
+
+    @property
+    def ends(self):
+        """The coordinates at which the pixels begin and end."""
+        return tuple(self.axis.unscaled(self.edges[[0, -1]]).tolist())
+
+    @property
+    def middles(self):
+        """The coordinates of their middles."""
+        return self.axis.unscaled(0.5 * (self.edges[1:] + self.edges[:-1]))
 
     @property
     def points(self):
@@ -148,6 +161,20 @@ class Layer:
         value = array.astype(np.float32)
         value[(mask != 0) | ~np.isfinite(value)] = np.nan
         return mask, _ranked(value)
+
+    @property
+    def ready(self):
+        """Is the whole map read, or small?"""
+        return self.variable.size <= DIRECT or "_overview" in self.__dict__
+
+    @cached_property
+    def limits(self):
+        """The values between which the whole map is coloured."""
+        rank = self._overview[0][1]
+        starts = (np.arange(0, size, -(-size // LIMITS)) for size in rank.shape)
+        shown = np.ma.masked_invalid(_unranked(_blocks(np.maximum, rank, *starts)))
+        found = _limits(shown) or {"vmin": shown.min(), "vmax": shown.max()}
+        return (0.0, 1.0) if shown.mask.all() else (float(found["vmin"]), float(found["vmax"]))
 
     @cached_property
     def _overview(self):
@@ -213,20 +240,20 @@ def rarest(mask, layer):
     return {kind: number[kind] for kind in order if number[kind]}
 
 
-def paint(mask, value, layer, limits=None):
-    """The pixels' colours, (rows, columns) of uint32 RGBA: each pixel's rarest kind, or its value between `limits`."""
+def paint(mask, value, layer):
+    """The pixels' colours, (rows, columns) of uint32 RGBA: each pixel's rarest kind, or its value."""
     image = np.full((*mask.shape, 4), 255, np.uint8)
     if value is not None:
-        low, high = limits
+        low, high = layer.limits
         image[...] = viridis((value - low) / ((high - low) or 1.0), bytes=True)
-        image[np.isnan(value)] = NONE_RGBA
+        image[np.isnan(value)] = _rgba(NOT_APPLY)
     for kind in rarest(mask, layer):
         where = (mask & layer.bits[kind]) != 0
         image[where] = _rgba(layer.kinds[kind])
         if kind in NO_ANSWER:
             y, x = np.nonzero(where)
             lines = ((x + y) % HATCH == 0) | ((kind == "failed") & ((x - y) % HATCH == 0))
-            image[y[lines], x[lines]] = LINE_RGBA
+            image[y[lines], x[lines]] = _rgba(LINE)
     return image.view(np.uint32)[..., 0]
 
 

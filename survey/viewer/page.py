@@ -1,0 +1,302 @@
+"""The page in the browser: the map, what lies under the pointer, and the chosen point with its motion."""
+
+import html
+import io
+from base64 import b64encode
+
+import numpy as np
+from bokeh import events
+from bokeh.core.property.descriptors import UnsetValueError
+from bokeh.layouts import column, row
+from bokeh.models import Checkbox, ColorBar, CustomJS, Div, Label, LinearColorMapper, Range1d, Select, Slider
+from bokeh.palettes import Viridis256
+from bokeh.plotting import figure
+from matplotlib.figure import Figure
+
+from survey.errors import BadInput, SurveyError
+from survey.figures import EDGES
+from survey.viewer import raster
+from survey.viewer.shown import short
+
+SIDE = 500  # width in pixels of what stands beside the map
+SOON = 30  # ms: changes that follow each other faster are answered once
+RINGS = 100  # pixels with undecided or failed points: if they are fewer, each is ringed
+RED = "#D40000"
+CURVE_POINTS = 300_000  # edges of more points are thinned
+CLICK = "Click a point of the map to see its motion and everything known of it."
+# the model's name carries the link into the address bar
+KEEP_LINK = "window.history.replaceState(null, '', '?' + cb_obj.name)"
+
+
+class Page:
+    """One page in a browser, on the survey `shown` (a `shown.Map`)."""
+
+    def __init__(self, shown, document):
+        self.map, self.document, self.waiting, self.pointer = shown, document, set(), None
+        self.caption = Div(width=SIDE - 30, styles={"color": "#555555"})
+        self.view = self._from_link(document.session_context.request.arguments)
+        self._plot()
+        self._side()
+        document.add_root(row(self.plot, self.side, sizing_mode="stretch_both"))
+        document.title = f"{shown.ds.attrs['title']} - survey view"
+        self.changed()
+        if self.view.point is not None:
+            self.choose(self.view.point)
+
+    def _from_link(self, arguments):
+        told = [f"{key}={values[0].decode()}" for key, values in arguments.items() if not key.startswith("bokeh-")]
+        try:
+            self.complaint = ""
+            return self.map.read("&".join(told))
+        except BadInput as error:
+            self.complaint = f"the link is not followed: {error}; "
+            return self.map.read("")
+
+    def _plot(self):
+        axes = self.map.axes
+        ranges = [
+            Range1d(*ends, bounds=axis.ends, reset_start=axis.ends[0], reset_end=axis.ends[1])
+            for ends, axis in zip(self.view.window, axes, strict=True)
+        ]
+        scales = ["log" if axis.log else "linear" for axis in axes]
+        plot = self.plot = figure(
+            x_range=ranges[0], y_range=ranges[1], x_axis_type=scales[0], y_axis_type=scales[1],
+            tools="pan,wheel_zoom,box_zoom,reset,save", active_scroll="wheel_zoom", background_fill_color="#f4f4f4",
+            sizing_mode="stretch_both", min_width=300, min_height=300,
+        )  # fmt: skip
+        plot.xaxis.axis_label, plot.yaxis.axis_label = (_label(self.map.ds[dim]) for dim in self.map.dims)
+        plot.grid.visible, plot.toolbar.logo = False, None
+        place = {"x": [], "y": []}
+        self.image = plot.image_rgba(source=place | {"image": [], "dw": [], "dh": []}, **IMAGE).data_source
+        self.curves = list(self._curves())
+        self.rings = plot.scatter("x", "y", source=dict(place), size=11, line_color=RED, **HOLLOW).data_source
+        look = {"size": 20, "marker": "circle_x", "line_color": "white", **HOLLOW}
+        self.chosen = plot.scatter("x", "y", source=dict(place), **look).data_source
+        plot.scatter("x", "y", source=self.chosen, **look | {"line_color": "black", "line_width": 1})
+        self.near = Label(**LABEL)
+        self.bar = ColorBar(color_mapper=LinearColorMapper(Viridis256), visible=False)
+        plot.add_layout(self.near)
+        plot.add_layout(self.bar, "right")
+        self._listen()
+
+    def _listen(self):
+        plot = self.plot
+        for ends in (plot.x_range, plot.y_range):
+            _on(ends, ("start", "end"), lambda: self.soon(self.changed))
+        _on(plot, ("inner_width", "inner_height"), lambda: self.soon(self.draw))
+        plot.on_event(events.MouseMove, self._moved)
+        plot.on_event(events.MouseLeave, self._left)
+        plot.on_event(events.Tap, self._tapped)
+        plot.js_on_change("name", CustomJS(code=KEEP_LINK))
+
+    def _curves(self):
+        """The edges of the tongues, drawn as `survey.figures` draws them."""
+        ds = self.map.ds
+        if "curve_count" not in ds:
+            return
+        ends, kinds = np.cumsum(ds.curve_count.values), ds.curve_class.values
+        x, y = (ds[f"curve_{dim}"].values for dim in self.map.dims)
+        thin = max(1, x.size // CURVE_POINTS)
+        for kind, look in EDGES.items():
+            own = [slice(start, last, thin) for start, last in zip([0, *ends], ends, strict=False)]
+            own = [part for part, of in zip(own, kinds, strict=True) if of == kind]
+            dash = "solid" if look["ls"] == "-" else list(look["ls"][1])
+            style = {"line_color": look["color"], "line_dash": dash, "line_width": 1.5 * look["lw"]}
+            yield self.plot.multi_line([x[part] for part in own], [y[part] for part in own], **style)
+
+    def _side(self):
+        ds, view, width = self.map.ds, self.view, SIDE - 30
+        self.variable = Select(title="variable", value=view.name, options=self.map.names, width=width)
+        _on(self.variable, ("value",), self.changed)
+        self.edges = Checkbox(label="edges of the tongues", active=view.boundaries, visible=bool(self.curves))
+        _on(self.edges, ("active",), self.changed)
+        self.sliders = {
+            dim: Slider(start=0, end=ds.sizes[dim] - 1, value=at, show_value=False, width=width)
+            for dim, at in view.others.items()
+            if ds.sizes[dim] > 1
+        }
+        for slider in self.sliders.values():
+            _on(slider, ("value",), self.changed)
+            _on(slider, ("value_throttled",), lambda: self.choose(self.view.point))
+        title = f"<b>{html.escape(ds.attrs['title'])}</b><br>{html.escape(ds.attrs['options'])}"
+        self.legend, self.motion, self.known = (Div(width=width) for _ in range(3))
+        self.motion.text = CLICK
+        told = [self.legend, self.caption, self.motion, self.known]
+        parts = [Div(text=title, width=width), self.variable, *self.sliders.values(), self.edges, *told]
+        look = {"overflow-y": "auto", "padding-left": "10px"}
+        self.side = column(*parts, width=SIDE, sizing_mode="stretch_height", styles=look)
+
+    def soon(self, function):
+        """Call the method once, shortly, however often it is asked for until then."""
+        if function.__name__ in self.waiting:
+            return
+        self.waiting.add(function.__name__)
+
+        def call():
+            self.waiting.discard(function.__name__)
+            function()
+
+        self.document.add_timeout_callback(call, SOON)
+
+    def changed(self):
+        """Take over what the user has chosen, tell it in the link, and draw it."""
+        view, plot, ds = self.view, self.plot, self.map.ds
+        view.name, view.boundaries = self.variable.value, self.edges.active
+        view.window = [(ends.start, ends.end) for ends in (plot.x_range, plot.y_range)]
+        for dim, slider in self.sliders.items():
+            view.others[dim] = int(slider.value)
+            slider.visible = dim in (*ds.status.dims, *ds[view.name].dims)
+            slider.title = f"{dim} = {short(ds[dim].values[view.others[dim]])}"
+        for curve in self.curves:
+            curve.visible = view.boundaries
+        plot.name = self.map.link(view)
+        if not self.map.layer(view).ready:
+            self.caption.text = f"reading {ds.status.size:,} points, once ..."
+        self.soon(self.draw)
+
+    def draw(self):
+        """Draw the window of the map that is seen, its legend, and what a pixel stands for."""
+        layer = self.map.layer(self.view)
+        try:
+            sizes = self.plot.inner_width, self.plot.inner_height
+        except UnsetValueError:  # the browser has not told it yet
+            return
+        xs, ys = (
+            axis.pixels(*window, size)
+            for axis, window, size in zip(self.map.axes, self.view.window, sizes, strict=True)
+        )
+        if xs is None or ys is None:
+            return
+        mask, value = layer.pixels(xs, ys)
+        corner = {
+            "x": [xs.ends[0]],
+            "y": [ys.ends[0]],
+            "dw": [xs.ends[1] - xs.ends[0]],
+            "dh": [ys.ends[1] - ys.ends[0]],
+        }
+        self.image.data = corner | {"image": [raster.paint(mask, value, layer)]}
+        kinds = raster.rarest(mask, layer)
+        self._ring(mask, layer, kinds, xs, ys)
+        self._legend(layer, kinds, value)
+        several = f"a pixel stands for up to {xs.points} × {ys.points} points" if max(xs.points, ys.points) > 1 else ""
+        shows = "its rarest kind" if layer.flagged else "the value largest in magnitude"
+        self.caption.text = html.escape(self.complaint + (f"{several} and shows {shows}" if several else ""))
+
+    def _ring(self, mask, layer, kinds, xs, ys):
+        """Rings round the pixels with undecided or failed points, where these are few and small."""
+        late = [kind for kind in ("undecided", "failed") if 0 < kinds.get(kind, 0) <= RINGS]
+        where = mask & sum((layer.bits[kind] for kind in late), start=layer.dtype(0))
+        i, j = np.nonzero(where)
+        self.rings.data = {"x": xs.middles[j], "y": ys.middles[i]}
+
+    def _legend(self, layer, kinds, value):
+        ds, view = self.map.ds, self.view
+        counted = ds.attrs.get(f"{view.name}_counts", "") if layer.flagged else ""
+        counts = dict(part.split(": ") for part in counted.split(", ") if part)
+        if view.name == "verdict" and "cell_verdict" in ds:
+            counts = {}
+        entries = [(kind, layer.kinds[kind]) for kind in layer.kinds if kind in kinds]
+        if value is not None and np.isnan(value).any():
+            entries.append(("does not apply", raster.NOT_APPLY))
+        number = {kind: f" ({int(counts[kind]):,} in all)" if kind in counts else "" for kind, _ in entries}
+        self.legend.text = "".join(
+            f"<span style='{ENTRY}'><span style='{SWATCH};background:{_swatch(kind, colour)}'></span>"
+            f"{html.escape(kind.replace('_', ' '))}{number[kind]}</span> "
+            for kind, colour in entries
+        )
+        self.bar.visible = not layer.flagged
+        if not layer.flagged:
+            self.bar.color_mapper.update(low=layer.limits[0], high=layer.limits[1])
+            self.bar.title = _label(ds[view.name], tex=False)
+
+    def _moved(self, event):
+        if event.x is not None:
+            self.pointer = event.x, event.y
+            self.soon(self.tell)
+
+    def _left(self, _):
+        self.pointer, self.near.visible = None, False
+
+    def tell(self):
+        """Show what is known of the point under the pointer, on that side of it where there is room."""
+        point = self._place(*self.pointer) if self.pointer else None
+        if point is None:
+            self.near.visible = False
+            return
+        (x, y), words = self.pointer, "\n".join(self.map.under(self.view, point))
+        left, low = (
+            np.mean(axis.scaled(np.array(window))) < axis.scaled(at)
+            for axis, window, at in zip(self.map.axes, self.view.window, (x, y), strict=True)
+        )
+        self.near.update(
+            x=x, y=y, text=words, visible=True, anchor=f"{'top' if low else 'bottom'}_{'right' if left else 'left'}",
+            x_offset=-12 if left else 12, y_offset=-12 if low else 12,
+        )  # fmt: skip
+
+    def _place(self, x, y):
+        """Places of the point in whose cell the position lies, or None."""
+        point = tuple(axis.nearest(at) for axis, at in zip(self.map.axes, (x, y), strict=True))
+        return None if None in point else point
+
+    def _tapped(self, event):
+        self.choose(self._place(event.x, event.y))
+
+    def choose(self, point):
+        """Choose a point, or none; its motion follows."""
+        self.view.point = point
+        if point is None:
+            return
+        x, y = self.map.position(point)
+        self.chosen.data = {"x": [x], "y": [y]}
+        self.plot.name = self.map.link(self.view)
+        self.motion.text, self.known.text = "solving this point in time ...", ""
+        self.soon(self.solve)
+
+    def solve(self):
+        """Show the motion of the chosen point, and everything that is known of it."""
+        coords = self.map.coords(self.view)
+        answers = self.map.ds.survey
+        try:
+            drawn = Figure(figsize=(6.8, 3.6), layout="constrained")
+            answers.trajectory(figure=drawn, **coords)
+            self.motion.text = _picture(drawn)
+        except SurveyError as error:
+            self.motion.text = f"no motion: {html.escape(str(error))}"
+        self.known.text = answers.point(**coords)._repr_html_()
+
+
+ENTRY = "white-space:nowrap;margin-right:14px"
+SWATCH = "display:inline-block;width:13px;height:13px;border:1px solid #555;vertical-align:-2px;margin-right:5px"
+HOLLOW = {"fill_alpha": 0, "line_width": 2.5}
+IMAGE = {key: key for key in ("image", "x", "y", "dw", "dh")} | {"level": "image"}
+LABEL = {
+    "x": 0, "y": 0, "text": "", "visible": False, "text_font_size": "12px", "text_line_height": 1.35, "padding": 6,
+    "background_fill_color": "white", "background_fill_alpha": 0.92, "border_line_color": "#888888",
+}  # fmt: skip
+
+
+def _on(model, properties, call):
+    """Call when one of the model's properties has changed."""
+    for name in properties:
+        model.on_change(name, lambda attr, old, new: call())
+
+
+def _picture(drawn):
+    """A matplotlib figure as HTML."""
+    file = io.BytesIO()
+    drawn.savefig(file, format="png", dpi=150)
+    return f"<img class='motion' style='width:100%' src='data:image/png;base64,{b64encode(file.getvalue()).decode()}'>"
+
+
+def _swatch(kind, colour):
+    if kind not in raster.NO_ANSWER:
+        return colour
+    lines = [f"repeating-linear-gradient({angle}deg,#777 0 1px,transparent 1px 4px)" for angle in (45, 135)]
+    return ",".join(lines[: 2 if kind == "failed" else 1]) + ",white"
+
+
+def _label(variable, tex=True):
+    """`long name, symbol (unit)`."""
+    symbol, units = variable.attrs.get("symbol", ""), variable.attrs.get("units", "1")
+    text = variable.attrs.get("long_name", variable.name) + (f", $${symbol}$$" if symbol and tex else "")
+    return text + ("" if units in ("1", "") else f" ({units})")
