@@ -18,11 +18,12 @@ from survey.figures import EDGES
 from survey.viewer import raster
 from survey.viewer.shown import short
 
-SIDE = 500  # width in pixels of what stands beside the map
+SIDE, WIDTH = 510, 470  # width in pixels of what stands beside the map, and of its parts
 SOON = 30  # ms: changes that follow each other faster are answered once
 RINGS = 100  # pixels with undecided or failed points: if they are fewer, each is ringed
 RED = "#D40000"
 CURVE_POINTS = 300_000  # edges of more points are thinned
+EDGES_TOLD = "edges of the tongues: even dark, odd grey; periodic solid, antiperiodic dashed"
 CLICK = "Click a point of the map to see its motion and everything known of it."
 # the model's name carries the link into the address bar
 KEEP_LINK = "window.history.replaceState(null, '', '?' + cb_obj.name)"
@@ -33,12 +34,12 @@ class Page:
 
     def __init__(self, shown, document):
         self.map, self.document, self.waiting, self.pointer = shown, document, set(), None
-        self.caption = Div(width=SIDE - 30, styles={"color": "#555555"})
+        self.caption = Div(width=WIDTH, styles={"color": "#555555"})
         self.view = self._from_link(document.session_context.request.arguments)
         self._plot()
         self._side()
         document.add_root(row(self.plot, self.side, sizing_mode="stretch_both"))
-        document.title = f"{shown.ds.attrs['title']} - survey view"
+        document.title = html.escape(shown.ds.attrs["title"])
         self.changed()
         if self.view.point is not None:
             self.choose(self.view.point)
@@ -69,7 +70,8 @@ class Page:
         place = {"x": [], "y": []}
         self.image = plot.image_rgba(source=place | {"image": [], "dw": [], "dh": []}, **IMAGE).data_source
         self.curves = list(self._curves())
-        self.rings = plot.scatter("x", "y", source=dict(place), size=11, line_color=RED, **HOLLOW).data_source
+        look = {"size": 9, "line_color": RED, "line_width": 2, "fill_color": "colour"}
+        self.rings = plot.scatter("x", "y", source=place | {"colour": []}, **look).data_source
         look = {"size": 20, "marker": "circle_x", "line_color": "white", **HOLLOW}
         self.chosen = plot.scatter("x", "y", source=dict(place), **look).data_source
         plot.scatter("x", "y", source=self.chosen, **look | {"line_color": "black", "line_width": 1})
@@ -105,13 +107,13 @@ class Page:
             yield self.plot.multi_line([x[part] for part in own], [y[part] for part in own], **style)
 
     def _side(self):
-        ds, view, width = self.map.ds, self.view, SIDE - 30
-        self.variable = Select(title="variable", value=view.name, options=self.map.names, width=width)
+        ds, view = self.map.ds, self.view
+        self.variable = Select(title="variable", value=view.name, options=self.map.names, width=WIDTH)
         _on(self.variable, ("value",), self.changed)
-        self.edges = Checkbox(label="edges of the tongues", active=view.boundaries, visible=bool(self.curves))
+        self.edges = Checkbox(label=EDGES_TOLD, active=view.boundaries, visible=bool(self.curves))
         _on(self.edges, ("active",), self.changed)
         self.sliders = {
-            dim: Slider(start=0, end=ds.sizes[dim] - 1, value=at, show_value=False, width=width)
+            dim: Slider(start=0, end=ds.sizes[dim] - 1, value=at, show_value=False, width=WIDTH)
             for dim, at in view.others.items()
             if ds.sizes[dim] > 1
         }
@@ -119,11 +121,11 @@ class Page:
             _on(slider, ("value",), self.changed)
             _on(slider, ("value_throttled",), lambda: self.choose(self.view.point))
         title = f"<b>{html.escape(ds.attrs['title'])}</b><br>{html.escape(ds.attrs['options'])}"
-        self.legend, self.motion, self.known = (Div(width=width) for _ in range(3))
+        self.legend, self.motion, self.known = (Div(width=WIDTH) for _ in range(3))
         self.motion.text = CLICK
         told = [self.legend, self.caption, self.motion, self.known]
-        parts = [Div(text=title, width=width), self.variable, *self.sliders.values(), self.edges, *told]
-        look = {"overflow-y": "auto", "padding-left": "10px"}
+        parts = [Div(text=title, width=WIDTH), self.variable, *self.sliders.values(), self.edges, *told]
+        look = {"overflow-x": "hidden", "overflow-y": "auto", "padding-left": "10px"}
         self.side = column(*parts, width=SIDE, sizing_mode="stretch_height", styles=look)
 
     def soon(self, function):
@@ -183,31 +185,31 @@ class Page:
         self.caption.text = html.escape(self.complaint + (f"{several} and shows {shows}" if several else ""))
 
     def _ring(self, mask, layer, kinds, xs, ys):
-        """Rings round the pixels with undecided or failed points, where these are few and small."""
-        late = [kind for kind in ("undecided", "failed") if 0 < kinds.get(kind, 0) <= RINGS]
-        where = mask & sum((layer.bits[kind] for kind in late), start=layer.dtype(0))
-        i, j = np.nonzero(where)
-        self.rings.data = {"x": xs.middles[j], "y": ys.middles[i]}
+        """Ring the pixels with undecided or failed points, where these are few."""
+        few = [kind for kind in ("undecided", "failed") if 0 < kinds.get(kind, 0) <= RINGS]
+        places = [(*np.nonzero(mask & layer.bits[kind]), layer.kinds[kind]) for kind in few]
+        self.rings.data = {
+            "x": [x for _, j, _ in places for x in xs.middles[j]],
+            "y": [y for i, _, _ in places for y in ys.middles[i]],
+            "colour": [colour for i, _, colour in places for _ in i],
+        }
 
     def _legend(self, layer, kinds, value):
-        ds, view = self.map.ds, self.view
-        counted = ds.attrs.get(f"{view.name}_counts", "") if layer.flagged else ""
-        counts = dict(part.split(": ") for part in counted.split(", ") if part)
-        if view.name == "verdict" and "cell_verdict" in ds:
-            counts = {}
+        """The kinds that are seen, with their share of the whole map; or the colour bar."""
+        ds, name = self.map.ds, self.view.name
+        shares = self.map.shares(name)
         entries = [(kind, layer.kinds[kind]) for kind in layer.kinds if kind in kinds]
         if value is not None and np.isnan(value).any():
             entries.append(("does not apply", raster.NOT_APPLY))
-        number = {kind: f" ({int(counts[kind]):,} in all)" if kind in counts else "" for kind, _ in entries}
         self.legend.text = "".join(
             f"<span style='{ENTRY}'><span style='{SWATCH};background:{_swatch(kind, colour)}'></span>"
-            f"{html.escape(kind.replace('_', ' '))}{number[kind]}</span> "
+            f"{html.escape(kind.replace('_', ' '))}{shares.get(kind, '')}</span> "
             for kind, colour in entries
         )
         self.bar.visible = not layer.flagged
         if not layer.flagged:
             self.bar.color_mapper.update(low=layer.limits[0], high=layer.limits[1])
-            self.bar.title = _label(ds[view.name], tex=False)
+            self.bar.title = _label(ds[name], tex=False)
 
     def _moved(self, event):
         if event.x is not None:

@@ -242,7 +242,7 @@ def rarest(mask, layer):
 
 def paint(mask, value, layer):
     """The pixels' colours, (rows, columns) of uint32 RGBA: each pixel's rarest kind, or its value."""
-    image = np.full((*mask.shape, 4), 255, np.uint8)
+    image = np.zeros((*mask.shape, 4), np.uint8)  # where nothing is known, nothing is drawn
     if value is not None:
         low, high = layer.limits
         image[...] = viridis((value - low) / ((high - low) or 1.0), bytes=True)

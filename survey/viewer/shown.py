@@ -8,7 +8,9 @@ from urllib.parse import parse_qsl, urlencode
 
 from survey import modules, status, store
 from survey.analysis.point import meaning
+from survey.dataset import percent
 from survey.errors import BadInput
+from survey.figures import _flags
 from survey.viewer import raster
 
 LINES = 6  # outputs told of the point under the pointer
@@ -92,6 +94,16 @@ class Map:
         if view.point is not None:
             told["point"] = ",".join(repr(value) for value in self.position(view.point))
         return urlencode(told, safe=",")
+
+    def shares(self, name):
+        """{flag: how much of the whole map bears it, in words}."""
+        ds = self.ds
+        if name == "verdict" and "area_fraction" in ds:
+            shares = zip(_flags(ds.area_verdict), ds.area_fraction.values, ds.area_fraction_error.values, strict=True)
+            return {flag: f" ({percent(share, bar)})".replace("+-", "±") for flag, share, bar in shares}
+        told = ds.attrs.get(f"{name}_counts", "")
+        counts = (part.split(": ") for part in told.split(", ") if part)
+        return {flag: f" ({int(number):,} in all)" for flag, number in counts}
 
     def position(self, point):
         """The coordinates (x, y) of a point's places."""
