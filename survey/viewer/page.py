@@ -63,7 +63,7 @@ class Page:
         plot = self.plot = figure(
             x_range=ranges[0], y_range=ranges[1], x_axis_type=scales[0], y_axis_type=scales[1],
             tools="pan,wheel_zoom,box_zoom,reset,save", active_scroll="wheel_zoom", background_fill_color="#f4f4f4",
-            sizing_mode="stretch_both", min_width=300, min_height=300,
+            sizing_mode="stretch_both", min_width=300, min_height=300, stylesheets=[":host(:focus) {outline: none}"],
         )  # fmt: skip
         plot.xaxis.axis_label, plot.yaxis.axis_label = (_label(self.map.ds[dim]) for dim in self.map.dims)
         plot.grid.visible, plot.toolbar.logo = False, None
