@@ -123,6 +123,16 @@ class Trajectory:
     panels: tuple[tuple[str, ...], ...]
 
 
+def told(value, bar):
+    """A value with its error bar, in few digits."""
+    return f"{float(value):.6g} +- {float(bar):.1g}"
+
+
+def named(answer, name):
+    """`name = value +- bar` of an output that is known of a point."""
+    return f"{name} = {told(answer[name], answer[f'{name}_error'])}"
+
+
 def condition(scene, when, own=""):
     """When `own` exists, in words: `; only with l; only when question = fate | portrait`; or nothing."""
     words, options = [], {option.name: option for option in scene.OPTIONS}

@@ -10,6 +10,12 @@ from survey import modules, own, status
 from survey.dataset import error_bars
 from survey.errors import BadInput
 
+# Attributes that tell of a whole file.
+WHOLE = (
+    "points", "accuracy_missed", "status_counts", "verdict_counts", "areas", "boundaries", "refine", "refine_points",
+    "complete",
+)  # fmt: skip
+
 
 def nearest(ds, coords):
     """The dataset at the point next to `coords` (numbers by axis; axes of one value may be left out)."""
@@ -18,9 +24,15 @@ def nearest(ds, coords):
     if missing:
         raise BadInput(f"{missing[0]} is missing: a point needs a number for each of {', '.join(ds.status.dims)}")
     point |= {dim: 0 for dim in ds.status.dims if dim not in point}
-    own_dims = set(ds.status.dims)
-    names = [name for name, v in ds.variables.items() if own_dims <= set(v.dims) or name in ds.coords]
-    return ds[names].isel(point)
+    return of_points(ds).isel(point)
+
+
+def of_points(ds):
+    """The variables that have a value per point: no edges, no cells, no counts of the whole map."""
+    names = [name for name, v in ds.data_vars.items() if set(ds.status.dims) <= set(v.dims)]
+    some = ds[names]
+    some.attrs = {key: value for key, value in ds.attrs.items() if key not in WHOLE}
+    return some
 
 
 def place(ds, coords):
@@ -93,39 +105,45 @@ class Point:
         if int(ds.status) != status.OK:
             return _sentence(ds)
         judge = getattr(_scene(ds), "why", None)
-        return judge(values(ds)) if judge and "verdict" in ds else _sentence(ds)
+        if judge is None or "verdict" not in ds:
+            return _sentence(ds)
+        try:
+            return judge(values(ds))
+        except KeyError as missing:
+            return f"the file does not hold {missing.args[0]}, which decides; let the survey write it"
 
     def __repr__(self):
-        return "\n".join(f"{head + ':':<12}{line}".rstrip() for head, line in self._lines())
+        rows = list(self._rows())
+        wide = max(len(f"{name} = {value}") for name, value, about in rows if about)
+        lines = (f"{name} = {value}".ljust(wide) + f"  {about}" if about else f"{name}: {value}"
+                 for name, value, about in rows)  # fmt: skip
+        return "\n".join([self.dataset.attrs.get("title", self.dataset.attrs["scene"]), *lines])
 
     def _repr_html_(self):
+        cell = "<td style='text-align:left;vertical-align:top'>"
         rows = "".join(
-            f"<tr><th style='text-align:left;vertical-align:top'>{html.escape(head)}</th>"
-            f"<td style='text-align:left'>{html.escape(line)}</td></tr>"
-            for head, line in self._lines()
+            "<tr>" + "".join(f"{cell}{html.escape(text)}</td>" for text in row) + "</tr>" for row in self._rows()
         )
-        return f"<table>{rows}</table>"
+        title = html.escape(self.dataset.attrs.get("title", self.dataset.attrs["scene"]))
+        return f"<table><caption>{title}</caption>{rows}</table>"
 
-    def _lines(self):
+    def _rows(self):
+        """(name, value, what it is) of everything; words have nothing in the third place."""
         ds = self.dataset
-        yield "point", ds.attrs.get("title", ds.attrs["scene"])
-        for name in self.parameters:
-            yield "parameter", f"{name} = {_number(ds[name])}  {_about(ds[name])}"
-        for key, value in options(ds).items():
-            yield "option", f"{key} = {value}"
-        yield "method", f"{ds.attrs.get('method', 'auto')}, rtol {ds.attrs.get('rtol', float('nan')):g}"
         if self.verdict:
-            yield "verdict", self.verdict
-        yield "why", self.why
-        yield "status", self.status
+            yield "verdict", self.verdict, ""
+        yield "why", self.why, ""
+        if int(ds.status) == status.OK:
+            yield "status", "ok", ""
+        told = [f"{key} = {value}" for key, value in options(ds).items()]
+        told += [f"method {ds.attrs.get('method', 'auto')}", f"rtol {ds.attrs.get('rtol', float('nan')):g}"]
+        yield "solved with", ", ".join(told), ""
+        for name, value in self.parameters.items():
+            yield name, f"{value!r}", _about(ds[name])
         bars = error_bars(ds)
         for name, variable in ds.data_vars.items():
-            if name.endswith("_error") or name in ("verdict", "status"):
-                continue
-            yield "output", f"{name} = {_value(ds, name, name in bars)}  {_about(variable)}"
-
-    def __str__(self):
-        return repr(self)
+            if not name.endswith("_error") and name not in ("verdict", "status"):
+                yield from _outputs(ds, name, variable, name in bars)
 
 
 def values(ds):
@@ -152,28 +170,34 @@ def _sentence(ds):
     return f"{word}: {said[word]}" if word in said else word
 
 
-def _value(ds, name, has_bar):
+def _outputs(ds, name, variable, has_bar):
+    """The rows of an output: one, or one for each place of its own dimension that has a value."""
+    about = _about(variable)
+    if not variable.ndim:
+        yield name, _told(ds, name, has_bar), about
+        return
+    label = variable.dims[0]
+    for i in range(ds.sizes[label]):
+        value = _told(ds.isel({label: i}), name, has_bar)
+        if value not in ("does not apply", "none"):
+            yield f"{name}[{ds[label].values[i]}]", value, about
+
+
+def _told(ds, name, has_bar):
+    """A value, to the digits that its error bar leaves it."""
     variable = ds[name]
-    if variable.ndim:
-        label = variable.dims[0]
-        parts = [_one(ds, name, has_bar, {label: i}) for i in range(ds.sizes[label])]
-        return ", ".join(f"{ds[label].values[i]}: {p}" for i, p in enumerate(parts) if p != "does not apply") or "none"
-    return _one(ds, name, has_bar, {})
-
-
-def _one(ds, name, has_bar, where):
-    variable = ds[name].isel(where)
     if "flag_values" in variable.attrs:
         return meaning(variable)
-    if not np.isfinite(variable.values):
+    value = float(variable)
+    if not np.isfinite(value):
         return "does not apply"
-    return f"{_number(variable)} +- {float(ds[f'{name}_error'].isel(where)):.2g}" if has_bar else str(variable.values)
-
-
-def _number(variable):
-    return repr(float(variable))
+    if not has_bar:
+        return str(variable.values)
+    bar = float(ds[f"{name}_error"])
+    known = 17 if bar == 0 or value == 0 else np.floor(np.log10(abs(value))) - np.floor(np.log10(bar)) + 2
+    return f"{value:#.{int(np.clip(known, 2, 17))}g} +- {bar:.2g}" if bar else f"{value!r} +- 0"
 
 
 def _about(variable):
     units = variable.attrs.get("units", "1")
-    return f"({variable.attrs.get('long_name', variable.name)}{'' if units in ('1', '') else f', {units}'})"
+    return f"{variable.attrs.get('long_name', variable.name)}{'' if units in ('1', '') else f' ({units})'}"

@@ -31,7 +31,8 @@ def _lines(axes, ds, x, *names):
         value, bar = ds[name], ds[f"{name}_error"]
         axes.plot(ds[x], value, lw=1.2, color=colour, label=f"${value.attrs.get('symbol', name)}$")
         axes.fill_between(ds[x], value - bar, value + bar, color=colour, alpha=0.3, lw=0)
-    axes.axhline(0.0, color=GREY, lw=0.6, zorder=0)
+    if min(axes.get_ylim()) < 0 < max(axes.get_ylim()):
+        axes.axhline(0.0, color=GREY, lw=0.6, zorder=0)
     axes.set(xlabel=_label(ds[x]), ylabel=_label(ds[names[0]]) if len(names) == 1 else "")
     if len(names) > 1:
         axes.legend(fontsize=8, frameon=False)
@@ -78,4 +79,27 @@ def _wrapped(angle, value):
     return np.insert(angle - 2 * np.pi * turns, jumps, np.nan), np.insert(value, jumps, np.nan)
 
 
-KINDS = {"lines": _lines, "multipliers": _multipliers, "cylinder": _cylinder}
+def _plane(axes, ds, x, y):
+    """A path in the plane, its start marked."""
+    axes.plot(ds[x], ds[y], lw=0.8, color=LINES[0])
+    axes.plot(ds[x].values[0], ds[y].values[0], "o", color=LINES[1], mec="black", ms=6)
+    axes.plot(0, 0, "+", color="black", ms=8)
+    axes.set(xlabel=f"${ds[x].attrs['symbol']}$", ylabel=f"${ds[y].attrs['symbol']}$", aspect="equal")
+
+
+def _sphere(axes, ds, x, y, z):
+    """A path on the unit sphere, its start marked; parallels and meridians in grey."""
+    angle = np.linspace(0, 2 * np.pi, 73)
+    for height in np.sin(np.radians([-60, -30, 0, 30, 60])):
+        ring = np.sqrt(1 - height**2)
+        axes.plot(ring * np.cos(angle), ring * np.sin(angle), height, lw=0.4, color=GREY)
+    for turn in np.radians(np.arange(0, 180, 30)):
+        axes.plot(np.cos(turn) * np.sin(angle), np.sin(turn) * np.sin(angle), np.cos(angle), lw=0.4, color=GREY)
+    axes.plot(ds[x], ds[y], ds[z], lw=1.2, color=LINES[0])
+    axes.plot(*([float(ds[name][0])] for name in (x, y, z)), "o", color=LINES[1], mec="black", ms=6)
+    axes.set_box_aspect((1, 1, 1), zoom=1.4)
+    axes.set(title="path of the axis", xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1))
+    axes.set_axis_off()
+
+
+KINDS = {"lines": _lines, "multipliers": _multipliers, "cylinder": _cylinder, "plane": _plane, "sphere": _sphere}

@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 
 from survey import api, own
-from survey.analysis.point import options, parameters
+from survey.analysis.point import options, parameters, values
 from survey.errors import BadInput
 
 
@@ -17,8 +17,8 @@ def solve(point, time=None):
     if make is None:
         raise BadInput(f"the scene {name} has no trajectory; it would be a function of that name in its file")
     given, chosen = parameters(point), options(point)
-    answer = api.evaluate(scene if "scene_hash" in point.attrs else name, **given, **chosen)
-    found = make(given, {key: v.values for key, v in answer.variables.items()}, chosen, time)
+    answer = api.evaluate(own.of_dataset(point), **given, **chosen)
+    found = make(given, values(answer), chosen, time)
     about = {"title": point.attrs.get("title", ""), "scene": name, "options": point.attrs["options"]}
     about |= {"parameters": ", ".join(f"{key}={value!r}" for key, value in given.items())}
     about |= {"panels": "; ".join(" ".join(panel) for panel in found.panels)}

@@ -1,4 +1,4 @@
-"""The solutions y1, y2 of Hill's equation over some periods, and the multipliers: what a trajectory shows of a point."""
+"""The solutions y1, y2 of Hill's equation over some periods, and its multipliers: the trajectory of a point."""
 
 from math import ceil
 
@@ -33,8 +33,7 @@ def solve(problem, answer, time, name="t"):
     }
     for i in range(2):
         words = f"solution with y(0) = {1 - i}, y'(0) = {i}"
-        data[f"y{i + 1}"] = (name, y[:, 0, i], {"long_name": words, "symbol": f"y_{i + 1}", "units": "1"})
-        data[f"y{i + 1}_error"] = (name, bars[:, 0, i], {"long_name": f"error bar of y{i + 1}", "units": "1"})
+        data |= linear_motion.value(name, f"y{i + 1}", f"y_{i + 1}", words, y[:, 0, i], bars[:, 0, i])
     return Trajectory(data, (("lines", name, "y1", "y2"), ("multipliers",)))
 
 
@@ -50,5 +49,4 @@ def _sampled(problem, steps):
     z = c0 + p * c1 + p * p * problem.c2
     if problem.whole:
         return z, lengths
-    back = z[::-1][:, [5, 4, 3, 2, 1, 0, 8, 7, 6]]  # z(T - t) = z(t)
-    return np.concatenate([z, back]), np.concatenate([lengths, lengths[::-1]])
+    return np.concatenate([z, linear_motion.mirrored(z)]), np.concatenate([lengths, lengths[::-1]])  # z(T - t) = z(t)

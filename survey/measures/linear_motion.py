@@ -34,7 +34,7 @@ def fundamental(matrices, lengths, periods):
 
 
 def _step(a, h):
-    """Y of each step (steps, n, n) from A at its three nodes (steps, 3, n, n): slopes K_i = A_i (1 + h sum a_ij K_j)."""
+    """Y of each step (steps, n, n) from A at its nodes (steps, 3, n, n): K_i = A_i (1 + h sum a_ij K_j)."""
     steps, _, n, _ = a.shape
     left = -h[:, None, None] * _INNER[None, :, :, None, None] * a[:, :, None]
     left = left.transpose(0, 1, 3, 2, 4).reshape(steps, 3 * n, 3 * n) + np.eye(3 * n)
@@ -63,6 +63,19 @@ def of_trace(trace, bar):
     first = first if abs(first) >= 1 else 0.5 * trace - root
     off = 0.5 * bar + min(np.sqrt(d), d / abs(root) if root else np.inf) + 4 * EPS * abs(first)
     return np.array([first, 1 / first]), np.array([off, off / (abs(first) * max(abs(first) - off, 0.5))])
+
+
+def mirrored(nodes):
+    """What is known at the NODES of the steps of half a period (steps, 9, ...), run through backwards."""
+    return nodes[::-1][:, [5, 4, 3, 2, 1, 0, 8, 7, 6]]
+
+
+def value(dim, name, symbol, words, values, bars):
+    """A variable along the time `dim`, and its error bar, as `Trajectory.data` holds them."""
+    return {
+        name: (dim, values, {"long_name": words, "symbol": symbol, "units": "1"}),
+        f"{name}_error": (dim, bars, {"long_name": f"error bar of {name}", "units": "1"}),
+    }
 
 
 def described(multipliers, bars):

@@ -29,7 +29,7 @@ from survey.kernels.elliptic import MEANS
 from survey.kernels.hill import LARGEST, NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE
 from survey.kernels.jit import kernel
 from survey.kernels.satellite import complete_integrals, half_periods, potential, sample, tabulate
-from survey.measures import hill, hill_motion
+from survey.measures import hill, hill_motion, hill_why
 from survey.measures.rows import Rows
 from survey.methods import dop853, taylor_double
 from survey.scene import Option, Output, Parameter
@@ -60,6 +60,7 @@ OPTIONS = (
     Option("body", ("prolate", "oblate"), "shape of the body: Iz < I or Iz > I", said_by="inertia_ratio"),
     Option("direction", ("1", "-1"), "sense of a rotation: 1 as the orbit, -1 against it", only_with="inertia_ratio"),
 )
+why = hill_why.why
 OUTPUTS = (
     *hill.OUTPUTS,
     Output("exponent_per_orbit", "growth of the logarithm of the amplitude per orbital revolution", r"\mu",
