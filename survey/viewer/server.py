@@ -19,7 +19,8 @@ try:
 
     from survey.viewer.page import Page
 except ModuleNotFoundError as error:
-    raise BadInput(f"survey view needs the package {error.name}: pip install 'survey[view]'") from None
+    needed = error.name.partition(".")[0]
+    raise BadInput(f"survey view needs the package {needed}: pip install 'survey[view]'") from None
 
 HOST = "127.0.0.1"  # loopback: no other machine reaches it
 
