@@ -159,7 +159,7 @@ def view(path, port, link, no_browser):
     """Show the map in the browser, to this machine alone: zoom, values with error bars, the motion of a point."""
     from survey.viewer.server import serve
 
-    serve(path, port, link, lambda line: err.print(line, markup=False), None if no_browser else click.launch)
+    serve(path, port, link, lambda line: err.print(line, markup=False), not no_browser)
 
 
 @program.command()

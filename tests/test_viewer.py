@@ -154,6 +154,18 @@ def test_a_link_tells_its_view():
     assert lines[1] == f"exponent = {with_bar(float(ds.exponent), float(ds.exponent_error))}"
 
 
+def test_a_falling_axis_is_drawn_rising(tmp_path):
+    xr.open_dataset(MAP).isel(k=slice(None, None, -1)).to_netcdf(tmp_path / "falling.nc")
+    images = []
+    for path in (MAP, tmp_path / "falling.nc"):
+        shown = Map(path)
+        view = shown.read("var=exponent")
+        pixels = [axis.pixels(*axis.ends, 60) for axis in shown.axes]
+        mask, value = shown.layer(view).pixels(*pixels)
+        images.append(raster.paint(mask, value, shown.layer(view)))
+    np.testing.assert_array_equal(*images)
+
+
 @pytest.mark.parametrize(
     ("query", "message"),
     [

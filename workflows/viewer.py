@@ -81,7 +81,7 @@ def browser():
             driver.quit()
 
 
-def wait(driver, done=lambda: True, seconds=60):
+def wait(driver, done=lambda: True, seconds=120):
     """Wait until the page is drawn, and `done()`; raises TimeoutError."""
     end = time.monotonic() + seconds
     while not (driver.execute_script(IDLE) and done()):

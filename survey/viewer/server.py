@@ -4,8 +4,13 @@ The token stands before everything else in the address, so that a request withou
 """
 
 import asyncio
+import html
+import logging
 import secrets
 import socket
+import tempfile
+import webbrowser
+from contextlib import contextmanager, nullcontext
 from urllib.parse import urlsplit
 
 from survey.errors import BadInput
@@ -25,11 +30,11 @@ except ModuleNotFoundError as error:
 HOST = "127.0.0.1"  # loopback: no other machine reaches it
 
 
-def serve(path, port, link="", say=print, opened=None):
+def serve(path, port, link="", say=print, browser=False):
     """Serve the survey in the file `path` to this machine, until interrupted (Ctrl-C).
 
-    `link` is the address of an earlier view, or what follows its question mark: that view is opened. `say` is told the
-    lines for the user; `opened(address)` is called once the server answers. Raises BadInput, Damaged.
+    `link` is the address of an earlier view, or what follows its question mark: that view is opened, in the user's
+    browser too if `browser`. `say` is told the lines for the user. Raises BadInput, Damaged.
     """
     shown = Map(path)
     query = urlsplit(link).query if "?" in link else link
@@ -41,12 +46,14 @@ def serve(path, port, link="", say=print, opened=None):
         say("Only this machine can reach it, and only with the token in that address. Ctrl-C ends it.")
         at = urlsplit(address).port
         say(f"From elsewhere: ssh -L {at}:{HOST}:{at} THIS_MACHINE, and open the same address there.")
-        if opened:
-            opened(address + query)
-        try:
-            await asyncio.Event().wait()
-        finally:
-            server.stop()
+        with _redirect(address + query) if browser else nullcontext() as page:
+            if browser:
+                webbrowser.open(page)
+            try:
+                await asyncio.Event().wait()
+            finally:
+                logging.disable()  # of what is cut off in the middle there is nothing to tell
+                server.stop()
 
     try:
         asyncio.run(run())
@@ -68,6 +75,18 @@ def start(shown, port):
         raise BadInput(f"--port {port}: {error.strerror}; choose another, or 0 for any that is free") from None
     server.start()
     return server, f"http://{HOST}:{port}/{token}/"
+
+
+@contextmanager
+def _redirect(address):
+    """The address of a file that only this user can read and that leads to `address`.
+
+    A browser is given it instead, since everyone on this machine can read the arguments of its processes.
+    """
+    with tempfile.NamedTemporaryFile("w", suffix=".html") as file:
+        file.write(f'<meta http-equiv="refresh" content="0; url={html.escape(address)}">')
+        file.flush()
+        yield f"file://{file.name}"
 
 
 def _free():
