@@ -17,9 +17,10 @@ import pytest
 import xarray as xr
 
 from survey import status
+from survey.analysis.point import _told
 from survey.errors import BadInput
 from survey.viewer import raster
-from survey.viewer.shown import Map, with_bar
+from survey.viewer.shown import Map
 
 ROOT = Path(__file__).parent.parent
 MAP = ROOT / "results/satellite_prolate_small.nc"
@@ -151,7 +152,7 @@ def test_a_link_tells_its_view():
     lines = list(shown.under(view, view.point))
     ds = xr.open_dataset(MAP).isel(k=3, rho=5)
     assert lines[0] == f"k = {float(ds.k):.8g}, rho = {float(ds.rho):.8g}"
-    assert lines[1] == f"exponent = {with_bar(float(ds.exponent), float(ds.exponent_error))}"
+    assert lines[1] == f"exponent = {_told(ds, 'exponent', True)}".replace("+-", "±") and "±" in lines[1]
 
 
 def test_a_falling_axis_is_drawn_rising(tmp_path):
@@ -184,11 +185,13 @@ def test_a_link_of_another_map_is_one_line(query, message):
     assert "\n" not in str(told.value)
 
 
-def test_a_value_is_told_to_two_digits_of_its_bar():
-    assert with_bar(0.123456789, 2.1e-5) == "0.123457 ± 2.1e-05"
-    assert with_bar(-1234.5678, 3.0) == "-1234.6 ± 3"
-    assert with_bar(1e-9, 1e-3) == "1e-09 ± 0.001" and with_bar(0.0, 1e-14) == "0 ± 1e-14"
-    assert with_bar(float("nan"), float("nan")) == "does not apply"
+def test_where_an_integer_does_not_apply_it_is_no_value():
+    shown = Map(ROOT / "results/gyrostat_fate_small.nc")
+    view = shown.read("var=net_turns")
+    _, value = shown.layer(view).pixels(*(axis.pixels(*axis.ends, 50) for axis in shown.axes))
+    assert np.isnan(value).any() and np.nanmax(np.abs(value)) < 1000
+    spun_up = tuple(np.argwhere(shown.ds.verdict.values == 5)[0])
+    assert next(line for line in shown.under(view, spun_up) if "net_turns" in line) == "net_turns = does not apply"
 
 
 def answer(address):

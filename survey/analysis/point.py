@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from survey import modules, own, status
-from survey.dataset import error_bars
+from survey.dataset import error_bars, fill_of
 from survey.errors import BadInput
 
 # Attributes that tell of a whole file.
@@ -192,7 +192,7 @@ def _told(ds, name, has_bar):
     if not np.isfinite(value):
         return "does not apply"
     if not has_bar:
-        return str(variable.values)
+        return "does not apply" if value == fill_of(variable) else str(variable.values)
     bar = float(ds[f"{name}_error"])
     known = 17 if bar == 0 or value == 0 else np.floor(np.log10(abs(value))) - np.floor(np.log10(bar)) + 2
     return f"{value:#.{int(np.clip(known, 2, 17))}g} +- {bar:.2g}" if bar else f"{value!r} +- 0"

@@ -153,7 +153,7 @@ class Page:
             curve.visible = view.boundaries
         plot.name = self.map.link(view)
         if not self.map.layer(view).ready:
-            self.caption.text = f"reading {ds.status.size:,} points, once ..."
+            self._say(f"reading {ds.status.size:,} points, once ...")
         self.soon(self.draw)
 
     def draw(self):
@@ -182,7 +182,10 @@ class Page:
         self._legend(layer, kinds, value)
         several = f"a pixel stands for up to {xs.points} × {ys.points} points" if max(xs.points, ys.points) > 1 else ""
         shows = "its rarest kind" if layer.flagged else "the value largest in magnitude"
-        self.caption.text = html.escape(self.complaint + (f"{several} and shows {shows}" if several else ""))
+        self._say(self.complaint + (f"{several} and shows {shows}" if several else ""))
+
+    def _say(self, words):
+        self.caption.update(text=html.escape(words), visible=bool(words))
 
     def _ring(self, mask, layer, kinds, xs, ys):
         """Ring the pixels with undecided or failed points, where these are few."""

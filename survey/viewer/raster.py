@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib import colormaps
 
 from survey import status
+from survey.dataset import fill_of
 from survey.figures import _flags, _limits, _palette
 from survey.grid import logarithmic
 
@@ -126,6 +127,7 @@ class Layer:
         self.variable = ds[name].isel(own).transpose(*dims)
         self.status = ds.status.isel(state).transpose(*dims)
         self.flagged = "flag_values" in self.variable.attrs
+        self.fill = np.nan if self.flagged or fill_of(self.variable) is None else fill_of(self.variable)
         flags = _flags(self.variable) if self.flagged else {}
         palette = _palette(flags)
         self.kinds = {flag: palette.get(flag, UNKNOWN) for flag in flags} | dict.fromkeys(NO_ANSWER, WHITE)
@@ -159,7 +161,7 @@ class Layer:
             flags = self._of_code[array.astype(np.int8, copy=False).view(np.uint8)]
             return np.where(mask == 0, flags, mask), None
         value = array.astype(np.float32)
-        value[(mask != 0) | ~np.isfinite(value)] = np.nan
+        value[(mask != 0) | (array == self.fill) | ~np.isfinite(value)] = np.nan
         return mask, _ranked(value)
 
     @property

@@ -3,11 +3,11 @@
 import textwrap
 from dataclasses import dataclass, field
 from functools import lru_cache
-from math import floor, isfinite, log10
+from math import isfinite
 from urllib.parse import parse_qsl, urlencode
 
 from survey import modules, status, store
-from survey.analysis.point import meaning
+from survey.analysis.point import _sentence, _told, meaning
 from survey.dataset import percent
 from survey.errors import BadInput
 from survey.figures import _flags
@@ -116,22 +116,19 @@ class Map:
 
     def under(self, view, point):
         """What is known of the point at these two places, in lines; the view's variable first."""
-        ds, place = self.ds, dict(zip(self.dims, point, strict=True)) | view.others
-        yield ", ".join(f"{dim} = {short(ds[dim].values[place[dim]])}" for dim in ds.status.dims)
+        ds = self.ds
+        names = dict.fromkeys([view.name, *(["verdict"] if "verdict" in ds else []), *self.names])
+        names = [name for name in names if name != "status"][:LINES]
+        bars = [f"{name}_error" for name in names if f"{name}_error" in ds]
+        here = ds[[*names, *bars, "status"]].isel(dict(zip(self.dims, point, strict=True)) | view.others).load()
+        yield ", ".join(f"{dim} = {short(here[dim].values)}" for dim in ds.status.dims)
         if view.name == "verdict" and "cell_verdict" in ds:
             yield from self._cell(*self.position(point))
-        state = self._at("status", place)
-        if state != status.OK:
-            yield from textwrap.wrap(_sentence(state), 60)
-        names = dict.fromkeys([view.name, *(["verdict"] if "verdict" in ds else []), *self.names])
-        for name in [name for name in names if name != "status"][:LINES]:
-            value = self._at(name, place)
-            if "flag_values" in value.attrs:
-                yield f"{name}: {meaning(value).replace('_', ' ')}"
-            elif f"{name}_error" in ds:
-                yield f"{name} = {with_bar(float(value), float(self._at(f'{name}_error', place)))}"
-            else:
-                yield f"{name} = {value.item()}"
+        if here.status != status.OK:
+            yield from textwrap.wrap(_sentence(here), 60)
+        for name in names:
+            value = _told(here, name, f"{name}_error" in bars).replace("+-", "±")
+            yield f"{name}: {value.replace('_', ' ')}" if "flag_values" in here[name].attrs else f"{name} = {value}"
 
     def _cell(self, *position):
         """The verdict of the cell that holds the point of a refined map."""
@@ -140,28 +137,10 @@ class Map:
             inside &= (ds[f"cell_{dim}_low"].values <= value) & (value <= ds[f"cell_{dim}_high"].values)
         yield from (f"cell: {meaning(found)}" for found in ds.cell_verdict[inside][:1])
 
-    def _at(self, name, place):
-        variable = self.ds[name]
-        return variable[tuple(place[dim] for dim in variable.dims)].load()
-
-
-def with_bar(value, bar):
-    """`0.123456789 ± 2.1e-08`: to two digits of the bar."""
-    if not isfinite(value):
-        return "does not apply"
-    digits = floor(log10(abs(value))) - floor(log10(bar)) + 2 if value and bar > 0 else 17
-    return f"{value:.{min(max(digits, 1), 17)}g} ± {bar:.2g}"
-
 
 def short(value):
     """A coordinate, number or label, for a reader."""
     return f"{value:.8g}" if value.dtype.kind == "f" else str(value)
-
-
-def _sentence(state):
-    """Why the point has no answer."""
-    name = meaning(state)
-    return next((part for part in state.attrs["comment"].split("; ") if part.startswith(f"{name}: ")), name)
 
 
 def _numbers(key, words, number):
