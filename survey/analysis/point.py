@@ -194,7 +194,7 @@ def _told(ds, name, has_bar):
     if not has_bar:
         return "does not apply" if value == fill_of(variable) else str(variable.values)
     bar = float(ds[f"{name}_error"])
-    known = 17 if bar == 0 or value == 0 else np.floor(np.log10(abs(value))) - np.floor(np.log10(bar)) + 2
+    known = 2 if bar == 0 or value == 0 else np.floor(np.log10(abs(value))) - np.floor(np.log10(bar)) + 2
     return f"{value:#.{int(np.clip(known, 2, 17))}g} +- {bar:.2g}" if bar else f"{value!r} +- 0"
 
 
