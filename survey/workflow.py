@@ -286,14 +286,7 @@ def check_parameters(scene, name, options, given, table=""):
 
 def check_request(scene, options, method, rtol, variables, tables=("", "")):
     """The Request; raises BadInput for an unknown method or variable, or an rtol outside (0, 1)."""
-    serving = methods_of(scene, options)
-    if method not in serving and method in methods_of(scene):
-        given = ", ".join(f"{name} = {value}" for name, value in options.items())
-        raise BadInput(
-            f"{tables[0]}method: {method!r} does not serve {given} (allowed: {', '.join(['auto', *serving])})"
-        )
-    if method != "auto" and method not in serving:
-        raise BadInput(f"{tables[0]}method: {modules.unknown('method', method, ['auto', *serving])}")
+    _check_method(scene, options, method, tables[0])
     if isinstance(rtol, bool) or not isinstance(rtol, (int, float)) or not 0 < rtol < 1:
         raise BadInput(f"{tables[0]}rtol = {rtol!r}: it must lie between 0 and 1, such as 1e-10")
     outputs = [output.name for output in scene.OUTPUTS if exists(output, options)]
@@ -301,6 +294,19 @@ def check_request(scene, options, method, rtol, variables, tables=("", "")):
         if variable not in outputs:
             raise BadInput(f"{tables[1]}variables: {modules.unknown('variable', variable, outputs)}")
     return Request(options, method, float(rtol), frozenset(outputs if variables is None else variables))
+
+
+def _check_method(scene, options, method, table):
+    """Raises BadInput for a method that is unknown or does not serve these options."""
+    if method == "auto":
+        return  # the methods' modules need not be imported
+    serving = methods_of(scene, options)
+    if method in serving:
+        return
+    if method not in methods_of(scene):
+        raise BadInput(f"{table}method: {modules.unknown('method', method, ['auto', *serving])}")
+    given = ", ".join(f"{name} = {value}" for name, value in options.items())
+    raise BadInput(f"{table}method: {method!r} does not serve {given} (allowed: {', '.join(['auto', *serving])})")
 
 
 def methods_of(scene, options=None):

@@ -1,15 +1,8 @@
 """The page of the gyrostat's errata: every corrected formula holds, and no printed one that is called wrong."""
 
-import importlib.util
-from pathlib import Path
-
+import gyrostat_errata as errata
 import pytest
 from mpmath import mp, mpf
-
-PATH = Path(__file__).parent.parent / "workflows/gyrostat_errata.py"
-SPEC = importlib.util.spec_from_file_location("gyrostat_errata", PATH)
-errata = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(errata)
 
 
 @pytest.mark.parametrize("row", errata.ERRATA, ids=lambda row: row[0])

@@ -8,12 +8,10 @@ survey/scenes/gyrostat.md.
 """
 
 # ruff: noqa: E501  (the rows of the page's tables)
-import argparse
 import random
-import sys
-from pathlib import Path
 
 from mpmath import cos, cosh, diff, exp, log, matrix, mp, mpf, pi, sin, sinh, sqrt, tan
+from script import parser, say
 
 DIGITS = 40
 DEFINED = ("A11", "A22", "A33", "A23", "A12", "A31", "B11", "B22", "B33", "B12", "B31", "B23", "C11", "C22", "C33",
@@ -732,10 +730,7 @@ def short(value):
 
 
 def main():
-    words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    words.add_argument("-o", "--output", default="results", metavar="DIR", help="where the page goes")
-    folder = Path(words.parse_args().output)
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = parser(__doc__, "the page").parse_args().output
     say("printed against corrected")
     errata = [(place, a, b, *erratum(test)) for place, a, b, test in ERRATA]
     say("what is right, and what is missing")
@@ -749,10 +744,6 @@ def main():
     path = folder / "gyrostat_errata.md"
     path.write_text(page)
     print(path)
-
-
-def say(line):
-    print(f"gyrostat_errata: {line}", file=sys.stderr)
 
 
 if __name__ == "__main__":
