@@ -14,6 +14,7 @@ from pathlib import Path
 import netCDF4
 import numpy as np
 import pytest
+import viewer as picture
 import xarray as xr
 
 from survey import status
@@ -24,10 +25,6 @@ from survey.viewer.shown import Map
 
 ROOT = Path(__file__).parent.parent
 MAP = ROOT / "results/satellite_prolate_small.nc"
-SPEC = importlib.util.spec_from_file_location("viewer_picture", ROOT / "workflows/viewer.py")
-picture = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(picture)
-
 served = pytest.mark.skipif(
     not importlib.util.find_spec("bokeh"), reason="bokeh is missing (pip install 'survey[view]')"
 )
@@ -204,7 +201,10 @@ def answer(address):
 
 @served
 def test_without_the_token_there_is_nothing_and_from_elsewhere_nobody():
-    with picture.served(MAP) as (address, process):
+    old = "http://127.0.0.1:1/old/?var=exponent&x=0.1,0.5"
+    with picture.served(MAP, "--link", old) as (address, process):
+        address, query = address.split("?")
+        assert query.startswith("var=exponent&x=0.1,0.5&y=")
         told = process.stderr.readline() + process.stderr.readline()
         host, token = re.fullmatch(r"(http://127\.0\.0\.1:\d+/)([\w-]{32})/", address).groups()
         port = int(host.rstrip("/").rpartition(":")[2])
@@ -250,6 +250,17 @@ def test_the_socket_wants_token_origin_and_a_session_that_the_page_signed():
         server.stop()
 
     asyncio.run(check())
+
+
+@served
+def test_the_browser_is_led_by_a_file_that_only_this_user_can_read():
+    from survey.viewer.server import _redirect
+
+    with _redirect("http://127.0.0.1:1/token/?var=w&x=1,2") as page:
+        file = Path(page.removeprefix("file://"))
+        assert file.stat().st_mode & 0o077 == 0
+        assert 'url=http://127.0.0.1:1/token/?var=w&amp;x=1,2"' in file.read_text()
+    assert not file.exists()
 
 
 def test_what_cannot_be_viewed_is_one_line(tmp_path):

@@ -5,7 +5,6 @@
 Needs the extra `view`, selenium, and Chromium with its driver (Debian: chromium chromium-driver).
 """
 
-import argparse
 import contextlib
 import re
 import shutil
@@ -14,7 +13,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from pathlib import Path
+
+from script import parser
 
 FLAGS = (
     "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
@@ -105,10 +105,9 @@ def act(driver, x, y, click=False):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("path", type=Path)
-    parser.add_argument("-o", "--output", type=Path, default=Path("."), help="the folder of viewer.png")
-    given = parser.parse_args()
+    words = parser(__doc__, "viewer.png")
+    words.add_argument("path", metavar="OUT.nc", help="the survey that is shown")
+    given = words.parse_args()
     if missing():
         raise SystemExit(f"missing: {missing()}")
     with served(given.path) as (address, _), browser() as driver:
@@ -116,8 +115,9 @@ def main():
         wait(driver)
         act(driver, *POINT, click=True)
         wait(driver, lambda: "point=" in driver.current_url)
-        driver.save_screenshot(given.output / "viewer.png")
-    print(given.output / "viewer.png")
+        path = given.output / "viewer.png"
+        driver.save_screenshot(path)
+    print(path)
 
 
 if __name__ == "__main__":
