@@ -7,9 +7,12 @@
     survey.scenes()                                              # the scenes and what they answer
     ds = survey.open("results/satellite_prolate.nc")             # open and check a file
 
+    ds.survey.map()                                              # xarray datasets get an accessor: survey/accessor.py
+
 Importing this package compiles nothing and loads nothing heavy.
 """
 
+import sys
 from importlib import import_module
 
 _HOME = {"run": "survey.api", "evaluate": "survey.api", "open": "survey.api", "hill": "survey.own"}
@@ -20,6 +23,34 @@ _HOME |= {
     "Stopped": "survey.errors",
 }
 __all__ = sorted([*_HOME, "scenes"])
+
+
+class _AfterXarray:
+    """Makes `ds.survey` known as soon as xarray is imported, by anyone: importing it here would take half a second."""
+
+    def find_spec(self, name, path=None, target=None):
+        if name != "xarray":
+            return None
+        specs = (finder.find_spec(name, path, target) for finder in sys.meta_path if finder is not self)
+        spec = next(filter(None, specs), None)
+        if spec is not None:
+            spec.loader.exec_module = self._registering(spec.loader.exec_module)
+        return spec
+
+    def _registering(self, execute):
+        def execute_and_register(module):
+            execute(module)
+            if self in sys.meta_path:
+                sys.meta_path.remove(self)
+                import_module("survey.accessor")
+
+        return execute_and_register
+
+
+if "xarray" in sys.modules:
+    import_module("survey.accessor")
+else:
+    sys.meta_path.insert(0, _AfterXarray())
 
 
 def __getattr__(name):

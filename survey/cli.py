@@ -126,23 +126,38 @@ def info(path, as_json):
 
 @program.command()
 @click.argument("path", metavar="OUT.nc")
-@click.option("-o", "--output", metavar="OUT.png", help="The picture; by default beside the file.")
+@click.option("-o", "--output", metavar="OUT.png", help="The picture, .png, .pdf or .svg; by default beside the file.")
 @click.option("--var", metavar="NAME", help="The variable; by default the verdict.")
-def plot(path, output, var):
+@click.option("--style", type=click.Choice(["screen", "paper"]), default="screen", help="For papers: PDF, hatched.")
+@click.option("--width", type=click.Choice(["single", "double"]), default="single", help="Columns, of style paper.")
+def plot(path, output, var, style, width):
     """Draw the stability map, or the named variable."""
     from pathlib import Path
 
     from survey import api, figures
 
     ds = api.open(path)
-    target = Path(output or (Path(path).with_suffix(".png") if not var else f"{path.removesuffix('.nc')}_{var}.png"))
+    suffix = ".pdf" if style == "paper" else ".png"
+    target = Path(output or f"{path.removesuffix('.nc')}{f'_{var}' if var else ''}{suffix}")
     try:
-        figures.save(ds, target, var)
+        figures.save(ds, target, var, style, width)
     except BadInput:
         raise
     except (OSError, ValueError) as error:
         raise BadInput(f"{target}: cannot draw to it ({error}); name a .png, .pdf or .svg file with -o") from None
     out.print(str(target), markup=False)
+
+
+@program.command()
+@click.argument("path", metavar="OUT.nc")
+@click.option("--port", type=click.IntRange(0, 65535), default=5006, show_default=True, help="0 for any that is free.")
+@click.option("--link", default="", help="The address of an earlier view, to see it again.")
+@click.option("--no-browser", is_flag=True, help="Only print the address.")
+def view(path, port, link, no_browser):
+    """Show the map in the browser, to this machine alone: zoom, values with error bars, the motion of a point."""
+    from survey.viewer.server import serve
+
+    serve(path, port, link, lambda line: err.print(line, markup=False), not no_browser)
 
 
 @program.command()

@@ -2,6 +2,7 @@
 
 import datetime
 import platform
+import re
 import subprocess
 import sys
 from functools import cache
@@ -254,6 +255,12 @@ def meaning(output):
     if comment:
         attributes["comment"] = "; ".join(comment)
     return attributes
+
+
+def fill_of(variable):
+    """The integer that stands where an integer output does not apply; None for an output that has none."""
+    told = re.search(r"(-?\d+) where it does not apply", variable.attrs.get("comment", ""))
+    return int(told[1]) if told else None
 
 
 def _flags(codes):

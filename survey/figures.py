@@ -1,15 +1,18 @@
-"""Dataset -> figure: the stability map, a variable with its colour bar, or a curve with its error band."""
+"""Dataset -> figure: the stability map, a variable with its colour bar, or a curve with its error band.
+
+Pictures are for the screen (`style` "screen") or for papers ("paper": column widths, no title, and hatching, so that
+verdicts differ in grey print too).
+"""
 
 import textwrap
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import matplotlib
 import numpy as np
-
-matplotlib.use("Agg", force=False)
-
-import matplotlib.pyplot as plt
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
@@ -24,6 +27,8 @@ from survey.grid import logarithmic
 # black is kept for undecided, white with hatching for failed
 COLOURS = ("#D55E00", "#A6D8F5", "#E69F00", "#F0E442", "#009E73", "#CC79A7", "#0072B2", "#999999", "#B8E0D2", "#5D3A9B")
 UNDECIDED = "#000000"
+HATCHES = ("//////", "", "....", "\\\\\\\\", "xxxx", "----", "||||", "++++", "oo", "**")  # of the COLOURS, in papers
+HATCHED = 500  # cells along an axis: hatching is drawn as outlines
 CELLS = 2000  # along an axis: more than a picture has pixels, and each costs a hundred bytes
 MARK_BELOW = 0.002  # a share of the map: rarer points are also marked with a ring, or nobody would see them
 _EDGES = "edges: even dark, odd grey;\nperiodic solid, antiperiodic dashed"
@@ -44,29 +49,74 @@ CURVES = {
 }
 
 
-def save(ds, path, name=None):
+@dataclass(frozen=True)
+class Look:
+    """A style: figure sizes in inches by width, and what matplotlib is told."""
+
+    sizes: Mapping[str, tuple[float, float]]
+    dpi: int
+    paper: bool = False
+    rc: Mapping[str, object] = field(default_factory=dict)
+
+
+_WIDE = (7.2, 5.2)
+STYLES = {
+    "screen": Look({"single": _WIDE, "double": _WIDE}, 150),
+    # columns of 85 and 175 mm; fonts are embedded as TrueType (42), as journals ask
+    "paper": Look({"single": (3.35, 2.9), "double": (6.89, 4.4)}, 600, True, {
+        "font.family": "STIXGeneral", "mathtext.fontset": "stix", "font.size": 9, "axes.labelsize": 9,
+        "xtick.labelsize": 8, "ytick.labelsize": 8, "axes.linewidth": 0.6, "xtick.major.width": 0.6,
+        "ytick.major.width": 0.6, "hatch.linewidth": 0.35, "pdf.fonttype": 42, "ps.fonttype": 42,
+        "svg.fonttype": "none",
+    }),
+}  # fmt: skip
+WIDTHS = ("single", "double")
+
+
+def look(style):
+    """The Look of a style's name (None: for the screen); raises BadInput for an unknown one."""
+    if style is not None and style not in STYLES:
+        raise BadInput(modules.unknown("style", style, list(STYLES)))
+    return STYLES[style or "screen"]
+
+
+def size(style, width):
+    """(width, height) in inches; raises BadInput for an unknown width."""
+    if width not in WIDTHS:
+        raise BadInput(modules.unknown("width", width, list(WIDTHS)))
+    return look(style).sizes[width]
+
+
+def save(ds, path, name=None, style=None, width="single"):
     """Draw variable `name` (the verdict, or the first output) of `ds` to `path` (PNG, PDF or SVG)."""
-    figure = draw(ds, name)
-    figure.savefig(path, dpi=150)
-    plt.close(figure)
+    with matplotlib.rc_context(look(style).rc):
+        draw(ds, name, style, width).savefig(path, dpi=look(style).dpi)
 
 
-def draw(ds, name=None):
-    """The matplotlib figure of one variable over the survey's axes; raises BadInput for an unknown variable."""
+def draw(ds, name=None, style=None, width="single"):
+    """The figure of one variable over the survey's axes, unknown to pyplot, which shows what it knows in notebooks."""
+    with matplotlib.rc_context(look(style).rc):
+        figure = Figure(figsize=size(style, width), layout="constrained")
+        onto(figure.subplots(), ds, name, style=style)
+    return figure
+
+
+def onto(axes, ds, name=None, boundaries=True, style=None):
+    """Draw one variable (the verdict, or the first output) onto matplotlib axes; BadInput for an unknown one."""
+    paper = look(style).paper
     drawable = [key for key in ds.data_vars if not key.endswith("_error") and set(ds[key].dims) >= set(ds.status.dims)]
     name = name or ("verdict" if "verdict" in ds else drawable[0])
     if name not in drawable:
         raise BadInput(modules.unknown("variable", name, drawable))
     variable, state = _flat(ds, name)
-    figure, axes = plt.subplots(figsize=(7.2, 5.2), layout="constrained")
     if variable.ndim == 2:
-        _map(axes, ds, variable, state)
+        _map(axes, ds, variable, state, boundaries, paper)
     elif variable.ndim == 1:
         _curve(axes, ds, variable, state)
     else:
         raise BadInput(f"{name} is a single number; a figure needs at least one axis")
-    axes.set_title(_title(ds, variable), fontsize=10)
-    return figure
+    if not paper:
+        axes.set_title(_title(ds, variable), fontsize=10)
 
 
 def _flat(ds, name):
@@ -76,36 +126,36 @@ def _flat(ds, name):
     return ds[name].isel(first), ds.status.isel({dim: 0 for dim in ds.status.dims if dim not in keep})
 
 
-def _map(axes, ds, variable, state):
+def _map(axes, ds, variable, state, boundaries, paper):
     x, y = (variable[dim] for dim in variable.dims)
     failed = np.isin(state.values, list(status.FAILURES))
     outside = state.values == status.INVALID_PARAMETERS
     if variable.name == "verdict" and "cell_verdict" in ds:
-        handles = _cells(axes, ds, x, y, failed)
+        handles = _cells(axes, ds, x, y, failed, paper)
     elif "flag_values" in variable.attrs:
-        handles = _verdicts(axes, x, y, variable, failed, outside)
+        handles = _verdicts(axes, x, y, variable, failed, outside, paper)
     else:
         some = _thinned(variable)
-        shown = np.where((failed | outside)[some], np.nan, variable.values[some].astype(float))
+        shown = np.where((failed | outside)[some], np.nan, variable[some].values.astype(float))
         shown = np.ma.masked_invalid(shown)
         look = {"cmap": "viridis", "shading": "nearest", "rasterized": True}
         drawn = axes.pcolormesh(x[some[0]], y[some[1]], shown.T, **look, **_limits(shown))
         whole = MaxNLocator(integer=True) if variable.dtype.kind == "i" else None
         axes.figure.colorbar(drawn, ax=axes, label=_label(variable), ticks=whole)
         axes.set_facecolor("#dddddd")
-        handles = _marks(axes, x, y, failed, "failed") + _marks(axes, x, y, outside, "outside the domain")
+        handles = _marks(axes, x, y, failed, "failed", paper) + _marks(axes, x, y, outside, "outside the domain", paper)
         handles += [Patch(color="#dddddd", label="does not apply")] if shown.mask.any() else []
-    if "curve_count" in ds:
-        handles += _curves(axes, _in_plane(ds, variable), x, y)
+    if boundaries and "curve_count" in ds:
+        handles += _curves(axes, in_plane(ds, variable), x, y)
     if handles:
-        _legend(axes, handles)
+        _legend(axes, handles, paper)
     for axis, coord in ((axes.xaxis, x), (axes.yaxis, y)):
         axis.set_label_text(_label(coord))
         if logarithmic(coord.values):
             (axes.set_xscale if axis is axes.xaxis else axes.set_yscale)("log")
 
 
-def _in_plane(ds, variable):
+def in_plane(ds, variable):
     """The curves of the plane that is drawn, where a third axis makes a stack of planes."""
     deeper = [c for c in variable.coords.values() if c.ndim == 0 and c.name in ds.dims and f"curve_{c.name}" in ds]
     if not deeper:
@@ -117,26 +167,34 @@ def _in_plane(ds, variable):
     return ds.isel(curve_point=here, curve=here[firsts])
 
 
+def curves_of(ds):
+    """{class: slices of its curves in `curve_point`}, in the order in which they are drawn."""
+    names = {code: name for name, code in _flags(ds.curve_class).items()}
+    kinds, ends = ds.curve_class.values, np.cumsum(ds.curve_count.values)
+    found = {}
+    for kind, last, number in zip(kinds, ends, ds.curve_count.values, strict=True):
+        found.setdefault(names[kind], []).append(slice(int(last - number), int(last)))
+    return {name: found[name] for name in CURVES if name in found}
+
+
 def _curves(axes, ds, x, y):
     """The boundaries over the map, points above lines, and their legend handles."""
-    names = {code: name for name, code in _flags(ds.curve_class).items()}
-    kinds = np.array([list(CURVES).index(names[code]) for code in ds.curve_class.values], int)
-    ends, handles = np.cumsum(ds.curve_count.values), {}
-    for own in np.argsort(kinds, kind="stable"):
-        label, look = list(CURVES.values())[kinds[own]]
-        points = slice(ends[own] - int(ds.curve_count[own]), ends[own])
-        over = 2 if "marker" not in look else 3
-        axes.plot(
-            ds[f"curve_{x.name}"].values[points], ds[f"curve_{y.name}"].values[points], clip_on=over < 3, **look,
-            zorder=over,
-        )  # fmt: skip
+    handles = {}
+    for name, parts in curves_of(ds).items():
+        label, look = CURVES[name]
+        over = 3 if "marker" in look else 2
+        for own in parts:
+            axes.plot(
+                ds[f"curve_{x.name}"].values[own], ds[f"curve_{y.name}"].values[own], clip_on=over < 3, **look,
+                zorder=over,
+            )  # fmt: skip
         handles.setdefault(label, Line2D([], [], label=label, **look))
     if "cell_verdict" not in ds:
         axes.set(xlim=_widened(x.values)[[0, -1]], ylim=_widened(y.values)[[0, -1]])
     return list(handles.values())
 
 
-def _cells(axes, ds, x, y, failed):
+def _cells(axes, ds, x, y, failed, paper):
     """The map's cells instead of its points, with the area of each verdict. Returns the handles."""
     left, right, low, high = (ds[f"cell_{axis.name}_{end}"].values for axis in (x, y) for end in ("low", "high"))
     corners = np.stack([left, low, left, high, right, high, right, low], axis=1).reshape(-1, 4, 2)
@@ -148,15 +206,19 @@ def _cells(axes, ds, x, y, failed):
         # without smoothing there are no seams between neighbours; a hairline keeps small undecided cells in sight
         line = {"edgecolors": "none", "antialiased": False}
         line = {"edgecolors": colour, "lw": 0.4, "snap": False} if name == "undecided" else line
+        hatch = _hatch(table, name) if paper else None
         axes.add_collection(PolyCollection(corners[own], facecolors=colour, rasterized=True, **line))
+        if hatch:
+            axes.add_collection(PolyCollection(corners[own], facecolors="none", lw=0, hatch=hatch, rasterized=True))
         part = percent(shares[name], float(ds.area_fraction_error[0])) if name in shares else f"{own.sum():,} cells"
         part = part.replace("+-", "±")
-        handles += [Patch(facecolor=colour, edgecolor="black", lw=0.5, label=f"{name} ({part})")] if own.any() else []
+        patch = Patch(facecolor=colour, edgecolor="black", lw=0.5, hatch=hatch, label=f"{name} ({part})")
+        handles += [patch] if own.any() else []
     axes.set(xlim=(left.min(), right.max()), ylim=(low.min(), high.max()))
-    return handles + _marks(axes, x, y, failed, "failed")
+    return handles + _marks(axes, x, y, failed, "failed", paper)
 
 
-def _verdicts(axes, x, y, variable, failed, outside):
+def _verdicts(axes, x, y, variable, failed, outside, paper):
     """A colour per flag; failed and outside points white and hatched; rare points ringed. Returns the handles."""
     table = _flags(variable)
     palette = _palette(table)
@@ -174,14 +236,41 @@ def _verdicts(axes, x, y, variable, failed, outside):
             facecolor=palette.get(names[code], "#444444"),
             edgecolor="black",
             linewidth=0.5,
-            label=_counted(names[code], number),
+            hatch=_hatch(table, names[code]) if paper else None,
+            label=names[code].replace("_", " ") if paper else _counted(names[code], number),
         )
         for code in codes
         if number[names[code]] and names[code] != "undecided"
     ]
-    handles += _marks(axes, x, y, (shown == table.get("undecided", -1)).filled(False), "undecided", UNDECIDED)
-    handles += _marks(axes, x, y, failed, "failed") + _marks(axes, x, y, outside, "outside the domain")
+    if paper:
+        for code in codes:
+            if number[names[code]] and _hatch(table, names[code]):
+                _hatched(axes, x, y, (shown == code).filled(False), _hatch(table, names[code]))
+    undecided = (shown == table.get("undecided", -1)).filled(False)
+    handles += _marks(axes, x, y, undecided, "undecided", paper, UNDECIDED)
+    handles += _marks(axes, x, y, failed, "failed", paper) + _marks(axes, x, y, outside, "outside the domain", paper)
     return handles
+
+
+def _hatch(table, name):
+    """The hatching of a meaning in papers; none of undecided, which is black."""
+    meant = [other for other in table if other != "undecided"]
+    return HATCHES[meant.index(name) % len(HATCHES)] if name in meant and "ok" not in table else ""
+
+
+def _hatched(axes, x, y, where, hatch):
+    """Hatch the cells of the points `where`, along the edges of the cells."""
+    some = tuple(slice(None, None, -(-length // HATCHED)) for length in where.shape)
+    x, y, where = _cornered(x.values[some[0]]), _cornered(y.values[some[1]]), where[some]
+    doubled = np.repeat(np.repeat(where.T.astype(float), 2, axis=0), 2, axis=1)
+    axes.contourf(x, y, doubled, levels=[0.5, 1.5], colors="none", hatches=[hatch])
+
+
+def _cornered(values):
+    """Each cell's two edges, cell after cell."""
+    middles = 0.5 * (values[1:] + values[:-1])
+    outer = _widened(values)[[0, -1]]
+    return np.concatenate([outer[:1], np.repeat(middles, 2), outer[1:]])
 
 
 def _thinned(variable):
@@ -202,10 +291,10 @@ def _palette(table):
     return {"undecided": UNDECIDED, "ok": COLOURS[1]} | dict(zip(meant, first, strict=False))
 
 
-def _marks(axes, x, y, where, label, colour="white"):
+def _marks(axes, x, y, where, label, paper=False, colour="white"):
     """Show the points `where`: hatched where they fill an area, ringed where they are rare; their legend handle."""
     total = int(where.sum())
-    label = f"{label} ({total:,})"
+    label = label if paper else f"{label} ({total:,})"
     if total == 0:
         return []
     if total <= MARK_BELOW * where.size:
@@ -255,9 +344,15 @@ def _curve(axes, ds, variable, state):
         axes.set_xscale("log")
 
 
-def _legend(axes, handles):
-    columns = min(4, len(handles))
-    axes.figure.legend(handles=handles, frameon=False, fontsize=8, loc="outside lower center", ncols=columns)
+def _legend(axes, handles, paper):
+    """Below: of the figure where the axes fill it, else of the axes."""
+    columns = 2 if paper and axes.figure.get_size_inches()[0] < 5 else 4
+    look = {"handles": handles, "frameon": False, "fontsize": 8, "ncols": min(columns, len(handles))}
+    alone = [other for other in axes.figure.axes if other.get_label() != "<colorbar>"] == [axes]
+    if alone and axes.figure.get_constrained_layout():
+        axes.figure.legend(loc="outside lower center", **look)
+    else:
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), **look)
 
 
 def _limits(shown):
@@ -275,9 +370,11 @@ def _label(variable):
     """`long name, symbol (unit)`."""
     symbol, units = variable.attrs.get("symbol", ""), variable.attrs.get("units", "1")
     text = variable.attrs.get("long_name", variable.name)
-    text += f", ${symbol}$" if symbol and "flag_values" not in variable.attrs else ""
+    shown = symbol and "flag_values" not in variable.attrs
+    text += ", $$" if shown else ""  # TeX is wider than what it shows: wrapped without it
     text += "" if units in ("1", "") else f" ({units})"
-    return textwrap.fill(text, 42, break_long_words=False)
+    wrapped = textwrap.fill(text, 40, break_long_words=False)
+    return wrapped.replace("$$", f"${symbol}$") if shown else wrapped
 
 
 def _title(ds, variable):

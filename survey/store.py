@@ -308,9 +308,10 @@ class Output:
         write_atomically(beside, line.encode())
 
 
-def load(path):
+def load(path, chunks="auto"):
     """The complete dataset in `path`: in memory and the file closed if it takes at most IN_MEMORY bytes, else lazy.
 
+    Lazy means dask arrays; with `chunks` None, arrays that read from the file what is indexed, at once.
     Raises BadInput or Damaged.
     """
     import xarray as xr
@@ -323,7 +324,7 @@ def load(path):
             _refuse_foreign(path, ds)
             if ds.nbytes <= IN_MEMORY:
                 return ds.load()
-        return xr.open_dataset(path, engine="netcdf4", chunks="auto")
+        return xr.open_dataset(path, engine="netcdf4", chunks=chunks)
     except SurveyError:
         raise
     except (OSError, RuntimeError, ValueError) as error:

@@ -1,0 +1,322 @@
+"""The page in the browser: the map, what lies under the pointer, and the chosen point with its motion."""
+
+import html
+import io
+from base64 import b64encode
+
+import numpy as np
+from bokeh import events
+from bokeh.core.property.descriptors import UnsetValueError
+from bokeh.layouts import column, row
+from bokeh.models import Checkbox, ColorBar, CustomJS, Div, Label, LinearColorMapper, Range1d, Select, Slider
+from bokeh.palettes import Viridis256
+from bokeh.plotting import figure
+from matplotlib.figure import Figure
+
+from survey import figures
+from survey.errors import BadInput, SurveyError
+from survey.viewer import raster
+from survey.viewer.shown import short
+
+SIDE, WIDTH = 510, 470  # width in pixels of what stands beside the map, and of its parts
+SOON = 30  # ms: changes that follow each other faster are answered once
+RINGS = 100  # pixels with undecided or failed points: if they are fewer, each is ringed
+RED = "#D40000"
+CURVE_POINTS = 300_000  # edges of more points are thinned
+MARKERS = {"D": "diamond", "o": "circle"}
+CLICK = "Click a point of the map to see its motion and everything known of it."
+# the model's name carries the link into the address bar
+KEEP_LINK = "window.history.replaceState(null, '', '?' + cb_obj.name)"
+
+
+class Page:
+    """One page in a browser, on the survey `shown` (a `shown.Map`)."""
+
+    def __init__(self, shown, document):
+        self.map, self.document, self.waiting, self.pointer = shown, document, set(), None
+        self.caption = Div(width=WIDTH, styles={"color": "#555555"})
+        self.view = self._from_link(document.session_context.request.arguments)
+        self._plot()
+        self._side()
+        document.add_root(row(self.plot, self.side, sizing_mode="stretch_both"))
+        document.title = html.escape(shown.ds.attrs["title"])
+        if self.curves:
+            self._fill()
+        self.changed()
+        if self.view.point is not None:
+            self.choose(self.view.point)
+
+    def _from_link(self, arguments):
+        told = [f"{key}={values[0].decode()}" for key, values in arguments.items() if not key.startswith("bokeh-")]
+        try:
+            self.complaint = ""
+            return self.map.read("&".join(told))
+        except BadInput as error:
+            self.complaint = f"the link is not followed: {error}; "
+            return self.map.read("")
+
+    def _plot(self):
+        axes = self.map.axes
+        ranges = [
+            Range1d(*ends, bounds=axis.ends, reset_start=axis.ends[0], reset_end=axis.ends[1])
+            for ends, axis in zip(self.view.window, axes, strict=True)
+        ]
+        scales = ["log" if axis.log else "linear" for axis in axes]
+        plot = self.plot = figure(
+            x_range=ranges[0], y_range=ranges[1], x_axis_type=scales[0], y_axis_type=scales[1],
+            tools="pan,wheel_zoom,box_zoom,reset,save", active_scroll="wheel_zoom", background_fill_color="#f4f4f4",
+            sizing_mode="stretch_both", min_width=300, min_height=300, stylesheets=[":host(:focus) {outline: none}"],
+        )  # fmt: skip
+        plot.xaxis.axis_label, plot.yaxis.axis_label = (_label(self.map.ds[dim]) for dim in self.map.dims)
+        plot.grid.visible, plot.toolbar.logo = False, None
+        place = {"x": [], "y": []}
+        self.image = plot.image_rgba(source=place | {"image": [], "dw": [], "dh": []}, **IMAGE).data_source
+        self.curves = dict(self._curves())
+        look = {"size": 9, "line_color": RED, "line_width": 2, "fill_color": "colour"}
+        self.rings = plot.scatter("x", "y", source=place | {"colour": []}, **look).data_source
+        look = {"size": 20, "marker": "circle_x", "line_color": "white", **HOLLOW}
+        self.chosen = plot.scatter("x", "y", source=dict(place), **look).data_source
+        plot.scatter("x", "y", source=self.chosen, **look | {"line_color": "black", "line_width": 1})
+        self.near = Label(**LABEL)
+        self.bar = ColorBar(color_mapper=LinearColorMapper(Viridis256), visible=False)
+        plot.add_layout(self.near)
+        plot.add_layout(self.bar, "right")
+        self._listen()
+
+    def _listen(self):
+        plot = self.plot
+        for ends in (plot.x_range, plot.y_range):
+            _on(ends, ("start", "end"), lambda: self.soon(self.changed))
+        _on(plot, ("inner_width", "inner_height"), lambda: self.soon(self.draw))
+        plot.on_event(events.MouseMove, self._moved)
+        plot.on_event(events.MouseLeave, self._left)
+        plot.on_event(events.Tap, self._tapped)
+        plot.js_on_change("name", CustomJS(code=KEEP_LINK))
+
+    def _curves(self):
+        """A renderer for each class of the boundaries, with the looks of `survey.figures`."""
+        for name in figures.curves_of(self.map.ds) if "curve_count" in self.map.ds else ():
+            _, look = figures.CURVES[name]
+            if "marker" in look:
+                style = {"marker": MARKERS[look["marker"]], "size": 1.6 * look["ms"], "line_color": look["mec"]}
+                yield name, self.plot.scatter("x", "y", source={"x": [], "y": []}, fill_color=look["mfc"], **style)
+                continue
+            dash = "solid" if look["ls"] == "-" else list(look["ls"][1])
+            style = {"line_dash": dash, "line_width": 1.5 * look["lw"]}
+            yield name, self.plot.multi_line("x", "y", source={"x": [], "y": []}, line_color=look["color"], **style)
+
+    def _fill(self):
+        """Show the boundaries of the plane that is seen."""
+        others = {dim: at for dim, at in self.view.others.items() if dim in self.map.ds[self.view.name].dims}
+        ds = figures.in_plane(self.map.ds, self.map.ds[self.view.name].isel(others))
+        x, y = (ds[f"curve_{dim}"].values for dim in self.map.dims)
+        thin, found = max(1, x.size // CURVE_POINTS), figures.curves_of(ds)
+        for name, curve in self.curves.items():
+            parts = [slice(own.start, own.stop, thin) for own in found.get(name, [])]
+            points = [x[own] for own in parts], [y[own] for own in parts]
+            if "marker" in figures.CURVES[name][1]:
+                points = [np.concatenate([*values, []]) for values in points]
+            curve.data_source.data = dict(zip("xy", points, strict=True))
+
+    def _side(self):
+        ds, view = self.map.ds, self.view
+        self.variable = Select(title="variable", value=view.name, options=self.map.names, width=WIDTH)
+        _on(self.variable, ("value",), self.changed)
+        told = "; ".join(dict.fromkeys(figures.CURVES[name][0] for name in self.curves)).replace("\n", " ")
+        self.edges = Checkbox(label=told, active=view.boundaries, visible=bool(self.curves))
+        _on(self.edges, ("active",), self.changed)
+        self.sliders = {
+            dim: Slider(start=0, end=ds.sizes[dim] - 1, value=at, show_value=False, width=WIDTH)
+            for dim, at in view.others.items()
+            if ds.sizes[dim] > 1
+        }
+        for slider in self.sliders.values():
+            _on(slider, ("value",), self.changed)
+            if self.curves:
+                _on(slider, ("value",), self._fill)
+            _on(slider, ("value_throttled",), lambda: self.choose(self.view.point))
+        title = f"<b>{html.escape(ds.attrs['title'])}</b><br>{html.escape(ds.attrs['options'])}"
+        self.legend, self.motion, self.known = (Div(width=WIDTH) for _ in range(3))
+        self.motion.text = CLICK
+        told = [self.legend, self.caption, self.motion, self.known]
+        parts = [Div(text=title, width=WIDTH), self.variable, *self.sliders.values(), self.edges, *told]
+        look = {"overflow-x": "hidden", "overflow-y": "auto", "padding-left": "10px"}
+        self.side = column(*parts, width=SIDE, sizing_mode="stretch_height", styles=look)
+
+    def soon(self, function):
+        """Call the method once, shortly, however often it is asked for until then."""
+        if function.__name__ in self.waiting:
+            return
+        self.waiting.add(function.__name__)
+
+        def call():
+            self.waiting.discard(function.__name__)
+            function()
+
+        self.document.add_timeout_callback(call, SOON)
+
+    def changed(self):
+        """Take over what the user has chosen, tell it in the link, and draw it."""
+        view, plot, ds = self.view, self.plot, self.map.ds
+        view.name, view.boundaries = self.variable.value, self.edges.active
+        view.window = [(ends.start, ends.end) for ends in (plot.x_range, plot.y_range)]
+        for dim, slider in self.sliders.items():
+            view.others[dim] = int(slider.value)
+            slider.visible = dim in (*ds.status.dims, *ds[view.name].dims)
+            slider.title = f"{dim} = {short(ds[dim].values[view.others[dim]])}"
+        for curve in self.curves.values():
+            curve.visible = view.boundaries
+        plot.name = self.map.link(view)
+        if not self.map.layer(view).ready:
+            self._say(f"reading {ds.status.size:,} points, once ...")
+        self.soon(self.draw)
+
+    def draw(self):
+        """Draw the window of the map that is seen, its legend, and what a pixel stands for."""
+        layer = self.map.layer(self.view)
+        try:
+            sizes = self.plot.inner_width, self.plot.inner_height
+        except UnsetValueError:  # the browser has not told it yet
+            return
+        xs, ys = (
+            axis.pixels(*window, size)
+            for axis, window, size in zip(self.map.axes, self.view.window, sizes, strict=True)
+        )
+        if xs is None or ys is None:
+            return
+        mask, value = layer.pixels(xs, ys)
+        corner = {
+            "x": [xs.ends[0]],
+            "y": [ys.ends[0]],
+            "dw": [xs.ends[1] - xs.ends[0]],
+            "dh": [ys.ends[1] - ys.ends[0]],
+        }
+        self.image.data = corner | {"image": [raster.paint(mask, value, layer)]}
+        kinds = raster.rarest(mask, layer)
+        self._ring(mask, layer, kinds, xs, ys)
+        self._legend(layer, kinds, value)
+        several = f"a pixel stands for up to {xs.points} × {ys.points} points" if max(xs.points, ys.points) > 1 else ""
+        shows = "its rarest kind" if layer.flagged else "the value largest in magnitude"
+        self._say(self.complaint + (f"{several} and shows {shows}" if several else ""))
+
+    def _say(self, words):
+        self.caption.update(text=html.escape(words), visible=bool(words))
+
+    def _ring(self, mask, layer, kinds, xs, ys):
+        """Ring the pixels with undecided or failed points, where these are few."""
+        few = [kind for kind in ("undecided", "failed") if 0 < kinds.get(kind, 0) <= RINGS]
+        places = [(*np.nonzero(mask & layer.bits[kind]), layer.kinds[kind]) for kind in few]
+        self.rings.data = {
+            "x": [x for _, j, _ in places for x in xs.middles[j]],
+            "y": [y for i, _, _ in places for y in ys.middles[i]],
+            "colour": [colour for i, _, colour in places for _ in i],
+        }
+
+    def _legend(self, layer, kinds, value):
+        """The kinds that are seen, with their share of the whole map; or the colour bar."""
+        ds, name = self.map.ds, self.view.name
+        shares = self.map.shares(name)
+        entries = [(kind, layer.kinds[kind]) for kind in layer.kinds if kind in kinds]
+        if value is not None and np.isnan(value).any():
+            entries.append(("does not apply", raster.NOT_APPLY))
+        self.legend.text = "".join(
+            f"<span style='{ENTRY}'><span style='{SWATCH};background:{_swatch(kind, colour)}'></span>"
+            f"{html.escape(kind.replace('_', ' '))}{shares.get(kind, '')}</span> "
+            for kind, colour in entries
+        )
+        self.bar.visible = not layer.flagged
+        if not layer.flagged:
+            self.bar.color_mapper.update(low=layer.limits[0], high=layer.limits[1])
+            self.bar.title = _label(ds[name], tex=False)
+
+    def _moved(self, event):
+        if event.x is not None:
+            self.pointer = event.x, event.y
+            self.soon(self.tell)
+
+    def _left(self, _):
+        self.pointer, self.near.visible = None, False
+
+    def tell(self):
+        """Show what is known of the point under the pointer, on that side of it where there is room."""
+        point = self._place(*self.pointer) if self.pointer else None
+        if point is None:
+            self.near.visible = False
+            return
+        (x, y), words = self.pointer, "\n".join(self.map.under(self.view, point))
+        left, low = (
+            np.mean(axis.scaled(np.array(window))) < axis.scaled(at)
+            for axis, window, at in zip(self.map.axes, self.view.window, (x, y), strict=True)
+        )
+        self.near.update(
+            x=x, y=y, text=words, visible=True, anchor=f"{'top' if low else 'bottom'}_{'right' if left else 'left'}",
+            x_offset=-12 if left else 12, y_offset=-12 if low else 12,
+        )  # fmt: skip
+
+    def _place(self, x, y):
+        """Places of the point in whose cell the position lies, or None."""
+        point = tuple(axis.nearest(at) for axis, at in zip(self.map.axes, (x, y), strict=True))
+        return None if None in point else point
+
+    def _tapped(self, event):
+        self.choose(self._place(event.x, event.y))
+
+    def choose(self, point):
+        """Choose a point, or none; its motion follows."""
+        self.view.point = point
+        if point is None:
+            return
+        x, y = self.map.position(point)
+        self.chosen.data = {"x": [x], "y": [y]}
+        self.plot.name = self.map.link(self.view)
+        self.motion.text, self.known.text = "solving this point in time ...", ""
+        self.soon(self.solve)
+
+    def solve(self):
+        """Show the motion of the chosen point, and everything that is known of it."""
+        coords = self.map.coords(self.view)
+        answers = self.map.ds.survey
+        try:
+            drawn = Figure(figsize=(6.8, 3.6), layout="constrained")
+            answers.trajectory(figure=drawn, **coords)
+            self.motion.text = _picture(drawn)
+        except SurveyError as error:
+            self.motion.text = f"no motion: {html.escape(str(error))}"
+        self.known.text = answers.point(**coords)._repr_html_()
+
+
+ENTRY = "white-space:nowrap;margin-right:14px"
+SWATCH = "display:inline-block;width:13px;height:13px;border:1px solid #555;vertical-align:-2px;margin-right:5px"
+HOLLOW = {"fill_alpha": 0, "line_width": 2.5}
+IMAGE = {key: key for key in ("image", "x", "y", "dw", "dh")} | {"level": "image"}
+LABEL = {
+    "x": 0, "y": 0, "text": "", "visible": False, "text_font_size": "12px", "text_line_height": 1.35, "padding": 6,
+    "background_fill_color": "white", "background_fill_alpha": 0.92, "border_line_color": "#888888",
+}  # fmt: skip
+
+
+def _on(model, properties, call):
+    """Call when one of the model's properties has changed."""
+    for name in properties:
+        model.on_change(name, lambda attr, old, new: call())
+
+
+def _picture(drawn):
+    """A matplotlib figure as HTML."""
+    file = io.BytesIO()
+    drawn.savefig(file, format="png", dpi=150)
+    return f"<img class='motion' style='width:100%' src='data:image/png;base64,{b64encode(file.getvalue()).decode()}'>"
+
+
+def _swatch(kind, colour):
+    if kind not in raster.NO_ANSWER:
+        return colour
+    lines = [f"repeating-linear-gradient({angle}deg,#777 0 1px,transparent 1px 4px)" for angle in (45, 135)]
+    return ",".join(lines[: 2 if kind == "failed" else 1]) + ",white"
+
+
+def _label(variable, tex=True):
+    """`long name, symbol (unit)`."""
+    symbol, units = variable.attrs.get("symbol", ""), variable.attrs.get("units", "1")
+    text = variable.attrs.get("long_name", variable.name) + (f", $${symbol}$$" if symbol and tex else "")
+    return text + ("" if units in ("1", "") else f" ({units})")

@@ -1,0 +1,154 @@
+"""A survey's file and a view of it: the link that tells the view, and what is known of a point in a few lines."""
+
+import textwrap
+from dataclasses import dataclass, field
+from functools import lru_cache
+from math import isfinite
+from urllib.parse import parse_qsl, urlencode
+
+from survey import modules, status, store
+from survey.analysis.point import _sentence, _told, meaning
+from survey.dataset import percent
+from survey.errors import BadInput
+from survey.figures import _flags
+from survey.viewer import raster
+
+LINES = 6  # outputs told of the point under the pointer
+
+
+@dataclass
+class View:
+    """A variable, the window [(x low, high), (y low, high)], places in the other dimensions, and the chosen point's."""
+
+    name: str
+    boundaries: bool = True
+    window: list = field(default_factory=list)
+    others: dict = field(default_factory=dict)
+    point: tuple | None = None
+
+
+class Map:
+    """A survey's file, lazy if it is large, and its two axes; raises BadInput or Damaged for a file that has no map."""
+
+    def __init__(self, path):
+        ds = store.load(path, chunks=None)
+        if len(ds.status.dims) < 2:
+            raise BadInput(f"{path}: this survey has no two axes, so there is no map to view; draw it with survey plot")
+        self.dims = ds.status.dims[:2]
+        down = [dim for dim in self.dims if ds[dim].values[0] > ds[dim].values[-1]]
+        self.ds = ds.isel({dim: slice(None, None, -1) for dim in down})
+        self.axes = [raster.Axis(self.ds[dim].values) for dim in self.dims]
+        own = set(ds.status.dims)
+        self.names = [name for name, v in ds.data_vars.items() if own <= set(v.dims) and not name.endswith("_error")]
+        # dimensions beside the two: of the survey, and of some outputs
+        self.others = list(dict.fromkeys(dim for name in self.names for dim in ds[name].dims if dim not in self.dims))
+        self._layers = lru_cache(maxsize=8)(self._layer)
+
+    def layer(self, view):
+        """The view's variable, ready to be drawn; the last few are kept."""
+        return self._layers(view.name, tuple((dim, view.others[dim]) for dim in self.of(view.name)))
+
+    def of(self, name):
+        """The dimensions of a variable beside the map's two."""
+        return [dim for dim in self.others if dim in self.ds[name].dims]
+
+    def _layer(self, name, place):
+        cells = name == "verdict" and "cell_verdict" in self.ds
+        return (raster.CellLayer if cells else raster.Layer)(self.ds, name, self.dims, dict(place))
+
+    def read(self, query):
+        """The View that a link's query tells; raises BadInput where it tells none of this map."""
+        told = dict(parse_qsl(query))
+        allowed = ["var", "boundaries", "x", "y", "point", *(f"at_{dim}" for dim in self.others)]
+        for key in told:
+            if key not in allowed:
+                raise BadInput(modules.unknown("key of the link", key, allowed))
+        view = View(told.get("var", "verdict" if "verdict" in self.names else self.names[0]))
+        if view.name not in self.names:
+            raise BadInput(modules.unknown("variable", view.name, self.names))
+        view.boundaries = told.get("boundaries") != "0"
+        for at, axis in zip("xy", self.axes, strict=True):
+            view.window.append(_numbers(at, told[at], 2) if at in told else axis.ends)
+            if not view.window[-1][0] < view.window[-1][1] or axis.pixels(*view.window[-1], 1) is None:
+                raise BadInput(f"{at} = {told[at]}: give low,high of a range that meets the map's, {axis.told}")
+        if "point" in told:
+            numbers = _numbers("point", told["point"], 2)
+            view.point = tuple(axis.nearest(value) for axis, value in zip(self.axes, numbers, strict=True))
+            if None in view.point:
+                raise BadInput(
+                    f"point = {told['point']}: it lies outside the map, {' by '.join(a.told for a in self.axes)}"
+                )
+        for dim in self.others:
+            (value,) = _numbers(f"at_{dim}", told.get(f"at_{dim}", "0"), 1)
+            if value not in range(self.ds.sizes[dim]):
+                raise BadInput(f"at_{dim} = {value:g}: it must be a place in that axis, 0 to {self.ds.sizes[dim] - 1}")
+            view.others[dim] = int(value)
+        return view
+
+    def link(self, view):
+        """The query that `read` reads."""
+        told = {"var": view.name}
+        told |= {at: ",".join(repr(float(end)) for end in ends) for at, ends in zip("xy", view.window, strict=True)}
+        told |= {} if view.boundaries else {"boundaries": 0}
+        told |= {f"at_{dim}": at for dim, at in view.others.items() if at}
+        if view.point is not None:
+            told["point"] = ",".join(repr(value) for value in self.position(view.point))
+        return urlencode(told, safe=",")
+
+    def shares(self, name):
+        """{flag: how much of the whole map bears it, in words}."""
+        ds = self.ds
+        if name == "verdict" and "area_fraction" in ds:
+            shares = zip(_flags(ds.area_verdict), ds.area_fraction.values, ds.area_fraction_error.values, strict=True)
+            return {flag: f" ({percent(share, bar)})".replace("+-", "±") for flag, share, bar in shares}
+        told = ds.attrs.get(f"{name}_counts", "")
+        counts = (part.split(": ") for part in told.split(", ") if part)
+        return {flag: f" ({int(number):,} in all)" for flag, number in counts}
+
+    def position(self, point):
+        """The coordinates (x, y) of a point's places."""
+        return tuple(float(axis.values[at]) for axis, at in zip(self.axes, point, strict=True))
+
+    def coords(self, view):
+        """{axis: value} of the chosen point, for the survey's accessor."""
+        place = dict(zip(self.dims, view.point, strict=True)) | view.others
+        return {dim: float(self.ds[dim].values[place[dim]]) for dim in self.ds.status.dims}
+
+    def under(self, view, point):
+        """What is known of the point at these two places, in lines; the view's variable first."""
+        ds = self.ds
+        names = dict.fromkeys([view.name, *(["verdict"] if "verdict" in ds else []), *self.names])
+        names = [name for name in names if name != "status"][:LINES]
+        bars = [f"{name}_error" for name in names if f"{name}_error" in ds]
+        here = ds[[*names, *bars, "status"]].isel(dict(zip(self.dims, point, strict=True)) | view.others).load()
+        yield ", ".join(f"{dim} = {short(here[dim].values)}" for dim in ds.status.dims)
+        if view.name == "verdict" and "cell_verdict" in ds:
+            yield from self._cell(*self.position(point))
+        if here.status != status.OK:
+            yield from textwrap.wrap(_sentence(here), 60)
+        for name in names:
+            value = _told(here, name, f"{name}_error" in bars).replace("+-", "±")
+            yield f"{name}: {value.replace('_', ' ')}" if "flag_values" in here[name].attrs else f"{name} = {value}"
+
+    def _cell(self, *position):
+        """The verdict of the cell that holds the point of a refined map."""
+        inside, ds = True, self.ds
+        for dim, value in zip(self.dims, position, strict=True):
+            inside &= (ds[f"cell_{dim}_low"].values <= value) & (value <= ds[f"cell_{dim}_high"].values)
+        yield from (f"cell: {meaning(found)}" for found in ds.cell_verdict[inside][:1])
+
+
+def short(value):
+    """A coordinate, number or label, for a reader."""
+    return f"{value:.8g}" if value.dtype.kind == "f" else str(value)
+
+
+def _numbers(key, words, number):
+    """The finite numbers in `words`, separated by commas."""
+    try:
+        found = tuple(float(word) for word in words.split(","))
+    except ValueError:
+        found = ()
+    if len(found) != number or not all(map(isfinite, found)):
+        raise BadInput(f"{key} = {words}: it must be {number} number{'s, separated by a comma' * (number > 1)}")
+    return found
