@@ -11,6 +11,7 @@ Importing this package compiles nothing and loads nothing heavy.
 """
 
 from importlib import import_module
+from typing import TYPE_CHECKING
 
 _HOME = {"run": "survey.api", "evaluate": "survey.api", "open": "survey.api", "hill": "survey.own"}
 _HOME |= {
@@ -21,14 +22,25 @@ _HOME |= {
 }
 __all__ = sorted([*_HOME, "scenes"])
 
+if TYPE_CHECKING:  # what a type checker sees; the same names as in _HOME
+    from survey.api import evaluate as evaluate
+    from survey.api import open as open
+    from survey.api import run as run
+    from survey.api import scenes as scenes
+    from survey.errors import BadInput as BadInput
+    from survey.errors import Damaged as Damaged
+    from survey.errors import Stopped as Stopped
+    from survey.errors import SurveyError as SurveyError
+    from survey.own import hill as hill
+else:
 
-def __getattr__(name):
-    if name == "scenes":  # a folder that can be called
-        return import_module("survey.scenes")
-    if name in _HOME:
-        return getattr(import_module(_HOME[name]), name)
-    raise AttributeError(f"module 'survey' has no attribute {name!r}")
+    def __getattr__(name):
+        if name == "scenes":  # a folder that can be called
+            return import_module("survey.scenes")
+        if name in _HOME:
+            return getattr(import_module(_HOME[name]), name)
+        raise AttributeError(f"module 'survey' has no attribute {name!r}")
 
 
-def __dir__():
+def __dir__() -> list[str]:
     return sorted([*globals(), *_HOME])
