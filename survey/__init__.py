@@ -7,11 +7,13 @@
     survey.scenes()                                              # the scenes and what they answer
     ds = survey.open("results/satellite_prolate.nc")             # open and check a file
 
+    ds.survey.map()                                              # xarray datasets get an accessor: survey/accessor.py
+
 Importing this package compiles nothing and loads nothing heavy.
 """
 
+import sys
 from importlib import import_module
-from typing import TYPE_CHECKING
 
 _HOME = {"run": "survey.api", "evaluate": "survey.api", "open": "survey.api", "hill": "survey.own"}
 _HOME |= {
@@ -22,25 +24,42 @@ _HOME |= {
 }
 __all__ = sorted([*_HOME, "scenes"])
 
-if TYPE_CHECKING:  # what a type checker sees; the same names as in _HOME
-    from survey.api import evaluate as evaluate
-    from survey.api import open as open
-    from survey.api import run as run
-    from survey.api import scenes as scenes
-    from survey.errors import BadInput as BadInput
-    from survey.errors import Damaged as Damaged
-    from survey.errors import Stopped as Stopped
-    from survey.errors import SurveyError as SurveyError
-    from survey.own import hill as hill
+
+class _AfterXarray:
+    """Makes `ds.survey` known as soon as xarray is imported, by anyone: importing it here would take half a second."""
+
+    def find_spec(self, name, path=None, target=None):
+        if name != "xarray":
+            return None
+        specs = (finder.find_spec(name, path, target) for finder in sys.meta_path if finder is not self)
+        spec = next(filter(None, specs), None)
+        if spec is not None:
+            spec.loader.exec_module = self._registering(spec.loader.exec_module)
+        return spec
+
+    def _registering(self, execute):
+        def execute_and_register(module):
+            execute(module)
+            if self in sys.meta_path:
+                sys.meta_path.remove(self)
+                import_module("survey.accessor")
+
+        return execute_and_register
+
+
+if "xarray" in sys.modules:
+    import_module("survey.accessor")
 else:
-
-    def __getattr__(name):
-        if name == "scenes":  # a folder that can be called
-            return import_module("survey.scenes")
-        if name in _HOME:
-            return getattr(import_module(_HOME[name]), name)
-        raise AttributeError(f"module 'survey' has no attribute {name!r}")
+    sys.meta_path.insert(0, _AfterXarray())
 
 
-def __dir__() -> list[str]:
+def __getattr__(name):
+    if name == "scenes":  # a folder that can be called
+        return import_module("survey.scenes")
+    if name in _HOME:
+        return getattr(import_module(_HOME[name]), name)
+    raise AttributeError(f"module 'survey' has no attribute {name!r}")
+
+
+def __dir__():
     return sorted([*globals(), *_HOME])

@@ -2,14 +2,10 @@
 
 import textwrap
 
-import matplotlib
 import numpy as np
-
-matplotlib.use("Agg", force=False)
-
-import matplotlib.pyplot as plt
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
@@ -23,6 +19,7 @@ from survey.grid import logarithmic
 # black is kept for undecided, white with hatching for failed
 COLOURS = ("#D55E00", "#A6D8F5", "#E69F00", "#F0E442", "#009E73", "#CC79A7", "#0072B2", "#999999", "#B8E0D2", "#5D3A9B")
 UNDECIDED = "#000000"
+SIZE = (7.2, 5.2)  # inches
 CELLS = 2000  # along an axis: more than a picture has pixels, and each costs a hundred bytes
 MARK_BELOW = 0.002  # a share of the map: rarer points are also marked with a ring, or nobody would see them
 # the edges of tongues by class (`measures.hill_edges`)
@@ -34,27 +31,30 @@ EDGES = {
 
 def save(ds, path, name=None):
     """Draw variable `name` (the verdict, or the first output) of `ds` to `path` (PNG, PDF or SVG)."""
-    figure = draw(ds, name)
-    figure.savefig(path, dpi=150)
-    plt.close(figure)
+    draw(ds, name).savefig(path, dpi=150)
 
 
 def draw(ds, name=None):
-    """The matplotlib figure of one variable over the survey's axes; raises BadInput for an unknown variable."""
+    """The figure of one variable over the survey's axes, unknown to pyplot, which shows what it knows in notebooks."""
+    figure = Figure(figsize=SIZE, layout="constrained")
+    onto(figure.subplots(), ds, name)
+    return figure
+
+
+def onto(axes, ds, name=None, boundaries=True):
+    """Draw one variable (the verdict, or the first output) onto matplotlib axes; BadInput for an unknown one."""
     drawable = [key for key in ds.data_vars if not key.endswith("_error") and set(ds[key].dims) >= set(ds.status.dims)]
     name = name or ("verdict" if "verdict" in ds else drawable[0])
     if name not in drawable:
         raise BadInput(modules.unknown("variable", name, drawable))
     variable, state = _flat(ds, name)
-    figure, axes = plt.subplots(figsize=(7.2, 5.2), layout="constrained")
     if variable.ndim == 2:
-        _map(axes, ds, variable, state)
+        _map(axes, ds, variable, state, boundaries)
     elif variable.ndim == 1:
         _curve(axes, ds, variable, state)
     else:
         raise BadInput(f"{name} is a single number; a figure needs at least one axis")
     axes.set_title(_title(ds, variable), fontsize=10)
-    return figure
 
 
 def _flat(ds, name):
@@ -64,7 +64,7 @@ def _flat(ds, name):
     return ds[name].isel(first), ds.status.isel({dim: 0 for dim in ds.status.dims if dim not in keep})
 
 
-def _map(axes, ds, variable, state):
+def _map(axes, ds, variable, state, boundaries):
     x, y = (variable[dim] for dim in variable.dims)
     failed = np.isin(state.values, list(status.FAILURES))
     outside = state.values == status.INVALID_PARAMETERS
@@ -74,7 +74,7 @@ def _map(axes, ds, variable, state):
         handles = _verdicts(axes, x, y, variable, failed, outside)
     else:
         some = _thinned(variable)
-        shown = np.where((failed | outside)[some], np.nan, variable.values[some].astype(float))
+        shown = np.where((failed | outside)[some], np.nan, variable[some].values.astype(float))
         shown = np.ma.masked_invalid(shown)
         look = {"cmap": "viridis", "shading": "nearest", "rasterized": True}
         drawn = axes.pcolormesh(x[some[0]], y[some[1]], shown.T, **look, **_limits(shown))
@@ -83,7 +83,7 @@ def _map(axes, ds, variable, state):
         axes.set_facecolor("#dddddd")
         handles = _marks(axes, x, y, failed, "failed") + _marks(axes, x, y, outside, "outside the domain")
         handles += [Patch(color="#dddddd", label="does not apply")] if shown.mask.any() else []
-    if "curve_count" in ds:
+    if boundaries and "curve_count" in ds:
         handles += _curves(axes, ds, x, y)
     if handles:
         _legend(axes, handles)
@@ -225,8 +225,13 @@ def _curve(axes, ds, variable, state):
 
 
 def _legend(axes, handles):
-    columns = min(4, len(handles))
-    axes.figure.legend(handles=handles, frameon=False, fontsize=8, loc="outside lower center", ncols=columns)
+    """Below: of the figure where the axes fill it, else of the axes."""
+    look = {"handles": handles, "frameon": False, "fontsize": 8, "ncols": min(4, len(handles))}
+    alone = [other for other in axes.figure.axes if other.get_label() != "<colorbar>"] == [axes]
+    if alone and axes.figure.get_constrained_layout():
+        axes.figure.legend(loc="outside lower center", **look)
+    else:
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), **look)
 
 
 def _limits(shown):

@@ -9,7 +9,7 @@ from survey import status
 from survey.errors import BadInput
 from survey.kernels.hill import EPS
 from survey.measures import hill as measure
-from survey.measures import hill_own
+from survey.measures import hill_motion, hill_own, hill_why
 from survey.scene import Parameter
 
 WORDS = {
@@ -79,6 +79,17 @@ class HillScene:
         out["period"] = np.where(out["status"] == status.OK, period[:, None], np.nan)
         out["period_error"] = (4 if callable(self.period) else 1) * EPS * out["period"]
         return {name: values.reshape(shape) for name, values in out.items()}
+
+    def why(self, answer):
+        """Why the point has its verdict (see `survey.scenes`)."""
+        return hill_why.why(answer, self.EVEN)
+
+    def trajectory(self, point, answer, options, time=None):
+        """Solutions and multipliers of a point (see `survey.scenes`)."""
+        points = np.array([[point[p.name] for p in self.PARAMETERS]])
+        period, edges, slack = self._ranges(points)
+        problem, _ = self._called(hill_own.problem, self.z, points, edges, period, slack, self.EVEN)
+        return hill_motion.solve(problem, answer, time, "u")
 
     def _ranges(self, points):
         """Period (N), edges of the pieces (N, P + 1; NaN where there are none) and slack (N; see `hill_own`)."""

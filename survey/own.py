@@ -37,6 +37,7 @@ EXAMPLES = {
     "PERIOD": "PERIOD = 3.14 (its length in u), or a function of p",
     "PARAMETERS": 'PARAMETERS = ("a", "b"), the names of p[0], p[1]',
 }
+_made: Any = {}  # by hash: what `hill` has made in this process
 REFERENCES = ("W. Magnus, S. Winkler, Hill's Equation, Interscience 1966",)
 
 
@@ -75,7 +76,8 @@ def hill(
         text = inspect.getsource(function)
     except (OSError, TypeError):
         text = ""
-    return _hill(z, period, parameters, even, breaks, name, text, title, inspect.getdoc(function), ())
+    scene = _hill(z, period, parameters, even, breaks, name, text, title, inspect.getdoc(function), ())
+    return _made.setdefault(scene.HASH, scene)
 
 
 def find(scene: Any, near: str | Path | None = None) -> tuple[str, Any]:
@@ -113,13 +115,18 @@ def check(scene: Any, grid: Any = None) -> None:
         scene.check(values.reshape(-1, len(names))[np.array(inside, bool)])
 
 
-def of_dataset(ds: Any) -> str:
-    """The scene's name, as `find` takes it, of a survey's dataset; BadInput if it was a user's and is not as it was."""
+def of_dataset(ds: Any) -> Any:
+    """The scene of a survey's dataset, as `find` takes it; BadInput if it was a user's and is not as it was."""
     name = ds.attrs["scene"]
     if "scene_hash" not in ds.attrs:
         return name
+    if not name.endswith(".py") and ds.attrs["scene_hash"] in _made:
+        return _made[ds.attrs["scene_hash"]]
     if not name.endswith(".py"):
-        raise BadInput(f"scene = {name!r} was a function given from Python: points cannot be solved again without it")
+        raise BadInput(
+            f"scene = {name!r} was a function given from Python: points cannot be solved again without it; "
+            "give it to survey.hill again first"
+        )
     try:
         name, scene = find(name, Path(ds.encoding.get("source", "")).parent)
     except BadInput:

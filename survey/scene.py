@@ -115,6 +115,26 @@ class Request:
         return self.lines.get(name)
 
 
+@dataclass(frozen=True)
+class Trajectory:
+    """One point solved in time: `data` as xarray.Dataset takes it, {name: (dimensions, values, attributes)}, and how
+    `survey.analysis.portrait` draws it: `panels`, each its kind and the names of the variables that it shows.
+    """
+
+    data: Mapping[str, tuple[Any, ...]]
+    panels: tuple[tuple[str, ...], ...]
+
+
+def told(value: Any, bar: Any) -> str:
+    """A value with its error bar, in few digits."""
+    return f"{float(value):.6g} +- {float(bar):.1g}"
+
+
+def named(answer: Any, name: str) -> str:
+    """`name = value +- bar` of an output that is known of a point."""
+    return f"{name} = {told(answer[name], answer[f'{name}_error'])}"
+
+
 def condition(scene: Any, when: Mapping[str, tuple[str, ...]], own: str = "") -> str:
     """When `own` exists, in words: `; only with l; only when question = fate | portrait`; or nothing."""
     words, options = [], {option.name: option for option in scene.OPTIONS}

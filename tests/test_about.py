@@ -6,6 +6,8 @@ from pathlib import Path
 
 import yaml
 
+import survey
+
 ROOT = Path(__file__).parent.parent
 ABOUT = ROOT / ".github"
 VERSION = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
@@ -32,3 +34,8 @@ def test_links_of_the_readme_and_the_guide_lead_somewhere():
     for path in (ROOT / "README.md", *ABOUT.glob("*.md"), ROOT / "results/README.md"):
         for target in re.findall(r"\]\((?!https?:)([^)#]+)", path.read_text()):
             assert (path.parent / target).exists(), f"{path.name}: {target}"
+
+
+def test_the_typed_view_names_what_the_package_has():
+    view = (ROOT / "survey/__init__.pyi").read_text()
+    assert sorted(re.findall(r"^from .* import (\w+) as \1$", view, re.MULTILINE)) == survey.__all__

@@ -8,7 +8,15 @@ methods by which `survey verify` solves points again), REFERENCES (tuple of stri
         number of values of each parameter
     solve(point, request) -> {output: array}
 
-`point` maps each parameter that exists to a float64 array; all have the same number of dimensions and
+and, for `ds.survey.point` and `ds.survey.trajectory`, if it likes, two more:
+
+    why(answer) -> a sentence: what decided the verdict, by which margin against which error bar
+    trajectory(point, answer, options, time) -> survey.scene.Trajectory: the motion at one point, up to `time` (None:
+        what suits); `point` maps each parameter to a number
+
+where `answer` holds everything that is known of one point, {name: array}, flags as words.
+
+`point` of `solve` maps each parameter that exists to a float64 array; all have the same number of dimensions and
 broadcast to the block's shape (an axis of the block is long in one array and 1 in the others, so what depends on
 one axis is computed once). A parameter outside its domain arrives as NaN: such points get the status
 `invalid_parameters`. `solve` returns, in the block's shape (plus an output's extra dimensions), every output in

@@ -28,11 +28,12 @@ from math import pi
 import numpy as np
 
 from survey import methods
+from survey.errors import BadInput
 from survey.kernels import nutation as nu
 from survey.measures import nutation
 from survey.measures.rows import Rows
 from survey.modules import load
-from survey.scene import Option, Output, Parameter
+from survey.scene import Option, Output, Parameter, Request, Trajectory, named, told
 from survey.status import INVALID_PARAMETERS, NO_CONVERGENCE, OK
 
 TITLE = "Rotation of an axisymmetric body in a Newtonian field (Brun's problem)"
@@ -48,6 +49,7 @@ _NO_MOTION = 16
 _STATE, _SCALED, _MOTION = {"sign": ("",)}, {"sign": ("1", "-1")}, {"motion": ("at_t",)}
 _HARMLESS = (1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0)
 _LARGE = {"minimum": -1e25, "maximum": 1e25}  # products of four such numbers are floats
+MOTION_PERIODS, MOTION_POINTS = 6, 3001  # of a trajectory
 DIMENSIONS = {"well": np.array([1, 2])}
 
 PARAMETERS = (
@@ -188,3 +190,64 @@ def _emptied(out, where):
     out["verdict"] = np.where(out["status"] == OK, out["verdict"], nutation.UNDECIDED)
     out["wells"] = np.where(where, -1, out["wells"])
     return out
+
+
+def trajectory(point, answer, options, time=None):
+    """u, psi and phi, and the path of the axis on the sphere (see `survey.scenes`).
+
+    Of scaled integrals: of the lowest well, from its lower turning point, for A = 1 and |k| = 1.
+    """
+    well = int(np.argmax(np.isfinite(np.ravel(answer["period"]))))
+    period = float(np.ravel(answer["period"])[well])
+    if not np.isfinite(period):
+        raise BadInput("this motion has no period (a separatrix, or no motion at all): take a point beside it")
+    state = {p.name: point[p.name] for p in PARAMETERS[:7] if p.name in point}
+    if "l" in point:
+        state = _state_of(point, float(np.ravel(answer["u_min"])[well]), int(options["sign"]))
+    t = np.linspace(0.0, MOTION_PERIODS * period if time is None else time, MOTION_POINTS)
+    asked = {name: np.full((1, 1), value) for name, value in state.items()} | {"t": t[None]}
+    out = {name: values[0] for name, values in solve(asked, Request({"motion": "at_t"}, rtol=1e-9)).items()}
+    data = {"t": ("t", t, {"long_name": "time", "symbol": "t", "units": "1"})}
+    for o in OUTPUTS[:3]:
+        meaning = {"long_name": o.long_name, "symbol": o.symbol, "units": o.units}
+        data[o.name] = ("t", out[o.name], meaning)
+        data[f"{o.name}_error"] = ("t", out[f"{o.name}_error"], meaning | {"long_name": f"error bound of {o.name}"})
+    side = np.sqrt((1.0 - out["u"]) * (1.0 + out["u"])) * _sides(out["u"], state)
+    for name, values in {"x": side * np.cos(out["psi"]), "y": side * np.sin(out["psi"]), "z": out["u"]}.items():
+        data[f"axis_{name}"] = ("t", values, {"long_name": f"component {name} of the body's axis", "units": "1"})
+    return Trajectory(
+        data, (("lines", "t", "u"), ("lines", "t", "psi", "phi"), ("sphere", "axis_x", "axis_y", "axis_z"))
+    )
+
+
+def _state_of(point, u, sign):
+    """The initial state at rest in theta at u, for scaled integrals: sqrt|k| = A = 1."""
+    ratio = point["ratio"]
+    if ratio == 1.0:
+        raise BadInput("ratio = 1: a sphere feels no field, so no motion has these integrals; take another ratio")
+    return {"A": 1.0, "C": ratio, "epsilon": sign / (1.0 - ratio), "theta0": float(np.arccos(u)), "p_theta0": 0.0,
+            "p_psi": point["beta"], "p_phi": point["alpha"]}  # fmt: skip
+
+
+def _sides(u, state):
+    """Which side of a pole that it passes the axis is on, -1 or 1: psi is given without its jumps of pi there."""
+    pole = 1 if state["p_psi"] == state["p_phi"] else -1 if state["p_psi"] == -state["p_phi"] else 0
+    near = pole * u
+    passed = (
+        (near[1:-1] > near[:-2]) & (near[1:-1] >= near[2:]) & (near[1:-1] > 0.9) if pole else np.zeros(len(u) - 2, bool)
+    )
+    return 1.0 - 2.0 * (np.cumsum(np.concatenate([[False], passed, [False]])) % 2)
+
+
+def why(answer):
+    """Why a point has its verdict, in a sentence (see `survey.scenes`)."""
+    distance = answer.get("separatrix_distance", np.nan)
+    apart = named(answer, "separatrix_distance") if np.isfinite(distance) else "these momenta have no separatrix"
+    if answer["verdict"] in ("separatrix", "undecided"):
+        return f"{apart}: the error bar reaches across 0" if np.isfinite(distance) else "the error bars leave it open"
+    if answer["verdict"] == "pole_passage":
+        return f"p_psi = +-p_phi exactly, so that the axis passes a pole; {apart}"
+    width = np.nanmax(answer["u_max"] - answer["u_min"])
+    bar = np.nanmax(answer["u_max_error"] + answer["u_min_error"])
+    across = "beyond" if width > bar else "within"
+    return f"u_max - u_min = {told(width, bar)}, {across} the error bars of the turning points; {apart}"

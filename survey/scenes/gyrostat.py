@@ -46,7 +46,7 @@ from survey import methods
 from survey.measures import cylinder, cylinder_auto, cylinder_fate, cylinder_portrait
 from survey.measures.cylinder_fate import NO_TURNS
 from survey.modules import load
-from survey.scene import Option, Output, Parameter
+from survey.scene import Option, Output, Parameter, Request, Trajectory, named, told
 from survey.status import INVALID_PARAMETERS, OK
 
 TITLE = "Gyrostat with Barnett-London effect, rotation about axis 1"
@@ -96,6 +96,7 @@ _FATES = {
 _ENDS = {"repelling": 0, "neutral": 1, "attracting": 2}
 _TYPES = ("none", "saddle", "attracting_node", "weak_node", "repelling_node", "attracting_focus", "weak_focus",
           "repelling_focus", "degenerate")  # fmt: skip
+AROUND, ORBIT_POINTS = np.arange(0, 2 * np.pi, np.pi / 3), 2001  # of the phase portrait
 DIMENSIONS = {
     "equilibrium": np.arange(1, cylinder_portrait.EQUILIBRIA + 1),
     "cycle": np.arange(1, cylinder_portrait.CYCLES + 1),
@@ -172,6 +173,63 @@ def solve(point, request):
         return {"fate": _fate, "portrait": _portrait}[question](point, method, request.rtol)
     measure = cylinder_auto if request.method == "auto" else cylinder
     return {"trajectory": _trajectory, "abel": _abel}[question](point, measure, method, request.rtol)
+
+
+def why(answer):
+    """Why a point has its verdict, in a sentence (see `survey.scenes`)."""
+    verdict = answer["verdict"]
+    if "stratum" in answer:
+        return _why_portrait(answer)
+    if verdict == "undecided":
+        return "the error bar reaches across a separatrix, or the return maps leave a cycle open"
+    if verdict.startswith("spin_up"):
+        k = answer["b12"] * answer["s3"] - answer["b31"] * answer["s2"]
+        return f"the return maps leave no cycle or equilibrium on the way, and w grows: K = b12 s3 - b31 s2 = {k:.6g}"
+    if verdict in ("rotation_plus", "rotation_minus", "libration"):
+        section = named(answer, "limit_phi" if verdict == "libration" else "limit_w")
+        return f"the return map of its side tends to the cycle with {section}, {named(answer, 'multiplier')} < 1"
+    if verdict.startswith("periodic"):
+        return "the stratum is integrable, and the level of its integral is closed"
+    return f"its end is inside the region of attraction of the equilibrium {named(answer, 'limit_phi')}"
+
+
+def _why_portrait(answer):
+    margins = [named(answer, "K")]
+    off = np.abs(answer["cycle_multiplier"] - 1.0)
+    if np.isfinite(off).any():
+        nearest = np.nanargmin(off)
+        near = told(answer["cycle_multiplier"][nearest], answer["cycle_multiplier_error"][nearest])
+        margins.append(f"the multiplier nearest to 1 is {near}")
+    words = {
+        "structurally_stable": "no margin is within its error bar",
+        "degenerate": "one of the margins is within its error bar of 0",
+    }
+    return f"stratum {answer['stratum']}, {', '.join(margins)}: " + words.get(
+        answer["verdict"], "near a saddle connection or a fold of cycles, the bars leave it open"
+    )
+
+
+def trajectory(point, answer, options, time=None):
+    """The orbit on the cylinder and some of its neighbours, from `phi0`, `w0` (see `survey.scenes`)."""
+    time = 40.0 if time is None else float(time)
+    own = point.get("phi0", 0.0), point.get("w0", 1.0)
+    starts = np.array([own, *[(phi, w) for phi in AROUND for w in (-1.5, -0.5, 0.0, 0.5, 1.5)]])
+    t = np.linspace(0.0, time, ORBIT_POINTS)
+    asked = {name: np.full((1, 1), point[name]) for name in _SYSTEM} | {"t": t[None]}
+    asked |= {
+        "phi0": starts[:, :1],
+        "w0": starts[:, 1:] * np.where(np.arange(len(starts)) > 0, max(1.0, abs(own[1])), 1)[:, None],
+    }
+    out = solve(asked, Request({"question": "trajectory"}, rtol=1e-9))
+    named = {o.name: {"long_name": o.long_name, "symbol": o.symbol, "units": o.units} for o in OUTPUTS if o.name in out}
+    data = {"t": ("t", t, {"long_name": "time", "symbol": "t", "units": "1"})}
+    for name in ("phi", "w"):
+        data[name], data[f"{name}_error"] = (
+            ("t", out[name][0], named[name]),
+            ("t", out[f"{name}_error"][0], named[name] | {"long_name": f"error bound of {name}"}),
+        )
+        data[f"{name}_nearby"] = (("start", "t"), out[name][1:], named[name])
+    return Trajectory(data, (("cylinder", "phi", "w"), ("lines", "t", "w")))
 
 
 def _dense(point, name):

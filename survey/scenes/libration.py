@@ -34,8 +34,8 @@ Deprit-Bartholome, Astronomical Journal 72 (1967) 173; K. R. Meyer, D. S. Schmid
 import numpy as np
 
 from survey.kernels.libration_forms import LABELS
-from survey.measures import normal_form
-from survey.scene import Output, Parameter
+from survey.measures import libration_motion, normal_form
+from survey.scene import Output, Parameter, Trajectory, named
 
 TITLE = "Formal stability of the triangular libration points"
 FAMILY = "normal_form"
@@ -93,3 +93,27 @@ def solve(point, request):
     mu = np.array(point["mu"], dtype=float).ravel()
     answer = normal_form.solve(mu, request.method, request.rtol)
     return {name: values.reshape(shape + values.shape[1:]) for name, values in answer.items()}
+
+
+def trajectory(point, answer, options, time=None):
+    """A planar orbit of the linear equations, from rest beside L4 (see `survey.scenes`)."""
+    slow = float(answer["omega2"])
+    suits = 3 * 2 * np.pi / slow if np.isfinite(slow) else 4 * np.pi
+    data = libration_motion.orbit(point["mu"], 0.0, min(suits, 100 * np.pi) if time is None else time)
+    return Trajectory(data, (("plane", "eta", "xi"), ("lines", "f", "xi", "eta")))
+
+
+def why(answer):
+    """Why a point has its verdict, in a sentence (see `survey.scenes`)."""
+    verdict = answer["verdict"]
+    if verdict == "linearly_unstable":
+        return "mu > mu_R = 0.0385208965...: the frequencies omega1 and omega2 are not real"
+    if verdict in ("boundary", "unstable_by_resonance"):
+        return "the half-ulp interval of mu contains " + ("mu_R" if verdict == "boundary" else "mu1 or mu2")
+    if verdict == "formally_stable_by_order_6":
+        return f"{named(answer, 'D4')} < 0 < {named(answer, 'a02')}: N vanishes on one ray of L = 0, where " + (
+            f"{named(answer, 'M_ray')} is not 0"
+        )
+    if verdict == "formally_stable_by_order_4":
+        return f"{named(answer, 'D4')} and {named(answer, 'a02')} have one sign: N is definite where L = 0, r >= 0"
+    return "an error bar reaches across 0: " + ", ".join(named(answer, name) for name in ("D4", "a02"))

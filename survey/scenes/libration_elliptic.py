@@ -27,9 +27,11 @@ accuracy asked to about e = 0.95. For mu below about 1e-13 all is too near Keple
 Source: J. M. A. Danby, Astron. J. 69 (1964) 165; checked and completed in `libration_elliptic.md` beside this file.
 """
 
-from survey.measures import danby
+import numpy as np
+
+from survey.measures import danby, libration_motion, linear_motion
 from survey.measures.rows import Rows
-from survey.scene import Parameter
+from survey.scene import Parameter, Trajectory, told
 
 TITLE = "Stability of the triangular libration points of the elliptic problem"
 FAMILY = "danby"
@@ -61,3 +63,32 @@ def solve(point, request):
         block.per_row(point["e"]), block.per_point(point["mu"]), request.method, request.rtol, dense
     )  # fmt: skip
     return {name: block.back(values) for name, values in out.items()}
+
+
+def trajectory(point, answer, options, time=None):
+    """A planar orbit of the linear equations, from rest beside L4, and the multipliers (see `survey.scenes`)."""
+    found, bars = libration_motion.multipliers(*(float(answer[name]) for name in ("a", "a_error", "b", "b_error")))
+    growth = np.log(abs(found).max())
+    turns = np.clip(libration_motion.GROWTH / growth if growth > 1e-6 else 6, 1, 6) // 1
+    data = libration_motion.orbit(point["mu"], point["e"], 2 * np.pi * turns if time is None else time)
+    data |= linear_motion.described(found, bars)
+    return Trajectory(data, (("plane", "eta", "xi"), ("multipliers",)))
+
+
+def why(answer):
+    """Why a point has its verdict, in a sentence (see `survey.scenes`)."""
+    a, da, b, db = (float(answer[name]) for name in ("a", "a_error", "b", "b_error"))
+    margins = {
+        "2 + 2 a + b": (2 + 2 * a + b, 2 * da + db, "multipliers meet at -1"),
+        "2 - 2 a + b": (2 - 2 * a + b, 2 * da + db, "multipliers meet at 1"),
+        "a^2/4 - b + 2": (a * a / 4 - b + 2, abs(a) * da / 2 + db, "two pairs meet"),
+        "4 - |a|": (4 - abs(a), da, "multipliers are real"),
+    }
+    least = min(margins, key=lambda name: margins[name][0])
+    value, bar, meeting = margins[least]
+    said = {"stable": "> 0, and so are the other margins", "unstable": "is not positive"}.get(
+        answer["verdict"], "is open"
+    )
+    return (
+        f"{least} = {told(value, bar)} {said} (at 0 {meeting}); decided by half-period factors, whose bars are sharper"
+    )

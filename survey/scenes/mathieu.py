@@ -18,7 +18,7 @@ from survey import status
 from survey.kernels import double as dd
 from survey.kernels.hill import NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE
 from survey.kernels.jit import inline, kernel
-from survey.measures import hill
+from survey.measures import hill, hill_motion, hill_why
 from survey.measures.rows import Rows
 from survey.methods import dop853, taylor_double
 from survey.scene import Parameter
@@ -37,6 +37,7 @@ PARAMETERS = (
     Parameter("q", "parametric excitation", "q", minimum=-1e12, maximum=1e12),
 )
 OPTIONS = ()
+why = hill_why.why
 OUTPUTS = hill.OUTPUTS
 HALF_PERIOD = pi / 2
 
@@ -54,6 +55,11 @@ def solve(point, request):
     out["period"] = np.where(out["status"] == status.OK, pi, np.nan)
     out["period_error"] = 1.3e-16 + 0.0 * out["period"]  # pi is rounded
     return {name: block.back(values) for name, values in out.items()}
+
+
+def trajectory(point, answer, options, time=None):
+    """Solutions and multipliers of a point (see `survey.scenes`)."""
+    return hill_motion.solve(_problem(np.array([point["q"]]), np.array([[point["a"]]])), answer, time)
 
 
 def _problem(q, a, line=None, ends=None):

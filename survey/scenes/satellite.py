@@ -29,7 +29,7 @@ from survey.kernels.elliptic import MEANS
 from survey.kernels.hill import LARGEST, NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE
 from survey.kernels.jit import kernel
 from survey.kernels.satellite import complete_integrals, half_periods, potential, sample, tabulate
-from survey.measures import hill
+from survey.measures import hill, hill_motion, hill_why
 from survey.measures.rows import Rows
 from survey.methods import dop853, taylor_double
 from survey.scene import Option, Output, Parameter
@@ -60,6 +60,7 @@ OPTIONS = (
     Option("body", ("prolate", "oblate"), "shape of the body: Iz < I or Iz > I", said_by="inertia_ratio"),
     Option("direction", ("1", "-1"), "sense of a rotation: 1 as the orbit, -1 against it", only_with="inertia_ratio"),
 )
+why = hill_why.why
 OUTPUTS = (
     *hill.OUTPUTS,
     Output("exponent_per_orbit", "growth of the logarithm of the amplitude per orbital revolution", r"\mu",
@@ -90,6 +91,16 @@ def solve(point, request):
         _solve(shared, np.where((alpha > 1) == oblate, rho, np.nan), oblate, request) for oblate in np.unique(alpha > 1)
     ]
     return {name: np.where(alpha > 1, bodies[-1][name], bodies[0][name]) for name in bodies[0]}
+
+
+def trajectory(point, answer, options, time=None):
+    """Solutions and multipliers of a point (see `survey.scenes`)."""
+    rho, oblate = point.get("rho"), options.get("body") == "oblate"
+    if rho is None:
+        rho = float(options["direction"]) / np.sqrt(3 * abs(1 - point["inertia_ratio"]))
+        oblate = point["inertia_ratio"] > 1
+    shared = moduli({name: np.array([value]) for name, value in point.items()})
+    return hill_motion.solve(_problem(Motion(*shared, bool(oblate)), np.array([[rho]])), answer, time, "u")
 
 
 def _solve(shared, rho, oblate, request, line=None, exactly_given=False, across=None):

@@ -1,0 +1,117 @@
+"""`ds.survey`: what a finished survey is asked in a notebook. Importing survey registers it, before or after xarray."""
+
+import xarray as xr
+
+from survey.errors import BadInput
+
+
+@xr.register_dataset_accessor("survey")
+class Survey:
+    """A survey's dataset: its map, one point, the motion at that point. Answers are xarray or matplotlib objects.
+
+    Works on the datasets of `survey.run`, `survey.open`, `survey.evaluate` and of `xarray.open_dataset`, lazy ones
+    (`chunks={}`) too, of which only what is asked for is loaded. Coordinates are numbers, the nearest point is taken.
+    Raises survey.BadInput in one line.
+    """
+
+    def __init__(self, ds):
+        if "status" not in ds or "scene" not in ds.attrs:
+            raise BadInput(
+                "this dataset was not written by survey: it has no status, or no attribute scene "
+                "(arithmetic drops attributes: xr.set_options(keep_attrs=True) keeps them)"
+            )
+        self._ds = ds
+
+    def map(self, var=None, ax=None, boundaries=True):
+        """Draw the stability map, or the variable `var`; along one axis, its curve and error band.
+
+        Undecided, failed and outside points are marked and counted in the legend; edges of tongues are drawn where
+        the file holds them, unless `boundaries` is False. Draws onto the matplotlib Axes `ax`, by default a new
+        figure's, and returns it (`ax.figure.savefig("map.pdf")`).
+        """
+        from survey import figures
+
+        ax = _new_axes(figures.SIZE) if ax is None else ax
+        figures.onto(ax, self._ds, var, boundaries)
+        return ax
+
+    def point(self, **coords):
+        """Everything known of the nearest point: a `survey.analysis.point.Point`, whose `dataset` is the point's."""
+        from survey.analysis import point
+
+        return point.Point(point.nearest(self._ds, coords).load())
+
+    def trajectory(self, time=None, figure=None, **coords):
+        """Solve the nearest point in time and draw its motion, as its scene defines. Returns the motion, a Dataset.
+
+        `time` is how long, in the scene's independent variable; the scene knows what suits. Draws into the matplotlib
+        Figure or SubFigure `figure`, by default a new one; not at all if it is False.
+        """
+        from survey.analysis import point, portrait, trajectory
+
+        found = trajectory.solve(point.nearest(self._ds, coords).load(), time)
+        if figure is not False:
+            portrait.draw(found, _new_figure() if figure is None else figure)
+        return found
+
+    def slice(self, **coords):
+        """The survey at the values of some axes that are next to `coords`: of a map, a row that `survey.map()` draws
+        as a curve with its error band. Returns a Dataset, as lazy as this one.
+        """
+        from survey.analysis import point
+
+        return point.of_points(self._ds).isel(point.place(self._ds, coords))
+
+    def boundary(self, kind=None, index=None):
+        """Where the verdict changes, one place after another along the dimension `place`, as a Dataset.
+
+        Where the file holds edges of tongues: a coordinate per axis, `position_error`, `kind` (of the periodic solution,
+        such as even_periodic), `index` (of the tongue) and, if they are joined, `curve`; of one `kind` or `index` if
+        asked for. Else midpoints between neighbouring points of different verdict, with X_error = half their distance.
+        """
+        from survey.analysis import boundary
+
+        return boundary.find(self._ds, kind, index)
+
+    def zoom(self, num=None, output=None, **ranges):
+        """A finer sweep of a part of the map, such as `zoom(k=(0.2, 0.3), num=200)`, the same workflow otherwise.
+
+        `num`: values along each axis with a range (by default as many as now; a dict gives one for each). Returns the
+        Dataset, in memory; with `output` it is written to that netCDF file by `survey.run`.
+        """
+        from survey.analysis import zoom
+
+        return zoom.sweep(self._ds, ranges, num, output)
+
+    def compare(self, other):
+        """This survey less `other` (a Dataset), at the points that both hold exactly.
+
+        Of each output X in both: `X_difference`, and `X_excess`, its size over the sum of both error bars (above 1 they
+        contradict one another); `verdict_differs`. The attribute `summary` tells it in a line, `unlike` what was asked
+        differently.
+        """
+        from survey.analysis import compare
+
+        return compare.find(self._ds, other)
+
+    def areas(self):
+        """Area and share of each verdict with error bars, as a Dataset along `area_verdict`; undecided apart.
+
+        From the cells that [refine] made; else from the points, where a bar holds all area between neighbours that
+        differ. The attribute `areas` tells it in a line.
+        """
+        from survey.analysis import areas
+
+        return areas.of_map(self._ds)
+
+
+def _new_axes(size):
+    import matplotlib.pyplot as plt
+
+    return plt.figure(figsize=size, layout="constrained").subplots()
+
+
+def _new_figure():
+    import matplotlib.pyplot as plt
+
+    return plt.figure(figsize=(9.2, 4.6), layout="constrained")

@@ -1,0 +1,82 @@
+"""How much of a map each verdict takes: from its cells where [refine] made them, else from its points."""
+
+from itertools import product
+
+import numpy as np
+import xarray as xr
+
+from survey import status
+from survey.dataset import percent
+from survey.errors import BadInput
+
+NO_ANSWER = -2
+SLAB = 2**20  # points read at once
+COMMENT = ("the area between neighbouring points of one verdict is counted as of that verdict; the bar holds all area "
+           "between neighbours that differ; what lies between points of one verdict is not seen")  # fmt: skip
+
+
+def of_map(ds):
+    """Area and share of each verdict with their bars along the dimension `area_verdict` (see `ds.survey.areas`)."""
+    if "area" in ds:
+        return _of_cells(ds)
+    if "verdict" not in ds:
+        raise BadInput("this survey has no verdict, so there are no areas of it")
+    if not ds.status.dims or min(ds.status.shape) < 2:
+        raise BadInput("areas: every axis needs two values or more; slice the others away")
+    codes = dict(zip(ds.verdict.attrs["flag_meanings"].split(), ds.verdict.attrs["flag_values"].tolist(), strict=True))
+    codes["no_answer"] = NO_ANSWER
+    area, least, most = _counted(ds, list(codes.values()))
+    total = area.sum()
+    kept = [i for i, name in enumerate(codes) if most[i] > 0 or name == "undecided"]
+    bar = np.maximum(most - area, area - least) + 1e-13 * total
+    units = " ".join(u for u in (ds[dim].attrs.get("units", "1") for dim in ds.status.dims) if u != "1") or "1"
+    return _described([list(codes)[i] for i in kept], area[kept], bar[kept], total, units, COMMENT)
+
+
+def _of_cells(ds):
+    """The areas of decided cells; what is left is undecided, all or none of it an area of either verdict."""
+    names = ds.area_verdict.attrs["flag_meanings"].split()
+    share = ds.area_fraction.values
+    total = float(ds.area.values[share.argmax()] / share.max())
+    bar = ds.area_error.values.astype(float)
+    left = total - (ds.area.values - bar).sum()
+    values, bars = [*ds.area.values, left], [*bar, 1e-13 * total]
+    words = "from cells that are decided as wholes; the area of the undecided cells is the others' error bar"
+    return _described([*names, "undecided"], np.array(values), np.array(bars), total, ds.area.attrs["units"], words)
+
+
+def _counted(ds, codes):
+    """Area (each cell between neighbours shared out by its corners), least and most area of each verdict code."""
+    dims = ds.status.dims
+    widths = [abs(np.diff(ds[dim].values.astype(float))) for dim in dims]
+    rest = int(np.prod(ds.status.shape[1:]))
+    step = max(1, SLAB // rest)
+    area, least, most = np.zeros((3, len(codes)))
+    for first in range(0, len(widths[0]), step):
+        some = {dims[0]: slice(first, first + step + 1)}
+        verdict = ds.verdict.transpose(*dims).isel(some).values
+        state = ds.status.isel(some).values
+        verdict = np.where(np.isin(state, [*status.FAILURES, status.INVALID_PARAMETERS]), NO_ANSWER, verdict)
+        own = [widths[0][first : first + step], *widths[1:]]
+        cell = np.ones(())
+        for width in own:
+            cell = cell[..., None] * width
+        corners = [verdict[cut] for cut in product(*[(slice(None, -1), slice(1, None))] * len(dims))]
+        for i, code in enumerate(codes):
+            number = sum((corner == code).astype(np.int8) for corner in corners)
+            area[i] += (cell * number).sum() / len(corners)
+            least[i] += cell[number == len(corners)].sum()
+            most[i] += cell[number > 0].sum()
+    return area, least, most
+
+
+def _described(names, area, bar, total, units, comment):
+    told = ", ".join(f"{n}: {percent(a / total, b / total)}" for n, a, b in zip(names, area, bar, strict=True))
+    found = {}
+    for name, scale, unit, words in (
+        ("area", 1.0, units, "area of the map with this verdict"),
+        ("area_fraction", total, "1", "share of the map's area with this verdict"),
+    ):
+        found[name] = ("area_verdict", area / scale, {"long_name": words, "units": unit})
+        found[f"{name}_error"] = ("area_verdict", bar / scale, {"long_name": f"error bound of {name}", "units": unit})
+    return xr.Dataset(found, {"area_verdict": names}, {"comment": comment, "areas": told})

@@ -1,0 +1,95 @@
+"""Where the verdict changes: the edges and curves that the file holds, or what the map's points say, as one table."""
+
+import numpy as np
+import xarray as xr
+
+from survey import modules
+from survey.errors import BadInput
+
+
+def find(ds, kind=None, index=None):
+    """Places on the boundary along the dimension `place` (see `ds.survey.boundary`)."""
+    if "curve_count" in ds:
+        found = _curves(ds)
+    elif "edge_count" in ds:
+        found = _edges(ds)
+    else:
+        found = _between_points(ds)
+    if "kind" not in found and (kind is not None or index is not None):
+        raise BadInput("kind, index: the file holds no edges by class and number; run the workflow with [boundaries]")
+    if kind is not None:
+        classes = dict(zip(found.kind.attrs["flag_meanings"].split(), found.kind.attrs["flag_values"], strict=True))
+        if kind not in classes:
+            raise BadInput(modules.unknown("kind", kind, list(classes)))
+        found = found.isel(place=np.flatnonzero(found.kind.values == classes[kind]))
+    return found if index is None else found.isel(place=np.flatnonzero(found["index"].values == index))
+
+
+def _curves(ds):
+    """Every point of every curve."""
+    number = ds.curve_count.values
+    which = np.repeat(np.arange(number.size), number)
+    axes = [dim for dim in ds.status.dims if f"curve_{dim}" in ds]
+    found = {dim: ("place", ds[f"curve_{dim}"].values, ds[f"curve_{dim}"].attrs) for dim in axes}
+    found["position_error"] = ("place", ds.curve_position_error.values, ds.curve_position_error.attrs)
+    found["curve"] = ("place", which, {"long_name": "curve, counted from 0", "units": "1"})
+    for name, source in (("kind", ds.curve_class), ("index", ds.curve_index)):
+        found[name] = ("place", source.values[which], source.attrs)
+    return _table(ds, found, "edges of tongues, as the file holds them, followed as curves")
+
+
+def _edges(ds):
+    """Every edge of every row."""
+    count, axis = ds.edge_count, ds.attrs.get("boundaries", ds.status.dims[-1])
+    found = {}
+    for dim in count.dims:
+        found[dim] = ("place", np.repeat(ds[dim].values, count.values), ds[dim].attrs)
+    found[axis] = ("place", ds.edge_position.values, ds.edge_position.attrs)
+    found["position_error"] = ("place", ds.edge_position_error.values, ds.edge_position_error.attrs)
+    for name, source in (("kind", ds.edge_class), ("index", ds.edge_index)):
+        found[name] = ("place", source.values, source.attrs)
+    return _table(ds, found, f"edges of tongues along {axis}, as the file holds them")
+
+
+def _between_points(ds):
+    """Midpoints between neighbours of different verdict; the boundary between two lies within half their distance."""
+    if "verdict" not in ds:
+        raise BadInput("this survey has no verdict, so it has no boundary; slice or map one of its outputs")
+    verdict = ds.verdict.values
+    axes = ds.verdict.dims
+    parts = [_along(ds, verdict, i) for i in range(len(axes)) if verdict.shape[i] > 1]
+    if not parts:
+        raise BadInput("a single point has no boundary; give the survey an axis")
+    joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    found = {}
+    for name, values in joined.items():
+        dim = name.removesuffix("_error")
+        meaning = ds[dim].attrs if dim in axes else ds.verdict.attrs
+        words = {
+            dim: meaning.get("long_name", dim),
+            f"{dim}_error": f"error bound of {dim}: half the distance of the two neighbours",
+            "below": "verdict of the neighbour at the lower place of the axis",
+            "above": "verdict of the neighbour at the higher place of the axis",
+        }
+        found[name] = ("place", values, meaning | {"long_name": words[name]})
+    return _table(ds, found, "midpoints between neighbouring points of different verdict; what lies between points of "
+                             "one verdict is not seen")  # fmt: skip
+
+
+def _along(ds, verdict, i):
+    """The midpoints along one axis: {axis: value, axis_error: value, below, above}."""
+    low, high = (np.moveaxis(verdict, i, 0)[cut] for cut in (slice(None, -1), slice(1, None)))
+    places = list(np.nonzero(low != high))
+    found = {"below": low[tuple(places)], "above": high[tuple(places)]}
+    first = places.pop(0)
+    places.insert(i, first)
+    for at, dim in enumerate(ds.verdict.dims):
+        values = ds[dim].values.astype(float)
+        here = values[places[at]]
+        after = values[places[at] + 1] if at == i else here
+        found[dim], found[f"{dim}_error"] = 0.5 * (here + after), 0.5 * abs(after - here)
+    return found
+
+
+def _table(ds, found, comment):
+    return xr.Dataset(found, attrs={"title": ds.attrs.get("title", ""), "scene": ds.attrs["scene"], "comment": comment})

@@ -1,0 +1,113 @@
+"""Two surveys at the points they share: where verdicts differ, and differences against the sum of the error bars."""
+
+import numpy as np
+import xarray as xr
+
+from survey.analysis.point import of_points
+from survey.dataset import error_bars
+from survey.errors import BadInput
+
+VERDICTS = {"same": 0, "one_undecided": 1, "differ": 2}
+
+
+def find(one, other):
+    """The Dataset that `ds.survey.compare` describes; raises BadInput where nothing is common."""
+    if not isinstance(other, xr.Dataset) or "status" not in other or "scene" not in other.attrs:
+        raise BadInput("compare: give the dataset of another survey, such as survey.open('other.nc')")
+    if one.attrs["scene"] != other.attrs["scene"]:
+        raise BadInput(f"compare: one is of the scene {one.attrs['scene']}, the other of {other.attrs['scene']}")
+    told = _unlike(one, other)
+    one, other = _common(of_points(one), of_points(other))
+    found = _outputs(one, other)
+    if "verdict" in one and "verdict" in other:
+        found["verdict_differs"] = _verdicts(one.verdict, other.verdict)
+    if not found:
+        raise BadInput("compare: the two have no output in common")
+    ds = xr.Dataset(found, attrs={"title": f"{one.attrs.get('title', '')}: two surveys", "scene": one.attrs["scene"]})
+    return ds.assign_attrs(unlike=told or "nothing but the points", summary=_summary(ds, one.status.size))
+
+
+def _common(one, other):
+    """Both at the values that they share exactly: a value that is only near belongs to another point."""
+    for name in set(one.coords) | set(other.coords):
+        first, second = one.coords.get(name), other.coords.get(name)
+        if first is None or second is None or first.dtype.kind not in "fi":
+            continue
+        if first.ndim > 1 or second.ndim > 1 or not {*first.dims, *second.dims} <= {name}:
+            continue
+        if not first.ndim and not second.ndim:
+            continue
+        values, at, there = np.intersect1d(np.ravel(first), np.ravel(second), return_indices=True)
+        if not values.size:
+            raise BadInput(
+                f"compare: no value of {name} is in both ({_range(first)} and {_range(second)}); solve one at the "
+                f"other's points, such as survey.evaluate(..., {name}=other.{name})"
+            )
+        order = np.argsort(at)
+        one = one.isel({name: at[order]}) if first.ndim else one
+        other = other.isel({name: there[order]}) if second.ndim else other
+        scalars = [ds for ds in (first, second) if not ds.ndim]
+        if scalars:
+            one = one.isel({name: 0}) if first.ndim else one
+            other = other.isel({name: 0}) if second.ndim else other
+    if set(one.status.dims) != set(other.status.dims):
+        raise BadInput(f"compare: the axes are {', '.join(one.status.dims)} and {', '.join(other.status.dims)}")
+    return one, other.transpose(*one.status.dims, ...)
+
+
+def _range(coord):
+    return f"{float(coord.min()):g} to {float(coord.max()):g}" if coord.ndim else f"{float(coord):g}"
+
+
+def _outputs(one, other):
+    """The difference of each output that has error bars in both, and that over the sum of the bars."""
+    found = {}
+    for name in error_bars(one):
+        if f"{name}_error" not in other:
+            continue
+        off = one[name] - other[name]
+        bar = one[f"{name}_error"].astype(float) + other[f"{name}_error"].astype(float)
+        meaning = {"long_name": f"difference in {name}", "units": one[name].attrs.get("units", "1")}
+        found[f"{name}_difference"] = off.assign_attrs(meaning)
+        excess = xr.where(off == 0, 0.0, abs(off) / bar)
+        meaning = {"long_name": f"difference in {name} over the sum of both error bars", "units": "1"}
+        found[f"{name}_excess"] = excess.assign_attrs(meaning | {"comment": "above 1 the two contradict one another"})
+    return found
+
+
+def _verdicts(one, other):
+    open_ = (one == -1) | (other == -1)
+    code = xr.where(one == other, VERDICTS["same"], xr.where(open_, VERDICTS["one_undecided"], VERDICTS["differ"]))
+    flags = {"flag_values": np.array(list(VERDICTS.values()), np.int8), "flag_meanings": " ".join(VERDICTS)}
+    return code.astype(np.int8).assign_attrs(long_name="do the verdicts differ", units="1", **flags)
+
+
+def _unlike(one, other):
+    """What else the two differ in: options, method, accuracy, code, fixed parameters."""
+    keys = ("options", "method", "rtol", "version_survey", "kernel_hash", "scene_hash")
+    told = [f"{key}: {one.attrs.get(key)} and {other.attrs.get(key)}" for key in keys
+            if one.attrs.get(key) != other.attrs.get(key)]  # fmt: skip
+    for name, value in one.coords.items():
+        if name in other.coords and value.ndim == other[name].ndim == 0 and value.item() != other[name].item():
+            told.append(f"{name}: {value.item():g} and {other[name].item():g}")
+    return "; ".join(told)
+
+
+def _summary(ds, points):
+    """One line: how many points, verdicts that differ, outputs beyond their bars."""
+    asked = {}
+    if "verdict_differs" in ds:
+        asked |= {key: (ds.verdict_differs == VERDICTS[key]).sum() for key in ("differ", "one_undecided")}
+    for name in ds.data_vars:
+        if name.endswith("_excess"):
+            asked[name], asked[f"{name}_most"] = (ds[name] > 1).sum(), ds[name].max()
+    found = {key: value.item() for key, value in xr.Dataset(asked).compute().data_vars.items()}
+    told = [f"{points:,} points in common"]
+    if "verdict_differs" in ds:
+        told.append(f"verdicts differ at {found['differ']:,}, one is undecided at {found['one_undecided']:,}")
+    for name in (key for key in found if key.endswith("_excess")):
+        if found[name]:
+            told.append(f"{name.removesuffix('_excess')} is beyond its error bars at {found[name]:,}, at most "
+                        f"{found[f'{name}_most']:.3g} times")  # fmt: skip
+    beyond = any(found[key] for key in found if key.endswith("_excess"))
+    return "; ".join(told if beyond else [*told, "all differences of outputs are within their error bars"])

@@ -1,0 +1,207 @@
+"""One point of a survey: finding it, and everything known of it in a form that can be read."""
+
+import html
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from survey import modules, own, status
+from survey.dataset import error_bars
+from survey.errors import BadInput
+
+WHOLE = (
+    "points",
+    "accuracy_missed",
+    "status_counts",
+    "verdict_counts",
+    "areas",
+    "boundaries",
+    "refine",
+    "refine_points",
+    "complete",
+)  # attributes that tell of a whole file
+
+
+def nearest(ds, coords):
+    """The dataset at the point next to `coords` (numbers by axis; axes of one value may be left out)."""
+    point = place(ds, coords)
+    missing = [dim for dim in ds.status.dims if dim not in point and ds.sizes[dim] > 1]
+    if missing:
+        raise BadInput(f"{missing[0]} is missing: a point needs a number for each of {', '.join(ds.status.dims)}")
+    point |= {dim: 0 for dim in ds.status.dims if dim not in point}
+    return of_points(ds).isel(point)
+
+
+def of_points(ds):
+    """The variables that have a value per point: no edges, no cells, no counts of the whole map."""
+    names = [name for name, v in ds.data_vars.items() if set(ds.status.dims) <= set(v.dims)]
+    return ds[names].assign_attrs({key: value for key, value in ds.attrs.items() if key not in WHOLE})[names]
+
+
+def place(ds, coords):
+    """{dimension: place of the nearest value} of numbers by axis; raises BadInput for one that is no axis or too far.
+
+    A number may lie beyond an end by half a step, not more.
+    """
+    axes = [dim for dim in ds.status.dims if dim in ds.coords]
+    places = {}
+    for name, value in coords.items():
+        if name not in axes:
+            raise BadInput(modules.unknown("axis", name, axes))
+        values = ds[name].values
+        if np.ndim(value) or np.asarray(value).dtype.kind not in "iuf" or not np.isfinite(value):
+            raise BadInput(f"{name} = {value!r}: give one number, from {values.min():g} to {values.max():g}")
+        i = int(np.abs(values - float(value)).argmin())
+        step = np.abs(np.diff(values)).max(initial=0)
+        if abs(values[i] - value) > 0.5 * step * (1 + 1e-9) and not values.min() <= value <= values.max():
+            raise BadInput(f"{name} = {value:g} lies outside the map: give a number from {values.min():g} to "
+                           f"{values.max():g}")  # fmt: skip
+        places[name] = i
+    return places
+
+
+def meaning(variable):
+    """The word of a flag's code, of a single value."""
+    codes = np.atleast_1d(variable.attrs["flag_values"]).tolist()
+    words = variable.attrs["flag_meanings"].split()
+    return dict(zip(codes, words, strict=True)).get(int(variable), str(int(variable)))
+
+
+def parameters(ds):
+    """{name: value} of a point's parameters."""
+    return {name: float(c) for name, c in ds.coords.items() if c.ndim == 0 and c.dtype.kind in "fi"}
+
+
+def options(ds):
+    """{name: value} of the scene's options."""
+    return dict(pair.split("=") for pair in ds.attrs["options"].split(", ") if pair)
+
+
+@dataclass(frozen=True, repr=False)
+class Point:
+    """Everything known of one point; print it, or let a notebook show it.
+
+    `dataset` holds it as it is in the file: every output, its error bar `X_error`, `status`, and `verdict`.
+    """
+
+    dataset: xr.Dataset
+
+    @property
+    def parameters(self):
+        """{name: value} of all parameters, fixed ones too."""
+        return parameters(self.dataset)
+
+    @property
+    def verdict(self):
+        """The verdict in a word; None where the scene has none."""
+        return meaning(self.dataset.verdict) if "verdict" in self.dataset else None
+
+    @property
+    def status(self):
+        """The status in a word."""
+        return meaning(self.dataset.status)
+
+    @property
+    def why(self):
+        """What decided the verdict, by which margin against which error bar; or why there is no answer."""
+        ds = self.dataset
+        if int(ds.status) != status.OK:
+            return _sentence(ds)
+        judge = getattr(_scene(ds), "why", None)
+        if judge is None or "verdict" not in ds:
+            return _sentence(ds)
+        try:
+            return judge(values(ds))
+        except KeyError as missing:
+            return f"the file does not hold {missing.args[0]}, which decides; let the survey write it"
+
+    def __repr__(self):
+        rows = list(self._rows())
+        wide = max(len(f"{name} = {value}") for name, value, about in rows if about)
+        lines = (f"{name} = {value}".ljust(wide) + f"  {about}" if about else f"{name}: {value}"
+                 for name, value, about in rows)  # fmt: skip
+        return "\n".join([self.dataset.attrs.get("title", self.dataset.attrs["scene"]), *lines])
+
+    def _repr_html_(self):
+        cell = "<td style='text-align:left;vertical-align:top'>"
+        rows = "".join(
+            "<tr>" + "".join(f"{cell}{html.escape(text)}</td>" for text in row) + "</tr>" for row in self._rows()
+        )
+        title = html.escape(self.dataset.attrs.get("title", self.dataset.attrs["scene"]))
+        return f"<table><caption>{title}</caption>{rows}</table>"
+
+    def _rows(self):
+        """(name, value, what it is) of everything; words have nothing in the third place."""
+        ds = self.dataset
+        if self.verdict:
+            yield "verdict", self.verdict, ""
+        yield "why", self.why, ""
+        if int(ds.status) == status.OK:
+            yield "status", "ok", ""
+        told = [f"{key} = {value}" for key, value in options(ds).items()]
+        told += [f"method {ds.attrs.get('method', 'auto')}", f"rtol {ds.attrs.get('rtol', float('nan')):g}"]
+        yield "solved with", ", ".join(told), ""
+        for name, value in self.parameters.items():
+            yield name, f"{value!r}", _about(ds[name])
+        bars = error_bars(ds)
+        for name, variable in ds.data_vars.items():
+            if not name.endswith("_error") and name not in ("verdict", "status"):
+                yield from _outputs(ds, name, variable, name in bars)
+
+
+def values(ds):
+    """{name: value} of everything known of a point, numpy arrays; `verdict` and other flags as words."""
+    return {
+        name: meaning(v) if "flag_values" in v.attrs and v.ndim == 0 else v.values
+        for name, v in ds.variables.items()
+        if set(v.dims) <= set(ds.dims)
+    }
+
+
+def _scene(ds):
+    """The scene's module, or None where it is a user's that is gone."""
+    try:
+        return own.find(own.of_dataset(ds))[1]
+    except BadInput:
+        return None
+
+
+def _sentence(ds):
+    """What the status says of the point."""
+    said = dict(part.split(": ", 1) for part in ds.status.attrs.get("comment", "").split("; ") if ": " in part)
+    word = meaning(ds.status)
+    return f"{word}: {said[word]}" if word in said else word
+
+
+def _outputs(ds, name, variable, has_bar):
+    """The rows of an output: one, or one for each place of its own dimension that has a value."""
+    about = _about(variable)
+    if not variable.ndim:
+        yield name, _told(ds, name, has_bar), about
+        return
+    label = variable.dims[0]
+    for i in range(ds.sizes[label]):
+        value = _told(ds.isel({label: i}), name, has_bar)
+        if value not in ("does not apply", "none"):
+            yield f"{name}[{ds[label].values[i]}]", value, about
+
+
+def _told(ds, name, has_bar):
+    """A value, to the digits that its error bar leaves it."""
+    variable = ds[name]
+    if "flag_values" in variable.attrs:
+        return meaning(variable)
+    value = float(variable)
+    if not np.isfinite(value):
+        return "does not apply"
+    if not has_bar:
+        return str(variable.values)
+    bar = float(ds[f"{name}_error"])
+    known = 17 if bar == 0 or value == 0 else np.floor(np.log10(abs(value))) - np.floor(np.log10(bar)) + 2
+    return f"{value:#.{int(np.clip(known, 2, 17))}g} +- {bar:.2g}" if bar else f"{value!r} +- 0"
+
+
+def _about(variable):
+    units = variable.attrs.get("units", "1")
+    return f"{variable.attrs.get('long_name', variable.name)}{'' if units in ('1', '') else f' ({units})'}"

@@ -1,0 +1,25 @@
+"""One point solved in time, as its scene's `trajectory` does."""
+
+import numpy as np
+import xarray as xr
+
+from survey import api, own
+from survey.analysis.point import options, parameters, values
+from survey.errors import BadInput
+
+
+def solve(point, time=None):
+    """The motion at `point` (a dataset of one point), a Dataset whose attribute `panels` says how it is drawn."""
+    if time is not None and not (np.isfinite(time) and time > 0):
+        raise BadInput(f"time = {time!r}: give a positive number, how long the motion is followed")
+    name, scene = own.find(own.of_dataset(point))
+    make = getattr(scene, "trajectory", None)
+    if make is None:
+        raise BadInput(f"the scene {name} has no trajectory; it would be a function of that name in its file")
+    given, chosen = parameters(point), options(point)
+    answer = api.evaluate(own.of_dataset(point), **given, **chosen)
+    found = make(given, values(answer), chosen, time)
+    about = {"title": point.attrs.get("title", ""), "scene": name, "options": point.attrs["options"]}
+    about |= {"parameters": ", ".join(f"{key}={value!r}" for key, value in given.items())}
+    about |= {"panels": "; ".join(" ".join(panel) for panel in found.panels)}
+    return xr.Dataset(dict(found.data), attrs=about)

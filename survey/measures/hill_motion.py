@@ -1,0 +1,52 @@
+"""The solutions y1, y2 of Hill's equation over some periods, and its multipliers: the trajectory of a point."""
+
+from math import ceil
+
+import numpy as np
+
+from survey.measures import linear_motion
+from survey.scene import Trajectory
+
+PERIODS, GROWTH = 6, 7.0  # so many periods, but not beyond e^7
+PHASE, LEAST, MOST = 0.05, 240, 20_000  # radians per step; steps per period
+
+
+def solve(problem, answer, time, name="t"):
+    """The Trajectory of a Problem of one point, of which `answer` is known, up to the time `time` (or what suits)."""
+    period = float(answer["period"])
+    periods = _number(float(answer["exponent"])) if time is None else max(1, ceil(time / period))
+    fastest = np.sqrt(float(problem.bound[0] @ abs(problem.p[0, 0]) ** np.arange(3)))
+    steps = int(np.clip(fastest * period / PHASE, LEAST, MOST)) // 2 * 2
+    z, lengths = _sampled(problem, steps if problem.whole else steps // 2)
+    matrices = np.zeros((*z.shape, 2, 2))
+    matrices[..., 0, 1], matrices[..., 1, 0] = 1.0, -z
+    y, bars = linear_motion.fundamental(matrices, lengths, periods)
+    t = np.concatenate([[0.0], np.cumsum(np.tile(lengths, periods))])
+    if time is not None:
+        kept = t <= time * (1 + 1e-12)
+        t, y, bars = t[kept], y[kept], bars[kept]
+    pair, off = linear_motion.of_trace(float(answer["discriminant"]), float(answer["discriminant_error"]))
+    data = {
+        name: (name, t, {"long_name": "time", "symbol": name, "units": "1"}),
+        "multiplier": ("multiplier", np.array([1, 2]), {"long_name": "number of the multiplier"}),
+        **linear_motion.described(pair, off),
+    }
+    for i in range(2):
+        words = f"solution with y(0) = {1 - i}, y'(0) = {i}"
+        data |= linear_motion.value(name, f"y{i + 1}", f"y_{i + 1}", words, y[:, 0, i], bars[:, 0, i])
+    return Trajectory(data, (("lines", name, "y1", "y2"), ("multipliers",)))
+
+
+def _number(exponent):
+    """How many periods suit a solution that grows by so much in each."""
+    return int(np.clip(GROWTH / exponent if exponent > 0 else PERIODS, 1, PERIODS))
+
+
+def _sampled(problem, steps):
+    """z at the nodes of all steps of a period (steps, 9), and their lengths."""
+    c0, c1 = problem.sample(np.array([0]), linear_motion.NODES, steps)[0].transpose(1, 0, 2)
+    p, lengths = problem.p[0, 0], problem.lengths(np.array([0]), steps)[0]
+    z = c0 + p * c1 + p * p * problem.c2
+    if problem.whole:
+        return z, lengths
+    return np.concatenate([z, linear_motion.mirrored(z)]), np.concatenate([lengths, lengths[::-1]])  # z(T - t) = z(t)

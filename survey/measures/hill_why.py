@@ -1,0 +1,48 @@
+"""Why a point of Hill's equation has its verdict, in a sentence: which factor decided, against which error bar."""
+
+from survey.scene import told
+
+RULE = "an exact rule decides here (no unstable side, or |D| = 2), whatever the error bars"
+
+
+def why(answer, even=True):
+    """The sentence, from what is known of the point (`answer`); `even`: are the factors those at T/2?"""
+    if answer["verdict"] == "marginal":
+        return f"{RULE}: |D| = 2"
+    if not even:
+        return _by_trace(answer)
+    factors = {name: _product(answer, *name) for name in (("dy1", "y2"), ("y1", "dy2"))}
+    (p, p_bar), (q, q_bar) = factors.values()
+    above, below = f"y1' y2 = {told(p, p_bar)}", f"y1 y2' = {told(q, q_bar)}"
+    if answer["verdict"] == "unstable":
+        if p > p_bar:
+            return f"{above} > 0 at T/2, {_times(p, p_bar)} its error bar: D = 2 + 4 y1' y2 > 2"
+        if -q > q_bar:
+            return f"{below} < 0 at T/2, {_times(q, q_bar)} its error bar: D = 4 y1 y2' - 2 < -2"
+    elif answer["verdict"] == "stable" and -p > p_bar and q > q_bar:
+        nearest = min(_ratio(p, p_bar), _ratio(q, q_bar))
+        return f"{above} < 0 and {below} > 0 at T/2, at least {nearest:.2g} times their error bars: |D| < 2"
+    elif answer["verdict"] == "undecided":
+        across = above if abs(p) <= p_bar else below
+        return f"{across} at T/2: the error bar reaches across 0, an edge of a tongue"
+    return f"{above}, {below} at T/2; {RULE}"
+
+
+def _by_trace(answer):
+    d, bar = float(answer["discriminant"]), float(answer["discriminant_error"])
+    side = {"stable": "|D| < 2", "unstable": "|D| > 2"}.get(answer["verdict"], "the error bar reaches across |D| = 2")
+    return f"D = {told(d, bar)}, {abs(2 - abs(d)):.2g} from |D| = 2: {side}"
+
+
+def _product(answer, one, other):
+    """The product of two factors and its bar."""
+    (x, dx), (y, dy) = ((float(answer[name]), float(answer[f"{name}_error"])) for name in (one, other))
+    return x * y, abs(x) * dy + abs(y) * dx + dx * dy
+
+
+def _ratio(value, bar):
+    return abs(value) / bar if bar else float("inf")
+
+
+def _times(value, bar):
+    return f"{_ratio(value, bar):.2g} times"
