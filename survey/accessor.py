@@ -22,17 +22,21 @@ class Survey:
             )
         self._ds = ds
 
-    def map(self, var=None, ax=None, boundaries=True):
+    def map(self, var=None, ax=None, boundaries=True, style=None, width="single"):
         """Draw the stability map, or the variable `var`; along one axis, its curve and error band.
 
         Undecided, failed and outside points are marked and counted in the legend; edges of tongues are drawn where
         the file holds them, unless `boundaries` is False. Draws onto the matplotlib Axes `ax`, by default a new
-        figure's, and returns it (`ax.figure.savefig("map.pdf")`).
+        figure's, and returns it (`ax.figure.savefig("map.pdf")`). `style="paper"`: for print, hatched, without title,
+        a single or double column wide; `survey plot --style paper` also embeds the fonts as journals ask.
         """
+        import matplotlib
+
         from survey import figures
 
-        ax = _new_axes(figures.SIZE) if ax is None else ax
-        figures.onto(ax, self._ds, var, boundaries)
+        with matplotlib.rc_context(figures.look(style).rc):
+            ax = _new_axes(figures.size(style, width)) if ax is None else ax
+            figures.onto(ax, self._ds, var, boundaries, style)
         return ax
 
     def point(self, **coords):
@@ -65,9 +69,9 @@ class Survey:
     def boundary(self, kind=None, index=None):
         """Where the verdict changes, one place after another along the dimension `place`, as a Dataset.
 
-        Where the file holds edges of tongues: a coordinate per axis, `position_error`, `kind` (of the periodic solution,
-        such as even_periodic), `index` (of the tongue) and, if they are joined, `curve`; of one `kind` or `index` if
-        asked for. Else midpoints between neighbouring points of different verdict, with X_error = half their distance.
+        Where the file holds edges of tongues: a coordinate per axis, `position_error`, `kind` (of the periodic
+        solution there), `index` (of the tongue) and, if they are joined, `curve`; of one `kind` or `index` if asked
+        for. Else midpoints between neighbouring points of different verdict, with X_error = half their distance.
         """
         from survey.analysis import boundary
 

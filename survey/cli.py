@@ -126,18 +126,23 @@ def info(path, as_json):
 
 @program.command()
 @click.argument("path", metavar="OUT.nc")
-@click.option("-o", "--output", metavar="OUT.png", help="The picture; by default beside the file.")
+@click.option("-o", "--output", metavar="OUT.png", help="The picture, .png, .pdf or .svg; by default beside the file.")
 @click.option("--var", metavar="NAME", help="The variable; by default the verdict.")
-def plot(path, output, var):
+@click.option(
+    "--style", type=click.Choice(["screen", "paper"]), default="screen", help="paper: PDF, hatched, no title."
+)
+@click.option("--width", type=click.Choice(["single", "double"]), default="single", help="Columns, of style paper.")
+def plot(path, output, var, style, width):
     """Draw the stability map, or the named variable."""
     from pathlib import Path
 
     from survey import api, figures
 
     ds = api.open(path)
-    target = Path(output or (Path(path).with_suffix(".png") if not var else f"{path.removesuffix('.nc')}_{var}.png"))
+    suffix = ".pdf" if style == "paper" else ".png"
+    target = Path(output or f"{path.removesuffix('.nc')}{f'_{var}' if var else ''}{suffix}")
     try:
-        figures.save(ds, target, var)
+        figures.save(ds, target, var, style, width)
     except BadInput:
         raise
     except (OSError, ValueError) as error:

@@ -1,7 +1,14 @@
-"""Dataset -> figure: the stability map, a variable with its colour bar, or a curve with its error band."""
+"""Dataset -> figure: the stability map, a variable with its colour bar, or a curve with its error band.
+
+Pictures are for the screen (`style` "screen") or for papers ("paper": column widths, no title, and hatching, so that
+verdicts differ in grey print too).
+"""
 
 import textwrap
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
+import matplotlib
 import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
@@ -19,7 +26,8 @@ from survey.grid import logarithmic
 # black is kept for undecided, white with hatching for failed
 COLOURS = ("#D55E00", "#A6D8F5", "#E69F00", "#F0E442", "#009E73", "#CC79A7", "#0072B2", "#999999", "#B8E0D2", "#5D3A9B")
 UNDECIDED = "#000000"
-SIZE = (7.2, 5.2)  # inches
+HATCHES = ("//////", "", "....", "\\\\\\\\", "xxxx", "----", "||||", "++++", "oo", "**")  # of the COLOURS, in papers
+HATCHED = 500  # cells along an axis: hatching is drawn as outlines
 CELLS = 2000  # along an axis: more than a picture has pixels, and each costs a hundred bytes
 MARK_BELOW = 0.002  # a share of the map: rarer points are also marked with a ring, or nobody would see them
 # the edges of tongues by class (`measures.hill_edges`)
@@ -29,32 +37,74 @@ EDGES = {
 }
 
 
-def save(ds, path, name=None):
+@dataclass(frozen=True)
+class Look:
+    """A style: figure sizes in inches by width, and what matplotlib is told."""
+
+    sizes: Mapping[str, tuple[float, float]]
+    dpi: int
+    paper: bool = False
+    rc: Mapping[str, object] = field(default_factory=dict)
+
+
+_WIDE = (7.2, 5.2)
+STYLES = {
+    "screen": Look({"single": _WIDE, "double": _WIDE}, 150),
+    # columns of 85 and 175 mm; Type 42 fonts are embedded whole, as journals ask
+    "paper": Look({"single": (3.35, 2.9), "double": (6.89, 4.4)}, 600, True, {
+        "font.family": "STIXGeneral", "mathtext.fontset": "stix", "font.size": 9, "axes.labelsize": 9,
+        "xtick.labelsize": 8, "ytick.labelsize": 8, "axes.linewidth": 0.6, "xtick.major.width": 0.6,
+        "ytick.major.width": 0.6, "hatch.linewidth": 0.35, "pdf.fonttype": 42, "ps.fonttype": 42,
+        "svg.fonttype": "none",
+    }),
+}  # fmt: skip
+WIDTHS = ("single", "double")
+
+
+def look(style):
+    """The Look of a style's name (None: for the screen); raises BadInput for an unknown one."""
+    if style is not None and style not in STYLES:
+        raise BadInput(modules.unknown("style", style, list(STYLES)))
+    return STYLES[style or "screen"]
+
+
+def size(style, width):
+    """(width, height) in inches; raises BadInput for an unknown width."""
+    if width not in WIDTHS:
+        raise BadInput(modules.unknown("width", width, list(WIDTHS)))
+    return look(style).sizes[width]
+
+
+def save(ds, path, name=None, style=None, width="single"):
     """Draw variable `name` (the verdict, or the first output) of `ds` to `path` (PNG, PDF or SVG)."""
-    draw(ds, name).savefig(path, dpi=150)
+    with matplotlib.rc_context(look(style).rc):
+        draw(ds, name, style, width).savefig(path, dpi=look(style).dpi)
 
 
-def draw(ds, name=None):
+def draw(ds, name=None, style=None, width="single"):
     """The figure of one variable over the survey's axes, unknown to pyplot, which shows what it knows in notebooks."""
-    figure = Figure(figsize=SIZE, layout="constrained")
-    onto(figure.subplots(), ds, name)
+    with matplotlib.rc_context(look(style).rc):
+        figure = Figure(figsize=size(style, width), layout="constrained")
+        onto(figure.subplots(), ds, name, style=style)
     return figure
 
 
-def onto(axes, ds, name=None, boundaries=True):
+def onto(axes, ds, name=None, boundaries=True, style=None):
     """Draw one variable (the verdict, or the first output) onto matplotlib axes; BadInput for an unknown one."""
+    paper = look(style).paper
     drawable = [key for key in ds.data_vars if not key.endswith("_error") and set(ds[key].dims) >= set(ds.status.dims)]
     name = name or ("verdict" if "verdict" in ds else drawable[0])
     if name not in drawable:
         raise BadInput(modules.unknown("variable", name, drawable))
     variable, state = _flat(ds, name)
     if variable.ndim == 2:
-        _map(axes, ds, variable, state, boundaries)
+        _map(axes, ds, variable, state, boundaries, paper)
     elif variable.ndim == 1:
         _curve(axes, ds, variable, state)
     else:
         raise BadInput(f"{name} is a single number; a figure needs at least one axis")
-    axes.set_title(_title(ds, variable), fontsize=10)
+    if not paper:
+        axes.set_title(_title(ds, variable), fontsize=10)
 
 
 def _flat(ds, name):
@@ -64,14 +114,14 @@ def _flat(ds, name):
     return ds[name].isel(first), ds.status.isel({dim: 0 for dim in ds.status.dims if dim not in keep})
 
 
-def _map(axes, ds, variable, state, boundaries):
+def _map(axes, ds, variable, state, boundaries, paper):
     x, y = (variable[dim] for dim in variable.dims)
     failed = np.isin(state.values, list(status.FAILURES))
     outside = state.values == status.INVALID_PARAMETERS
     if variable.name == "verdict" and "cell_verdict" in ds:
-        handles = _cells(axes, ds, x, y, failed)
+        handles = _cells(axes, ds, x, y, failed, paper)
     elif "flag_values" in variable.attrs:
-        handles = _verdicts(axes, x, y, variable, failed, outside)
+        handles = _verdicts(axes, x, y, variable, failed, outside, paper)
     else:
         some = _thinned(variable)
         shown = np.where((failed | outside)[some], np.nan, variable[some].values.astype(float))
@@ -81,12 +131,12 @@ def _map(axes, ds, variable, state, boundaries):
         whole = MaxNLocator(integer=True) if variable.dtype.kind == "i" else None
         axes.figure.colorbar(drawn, ax=axes, label=_label(variable), ticks=whole)
         axes.set_facecolor("#dddddd")
-        handles = _marks(axes, x, y, failed, "failed") + _marks(axes, x, y, outside, "outside the domain")
+        handles = _marks(axes, x, y, failed, "failed", paper) + _marks(axes, x, y, outside, "outside the domain", paper)
         handles += [Patch(color="#dddddd", label="does not apply")] if shown.mask.any() else []
     if boundaries and "curve_count" in ds:
         handles += _curves(axes, ds, x, y)
     if handles:
-        _legend(axes, handles)
+        _legend(axes, handles, paper)
     for axis, coord in ((axes.xaxis, x), (axes.yaxis, y)):
         axis.set_label_text(_label(coord))
         if logarithmic(coord.values):
@@ -105,7 +155,7 @@ def _curves(axes, ds, x, y):
     return [Line2D([], [], label=label, **EDGES[2])] if ends.size else []
 
 
-def _cells(axes, ds, x, y, failed):
+def _cells(axes, ds, x, y, failed, paper):
     """The map's cells instead of its points, with the area of each verdict. Returns the handles."""
     left, right, low, high = (ds[f"cell_{axis.name}_{end}"].values for axis in (x, y) for end in ("low", "high"))
     corners = np.stack([left, low, left, high, right, high, right, low], axis=1).reshape(-1, 4, 2)
@@ -117,15 +167,19 @@ def _cells(axes, ds, x, y, failed):
         # without smoothing there are no seams between neighbours; a hairline keeps small undecided cells in sight
         line = {"edgecolors": "none", "antialiased": False}
         line = {"edgecolors": colour, "lw": 0.4, "snap": False} if name == "undecided" else line
+        hatch = _hatch(table, name) if paper else None
         axes.add_collection(PolyCollection(corners[own], facecolors=colour, rasterized=True, **line))
+        if hatch:
+            axes.add_collection(PolyCollection(corners[own], facecolors="none", lw=0, hatch=hatch, rasterized=True))
         part = percent(shares[name], float(ds.area_fraction_error[0])) if name in shares else f"{own.sum():,} cells"
         part = part.replace("+-", "±")
-        handles += [Patch(facecolor=colour, edgecolor="black", lw=0.5, label=f"{name} ({part})")] if own.any() else []
+        patch = Patch(facecolor=colour, edgecolor="black", lw=0.5, hatch=hatch, label=f"{name} ({part})")
+        handles += [patch] if own.any() else []
     axes.set(xlim=(left.min(), right.max()), ylim=(low.min(), high.max()))
-    return handles + _marks(axes, x, y, failed, "failed")
+    return handles + _marks(axes, x, y, failed, "failed", paper)
 
 
-def _verdicts(axes, x, y, variable, failed, outside):
+def _verdicts(axes, x, y, variable, failed, outside, paper):
     """A colour per flag; failed and outside points white and hatched; rare points ringed. Returns the handles."""
     table = _flags(variable)
     palette = _palette(table)
@@ -143,14 +197,41 @@ def _verdicts(axes, x, y, variable, failed, outside):
             facecolor=palette.get(names[code], "#444444"),
             edgecolor="black",
             linewidth=0.5,
-            label=_counted(names[code], number),
+            hatch=_hatch(table, names[code]) if paper else None,
+            label=names[code].replace("_", " ") if paper else _counted(names[code], number),
         )
         for code in codes
         if number[names[code]] and names[code] != "undecided"
     ]
-    handles += _marks(axes, x, y, (shown == table.get("undecided", -1)).filled(False), "undecided", UNDECIDED)
-    handles += _marks(axes, x, y, failed, "failed") + _marks(axes, x, y, outside, "outside the domain")
+    if paper:
+        for code in codes:
+            if number[names[code]] and _hatch(table, names[code]):
+                _hatched(axes, x, y, (shown == code).filled(False), _hatch(table, names[code]))
+    undecided = (shown == table.get("undecided", -1)).filled(False)
+    handles += _marks(axes, x, y, undecided, "undecided", paper, UNDECIDED)
+    handles += _marks(axes, x, y, failed, "failed", paper) + _marks(axes, x, y, outside, "outside the domain", paper)
     return handles
+
+
+def _hatch(table, name):
+    """The hatching of a meaning in papers; none of undecided, which is black."""
+    meant = [other for other in table if other != "undecided"]
+    return HATCHES[meant.index(name) % len(HATCHES)] if name in meant and "ok" not in table else ""
+
+
+def _hatched(axes, x, y, where, hatch):
+    """Hatch the cells of the points `where`, along the edges of the cells."""
+    some = tuple(slice(None, None, -(-length // HATCHED)) for length in where.shape)
+    x, y, where = _cornered(x.values[some[0]]), _cornered(y.values[some[1]]), where[some]
+    doubled = np.repeat(np.repeat(where.T.astype(float), 2, axis=0), 2, axis=1)
+    axes.contourf(x, y, doubled, levels=[0.5, 1.5], colors="none", hatches=[hatch])
+
+
+def _cornered(values):
+    """Each cell's two edges, cell after cell."""
+    middles = 0.5 * (values[1:] + values[:-1])
+    outer = _widened(values)[[0, -1]]
+    return np.concatenate([outer[:1], np.repeat(middles, 2), outer[1:]])
 
 
 def _thinned(variable):
@@ -171,10 +252,10 @@ def _palette(table):
     return {"undecided": UNDECIDED, "ok": COLOURS[1]} | dict(zip(meant, first, strict=False))
 
 
-def _marks(axes, x, y, where, label, colour="white"):
+def _marks(axes, x, y, where, label, paper=False, colour="white"):
     """Show the points `where`: hatched where they fill an area, ringed where they are rare; their legend handle."""
     total = int(where.sum())
-    label = f"{label} ({total:,})"
+    label = label if paper else f"{label} ({total:,})"
     if total == 0:
         return []
     if total <= MARK_BELOW * where.size:
@@ -224,9 +305,10 @@ def _curve(axes, ds, variable, state):
         axes.set_xscale("log")
 
 
-def _legend(axes, handles):
+def _legend(axes, handles, paper):
     """Below: of the figure where the axes fill it, else of the axes."""
-    look = {"handles": handles, "frameon": False, "fontsize": 8, "ncols": min(4, len(handles))}
+    columns = 2 if paper and axes.figure.get_size_inches()[0] < 5 else 4
+    look = {"handles": handles, "frameon": False, "fontsize": 8, "ncols": min(columns, len(handles))}
     alone = [other for other in axes.figure.axes if other.get_label() != "<colorbar>"] == [axes]
     if alone and axes.figure.get_constrained_layout():
         axes.figure.legend(loc="outside lower center", **look)

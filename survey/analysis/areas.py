@@ -28,7 +28,7 @@ def of_map(ds):
     area, least, most = _counted(ds, list(codes.values()))
     total = area.sum()
     kept = [i for i, name in enumerate(codes) if most[i] > 0 or name == "undecided"]
-    bar = np.maximum(most - area, area - least) + 1e-13 * total
+    bar = np.where(most > 0, np.maximum(most - area, area - least) + 1e-13 * total, 0.0)
     units = " ".join(u for u in (ds[dim].attrs.get("units", "1") for dim in ds.status.dims) if u != "1") or "1"
     return _described([list(codes)[i] for i in kept], area[kept], bar[kept], total, units, COMMENT)
 

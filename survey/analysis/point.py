@@ -10,17 +10,11 @@ from survey import modules, own, status
 from survey.dataset import error_bars
 from survey.errors import BadInput
 
+# Attributes that tell of a whole file.
 WHOLE = (
-    "points",
-    "accuracy_missed",
-    "status_counts",
-    "verdict_counts",
-    "areas",
-    "boundaries",
-    "refine",
-    "refine_points",
+    "points", "accuracy_missed", "status_counts", "verdict_counts", "areas", "boundaries", "refine", "refine_points",
     "complete",
-)  # attributes that tell of a whole file
+)  # fmt: skip
 
 
 def nearest(ds, coords):
@@ -36,7 +30,9 @@ def nearest(ds, coords):
 def of_points(ds):
     """The variables that have a value per point: no edges, no cells, no counts of the whole map."""
     names = [name for name, v in ds.data_vars.items() if set(ds.status.dims) <= set(v.dims)]
-    return ds[names].assign_attrs({key: value for key, value in ds.attrs.items() if key not in WHOLE})[names]
+    some = ds[names]
+    some.attrs = {key: value for key, value in ds.attrs.items() if key not in WHOLE}
+    return some
 
 
 def place(ds, coords):

@@ -89,7 +89,5 @@ def _number(num, name, size):
     """How many values the axis gets: as many as it has, one number for all, or one by name."""
     number = num.get(name, size) if isinstance(num, dict) else size if num is None else num
     if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or number < 2:
-        raise BadInput(
-            f"num = {number!r}: give a whole number from 2 on, or one for each axis, such as {{{name!r}: 200}}"
-        )
+        raise BadInput(f"num = {number!r}: give a whole number from 2 on, or one for each axis: {{{name!r}: 200}}")
     return int(number)
