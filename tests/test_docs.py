@@ -7,6 +7,7 @@ import shlex
 import sys
 import tomllib
 
+import matplotlib.pyplot as plt
 import pytest
 import snippets
 from snippets import ROOT, fenced
@@ -26,7 +27,9 @@ def folder(tmp_path, monkeypatch):
     """An empty folder to work in, with small copies of the workflows."""
     snippets.copy_workflows(tmp_path)
     monkeypatch.chdir(tmp_path)
-    return tmp_path
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    yield tmp_path
+    plt.close("all")
 
 
 @pytest.fixture
@@ -117,6 +120,9 @@ def test_what_is_known_of_the_scene_of_the_page(added):
     ends = [solve_ivp(slope, [0, np.pi], y, "DOP853", rtol=1e-12, atol=1e-12).y[:, -1] for y in ([1, 0], [0, 1])]
     assert float(ds.y1[1, 1]) == pytest.approx(ends[0][0], abs=1e-9)
     assert float(ds.dy2[1, 1]) == pytest.approx(ends[1][1], abs=1e-9)
+    motion = ds.survey.trajectory(K=8.0, e=0.6, figure=False)
+    half = motion.sel(f=np.pi, method="nearest")
+    assert float(half.y1) == pytest.approx(ends[0][0], abs=1e-6) and "stable" in str(ds.survey.point(K=8.0, e=0.6))
 
 
 def test_the_method_of_the_page_passes_what_every_method_passes(added, monkeypatch):
