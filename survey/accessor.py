@@ -31,9 +31,11 @@ class Survey:
         a single or double column wide; `survey plot --style paper` also embeds the fonts as journals ask.
         """
         import matplotlib
+        import matplotlib.pyplot as plt
 
         from survey import figures
 
+        plt.draw_if_interactive()  # a notebook's backend, loaded within rc_context, would show no later figure
         with matplotlib.rc_context(figures.look(style).rc):
             ax = _new_axes(figures.size(style, width)) if ax is None else ax
             figures.onto(ax, self._ds, var, boundaries, style)

@@ -5,6 +5,7 @@ build/docs/source/notebooks.
 """
 
 import argparse
+import json
 import shutil
 import subprocess
 import sys
@@ -43,6 +44,14 @@ def _notebooks(folder):
     return "\n".join(["# Notebooks", "", words, "", "```{toctree}", ":maxdepth: 1", "", *names, "```", ""])
 
 
+def check(folder):
+    """Every executed notebook ends with the figure that answers its question."""
+    for path in sorted(folder.glob("*.ipynb")):
+        *_, last = (cell for cell in json.loads(path.read_text())["cells"] if cell["cell_type"] == "code")
+        if not any("image/png" in output.get("data", {}) for output in last["outputs"]):
+            sys.exit(f"{path}: its last cell shows no figure")
+
+
 def main():
     words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     words.add_argument("--no-notebooks", action="store_true", help="leave the notebooks as they are, without outputs")
@@ -51,6 +60,7 @@ def main():
     assemble(source)
     if not given.no_notebooks:
         run("pytest", *NBMAKE, "-n", "2", str(source / "notebooks"))
+        check(source / "notebooks")
     run("sphinx", "-q", "-W", "--keep-going", "-E", "-d", str(OUT / "doctrees"), str(source), str(OUT / "html"))
     print(OUT / "html/index.html")
 
