@@ -128,9 +128,7 @@ def info(path, as_json):
 @click.argument("path", metavar="OUT.nc")
 @click.option("-o", "--output", metavar="OUT.png", help="The picture, .png, .pdf or .svg; by default beside the file.")
 @click.option("--var", metavar="NAME", help="The variable; by default the verdict.")
-@click.option(
-    "--style", type=click.Choice(["screen", "paper"]), default="screen", help="paper: PDF, hatched, no title."
-)
+@click.option("--style", type=click.Choice(["screen", "paper"]), default="screen", help="For papers: PDF, hatched.")
 @click.option("--width", type=click.Choice(["single", "double"]), default="single", help="Columns, of style paper.")
 def plot(path, output, var, style, width):
     """Draw the stability map, or the named variable."""

@@ -62,7 +62,7 @@ class Look:
 _WIDE = (7.2, 5.2)
 STYLES = {
     "screen": Look({"single": _WIDE, "double": _WIDE}, 150),
-    # columns of 85 and 175 mm; Type 42 fonts are embedded whole, as journals ask
+    # columns of 85 and 175 mm; fonts are embedded as TrueType (42), as journals ask
     "paper": Look({"single": (3.35, 2.9), "double": (6.89, 4.4)}, 600, True, {
         "font.family": "STIXGeneral", "mathtext.fontset": "stix", "font.size": 9, "axes.labelsize": 9,
         "xtick.labelsize": 8, "ytick.labelsize": 8, "axes.linewidth": 0.6, "xtick.major.width": 0.6,
@@ -362,9 +362,11 @@ def _label(variable):
     """`long name, symbol (unit)`."""
     symbol, units = variable.attrs.get("symbol", ""), variable.attrs.get("units", "1")
     text = variable.attrs.get("long_name", variable.name)
-    text += f", ${symbol}$" if symbol and "flag_values" not in variable.attrs else ""
+    shown = symbol and "flag_values" not in variable.attrs
+    text += ", $$" if shown else ""  # TeX is wider than what it shows: wrapped without it
     text += "" if units in ("1", "") else f" ({units})"
-    return textwrap.fill(text, 42, break_long_words=False)
+    wrapped = textwrap.fill(text, 40, break_long_words=False)
+    return wrapped.replace("$$", f"${symbol}$") if shown else wrapped
 
 
 def _title(ds, variable):

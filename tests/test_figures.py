@@ -91,6 +91,31 @@ def test_a_row_of_verdicts_is_drawn_by_its_names(toy):
     plt.close(figure)
 
 
+def test_for_papers_verdicts_are_hatched_in_columns_and_fonts_embedded(toy, tmp_path):
+    figure = figures.draw(toy, style="paper", width="double")
+    assert figure.get_size_inches()[0] == pytest.approx(175 / 25.4, abs=0.01) and not figure.axes[0].get_title()
+    legend = figure.legends[0]
+    hatches = {t.get_text(): p.get_hatch() for t, p in zip(legend.get_texts(), legend.get_patches(), strict=False)}
+    assert hatches["unstable"] == "//////" and not hatches["stable"]
+    assert figure.axes[0].get_ylabel() == r"ratio, $\rho$ (rad)"
+    figures.save(toy, tmp_path / "map.pdf", style="paper")
+    content = (tmp_path / "map.pdf").read_bytes()
+    assert content.startswith(b"%PDF") and b"/FontFile2" in content and b"/Type3" not in content
+
+
+def test_hatching_follows_the_edges_of_cells(toy):
+    from matplotlib.figure import Figure
+
+    axes = Figure().subplots()
+    one = toy.isel(k=slice(0, 3), rho=slice(0, 3))
+    where = np.array([[False, False, False], [False, True, False], [False, False, False]])
+    figures._hatched(axes, one.k, one.rho, where, "////")
+    (path,) = axes.collections[0].get_paths()
+    middles = [0.5 * (v[1:] + v[:-1]) for v in (one.k.values, one.rho.values)]
+    for corner in np.unique(path.vertices.round(12), axis=0):
+        assert all(np.isclose(value, edges).any() for value, edges in zip(corner, middles, strict=True))
+
+
 def test_a_single_number_has_no_figure(surveyed):
     with pytest.raises(BadInput, match="at least one axis"):
         figures.draw(survey.open(surveyed).isel(t=0, w0=0), "w")

@@ -29,7 +29,7 @@ def find(one, other):
 
 def _common(one, other):
     """Both at the values that they share exactly: a value that is only near belongs to another point."""
-    for name in set(one.coords) | set(other.coords):
+    for name in dict.fromkeys([*one.coords, *other.coords]):
         first, second = one.coords.get(name), other.coords.get(name)
         if first is None or second is None or first.dtype.kind not in "fi":
             continue
@@ -69,7 +69,7 @@ def _outputs(one, other):
         bar = one[f"{name}_error"].astype(float) + other[f"{name}_error"].astype(float)
         meaning = {"long_name": f"difference in {name}", "units": one[name].attrs.get("units", "1")}
         found[f"{name}_difference"] = off.assign_attrs(meaning)
-        excess = xr.where(off == 0, 0.0, abs(off) / bar)
+        excess = abs(off) / xr.where(off == 0, 1.0, bar)
         meaning = {"long_name": f"difference in {name} over the sum of both error bars", "units": "1"}
         found[f"{name}_excess"] = excess.assign_attrs(meaning | {"comment": "above 1 the two contradict one another"})
     return found

@@ -6,6 +6,7 @@ import xarray as xr
 from survey import api, own
 from survey.analysis.point import options, parameters, values
 from survey.errors import BadInput
+from survey.scene import exists
 
 
 def solve(point, time=None):
@@ -17,8 +18,9 @@ def solve(point, time=None):
     if make is None:
         raise BadInput(f"the scene {name} has no trajectory; it would be a function of that name in its file")
     given, chosen = parameters(point), options(point)
-    answer = api.evaluate(own.of_dataset(point), **given, **chosen)
-    found = make(given, values(answer), chosen, time)
+    needed = {o.name for o in scene.OUTPUTS if exists(o, chosen)}
+    known = point if needed <= set(point) else api.evaluate(own.of_dataset(point), **given, **chosen)
+    found = make(given, values(known), chosen, time)
     about = {"title": point.attrs.get("title", ""), "scene": name, "options": point.attrs["options"]}
     about |= {"parameters": ", ".join(f"{key}={value!r}" for key, value in given.items())}
     about |= {"panels": "; ".join(" ".join(panel) for panel in found.panels)}

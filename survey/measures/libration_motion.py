@@ -15,14 +15,7 @@ GROWTH = 5.0
 
 def orbit(mu, e, time):
     """f, xi and eta, from rest in xi = 1, up to f = `time`, with their bars, as `Trajectory.data` holds them."""
-    d1, d2 = (float(rate[0]) for rate in danby.rates(np.array([mu])))
-    height, lengths = danby.mesh(STEPS, int(danby.grading(np.array([e]))[0]), tuple(linear_motion.NODES))
-    r = 1.0 / ((1.0 - e) + e * height)
-    r, lengths = np.concatenate([r, linear_motion.mirrored(r)]), np.concatenate([lengths, lengths[::-1]])
-    matrices = np.zeros((*r.shape, 4, 4))
-    matrices[..., 0, 2] = matrices[..., 1, 3] = 1.0
-    matrices[..., 2, 0], matrices[..., 3, 1] = d1 * r, d2 * r
-    matrices[..., 2, 3], matrices[..., 3, 2] = 2.0, -2.0
+    matrices, lengths = coefficients(mu, e)
     turns = int(np.clip(ceil(time / (2 * pi) - 1e-9), 1, MOST))
     y, bars = linear_motion.fundamental(matrices, lengths, turns)
     f = np.concatenate([[0.0], np.cumsum(np.tile(lengths, turns))])
@@ -32,6 +25,19 @@ def orbit(mu, e, time):
         words = f"displacement along the {('first', 'second')[i]} principal axis of the potential"
         data |= linear_motion.value("f", name, rf"\{name}", words, y[kept, i, 0], bars[kept, i, 0])
     return data
+
+
+def coefficients(mu, e):
+    """A of Y' = A Y, Y = (xi, eta, xi', eta'), at the nodes of the steps of a turn (steps, 9, 4, 4); their lengths."""
+    d1, d2 = (float(rate[0]) for rate in danby.rates(np.array([mu])))
+    height, lengths = danby.mesh(STEPS, int(danby.grading(np.array([e]))[0]), tuple(linear_motion.NODES))
+    r = 1.0 / ((1.0 - e) + e * height)
+    r, lengths = np.concatenate([r, linear_motion.mirrored(r)]), np.concatenate([lengths, lengths[::-1]])
+    matrices = np.zeros((*r.shape, 4, 4))
+    matrices[..., 0, 2] = matrices[..., 1, 3] = 1.0
+    matrices[..., 2, 0], matrices[..., 3, 1] = d1 * r, d2 * r
+    matrices[..., 2, 3], matrices[..., 3, 2] = 2.0, -2.0
+    return matrices, lengths
 
 
 def multipliers(a, a_bar, b, b_bar):

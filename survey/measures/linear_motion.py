@@ -1,7 +1,7 @@
 """Motions of linear equations Y' = A(t) Y between their known multipliers: for pictures, with an error bar each.
 
-Gauss collocation with three nodes, order 6; each step is taken whole and in two halves, whose difference is the bar of
-the halves (over 2^6 - 1 it would be their expected error).
+Gauss collocation with three nodes, order 6; each step is taken whole and in two halves, and the bar of the halves is
+four times the largest difference so far (of order 6, truncation alone would be a 63rd of the difference).
 
 Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.7, table 7.4.
 """
@@ -30,7 +30,8 @@ def fundamental(matrices, lengths, periods):
     halves = [_step(matrices[:, 3 * i : 3 * i + 3], 0.5 * h) for i in range(2)]
     fine, coarse = _chain(halves[1] @ halves[0], periods), _chain(_step(matrices[:, 6:], h), periods)
     rounding = EPS * np.arange(1, len(fine) + 1)[:, None, None] * abs(fine).max(axis=(1, 2), keepdims=True)
-    return fine, abs(fine - coarse) + rounding
+    # the two are rounded differently, too: the largest difference so far tells of rounding where truncation is small
+    return fine, 4 * np.maximum.accumulate(abs(fine - coarse), axis=0) + rounding
 
 
 def _step(a, h):

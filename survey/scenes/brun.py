@@ -251,10 +251,12 @@ def _sides(u, state):
     """Which side of a pole that it passes the axis is on, -1 or 1: psi is given without its jumps of pi there."""
     pole = 1 if state["p_psi"] == state["p_phi"] else -1 if state["p_psi"] == -state["p_phi"] else 0
     near = pole * u
-    passed = (
-        (near[1:-1] > near[:-2]) & (near[1:-1] >= near[2:]) & (near[1:-1] > 0.9) if pole else np.zeros(len(u) - 2, bool)
-    )
-    return 1.0 - 2.0 * (np.cumsum(np.concatenate([[False], passed, [False]])) % 2)
+    before, here, after = near[:-2], near[1:-1], near[2:]
+    top = 1 + np.flatnonzero((here > before) & (here >= after) & (here > 0.9))
+    later = near[top + 1] > near[top - 1]  # the parabola through three places has its top beyond the middle one
+    passed = np.zeros(u.size, int)
+    passed[top + later] = 1
+    return 1 - 2 * (np.cumsum(passed) % 2)
 
 
 def why(answer):

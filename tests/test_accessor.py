@@ -1,0 +1,341 @@
+"""`ds.survey`: each question asked of small surveys, and its answer compared with something it was not made from."""
+
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import dask.array as da
+import matplotlib
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import linalg, special
+
+import survey
+from survey import status
+from survey.errors import BadInput
+
+matplotlib.use("Agg")
+GYROSTAT = {"b12": 0.7, "b31": -0.4, "d": 1.1, "c23": 0.3, "s2": 0.5, "s3": -0.2}
+FATES = Path(__file__).parent.parent / "results/gyrostat_fate_small.nc"
+STATE = {"A": 1.0, "C": 0.5, "epsilon": 3.0, "p_theta0": 0.3}
+
+
+@pytest.fixture(scope="module")
+def mathieu():
+    return survey.evaluate("mathieu", a=np.linspace(-1.0, 5.0, 31), q=np.linspace(0.1, 2.0, 20))
+
+
+@pytest.fixture(scope="module")
+def toy():
+    """A disc of radius 0.3 that is unstable, in the unit square; some points undecided, failed and outside."""
+    x, y = np.linspace(0, 1, 101), np.linspace(0, 1, 81)
+    verdict = np.where(np.hypot(x[:, None] - 0.5, y - 0.5) < 0.3, 0, 1).astype(np.int8)
+    state = np.zeros(verdict.shape, np.int8)
+    verdict[:3, :3], verdict[-5:, -5:], state[-5:, -5:] = -1, -1, status.STEP_LIMIT
+    flags = {"flag_values": np.array([-1, 0, 1], np.int8), "flag_meanings": "undecided unstable stable"}
+    return xr.Dataset(
+        {"verdict": (("k", "rho"), verdict, flags), "status": (("k", "rho"), state)},
+        {"k": x, "rho": y}, {"scene": "satellite", "options": "body=prolate", "title": "A toy map"},
+    )  # fmt: skip
+
+
+def close(one, other, bar):
+    """Do two numbers agree within the bar, which is no excuse for anything?"""
+    return abs(float(one) - float(other)) <= bar < 1e-6 * (1 + abs(float(other)))
+
+
+@pytest.mark.parametrize("first", ["survey, xarray", "xarray, survey"])
+def test_any_order_of_imports_registers_the_accessor(first):
+    code = f"import importlib.util as u, sys; u.find_spec('xarray'); import {first}; xarray.Dataset.survey.map"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_figures_leave_the_backend_of_a_notebook_alone():
+    code = "import survey.figures, matplotlib; assert matplotlib.get_backend() == 'svg', matplotlib.get_backend()"
+    subprocess.run([sys.executable, "-c", code], check=True, env=os.environ | {"MPLBACKEND": "svg"})
+
+
+def test_a_map_marks_what_is_undecided_or_failed_on_any_axes(toy):
+    own = toy.survey.map()
+    legend = [text.get_text() for text in own.figure.legends[0].get_texts()]
+    assert {"undecided (9)", "failed (25)"} < set(legend)
+    given = matplotlib.figure.Figure().subplots(1, 2)[1]
+    assert toy.survey.map(ax=given) is given
+    assert [text.get_text() for text in given.get_legend().get_texts()] == legend
+
+
+def test_a_slice_is_a_row_of_the_map_and_draws_its_error_band(mathieu):
+    row = mathieu.survey.slice(q=1.02)
+    xr.testing.assert_identical(row.y1, mathieu.y1.sel(q=1.02, method="nearest"))
+    axes = row.survey.map("y1")
+    assert axes.get_xlabel() == "characteristic value, $a$" and len(axes.collections) == 1
+    assert "verdict_counts" not in row.attrs
+
+
+def test_a_point_is_the_nearest_one_with_its_bars_and_reasons(mathieu):
+    point = mathieu.survey.point(a=1.02, q=0.49)
+    assert point.parameters == {"a": float(mathieu.a[10]), "q": float(mathieu.q[4])}
+    assert point.verdict == "unstable" and point.status == "ok"
+    assert "y1 y2' = " in point.why and "< 0 at T/2" in point.why
+    text = repr(point)
+    assert "verdict: unstable" in text and f"+- {float(point.dataset.y1_error):.2g}" in text
+    assert "<table>" in point._repr_html_() and "&lt; 0 at T/2" in point._repr_html_()
+    assert point.dataset.y1 == mathieu.y1[10, 4]
+
+
+@pytest.mark.parametrize(
+    ("scene", "given", "words"),
+    [
+        ("mathieu", {"a": 4.0, "q": 0.0}, "exact rule"),
+        ("mathieu", {"a": 0.5, "q": 0.1}, "times their error bars"),
+        ("mathieu", {"a": 0.5, "q": 0.1, "variables": ["verdict"]}, "does not hold"),
+        ("satellite", {"k": [0.5, 1.0], "rho": 1.0}, "invalid_parameters"),
+        ("libration", {"mu": 0.012}, "M_ray = -148."),
+        ("libration", {"mu": 0.01}, "have one sign"),
+        ("libration", {"mu": 0.05}, "mu > mu_R"),
+        ("libration_elliptic", {"mu": 0.05, "e": 0.1}, "is not positive (at 0 two pairs meet)"),
+        ("libration_elliptic", {"mu": 0.01, "e": 0.1}, "> 0, and so are"),
+        ("gyrostat", {"question": "portrait", **GYROSTAT}, "the multiplier nearest to 1 is 1.006"),
+        ("brun", {"theta0": 1.0, "p_psi": 0.6, "p_phi": 0.4, **STATE}, "beyond the error bars"),
+        ("brun", {"theta0": 1.0, "p_psi": 0.5, "p_phi": 0.5, **STATE}, "passes a pole"),
+        ("brun", {"l": 1.0, "alpha": 0.2, "beta": 0.1}, "separatrix_distance = "),
+    ],
+)
+def test_every_scene_says_why(scene, given, words):
+    ds = survey.evaluate(scene, **given)
+    last = {dim: float(ds[dim][-1]) for dim in ds.status.dims}
+    assert words in ds.survey.point(**last).why
+
+
+def test_a_fate_says_why():
+    fates = survey.open(FATES).survey
+    assert "limit_phi = 2.6135" in fates.point(phi0=0.3, w0=0.0).why
+    assert "K = b12 s3 - b31 s2 = 0.06" in fates.point(phi0=0.3, w0=4.0).why
+
+
+@pytest.mark.parametrize(
+    ("scene", "given"),
+    [
+        ("mathieu", {"a": 3.0, "q": 0.7}),
+        ("mathieu", {"a": 1.0, "q": 0.5}),
+        ("satellite", {"k": 0.5, "rho": 1.2, "body": "oblate"}),
+        ("satellite", {"one_minus_k": -0.5, "inertia_ratio": 0.6, "direction": "-1"}),
+    ],
+)
+def test_solutions_of_hills_equation_pass_through_the_factors(scene, given):
+    known = survey.evaluate(scene, method="dop853", rtol=1e-12, **given)
+    motion = known.survey.trajectory(figure=False)
+    (time,) = motion.y1.dims
+    half = motion.sel({time: 0.5 * float(known.period)}, method="nearest")
+    assert abs(half[time] - 0.5 * known.period) < 1e-12
+    for name in ("y1", "y2"):
+        assert close(half[name], known[name], float(half[f"{name}_error"] + known[f"{name}_error"]))
+    assert close(motion.multiplier_real.sum(), known.discriminant, 2 * float(motion.multiplier_error.max()))
+    size = np.hypot(motion.multiplier_real, motion.multiplier_imag)
+    assert (abs(size - 1) <= motion.multiplier_error).all() == (known.verdict == 1)
+
+
+def test_ones_own_equation_has_points_trajectories_and_zooms():
+    def z(u, p):
+        return p[0] + p[1] * math.cos(u) + 0.1 * math.sin(2 * u)
+
+    own = survey.hill(z, period=2 * math.pi, parameters=("a", "b"))
+    ds = survey.evaluate(own, a=[0.25, 0.5], b=0.3)
+    assert "from |D| = 2: |D| > 2" in ds.survey.point(a=0.25).why
+    motion = ds.survey.trajectory(a=0.5, figure=False)
+    end = motion.sel(u=2 * math.pi, method="nearest")
+    assert close(end.y1, ds.y1[1], float(end.y1_error + ds.y1_error[1]))
+    xr.testing.assert_equal(ds.survey.zoom(a=(0.25, 0.5)).y1, ds.y1)
+
+
+@pytest.mark.parametrize("mu", [0.01, 0.05])
+def test_the_orbit_beside_l4_is_the_exponential_of_the_matrix(mu):
+    motion = survey.evaluate("libration", mu=mu).survey.trajectory(figure=False).isel(f=-1)
+    s = math.sqrt(1 - 3 * mu * (1 - mu))
+    matrix = np.array([[0, 0, 1, 0], [0, 0, 0, 1], [1.5 * (1 + s), 0, 0, 2], [0, 1.5 * (1 - s), -2, 0]])
+    exact = linalg.expm(matrix * float(motion.f))
+    assert close(motion.xi, exact[0, 0], float(motion.xi_error))
+    assert close(motion.eta, exact[1, 0], float(motion.eta_error))
+
+
+def test_multipliers_of_the_elliptic_problem_are_those_of_its_monodromy():
+    from survey.measures import libration_motion, linear_motion
+
+    ds = survey.evaluate("libration_elliptic", mu=[0.01, 0.05], e=0.3)
+    for mu in (0.01, 0.05):
+        motion = ds.survey.trajectory(mu=mu, figure=False)
+        found = np.sort_complex(motion.multiplier_real.values + 1j * motion.multiplier_imag.values)
+        matrices, lengths = libration_motion.coefficients(mu, 0.3)
+        monodromy = linear_motion.fundamental(matrices, lengths, 1)[0][-1]
+        off = abs(found - np.sort_complex(np.linalg.eigvals(monodromy)))
+        assert (off < 1e-7 * abs(found).max() + motion.multiplier_error.max().item()).all()
+        assert motion.attrs["panels"] == "plane eta xi; multipliers"
+
+
+def test_the_orbit_of_a_gyrostat_is_its_trajectory():
+    ds = survey.open(FATES)
+    start = {"phi0": float(ds.phi0[25]), "w0": float(ds.w0[20])}
+    motion = ds.survey.trajectory(time=5.0, **start).isel(t=-1)
+    known = survey.evaluate("gyrostat", question="trajectory", method="dop853", t=5.0, **start, **GYROSTAT)
+    for name in ("phi", "w"):
+        assert close(motion[name], known[name], float(motion[f"{name}_error"] + known[f"{name}_error"]))
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"theta0": 1.0, "p_psi": 0.6, "p_phi": 0.4, **STATE},
+        {"theta0": 1.0, "p_psi": 0.5, "p_phi": 0.5, **STATE},  # passes the upper pole
+        {"theta0": 2.0, "p_psi": 0.5, "p_phi": -0.5, **STATE},  # and the lower one
+        {"l": 1.0, "alpha": 0.2, "beta": 0.1},
+        {"l": 1.0, "alpha": 0.2, "beta": 0.3, "sign": "-1"},
+    ],
+)
+def test_the_axis_of_a_body_moves_on_the_sphere_without_jumps(given):
+    ds = survey.evaluate("brun", **given)
+    motion = ds.survey.trajectory()
+    path = np.stack([motion[f"axis_{name}"] for name in "xyz"])
+    speed = np.linalg.norm(np.diff(path), axis=0) / np.diff(motion.t)
+    np.testing.assert_allclose((path**2).sum(axis=0), 1.0, atol=1e-12)
+    assert np.abs(np.diff(speed)).max() < 0.1 * speed.max()
+    low, high = float(np.nanmin(ds.u_min)), float(ds.u_max.values.ravel()[np.nanargmin(ds.u_min.values.ravel())])
+    assert motion.u.min() == pytest.approx(low, abs=1e-5) and motion.u.max() == pytest.approx(high, abs=1e-5)
+
+
+def test_the_boundary_between_points_holds_the_true_one(mathieu):
+    places = mathieu.survey.boundary()
+    lowest = places.where((places.q_error == 0) & (places.a > 2.5), drop=True)
+    assert lowest.place.size > 20
+    for a, bar, q in zip(lowest.a.values, lowest.a_error.values, lowest.q.values, strict=True):
+        edges = [special.mathieu_a(2, q), special.mathieu_b(2, q)]
+        assert min(abs(a - edge) for edge in edges) <= bar
+
+
+@pytest.fixture(scope="module")
+def tongues(tmp_path_factory):
+    """A file with edges, curves and cells."""
+    workflow = {
+        "scene": "mathieu", "title": "Tongues", "boundaries": {}, "refine": {"width": 0.1},
+        "axes": {"q": {"start": 0.5, "stop": 1.5, "num": 4}, "a": {"start": 2.5, "stop": 6.0, "num": 6}},
+    }  # fmt: skip
+    path = tmp_path_factory.mktemp("tongues") / "tongues.nc"
+    survey.run(workflow, output=path)
+    return path
+
+
+def test_the_boundary_in_a_file_is_told_by_class_and_index(tongues):
+    ds = survey.open(tongues)
+    edge = ds.survey.boundary(kind="even_periodic", index=2)
+    off = abs(edge.a.values - special.mathieu_a(2, edge.q.values))
+    assert edge.place.size > 4 and (off <= 3.5 * edge.position_error + 1e-9).all()
+    rows = ds.drop_vars([name for name in ds if name.startswith("curve")]).survey.boundary(index=2)
+    assert sorted(np.unique(rows.q)) == ds.q.values.tolist() and rows.place.size == 8
+    with pytest.raises(BadInput, match="unknown kind 'even'"):
+        ds.survey.boundary(kind="even")
+
+
+def test_a_zoom_is_the_same_workflow_on_a_part(tongues, tmp_path):
+    ds = survey.open(tongues)
+    finer = ds.survey.zoom(q=(0.5, 1.0), num=3)
+    assert finer.sizes["q"] == 3 and finer.a.identical(ds.a) and {"curve_count", "area"} <= set(finer)
+    written = finer.survey.zoom(q=(0.5, 0.75), num={"q": 2}, output=tmp_path / "part.nc")
+    assert survey.open(tmp_path / "part.nc").attrs["title"] == written.attrs["title"] == "Tongues, a part, a part"
+    assert (finer.survey.compare(written).y1_excess <= 1).all()
+    row = ds.survey.slice(q=0.8).survey.zoom(a=(3.0, 4.0))
+    assert row.sizes["a"] == 6 and set(row.edge_position.dims) == {"edge"} and float(row.q) == float(ds.q[1])
+
+
+def test_areas_of_points_and_cells(toy, tongues):
+    found = toy.survey.areas()
+    disc = found.sel(area_verdict="unstable")
+    assert abs(disc.area - 0.09 * math.pi) <= disc.area_error < 0.04
+    assert list(found.area_verdict) == ["undecided", "unstable", "stable", "no_answer"]
+    assert float(found.area_fraction.sum()) == pytest.approx(1)
+    undecided = found.sel(area_verdict="undecided")
+    assert 0 < undecided.area - undecided.area_error + 1e-3 and undecided.area < 2e-3
+    ds = survey.open(tongues)
+    cells, points = ds.survey.areas(), ds.drop_vars([name for name in ds if "area" in name]).survey.areas()
+    off = abs(cells.area - points.area).sel(area_verdict="stable")
+    assert off <= (cells.area_error + points.area_error).sel(area_verdict="stable")
+    assert float(cells.area.sum()) == pytest.approx(3.5, abs=float(2 * cells.area_error.sum()))
+
+
+def test_a_comparison_finds_what_is_beyond_the_bars_and_nothing_else(mathieu):
+    other = survey.evaluate("mathieu", a=mathieu.a.values[::2], q=mathieu.q.values, rtol=1e-9, method="dop853")
+    same = mathieu.survey.compare(other)
+    assert same.sizes == {"a": 16, "q": 20} and same.attrs["summary"].endswith("are within their error bars")
+    assert "method: auto and dop853" in same.attrs["unlike"] and (same.y1_excess <= 1).all()
+    spoiled = other.copy(deep=True)
+    bars = mathieu.y1_error.astype(float) + mathieu.y1_error
+    spoiled["y1"] = mathieu.y1.isel(a=slice(None, None, 2)) + 0.5 * bars
+    spoiled["y1_error"] = mathieu.y1_error.isel(a=slice(None, None, 2))
+    spoiled["y1"][3, 4] += 10 * bars[6, 4]
+    spoiled["verdict"][0, 0], spoiled["verdict"][0, 1] = 1 - other.verdict[0, 0], -1
+    found = mathieu.survey.compare(spoiled)
+    assert np.argwhere((found.y1_excess > 1).values).tolist() == [[3, 4]]
+    assert found.y1_excess[3, 4] == pytest.approx(10.5, rel=0.01) and (found.y2_excess <= 1).all()
+    assert found.verdict_differs.values[0, :3].tolist() == [2, 1, 0]
+    assert "verdicts differ at 1, one is undecided at 1" in found.attrs["summary"]
+
+
+class Counted:
+    """An array that counts what is read of it."""
+
+    def __init__(self, array):
+        self.array, self.read, self.shape, self.dtype, self.ndim = array, 0, array.shape, array.dtype, array.ndim
+
+    def __getitem__(self, where):
+        part = self.array[where]
+        self.read += part.size
+        return part
+
+
+def test_lazy_files_are_read_in_part(mathieu, tmp_path):
+    counted = {name: Counted(v.values) for name, v in mathieu.data_vars.items()}
+    lazy = mathieu.copy(data={name: da.from_array(c, chunks=(5, 5)) for name, c in counted.items()})
+    point = lazy.survey.point(a=1.0, q=0.5)
+    assert all(0 < c.read <= 25 for c in counted.values()) and point.verdict == "unstable"
+    assert lazy.survey.slice(q=0.5).y1.chunks and lazy.survey.compare(mathieu).y1_excess.chunks
+    mathieu.to_netcdf(tmp_path / "map.nc")
+    with xr.open_dataset(tmp_path / "map.nc", chunks={}) as ds:
+        ds.survey.map()
+        ds.survey.map("y1")
+        xr.testing.assert_identical(ds.survey.areas(), mathieu.survey.areas())
+        xr.testing.assert_identical(ds.survey.boundary(), mathieu.survey.boundary())
+        ds.survey.trajectory(a=1.0, q=0.5)
+        assert ds.survey.zoom(a=(0.0, 1.0), num=3).sizes == {"a": 3, "q": 20}
+
+
+@pytest.mark.parametrize(
+    ("ask", "words"),
+    [
+        (lambda s: s.point(a=1.0), "q is missing"),
+        (lambda s: s.point(a=9.0, q=1.0), "a = 9 lies outside the map: give a number from -1 to 5"),
+        (lambda s: s.point(b=1.0), "unknown axis 'b'"),
+        (lambda s: s.slice(a="x"), "give one number"),
+        (lambda s: s.map("y3"), "unknown variable 'y3'"),
+        (lambda s: s.map(style="poster"), "unknown style 'poster'"),
+        (lambda s: s.map(style="paper", width="triple"), "unknown width 'triple'"),
+        (lambda s: s.boundary(index=2), "no edges"),
+        (lambda s: s.zoom(), "give a range"),
+        (lambda s: s.zoom(a=(2.0, 1.0)), "the lower one first"),
+        (lambda s: s.zoom(a=(0.0, 1.0), num=1), "num = 1"),
+        (lambda s: s.trajectory(a=1.0, q=0.5, time=-1.0), "time = -1.0"),
+        (lambda s: s.compare(3), "give the dataset"),
+        (lambda s: s.compare(survey.evaluate("mathieu", a=7.5, q=1.0)), "no value of a is in both"),
+        (lambda s: s.compare(survey.evaluate("libration", mu=0.01)), "one is of the scene"),
+        (lambda s: s.slice(q=1.0).survey.slice(a=1.0).survey.areas(), "two values or more"),
+    ],
+)
+def test_what_cannot_be_answered_is_said_in_one_line(mathieu, ask, words):
+    with pytest.raises(BadInput) as said:
+        ask(mathieu.survey)
+    assert words in str(said.value) and "\n" not in str(said.value)
+
+
+def test_a_foreign_dataset_is_refused():
+    with pytest.raises(BadInput, match="not written by survey"):
+        xr.Dataset({"t": ("x", [1.0])}).survey.map()
