@@ -57,20 +57,21 @@ def run(
 
 
 def draw(ds: xr.Dataset, workflow: Any) -> list[Path]:
-    """Draw the workflow's figures beside its output; returns their paths (`OUT.png`, further ones `OUT_NAME.png`)."""
+    """Draw the workflow's figures beside its output; returns their paths: `OUT.png`, further ones `OUT_NAME.png`.
+
+    In the style for papers they are PDF files.
+    """
     if not workflow.figures:
         return []
     from survey import figures
 
-    first = workflow.figures[0]
+    first, suffix = workflow.figures[0], ".pdf" if workflow.style == "paper" else ".png"
     paths = {
-        name: workflow.path.with_suffix(".png")
-        if name == first
-        else workflow.path.with_name(f"{workflow.path.stem}_{name}.png")
+        name: workflow.path.with_name(f"{workflow.path.stem}{'' if name == first else f'_{name}'}{suffix}")
         for name in workflow.figures
     }
     for name, path in paths.items():
-        figures.save(ds, path, name)
+        figures.save(ds, path, name, workflow.style)
     return list(paths.values())
 
 
