@@ -31,9 +31,11 @@ class Survey:
         a single or double column wide; `survey plot --style paper` also embeds the fonts as journals ask.
         """
         import matplotlib
+        import matplotlib.pyplot as plt
 
         from survey import figures
 
+        plt.draw_if_interactive()  # a notebook's backend, loaded within rc_context, would show no later figure
         with matplotlib.rc_context(figures.look(style).rc):
             ax = _new_axes(figures.size(style, width)) if ax is None else ax
             figures.onto(ax, self._ds, var, boundaries, style)
@@ -69,9 +71,9 @@ class Survey:
     def boundary(self, kind=None, index=None):
         """Where the verdict changes, one place after another along the dimension `place`, as a Dataset.
 
-        Where the file holds edges of tongues: a coordinate per axis, `position_error`, `kind` (of the periodic
-        solution there), `index` (of the tongue) and, if they are joined, `curve`; of one `kind` or `index` if asked
-        for. Else midpoints between neighbouring points of different verdict, with X_error = half their distance.
+        Where the file holds it ([boundaries] in the workflow): a coordinate per axis, `position_error`, `kind` (what
+        kind of boundary), `index` (of the tongue) and, if joined, `curve`; of one `kind` or `index` if asked for. Else
+        midpoints between neighbouring points of different verdict, with X_error = half their distance.
         """
         from survey.analysis import boundary
 

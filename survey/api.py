@@ -2,9 +2,13 @@
 
 import inspect
 import os
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 
 import survey.methods as method_folder
@@ -14,10 +18,17 @@ from survey import workflow as workflows
 from survey.dataset import count, counts, describe, error_bars, layout, percent
 from survey.errors import BadInput
 from survey.grid import Grid, line
-from survey.scene import condition, exists
+from survey.hill_scene import HillScene
+from survey.scene import Option, Output, Parameter, Request, condition, exists
 
 
-def run(workflow, output=None, workers=None, scheduler=None, fresh=False):
+def run(
+    workflow: str | os.PathLike[str] | Mapping[str, Any],
+    output: str | os.PathLike[str] | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    fresh: bool = False,
+) -> xr.Dataset:
     """Run, or resume, the survey in the TOML file `workflow`: the same as the command `survey run`.
 
     Parameters
@@ -45,25 +56,33 @@ def run(workflow, output=None, workers=None, scheduler=None, fresh=False):
     return ds
 
 
-def draw(ds, workflow):
-    """Draw the workflow's figures beside its output; returns their paths (`OUT.png`, further ones `OUT_NAME.png`)."""
+def draw(ds: xr.Dataset, workflow: Any) -> list[Path]:
+    """Draw the workflow's figures beside its output; returns their paths: `OUT.png`, further ones `OUT_NAME.png`.
+
+    In the style for papers they are PDF files.
+    """
     if not workflow.figures:
         return []
     from survey import figures
 
-    first = workflow.figures[0]
+    first, suffix = workflow.figures[0], ".pdf" if workflow.style == "paper" else ".png"
     paths = {
-        name: workflow.path.with_suffix(".png")
-        if name == first
-        else workflow.path.with_name(f"{workflow.path.stem}_{name}.png")
+        name: workflow.path.with_name(f"{workflow.path.stem}{'' if name == first else f'_{name}'}{suffix}")
         for name in workflow.figures
     }
     for name, path in paths.items():
-        figures.save(ds, path, name)
+        figures.save(ds, path, name, workflow.style)
     return list(paths.values())
 
 
-def evaluate(scene, *, method="auto", rtol=1e-10, variables=None, **parameters):
+def evaluate(
+    scene: str | os.PathLike[str] | HillScene,
+    *,
+    method: str = "auto",
+    rtol: float = 1e-10,
+    variables: str | Iterable[str] | None = None,
+    **parameters: npt.ArrayLike,
+) -> xr.Dataset:
     """Solve a scene at the given parameters.
 
     Parameters
@@ -113,7 +132,7 @@ def evaluate(scene, *, method="auto", rtol=1e-10, variables=None, **parameters):
     return count(ds.assign_coords(_own_coordinates(given)))
 
 
-def open(path):
+def open(path: str | os.PathLike[str]) -> xr.Dataset:
     """The dataset in the netCDF file `path`: in memory and the file closed; or lazy, if it takes more than 256 MiB.
 
     Raises survey.BadInput if there is no such file or survey did not write it, survey.Damaged if it is incomplete.
@@ -121,12 +140,12 @@ def open(path):
     return store.load(path)
 
 
-def scenes():
+def scenes() -> dict[str, str]:
     """{name: title} of the scenes."""
-    return scene_folder()
+    return scene_folder()  # type: ignore[operator]  # a folder that can be called
 
 
-def _labelled(key, value):
+def _labelled(key: str, value: Any) -> xr.DataArray:
     """The parameter as a float64 DataArray."""
     if isinstance(value, xr.Variable):
         value = xr.DataArray(value)
@@ -142,7 +161,7 @@ def _labelled(key, value):
     return value.astype(float)
 
 
-def _check_dimensions(module, given):
+def _check_dimensions(module: Any, given: dict[str, xr.DataArray]) -> None:
     """Raise BadInput if coordinates disagree along a shared dimension, or a dimension bears an output's name."""
     try:
         xr.align(*given.values(), join="exact", copy=False)
@@ -156,14 +175,14 @@ def _check_dimensions(module, given):
             raise BadInput(f"{key}: its dimension {dim!r} bears the name of an output or of its dimension; rename it")
 
 
-def _check_lone_values(used, given):
+def _check_lone_values(used: dict[str, Parameter], given: dict[str, xr.DataArray]) -> None:
     for key, array in given.items():
         if array.ndim == 0 and not array.chunks and not used[key].holds(array.values):
             raise BadInput(f"{key} = {float(array):g} is outside its domain; allowed: {used[key].domain}")
 
 
-def _grid(used, given):
-    sizes = {}
+def _grid(used: dict[str, Parameter], given: dict[str, xr.DataArray]) -> Grid:
+    sizes: dict[Hashable, int] = {}
     for key, array in given.items():
         for dim, size in array.sizes.items():
             if sizes.setdefault(dim, size) != size:
@@ -175,15 +194,15 @@ def _grid(used, given):
     )
 
 
-def _own_coordinates(given):
+def _own_coordinates(given: dict[str, xr.DataArray]) -> dict[Hashable, xr.DataArray]:
     """Coordinates that the caller's DataArrays bring along."""
-    own = {}
+    own: dict[Hashable, xr.DataArray] = {}
     for array in given.values():
         own |= {name: coord for name, coord in array.coords.items() if name not in given}
     return own
 
 
-def _lazy(module, scene, request, given):
+def _lazy(module: Any, scene: str, request: Request, given: dict[str, xr.DataArray]) -> xr.Dataset:
     """The same dataset, its values computed block by block when they are asked for."""
     table = layout(module, request)
     names = list(given)
@@ -192,7 +211,7 @@ def _lazy(module, scene, request, given):
     }
     request = replace(request, lines={key: line(np.asarray(array)) for key, array in alone.items()})
 
-    def solve(*arrays):
+    def solve(*arrays: Any) -> tuple[Any, ...]:
         shape = np.broadcast_shapes(*(array.shape for array in arrays))
         wide = [array.reshape((1,) * (len(shape) - array.ndim) + array.shape) for array in arrays]
         solved = engine.solve_point(module, request, dict(zip(names, wide, strict=True)), shape)
@@ -215,7 +234,7 @@ def _lazy(module, scene, request, given):
     return describe(Grid(sizes, values), module, scene, request, data).assign_coords(_own_coordinates(given))
 
 
-def scene(name):
+def scene(name: Any) -> dict[str, Any]:
     """Everything a user needs of one scene: equations, parameters, options, outputs, status, methods, sources."""
     name, module = own.find(name)
     return {
@@ -237,7 +256,7 @@ def scene(name):
     }
 
 
-def summary(ds):
+def summary(ds: xr.Dataset) -> dict[str, Any]:
     """What is in a survey's dataset: axes, fixed numbers, variables, counts, provenance."""
     axes = {
         dim: f"{ds.sizes[dim]} values from {ds[dim].values[0]!s} to {ds[dim].values[-1]!s}"
@@ -251,7 +270,7 @@ def summary(ds):
         "axes": axes,
         "fixed": {name: float(c) for name, c in ds.coords.items() if c.ndim == 0 and c.dtype.kind == "f"},
         "variables": {
-            name: v.attrs.get("long_name", "") for name, v in ds.data_vars.items() if not name.endswith("_error")
+            name: v.attrs.get("long_name", "") for name, v in ds.data_vars.items() if not str(name).endswith("_error")
         },
         **({"areas": areas(ds)} if "area" in ds else {}),
         "counts": {name: counts(ds[name]) for name in ("verdict", "status") if name in ds},
@@ -263,14 +282,14 @@ def summary(ds):
     }
 
 
-def areas(ds):
+def areas(ds: xr.Dataset) -> dict[str, str]:
     """{verdict: its area with its error bound, and its share of the map} of a refined map."""
     names = ("area", "area_error", "area_fraction", "area_fraction_error")
     rows = zip(ds.area_verdict.attrs["flag_meanings"].split(), *(ds[name].values for name in names), strict=True)
     return {name: f"{area:.12g} +- {bar:.2g} ({percent(part, off)})" for name, area, bar, part, off in rows}
 
 
-def audit(ds, points, seed=0):
+def audit(ds: xr.Dataset, points: int, seed: int = 0) -> dict[str, Any]:
     """Solve random points of `ds` again by other methods at higher accuracy; each difference against the error bars.
 
     Returns {"points", "method", "outside", "complaints"}.
@@ -298,7 +317,7 @@ def audit(ds, points, seed=0):
     return report | {"points": chosen.size, "outside": len(complaints), "complaints": complaints}
 
 
-def _outside(flat, again, given):
+def _outside(flat: xr.Dataset, again: xr.Dataset, given: dict[str, Any]) -> Iterator[str]:
     """A sentence per output and point whose difference exceeds the sum of the error bars."""
     for name in error_bars(flat):
         bar = flat[f"{name}_error"].values.astype(float) + again[f"{name}_error"].transpose("_point", ...).values
@@ -308,12 +327,12 @@ def _outside(flat, again, given):
             yield f"{name} at {where}: off by {np.nanmax(off[i]):.3g}, error bars {np.nanmax(bar[i]):.3g}"
 
 
-def _beside(option):
+def _beside(option: Option) -> str:
     words = f"; only with {option.only_with}" if option.only_with else ""
     return words + (f"; not beside {option.said_by}, which says it" if option.said_by else "")
 
 
-def _parameter_line(module, p):
+def _parameter_line(module: Any, p: Parameter) -> str:
     unit = " (no unit)" if p.units == "1" else f" ({p.units})"
     need = (
         f"default {p.default:g}"
@@ -327,7 +346,7 @@ def _parameter_line(module, p):
     return f"{p.long_name}{unit}; {p.domain}; {need}{condition(module, p.when, p.name)}"
 
 
-def _outputs_line(module, same):
+def _outputs_line(module: Any, same: list[Output]) -> str:
     """One line for the outputs of a name; those that differ in their dimensions alone are told once."""
     texts = list(dict.fromkeys(_output_text(o) for o in same))
     if len(texts) < len(same):
@@ -335,13 +354,13 @@ def _outputs_line(module, same):
     return " | ".join(_output_text(o) + condition(module, o.when) for o in same)
 
 
-def _output_text(o):
+def _output_text(o: Output) -> str:
     what = ", ".join(f"{name} {code}" for name, code in o.flags.items()) if o.flags is not None else ""
     unit = "" if o.flags is not None or o.integer else " (no unit)" if o.units == "1" else f" ({o.units})"
     return "; ".join(part for part in (f"{o.long_name}{unit}", what, o.applies) if part)
 
 
-def _method_line(module, name):
+def _method_line(module: Any, name: str) -> str:
     method = modules.load(method_folder, name, "method")
     first, when = inspect.cleandoc(method.__doc__).splitlines()[0], condition(module, getattr(method, "WHEN", {}))
     return first.removesuffix(".") + when if when else first

@@ -1,6 +1,6 @@
 """Axes -> exact coordinates -> blocks. A block reaches a scene as its axes, not as a list of points."""
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from math import ceil, prod
@@ -17,9 +17,9 @@ class Grid:
     `sizes` holds the dimensions in order. Dimensions in `whole` are never cut.
     """
 
-    sizes: Mapping[str, int]
-    parameters: Mapping[str, tuple[tuple[str, ...], np.ndarray]]
-    whole: frozenset[str] = frozenset()
+    sizes: Mapping[Hashable, int]
+    parameters: Mapping[str, tuple[tuple[Hashable, ...], np.ndarray]]
+    whole: frozenset[Hashable] = frozenset()
 
     @property
     def shape(self):

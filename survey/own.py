@@ -15,13 +15,15 @@ missed unless BREAKS stand beside it. [boundaries] and [refine] take z to be ana
 
 import hashlib
 import inspect
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import lru_cache
 from itertools import product
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, ModuleType
+from typing import Any, NoReturn
 
 import numpy as np
+import numpy.typing as npt
 
 import survey.scenes
 from survey import modules
@@ -35,11 +37,19 @@ EXAMPLES = {
     "PERIOD": "PERIOD = 3.14 (its length in u), or a function of p",
     "PARAMETERS": 'PARAMETERS = ("a", "b"), the names of p[0], p[1]',
 }
-_made = {}  # by hash: what `hill` has made in this process
+_made: Any = {}  # by hash: what `hill` has made in this process
 REFERENCES = ("W. Magnus, S. Winkler, Hill's Equation, Interscience 1966",)
 
 
-def hill(z, *, period, parameters, even=False, breaks=(), title=None):
+def hill(
+    z: Callable[[float, Any], float],
+    *,
+    period: float | Callable[[Any], float],
+    parameters: str | Parameter | Iterable[str | Parameter],
+    even: bool = False,
+    breaks: npt.ArrayLike | Callable[[Any], npt.ArrayLike] = (),
+    title: str | None = None,
+) -> HillScene:
     """The scene of y'' + z(u, p) y = 0, for `survey.evaluate` and `survey.run`.
 
     Parameters
@@ -70,7 +80,7 @@ def hill(z, *, period, parameters, even=False, breaks=(), title=None):
     return _made.setdefault(scene.HASH, scene)
 
 
-def find(scene, near=None):
+def find(scene: Any, near: str | Path | None = None) -> tuple[str, Any]:
     """(name, scene) of a scene's name, of a file `*.py` (relative to this folder, or else to `near`), or of `hill`."""
     if isinstance(scene, HillScene):
         return scene.NAME, scene
@@ -92,7 +102,7 @@ def find(scene, near=None):
     return str(path), _from_text(str(path), text)
 
 
-def check(scene, grid=None):
+def check(scene: Any, grid: Any = None) -> None:
     """Raise BadInput if `scene` is a user's and wrong at the ends and middles of the grid's axes."""
     if not isinstance(scene, HillScene):
         return
@@ -105,7 +115,7 @@ def check(scene, grid=None):
         scene.check(values.reshape(-1, len(names))[np.array(inside, bool)])
 
 
-def of_dataset(ds):
+def of_dataset(ds: Any) -> Any:
     """The scene of a survey's dataset, as `find` takes it; BadInput if it was a user's and is not as it was."""
     name = ds.attrs["scene"]
     if "scene_hash" not in ds.attrs:
@@ -127,7 +137,7 @@ def of_dataset(ds):
 
 
 @lru_cache(maxsize=32)
-def _from_text(name, text):
+def _from_text(name: str, text: str) -> HillScene:
     """The scene in the text of a file."""
     module = ModuleType(Path(name).stem)
     module.__file__ = name
@@ -144,10 +154,13 @@ def _from_text(name, text):
     return _hill(module.z, module.PERIOD, module.PARAMETERS, *optional, name, text, title, about, references)
 
 
-def _hill(z, period, parameters, even, breaks, name, text, title, about, references):
+def _hill(
+    z: Any, period: Any, parameters: Any, even: Any, breaks: Any,
+    name: str, text: str, title: str | None, about: str | None, references: Iterable[str],
+) -> HillScene:  # fmt: skip
     """The checked scene; raises BadInput."""
 
-    def refuse(words):
+    def refuse(words: str) -> NoReturn:
         raise BadInput(f"{name}: {words}")
 
     if not callable(z) or _arguments(z) != 2:
@@ -183,25 +196,25 @@ def _hill(z, period, parameters, even, breaks, name, text, title, about, referen
     )  # fmt: skip
 
 
-def _symbol(name):
+def _symbol(name: str) -> str:
     """The name in TeX."""
     return name if len(name) == 1 else rf"\mathrm{{{name.replace('_', chr(92) + '_')}}}"
 
 
-def _arguments(z):
+def _arguments(z: Any) -> int:
     try:
         return len(inspect.signature(getattr(z, "py_func", z)).parameters)
     except (TypeError, ValueError):
         return 0
 
 
-def _names(code):
+def _names(code: CodeType) -> list[str]:
     """Names that the code, or a function inside it, looks up."""
     inner = [const for const in code.co_consts if inspect.iscode(const)]
     return [*code.co_names, *(name for own in inner for name in _names(own))]
 
 
-def _bits(value, seen=()):
+def _bits(value: Any, seen: tuple[int, ...] = ()) -> bytes:
     """Bytes that change when a function, what it calls, or any of its numbers changes."""
     value = getattr(value, "py_func", value)
     if id(value) in seen:

@@ -3,8 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ class Parameter:
     whole: bool = False
     number_option: bool = False
 
-    def holds(self, values):
+    def holds(self, values: npt.ArrayLike) -> npt.NDArray[np.bool_]:
         """True where `values` (any shape) lie in the domain; NaN and infinities do not."""
         values = np.asarray(values, dtype=float)
         above = values > self.minimum if self.open_minimum else values >= self.minimum
@@ -40,7 +42,7 @@ class Parameter:
         return np.isfinite(values) & above & below & ~np.isin(values, self.excluded)
 
     @property
-    def domain(self):
+    def domain(self) -> str:
         """The domain in words, such as `0 <= k, k != 1`."""
         words = []
         if self.minimum > -inf:
@@ -65,7 +67,7 @@ class Option:
     only_with: str = ""
     said_by: str = ""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         object.__setattr__(self, "default", self.default or self.choices[0])
 
 
@@ -89,7 +91,7 @@ class Output:
     dims: tuple[str, ...] = ()
 
     @property
-    def dtype(self):
+    def dtype(self) -> np.dtype[Any]:
         if self.flags is not None:
             return np.dtype("int8")
         return np.dtype("int32") if self.integer else np.dtype("float64")
@@ -105,7 +107,7 @@ class Request:
     variables: frozenset[str] = frozenset()
     lines: Mapping[str, tuple[int, float, float]] = field(default_factory=dict)
 
-    def line(self, name):
+    def line(self, name: str) -> tuple[int, float, float] | None:
         """(number, least, greatest) of the whole axis of the parameter `name`, which no other shares; or None.
 
         What depends on an axis depends on the whole of it, never on the block: so a block's bits are always the same.
@@ -119,21 +121,21 @@ class Trajectory:
     `survey.analysis.portrait` draws it: `panels`, each its kind and the names of the variables that it shows.
     """
 
-    data: Mapping[str, tuple]
+    data: Mapping[str, tuple[Any, ...]]
     panels: tuple[tuple[str, ...], ...]
 
 
-def told(value, bar):
+def told(value: Any, bar: Any) -> str:
     """A value with its error bar, in few digits."""
     return f"{float(value):.6g} +- {float(bar):.1g}"
 
 
-def named(answer, name):
+def named(answer: Any, name: str) -> str:
     """`name = value +- bar` of an output that is known of a point."""
     return f"{name} = {told(answer[name], answer[f'{name}_error'])}"
 
 
-def condition(scene, when, own=""):
+def condition(scene: Any, when: Mapping[str, tuple[str, ...]], own: str = "") -> str:
     """When `own` exists, in words: `; only with l; only when question = fate | portrait`; or nothing."""
     words, options = [], {option.name: option for option in scene.OPTIONS}
     for name, allowed in when.items():
@@ -147,6 +149,6 @@ def condition(scene, when, own=""):
     return "".join(f"; only {word}" for word in words)
 
 
-def exists(item, options):
+def exists(item: Parameter | Output, options: Mapping[str, str]) -> bool:
     """Does this parameter or output exist under these option values?"""
     return all(options.get(name, "") in allowed for name, allowed in item.when.items())

@@ -58,6 +58,7 @@ class Output(Table):
     path: str | None = None
     figures: list[str] = []
     variables: list[str] | None = None
+    style: Literal["screen", "paper"] = "screen"
 
 
 class Boundaries(Table):
@@ -99,6 +100,7 @@ class Workflow:
     text: str
     boundaries: str | None = None
     refine: Mapping[str, tuple[float, bool]] | None = None
+    style: str = "screen"
 
 
 def read(path, overrides=(), output=None):
@@ -162,6 +164,7 @@ def check(data, text="", output=None, default_path="survey.nc", near=None):
         text=text or tomli_w.dumps(data),
         boundaries=_check_boundaries(scene, name, file.boundaries, given),
         refine=_check_refine(scene, name, file, given),
+        style=file.output.style,
     )
 
 

@@ -319,7 +319,7 @@ def test_lazy_files_are_read_in_part(mathieu, tmp_path):
         (lambda s: s.map("y3"), "unknown variable 'y3'"),
         (lambda s: s.map(style="poster"), "unknown style 'poster'"),
         (lambda s: s.map(style="paper", width="triple"), "unknown width 'triple'"),
-        (lambda s: s.boundary(index=2), "no edges"),
+        (lambda s: s.boundary(index=2), "no boundary that has one"),
         (lambda s: s.zoom(), "give a range"),
         (lambda s: s.zoom(a=(2.0, 1.0)), "the lower one first"),
         (lambda s: s.zoom(a=(0.0, 1.0), num=1), "num = 1"),

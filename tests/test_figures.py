@@ -103,6 +103,13 @@ def test_for_papers_verdicts_are_hatched_in_columns_and_fonts_embedded(toy, tmp_
     assert content.startswith(b"%PDF") and b"/FontFile2" in content and b"/Type3" not in content
 
 
+def test_a_workflow_may_ask_for_the_style_of_papers(small, tmp_path):
+    text = small.read_text().replace('figures = ["w"]', 'figures = ["w", "phi"]\nstyle = "paper"')
+    small.write_text(text)
+    survey.run(small, output=tmp_path / "small.nc")
+    assert (tmp_path / "small.pdf").exists() and (tmp_path / "small_phi.pdf").exists()
+
+
 def test_hatching_follows_the_edges_of_cells(toy):
     from matplotlib.figure import Figure
 

@@ -7,17 +7,18 @@ import sys
 from pathlib import Path
 
 import pytest
+import snippets
+from snippets import ROOT
 
 import survey
 from survey import engine, workflow
 
-ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
 BIN = Path(sys.executable).parent
 
 
 def fenced(language):
-    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+    return snippets.fenced(README, language)
 
 
 def small(code):

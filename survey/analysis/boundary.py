@@ -15,8 +15,9 @@ def find(ds, kind=None, index=None):
         found = _edges(ds)
     else:
         found = _between_points(ds)
-    if "kind" not in found and (kind is not None or index is not None):
-        raise BadInput("kind, index: the file holds no edges by class and number; run the workflow with [boundaries]")
+    for name, asked in (("kind", kind), ("index", index)):
+        if asked is not None and name not in found:
+            raise BadInput(f"{name}: the file holds no boundary that has one; run the workflow with [boundaries]")
     if kind is not None:
         classes = dict(zip(found.kind.attrs["flag_meanings"].split(), found.kind.attrs["flag_values"], strict=True))
         if kind not in classes:
@@ -29,13 +30,13 @@ def _curves(ds):
     """Every point of every curve."""
     number = ds.curve_count.values
     which = np.repeat(np.arange(number.size), number)
-    axes = [dim for dim in ds.status.dims if f"curve_{dim}" in ds]
-    found = {dim: ("place", ds[f"curve_{dim}"].values, ds[f"curve_{dim}"].attrs) for dim in axes}
-    found["position_error"] = ("place", ds.curve_position_error.values, ds.curve_position_error.attrs)
+    along = [name for name, v in ds.data_vars.items() if v.dims == ("curve_point",)]
+    found = {name.removeprefix("curve_"): ("place", ds[name].values, ds[name].attrs) for name in along}
     found["curve"] = ("place", which, {"long_name": "curve, counted from 0", "units": "1"})
-    for name, source in (("kind", ds.curve_class), ("index", ds.curve_index)):
-        found[name] = ("place", source.values[which], source.attrs)
-    return _table(ds, found, "edges of tongues, as the file holds them, followed as curves")
+    for name, source in (("kind", "curve_class"), ("index", "curve_index")):
+        if source in ds:
+            found[name] = ("place", ds[source].values[which], ds[source].attrs)
+    return _table(ds, found, "curves as the file holds them")
 
 
 def _edges(ds):

@@ -18,12 +18,7 @@ def draw(ds, figure):
     for i, (kind, *names) in enumerate(panels):
         more = {"projection": "3d"} if kind == "sphere" else {}
         KINDS[kind](figure.add_subplot(1, len(panels), i + 1, **more), ds, *names)
-    figure.suptitle("\n".join(part for part in (ds.attrs["title"], _where(ds)) if part), fontsize=10)
-
-
-def _where(ds):
-    pairs = [pair.split("=") for pair in ds.attrs["parameters"].split(", ") if pair]
-    return ", ".join(f"{key} = {float(value):.6g}" for key, value in pairs if float(value) != 0)
+    figure.suptitle("\n".join(part for part in (ds.attrs["title"], ds.attrs["where"]) if part), fontsize=10)
 
 
 def _lines(axes, ds, x, *names):
@@ -61,7 +56,9 @@ def _multipliers(axes, ds):
 
 def _cylinder(axes, ds, x, y):
     """An orbit on the cylinder, its start marked, among its neighbours."""
-    for orbit, speed in zip(ds[f"{x}_nearby"].values, ds[f"{y}_nearby"].values, strict=True):
+    part = {"t": slice(0, ds.sizes["t"] * 2 // 5)}  # or spirals fill the plane
+    nearby = ds[[f"{x}_nearby", f"{y}_nearby"]].isel(part)
+    for orbit, speed in zip(*(v.values for v in nearby.data_vars.values()), strict=True):
         axes.plot(*_wrapped(orbit, speed), lw=0.6, color=GREY)
     axes.plot(*_wrapped(ds[x].values, ds[y].values), lw=1.8, color=LINES[0])
     axes.plot(np.mod(ds[x].values[0], 2 * np.pi), ds[y].values[0], "o", color=LINES[1], mec="black", ms=6)

@@ -23,5 +23,7 @@ def solve(point, time=None):
     found = make(given, values(known), chosen, time)
     about = {"title": point.attrs.get("title", ""), "scene": name, "options": point.attrs["options"]}
     about |= {"parameters": ", ".join(f"{key}={value!r}" for key, value in given.items())}
+    shown = [f"${point[key].attrs.get('symbol', key)} = {value:.6g}$" for key, value in given.items() if value]
+    about |= {"where": ", ".join(shown)}
     about |= {"panels": "; ".join(" ".join(panel) for panel in found.panels)}
     return xr.Dataset(dict(found.data), attrs=about)

@@ -1,0 +1,11 @@
+"""What a type checker sees of the package: the names that `__init__.py` finds when they are asked for."""
+
+from survey.api import evaluate as evaluate
+from survey.api import open as open
+from survey.api import run as run
+from survey.api import scenes as scenes
+from survey.errors import BadInput as BadInput
+from survey.errors import Damaged as Damaged
+from survey.errors import Stopped as Stopped
+from survey.errors import SurveyError as SurveyError
+from survey.own import hill as hill

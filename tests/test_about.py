@@ -1,0 +1,41 @@
+"""What stands about the program in its own files agrees with the program."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import yaml
+
+import survey
+
+ROOT = Path(__file__).parent.parent
+ABOUT = ROOT / ".github"
+VERSION = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+
+
+def test_the_citation_names_this_version():
+    citation = yaml.safe_load((ABOUT / "CITATION.cff").read_text())
+    assert citation["version"] == VERSION and citation["authors"] == [{"name": "the survey founders"}]
+    assert {"cff-version", "message", "title"} <= set(citation)
+
+
+def test_the_changelog_tells_of_this_version():
+    headings = re.findall(r"^## \[(.*)\]", (ABOUT / "CHANGELOG.md").read_text(), re.MULTILINE)
+    assert headings[0] == "Unreleased" and headings[1] == VERSION
+
+
+def test_contributors_and_ci_run_the_same_checks():
+    guide, ci = (ABOUT / "CONTRIBUTING.md").read_text(), (ROOT / ".ci/run").read_text()
+    for program in ("ruff check .", "lint-imports", "mypy"):
+        assert program in guide and program in ci
+
+
+def test_links_of_the_readme_and_the_guide_lead_somewhere():
+    for path in (ROOT / "README.md", *ABOUT.glob("*.md"), ROOT / "results/README.md"):
+        for target in re.findall(r"\]\((?!https?:)([^)#]+)", path.read_text()):
+            assert (path.parent / target).exists(), f"{path.name}: {target}"
+
+
+def test_the_typed_view_names_what_the_package_has():
+    view = (ROOT / "survey/__init__.pyi").read_text()
+    assert sorted(re.findall(r"^from .* import (\w+) as \1$", view, re.MULTILINE)) == survey.__all__
