@@ -144,7 +144,7 @@ def test_ones_own_equation_has_points_trajectories_and_zooms():
 
     own = survey.hill(z, period=2 * math.pi, parameters=("a", "b"))
     ds = survey.evaluate(own, a=[0.25, 0.5], b=0.3)
-    assert "from |D| = 2: |D| > 2" in ds.survey.point(a=0.25).why
+    assert "its error bar: |D| > 2" in ds.survey.point(a=0.25).why
     motion = ds.survey.trajectory(a=0.5, figure=False)
     end = motion.sel(u=2 * math.pi, method="nearest")
     assert close(end.y1, ds.y1[1], float(end.y1_error + ds.y1_error[1]))

@@ -4,12 +4,14 @@ from survey.scene import told
 
 RULE = "an exact rule decides here (no unstable side, or |D| = 2), whatever the error bars"
 
+FACTORS = {"y1", "y2", "dy1", "dy2"}
+
 
 def why(answer, even=True):
     """The sentence, from what is known of the point (`answer`); `even`: are the factors those at T/2?"""
     if answer["verdict"] == "marginal":
         return f"{RULE}: |D| = 2"
-    if not even:
+    if not (even and FACTORS <= set(answer)):
         return _by_trace(answer)
     factors = {name: _product(answer, *name) for name in (("dy1", "y2"), ("y1", "dy2"))}
     (p, p_bar), (q, q_bar) = factors.values()
@@ -30,8 +32,14 @@ def why(answer, even=True):
 
 def _by_trace(answer):
     d, bar = float(answer["discriminant"]), float(answer["discriminant_error"])
-    side = {"stable": "|D| < 2", "unstable": "|D| > 2"}.get(answer["verdict"], "the error bar reaches across |D| = 2")
-    return f"D = {told(d, bar)}, {abs(2 - abs(d)):.2g} from |D| = 2: {side}"
+    off = abs(2 - abs(d))
+    if answer["verdict"] == "undecided":
+        side = "the error bar reaches across |D| = 2"
+    elif off > bar:
+        side = f"{_times(off, bar)} its error bar: " + ("|D| > 2" if abs(d) > 2 else "|D| < 2")
+    else:
+        side = "less than its error bar: the factors at T/2 decide, or an exact rule"
+    return f"D = {told(d, bar)}, {off:.2g} from |D| = 2, {side}"
 
 
 def _product(answer, one, other):
