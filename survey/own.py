@@ -67,7 +67,8 @@ def hill(z, *, period, parameters, even=False, breaks=(), title=None):
     except (OSError, TypeError):
         text = ""
     scene = _hill(z, period, parameters, even, breaks, name, text, title, inspect.getdoc(function), ())
-    return _made.setdefault(scene.HASH, scene)
+    _made[scene.HASH] = scene
+    return scene
 
 
 def find(scene, near=None):
