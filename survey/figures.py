@@ -112,7 +112,7 @@ def onto(axes, ds, name=None, boundaries=True, style=None):
     if variable.ndim == 2:
         _map(axes, ds, variable, state, boundaries, paper)
     elif variable.ndim == 1:
-        _curve(axes, ds, variable, state)
+        _curve(axes, ds, variable, state, paper)
     else:
         raise BadInput(f"{name} is a single number; a figure needs at least one axis")
     if not paper:
@@ -318,7 +318,7 @@ def _widened(values):
     return np.concatenate([[values[0] - low], values, [values[-1] + high]])
 
 
-def _curve(axes, ds, variable, state):
+def _curve(axes, ds, variable, state, paper):
     x = variable[variable.dims[0]]
     if "flag_values" in variable.attrs:
         palette = _palette(_flags(variable))
@@ -330,6 +330,7 @@ def _curve(axes, ds, variable, state):
         axes.set_yticks(range(len(names)), names, fontsize=8)
     else:
         label = textwrap.fill(variable.attrs.get("long_name", variable.name), 60)
+        label = f"${variable.attrs.get('symbol') or variable.name}$" if paper else label
         axes.plot(x, variable, lw=1.2, color="#0072B2", label=label)
     if f"{variable.name}_error" in ds:
         bar = ds[f"{variable.name}_error"].isel({d: 0 for d in ds[variable.name].dims if d not in variable.dims})
@@ -338,7 +339,10 @@ def _curve(axes, ds, variable, state):
     if bad.any():
         axes.plot(x.values[bad], np.full(bad.sum(), axes.get_ylim()[0]), "x", color="#D55E00", label="no answer")
     axes.set(xlabel=_label(x), ylabel=_label(variable))
-    if axes.get_legend_handles_labels()[0]:
+    handles = axes.get_legend_handles_labels()[0]
+    if handles and paper:
+        _legend(axes, handles, paper)
+    elif handles:
         axes.legend(fontsize=8)
     if logarithmic(x.values):
         axes.set_xscale("log")

@@ -77,7 +77,8 @@ def hill(
     except (OSError, TypeError):
         text = ""
     scene = _hill(z, period, parameters, even, breaks, name, text, title, inspect.getdoc(function), ())
-    return _made.setdefault(scene.HASH, scene)
+    _made[scene.HASH] = scene
+    return scene
 
 
 def find(scene: Any, near: str | Path | None = None) -> tuple[str, Any]:

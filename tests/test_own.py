@@ -109,13 +109,15 @@ def _times(f):
     return lambda u, p: p[0] - f * p[1] * np.cos(2 * u)
 
 
-def test_a_function_from_python_runs_in_other_processes(tmp_path):
+def test_a_function_from_python_runs_in_other_processes(tmp_path, monkeypatch):
     axes = {"a": {"start": -1.0, "stop": 10.0, "num": 8}, "q": 1.0}
     given = {"scene": scene(_times(2.0)), "axes": axes}
     one = survey.run(given, output=tmp_path / "one.nc")
     two = survey.run(given, output=tmp_path / "two.nc", workers=1)
     xr.testing.assert_equal(one.drop_attrs(), two.drop_attrs())
     assert "return lambda u, p" in one.attrs["scene_text"]
+    assert own.of_dataset(one).HASH == one.attrs["scene_hash"]
+    monkeypatch.setattr(own, "_made", {})  # as in another session
     with pytest.raises(BadInput, match="was a function given from Python"):
         own.of_dataset(survey.open(tmp_path / "one.nc"))
 
