@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 
+import hypothesis
 import pytest
 from numba.core.dispatcher import Dispatcher
 
@@ -29,6 +30,8 @@ path    = "small.nc"
 figures = ["w"]
 """
 
+hypothesis.settings.register_profile("untimed", deadline=None)
+hypothesis.settings.load_profile("untimed")
 gc.set_threshold(100_000)  # as the program does: a tenth of the time in which kernels are compiled
 # Coverage's tracer would look at each line of numba's compiler: a kernel takes half as long again with it.
 _compile = Dispatcher.compile
