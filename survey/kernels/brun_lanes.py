@@ -13,7 +13,7 @@ from survey.kernels.brun import of_state
 from survey.kernels.jit import inline, kernel
 from survey.kernels.nutation_lanes import A, B, GIVEN, GOOD, OUTPUTS, ROWS, TILE, WELLS, finish, put
 
-FEW, MORE = (7, 1, 6), (40, 4, 26)  # steps of Laguerre's method and of Newton's, means
+FEW, MORE = (7, 1, 6), (30, 4, 26)  # steps of Laguerre's method and of Newton's, means
 LEFT, DONE, CANCELLED = 0, 1, 2
 
 
@@ -67,7 +67,7 @@ def leave(work, told, first, out, wells, done):
 
 
 @kernel
-def solve(work, steps, exactly):
+def solve(work, steps, exactly, actions):
     if steps[1] > 1:
         nl.approach_slowly(work, steps[0])
     else:
@@ -76,7 +76,8 @@ def solve(work, steps, exactly):
     nl.means(work, steps[2])
     if exactly:
         nutation_fine.fine(work)
-    nl.small_actions(work)
+    if actions:
+        nl.small_actions(work)
 
 
 @kernel
@@ -94,27 +95,27 @@ def tell_integrals(work, told):
 
 
 @kernel
-def of_states(points, steps, exactly, out, wells, done):
+def of_states(points, steps, exactly, actions, out, wells, done):
     """Outputs (OUTPUTS, n) of initial states (GIVEN, n), the numbers of wells (n), and which are DONE (n).
 
-    exactly: CANCELLED ones too.
+    exactly: CANCELLED ones too; actions: accurate ones of small wells.
     """
     work, told = np.zeros(nutation_fine.ALL), np.empty(OUTPUTS * TILE)
     for first in range(0, len(done), TILE):
         enter(points, first, work)
         states(work)
-        solve(work, steps, exactly)
+        solve(work, steps, exactly, actions)
         tell_states(work, told)
         leave(work, told, first, out, wells, done)
 
 
 @kernel
-def of_integrals(points, steps, exactly, out, wells, done):
+def of_integrals(points, steps, exactly, actions, out, wells, done):
     """As `of_states`, at scaled integrals."""
     work, told = np.zeros(nutation_fine.ALL), np.empty(OUTPUTS * TILE)
     for first in range(0, len(done), TILE):
         enter(points, first, work)
         integrals(work)
-        solve(work, steps, exactly)
+        solve(work, steps, exactly, actions)
         tell_integrals(work, told)
         leave(work, told, first, out, wells, done)

@@ -146,7 +146,7 @@ def narrow(work, i):
     half = sqrt(slope[0] * slope[0] - 2.0 * height * second)
     lower, upper = (half - slope[0]) / second, (-half - slope[0]) / second
     close = (upper - lower < WIDE) & (half > 0.0) & (second < 0.0)
-    close &= ((abs(start - y) < WIDE) if told else (abs(v - y) < WIDE) & (abs(2.0 - w - y) < WIDE))
+    close &= (abs(start - y) < WIDE) if told else (abs(v - y) < WIDE) & (abs(2.0 - w - y) < WIDE)
     put(work, V_HIGH, i, dd.two_sum(y, lower) if close else (v, 0.0))
     put(work, W_LOW, i, dd.sub((2.0, 0.0), dd.two_sum(y, upper)) if close else (w, 0.0))
 
@@ -221,7 +221,12 @@ def enter(work, row, square, x, y, i):
     xy = x * y
     low = square < xy
     square = xy * (xy / square) if low else square
-    work[row + i], work[row + TILE + i], work[row + 2 * TILE + i], work[row + 3 * TILE + i] = sqrt(square), 1.0, 0.0, 1.0 if low else 0.0
+    work[row + i], work[row + TILE + i], work[row + 2 * TILE + i], work[row + 3 * TILE + i] = (
+        sqrt(square),
+        1.0,
+        0.0,
+        1.0 if low else 0.0,
+    )
 
 
 @inline
@@ -230,9 +235,7 @@ def prepare(work, i):
     root_low, root_high = sqrt(work[Q_LOW + i]), sqrt(work[Q_HIGH + i])
     x, y = sqrt(0.5 * work[ABOVE + i]), sqrt(root_low * root_high)
     incline = 2.0 * work[K + i] * work[SUM + i] / (root_low + root_high)
-    square, line, point = parameter(
-        work[MINUS + i], work[V_HIGH + i], work[V_LOW + i], root_high, root_low, incline, y
-    )
+    square, line, point = parameter(work[MINUS + i], work[V_HIGH + i], work[V_LOW + i], root_high, root_low, incline, y)
     enter(work, UP, square, x, y, i)
     work[LINE_UP + i], work[POINT_UP + i] = line, point
     square, line, point = parameter(work[PLUS + i], work[W_LOW + i], work[W_HIGH + i], root_low, root_high, -incline, y)
@@ -268,16 +271,16 @@ def take_mean(work, i):
 @inline
 def advance(gap, near, far, width, root_near, root_far, incline, bend, period, line, p, ratio, g):
     """As in methods/agm.py: whole multiples of pi, the rest, and the size of its terms."""
-    direct = 0.5 * gap * period / far * (
-        1.0 + 0.5 * width * (1.0 + 0.5 * (p * p - g) / (p * p + g) * ratio) / near
-    )
+    direct = 0.5 * gap * period / far * (1.0 + 0.5 * width * (1.0 + 0.5 * (p * p - g) / (p * p + g) * ratio) / near)
     q = gap * gap / (near * far)
     second = 0.25 * (root_far * near + root_near * far) * bend * ratio / q
     part = 0.5 * gap * period / line
     slanted = p > 0.0
     value = direct if slanted else part * (incline + second)
-    return 0.0 if slanted else copysign(1.0, gap), value, abs(value) if slanted else abs(part) * (
-        abs(incline) + abs(second)
+    return (
+        0.0 if slanted else copysign(1.0, gap),
+        value,
+        abs(value) if slanted else abs(part) * (abs(incline) + abs(second)),
     )
 
 

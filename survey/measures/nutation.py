@@ -33,17 +33,23 @@ def of_integrals(points, sign):
     return rows, kinds, count, heights
 
 
-def in_lanes(kernel, points):
-    """Values and bars (12, n) of `points` (7, n), numbers of wells (n), and which are answered (n): see `brun_lanes`."""
+def in_lanes(kernel, points, actions):
+    """Values and bars (12, n) of `points` (7, n), numbers of wells (n), and which are answered (n): see `brun_lanes`.
+
+    actions: to full accuracy in small wells, too.
+    """
     n = points.shape[1]
     out, wells, done = np.empty((2 * len(NAMES), n)), np.empty(n), np.empty(n)
-    kernel(points, brun_lanes.FEW, False, out, wells, done)
-    for state, exactly in ((brun_lanes.LEFT, False), (brun_lanes.CANCELLED, True)):
-        again = np.flatnonzero(done == state)
-        if again.size:
-            part = np.empty((len(out), again.size)), np.empty(again.size), np.empty(again.size)
-            kernel(np.ascontiguousarray(points[:, again]), brun_lanes.MORE, exactly, *part)
-            out[:, again], wells[again], done[again] = part
+    for steps in (brun_lanes.FEW, brun_lanes.MORE):
+        for state, exactly in ((brun_lanes.LEFT, False), (brun_lanes.CANCELLED, True)):
+            if steps == brun_lanes.FEW and not exactly:
+                kernel(points, steps, exactly, actions, out, wells, done)
+                continue
+            again = np.flatnonzero(done == state)
+            if again.size:
+                part = np.empty((len(out), again.size)), np.empty(again.size), np.empty(again.size)
+                kernel(np.ascontiguousarray(points[:, again]), steps, exactly, actions, *part)
+                out[:, again], wells[again], done[again] = part
     return out, wells, done == brun_lanes.DONE
 
 
