@@ -1,6 +1,7 @@
 """Brun's problem in multiprecision: (S1)-(S6) of `scenes/brun.md`, and what half an ulp of the inputs changes."""
 
 import warnings
+from itertools import pairwise
 
 import numpy as np
 from mpmath import mp, mpf
@@ -53,7 +54,7 @@ def wells(sign, state):
     """The pairs of real roots within [-1, 1] between which P > 0, lower u first."""
     roots, c = real_roots(mpf(sign), *state)
     inside = [r for r in roots if abs(r) <= 1]
-    return [(x, y) for x, y in zip(inside, inside[1:], strict=False) if mp.polyval(c, (x + y) / 2) > 0]
+    return [(x, y) for x, y in pairwise(inside) if mp.polyval(c, (x + y) / 2) > 0]
 
 
 def polished(given, ends):

@@ -1,4 +1,4 @@
-"""As `kernels/brun.py` and `methods/agm.py`, by `nutation_lanes`: with few steps, with more, or in double-double at last.
+"""As `kernels/brun.py` and `methods/agm.py`, in lanes: with few steps, with more, or in double-double at last.
 
 Points are columns of GIVEN numbers: A, C, epsilon, theta0, p_theta0, b, a; or l, the sign of k, -1 for the lower of two
 wells and 1 for the upper one, C/A, nothing, b, a.
@@ -11,7 +11,7 @@ from survey.kernels import nutation_fine
 from survey.kernels import nutation_lanes as nl
 from survey.kernels.brun import of_state
 from survey.kernels.jit import inline, kernel
-from survey.kernels.nutation_lanes import A, B, GIVEN, GOOD, OUTPUTS, ROWS, TILE, WELLS, finish, put
+from survey.kernels.nutation_lanes import GIVEN, GOOD, OUTPUTS, TILE, WELLS, A, B, finish, put
 
 FEW, MORE = (7, 1, 6), (30, 4, 26)  # steps of Laguerre's method and of Newton's, means
 LEFT, DONE, CANCELLED = 0, 1, 2

@@ -1,4 +1,4 @@
-"""As `nutation_lanes`, in double-double: what the poles add to multiples of pi, where both nearly cancel (fast spin)."""
+"""As `nutation_lanes`, in double-double: what the poles add to multiples of pi, where both nearly cancel."""
 
 from survey.kernels import double as dd
 from survey.kernels.jit import inline, kernel

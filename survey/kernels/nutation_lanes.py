@@ -12,7 +12,6 @@ import numpy as np
 from survey.kernels import double as dd
 from survey.kernels.jit import inline, kernel
 from survey.kernels.nutation import EPS
-from survey.kernels.brun import of_state
 from survey.kernels.quartic import UNIT
 
 TILE = 64
@@ -32,7 +31,8 @@ K, L, PLUS_POLE, MINUS_POLE, MINUS, PLUS = range(7 * TILE, 19 * TILE, 2 * TILE)
 V_HIGH, W_LOW, V_LOW, W_HIGH, SUM = range(19 * TILE, 29 * TILE, 2 * TILE)
 # pairs: Q at the turning points, s of (S5), 4 q0 - k S^2
 Q_LOW, Q_HIGH, MIDDLE, BEND = range(29 * TILE, 37 * TILE, 2 * TILE)
-# u at the start, turning points, their distance, s + g, L - (k ul uh + q0)/2, 1 where all this is right (2: but cancels), wells
+# u at the start, turning points, their distance, s + g, L - (k ul uh + q0)/2, 1 where all is right (2: but cancels),
+# number of wells
 U, LOW, HIGH, WIDTH, ABOVE, LEVEL, GOOD, WELLS = range(37 * TILE, 45 * TILE, TILE)
 X, Y, WEIGHT, SERIES = range(45 * TILE, 49 * TILE, TILE)  # the mean
 UP, DOWN = 49 * TILE, 53 * TILE  # the sums R of both poles: p, weight, total, 1 if complementary
@@ -293,11 +293,12 @@ def finish(work, size, drift, i, told):
     incline, g = 2.0 * work[K + i] * work[SUM + i] / (root_low + root_high), root_low * root_high
     bend = 0.5 * work[K + i] * work[BEND + i] / work[ABOVE + i]
     minus, plus = work[MINUS + i], work[PLUS + i]
+    line, point, ratio = work[LINE_UP + i], work[POINT_UP + i], work[UP + 2 * TILE + i]
     turns_up, up, size_up = advance(minus, work[V_HIGH + i], work[V_LOW + i], width, root_high, root_low, incline, bend,
-                                    period, work[LINE_UP + i], work[POINT_UP + i], work[UP + 2 * TILE + i], g)  # fmt: skip
+                                    period, line, point, ratio, g)  # fmt: skip
+    line, point, ratio = work[LINE_DOWN + i], work[POINT_DOWN + i], work[DOWN + 2 * TILE + i]
     turns_down, down, size_down = advance(plus, work[W_LOW + i], work[W_HIGH + i], width, root_low, root_high, -incline,
-                                          bend, period, work[LINE_DOWN + i], work[POINT_DOWN + i], work[DOWN + 2 * TILE + i],
-                                          g)  # fmt: skip
+                                          bend, period, line, point, ratio, g)  # fmt: skip
     total, difference, rough = down + up, down - up, size_up + size_down
     sure = (work[GOOD + i] == 1.0) & (abs(work[X + i] - work[Y + i]) <= NEAR * middle)
     sure &= abs(work[UP + TILE + i]) <= LAST * work[UP + 2 * TILE + i]

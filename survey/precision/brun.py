@@ -24,7 +24,7 @@ _WORKS = {
 
 
 def states(family):
-    """[(distance, parameters, {output: exact value}, {output: floor})] of a family (error of the values below 1e-35)."""
+    """[(distance, parameters, {output: exact value}, {output: floor})] of a family (error below 1e-35)."""
     data = json.loads(resources.files("survey.reference").joinpath("brun_distances.json").read_text())
     return [
         (

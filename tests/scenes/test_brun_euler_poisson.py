@@ -1,7 +1,7 @@
-"""Brun's problem by the Euler-Poisson equations in Cartesian components, and wells in lanes against one after the other.
+"""Brun's problem by the Euler-Poisson equations in Cartesian components; wells in lanes and one by one.
 
-M' = M x w + epsilon gamma x I gamma, e' = e x w for the fixed axes e = gamma (vertical), xi, eta in the body, w = I^-1 M:
-no angle, no polynomial and no elliptic function.
+M' = M x w + epsilon gamma x I gamma, e' = e x w for the fixed axes e = gamma (vertical), xi, eta in the body,
+w = I^-1 M: no angle, no polynomial and no elliptic function.
 """
 
 import numpy as np
@@ -95,7 +95,7 @@ VALUES = ("u_min", "u_max", "period", "precession", "spin", "action", "separatri
 
 
 def test_lanes():
-    """What is solved in lanes is what agm gives one well at a time, and a point's bits do not depend on its neighbours."""
+    """What is solved in lanes is what agm gives one well at a time; a point's bits do not depend on others."""
     random = np.random.default_rng(11)
     hard = np.array([draw(random)[1] for _ in range(1000)]).T
     both = np.concatenate([states(1000, 6), hard], axis=1)

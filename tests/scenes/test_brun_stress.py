@@ -15,7 +15,7 @@ def evaluate(points, method="auto", **more):
 
 
 def misses(seed, number):
-    """Complaints: an error outside its bar, or above 100 times the floor (1000 the action's), of a rounded output's at least."""
+    """Complaints: an error outside its bar, or above 100 times the floor, of a rounded output at least."""
     random = np.random.default_rng(seed)
     kinds, points = zip(*(draw(random) for _ in range(number)), strict=True)
     ds, told = evaluate(np.array(points)), []
