@@ -18,7 +18,7 @@ _STATE = ("A", "C", "epsilon", "theta0", "p_theta0", "p_psi", "p_phi")
 _WORKS = {
     "initial states": ("", 0.0),
     "near separatrices": ("separatrix", 1e-8),
-    "passing poles closely": ("pole", 1e-4),
+    "passing poles closely": ("pole", 1e-3),
     "near regular precessions": ("precession", 1e-8),
 }
 
@@ -42,7 +42,7 @@ def references(work):
     """The reference cases, or the family of states that belongs to the work."""
     family, least = _WORKS[work]
     if family:
-        rows = [row for row in states(family) if least < 1.1 * row[0] < 0.02]
+        rows = [row for row in states(family) if least < 1.1 * row[0] < 0.2]
         return [(point, {}, {ERROR: float(exact[ERROR])}, 1) for _, point, exact, _ in rows]
     data = json.loads(resources.files("survey.reference").joinpath("brun.json").read_text())
     cases = []
@@ -54,14 +54,14 @@ def references(work):
 
 
 def works():
-    """Initial states that share nothing: any, and near what takes digits away, at distances of 1e-2 and less."""
+    """Initial states that share nothing: any, and near what takes digits away, at small distances."""
     random = np.random.default_rng(1)
     n = _POINTS
     size = 10.0 ** random.uniform(-0.5, 0.5, n)
     body = {"A": size, "C": size * random.uniform(0.05, 1.99, n)}
     theta, (p, b, a) = random.uniform(0.1, 3.04, n), random.normal(size=(3, n))
     field = random.choice([-1.0, 1.0], n) * 10.0 ** random.uniform(-2.0, 1.0, n)
-    close, past = 10.0 ** random.uniform(-8.0, -2.0, n), 10.0 ** random.uniform(-4.0, -2.0, n)
+    close, past = 10.0 ** random.uniform(-8.0, -2.0, n), 10.0 ** random.uniform(-3.0, -1.0, n)
     any_state = body | {"epsilon": field, "theta0": theta, "p_theta0": p, "p_psi": b, "p_phi": a}
     passing = any_state | {"p_psi": random.choice([-1.0, 1.0], n) * a * (1.0 + past)}
     k = abs(field)
