@@ -208,9 +208,21 @@ def fill(gaps, k, level, ats, equatorial, right, left, row):
     plus_side, minus_side = plus_side + 8.0 * moved * near, minus_side + 8.0 * moved * far
     row[NOISE_HIGH] = (plus_side if uh[0] >= 0.0 else minus_side) / max(row[Q_HIGH], TINY)
     row[NOISE_LOW] = (plus_side if ul[0] >= 0.0 else minus_side) / max(row[Q_LOW], TINY)
+    direct(k, dd.sub(level, k), square, uh, bar, row, Q_HIGH, NOISE_HIGH)
+    direct(k, dd.sub(level, k), square, ul, bar, row, Q_LOW, NOISE_LOW)
     beside_saddle(equatorial, uh, bar_v, -1.0, row, Q_HIGH, NOISE_HIGH)
     beside_saddle(equatorial, ul, bar_w, 1.0, row, Q_LOW, NOISE_LOW)
     row[NOISE_BEND] = 8.0 * (moved + UNIT * (abs(level[0]) + abs(k[0]))) / max(abs(row[BEND]), TINY)
+
+
+@inline
+def direct(k, rest, square, u, bar, row, place, error):
+    """Q at a turning point as L - k + k (S^2 + 2 u^2), where that is better known than from the pole."""
+    value = dd.add(rest, dd.mul(k, dd.add(square, dd.times(dd.mul(u, u), 2.0))))
+    noise = 8.0 * (abs(k[0]) * bar + UNIT * (abs(rest[0]) + 8.0 * abs(k[0])))
+    if noise < row[error] * value[0]:
+        put(row, place, value)
+        row[error] = noise / value[0]
 
 
 @inline

@@ -18,7 +18,7 @@ _STATE = ("A", "C", "epsilon", "theta0", "p_theta0", "p_psi", "p_phi")
 _WORKS = {
     "initial states": ("", 0.0),
     "near separatrices": ("separatrix", 1e-8),
-    "passing poles closely": ("pole", 1e-3),
+    "passing poles closely": ("pole", 1e-2),
     "near regular precessions": ("precession", 1e-8),
 }
 
@@ -61,9 +61,10 @@ def works():
     body = {"A": size, "C": size * random.uniform(0.05, 1.99, n)}
     theta, (p, b, a) = random.uniform(0.1, 3.04, n), random.normal(size=(3, n))
     field = random.choice([-1.0, 1.0], n) * 10.0 ** random.uniform(-2.0, 1.0, n)
-    close, past = 10.0 ** random.uniform(-8.0, -2.0, n), 10.0 ** random.uniform(-3.0, -1.0, n)
+    close, past = 10.0 ** random.uniform(-8.0, -2.0, n), 10.0 ** random.uniform(-2.0, -1.0, n)
     any_state = body | {"epsilon": field, "theta0": theta, "p_theta0": p, "p_psi": b, "p_phi": a}
-    passing = any_state | {"p_psi": random.choice([-1.0, 1.0], n) * a * (1.0 + past)}
+    spin = random.choice([-1.0, 1.0], n) * random.uniform(0.5, 2.0, n)
+    passing = any_state | {"p_phi": spin, "p_psi": random.choice([-1.0, 1.0], n) * spin * (1.0 + past)}
     k = abs(field)
     hill = random.uniform(-0.3, 0.3, n)
     wide = 0.5 * k * np.sqrt((1 - hill**2) * (1 - 9 * hill**2)) * random.uniform(-0.9, 0.9, n)
