@@ -49,7 +49,9 @@ def _line(axes, own, look):
 
 
 def _limit(axes, least, records):
-    """The least time of a method's operations, at the errors which that method has there."""
+    """The least time of a method's operations, at the errors which that method has there, if it was counted."""
+    if not least:
+        return
     errors = {r.setting: max(r.error, LEAST_ERROR) for r in records if r.method == least[0]["method"]}
     heights = [errors[entry["setting"]] for entry in least]
     axes.plot(

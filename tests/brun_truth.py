@@ -1,22 +1,28 @@
 """Brun's problem in multiprecision: (S1)-(S6) of `scenes/brun.md`, and what half an ulp of the inputs changes."""
 
 import warnings
+from itertools import pairwise
 
 import numpy as np
 from mpmath import mp, mpf
 
 NAMES = ("A", "C", "epsilon", "theta0", "p_theta0", "p_psi", "p_phi")
-OUTPUTS = ("u_min", "u_max", "period", "precession", "spin")
+OUTPUTS = ("u_min", "u_max", "period", "precession", "spin", "action")
 HALF_ULP = mpf(2) ** -53
 
 
 def integrals(state):
-    """k, L and u0 of (A, C, epsilon, theta0, p_theta0, p_psi, p_phi) (S1)."""
+    """A, C, k, L, a, b and u0 of (A, C, epsilon, theta0, p_theta0, p_psi, p_phi) (S1)."""
     A, C, epsilon, theta, p_theta, b, a = state
     sine, u = mp.sin(theta), mp.cos(theta)
     x = (b - a * u) / sine if sine else mpf(0)
     k = epsilon * A * (A - C)
-    return k, p_theta**2 + x**2 - k * u * u + a * a, u
+    return A, C, k, p_theta**2 + x**2 - k * u * u + a * a, a, b, u
+
+
+def scaled(sign):
+    """The same of (l, alpha, beta), for A = C = 1; u0 is not known."""
+    return lambda state: (mpf(1), mpf(1), mpf(sign), state[0], state[1], state[2], None)
 
 
 def quartic(k, L, a, b):
@@ -24,25 +30,37 @@ def quartic(k, L, a, b):
     return [-k, mpf(0), k - L, 2 * a * b, L - a * a - b * b]
 
 
-def turning_points(state):
-    """The real roots of P next to u0 on both sides: the nearest is the lower one where P rises."""
-    k, L, u = integrals(state)
-    c = quartic(k, L, state[6], state[5])
+def real_roots(k, L, a, b):
+    c = quartic(k, L, a, b)
     while c[0] == 0:
         c = c[1:]
     with warnings.catch_warnings():  # mpmath 1.4 asks for another order of coefficients, which 1.3 does not know
         warnings.simplefilter("ignore")
-        roots = sorted(r.real for r in mp.polyroots(c, maxsteps=400, extraprec=300) if abs(r.imag) < mpf(10) ** -35)
+        found = mp.polyroots(c, maxsteps=400, extraprec=300)
+    return sorted(r.real for r in found if abs(r.imag) < mpf(10) ** -35), c
+
+
+def turning_points(state):
+    """The real roots of P next to u0 on both sides: the nearest is the lower one where P rises."""
+    _A, _C, k, L, a, b, u = integrals(state)
+    roots, c = real_roots(k, L, a, b)
     near = min(roots, key=lambda r: abs(r - u))
     at = roots.index(near)
     slope = sum(n * x * near ** (n - 1) for n, x in enumerate(reversed(c)) if n)
     return (near, roots[at + 1]) if slope > 0 else (roots[at - 1], near)
 
 
-def polished(state, ends):
+def wells(sign, state):
+    """The pairs of real roots within [-1, 1] between which P > 0, lower u first."""
+    roots, c = real_roots(mpf(sign), *state)
+    inside = [r for r in roots if abs(r) <= 1]
+    return [(x, y) for x, y in pairwise(inside) if mp.polyval(c, (x + y) / 2) > 0]
+
+
+def polished(given, ends):
     """The roots of P near `ends`, by Newton's method."""
-    k, L, _u = integrals(state)
-    c = quartic(k, L, state[6], state[5])
+    _A, _C, k, L, a, b, _u = given
+    c = quartic(k, L, a, b)
     found = []
     for u in ends:
         for _ in range(12):
@@ -66,10 +84,9 @@ def third(x, y, p):
     return 3 * mp.pi * total / (4 * mean * p)
 
 
-def outputs(state, ends, library=True):
-    """u_min, u_max, T, Delta_psi, Delta_phi by (S5), (S6), with mpmath's R_J or, faster, the mean."""
-    A, C, _epsilon, _theta, _p, b, a = state
-    k, L, _u = integrals(state)
+def outputs(given, ends, library=True):
+    """u_min, u_max, T, Delta_psi, Delta_phi, J by (S5), (S6), (S14), with mpmath's R_J or, faster, the mean."""
+    A, C, k, L, a, b, _u = given
     low, high = ends
     S = low + high
 
@@ -88,20 +105,22 @@ def outputs(state, ends, library=True):
 
     up = (b - a) * half(1 - high, 1 - low, q(low)) / A if b != a else mpf(0)
     down = (b + a) * half(1 + low, 1 + high, q(high)) / A if b != -a else mpf(0)
-    return [low, high, period, up + down, a * (1 / C - 1 / A) * period + down - up]
+    level = L - (k * low * high + L - k + k * (S * S - low * high)) / 2
+    action = (period / A * level + 4 * mp.elliprg(0, X, Y).real - (b - a) * up - (b + a) * down) / (2 * mp.pi)
+    return [low, high, period, up + down, a * (1 / C - 1 / A) * period + down - up, action]
 
 
-def truth(point):
+def truth(point, given=integrals, ends=None):
     """The exact outputs at a point of float64 numbers, and what half-ulp changes of its numbers add up to."""
     state = [mpf(float(x)) for x in point]
-    ends = turning_points(state)
-    exact = outputs(state, ends)
+    ends = ends or turning_points(state)
+    exact = outputs(given(state), ends)
+    here = outputs(given(state), ends, library=False)
     floor, step = [mpf(0)] * len(exact), mpf(10) ** -22
     for i, x in enumerate(state):
         if x:
-            moved = [*state[:i], x * (1 + step), *state[i + 1 :]]
+            moved = given([*state[:i], x * (1 + step), *state[i + 1 :]])
             there = outputs(moved, polished(moved, ends), library=False)
-            here = outputs(state, ends, library=False)
             floor = [f + abs(t - h) / step * HALF_ULP for f, t, h in zip(floor, there, here, strict=True)]
     return exact, floor
 
@@ -146,3 +165,36 @@ def draw(random):
 
 KINDS = ("any", "near the pole +1", "near the pole -1", "passing a pole closely", "tiny field", "fast spin", "no spin",
          "near a regular precession", "near a saddle", "near the upright rotation")  # fmt: skip
+
+
+def draw_scaled(random):
+    """(kind, sign, (l, alpha, beta)): hard cases."""
+    sign, side = random.choice([-1, 1]), random.choice([-1.0, 1.0])
+    kind = random.choice(SCALED)
+    alpha, beta = random.normal(size=2)
+    close = 10 ** random.uniform(-13, -2)
+    u, y = random.uniform(-0.99, 0.99), side * 10 ** random.uniform(-0.4, 0.7)
+    if kind == "near a saddle":
+        sign, u = 1, random.uniform(-0.33, 0.33)
+        wide = 0.5 * np.sqrt((1 - u * u) * (1 - 9 * u * u)) * random.uniform(-1, 1)
+        y = side * np.sqrt(0.5 * (1 - 3 * u * u) + wide)
+    if kind in ("near a saddle", "near a regular precession"):
+        alpha, beta = u * (y - sign / y), y - sign * u * u / y  # (S8)
+        level = y * y * (1 - u * u) - sign * u * u + alpha * alpha
+        return kind, sign, (level + close * random.choice([-1.0, 1.0]) * max(1.0, abs(level)), alpha, beta)
+    if kind == "passing a pole closely":
+        beta = side * alpha * (1 + close * random.choice([-1.0, 1.0]))
+    elif kind == "near the upright rotation":
+        beta = side * alpha * (1 + close)
+        return kind, sign, (alpha * alpha - sign + random.uniform(0, 100) * close, alpha, beta)
+    elif kind == "fast spin":
+        alpha *= 10 ** random.uniform(1, 8)
+    elif kind == "tiny field":
+        large = 10 ** random.uniform(2, 9)
+        alpha, beta = large * alpha, large * beta
+    level = max(alpha * alpha, beta * beta) * (1 + 10 ** random.uniform(-3, 1)) + random.uniform(-1, 1)
+    return kind, sign, (level, alpha, beta)
+
+
+SCALED = ("any", "passing a pole closely", "near a regular precession", "near a saddle", "near the upright rotation",
+          "fast spin", "tiny field")  # fmt: skip

@@ -5,7 +5,7 @@ from math import cos, sin, sqrt
 import numpy as np
 
 from survey.kernels import double as dd
-from survey.kernels.jit import kernel
+from survey.kernels.jit import inline, kernel
 from survey.kernels.nutation import (
     EPS,
     HIGH,
@@ -24,31 +24,31 @@ from survey.kernels.nutation import (
     TINY,
     WIDTH,
     K,
+    about_equator,
+    barrier,
     find,
 )
 from survey.kernels.sines import sin_cos
 
 
-@kernel
+@inline
 def of_state(size_a, size_c, epsilon, theta, p_theta, b, a):
     """k, L, L + k - a b and L + k + a b as pairs, and u (S1); the last is False outside the domain."""
     sine, cosine = sin_cos(0.5 * theta)
     k = dd.mul(dd.two_prod(epsilon, size_a), dd.two_sum(size_a, -size_c))
-    if sine[0] == 0.0 and a != b:
-        return k, k, k, k, 1.0, False
+    inside = sine[0] != 0.0 or a == b
     high, low = dd.mul(cosine, cosine), dd.mul(sine, sine)  # (1 + u)/2, (1 - u)/2
     double = dd.times(dd.mul(sine, cosine), 2.0)
     minus, plus = dd.two_sum(b, -a), dd.two_sum(b, a)
-    x = (0.0, 0.0)
-    if sine[0] != 0.0:
-        x = dd.div(dd.add(dd.mul(minus, high), dd.mul(plus, low)), double)
+    divisor = double[0] if sine[0] != 0.0 else 1.0, double[1]  # at the pole x is 0
+    x = dd.div(dd.add(dd.mul(minus, high), dd.mul(plus, low)), divisor)
     kinetic = dd.add(dd.two_prod(p_theta, p_theta), dd.mul(x, x))
     common = dd.add(kinetic, dd.mul(k, dd.mul(double, double)))
     at_plus = dd.sub(common, dd.times(minus, a))
     at_minus = dd.add(common, dd.times(plus, a))
     u = dd.mul(dd.sub(cosine, sine), dd.add(cosine, sine))
     level = dd.add(dd.sub(kinetic, dd.mul(k, dd.mul(u, u))), dd.two_prod(a, a))
-    return k, level, at_plus, at_minus, u[0], True
+    return k, level, at_plus, at_minus, u[0], inside
 
 
 @kernel
@@ -122,3 +122,26 @@ def of_integrals(points, sign, rows, kinds, heights):
             a, b, k, pair, dd.sub(high, product), dd.add(high, product), rows[i], kinds[i]
         )
         heights[i, 2] = 1.0
+
+
+@kernel
+def heights_of_states(points, heights):
+    """Fill `heights` (n, 3) as `of_states`, for points in columns (7, n)."""
+    for i in range(len(heights)):
+        b, a = points[5, i], points[6, i]
+        k, level, at_plus, at_minus, _u, _inside = of_state(
+            points[0, i], points[1, i], points[2, i], points[3, i], points[4, i], b, a
+        )
+        found = barrier(a, b, k, about_equator(a, b, level, k), at_plus[0], at_minus[0])
+        heights[i, 0], heights[i, 1], heights[i, 2] = found[0], found[1], abs(k[0])
+
+
+@kernel
+def heights_of_integrals(points, heights):
+    """As `heights_of_states`, for the columns (l, sign, -, -, -, beta, alpha)."""
+    for i in range(len(heights)):
+        level, sign, b, a = points[0, i], points[1, i], points[5, i], points[6, i]
+        pair, k, high, product = (level, 0.0), (sign, 0.0), dd.two_sum(level, sign), dd.two_prod(a, b)
+        at_plus, at_minus = dd.sub(high, product)[0], dd.add(high, product)[0]
+        found = barrier(a, b, k, about_equator(a, b, pair, k), at_plus, at_minus)
+        heights[i, 0], heights[i, 1], heights[i, 2] = found[0], found[1], 1.0

@@ -15,10 +15,9 @@ from survey.kernels.quartic import ROUGH, UNIT, root, roughly, slope, slopes, va
 LOW, HIGH, LOW_PLUS, LOW_MINUS, HIGH_PLUS, HIGH_MINUS, WIDTH, SUM = range(8)
 Q_LOW, Q_HIGH, Q_PLUS, Q_MINUS, BEND, MIDDLE = range(8, 14)  # BEND: 4 q0 - k S^2; MIDDLE: s of (S5)
 K, L, MINUS, PLUS, LEVEL = range(14, 19)  # k, L, b - a, b + a, L - (k ul uh + q0)/2
-BAR_LOW, BAR_HIGH, NOISE_LOW, NOISE_HIGH, NOISE_BEND = range(
-    19, 24
-)  # of the turning points and, relative, of Q and BEND
-REST = 24  # from here on what float64 leaves of each number
+# of the turning points and, relative, of Q, BEND and WIDTH
+BAR_LOW, BAR_HIGH, NOISE_LOW, NOISE_HIGH, NOISE_BEND, NOISE_WIDTH = range(19, 25)
+REST = 25  # from here on what float64 leaves of each number
 SIZE = 2 * REST
 # kinds of wells
 NONE, LOST, SEPARATRIX, NUTATION, PRECESSION, PASSAGE = -2, -1, 0, 1, 2, 3
@@ -177,6 +176,7 @@ def fill(gaps, k, level, ats, equatorial, right, left, row):
     put(row, HIGH_PLUS, v)
     put(row, HIGH_MINUS, wh)
     row[BAR_HIGH], row[BAR_LOW] = bar_v + EPS * abs(uh[0]), bar_w + EPS * abs(ul[0])
+    row[NOISE_WIDTH] = (bar_v + bar_w) / max(width, TINY)
     put(row, K, k)
     put(row, L, level)
     put(row, MINUS, minus)
@@ -208,9 +208,21 @@ def fill(gaps, k, level, ats, equatorial, right, left, row):
     plus_side, minus_side = plus_side + 8.0 * moved * near, minus_side + 8.0 * moved * far
     row[NOISE_HIGH] = (plus_side if uh[0] >= 0.0 else minus_side) / max(row[Q_HIGH], TINY)
     row[NOISE_LOW] = (plus_side if ul[0] >= 0.0 else minus_side) / max(row[Q_LOW], TINY)
+    direct(k, dd.sub(level, k), square, uh, bar, row, Q_HIGH, NOISE_HIGH)
+    direct(k, dd.sub(level, k), square, ul, bar, row, Q_LOW, NOISE_LOW)
     beside_saddle(equatorial, uh, bar_v, -1.0, row, Q_HIGH, NOISE_HIGH)
     beside_saddle(equatorial, ul, bar_w, 1.0, row, Q_LOW, NOISE_LOW)
     row[NOISE_BEND] = 8.0 * (moved + UNIT * (abs(level[0]) + abs(k[0]))) / max(abs(row[BEND]), TINY)
+
+
+@inline
+def direct(k, rest, square, u, bar, row, place, error):
+    """Q at a turning point as L - k + k (S^2 + 2 u^2), where that is better known than from the pole."""
+    value = dd.add(rest, dd.mul(k, dd.add(square, dd.times(dd.mul(u, u), 2.0))))
+    noise = 8.0 * (abs(k[0]) * bar + UNIT * (abs(rest[0]) + 8.0 * abs(k[0])))
+    if noise < row[error] * value[0]:
+        put(row, place, value)
+        row[error] = noise / value[0]
 
 
 @inline
@@ -252,6 +264,24 @@ def above(row, g):
 
 
 @kernel
+def barrier(a, b, k, equatorial, at_plus, at_minus):
+    """(L above the separatrix, its bar; u of the saddle and F' there); NaN where there is none at these a and b."""
+    size_k = k[0]
+    between, rise = saddle(a, b, size_k)
+    if rise > 0.0:
+        height, size = value(equatorial, (between, 0.0))
+        rough = (abs(a) + abs(b * between)) * (abs(b) + abs(a * between)) + size_k * abs(between)
+        bar = 4.0 * UNIT * size + (8.0 * EPS * rough) ** 2 / rise  # the saddle's place is as good as F there
+        return height[0] / ((1.0 - between) * (1.0 + between)), bar, between, rise
+    distance, bar = nan, 0.0
+    if size_k < 0.0:
+        distance, bar = hill_at_pole(b - a, a * b, size_k, at_plus)
+        if bar == 0.0:
+            distance, bar = hill_at_pole(b + a, -a * b, size_k, at_minus)
+    return distance, bar, between, rise
+
+
+@kernel
 def find(a, b, k, level, at_plus, at_minus, rows, kinds):
     """Fill `rows` (2, SIZE) and `kinds` (2) with the wells, lower u first; returns (L above the separatrix, its bar).
 
@@ -264,18 +294,7 @@ def find(a, b, k, level, at_plus, at_minus, rows, kinds):
     polar = about_pole(dd.mul(gaps[0], gaps[0]), at_plus, level, k)
     antipolar = about_pole(dd.mul(gaps[1], gaps[1]), at_minus, level, k)
     equatorial = about_equator(a, b, level, k)
-    between, rise = saddle(a, b, size_k)
-    distance, bar = nan, 0.0
-    if rise > 0.0:
-        height, size = value(equatorial, (between, 0.0))
-        rest = (1.0 - between) * (1.0 + between)
-        distance = height[0] / rest
-        rough = (abs(a) + abs(b * between)) * (abs(b) + abs(a * between)) + size_k * abs(between)
-        bar = 4.0 * UNIT * size + (8.0 * EPS * rough) ** 2 / rise  # the saddle's place is as good as F there
-    elif size_k < 0.0:
-        distance, bar = hill_at_pole(minus, product, size_k, at_plus[0])
-        if bar == 0.0:
-            distance, bar = hill_at_pole(plus, -product, size_k, at_minus[0])
+    distance, bar, between, rise = barrier(a, b, k, equatorial, at_plus[0], at_minus[0])
     if abs(distance) <= bar:
         kinds[0] = SEPARATRIX
         return distance, bar

@@ -6,7 +6,7 @@ from math import factorial
 import numpy as np
 
 from survey.kernels.double import add, mul, neg, times, two_prod
-from survey.kernels.jit import kernel
+from survey.kernels.jit import inline
 
 GRID = 16.0
 LARGEST = 3.2
@@ -33,7 +33,7 @@ _S3, _S5, _S7 = (_pair(Fraction((-1) ** (n // 2), factorial(n))) for n in (3, 5,
 _C4, _C6, _C8 = (_pair(Fraction((-1) ** (n // 2), factorial(n))) for n in (4, 6, 8))
 
 
-@kernel
+@inline
 def sin_cos(x):
     """sin x and cos x of 0 <= x <= LARGEST, to a few units of 2^-104; relative, where sin x is small with x."""
     j = int(x * GRID + 0.5)

@@ -6,11 +6,12 @@ a (1/C - 1/A) T, the action, and their bars; and from these, at given times, u, 
 
 import numpy as np
 
-from survey.kernels import brun
+from survey.kernels import brun, brun_lanes
 from survey.kernels import nutation as nu
 
 PERIOD, PRECESSION, SPIN, ACTION = range(4)
 TURN = 2.0 * np.pi
+NAMES = ("u_min", "u_max", "period", "precession", "spin", "action")
 TRUST = 0.03  # relative errors beyond are no errors of first order
 UNDECIDED = -1
 
@@ -31,6 +32,31 @@ def of_integrals(points, sign):
     brun.of_integrals(np.ascontiguousarray(points), float(sign), rows, kinds, heights)
     count = np.where((kinds == nu.SEPARATRIX).any(axis=1), -1, (kinds >= nu.NUTATION).sum(axis=1))
     return rows, kinds, count, heights
+
+
+def in_lanes(kernel, points, actions):
+    """Values and bars (12, n) of `points` (7, n), numbers of wells (n), and which are answered (n): see `brun_lanes`.
+
+    actions: to full accuracy in small wells, too.
+    """
+    n = points.shape[1]
+    out, wells, done = np.empty((2 * len(NAMES), n)), np.empty(n), np.empty(n)
+    for steps in (brun_lanes.FEW, brun_lanes.MORE):
+        for state, exactly in ((brun_lanes.LEFT, False), (brun_lanes.CANCELLED, True)):
+            if steps == brun_lanes.FEW and not exactly:
+                kernel(points, steps, exactly, actions, out, wells, done)
+                continue
+            again = np.flatnonzero(done == state)
+            if again.size:
+                part = np.empty((len(out), again.size)), np.empty(again.size), np.empty(again.size)
+                kernel(np.ascontiguousarray(points[:, again]), steps, exactly, actions, *part)
+                out[:, again], wells[again], done[again] = part
+    return out, wells, done == brun_lanes.DONE
+
+
+def named(values):
+    """{name: values, name_error: bars} of the answers of `in_lanes`."""
+    return dict(zip((*NAMES, *(f"{name}_error" for name in NAMES)), values, strict=True))
 
 
 def periods(method, rows, kinds, rtol):
@@ -62,6 +88,10 @@ def outputs(rows, out, inertia, drift):
         "spin": (spin, spin_bar),
         "action": (values[:, ACTION], bars[:, ACTION]),
     }
+    return _named(found, good)
+
+
+def _named(found, good):
     result = {}
     for name, (value, error) in found.items():
         result[name], result[f"{name}_error"] = np.where(good, value, np.nan), np.where(good, error, np.nan)
@@ -104,10 +134,7 @@ def motions(method, rows, kinds, starts, out, times, inertia, drift):
     bar = here[..., 5] + 12.0 * nu.EPS * np.abs(turned) + nu.EPS * np.abs(phi)
     found = {"u": (here[..., 0], here[..., 3]), "psi": (here[..., 1], here[..., 4]), "phi": (phi, bar)}
     good = np.isfinite(here).all(axis=-1)
-    result = {}
-    for name, (value, error) in found.items():
-        result[name], result[f"{name}_error"] = np.where(good, value, np.nan), np.where(good, error, np.nan)
-    return result
+    return _named(found, good)
 
 
 def verdicts(rows, kinds):
@@ -116,8 +143,16 @@ def verdicts(rows, kinds):
     return np.where(one, nu.PRECESSION, np.maximum(kinds, UNDECIDED))
 
 
+def heights(kernel, points):
+    """Heights (n, 3) of points (7, n): see `kernels/brun.py`."""
+    found = np.empty((points.shape[1], 3))
+    kernel(points, found)
+    return found
+
+
 def distance(heights):
-    """(L - L of the separatrix)/|k| and its bar; NaN where there is no separatrix."""
+    """The output of that name: (L - L of the separatrix)/|k|, and its bar; NaN where there is no separatrix."""
+    heights = np.where(np.isfinite(heights[:, :1]), heights, np.nan)
     value = heights[:, 0] / heights[:, 2]
-    bar = np.where(np.isfinite(value), heights[:, 1] / heights[:, 2] + 4.0 * nu.EPS * np.abs(value), np.nan)
-    return np.where(np.isfinite(value), value, np.nan), bar
+    bar = heights[:, 1] / heights[:, 2] + 4.0 * nu.EPS * np.abs(value)
+    return {"separatrix_distance": value, "separatrix_distance_error": bar}

@@ -21,7 +21,7 @@ SERVES = ("nutation",)
 EPS = nu.EPS
 NODES = 16
 _COSINES = np.cos((np.arange(NODES) + 0.5) * pi / NODES)
-CANCELLED = 0.02  # advances that are a smaller part of their terms are computed in double-double
+CANCELLED = 0.01  # advances that are a smaller part of their terms are computed in double-double
 FINE = 2.0**-94
 SLANT = 0.25  # where the line through the roots of Q is lower at the pole, relative, pi is not split off
 
@@ -121,8 +121,8 @@ def periods_of(row, out):
     out[0], out[4] = period, (12.0 * EPS + noise) * period
     total, difference, size = down + up, down - up, size_up + size_down
     error, rounding = (24.0 * EPS + 4.0 * noise) * size, 2.0 * EPS
-    cancelled = min(abs(total), abs(difference)) < CANCELLED * size
-    if cancelled and turns_up * turns_down != 0.0 and row[nu.MIDDLE] > 0.0:
+    bare = abs(total) if turns_up + turns_down == 0.0 else abs(difference)  # without multiples of pi
+    if bare < CANCELLED * size and turns_up * turns_down != 0.0 and row[nu.MIDDLE] > 0.0:
         total, difference = fine_parts(row)
         error, rounding = (FINE + 4.0 * noise) * size, 12.0 * EPS
     out[1], out[2] = pi * (turns_down + turns_up) + total, pi * (turns_down - turns_up) + difference
@@ -138,7 +138,7 @@ def periods_of(row, out):
     if out[7] > 1e-14 * abs(out[3]):
         action = smooth_action(row, root_low, root_high)
         if action >= 0.0:
-            out[3], out[7] = action, (64.0 * EPS + noise) * action
+            out[3], out[7] = action, (64.0 * EPS + noise + 2.5 * row[nu.NOISE_WIDTH]) * action
 
 
 @kernel

@@ -79,6 +79,7 @@ def periods_of(row, n, speed, half, whole, out):
     seen, missed = exp(-speed * n), exp(-2.0 * speed * n)
     for i in range(4):
         half[i] = 10.0 * (abs(whole[i] - half[i]) * seen + abs(whole[i]) * missed) + noise * abs(whole[i])
+    half[3] += 2.5 * row[nu.NOISE_WIDTH] * whole[3]
     out[0], out[1], out[2], out[3] = whole[0], whole[1] + whole[2], whole[2] - whole[1], whole[3]
     out[4], out[5], out[6], out[7] = half[0], half[1] + half[2], half[1] + half[2], half[3]
 

@@ -23,7 +23,7 @@ def integrate(system, rtol):
 
 @cache
 def _compiled(slope):
-    slope = numba.njit(slope)
+    slope = numba.njit(error_model="numpy")(slope)  # a division by zero is a step to be refused
 
     @cyjit
     def fill(out, t, state, parameters):
@@ -34,7 +34,7 @@ def _compiled(slope):
     return fill
 
 
-@numba.njit
+@numba.njit(error_model="numpy")
 def _loop(address, start, parameters, span, rtol, ends):
     for i in range(len(span)):
         solved = nbsolve2_ivp(address, (0.0, span[i]), start[i], method="DOP853", args=parameters[i],

@@ -9,7 +9,7 @@ Everything that belongs to one scene lies in the file of its name beside this on
     system(point, options) the same question as ODEs, for the peers in `survey.peers`
     outcome(ends)          {ERROR: values} from the states (points, n) at the ends of the spans, and "verdict" if any
     LIMITED                the method whose operations, at the machine's peak rate, are the least time of the chart
-    operations_of(run)     its operations while `run()` solves a work with it
+    operations_of(run)     its operations while `run()` solves a work with it (both optional)
     MOST                   {method: number of points that it is timed on}, for those that need long (optional)
 """
 
@@ -138,6 +138,8 @@ def measure(scene, case, peers=False, say=lambda line: None):
 def limit(scene, case):
     """The machine's rates, and the least seconds per point that the operations of one method leave possible."""
     rates = peak.rates()
+    if not hasattr(case, "LIMITED"):
+        return {"rates": rates, "least": []}
     solve = _solver(modules.load(scenes, scene, "scene"), case.LIMITED, case.ERROR)
     least = []
     for work, (point, options) in case.works().items():

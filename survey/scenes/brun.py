@@ -24,12 +24,14 @@ grows as the logarithm of the distance.
 Source: Bekov, Shinibaev et al., on quadratures of Kobb's type, checked and corrected in `brun.md` beside this file.
 """
 
+from functools import partial
 from math import pi
 
 import numpy as np
 
 from survey import methods
 from survey.errors import BadInput
+from survey.kernels import brun, brun_lanes
 from survey.kernels import nutation as nu
 from survey.measures import nutation
 from survey.measures.rows import Rows
@@ -124,21 +126,27 @@ OUTPUTS = (
 
 def cost(options, sizes):
     """Seconds per point, rough."""
-    return 2.5e-6
+    return 1e-6
 
 
 def solve(point, request):
-    """All outputs of a block (see `survey.scenes`)."""
+    """All outputs of a block (see `survey.scenes`); `auto`: in lanes, and by agm what these leave."""
+    auto = request.method == "auto" and "t" not in point
     method = load(methods, "agm" if request.method == "auto" else request.method, "method")
     shared = {p.name: point[p.name] for p in PARAMETERS if p.name in point and p.name != "t"}
     block = Rows(tuple(shared.values()), *([point["t"]] if "t" in point else []))
     given = {name: block.per_row(values) for name, values in shared.items()}
-    valid = np.isfinite(np.column_stack(list(given.values()))).all(axis=1)
+    valid = np.logical_and.reduce([np.isfinite(values) for values in given.values()])
+    wanted = request.variables or {"action", "separatrix_distance"}
     if "l" in given:
-        out = _scaled(given, valid, int(request.options["sign"]), method, request.rtol)
+        sign = int(request.options["sign"])
+        slowly = partial(_scaled, sign=sign, method=method, rtol=request.rtol)
+        out = _scaled_in_lanes(given, valid, sign, slowly, wanted) if auto else slowly(given, valid)
     else:
         times = block.per_point(point["t"]) if "t" in point else None
-        out = _state(given, valid & (given["C"] <= 2.0 * given["A"]), method, request.rtol, times)
+        valid &= given["C"] <= 2.0 * given["A"]
+        slowly = partial(_state, method=method, rtol=request.rtol, times=times)
+        out = _state_in_lanes(given, valid, slowly, wanted) if auto else slowly(given, valid)
     out |= nutation.rates(out, request.variables)
     return {name: _back(block, values) for name, values in out.items()}
 
@@ -148,6 +156,44 @@ def _back(block, values):
     if values.ndim == 3:
         return np.stack([block.back(values[..., i]) for i in range(values.shape[-1])], axis=-1)
     return block.back(values.reshape(block.rows, -1))
+
+
+def _state_in_lanes(given, valid, slowly, wanted):
+    columns = np.stack([given[p.name] for p in PARAMETERS[:7]])
+    values, wells, done = nutation.in_lanes(brun_lanes.of_states, columns, "action" in wanted)
+    out = nutation.named(values) | {"wells": wells.astype(np.int64)}
+    if "separatrix_distance" in wanted:
+        out |= nutation.distance(nutation.heights(brun.heights_of_states, columns))
+    return _completed(out, given, valid, done, slowly)
+
+
+def _scaled_in_lanes(given, valid, sign, slowly, wanted):
+    """Both wells, where there are two, one after the other."""
+    columns = np.zeros((7, valid.size))
+    columns[0], columns[1], columns[2], columns[3] = given["l"], sign, -1.0, given["ratio"]
+    columns[5], columns[6] = given["beta"], given["alpha"]
+    values, wells, done = nutation.in_lanes(brun_lanes.of_integrals, columns, "action" in wanted)
+    both = np.full((*values.shape, 2), np.nan)
+    both[..., 0] = values
+    two = np.flatnonzero(done & (wells == 2))
+    upper = columns[:, two]
+    upper[2] = 1.0
+    both[:, two, 1], _wells, done[two] = nutation.in_lanes(brun_lanes.of_integrals, upper, "action" in wanted)
+    out = nutation.named(both[:, :, None, :]) | {"wells": wells.astype(np.int64)}
+    if "separatrix_distance" in wanted:
+        out |= nutation.distance(nutation.heights(brun.heights_of_integrals, columns))
+    return _completed(out, given, valid, done, slowly)
+
+
+def _completed(out, given, valid, done, slowly):
+    """`out` of nutations, with what the lanes have left."""
+    out |= {"verdict": np.full(valid.size, nu.NUTATION), "status": np.full(valid.size, OK)}
+    left = np.flatnonzero(~(done & valid))
+    if left.size:
+        part = slowly({name: values[left] for name, values in given.items()}, valid[left])
+        for name, values in out.items():
+            values[left] = part[name]
+    return out
 
 
 def _state(given, valid, method, rtol, times):
@@ -194,8 +240,7 @@ def _scaled(given, valid, sign, method, rtol):
 
 def _finished(out, status, valid, count, heights):
     """`out` with what is one per point, and nothing where the parameters are not valid."""
-    out["separatrix_distance"], out["separatrix_distance_error"] = nutation.distance(heights)
-    out["wells"] = count
+    out |= nutation.distance(heights) | {"wells": count}
     out["status"] = np.where(valid, status, INVALID_PARAMETERS)
     return _emptied(out, ~valid)
 

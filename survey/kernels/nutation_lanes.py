@@ -1,0 +1,416 @@
+"""Single wells off separatrices, poles and double roots, many at once: what `brun` and `agm` do, lanes innermost.
+
+The formulas, the double-double set-up and the bars are those of `kernels/nutation.py` and `methods/agm.py`; a lane is
+done only where every number of its set-up is proved to be right to an eighth of a rounding and where the fixed numbers
+of steps suffice: otherwise it is left to them. A lane's bits do not depend on its neighbours.
+"""
+
+from math import copysign, pi, sqrt
+
+import numpy as np
+
+from survey.kernels import double as dd
+from survey.kernels.jit import inline, kernel
+from survey.kernels.nutation import EPS
+from survey.kernels.quartic import UNIT
+
+TILE = 64
+GIVEN, OUTPUTS = 7, 12  # rows of numbers given; u_min, u_max, period, precession, spin, action, then their bars
+RIGHT = 0.125 * EPS  # errors of the set-up, relative
+BLUR = 0.01  # the error of a well's width, relative
+WIDE = 0.1  # wells that are wider are no parabolas
+NEAR, LAST = 2e-9, 1e-17  # the last two means, and the last weight of R
+SLANT, CANCELLED = 0.25, 0.01  # as in methods/agm.py
+NODES = 16
+COSINES = np.cos((np.arange(NODES) + 0.5) * pi / NODES)
+# places of the rows of a tile: of what is given the last two, b and a
+B, A = 5 * TILE, 6 * TILE
+# pairs: k, L, L + k - a b, L + k + a b, b - a, b + a
+K, L, PLUS_POLE, MINUS_POLE, MINUS, PLUS = range(7 * TILE, 19 * TILE, 2 * TILE)
+# pairs: 1 - u and 1 + u of both turning points (first, roughly, of those beside their poles), ul + uh
+V_HIGH, W_LOW, V_LOW, W_HIGH, SUM = range(19 * TILE, 29 * TILE, 2 * TILE)
+# pairs: Q at the turning points, s of (S5), 4 q0 - k S^2
+Q_LOW, Q_HIGH, MIDDLE, BEND = range(29 * TILE, 37 * TILE, 2 * TILE)
+# u at the start, turning points, their distance, s + g, L - (k ul uh + q0)/2, 1 where all is right (2: but cancels),
+# number of wells
+U, LOW, HIGH, WIDTH, ABOVE, LEVEL, GOOD, WELLS = range(37 * TILE, 45 * TILE, TILE)
+X, Y, WEIGHT, SERIES = range(45 * TILE, 49 * TILE, TILE)  # the mean
+UP, DOWN = 49 * TILE, 53 * TILE  # the sums R of both poles: p, weight, total, 1 if complementary
+LINE_UP, POINT_UP, LINE_DOWN, POINT_DOWN = range(57 * TILE, 61 * TILE, TILE)  # l of (S11), the root of P0 of (S13)
+# the sum and the difference of the parts of both poles, with all their digits, and 1 if these are known
+FINE_TOTAL, FINE_DIFFERENCE, FINE = range(61 * TILE, 64 * TILE, TILE)
+BAR_V, BAR_W, ACTION = range(64 * TILE, 67 * TILE, TILE)  # of the first two pairs; (S15), where it is known
+ROWS = 67
+
+
+@inline
+def laguerre(c0, c1, c2, c3, c4, y):
+    """A step towards the next root above y where c(y) < 0, or below it where c(y) > 0 (its roots real)."""
+    value = c0 + y * (c1 + y * (c2 + y * (c3 + y * c4)))
+    first = c1 + y * (2.0 * c2 + y * (3.0 * c3 + y * 4.0 * c4))
+    second = 2.0 * c2 + y * (6.0 * c3 + y * 12.0 * c4)
+    square = 9.0 * first * first - 12.0 * value * second
+    y -= 4.0 * value / (first + sqrt(square if square > 0.0 else 0.0))
+    return min(max(y, 0.0), 2.0)
+
+
+@inline
+def polished(c0, c1, c2, c3, c4, y):
+    """A step of Newton's method in double-double towards the root (a pair) near y, and a bound of its error then."""
+    r = dd.add(dd.mul(c4, y), c3)
+    r = dd.add(dd.mul(r, y), c2)
+    r = dd.add(dd.mul(r, y), c1)
+    r = dd.add(dd.mul(r, y), c0)
+    x, a0, a1, a2, a3, a4 = y[0], abs(c0[0]), abs(c1[0]), abs(c2[0]), abs(c3[0]), abs(c4[0])
+    size, steep = a0 + x * (a1 + x * (a2 + x * (a3 + x * a4))), a1 + x * (2.0 * a2 + x * (3.0 * a3 + x * 4.0 * a4))
+    first = c1[0] + x * (2.0 * c2[0] + x * (3.0 * c3[0] + x * 4.0 * c4[0]))
+    second = 2.0 * c2[0] + x * (6.0 * c3[0] + x * 12.0 * c4[0])
+    move = r[0] / first
+    bend = abs(second) + abs(move) * (6.0 * a3 + 36.0 * a4)
+    bar = (2.0 * UNIT * size + abs(move) * (8.0 * EPS * steep + abs(move) * bend)) / abs(first) + 2.0 * UNIT * x
+    return dd.add(y, (-move, 0.0)), bar
+
+
+@inline
+def pair(work, row, i):
+    return work[row + i], work[row + TILE + i]
+
+
+@inline
+def put(work, row, i, value):
+    work[row + i], work[row + TILE + i] = value
+
+
+@inline
+def step(work, i):
+    """A step of Laguerre's method from the poles inwards."""
+    k, level = work[K + i], work[L + i]
+    c2, c3 = -level - 5.0 * k, 4.0 * k
+    minus, plus = work[MINUS + i], work[PLUS + i]
+    work[V_HIGH + i] = laguerre(-minus * minus, 2.0 * work[PLUS_POLE + i], c2, c3, -k, work[V_HIGH + i])
+    work[W_LOW + i] = laguerre(-plus * plus, 2.0 * work[MINUS_POLE + i], c2, c3, -k, work[W_LOW + i])
+
+
+@inline
+def between(c0, c1, c2, c3, c4, work, row, i):
+    """As `laguerre`, from the place in `work` towards a root between a pole and `top`, where c > 0: never beyond."""
+    y, low, high = work[row + i], work[row + TILE + i], work[row + 2 * TILE + i]
+    value = c0 + y * (c1 + y * (c2 + y * (c3 + y * c4)))
+    low, high = y if value <= 0.0 else low, y if value > 0.0 else high
+    new = laguerre(c0, c1, c2, c3, c4, y)
+    bad = (not (new > low)) | (not (new < high))
+    work[row + i] = 0.5 * (low + high) if bad & (value != 0.0) else new
+    work[row + TILE + i], work[row + 2 * TILE + i] = low, high
+
+
+@inline
+def search(work, i):
+    """A step of `between` on both sides of U."""
+    k, level = work[K + i], work[L + i]
+    c2, c3 = -level - 5.0 * k, 4.0 * k
+    minus, plus = work[MINUS + i], work[PLUS + i]
+    between(-minus * minus, 2.0 * work[PLUS_POLE + i], c2, c3, -k, work, UP, i)
+    between(-plus * plus, 2.0 * work[MINUS_POLE + i], c2, c3, -k, work, DOWN, i)
+
+
+@inline
+def choose(work, i):
+    """Where there are two wells, the inner turning point of the one that holds U for the outer one of the other."""
+    k, v, w = work[K + i], work[V_HIGH + i], work[W_LOW + i]
+    total, width = w - v, 2.0 - v - w
+    bend = 4.0 * (work[L + i] - k) + k * (2.0 * total * total + width * width)
+    two = (k > 0.0) & (bend < 0.0)
+    half = sqrt(-0.25 * bend / k) if two else 0.0
+    upper = work[U + i] > -0.5 * total
+    work[V_HIGH + i] = 1.0 + 0.5 * total + half if two & (not upper) else v
+    work[W_LOW + i] = 1.0 - 0.5 * total + half if two & upper else w
+
+
+@inline
+def narrow(work, i):
+    """Turning points that nearly coincide, from the parabola at the greatest P between them."""
+    k, minus = pair(work, K, i), pair(work, MINUS, i)
+    c2, c3 = dd.neg(dd.add(pair(work, L, i), dd.times(k, 5.0))), dd.times(k, 4.0)
+    c1 = dd.times(pair(work, PLUS_POLE, i), 2.0)
+    v, w, start = work[V_HIGH + i], work[W_LOW + i], 1.0 - work[U + i]
+    told = abs(work[U + i]) <= 1.0
+    y = start if told else 0.5 * (v + (2.0 - w))
+    for _ in range(2):
+        first = c1[0] + y * (2.0 * c2[0] + y * (3.0 * c3[0] - y * 4.0 * k[0]))
+        second = 2.0 * c2[0] + y * (6.0 * c3[0] - y * 12.0 * k[0])
+        y -= first / second
+    r, slope = dd.sub(c3, dd.times(k, y)), dd.sub(dd.times(c3, 3.0), dd.times(k, 4.0 * y))
+    r, slope = dd.add(dd.times(r, y), c2), dd.add(dd.times(slope, y), dd.times(c2, 2.0))
+    r, slope = dd.add(dd.times(r, y), c1), dd.add(dd.times(slope, y), c1)
+    height = dd.sub(dd.times(r, y), dd.mul(minus, minus))[0]
+    half = sqrt(slope[0] * slope[0] - 2.0 * height * second)
+    lower, upper = (half - slope[0]) / second, (-half - slope[0]) / second
+    close = (upper - lower < WIDE) & (half > 0.0) & (second < 0.0)
+    close &= (abs(start - y) < WIDE) if told else (abs(v - y) < WIDE) & (abs(2.0 - w - y) < WIDE)
+    put(work, V_HIGH, i, dd.two_sum(y, lower) if close else (v, 0.0))
+    put(work, W_LOW, i, dd.sub((2.0, 0.0), dd.two_sum(y, upper)) if close else (w, 0.0))
+
+
+@inline
+def polish(work, i):
+    """A step of Newton's method towards both turning points."""
+    k, minus, plus = pair(work, K, i), pair(work, MINUS, i), pair(work, PLUS, i)
+    c2, c3, c4 = dd.neg(dd.add(pair(work, L, i), dd.times(k, 5.0))), dd.times(k, 4.0), dd.neg(k)
+    at_plus, at_minus = dd.times(pair(work, PLUS_POLE, i), 2.0), dd.times(pair(work, MINUS_POLE, i), 2.0)
+    v, bar_v = polished(dd.neg(dd.mul(minus, minus)), at_plus, c2, c3, c4, pair(work, V_HIGH, i))
+    w, bar_w = polished(dd.neg(dd.mul(plus, plus)), at_minus, c2, c3, c4, pair(work, W_LOW, i))
+    put(work, V_HIGH, i, v)
+    put(work, W_LOW, i, w)
+    work[BAR_V + i], work[BAR_W + i] = bar_v, bar_w
+
+
+@inline
+def settle(work, i):
+    """All that the turning points give, with all its digits; GOOD where it is proved to have them."""
+    k, level, v, w = pair(work, K, i), pair(work, L, i), pair(work, V_HIGH, i), pair(work, W_LOW, i)
+    bar_v, bar_w = work[BAR_V + i], work[BAR_W + i]
+    one, two = (1.0, 0.0), (2.0, 0.0)
+    high, low, total, v_low, w_high = dd.sub(one, v), dd.sub(w, one), dd.sub(w, v), dd.sub(two, w), dd.sub(two, v)
+    width = dd.sub(v_low, v)[0]
+    square, rest, product = dd.mul(total, total), dd.sub(level, k), dd.mul(high, low)
+    near = dd.add(rest, dd.mul(k, dd.add(square, dd.times(dd.mul(high, high), 2.0))))
+    far = dd.add(rest, dd.mul(k, dd.add(square, dd.times(dd.mul(low, low), 2.0))))
+    bow = dd.mul(k, square)
+    middle = dd.add(rest, dd.times(bow, 1.5))
+    bend = dd.add(dd.times(rest, 4.0), dd.sub(dd.times(bow, 3.0), dd.times(dd.mul(k, product), 4.0)))
+    level_rest = dd.sub(level, dd.times(dd.add(rest, bow), 0.5))
+    g = sqrt(near[0]) * sqrt(far[0])
+    error = 8.0 * (abs(k[0]) * (bar_v + bar_w) + UNIT * (abs(level[0]) + 8.0 * abs(k[0])))
+    smooth = middle[0] >= 0.0
+    sure = (error < RIGHT * near[0]) & (error < RIGHT * far[0]) & (bar_v + bar_w < BLUR * width)
+    sure &= smooth | ((error < RIGHT * abs(bend[0])) & (bar_v + bar_w < RIGHT * width))
+    sure &= (bar_v < RIGHT * v[0]) & (bar_w < RIGHT * w[0])
+    sure &= (bar_w < RIGHT * v_low[0]) & (bar_v < RIGHT * w_high[0])
+    sure &= (work[MINUS + i] != 0.0) & (work[PLUS + i] != 0.0)
+    sure &= width > 4.0 * (bar_v + bar_w + EPS * (abs(low[0]) + abs(high[0])))  # else it is a regular precession
+    two = (k[0] > 0.0) & (bend[0] < 0.0)
+    aside = (-0.5 * total[0] > high[0]) | (-0.5 * total[0] < low[0])  # Q is least outside the well
+    sure &= (k[0] <= 0.0) | (bend[0] > error) | (aside & (bend[0] < -error))
+    work[WELLS + i] = 2.0 if two else 1.0
+    work[GOOD + i] = 1.0 if sure else 0.0
+    work[ABOVE + i] = middle[0] + g if smooth else 0.25 * k[0] * width * width * bend[0] / (g - middle[0])
+    work[LOW + i], work[HIGH + i], work[WIDTH + i], work[LEVEL + i] = low[0], high[0], width, level_rest[0]
+    put(work, V_LOW, i, v_low)
+    put(work, W_HIGH, i, w_high)
+    put(work, SUM, i, total)
+    put(work, Q_LOW, i, far)
+    put(work, Q_HIGH, i, near)
+    put(work, MIDDLE, i, middle)
+    put(work, BEND, i, bend)
+
+
+@inline
+def parameter(gap, near, far, root_near, root_far, incline, y):
+    """p^2 of the sum R, the line at the pole, and (S13) P0's root if that is used, else 0."""
+    line = root_near + incline * near
+    slanted = line <= SLANT * root_near
+    p = root_far * sqrt(near / far)
+    half = 0.5 * (p + y * y / p)
+    q = gap * gap / (near * far) * (y / line) ** 2
+    return half * half if slanted else q, line, p if slanted else 0.0
+
+
+@inline
+def enter(work, row, square, x, y, i):
+    """The start of a sum R (S12)."""
+    xy = x * y
+    low = square < xy
+    square = xy * (xy / square) if low else square
+    work[row + i], work[row + TILE + i], work[row + 2 * TILE + i], work[row + 3 * TILE + i] = (
+        sqrt(square),
+        1.0,
+        0.0,
+        1.0 if low else 0.0,
+    )
+
+
+@inline
+def prepare(work, i):
+    """The means' start."""
+    root_low, root_high = sqrt(work[Q_LOW + i]), sqrt(work[Q_HIGH + i])
+    x, y = sqrt(0.5 * work[ABOVE + i]), sqrt(root_low * root_high)
+    incline = 2.0 * work[K + i] * work[SUM + i] / (root_low + root_high)
+    square, line, point = parameter(work[MINUS + i], work[V_HIGH + i], work[V_LOW + i], root_high, root_low, incline, y)
+    enter(work, UP, square, x, y, i)
+    work[LINE_UP + i], work[POINT_UP + i] = line, point
+    square, line, point = parameter(work[PLUS + i], work[W_LOW + i], work[W_HIGH + i], root_low, root_high, -incline, y)
+    enter(work, DOWN, square, x, y, i)
+    work[LINE_DOWN + i], work[POINT_DOWN + i] = line, point
+    work[X + i], work[Y + i], work[WEIGHT + i], work[SERIES + i] = x, y, 1.0, 0.0
+
+
+@inline
+def go_on(work, row, xy, root, i):
+    """A term of the sum R."""
+    p = work[row + i]
+    size = p * p + xy
+    inverse = 1.0 / size
+    e = (p - root) * (p + root) * inverse
+    work[row + 2 * TILE + i] += work[row + TILE + i] * (2.0 * xy * inverse if work[row + 3 * TILE + i] == 1.0 else 1.0)
+    work[row + TILE + i] *= 0.5 * e
+    work[row + i] = 0.5 * size / p
+
+
+@inline
+def take_mean(work, i):
+    x, y = work[X + i], work[Y + i]
+    xy = x * y
+    root = sqrt(xy)
+    go_on(work, UP, xy, root, i)
+    go_on(work, DOWN, xy, root, i)
+    c, weight = 0.5 * (x - y), 2.0 * work[WEIGHT + i]
+    work[SERIES + i] += weight * c * c
+    work[X + i], work[Y + i], work[WEIGHT + i] = 0.5 * (x + y), root, weight
+
+
+@inline
+def advance(gap, near, far, width, root_near, root_far, incline, bend, period, line, p, ratio, g):
+    """As in methods/agm.py: whole multiples of pi, the rest, and the size of its terms."""
+    direct = 0.5 * gap * period / far * (1.0 + 0.5 * width * (1.0 + 0.5 * (p * p - g) / (p * p + g) * ratio) / near)
+    q = gap * gap / (near * far)
+    second = 0.25 * (root_far * near + root_near * far) * bend * ratio / q
+    part = 0.5 * gap * period / line
+    slanted = p > 0.0
+    value = direct if slanted else part * (incline + second)
+    return (
+        0.0 if slanted else copysign(1.0, gap),
+        value,
+        abs(value) if slanted else abs(part) * (abs(incline) + abs(second)),
+    )
+
+
+@inline
+def finish(work, size, drift, i, told):
+    """told = values and bars, of a well of a body with A = `size`; False where they are left to the other kernels."""
+    middle = 0.5 * (work[X + i] + work[Y + i])
+    period = 2.0 * pi / middle
+    root_low, root_high, width = sqrt(work[Q_LOW + i]), sqrt(work[Q_HIGH + i]), work[WIDTH + i]
+    incline, g = 2.0 * work[K + i] * work[SUM + i] / (root_low + root_high), root_low * root_high
+    bend = 0.5 * work[K + i] * work[BEND + i] / work[ABOVE + i]
+    minus, plus = work[MINUS + i], work[PLUS + i]
+    line, point, ratio = work[LINE_UP + i], work[POINT_UP + i], work[UP + 2 * TILE + i]
+    turns_up, up, size_up = advance(minus, work[V_HIGH + i], work[V_LOW + i], width, root_high, root_low, incline, bend,
+                                    period, line, point, ratio, g)  # fmt: skip
+    line, point, ratio = work[LINE_DOWN + i], work[POINT_DOWN + i], work[DOWN + 2 * TILE + i]
+    turns_down, down, size_down = advance(plus, work[W_LOW + i], work[W_HIGH + i], width, root_low, root_high, -incline,
+                                          bend, period, line, point, ratio, g)  # fmt: skip
+    total, difference, rough = down + up, down - up, size_up + size_down
+    sure = (work[GOOD + i] == 1.0) & (abs(work[X + i] - work[Y + i]) <= NEAR * middle)
+    sure &= abs(work[UP + TILE + i]) <= LAST * work[UP + 2 * TILE + i]
+    sure &= abs(work[DOWN + TILE + i]) <= LAST * work[DOWN + 2 * TILE + i]
+    bare = abs(total) if turns_up + turns_down == 0.0 else abs(difference)  # without multiples of pi
+    cancelled = (bare < CANCELLED * rough) & (turns_up * turns_down != 0.0) & (work[MIDDLE + i] > 0.0)
+    fine = work[FINE + i] == 1.0
+    exactly = fine & cancelled
+    total = work[FINE_TOTAL + i] * period if exactly else total
+    difference = work[FINE_DIFFERENCE + i] * period if exactly else difference
+    error, rounding = (EPS / 32.0 * rough, 12.0 * EPS) if exactly else (25.0 * EPS * rough, 2.0 * EPS)
+    turned = 2.0 * EPS * pi
+    precession, spin = pi * (turns_down + turns_up) + total, pi * (turns_down - turns_up) + difference
+    error_precession = error + rounding * abs(total) + turned * abs(turns_down + turns_up)
+    error_spin = error + rounding * abs(difference) + turned * abs(turns_down - turns_up)
+    rest = 0.5 * (0.5 * work[ABOVE + i] - work[SERIES + i])
+    up, down = minus * (pi * turns_up + up), plus * (pi * turns_down + down)
+    action = (period * (work[LEVEL + i] + rest) - up - down) / (2.0 * pi)
+    rough = period * (abs(work[LEVEL + i]) + abs(rest))
+    rough += abs(minus) * (pi + size_up) + abs(plus) * (pi + size_down)
+    error_action = 25.0 * EPS * rough / (2.0 * pi)
+    small = (error_action > 1e-14 * abs(action)) & (work[ACTION + i] > 0.0)
+    action = work[ACTION + i] if small else action
+    blur = (work[BAR_V + i] + work[BAR_W + i]) / width
+    error_action = (65.0 * EPS + 2.5 * blur) * action if small else error_action
+    period *= size
+    error_period = 15.0 * EPS * period
+    turned = drift * period
+    told[i], told[TILE + i], told[2 * TILE + i] = work[LOW + i], work[HIGH + i], period
+    told[3 * TILE + i], told[4 * TILE + i], told[5 * TILE + i] = precession, spin + turned, action
+    told[6 * TILE + i] = work[BAR_W + i] + EPS * abs(work[LOW + i])
+    told[7 * TILE + i] = work[BAR_V + i] + EPS * abs(work[HIGH + i])
+    told[8 * TILE + i], told[9 * TILE + i], told[11 * TILE + i] = error_period, error_precession, error_action
+    told[10 * TILE + i] = error_spin + 23.0 * EPS * abs(turned) + EPS * abs(spin + turned)
+    work[GOOD + i] = 0.0 if not sure else 2.0 if cancelled & (not fine) else 1.0
+
+
+@inline
+def add_node(work, cosine, i):
+    """A node of (S15)."""
+    up, down, width = 0.5 * (1.0 + cosine), 0.5 * (1.0 - cosine), work[WIDTH + i]
+    q = work[Q_LOW + i] * down + work[Q_HIGH + i] * up - work[K + i] * width * width * up * down
+    rest = (work[V_LOW + i] * down + work[V_HIGH + i] * up) * (work[W_LOW + i] * down + work[W_HIGH + i] * up)
+    work[ACTION + i] += up * down * sqrt(q) / rest
+
+
+@inline
+def judge(work, i):
+    """The action, or 0 where singularities are too near for so few nodes."""
+    k, width, total = work[K + i], work[WIDTH + i], work[SUM + i]
+    ratio = 0.25 * work[BEND + i] / k
+    beyond, beside = abs(sqrt(abs(ratio)) - abs(total)), sqrt(total * total + abs(ratio))
+    far = 2.0 if k == 0.0 else beyond if ratio < 0.0 else beside
+    known = (min(work[V_HIGH + i], work[W_LOW + i]) >= 0.5 * width) & (far >= 1.1 * width)
+    work[ACTION + i] = width * width * work[ACTION + i] / NODES if known else 0.0
+
+
+@kernel
+def small_actions(work):
+    """Fill the row ACTION by Gauss-Chebyshev quadrature, see methods/agm.py."""
+    for j in range(NODES):
+        for i in range(TILE):
+            add_node(work, COSINES[j], i)
+    for i in range(TILE):
+        judge(work, i)
+
+
+@kernel
+def approach(work, steps):
+    """From the polynomial to the turning points, in float64."""
+    for i in range(TILE):
+        work[V_HIGH + i], work[W_LOW + i], work[FINE + i], work[ACTION + i] = 0.0, 0.0, 0.0, 0.0
+        work[V_HIGH + TILE + i], work[W_LOW + TILE + i] = 0.0, 0.0
+    for _ in range(steps):
+        for i in range(TILE):
+            step(work, i)
+    for i in range(TILE):
+        choose(work, i)
+
+
+@kernel
+def approach_slowly(work, steps):
+    """As `approach`, where Laguerre's method has gone astray or would have to go on for long."""
+    for i in range(TILE):
+        for row, top in ((UP, 1.0 - work[U + i]), (DOWN, 1.0 + work[U + i])):
+            work[row + i], work[row + TILE + i] = 0.0, 0.0
+            work[row + 2 * TILE + i] = top if 0.0 <= top <= 2.0 else 2.0
+    for _ in range(steps):
+        for i in range(TILE):
+            search(work, i)
+    for i in range(TILE):
+        work[V_HIGH + i], work[W_LOW + i], work[FINE + i], work[ACTION + i] = work[UP + i], work[DOWN + i], 0.0, 0.0
+        work[V_HIGH + TILE + i], work[W_LOW + TILE + i] = 0.0, 0.0
+        choose(work, i)
+    for i in range(TILE):
+        narrow(work, i)
+
+
+@kernel
+def wells(work, steps):
+    """To the wells, in double-double."""
+    for _ in range(steps):
+        for i in range(TILE):
+            polish(work, i)
+    for i in range(TILE):
+        settle(work, i)
+
+
+@kernel
+def means(work, number):
+    for i in range(TILE):
+        prepare(work, i)
+    for _ in range(number):
+        for i in range(TILE):
+            take_mean(work, i)
