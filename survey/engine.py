@@ -285,7 +285,7 @@ def extras(workflow, once, progress=None):
     if workflow.refine:
         from survey import refine
 
-        further.append(refine.find(workflow, _each, getattr(progress, "refining", None)))
+        further.append(refine.find(workflow, dispatch.on_threads, once, getattr(progress, "refining", None)))
     return further
 
 
@@ -415,10 +415,3 @@ def fingerprint(workflow):
         "kernels": jit.SOURCE_HASH,
         "scene_hash": getattr(workflow.scene, "HASH", ""),
     }
-
-
-def _each(task, items):
-    """[task(item) for item in items], on the threads of this machine."""
-    results = [None] * len(items)
-    dispatch.on_threads(lambda at: results.__setitem__(at, task(items[at])), range(len(items)))
-    return results

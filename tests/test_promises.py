@@ -135,6 +135,59 @@ def test_a_killed_worker_is_replaced(folder, unbroken):
     same(folder, unbroken)
 
 
+CELLS = """
+title = "Cells to be killed"
+scene = "mathieu"
+[axes]
+a = { start = 0.5, stop = 800.0, num = 5 }
+q = { start = 0.1, stop = 200.0, num = 5 }
+[output]
+path = "cells.nc"
+variables = ["verdict"]
+[refine]
+width = 0.001
+"""
+# the program with many small parts of cells, telling which of them it works out
+PARTS = """
+import os
+from survey import store
+from survey.measures import hill_cells
+hill_cells.BATCH = 1
+once = store.Blocks.once
+def told(kept, name, make):
+    def make_and_tell():
+        os.write(1, name.encode() + b" ")
+        return make()
+    return once(kept, name, make_and_tell)
+store.Blocks.once = told
+from survey.cli import main
+main()
+"""
+
+
+def test_cells_go_on_where_a_kill_left_them(tmp_path):
+    (tmp_path / "cells.toml").write_text(CELLS)
+    command = [sys.executable, "-c", PARTS, "run", "cells.toml"]
+    keywords = {"cwd": tmp_path, "text": True, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    whole = subprocess.run([*command, "-o", "whole.nc"], **keywords, timeout=120)
+    assert whole.returncode == 0 and "100.00% of the map settled" in whole.stderr, whole.stderr
+    parts, known = whole.stdout.split(), set()
+    for share in (0.3, 0.7):
+        running = subprocess.Popen(command, **keywords)
+        wait_for(lambda: len(_parts_of_cells(tmp_path)) > share * len(parts))  # noqa: B023
+        running.kill()
+        assert not known & set(running.communicate()[0].split())
+        known = _parts_of_cells(tmp_path)
+    done = subprocess.run(command, **keywords, timeout=120)
+    assert done.returncode == 0 and sorted([*known, *done.stdout.split()]) == sorted(parts), done.stderr
+    assert store.check(tmp_path / "cells.nc") == []
+    xr.testing.assert_equal(*(xr.load_dataset(tmp_path / name).drop_attrs() for name in ("whole.nc", "cells.nc")))
+
+
+def _parts_of_cells(folder):
+    return {file.stem for file in (folder / "cells.nc.blocks").glob("cells-*.extra")}
+
+
 @pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143)])
 def test_workers_stop_promptly_with_the_run(folder, name, code):
     heeding = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731  (a background job ignores it)
