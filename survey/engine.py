@@ -120,7 +120,7 @@ class Solved(NamedTuple):
     number: int
     process: str
     compiling: float
-    seconds: float
+    seconds: float | None
     content: bytes | None = None
 
 
@@ -150,7 +150,7 @@ class Job:
         arrays = {name: np.full(shape + extra, fill, kind) for name, (kind, fill, extra) in table.items()}
         arrays["status"][...] = status.WORKER_DIED
         self.kept.save(number, arrays)
-        return Solved(number, "", 0.0, 0.0)
+        return Solved(number, "", 0.0, None)
 
 
 def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
@@ -231,18 +231,23 @@ class Remaining:
         self.open = np.ones(len(blocks), bool)
         self.open[list(reused)] = False
         self.nearest, self.cost = np.full(len(blocks), np.inf), np.zeros(len(blocks))
-        self.began, self.worked = time.perf_counter(), 0.0
+        self.began, self.worked = np.inf, 0.0
 
     def took(self, number, seconds):
-        """Block `number` took so many seconds of one worker."""
+        """Block `number` took so many seconds of one worker, what it compiled left out; None: its worker died."""
         self.open[number] = False
+        if seconds is None:
+            return
+        self.began = min(self.began, time.perf_counter() - seconds)
         self.worked += seconds
         distance = ((self.places - self.places[number]) ** 2).sum(axis=1)
         nearer = distance < self.nearest
         self.nearest[nearer], self.cost[nearer] = distance[nearer], seconds / self.points[number]
 
     def __call__(self):
-        workers = max(self.worked / (time.perf_counter() - self.began), 1e-9)  # as many as have been at work
+        if not self.worked:
+            return 0.0
+        workers = self.worked / (time.perf_counter() - self.began)  # as many as have been at work
         return float((self.cost * self.points)[self.open].sum() / workers)
 
 
