@@ -49,6 +49,27 @@ def find(workflow, each, once=lambda name, make: make(), tell=None):
     return _describe(workflow, found, points)
 
 
+def plan(workflow, cost):
+    """(what is known before: how many cells there are at most, and on most maps; seconds of one thread, roughly).
+
+    `cost` is the scene's figure for a point, in seconds.
+    """
+    panels = _panels(workflow)
+    most = min(sum(1 << x.depth + y.depth for x, y in panels), hill_cells.MOST)
+    # measured: some twenty curves' widths of cells; along a value that a parameter excludes, each cell is solved
+    usual = min(sum(20 << max(x.depth, y.depth) for x, y in panels), most)
+    blocks = sum(16 + 2 * ((1 << y.depth) * _cut(workflow, 0, x) + (1 << x.depth) * _cut(workflow, 1, y))
+                 for x, y in panels)  # fmt: skip
+    seconds = 3e-6 * usual + blocks * hill_cells.PLACES.size**2 * 20 * cost
+    return {"most": most, "bytes_at_most": 33 * most, "usually": usual}, seconds
+
+
+def _cut(workflow, at, axis):
+    """How many ends of a panel's side are values that its parameter excludes."""
+    name = list(workflow.refine)[at]
+    return len({axis.low, axis.high} & set(next(p.excluded for p in workflow.scene.PARAMETERS if p.name == name)))
+
+
 def _in_parts(name, each, once, tell):
     """`each` of `hill_cells.find`, called once a level: what a part finds is kept as soon as it is there."""
     levels = count()
