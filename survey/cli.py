@@ -110,8 +110,9 @@ def verify(path, points, seed):
         complain(f"{path}: {complaint}", 3)
     if not again["complaints"]:
         silent = f", which do not answer at {again['silent']} others" if again["silent"] else ""
+        beside = "".join(f", {again[what]} {what}" for what in ("edges", "cells") if again[what])
         out.print(
-            f"{path}: sound; {again['points']} points solved again by {again['method']}{silent}, "
+            f"{path}: sound; {again['points']} points{beside} solved again by {again['method']}{silent}, "
             "all within the error bars", markup=False,
         )  # fmt: skip
     return 3 if again["complaints"] else 0

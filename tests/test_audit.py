@@ -58,3 +58,20 @@ def _plant(ds, name):
     codes = ds[name].attrs.get("flag_values", np.array([values[where], values[where] + 1]))
     values[where] = codes[(codes != values[where]) & (codes >= 0)][0]
     return True
+
+
+def test_edges_and_cells_are_solved_again(tmp_path):
+    axes = {"a": {"start": 0.5, "stop": 9.5, "num": 5}, "q": {"start": 0.5, "stop": 5.0, "num": 4}}
+    workflow = {"scene": "mathieu", "axes": axes, "output": {"variables": ["verdict"]}}
+    ds = survey.run(workflow | {"boundaries": {"axis": "a"}, "refine": {"width": 0.05}}, output=tmp_path / "map.nc")
+    sound = audit(ds, 30)
+    assert sound["complaints"] == [] and sound["cells"] == 30 and sound["edges"] == ds.sizes["edge"] > 10
+    planted = ds.copy(deep=True)
+    planted.edge_position[5] += 1e-7
+    (line,) = audit(planted, 1000)["complaints"]
+    assert line.startswith("edge_position at q = ") and "has no zero within its error bar, by dop853" in line
+    planted = ds.copy(deep=True)
+    largest = ((ds.cell_a_high - ds.cell_a_low) * (ds.cell_verdict != -1)).values.argmax()
+    planted.cell_verdict[largest] = 1 - ds.cell_verdict[largest]
+    (line,) = audit(planted, 100_000)["complaints"]
+    assert line.startswith("cell_verdict at a = ") and " not " in line

@@ -73,6 +73,6 @@ def test_the_bits_are_the_same_on_the_same_machine(both):
 
 
 def _arrays(file):
-    """The variables' values, but where curves are stepped along, and which cells there are: not within bars the same."""
+    """The variables, but those of curves and cells, whose places are steps and halvings and have no bars."""
     beside = ("curve_", "cell_", "fold_")
     return {name: np.asarray(v[:]) for name, v in file.variables.items() if not name.startswith(beside)}

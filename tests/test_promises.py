@@ -11,7 +11,7 @@ Where each promise is tested, here if no file is named; (slow): its long form, (
  6 drift is refused      test_drift_and_a_second_writer_are_refused; test_store (beside)
  7 one writer            test_drift_and_a_second_writer_are_refused; test_store: a killed holder
  8 damage is found       test_a_flipped_bit_of_a_block_is_mended; test_cli: test_verify_finds_...; test_store: every
-                         bit of a block (beside); test_audit: a wrong value under sound checksums (beside)
+                         bit of a block (beside); test_audit: wrong values under sound sums (beside)
  9 bounded memory        test_memory_is_bounded_by_blocks_not_by_the_map: 10^6 points, 10^8 (slow)
 10 prompt stop           test_workers_stop_promptly_with_the_run; test_cli: test_an_interrupted_run_can_be_resumed;
                          test_cluster: test_the_batch_script_stops_before_the_walltime_and_is_queued_again
