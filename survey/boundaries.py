@@ -1,7 +1,11 @@
-"""The edges of the tongues of a map, row by row and as curves: arrays -> variables of the dataset.
+"""The boundaries on a map: the edges of tongues, row by row and as curves, or curves in closed form -> variables.
 
 Contiguous ragged arrays (CF 9.3.3): `edge_count` edges of each row lie one after another along `edge`, and
 `curve_count` points of each curve along `curve_point`.
+
+A scene has boundaries where its family has a measure of curves, `measures/FAMILY_curves.py`. One that knows them in
+closed form has `closed`, which gives them, with `refusal`, CLASSES, TITLE and ALONG (see `measures.nutation_curves`).
+The edges of all others are sought as the zeros of Hill's factors.
 """
 
 from math import prod
@@ -9,6 +13,8 @@ from math import prod
 import numpy as np
 import xarray as xr
 
+from survey import measures, modules
+from survey.dataset import meaning
 from survey.grid import logarithmic
 from survey.measures import hill_curves, hill_edges, hill_folds, hill_look
 from survey.scene import Request
@@ -19,12 +25,21 @@ RTOL = 1e-13
 MARGIN = 1e-3  # of an axis: how near curves come to a value that is no parameter, such as k = 1
 
 
+def measure_of(scene):
+    """The measure of curves of the scene's family; None where there is none."""
+    name = f"{scene.FAMILY}_curves"
+    return modules.load(measures, name, "measure") if name in modules.names(measures) else None
+
+
 def find(workflow, each=None, once=lambda name, make: make()):
-    """The dataset of the workflow's edges, and of their curves where there are two axes.
+    """The dataset of the workflow's curves; of Hill's edges, and of their curves where there are two axes.
 
     `each(task, numbers, what)` calls the task for every number, in any order, on threads if it likes;
     `once(name, make)` gives the arrays of `make()`, or those that an earlier run has kept under this name.
     """
+    measure = measure_of(workflow.scene)
+    if hasattr(measure, "closed"):
+        return xr.Dataset(_closed(workflow, measure), attrs={"boundaries": workflow.boundaries})
     each = each or hill_curves.in_turn
     grid, axis = workflow.grid, workflow.boundaries
     other = [dim for dim in grid.sizes if dim != axis]
@@ -40,10 +55,58 @@ def plan(workflow, cost):
 
     `cost` is the scene's figure for a point, in seconds.
     """
+    measure = measure_of(workflow.scene)
+    if hasattr(measure, "closed"):  # measured: about a tenth of a second each
+        size = 8 * (1 + len(workflow.grid.sizes) + 2 * len(measure.ALONG))
+        return {"bytes_per_curve_point": size}, 0.1 * prod(list(workflow.grid.sizes.values())[2:])
     sizes = [size for dim, size in workflow.grid.sizes.items() if dim != workflow.boundaries]
     # measured: ten to twenty edges a row; half a thousand points of curves
     seconds = prod(sizes) * (2e-3 + 250 * cost) + (0.2 + 1e4 * cost if sizes else 0.0)
     return {"rows": prod(sizes), "bytes_per_edge": 25, "bytes_per_curve_point": 24 * len(sizes)}, seconds
+
+
+def _closed(workflow, measure):
+    """The variables of curves in closed form: on one map, or on each of those that a third axis makes a stack of."""
+    grid = workflow.grid
+    names, fixed = (
+        list(grid.sizes),
+        {name: float(values) for name, (dims, values) in grid.parameters.items() if not dims},
+    )
+    square, third = _square(workflow, *names[:2]), names[2:]
+    planes = [{third[0]: float(value)} for value in grid.parameters[third[0]][1]] if third else [{}]
+    found = [measure.closed(square, names[:2], fixed | plane, workflow.request.options) for plane in planes]
+    count, kind, flat, error = (
+        np.concatenate([getattr(curves, name) for curves in found]) for name in ("count", "kind", "places", "error")
+    )
+    points = [curves.count.sum() for curves in found]
+    places = np.column_stack([flat, *(np.repeat([plane[name] for plane in planes], points) for name in third)])
+    kind = _flags(measure.TITLE, measure.CLASSES, kind)
+    variables = _of_curves(workflow, names, count, kind, places, error, "on the curve")
+    for output in measure.ALONG:
+        values, errors = (np.concatenate([curves.along[output.name][i] for curves in found]) for i in (0, 1))
+        told = meaning(output) | {"ancillary_variables": f"curve_{output.name}_error"}
+        variables[f"curve_{output.name}"] = ("curve_point", values, told)
+        variables[f"curve_{output.name}_error"] = ("curve_point", errors, {
+            "long_name": f"error bound of curve_{output.name}", "units": output.units})  # fmt: skip
+    return variables
+
+
+def _of_curves(workflow, names, count, kind, places, error, where):
+    """The variables that all curves have."""
+    variables = {
+        "curve_count": ("curve", count.astype(np.int32), {
+            "long_name": "number of points of the curve", "units": "1", "sample_dimension": "curve_point"}),
+        "curve_class": ("curve", *kind),
+        "curve_position_error": ("curve_point", error, {
+            "long_name": "error bound of a point's distance from the curve", "units": "1",
+            "comment": "along the normal, on the map's border along that; unit: the range of either axis, "
+                       "of its logarithm if the axis is logarithmic"}),
+    }  # fmt: skip
+    for i, name in enumerate(names):
+        parameter, named = _named(workflow, name)
+        variables[f"curve_{name}"] = ("curve_point", places[:, i], named | {
+            "long_name": f"{parameter.long_name} {where}", "ancillary_variables": "curve_position_error"})  # fmt: skip
+    return variables
 
 
 def _edges(workflow, axis, rows, each, once):
@@ -117,28 +180,20 @@ def _curves(workflow, across, axis, edges, each):
     curves = hill_curves.trace(solve, square, seeds, each)
     folds = hill_folds.find(solve, square, curves)
     names, places = (across, axis), (square.places(curves.x), square.places(folds.x))
-    variables = {
+    where = "on the edge of a tongue"
+    variables = _of_curves(workflow, names, curves.count, _class(curves.kind), places[0], curves.error, where)
+    variables |= {
         "edge_curve": ("edge", curves.of_seed[: edges.row.size].astype(np.int32), {
             "long_name": "curve through the edge, counted from 0", "units": "1"}),
-        "curve_count": ("curve", curves.count.astype(np.int32), {
-            "long_name": "number of points of the curve", "units": "1", "sample_dimension": "curve_point"}),
-        "curve_class": ("curve", *_class(curves.kind)),
         "curve_index": ("curve", *_index(curves.index)),
         "curve_complete": ("curve", curves.complete.astype(np.int8),
                            _yes_or_no("is the curve closed, or does it end at the map's border", "lost complete")),
-        "curve_position_error": ("curve_point", curves.error, {
-            "long_name": "error bound of a point's distance from the curve", "units": "1",
-            "comment": "along the normal, on the map's border along that; unit: the range of either axis, "
-                       "of its logarithm if the axis is logarithmic"}),
         "fold_curve": ("fold", folds.curve.astype(np.int32), {
             "long_name": f"curve that turns back in {across}, counted from 0", "units": "1",
             "instance_dimension": "curve"}),
     }  # fmt: skip
     for i, name in enumerate(names):
         parameter, named = _named(workflow, name)
-        variables[f"curve_{name}"] = ("curve_point", places[0][:, i], named | {
-            "long_name": f"{parameter.long_name} on the edge of a tongue",
-            "ancillary_variables": "curve_position_error"})  # fmt: skip
         variables[f"fold_{name}"] = ("fold", places[1][:, i], named | {
             "long_name": f"{parameter.long_name} at the fold of an edge",
             "ancillary_variables": f"fold_{name}_error"})  # fmt: skip
@@ -197,9 +252,12 @@ def _named(workflow, name):
 
 
 def _class(kind):
-    codes = np.array(list(hill_edges.CLASSES.values()), np.int8)
-    flags = {"flag_values": codes, "flag_meanings": " ".join(hill_edges.CLASSES)}
-    return kind.astype(np.int8), flags | {"long_name": "kind of the periodic solution at the edge", "units": "1"}
+    return _flags("kind of the periodic solution at the edge", hill_edges.CLASSES, kind)
+
+
+def _flags(title, classes, kind):
+    codes = {"flag_values": np.array(list(classes.values()), np.int8), "flag_meanings": " ".join(classes)}
+    return kind.astype(np.int8), codes | {"long_name": title, "units": "1"}
 
 
 def _index(index):

@@ -72,7 +72,7 @@ def variables(grid, scene, request):
     dims = tuple(grid.sizes)
     table = {}
     for output in outputs_of(scene, request):
-        table[output.name] = (dims + output.dims, _attributes(output))
+        table[output.name] = (dims + output.dims, meaning(output))
         if output.dtype.kind == "f":
             bar = {"long_name": f"error bound of {output.name}", "units": output.units}
             bar |= {"coverage_content_type": "qualityInformation", "symbol": rf"\delta {output.symbol or output.name}"}
@@ -241,7 +241,8 @@ def _meaning(parameter):
     }
 
 
-def _attributes(output):
+def meaning(output):
+    """The attributes of an Output."""
     attributes = {"long_name": output.long_name, "coverage_content_type": "modelResult"}
     attributes |= {"units": output.units, "symbol": output.symbol or output.name}
     if output.flags is not None:

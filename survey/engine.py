@@ -147,7 +147,7 @@ class Job:
         content = self.kept.keep(number, solve_block(self.scene, self.request, self.grid, self.blocks[number]))
         compiled = compile_seconds()
         seconds = time.perf_counter() - began - (compiled - before)
-        return Solved(number, f"{socket.gethostname()} {os.getpid()}", compiled, max(seconds, 0.0), content)
+        return Solved(number, _process(), compiled, max(seconds, 0.0), content)
 
     def died(self, number):
         """Keep block `number` with the status of points whose worker died again and again."""
@@ -201,8 +201,8 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
             else:
                 dispatch.on_threads(job, todo, finished)
             computed = time.perf_counter()
-            if f"{socket.gethostname()} {os.getpid()}" in compiled:
-                compiled[f"{socket.gethostname()} {os.getpid()}"] -= before
+            if _process() in compiled:
+                compiled[_process()] -= before
             compiling = max(compiled.values(), default=0.0)  # processes compile side by side
             further = extras(workflow, kept.once, progress)
             beside = time.perf_counter() - computed
@@ -255,6 +255,11 @@ class Remaining:
             return 0.0
         workers = self.worked / (time.perf_counter() - self.began)  # as many as have been at work
         return float((self.cost * self.points)[self.open].sum() / workers)
+
+
+def _process():
+    """What names this process among those of all hosts."""
+    return f"{socket.gethostname()} {os.getpid()}"
 
 
 def _code():

@@ -12,6 +12,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from survey import modules, status
@@ -25,10 +26,21 @@ COLOURS = ("#D55E00", "#A6D8F5", "#E69F00", "#F0E442", "#009E73", "#CC79A7", "#0
 UNDECIDED = "#000000"
 CELLS = 2000  # along an axis: more than a picture has pixels, and each costs a hundred bytes
 MARK_BELOW = 0.002  # a share of the map: rarer points are also marked with a ring, or nobody would see them
-# the edges of tongues by class (`measures.hill_edges`)
-EDGES = {
-    kind: {"color": "#000000" if kind % 2 == 0 else "#707070", "ls": "-" if kind > 1 else (0, (5, 2)), "lw": 0.8}
-    for kind in range(4)
+_EDGES = "edges: even dark, odd grey;\nperiodic solid, antiperiodic dashed"
+_RIM = withStroke(linewidth=2.0, foreground="#444444")
+_POINT = {"ls": "none", "mec": "#000000", "mew": 0.8}
+# boundaries by class: what the legend says, and how they are drawn
+CURVES = {
+    "even_periodic": (_EDGES, {"color": "#000000", "ls": "-", "lw": 0.8}),
+    "odd_periodic": (_EDGES, {"color": "#707070", "ls": "-", "lw": 0.8}),
+    "even_antiperiodic": (_EDGES, {"color": "#000000", "ls": (0, (5, 2)), "lw": 0.8}),
+    "odd_antiperiodic": (_EDGES, {"color": "#707070", "ls": (0, (5, 2)), "lw": 0.8}),
+    "pole_passage": ("pole passages", {"color": "#FFFFFF", "ls": (0, (4, 2)), "lw": 1.0, "path_effects": [_RIM]}),
+    "stable_precession": ("stable regular precessions", {"color": "#000000", "ls": "-", "lw": 1.2}),
+    "separatrix": ("separatrices", {"color": "#D55E00", "ls": "-", "lw": 1.4}),
+    "cusp": ("cusps", {"marker": "D", "ms": 5, "mfc": "#FFFFFF"} | _POINT),
+    "stable_upright": ("stable upright rotations", {"marker": "o", "ms": 5, "mfc": "#000000"} | _POINT),
+    "unstable_upright": ("unstable upright rotations", {"marker": "o", "ms": 6, "mfc": "#D55E00"} | _POINT),
 }
 
 
@@ -84,7 +96,7 @@ def _map(axes, ds, variable, state):
         handles = _marks(axes, x, y, failed, "failed") + _marks(axes, x, y, outside, "outside the domain")
         handles += [Patch(color="#dddddd", label="does not apply")] if shown.mask.any() else []
     if "curve_count" in ds:
-        handles += _curves(axes, ds, x, y)
+        handles += _curves(axes, _in_plane(ds, variable), x, y)
     if handles:
         _legend(axes, handles)
     for axis, coord in ((axes.xaxis, x), (axes.yaxis, y)):
@@ -93,16 +105,35 @@ def _map(axes, ds, variable, state):
             (axes.set_xscale if axis is axes.xaxis else axes.set_yscale)("log")
 
 
+def _in_plane(ds, variable):
+    """The curves of the plane that is drawn, where a third axis makes a stack of planes."""
+    deeper = [c for c in variable.coords.values() if c.ndim == 0 and c.name in ds.dims and f"curve_{c.name}" in ds]
+    if not deeper:
+        return ds
+    here = np.repeat(True, ds.sizes["curve_point"])
+    for coordinate in deeper:
+        here &= ds[f"curve_{coordinate.name}"].values == float(coordinate)
+    firsts = np.cumsum(ds.curve_count.values) - ds.curve_count.values
+    return ds.isel(curve_point=here, curve=here[firsts])
+
+
 def _curves(axes, ds, x, y):
-    """The edges of the tongues over the map, and their legend handle."""
-    ends = np.cumsum(ds.curve_count.values)
-    for last, number, kind in zip(ends, ds.curve_count.values, ds.curve_class.values, strict=True):
-        own = slice(last - number, last)
-        axes.plot(ds[f"curve_{x.name}"].values[own], ds[f"curve_{y.name}"].values[own], **EDGES[kind])
+    """The boundaries over the map, points above lines, and their legend handles."""
+    names = {code: name for name, code in _flags(ds.curve_class).items()}
+    kinds = np.array([list(CURVES).index(names[code]) for code in ds.curve_class.values], int)
+    ends, handles = np.cumsum(ds.curve_count.values), {}
+    for own in np.argsort(kinds, kind="stable"):
+        label, look = list(CURVES.values())[kinds[own]]
+        points = slice(ends[own] - int(ds.curve_count[own]), ends[own])
+        over = 2 if "marker" not in look else 3
+        axes.plot(
+            ds[f"curve_{x.name}"].values[points], ds[f"curve_{y.name}"].values[points], clip_on=over < 3, **look,
+            zorder=over,
+        )  # fmt: skip
+        handles.setdefault(label, Line2D([], [], label=label, **look))
     if "cell_verdict" not in ds:
         axes.set(xlim=_widened(x.values)[[0, -1]], ylim=_widened(y.values)[[0, -1]])
-    label = "edges: even dark, odd grey;\nperiodic solid, antiperiodic dashed"
-    return [Line2D([], [], label=label, **EDGES[2])] if ends.size else []
+    return list(handles.values())
 
 
 def _cells(axes, ds, x, y, failed):

@@ -61,7 +61,11 @@ class Counted:
         Counted.operations += 1
         return self
 
-    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = _count
+    def _times(self, other):
+        return self if isinstance(other, float) and other == 1.0 else self._count()  # the compiler drops it
+
+    __add__ = __radd__ = __sub__ = __rsub__ = __truediv__ = __rtruediv__ = _count
+    __mul__ = __rmul__ = _times
 
     def __abs__(self):
         return self

@@ -170,18 +170,37 @@ def _is_number(value):
 
 
 def _check_boundaries(scene, name, asked, given):
-    """The axis along which edges of tongues are sought, the last one by default; None if none are asked for."""
+    """The axis along which edges are sought, the last one by default; None if no boundaries are asked for."""
     if asked is None:
         return None
+    from survey.boundaries import measure_of
+
     axes = [key for key, values in given.items() if np.ndim(values)]
-    if scene.FAMILY != "hill":
-        raise BadInput(f"boundaries: the scene {name} has no tongues; leave the table out")
+    measure = measure_of(scene)
+    if measure is None:
+        raise BadInput(f"boundaries: of the scene {name} no boundary curves are known; leave the table out")
+    if hasattr(measure, "closed"):
+        return _check_closed(measure, name, asked, {key: given[key].size for key in axes})
     _check_even(scene, name, "boundaries")
     if not 1 <= len(axes) <= 2:
         raise BadInput(f"boundaries: they are drawn on one axis or two, and there are {len(axes)}; fix the others")
     if asked.axis is not None and asked.axis not in axes:
         raise BadInput(f"boundaries.axis: {modules.unknown('axis', asked.axis, axes)}")
     return asked.axis or axes[-1]
+
+
+def _check_closed(measure, name, asked, sizes):
+    """The last of the axes {name: number of values}; raises BadInput where the measure knows no curves on these."""
+    axes = list(sizes)
+    refusal = measure.refusal(axes)
+    if refusal:
+        raise BadInput(f"boundaries: of {name} {refusal}; change the axes, or leave the table out")
+    if asked.axis is not None:
+        raise BadInput(f"boundaries.axis: the curves of {name} are closed forms, no axis is searched; leave it out")
+    for key in axes[:2]:
+        if sizes[key] < 2:
+            raise BadInput(f"boundaries: the axis {key} has one value, and curves need a range; give two or more")
+    return axes[-1]
 
 
 def _check_even(scene, name, table):
@@ -286,14 +305,7 @@ def check_parameters(scene, name, options, given, table=""):
 
 def check_request(scene, options, method, rtol, variables, tables=("", "")):
     """The Request; raises BadInput for an unknown method or variable, or an rtol outside (0, 1)."""
-    serving = methods_of(scene, options)
-    if method not in serving and method in methods_of(scene):
-        given = ", ".join(f"{name} = {value}" for name, value in options.items())
-        raise BadInput(
-            f"{tables[0]}method: {method!r} does not serve {given} (allowed: {', '.join(['auto', *serving])})"
-        )
-    if method != "auto" and method not in serving:
-        raise BadInput(f"{tables[0]}method: {modules.unknown('method', method, ['auto', *serving])}")
+    _check_method(scene, options, method, tables[0])
     if isinstance(rtol, bool) or not isinstance(rtol, (int, float)) or not 0 < rtol < 1:
         raise BadInput(f"{tables[0]}rtol = {rtol!r}: it must lie between 0 and 1, such as 1e-10")
     outputs = [output.name for output in scene.OUTPUTS if exists(output, options)]
@@ -301,6 +313,19 @@ def check_request(scene, options, method, rtol, variables, tables=("", "")):
         if variable not in outputs:
             raise BadInput(f"{tables[1]}variables: {modules.unknown('variable', variable, outputs)}")
     return Request(options, method, float(rtol), frozenset(outputs if variables is None else variables))
+
+
+def _check_method(scene, options, method, table):
+    """Raises BadInput for a method that is unknown or does not serve these options."""
+    if method == "auto":
+        return  # the methods' modules need not be imported
+    serving = methods_of(scene, options)
+    if method in serving:
+        return
+    if method not in methods_of(scene):
+        raise BadInput(f"{table}method: {modules.unknown('method', method, ['auto', *serving])}")
+    given = ", ".join(f"{name} = {value}" for name, value in options.items())
+    raise BadInput(f"{table}method: {method!r} does not serve {given} (allowed: {', '.join(['auto', *serving])})")
 
 
 def methods_of(scene, options=None):

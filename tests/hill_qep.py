@@ -4,6 +4,8 @@ y = sum of a_j cos or sin(f_j u), z = g(u) + 2 rho w(u) + rho^2 with g, w by the
 classes (A0 + rho A1 + rho^2) a = 0, linearised to twice its size.
 """
 
+from functools import cache
+
 import numpy as np
 from mpmath import ellipfun, ellipk, mp
 from scipy.linalg import eigvals
@@ -36,12 +38,21 @@ def eigenvalues(period, w, g, kind, harmonics):
 def coefficients(body, k, number):
     """The period, and c_0, c_1, ... of w and of z at rho = 0, as series c_0 + 2 c_1 cos ..., by mpmath's cn, dn."""
     samples = 4 * number
+    period, w = motion(k, samples)
     with mp.workdps(20):
-        m, rotates = (mp.mpf(1) / k**2 if k > 1 else mp.mpf(k) ** 2), k > 1
-        period = 2 * ellipk(m) / k if rotates else 4 * ellipk(m)
-        scale = k if rotates else 1
-        w = [k * ellipfun("dn" if rotates else "cn")(scale * period * n / samples, m=m) for n in range(samples)]
         c = 1 - mp.mpf(k) ** 2 if body == "prolate" else -(mp.mpf(k) ** 2)
         z = [float(2 * v * v + c) for v in w]
         w, period = [float(v) for v in w], float(period)
     return period, *(np.fft.rfft(values).real[: 2 * number] / samples for values in (w, z))
+
+
+@cache
+def motion(k, samples):
+    """The period, and k cn or k dn at `samples` places in it: even about its middle."""
+    with mp.workdps(20):
+        m, rotates = (mp.mpf(1) / k**2 if k > 1 else mp.mpf(k) ** 2), k > 1
+        period = 2 * ellipk(m) / k if rotates else 4 * ellipk(m)
+        scale = k if rotates else 1
+        function = ellipfun("dn" if rotates else "cn")
+        half = [k * function(scale * period * n / samples, m=m) for n in range(samples // 2 + 1)]
+        return period, half + half[-2:0:-1]

@@ -125,7 +125,7 @@ def test_a_row_of_its_own(tmp_path):
         ({"boundaries": {"axis": "rhoo"}}, r"boundaries.axis: unknown axis 'rhoo'; did you mean 'rho'"),
         ({"boundaries": {"axes": "rho"}}, r"unknown key boundaries.axes; did you mean 'axis'"),
         ({"axes": {"k": 0.5, "rho": 1.0}}, r"boundaries: they are drawn on one axis or two"),
-        ({"scene": "gyrostat", "axes": {"w0": {"values": [1.0, 2.0]}}, "options": {}}, r"gyrostat has no tongues"),
+        ({"scene": "gyrostat", "axes": {"w0": {"values": [1.0, 2.0]}}, "options": {}}, r"gyrostat no boundary curves"),
     ],
 )
 def test_what_cannot_be_is_refused(changes, words):

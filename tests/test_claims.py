@@ -1,17 +1,10 @@
 """The pieces that test the source's printed formulas, at small size."""
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
+import satellite_claims as claims
 
 import survey
-
-PATH = Path(__file__).parent.parent / "workflows/satellite_claims.py"
-SPEC = importlib.util.spec_from_file_location("satellite_claims", PATH)
-claims = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(claims)
 
 
 @pytest.mark.parametrize("case", [claims.CASES[i] for i in (0, 3, 6, 7)])

@@ -1,18 +1,15 @@
 """The kept table of critical amplitudes: every edge within its error by multiprecision, all of them, to 12 digits."""
 
 import csv
-import importlib.util
 from pathlib import Path
 
 import numpy as np
 import pytest
+import satellite_critical_amplitudes as critical
 from hill_problems import REFERENCE, mp_factors
 from mpmath import mp, mpf
 
 ROOT = Path(__file__).parent.parent
-SPEC = importlib.util.spec_from_file_location("critical", ROOT / "workflows/satellite_critical_amplitudes.py")
-critical = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(critical)
 
 with (ROOT / "results/satellite_critical_amplitudes.csv").open() as file:
     ROWS = list(csv.DictReader(file))

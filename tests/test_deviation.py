@@ -1,15 +1,9 @@
 """The workflow that measures how deviations from the gyrostat's invariant set grow."""
 
-import importlib.util
-from pathlib import Path
-
+import gyrostat_deviation as workflow
 import numpy as np
 import pytest
 
-PATH = Path(__file__).parent.parent / "workflows/gyrostat_deviation.py"
-SPEC = importlib.util.spec_from_file_location("gyrostat_deviation", PATH)
-workflow = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(workflow)
 TIMES = np.linspace(0.0, 5.0, 26)
 LARGEST, *_ = workflow.BODIES.values()
 

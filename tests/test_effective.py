@@ -1,18 +1,11 @@
 """The page and picture of effective stability: its resonances, its ellipses, and what it says for few orders."""
 
-import importlib.util
-from pathlib import Path
-
+import libration_effective as workflow
 import libration_exact as exact
 import lie_twin
 import numpy as np
 import pytest
 from mpmath import mpf
-
-PATH = Path(__file__).parent.parent / "workflows" / "libration_effective.py"
-spec = importlib.util.spec_from_file_location(PATH.stem, PATH)
-workflow = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(workflow)
 
 
 def test_its_resonances_are_the_known_ones():

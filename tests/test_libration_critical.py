@@ -1,18 +1,15 @@
 """Critical mass ratios: the exact algebra against the published digits, the kept table, and a polynomial by hand."""
 
 import csv
-import importlib.util
 from fractions import Fraction
 from pathlib import Path
 
+import libration_critical as critical
 import libration_exact as exact
 import pytest
 from mpmath import mp, mpf
 
 ROOT = Path(__file__).parent.parent
-SPEC = importlib.util.spec_from_file_location("libration_critical", ROOT / "workflows/libration_critical.py")
-critical = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(critical)
 
 with (ROOT / "results/libration_critical_values.csv").open() as file:
     ROWS = list(csv.DictReader(file))

@@ -1,20 +1,17 @@
 """The kept curves of Danby's map: within their errors by multiprecision, and to 1e-12."""
 
 import csv
-import importlib.util
 import json
 import re
 from importlib import resources
 from itertools import pairwise
 from pathlib import Path
 
+import libration_elliptic_boundaries as boundaries
 import pytest
 from mpmath import mp, mpf
 
 ROOT = Path(__file__).parent.parent
-SPEC = importlib.util.spec_from_file_location("boundaries", ROOT / "workflows/libration_elliptic_boundaries.py")
-boundaries = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(boundaries)
 REFERENCE = json.loads(resources.files("survey.reference").joinpath("libration_elliptic.json").read_text())
 
 with (ROOT / "results/libration_elliptic_boundaries.csv").open() as file:

@@ -1,17 +1,12 @@
 """The workflow that maps where the gyrostat's methods fail, on coarse planes."""
 
-import importlib.util
 from dataclasses import replace
-from pathlib import Path
 
+import gyrostat_methods as workflow
 import mpmath as mp
 import numpy as np
 import pytest
 
-PATH = Path(__file__).parent.parent / "workflows/gyrostat_methods.py"
-SPEC = importlib.util.spec_from_file_location("gyrostat_methods", PATH)
-workflow = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(workflow)
 METHODS = ("closed", "taylor", "dop853", "auto")  # those that need no minutes to compile and run
 
 

@@ -6,12 +6,10 @@ The six equations (1)-(6) are solved in a rotated body frame, where no component
 """
 
 # ruff: noqa: E501  (the page's lines)
-import argparse
-import sys
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from script import parser, say
 
 import survey
 from survey.figures import COLOURS
@@ -133,10 +131,7 @@ for t <= 20:
 
 
 def main():
-    words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    words.add_argument("-o", "--output", default="results", metavar="DIR", help="where the page and its picture go")
-    folder = Path(words.parse_args().output)
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = parser(__doc__, "the page and its picture").parse_args().output
     say("growth of deviations")
     runs = {name: motion(*body(free)) for name, free in BODIES.items()}
     kept = {name: (off_reduced(states), growth(tangent)) for name, (states, tangent) in runs.items()}
@@ -199,10 +194,6 @@ def draw(kept, off, path):
         axes.grid(alpha=0.3)
     figure.savefig(path, dpi=150)
     plt.close(figure)
-
-
-def say(line):
-    print(f"gyrostat_deviation: {line}", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -8,14 +8,9 @@ survey/scenes/gyrostat.md.
 """
 
 # ruff: noqa: E501  (the rows of the page's tables)
-import argparse
-import random
-import sys
-from pathlib import Path
-
+from errata import number, write
 from mpmath import cos, cosh, diff, exp, log, matrix, mp, mpf, pi, sin, sinh, sqrt, tan
 
-DIGITS = 40
 DEFINED = ("A11", "A22", "A33", "A23", "A12", "A31", "B11", "B22", "B33", "B12", "B31", "B23", "C11", "C22", "C33",
            "C12", "C31", "C23", "l1", "l2", "l3", "s1", "s2", "s3")  # fmt: skip
 
@@ -45,11 +40,6 @@ class Body:
         """b12, b31, d, c23, s2, s3 over A11."""
         six = self.B12, self.B31, self.C22 - self.C33, self.C23, self.s2, self.s3
         return [x / self.A11 for x in six]
-
-
-def number(dice):
-    """A random number of size 0.3 to 1.3: none is 0 or 1, or a missing factor would hide."""
-    return dice.choice((-1, 1)) * (mpf(3) + 10 * mpf(dice.random())) / 10
 
 
 def cross(a, b):
@@ -708,52 +698,5 @@ citations were not checked.
 |---|---|---|
 {gaps}
 """
-TRIALS = 5
-
-
-def trials(function, seed=0):
-    """The values of `function` at TRIALS random parameters, in DIGITS digits."""
-    with mp.workdps(DIGITS):
-        return [function(random.Random(seed + i)) for i in range(TRIALS)]
-
-
-def erratum(function):
-    """(least residual as printed, worst residual corrected)."""
-    found = trials(function)
-    return float(min(a for a, _ in found)), float(max(b for _, b in found))
-
-
-def residual(function):
-    return float(max(trials(function)))
-
-
-def short(value):
-    return f"{value:.0e}" if value else "0"
-
-
-def main():
-    words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    words.add_argument("-o", "--output", default="results", metavar="DIR", help="where the page goes")
-    folder = Path(words.parse_args().output)
-    folder.mkdir(parents=True, exist_ok=True)
-    say("printed against corrected")
-    errata = [(place, a, b, *erratum(test)) for place, a, b, test in ERRATA]
-    say("what is right, and what is missing")
-    page = PAGE.format(
-        digits=DIGITS,
-        trials=TRIALS,
-        errata="\n".join(f"| {place} | {a} | {b} | {x:.1g} | {short(y)} |" for place, a, b, x, y in errata),
-        right="\n".join(f"| {place} | {what} | {short(residual(test))} |" for place, what, test in RIGHT),
-        gaps="\n".join(f"| {place} | {what} | {short(residual(test))} |" for place, what, test in GAPS),
-    )
-    path = folder / "gyrostat_errata.md"
-    path.write_text(page)
-    print(path)
-
-
-def say(line):
-    print(f"gyrostat_errata: {line}", file=sys.stderr)
-
-
 if __name__ == "__main__":
-    main()
+    write(__doc__, "gyrostat_errata", PAGE, {"errata": ERRATA, "right": RIGHT, "gaps": GAPS})

@@ -7,13 +7,10 @@ series of its own, solved twice with other orders and steps, and held against mp
 """
 
 # ruff: noqa: E501  (the page's lines)
-import argparse
 import json
 import math
-import sys
 from dataclasses import dataclass
 from importlib.resources import files
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import mpmath as mp
@@ -21,6 +18,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.colors import BoundaryNorm
 from matplotlib.patches import Patch
+from script import parser, say
 
 import survey
 from survey import methods, modules
@@ -464,12 +462,10 @@ RULE = """1. A closed form where one applies. With b = 0 it meets rtol at {close
 
 
 def main():
-    words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    words.add_argument("-o", "--output", default="results", metavar="DIR", help="where the page and its picture go")
+    words = parser(__doc__, "the page and its picture")
     words.add_argument("--share", type=float, default=1.0, help="of the points along each axis: below 1 coarser")
     given = words.parse_args()
-    folder = Path(given.output)
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = given.output
     say("planes")
     maps, true, judged = planes(given.share), {}, {}
     for name, plane in maps.items():
@@ -577,10 +573,6 @@ def panel(ax, j, norm):
         at = [np.arange(-1, size + 1) for size in (j.missed.shape[1], j.missed.shape[0])]
         ax.contourf(*at, wide, levels=[0.5, 1.5], colors="none", hatches=["////"])
     return shown
-
-
-def say(line):
-    print(f"gyrostat_methods: {line}", file=sys.stderr)
 
 
 if __name__ == "__main__":

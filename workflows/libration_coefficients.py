@@ -5,7 +5,6 @@
 Runs `libration_coefficients.toml` beside this file, and draws libration_coefficients.png and libration_verdict.png.
 """
 
-import argparse
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -13,6 +12,7 @@ import numpy as np
 from libration_critical import boundaries, resonances
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
+from script import parser
 
 import survey
 from survey.figures import COLOURS
@@ -113,10 +113,7 @@ def draw_verdict(ds, path):
 
 
 def main():
-    words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    words.add_argument("-o", "--output", default="results", metavar="DIR", help="where the map and its pictures go")
-    folder = Path(words.parse_args().output)
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = parser(__doc__, "the map and its pictures").parse_args().output
     ds = survey.run(SURVEY, output=folder / SURVEY.with_suffix(".nc").name)
     paths = [folder / f"libration_{name}.png" for name in ("coefficients", "verdict")]
     draw_coefficients(ds, paths[0])

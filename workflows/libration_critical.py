@@ -7,7 +7,6 @@ theorem counts the zeros, so none is missing; each lies between two rational num
 signs. Nothing is rounded before mu is printed. Equation numbers: survey/scenes/libration.md.
 """
 
-import argparse
 import csv
 from dataclasses import dataclass
 from decimal import Decimal, localcontext
@@ -15,9 +14,9 @@ from fractions import Fraction
 from functools import reduce
 from itertools import pairwise
 from math import gcd, lcm
-from pathlib import Path
 
 import numpy as np
+from script import parser
 
 import survey
 from survey.kernels.libration_forms import FORMS, LABELS
@@ -481,10 +480,7 @@ def page():
 
 
 def main():
-    words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    words.add_argument("-o", "--output", default="results", metavar="DIR", help="where the page and its table go")
-    folder = Path(words.parse_args().output)
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = parser(__doc__, "the page and its table").parse_args().output
     text, values = page()
     written, listed = folder / "libration_critical_values.md", folder / "libration_critical_values.csv"
     written.write_text(text)

@@ -5,12 +5,9 @@
 Definition and assumptions: `survey/measures/effective_stability.py`; series: `survey/methods/lie.py`.
 """
 
-import argparse
-import sys
-from pathlib import Path
-
 import matplotlib.pyplot as plt
 import numpy as np
+from script import parser, say
 
 from survey.figures import COLOURS
 from survey.kernels.lie_plan import plan
@@ -131,10 +128,7 @@ order {top}:
 
 
 def main():
-    words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    words.add_argument("-o", "--output", default="results", metavar="DIR", help="where the page and its picture go")
-    folder = Path(words.parse_args().output)
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = parser(__doc__, "the page and its picture").parse_args().output
     mu, places = MU_R[0] * (np.arange(NUMBER) + 0.5) / NUMBER, np.array(list(PLACES.values()))
     curves, at = {}, {}
     for order in ORDERS:
@@ -209,10 +203,6 @@ def draw(mu, curves, found, path):
         axes.legend(fontsize=8, frameon=False, loc="lower center", ncols=4)
     figure.savefig(path, dpi=150)
     plt.close(figure)
-
-
-def say(line):
-    print(f"libration_effective: {line}", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -6,14 +6,12 @@ On A and B a pair of multipliers meets at -1, on KC two pairs meet on the circle
 all four multipliers are -1: it is sought as the zero of A and t together (`survey/scenes/libration_elliptic.md`, 5).
 """
 
-import argparse
 import csv
-import sys
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
+from script import parser, say
 
 import survey
 from survey.kernels.traces import discriminant, product
@@ -161,13 +159,10 @@ def draw(points, end, path):
 
 
 def main():
-    words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    words.add_argument("-o", "--output", default="results", metavar="DIR", help="where the page, table and picture go")
-    folder = Path(words.parse_args().output)
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = parser(__doc__, "the page, table and picture").parse_args().output
     page, listed, picture = (folder / f"libration_elliptic_boundaries.{kind}" for kind in ("md", "csv", "png"))
     end, end_error = tip()
-    print("libration_elliptic_boundaries: the tip is found", file=sys.stderr)
+    say("the tip is found")
     points = curves(end[1])
     with listed.open("w", newline="") as file:
         out = csv.writer(file, lineterminator="\n")

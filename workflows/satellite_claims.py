@@ -7,9 +7,6 @@ printed ones are held against the rigid body itself: Euler's equations with dire
 """
 
 # ruff: noqa: E501  (the rows of the page's tables)
-import argparse
-import sys
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -18,6 +15,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 from scipy.integrate import solve_ivp
 from scipy.special import ellipe, ellipj, ellipk
+from script import parser, say
 
 import survey
 from survey.figures import COLOURS
@@ -348,10 +346,7 @@ Rotations against the orbit are another matter: the corrected criterion certifie
 
 
 def main():
-    words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    words.add_argument("-o", "--output", default="results", metavar="DIR", help="where the page and its map go")
-    folder = Path(words.parse_args().output)
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = parser(__doc__, "the page and its map").parse_args().output
     say("rigid body against equation (3)")
     rows = [
         f"| {body}, {k:g}, {rho:g} | {true:.4f} | {abs(true - known):.0e} | {printed:.4f} | {sign:.4f} |"
@@ -410,10 +405,6 @@ def draw(maps, turns, path):
 def hatch(axes, x, y, where, pattern):
     if where.any():
         axes.contourf(x, y, where.astype(float), levels=[0.5, 1.5], colors="none", hatches=[pattern])
-
-
-def say(line):
-    print(f"satellite_claims: {line}", file=sys.stderr)
 
 
 if __name__ == "__main__":

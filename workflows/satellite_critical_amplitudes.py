@@ -6,14 +6,12 @@ Both have rho = 1/sqrt(3), the least of any body. The edges are sought along x =
 and lose no digit: librations from rest to 2e-11 rad short of 90 degrees, rotations from k = 1000 to as near k = 1.
 """
 
-import argparse
 import csv
-import sys
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
+from script import parser, say
 
 import survey
 from survey.measures import hill_edges
@@ -213,14 +211,11 @@ def upward(error):
 
 
 def main():
-    words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    words.add_argument("-o", "--output", default="results", metavar="DIR", help="where the page and its table go")
-    folder = Path(words.parse_args().output)
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = parser(__doc__, "the page and its table").parse_args().output
     page, listed = folder / "satellite_critical_amplitudes.md", folder / "satellite_critical_amplitudes.csv"
     found = {}
     for case in CASES:
-        print(f"satellite_critical_amplitudes: {case.body}, {case.motion}", file=sys.stderr)
+        say(f"{case.body}, {case.motion}")
         found[case] = edges(case)
     with listed.open("w", newline="") as file:
         out = csv.DictWriter(file, COLUMNS, lineterminator="\n")

@@ -11,9 +11,12 @@ errors. Beside the product goes the matrix V of its error ellipse, V <- G V G' +
 largest local error of a column; |error| <= sqrt(n V_ii) after n steps, to first order (as in `kernels.lanes`).
 """
 
+from itertools import combinations_with_replacement
+
 import numpy as np
 
 from survey.kernels.jit import inline, splice
+from survey.kernels.unroll import largest, unroll
 
 TILE = 64
 VECTOR = 8
@@ -75,97 +78,56 @@ def copy(work, first, column, count):
         work[to + 8, i], work[to + 9, i] = work[first + 4, i], 0.0
 
 
-@inline
+@unroll
 def advance(work, i):
     """One step of lane i."""
-    # fmt: off
-    # forward F, backward B: columns 0, 1 start in X, 2, 3 in Y
-    f00, f10, f20, f30 = work[30, i], work[31, i], work[32, i], work[33, i]
-    b00, b10, b20, b30 = work[34, i], work[35, i], work[36, i], work[37, i]
-    t0, s0 = work[38, i], work[39, i]
-    f01, f11, f21, f31 = work[40, i], work[41, i], work[42, i], work[43, i]
-    b01, b11, b21, b31 = work[44, i], work[45, i], work[46, i], work[47, i]
-    t1, s1 = work[48, i], work[49, i]
-    f02, f12, f22, f32 = work[50, i], work[51, i], work[52, i], work[53, i]
-    b02, b12, b22, b32 = work[54, i], work[55, i], work[56, i], work[57, i]
-    t2, s2 = work[58, i], work[59, i]
-    f03, f13, f23, f33 = work[60, i], work[61, i], work[62, i], work[63, i]
-    b03, b13, b23, b33 = work[64, i], work[65, i], work[66, i], work[67, i]
-    t3, s3 = work[68, i], work[69, i]
-    # G = F B^-1, by rows; B^-1 = (b22, b32, -b02, -b12; b23, b33, -b03, -b13; -b20, -b30, b00, b10; -b21, ...)
-    g00, g01, g02, g03 = _row(f00, f01, f02, f03, b00, b10, b20, b30, b01, b11, b21, b31,
-                              b02, b12, b22, b32, b03, b13, b23, b33)
-    g10, g11, g12, g13 = _row(f10, f11, f12, f13, b00, b10, b20, b30, b01, b11, b21, b31,
-                              b02, b12, b22, b32, b03, b13, b23, b33)
-    g20, g21, g22, g23 = _row(f20, f21, f22, f23, b00, b10, b20, b30, b01, b11, b21, b31,
-                              b02, b12, b22, b32, b03, b13, b23, b33)
-    g30, g31, g32, g33 = _row(f30, f31, f32, f33, b00, b10, b20, b30, b01, b11, b21, b31,
-                              b02, b12, b22, b32, b03, b13, b23, b33)
+    # forward and backward by rows: their columns 0, 1 start in X, 2, 3 in Y
+    step = [[work[COLUMNS + COLUMN * c + place, i] for c in range(4)] for place in range(COLUMN)]
+    forward, backward, (forward_error, backward_error) = step[:4], step[4:8], step[8:]
+    g = [_by_inverse(row, backward) for row in forward]
     # |error of G|_ij <= y_j + x_i: through F, and through the inverse of B
-    y0 = t0 * abs(b22) + t1 * abs(b23) + t2 * abs(b20) + t3 * abs(b21)
-    y1 = t0 * abs(b32) + t1 * abs(b33) + t2 * abs(b30) + t3 * abs(b31)
-    y2 = t0 * abs(b02) + t1 * abs(b03) + t2 * abs(b00) + t3 * abs(b01)
-    y3 = t0 * abs(b12) + t1 * abs(b13) + t2 * abs(b10) + t3 * abs(b11)
-    x0 = s2 * abs(f00) + s3 * abs(f01) + s0 * abs(f02) + s1 * abs(f03)
-    x1 = s2 * abs(f10) + s3 * abs(f11) + s0 * abs(f12) + s1 * abs(f13)
-    x2 = s2 * abs(f20) + s3 * abs(f21) + s0 * abs(f22) + s1 * abs(f23)
-    x3 = s2 * abs(f30) + s3 * abs(f31) + s0 * abs(f32) + s1 * abs(f33)
-    # fmt: on
-    by_y, by_x, r0, r1, r2, r3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    y = [_dot(forward_error, _magnitudes(_exchanged(row))) for row in _exchanged(backward)]
+    x = [_dot(_exchanged(backward_error), _magnitudes(row)) for row in forward]
+    by_y = by_x = 0.0
+    rounding = [0.0, 0.0, 0.0, 0.0]
     for j in range(4):
-        a, b, c, d = work[j, i], work[4 + j, i], work[8 + j, i], work[12 + j, i]
-        work[j, i] = g00 * a + g01 * b + g02 * c + g03 * d
-        work[4 + j, i] = g10 * a + g11 * b + g12 * c + g13 * d
-        work[8 + j, i] = g20 * a + g21 * b + g22 * c + g23 * d
-        work[12 + j, i] = g30 * a + g31 * b + g32 * c + g33 * d
-        a, b, c, d = abs(a), abs(b), abs(c), abs(d)
-        by_y = max(by_y, y0 * a + y1 * b + y2 * c + y3 * d)
-        by_x = max(by_x, a + b + c + d)
-        r0 = max(r0, abs(g00) * a + abs(g01) * b + abs(g02) * c + abs(g03) * d)
-        r1 = max(r1, abs(g10) * a + abs(g11) * b + abs(g12) * c + abs(g13) * d)
-        r2 = max(r2, abs(g20) * a + abs(g21) * b + abs(g22) * c + abs(g23) * d)
-        r3 = max(r3, abs(g30) * a + abs(g31) * b + abs(g32) * c + abs(g33) * d)
-    x0, x1 = by_y + by_x * x0 + ROUNDING * r0, by_y + by_x * x1 + ROUNDING * r1
-    x2, x3 = by_y + by_x * x2 + ROUNDING * r2, by_y + by_x * x3 + ROUNDING * r3
-    work[SUM, i] += max(max(y0, y1), max(y2, y3))
-    v00, v01, v02, v03, v11 = work[16, i], work[17, i], work[18, i], work[19, i], work[20, i]
-    v12, v13, v22, v23, v33 = work[21, i], work[22, i], work[23, i], work[24, i], work[25, i]
-    a0, a1, a2, a3 = _times(g00, g01, g02, g03, v00, v01, v02, v03, v11, v12, v13, v22, v23, v33)
-    work[16, i] = a0 * g00 + a1 * g01 + a2 * g02 + a3 * g03 + x0 * x0
-    work[17, i] = a0 * g10 + a1 * g11 + a2 * g12 + a3 * g13
-    work[18, i] = a0 * g20 + a1 * g21 + a2 * g22 + a3 * g23
-    work[19, i] = a0 * g30 + a1 * g31 + a2 * g32 + a3 * g33
-    a0, a1, a2, a3 = _times(g10, g11, g12, g13, v00, v01, v02, v03, v11, v12, v13, v22, v23, v33)
-    work[20, i] = a0 * g10 + a1 * g11 + a2 * g12 + a3 * g13 + x1 * x1
-    work[21, i] = a0 * g20 + a1 * g21 + a2 * g22 + a3 * g23
-    work[22, i] = a0 * g30 + a1 * g31 + a2 * g32 + a3 * g33
-    a0, a1, a2, a3 = _times(g20, g21, g22, g23, v00, v01, v02, v03, v11, v12, v13, v22, v23, v33)
-    work[23, i] = a0 * g20 + a1 * g21 + a2 * g22 + a3 * g23 + x2 * x2
-    work[24, i] = a0 * g30 + a1 * g31 + a2 * g32 + a3 * g33
-    a0, a1, a2, a3 = _times(g30, g31, g32, g33, v00, v01, v02, v03, v11, v12, v13, v22, v23, v33)
-    work[25, i] = a0 * g30 + a1 * g31 + a2 * g32 + a3 * g33 + x3 * x3
+        column = [work[4 * k + j, i] for k in range(4)]
+        for k in range(4):
+            work[4 * k + j, i] = _dot(g[k], column)
+        sizes = _magnitudes(column)
+        by_y = largest(by_y, _dot(y, sizes))
+        by_x = largest(by_x, sum(sizes[1:], sizes[0]))
+        rounding = [largest(rounding[k], _dot(_magnitudes(g[k]), sizes)) for k in range(4)]
+    local = [by_y + by_x * x[k] + ROUNDING * rounding[k] for k in range(4)]
+    work[SUM, i] = work[SUM, i] + largest(largest(y[0], y[1]), largest(y[2], y[3]))
+    places = {(j, k): at for at, (j, k) in enumerate(combinations_with_replacement(range(4), 2), V)}
+    v = [[work[places[min(j, k), max(j, k)], i] for k in range(4)] for j in range(4)]
+    for j in range(4):
+        row = [_dot(g[j], v[k]) for k in range(4)]
+        for k in range(j, 4):
+            propagated = _dot(row, g[k])
+            work[places[j, k], i] = propagated + local[j] * local[j] if j == k else propagated
 
 
-@inline
-def _row(f0, f1, f2, f3, b00, b10, b20, b30, b01, b11, b21, b31, b02, b12, b22, b32, b03, b13, b23, b33):
-    """A row of F times the inverse of B."""
-    return (
-        (f0 * b22 + f1 * b23) - (f2 * b20 + f3 * b21),
-        (f0 * b32 + f1 * b33) - (f2 * b30 + f3 * b31),
-        (f2 * b00 + f3 * b01) - (f0 * b02 + f1 * b03),
-        (f2 * b10 + f3 * b11) - (f0 * b12 + f1 * b13),
-    )
+def _dot(a, b):
+    terms = [p * q for p, q in zip(a, b, strict=True)]
+    return sum(terms[1:], terms[0])
 
 
-@inline
-def _times(g0, g1, g2, g3, v00, v01, v02, v03, v11, v12, v13, v22, v23, v33):
-    """A row of G times the symmetric V."""
-    return (
-        g0 * v00 + g1 * v01 + g2 * v02 + g3 * v03,
-        g0 * v01 + g1 * v11 + g2 * v12 + g3 * v13,
-        g0 * v02 + g1 * v12 + g2 * v22 + g3 * v23,
-        g0 * v03 + g1 * v13 + g2 * v23 + g3 * v33,
-    )
+def _magnitudes(numbers):
+    return [abs(x) for x in numbers]
+
+
+def _exchanged(items):
+    """Those of Y before those of X."""
+    return [*items[2:], *items[:2]]
+
+
+def _by_inverse(f, b):
+    """A row of F times B^-1 = (b22, b32, -b02, -b12; b23, b33, -b03, -b13; -b20, -b30, b00, b10; -b21, ...)."""
+    through_x = [_dot(f[:2], row[2:]) for row in b]
+    through_y = [_dot(f[2:], row[:2]) for row in b]
+    return [through_x[k] - through_y[k] for k in (2, 3)] + [through_y[k] - through_x[k] for k in (0, 1)]
 
 
 @splice

@@ -9,6 +9,7 @@ Sources: DLMF 19.8(i) and 22.20(ii); R. Bulirsch, Numer. Math. 7 (1965) 78-90 (s
 from math import cos, pi, sin, sqrt
 
 from survey.kernels.jit import inline, splice
+from survey.kernels.unroll import unroll
 
 # Convergence is quadratic: a relative gap of 1e-8 leaves 1e-17, and k' = 1e-150 gets there in eleven steps.
 GAP = 1e-8
@@ -96,7 +97,7 @@ def jacobi_lanes(lanes, count, pairs, last):
 HUGE = 1e140
 
 
-@inline
+@unroll
 def _sine_cosine(x):
     """sin and cos in 0..pi/2, to 3e-16, as the double angles of their series to x^17 at x/2; branch-free."""
     half = 0.5 * x

@@ -9,6 +9,7 @@ from math import asinh, atan2, isfinite, pi, sqrt
 import numpy as np
 
 from survey.kernels.jit import inline, kernel
+from survey.kernels.unroll import unroll
 
 RESULTS = 10
 EPS = 2.3e-16
@@ -146,7 +147,7 @@ def measure(results, rule, wanted, rtol, whole, overflow, floats, verdict, late,
         late[i] = missed
 
 
-@inline
+@unroll
 def _product(a, b, ea, eb):
     """a b and its error bound, the rounding of the product included."""
     return a * b, ea * abs(b) + eb * abs(a) + ea * eb + EPS * abs(a * b)

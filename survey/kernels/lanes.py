@@ -14,6 +14,7 @@ the bounds are multiplied by exp(M), else a step so long that the method damps w
 import numpy as np
 
 from survey.kernels.jit import splice
+from survey.kernels.unroll import changes_sign, unroll
 
 TILE = 64
 VECTOR = 8
@@ -102,27 +103,26 @@ def _start(state, count):
         state[3, i] = 1.0
 
 
-@splice
+@unroll
 def _advance(matrix, h, state, i):
     """One step of lane i. State: y1, y1', y2, y2', S of column 1 (3), S of column 2 (3), zeros of y1, y2, M."""
-    y, v, s, t, w = column(matrix, state[0, i], state[1, i], state[4, i], state[5, i], state[6, i])
-    state[10, i] += 1.0 if (y < 0.0) != (state[0, i] < 0.0) else 0.0
-    state[0, i], state[1, i] = y, v
-    state[4, i], state[5, i], state[6, i] = s, t, w
-    y, v, s, t, w = column(matrix, state[2, i], state[3, i], state[7, i], state[8, i], state[9, i])
-    state[11, i] += 1.0 if (y < 0.0) != (state[2, i] < 0.0) else 0.0
-    state[2, i], state[3, i] = y, v
-    state[7, i], state[8, i], state[9, i] = s, t, w
-    state[12, i] += relative(matrix, h)
+    for at, ellipse, zeros in ((0, 4, 10), (2, 7, 11)):
+        before = state[at, i]
+        ends = column(matrix, before, state[at + 1, i], *(state[ellipse + k, i] for k in range(3)))
+        state[zeros, i] = state[zeros, i] + changes_sign(before, ends[0])
+        state[at, i], state[at + 1, i] = ends[:2]
+        for k in range(3):
+            state[ellipse + k, i] = ends[2 + k]
+    state[12, i] = state[12, i] + relative(matrix, h)
 
 
-@splice
+@unroll
 def relative(matrix, h):
     """The local error bounds of a step as one number without units."""
     return matrix[4] + (matrix[5] / h + matrix[6] * h)
 
 
-@splice
+@unroll
 def column(matrix, y, v, s, t, w):
     """(y, v) and its error ellipse (s, t; t, w) after the step with propagator and bounds `matrix`."""
     a, b, c, d, diagonal, upper, lower = matrix

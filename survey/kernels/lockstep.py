@@ -19,6 +19,7 @@ import numpy as np
 from survey.kernels.along import NO_CONVERGENCE, OK, OVERFLOW, STEP_LIMIT, TRUST, UNTOLD, bar, finite, start_sign
 from survey.kernels.flow import B12, B31, BOUND_DG, BOUND_F, BOUND_G, C23, S2, S3, TWO_PI, TWO_PI_LOW, UNIT, D, reduced
 from survey.kernels.jit import inline, kernel
+from survey.kernels.unroll import unroll
 
 ORDER = 16
 LOW = 6
@@ -75,28 +76,30 @@ def sine_cosine(x):
     return sine, cosine
 
 
-@inline
-def _expand(n, T, fixed):
-    """Coefficients n + 1 of S, C and w from those up to n: products in pairs, which share what they load."""
-    r = 1.0 / (n + 1)
-    for i in range(LANES):
-        cw = sw = cs = 0.0
-        for k in range((n + 1) // 2):
-            j = n - k
-            wk, wj = T[_W + k, i], T[_W + j, i]
-            sk, sj = T[_S + k, i], T[_S + j, i]
-            ck, cj = T[_C + k, i], T[_C + j, i]
-            cw += wk * cj + wj * ck
-            sw += wk * sj + wj * sk
-            cs += ck * sj + cj * sk
-        if n % 2 == 0:
-            w, s, c = T[_W + n // 2, i], T[_S + n // 2, i], T[_C + n // 2, i]
-            cw += w * c
-            sw += w * s
-            cs += c * s
-        g = fixed[_P2, i] * T[_C + n, i] - fixed[_P3, i] * T[_S + n, i] - fixed[_PD, i] * cs
-        T[_S + n + 1, i], T[_C + n + 1, i] = cw * r, -sw * r
-        T[_W + n + 1, i] = (fixed[_P12, i] * cw - fixed[_P31, i] * sw + g) * r
+def _orders(first, last):
+    """What adds the coefficients first + 1 to `last` of the series of S, C and w of a lane."""
+
+    @unroll
+    def expand(T, fixed, i):
+        p12, p31, p2, p3, pd = (fixed[row, i] for row in (_P12, _P31, _P2, _P3, _PD))
+        s, c, w = ([T[row + n, i] for n in range(first + 1)] for row in (_S, _C, _W))
+        for n in range(first, last):
+            r = 1.0 / (n + 1)
+            cw, sw, cs = _product(c, w, n), _product(s, w, n), _product(c, s, n)
+            g = p2 * c[n] - p3 * s[n] - pd * cs
+            s.append(cw * r)
+            c.append(-sw * r)
+            w.append((p12 * cw - p31 * sw + g) * r)
+            T[_S + n + 1, i], T[_C + n + 1, i], T[_W + n + 1, i] = s[n + 1], c[n + 1], w[n + 1]
+
+    return expand
+
+
+def _product(a, b, n):
+    """Coefficient n of the product of two series, from the outside."""
+    terms = [a[n - k] * b[k] + a[k] * b[n - k] for k in range((n + 1) // 2)]
+    terms += [a[n // 2] * b[n // 2]] if n % 2 == 0 else []
+    return sum(terms[1:], terms[0])
 
 
 @inline
@@ -112,72 +115,44 @@ def _begin(T, state):
         T[_S, i], T[_C, i], T[_W, i] = s, c, state[_V, i]
 
 
-@inline
-def _low(n, T, fixed):
-    """Coefficient n of f and g'."""
-    for i in range(LANES):
-        s, c = T[_S + n, i], T[_C + n, i]
-        squares = 0.0
-        for k in range((n + 1) // 2):
-            squares += 2.0 * (T[_S + k, i] * T[_S + n - k, i])
-        if n % 2 == 0:
-            squares += T[_S + n // 2, i] * T[_S + n // 2, i]
+_low_orders, _middle_orders, _high_orders = _orders(0, 7), _orders(7, 12), _orders(12, ORDER)
+
+
+@unroll
+def _vary(T, fixed, i):
+    """Series of f and g', and of the variations: u' = f u + z, z' = g' u; of lane i."""
+    p12, p31, p2, p3, pd = (fixed[row, i] for row in (_P12, _P31, _P2, _P3, _PD))
+    s, c = [T[_S + n, i] for n in range(LOW + 1)], [T[_C + n, i] for n in range(LOW + 1)]
+    f, dg = [], []
+    for n in range(LOW + 1):
+        squares = _product(s, s, n)
         double = 1.0 - 2.0 * squares if n == 0 else -2.0 * squares  # cos 2 psi
-        T[_F + n, i] = fixed[_P12, i] * c - fixed[_P31, i] * s
-        T[_DG + n, i] = -fixed[_PD, i] * double - fixed[_P2, i] * s - fixed[_P3, i] * c
-
-
-@inline
-def _vary(n, T):
-    """Coefficients n + 1 of the variations: u' = f u + z, z' = g' u."""
-    r = 1.0 / (n + 1)
-    for i in range(LANES):
-        f1 = g1 = f2 = g2 = 0.0
-        for k in range(n + 1):
-            u1, u2, f, g = T[_U1 + n - k, i], T[_U2 + n - k, i], T[_F + k, i], T[_DG + k, i]
-            f1 += f * u1
-            g1 += g * u1
-            f2 += f * u2
-            g2 += g * u2
-        T[_U1 + n + 1, i], T[_Z1 + n + 1, i] = (f1 + T[_Z1 + n, i]) * r, g1 * r
-        T[_U2 + n + 1, i], T[_Z2 + n + 1, i] = (f2 + T[_Z2 + n, i]) * r, g2 * r
+        f.append(p12 * c[n] - p31 * s[n])
+        dg.append(-pd * double - p2 * s[n] - p3 * c[n])
+        T[_F + n, i], T[_DG + n, i] = f[n], dg[n]
+    for first, u, z in ((_U1, [1.0], [-f[0]]), (_U2, [0.0], [1.0])):
+        for n in range(LOW):
+            r = 1.0 / (n + 1)
+            fu = sum((f[k] * u[n - k] for k in range(1, n + 1)), f[0] * u[n])
+            gu = sum((dg[k] * u[n - k] for k in range(1, n + 1)), dg[0] * u[n])
+            u.append((fu + z[n]) * r)
+            z.append(gu * r)
+        for n in range(LOW + 1):
+            T[first + n, i], T[first + LOW + 1 + n, i] = u[n], z[n]
 
 
 @inline
 def _series(T, state, fixed):
-    """All coefficients of all lanes; written out, so that LLVM knows the bounds of the inner loops and unrolls them."""
+    """All coefficients of all lanes; in several loops, since one has more numbers than there are registers."""
     _begin(T, state)
-    _expand(0, T, fixed)
-    _expand(1, T, fixed)
-    _expand(2, T, fixed)
-    _expand(3, T, fixed)
-    _expand(4, T, fixed)
-    _expand(5, T, fixed)
-    _expand(6, T, fixed)
-    _expand(7, T, fixed)
-    _expand(8, T, fixed)
-    _expand(9, T, fixed)
-    _expand(10, T, fixed)
-    _expand(11, T, fixed)
-    _expand(12, T, fixed)
-    _expand(13, T, fixed)
-    _expand(14, T, fixed)
-    _expand(15, T, fixed)
-    _low(0, T, fixed)
-    _low(1, T, fixed)
-    _low(2, T, fixed)
-    _low(3, T, fixed)
-    _low(4, T, fixed)
-    _low(5, T, fixed)
-    _low(6, T, fixed)
     for i in range(LANES):
-        T[_U1, i], T[_Z1, i], T[_U2, i], T[_Z2, i] = 1.0, -T[_F, i], 0.0, 1.0
-    _vary(0, T)
-    _vary(1, T)
-    _vary(2, T)
-    _vary(3, T)
-    _vary(4, T)
-    _vary(5, T)
+        _low_orders(T, fixed, i)
+    for i in range(LANES):
+        _middle_orders(T, fixed, i)
+    for i in range(LANES):
+        _high_orders(T, fixed, i)
+    for i in range(LANES):
+        _vary(T, fixed, i)
 
 
 @inline

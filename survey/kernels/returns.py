@@ -13,7 +13,7 @@ import numpy as np
 from survey.kernels.along import bar, carried, expand, local_error, time_at, time_of_turning
 from survey.kernels.equilibria import ANGLE, captured
 from survey.kernels.flow import BOUND_DG, BOUND_F, BOUND_G, TWO_PI, table, values
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import inline, kernel, splice
 
 ROTATION, LIBRATION = 0, 1
 NO_IMAGE, UNKNOWN = 0, -1  # classes without an image
@@ -117,7 +117,7 @@ def image(setting, begin, at, kind, p, eqs, count, place, x, tolerance, node):
         libration(setting, begin, at, p, eqs, count, place, x, tolerance, node)
 
 
-@inline
+@splice
 def fixed_points(image_of, kind, p, eqs, count, place, interval, xs, tolerance, cycles, found, edges):
     """All fixed points on the lattice xs (ascending), appended to `cycles`; returns their number.
 
@@ -161,7 +161,7 @@ def put(target, source):
         target[i] = source[i]
 
 
-@inline
+@splice
 def scan(image_of, kind, p, eqs, count, place, xs, tolerance, nodes):
     """Fill `nodes` with the images of xs, and more beside every border of a class; returns their number."""
     a, c, d = np.zeros(7), np.zeros(7), np.zeros(7)
@@ -203,7 +203,7 @@ def differ(a, b):
     return (a[CHANGE] > 0.0) != (b[CHANGE] > 0.0)
 
 
-@inline
+@splice
 def followed_down(image_of, kind, p, eqs, count, place, a, b, tolerance, m):
     """Follow a dip of |D| between a and b; True when D crosses 0 or touches it at the node m."""
     left, right = np.empty(7), np.empty(7)
@@ -230,7 +230,7 @@ def followed_down(image_of, kind, p, eqs, count, place, a, b, tolerance, m):
     return False
 
 
-@inline
+@splice
 def solved(image_of, kind, p, eqs, count, place, interval, a, b, tolerance, row):
     """The fixed point between a and b, where D changes sign: Newton's method kept inside a bracket."""
     low, high, m = a[X], b[X], np.zeros(7)

@@ -10,6 +10,7 @@ from survey.kernels import brun
 from survey.kernels import nutation as nu
 
 PERIOD, PRECESSION, SPIN, ACTION = range(4)
+TURN = 2.0 * np.pi
 TRUST = 0.03  # relative errors beyond are no errors of first order
 UNDECIDED = -1
 
@@ -64,6 +65,32 @@ def outputs(rows, out, inertia, drift):
     result = {}
     for name, (value, error) in found.items():
         result[name], result[f"{name}_error"] = np.where(good, value, np.nan), np.where(good, error, np.nan)
+    return result
+
+
+def rates(out, wanted):
+    """{name: values, name_error: bars} of those `wanted` that follow from `outputs`: frequencies, rotation numbers."""
+    period, bar = out["period"], out["period_error"]
+    result = {}
+    with np.errstate(invalid="ignore"):
+        if "nutation_frequency" in wanted:
+            value = TURN / period
+            result |= {
+                "nutation_frequency": value,
+                "nutation_frequency_error": value * (bar / (period - bar) + 4.0 * nu.EPS),
+            }
+        for name in ("precession", "spin"):
+            angle, rough = out[name], out[f"{name}_error"]
+            if f"{name}_rate" in wanted:
+                value = angle / period
+                result[f"{name}_rate"] = value
+                result[f"{name}_rate_error"] = (rough + np.abs(value) * bar) / (period - bar) + 2.0 * nu.EPS * np.abs(
+                    value
+                )
+            if f"{name}_number" in wanted:
+                value = angle / TURN
+                result[f"{name}_number"] = value
+                result[f"{name}_number_error"] = rough / TURN + 3.0 * nu.EPS * np.abs(value)
     return result
 
 

@@ -68,7 +68,9 @@ def trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
         while j < size and (times[j] - t) - t_low < h:
             dt = (times[j] - t) - t_low
             gyrostat.at(T, dt, new)
-            there[:] = squares
+            for i in range(6):  # an assignment of arrays takes seconds to compile
+                for k in range(6):
+                    there[i, k] = squares[i, k]
             gyrostat.carry(G, T, V, dt, there, J, work)
             read(new, there, n, phi + gyrostat.angle(T, dt, axis), here)
             if not (here[2] < TRUST and here[3] < TRUST * (1.0 + abs(here[1]))):
@@ -80,7 +82,7 @@ def trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
         gyrostat.at(T, h, new)
         gyrostat.carry(G, T, V, h, squares, J, work)
         read(new, squares, n, phi + gyrostat.angle(T, h, axis), here)
-        state[:] = new
+        state, new = new, state
         phi, w = here[0], here[1]
         high = t + h
         t_low += h - (high - t)

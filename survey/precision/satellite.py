@@ -91,8 +91,8 @@ def operations_of(run):
 
 def _one_step(p):
     """All that `lanes.chain` does per lane and step: the step, two columns with error ellipses, zeros and sums."""
-    matrix = taylor16.hill_step.py_func(np.ones(2 * taylor16.WIDTH), 1.0, p, 0.1)
+    matrix = taylor16.hill_step(np.ones(2 * taylor16.WIDTH), 1.0, p, 0.1)
     for _ in range(2):
-        lanes.column.py_func(matrix, p, p, p, p, p)
+        lanes.column(matrix, p, p, p, p, p)
         p + 1.0
-    return p + lanes.relative.py_func(matrix, 0.1)
+    return p + lanes.relative(matrix, 0.1)

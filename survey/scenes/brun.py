@@ -12,9 +12,10 @@ scaled integrals l = L/|k|, alpha = p_phi/sqrt|k|, beta = p_psi/sqrt|k| with the
 which only the spin needs; then every well of the effective potential has its place, lower u first, and time is in units
 of A/sqrt|k|, action in units of sqrt|k|.
 
-Per period of the nutation psi advances by `precession` and phi by `spin`; these are not reduced modulo 2 pi. They jump
-by 2 pi where p_psi -+ p_phi changes its sign on motions that pass a pole, u = +-1; on such a motion they have the mean
-of both limits.
+Per period of the nutation psi advances by `precession` and phi by `spin`; these are not reduced modulo 2 pi, nor are
+the rotation numbers, which are 1/(2 pi) of them. They jump by 2 pi (by 1) where p_psi -+ p_phi changes its sign on
+motions that pass a pole, u = +-1; on such a motion they have the mean of both limits. [boundaries] gives these lines,
+the separatrices and the regular precessions on maps of two of l, alpha, beta.
 
 Known: T, precession and reduced spin are symmetric in p_psi <-> p_phi; both wells have the same T; without field
 (epsilon = 0, or A = C) the advances are multiples of pi; T = 2 pi / omega_n at regular precessions; near a separatrix T
@@ -76,16 +77,32 @@ OPTIONS = (
 _TURNS = "off separatrices, where the period is infinite"
 
 
-def _outputs(when, dims):
-    applies = {"when": when, "dims": dims, "applies": _TURNS}
+def _branch(unit):
+    """The convention for advances, in words."""
     return (
-        Output("u_min", "lower turning point of u = cos theta", r"u_{\min}", **applies),
-        Output("u_max", "upper turning point of u = cos theta", r"u_{\max}", **applies),
-        Output("period", "period of the nutation", "T", **applies),
-        Output("precession", "advance of psi in a period", r"\Delta\psi", units="rad", **applies),
-        Output("spin", "advance of phi in a period", r"\Delta\varphi", units="rad", **applies),
-        Output("action", "action of the nutation, (1 / 2 pi) times the integral of p_theta d theta", "J_u", **applies),
+        f"{_TURNS}; not reduced: jumps by {unit} where p_psi - p_phi (u = 1) or p_psi + p_phi (u = -1) changes its sign"
+        " on motions that pass that pole, and is the mean of both limits there"
     )
+
+
+def _outputs(when, dims):
+    given = {"when": when, "dims": dims}
+    turns, by_turn, by_one = ({"applies": words} | given for words in (_TURNS, _branch("2 pi"), _branch("1")))
+    by_rate = {"applies": _branch("2 pi / T")} | given
+    return (
+        Output("u_min", "lower turning point of u = cos theta", r"u_{\min}", **turns),
+        Output("u_max", "upper turning point of u = cos theta", r"u_{\max}", **turns),
+        Output("period", "period of the nutation", "T", **turns),
+        Output("precession", "advance of psi in a period", r"\Delta\psi", units="rad", **by_turn),
+        Output("spin", "advance of phi in a period", r"\Delta\varphi", units="rad", **by_turn),
+        Output("action", "action of the nutation, 1 / 2 pi times the integral of p_theta d theta over a period", "J_u",
+               **turns),
+        Output("nutation_frequency", "frequency of the nutation", r"2\pi / T", **turns),
+        Output("precession_rate", "mean rate of precession", r"\Delta\psi / T", **by_rate),
+        Output("spin_rate", "mean rate of spin", r"\Delta\varphi / T", **by_rate),
+        Output("precession_number", "rotation number of the precession", r"\Delta\psi / 2\pi", **by_one),
+        Output("spin_number", "rotation number of the spin", r"\Delta\varphi / 2\pi", **by_one),
+    )  # fmt: skip
 
 
 _ANGLE = {"units": "rad", "when": _MOTION, "applies": f"{_TURNS}; without the jumps of pi in passing a pole"}
@@ -120,6 +137,7 @@ def solve(point, request):
     else:
         times = block.per_point(point["t"]) if "t" in point else None
         out = _state(given, valid & (given["C"] <= 2.0 * given["A"]), method, request.rtol, times)
+    out |= nutation.rates(out, request.variables)
     return {name: _back(block, values) for name, values in out.items()}
 
 

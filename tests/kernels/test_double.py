@@ -15,17 +15,17 @@ from survey.kernels.satellite import half_period
 def all_of(x, y, out):
     """Every operation on the pairs x and y, in the order of `exact`."""
     a, b = (x[0], x[1]), (y[0], y[1])
-    out[0] = dd.two_sum(x[0], y[0])
-    out[1] = dd.two_prod(x[0], y[0])
-    out[2] = dd.add(a, b)
-    out[3] = dd.sub(a, b)
-    out[4] = dd.mul(a, b)
-    out[5] = dd.times(a, y[0])
-    out[6] = dd.over(a, y[0])
-    out[7] = dd.div(a, b)
+    out[0, 0], out[0, 1] = dd.two_sum(x[0], y[0])
+    out[1, 0], out[1, 1] = dd.two_prod(x[0], y[0])
+    out[2, 0], out[2, 1] = dd.add(a, b)
+    out[3, 0], out[3, 1] = dd.sub(a, b)
+    out[4, 0], out[4, 1] = dd.mul(a, b)
+    out[5, 0], out[5, 1] = dd.times(a, y[0])
+    out[6, 0], out[6, 1] = dd.over(a, y[0])
+    out[7, 0], out[7, 1] = dd.div(a, b)
     positive = a if x[0] > 0.0 else dd.neg(a)
-    out[8] = dd.sqrt(positive)
-    out[9] = dd.mean(positive, b if y[0] > 0.0 else dd.neg(b))
+    out[8, 0], out[8, 1] = dd.sqrt(positive)
+    out[9, 0], out[9, 1] = dd.mean(positive, b if y[0] > 0.0 else dd.neg(b))
 
 
 def exact(x, y):

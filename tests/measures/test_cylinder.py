@@ -119,18 +119,31 @@ def test_beside_a_turning_point_ok_is_certain_and_turning_holds_within_its_bar()
         assert all(np.array_equal(a[0, 0], b[0, j]) for a, b in zip(alone, together, strict=True))
 
 
-def exact(six, phi, w, t):
-    """phi and w at t by mpmath's Taylor integrator, 25 digits."""
-    with mp.workdps(25):
-        b12, b31, d, c23, s2, s3 = map(mp.mpf, six)
+def series(six, phi, w, order):
+    """Taylor coefficients of phi and w in time."""
+    b12, b31, d, c23, s2, s3 = six
+    sine, cosine, phi, w = [mp.sin(phi)], [mp.cos(phi)], [phi], [w]
+    for n in range(order):
+        cw, sw, cs, cc, ss = (
+            mp.fdot(x, y[::-1]) for x, y in ((cosine, w), (sine, w), (cosine, sine), (cosine, cosine), (sine, sine))
+        )
+        rate = b12 * cw - b31 * sw - d * cs - c23 * (cc - ss) + s2 * cosine[n] - s3 * sine[n]
+        for row, value in zip((sine, cosine, phi, w), (cw, -sw, w[n], rate), strict=True):
+            row.append(value / (n + 1))
+    return phi, w
 
-        def rates(_t, y):
-            s, c = mp.sin(y[0]), mp.cos(y[0])
-            return [y[1], (b12 * c - b31 * s) * y[1] - d * c * s - c23 * (c * c - s * s) + s2 * c - s3 * s]
 
-        sign = 1 if t > 0 else -1
-        backward = mp.odefun(lambda s, y: [sign * v for v in rates(s, y)], 0, [mp.mpf(phi), mp.mpf(w)])
-        return [float(v) for v in backward(abs(t))]
+def exact(six, phi, w, t, digits=30):
+    """phi and w at t by Taylor series with mpmath, of an order of one for each digit."""
+    with mp.workdps(digits):
+        six, phi, w, left = list(map(mp.mpf, six)), mp.mpf(phi), mp.mpf(w), mp.mpf(t)
+        while left:
+            rows = series(six, phi, w, digits)
+            largest = max(abs(c) ** (mp.mpf(1) / n) for row in rows for n, c in list(enumerate(row))[-2:])
+            step = mp.sign(left) * min(abs(left), 1 / (10 * largest))
+            phi, w = (mp.fdot(row, [step**n for n in range(digits + 1)]) for row in rows)
+            left -= step
+        return [float(phi), float(w)]
 
 
 RANDOM = np.random.default_rng(11).normal(size=(5, 9)) * [1, 1, 2, 2, 2, 2, 2, 3, 3]
@@ -139,6 +152,17 @@ HARD = [
     [0.3, 0.2, 1.0, 0.5, 0.4, 0.1, 0.2, 60.0, 1.0],  # fast
     [0.7, -0.4, 1.1, 0.3, 0.5, -0.2, 3.5, 1.854144577, 5.0],  # beside a separatrix
 ]
+
+
+def test_the_series_agree_with_mpmaths_own_integrator():
+    *six, phi, w, _t = RANDOM[0].tolist()
+    b12, b31, d, c23, s2, s3 = six
+
+    def rates(_t, y):
+        s, c = mp.sin(y[0]), mp.cos(y[0])
+        return [y[1], (b12 * c - b31 * s) * y[1] - d * c * s - c23 * (c * c - s * s) + s2 * c - s3 * s]
+
+    assert mp.odefun(rates, 0, [phi, w])(0.5) == pytest.approx(exact(six, phi, w, 0.5), rel=1e-13)
 
 
 @pytest.mark.parametrize("numbers", [*RANDOM.tolist(), *HARD])

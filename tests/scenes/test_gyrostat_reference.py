@@ -4,12 +4,11 @@ Within the error bar and to 11 digits, but for what the rounding of the inputs (
 the digits that the conditioning leaves.
 """
 
-import importlib.util
 import json
 import math
 from importlib.resources import files
-from pathlib import Path
 
+import gyrostat_errata as errata
 import mpmath as mp
 import numpy as np
 import pytest
@@ -20,10 +19,6 @@ from survey.measures import cylinder_fate
 from survey.methods import taylor
 
 REFERENCE = json.loads((files("survey.reference") / "gyrostat.json").read_text())
-PATH = Path(__file__).parent.parent.parent / "workflows/gyrostat_errata.py"
-SPEC = importlib.util.spec_from_file_location("gyrostat_errata", PATH)
-errata = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(errata)
 NAMES = ("b12", "b31", "d", "c23", "s2", "s3")
 METHODS = {"trajectory": ("auto", "taylor", "dop853", "rk4", "full", "closed")}
 METHODS["abel"] = tuple(name for name in METHODS["trajectory"] if name != "full")

@@ -1,0 +1,57 @@
+"""Straight code from loops: compiled and plain Python give the same bits, whatever goes in."""
+
+from math import inf, nan
+
+import numpy as np
+import pytest
+
+from survey.kernels.jit import kernel
+from survey.kernels.unroll import changes_sign, largest, unroll
+
+
+@unroll
+def inner(x, y):
+    return largest(abs(x), 0.25) / y
+
+
+@unroll
+def some(table, i, pair, scale, out):
+    """Every operation, in both orders, with numbers, loops, lists, tuples, places and another such function."""
+    u, v = pair
+    series = [table[0, i], u]
+    for n in range(5):
+        series.append(sum((series[n - j] * series[j] for j in range(n + 1)), -v) * (1 / (n + 2)))
+    out[0, i] = series[-1] - 3.0
+    out[1, i] = 2.0 - series[-2] + out[0, i]
+    out[2, i] = changes_sign(u, v) + 1
+    last = series[3] / (1.0 / scale + 2)
+    return last, largest(last, inner(u, v)), 0.5
+
+
+@kernel
+def many(table, us, vs, scale, out):
+    for i in range(len(us)):
+        out[3, i], out[4, i], out[5, i] = some(table[::2], i, (us[i], vs[i]), scale, out)
+
+
+def test_compiled_as_plain():
+    rng = np.random.default_rng(7)
+    special = np.array([0.0, -0.0, 1.0, -1e-310, inf, -inf, nan])
+    us, vs = (values.ravel() for values in np.meshgrid(special, np.append(special, rng.normal(size=9))))
+    table = rng.normal(size=(4, us.size))
+    compiled, plain = np.zeros((6, us.size)), np.zeros((6, us.size))
+    many(table, us, vs, 0.3, compiled)
+    with np.errstate(all="ignore"):
+        for i in range(us.size):
+            plain[3:, i] = some(table[::2], i, (us[i], vs[i]), np.float64(0.3), plain)
+    np.testing.assert_array_equal(compiled, plain)
+    zero = compiled == 0
+    np.testing.assert_array_equal(np.signbit(compiled[zero]), np.signbit(plain[zero]))
+    assert np.isnan(compiled).any() and np.isfinite(compiled).any()
+
+
+@pytest.mark.parametrize("a", [-1.0, -0.0, 0.0, 2.0])
+@pytest.mark.parametrize("b", [-1.0, -0.0, 0.0, 2.0])
+def test_words(a, b):
+    assert largest(a, b) == max(a, b)
+    assert changes_sign(a, b) == ((a < 0) != (b < 0))

@@ -1,0 +1,22 @@
+"""What the scripts here share: their command line, and what they say meanwhile."""
+
+import argparse
+import sys
+from pathlib import Path
+
+
+def parser(doc, what):
+    """Parser of a script's command line; its `output`, where `what` goes, is a folder that is made where none is."""
+    words = argparse.ArgumentParser(description=doc.splitlines()[0])
+    words.add_argument("-o", "--output", default="results", metavar="DIR", type=_folder, help=f"folder for {what}")
+    return words
+
+
+def _folder(text):
+    path = Path(text)
+    path.mkdir(parents=True, exist_ok=True)
+    return path
+
+
+def say(line):
+    print(f"{Path(sys.argv[0]).stem}: {line}", file=sys.stderr)
