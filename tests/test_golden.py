@@ -17,7 +17,7 @@ from survey import modules, store
 FOLDER = Path(__file__).parent / "golden"
 CHANGING = {"date_created", "history", "wall_time_s", "compile_time_s", "commit", "dirty", "kernel_hash", "cpu"}
 CHANGING |= {"summary", "references", "areas", "refine_points"}  # words, and what other processors round otherwise
-WORDS = {"_FillValue", "comment"}  # a fill value may be NaN, and words may be bettered
+WORDS = {"_FillValue", "comment", "long_name"}  # a fill value may be NaN, and words may be bettered
 COMPILERS = ("version_numba", "version_llvmlite", "version_numpy", "cpu")
 
 
