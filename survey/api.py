@@ -15,7 +15,7 @@ import survey.methods as method_folder
 import survey.scenes as scene_folder
 from survey import engine, modules, own, status, store
 from survey import workflow as workflows
-from survey.dataset import count, counts, describe, error_bars, layout, percent
+from survey.dataset import count, counts, describe, layout, percent
 from survey.errors import BadInput
 from survey.grid import Grid, line
 from survey.hill_scene import HillScene
@@ -288,46 +288,6 @@ def areas(ds: xr.Dataset) -> dict[str, str]:
     rows = zip(ds.area_verdict.attrs["flag_meanings"].split(), *(ds[name].values for name in names), strict=True)
     return {name: f"{area:.12g} +- {bar:.2g} ({percent(part, off)})" for name, area, bar, part, off in rows}
 
-
-def audit(ds: xr.Dataset, points: int, seed: int = 0) -> dict[str, Any]:
-    """Solve random points of `ds` again by other methods at higher accuracy; each difference against the error bars.
-
-    Returns {"points", "method", "outside", "complaints"}.
-    """
-    name = own.of_dataset(ds)
-    _, module = own.find(name)
-    options = dict(pair.split("=") for pair in ds.attrs["options"].split(", ") if pair)
-    others = [m for m in workflows.methods_of(module, options) if m != ds.attrs["method"]]
-    used = [m for m in module.AUDIT if m in others] or others[:1]
-    report = {"points": 0, "method": " and ".join(used), "outside": 0, "complaints": []}
-    if not points:
-        return report
-    ds = ds if ds.status.dims else ds.expand_dims("_one")
-    size = min(points, ds.status.size)
-    chosen = np.sort(np.random.default_rng(seed).choice(ds.status.size, size, replace=False, shuffle=False))
-    places = np.unravel_index(chosen, ds.status.shape)
-    flat = ds.isel({dim: ("_point", place) for dim, place in zip(ds.status.dims, places, strict=True)}).load()
-    names = [p.name for p in module.PARAMETERS if p.name in ds.coords]
-    given = {key: ("_point", np.broadcast_to(flat[key].values, size).copy()) for key in names}
-    arrays = {key: xr.DataArray(values, dims=dim) for key, (dim, values) in given.items()}
-    complaints = []
-    for method in used:
-        again = evaluate(name, method=method, rtol=max(ds.attrs["rtol"] / 100, 1e-13), **options, **arrays)
-        complaints += [f"{line}, by {method}" for line in _outside(flat, again, given)]
-    return report | {"points": chosen.size, "outside": len(complaints), "complaints": complaints}
-
-
-def _outside(flat: xr.Dataset, again: xr.Dataset, given: dict[str, Any]) -> Iterator[str]:
-    """A sentence per output and point whose difference exceeds the sum of the error bars."""
-    for name in error_bars(flat):
-        bar = flat[f"{name}_error"].values.astype(float) + again[f"{name}_error"].transpose("_point", ...).values
-        off = np.abs(flat[name].transpose("_point", ...).values - again[name].transpose("_point", ...).values)
-        for i in np.unique(np.argwhere(off > bar)[:, :1]):
-            where = ", ".join(f"{key} = {values[i]!r}" for key, (_, values) in given.items())
-            yield f"{name} at {where}: off by {np.nanmax(off[i]):.3g}, error bars {np.nanmax(bar[i]):.3g}"
-
-
-def _beside(option: Option) -> str:
     words = f"; only with {option.only_with}" if option.only_with else ""
     return words + (f"; not beside {option.said_by}, which says it" if option.said_by else "")
 

@@ -8,6 +8,8 @@ closed form has `closed`, which gives them, with `refusal`, CLASSES, TITLE and A
 The edges of all others are sought as the zeros of Hill's factors.
 """
 
+from math import prod
+
 import numpy as np
 import xarray as xr
 
@@ -46,6 +48,21 @@ def find(workflow, each=None, once=lambda name, make: make()):
     if other:
         found |= _curves(workflow, other[0], axis, edges, each)
     return xr.Dataset(found, attrs={"boundaries": axis})
+
+
+def plan(workflow, cost):
+    """(what is known before: rows, bytes of an edge, how many there are being found; seconds of one thread, roughly).
+
+    `cost` is the scene's figure for a point, in seconds.
+    """
+    measure = measure_of(workflow.scene)
+    if hasattr(measure, "closed"):  # measured: about a tenth of a second each
+        size = 8 * (1 + len(workflow.grid.sizes) + 2 * len(measure.ALONG))
+        return {"bytes_per_curve_point": size}, 0.1 * prod(list(workflow.grid.sizes.values())[2:])
+    sizes = [size for dim, size in workflow.grid.sizes.items() if dim != workflow.boundaries]
+    # measured: ten to twenty edges a row; half a thousand points of curves
+    seconds = prod(sizes) * (2e-3 + 250 * cost) + (0.2 + 1e4 * cost if sizes else 0.0)
+    return {"rows": prod(sizes), "bytes_per_edge": 25, "bytes_per_curve_point": 24 * len(sizes)}, seconds
 
 
 def _closed(workflow, measure):

@@ -98,20 +98,24 @@ def plan(workflow, overrides, output, as_json):
 def verify(path, points, seed):
     """Check digest, completeness and counts; solve N random points again by another method."""
     from survey import api, store
+    from survey.audit import audit
 
     complaints = store.check(path)
     for complaint in complaints:
         complain(complaint, 3)
     if complaints:
         return 3
-    audit = api.audit(api.open(path), points, seed)
-    for complaint in audit["complaints"]:
+    again = audit(api.open(path), points, seed)
+    for complaint in again["complaints"]:
         complain(f"{path}: {complaint}", 3)
-    if not audit["complaints"]:
+    if not again["complaints"]:
+        silent = f", which do not answer at {again['silent']} others" if again["silent"] else ""
+        beside = "".join(f", {again[what]} {what}" for what in ("edges", "cells") if again[what])
         out.print(
-            f"{path}: sound; {audit['points']} points solved again by {audit['method']}, all within the error bars"
-        )
-    return 3 if audit["complaints"] else 0
+            f"{path}: sound; {again['points']} points{beside} solved again by {again['method']}{silent}, "
+            "all within the error bars", markup=False,
+        )  # fmt: skip
+    return 3 if again["complaints"] else 0
 
 
 @program.command()

@@ -10,6 +10,7 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from importlib import import_module
 from importlib.metadata import version
 from math import prod
 from typing import Any, NamedTuple
@@ -32,10 +33,15 @@ REGION_POINTS, REGION_BYTES = 2**20, 2**25
 
 def seconds_per_point(scene, request, grid):
     """The scene's rough figure for this grid, and the method's for this scene."""
-    seconds = scene.cost(request.options, {name: values.size for name, (_, values) in grid.parameters.items()})
+    seconds = _cost(scene, request, grid)
     if request.method == "auto":
         return seconds
     return seconds * getattr(modules.load(methods, request.method, "method"), "COST", {}).get(scene.FAMILY, 1.0)
+
+
+def _cost(scene, request, grid):
+    """The scene's rough figure for this grid, in seconds per point."""
+    return scene.cost(request.options, {name: values.size for name, (_, values) in grid.parameters.items()})
 
 
 def points_per_block(scene, request, grid):
@@ -120,7 +126,7 @@ class Solved(NamedTuple):
     number: int
     process: str
     compiling: float
-    seconds: float
+    seconds: float | None
     content: bytes | None = None
 
 
@@ -150,7 +156,7 @@ class Job:
         arrays = {name: np.full(shape + extra, fill, kind) for name, (kind, fill, extra) in table.items()}
         arrays["status"][...] = status.WORKER_DIED
         self.kept.save(number, arrays)
-        return Solved(number, "", 0.0, 0.0)
+        return Solved(number, "", 0.0, None)
 
 
 def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
@@ -231,18 +237,23 @@ class Remaining:
         self.open = np.ones(len(blocks), bool)
         self.open[list(reused)] = False
         self.nearest, self.cost = np.full(len(blocks), np.inf), np.zeros(len(blocks))
-        self.began, self.worked = time.perf_counter(), 0.0
+        self.began, self.worked = np.inf, 0.0
 
     def took(self, number, seconds):
-        """Block `number` took so many seconds of one worker."""
+        """Block `number` took so many seconds of one worker, what it compiled left out; None: its worker died."""
         self.open[number] = False
+        if seconds is None:
+            return
+        self.began = min(self.began, time.perf_counter() - seconds)
         self.worked += seconds
         distance = ((self.places - self.places[number]) ** 2).sum(axis=1)
         nearer = distance < self.nearest
         self.nearest[nearer], self.cost[nearer] = distance[nearer], seconds / self.points[number]
 
     def __call__(self):
-        workers = max(self.worked / (time.perf_counter() - self.began), 1e-9)  # as many as have been at work
+        if not self.worked:
+            return 0.0
+        workers = self.worked / (time.perf_counter() - self.began)  # as many as have been at work
         return float((self.cost * self.points)[self.open].sum() / workers)
 
 
@@ -278,20 +289,23 @@ def _compiling_ahead(scene):
 
 def extras(workflow, once, progress=None):
     """Datasets that go into the file beside the map, their attributes with its own; `once` as in `store.Blocks`."""
-    further = []
-    if workflow.boundaries:
-        from survey import boundaries
+    further, parts = [], _parts_beside(workflow)
+    if "edges" in parts:
 
         def each(task, numbers, what):
             told = (lambda done, _=None: progress(done, len(numbers), 0, what)) if progress else (lambda *_: None)
             dispatch.on_threads(task, numbers, told)
 
-        further.append(boundaries.find(workflow, each, once))
-    if workflow.refine:
-        from survey import refine
-
-        further.append(refine.find(workflow, _each, getattr(progress, "refining", None)))
+        further.append(parts["edges"].find(workflow, each, once))
+    if "cells" in parts:
+        further.append(parts["cells"].find(workflow, dispatch.on_threads, once, getattr(progress, "refining", None)))
     return further
+
+
+def _parts_beside(workflow):
+    """{what the file gets beside the map: the module that finds it}."""
+    asked = {"edges": ("boundaries", workflow.boundaries), "cells": ("refine", workflow.refine)}
+    return {what: import_module(f"survey.{name}") for what, (name, wanted) in asked.items() if wanted}
 
 
 class Assembly:
@@ -370,6 +384,10 @@ def plan(workflow):
     """What a run would do: points, blocks, bytes, method, estimated seconds. No kernel is called."""
     scene, request, grid = workflow.scene, workflow.request, workflow.grid
     seconds = grid.points * seconds_per_point(scene, request, grid)
+    beside = {}
+    for name, part in _parts_beside(workflow).items():
+        beside[name], more = part.plan(workflow, _cost(scene, request, grid))
+        seconds += more
     return {
         "scene": workflow.name,
         "options": ", ".join(f"{key}={value}" for key, value in request.options.items()),
@@ -380,6 +398,7 @@ def plan(workflow):
         "method": request.method,
         "rtol": request.rtol,
         "variables": ", ".join(name for name in layout(scene, request)),
+        **beside,
         "output": str(workflow.path),
         "threads": cpus(),
         "estimated_seconds": float(f"{seconds / cpus():.2g}"),
@@ -420,10 +439,3 @@ def fingerprint(workflow):
         "kernels": jit.SOURCE_HASH,
         "scene_hash": getattr(workflow.scene, "HASH", ""),
     }
-
-
-def _each(task, items):
-    """[task(item) for item in items], on the threads of this machine."""
-    results = [None] * len(items)
-    dispatch.on_threads(lambda at: results.__setitem__(at, task(items[at])), range(len(items)))
-    return results

@@ -59,16 +59,22 @@ class Progress:
         if what == "blocks":
             self._line(f"{self.workflow.grid.points:,} points in {total} blocks, {reused} already done")
 
-    def refining(self, settled, points):
-        """Told as cells are refined: which part of the map is settled, and how many points were solved for it."""
+    def refining(self, settled, points, left):
+        """Told as cells are refined: the part of the map that is settled, points solved, seconds for the known rest.
+
+        What these parts leave open is found out as they are done, so the rest may be longer.
+        """
         if self.silent:
             return
         text = f"cells: {settled:.2%} of the map settled, {points:,} points solved"
         if self.bar and settled < 1:
-            self.bar.update(self.task, description=f"{self.workflow.name}: {text}")
-        elif settled == 1 or time.monotonic() - self.logged > LOG_SECONDS:
-            self.logged = time.monotonic()
+            eta = time.strftime("%H:%M:%S or more", time.gmtime(left))
+            self.bar.update(self.task, description=f"{self.workflow.name}: {text}", what="cells", eta=eta)
+        elif settled == 1:
             self._line(text)
+        elif time.monotonic() - self.logged > LOG_SECONDS:
+            self.logged = time.monotonic()
+            self._line(f"{text}, ETA {left:.0f} s or more")
 
     def _line(self, text):
         self.console.print(f"{self.workflow.name}: {text}", markup=False)

@@ -4,7 +4,8 @@ Cells are halved until they are decided or as wide as [refine] says, and become 
 """
 
 import math
-from itertools import pairwise
+import time
+from itertools import count, pairwise
 
 import numpy as np
 import xarray as xr
@@ -19,24 +20,75 @@ LABELS = ("unstable", "stable")
 ROUNDING = 1e-13  # of the sum of areas, relative to the whole
 
 
-def find(workflow, each, tell):
-    """The dataset of the workflow's cells and areas; `each` and `tell` (or None) as in `hill_cells.find`."""
+def find(workflow, each, once=lambda name, make: make(), tell=None):
+    """The dataset of the workflow's cells and areas.
+
+    `each(task, numbers, finished)` as `dispatch.on_threads`; `once(name, make)` gives the arrays of `make()`, or those
+    that an earlier run has kept under this name. `tell(settled, points, left)` hears which part of the map is settled,
+    how many points were solved for it, and the seconds that the parts known to be open will take.
+    """
     panels = _panels(workflow)
     points, found, whole = 0, [], _area(panels)
     for x, y in panels:
         share, done = _area([(x, y)]) / whole, _area(panels[: len(found)]) / whole
+        told = [done, points]
 
-        def told(part, solved, share=share, done=done, before=points):
-            if tell:
-                tell(done + share * part, before + solved)
+        def settled(part, solved, share=share, done=done, before=points, told=told):
+            told[:] = done + share * part, before + solved
 
+        name = f"cells-{len(found)}-{x.depth}-{y.depth}"
+        parts = _in_parts(name, each, once, lambda left, told=told: tell and tell(*told, left))
         try:
-            cells = hill_cells.find(_solver(workflow, x, y), x, y, each, told)
+            cells = hill_cells.find(_solver(workflow, x, y), x, y, parts, settled)
         except OverflowError as error:
             raise BadInput(f"refine.width: the map has {error}; take a greater width, or a smaller map") from None
         found.append(cells)
         points += cells.points
+    if tell:
+        tell(1.0, points, 0.0)
     return _describe(workflow, found, points)
+
+
+def plan(workflow, cost):
+    """(what is known before: how many cells there are at most, and on most maps; seconds of one thread, roughly).
+
+    `cost` is the scene's figure for a point, in seconds.
+    """
+    panels = _panels(workflow)
+    most = min(sum(1 << x.depth + y.depth for x, y in panels), hill_cells.MOST)
+    # measured: some twenty curves' widths of cells; along a value that a parameter excludes, each cell is solved
+    usual = min(sum(20 << max(x.depth, y.depth) for x, y in panels), most)
+    blocks = sum(16 + 2 * ((1 << y.depth) * _cut(workflow, 0, x) + (1 << x.depth) * _cut(workflow, 1, y))
+                 for x, y in panels)  # fmt: skip
+    seconds = 3e-6 * usual + blocks * hill_cells.PLACES.size**2 * 20 * cost
+    return {"most": most, "bytes_at_most": 33 * most, "usually": usual}, seconds
+
+
+def _cut(workflow, at, axis):
+    """How many ends of a panel's side are values that its parameter excludes."""
+    name = list(workflow.refine)[at]
+    return len({axis.low, axis.high} & set(next(p.excluded for p in workflow.scene.PARAMETERS if p.name == name)))
+
+
+def _in_parts(name, each, once, tell):
+    """`each` of `hill_cells.find`, called once a level: what a part finds is kept as soon as it is there."""
+    levels = count()
+
+    def parts(task, items):
+        level, began, leaves = next(levels), time.perf_counter(), [None] * len(items)
+
+        def part(number):
+            arrays = once(f"{name}-{level}-{number}", lambda: {"leaves": task(items[number])})
+            leaves[number] = arrays["leaves"]
+
+        def finished(done, _=None):
+            if done:
+                tell((time.perf_counter() - began) / done * (len(items) - done))
+
+        each(part, range(len(items)), finished)
+        return leaves
+
+    return parts
 
 
 def _area(panels):

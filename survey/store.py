@@ -202,9 +202,12 @@ def refused(path):
         raise Stopped(f"{path}: writing failed ({told}); mend it and run the command again") from None
 
 
-def write_atomically(path, content):
-    """Write bytes, or what `content(file)` writes, so that `path` is absent, old or new at every instant."""
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+def write_atomically(path, content, folder=None):
+    """Write bytes, or what `content(file)` writes, so that `path` is absent, old or new at every instant.
+
+    In `folder`, on the same disk, lies what is not yet complete; by default beside it.
+    """
+    part = (folder or path.parent) / f".{path.name}.{os.getpid()}.part"
     try:
         with open(part, "wb") as file:
             content(file) if callable(content) else file.write(content)
@@ -303,9 +306,9 @@ class Output:
         # both digests stand until the rename is done, so that no instant shows a sound file as damaged
         old = beside.read_text() if beside.exists() and self.path.exists() else ""
         line = f"{digest}  {self.path.name}\n"
-        write_atomically(beside, (old + line).encode())
+        write_atomically(beside, (old + line).encode(), self.part.parent)
         publish(self.part, self.path)
-        write_atomically(beside, line.encode())
+        write_atomically(beside, line.encode(), self.part.parent)
 
 
 def load(path, chunks="auto"):

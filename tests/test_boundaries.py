@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 import survey
-from survey import boundaries, figures, store
+from survey import boundaries, engine, figures, store
 from survey.errors import Stopped
 from survey.workflow import check
 
@@ -40,6 +40,13 @@ def test_the_edges_lie_where_the_verdict_changes(path):
         inside = np.histogram(own, ds.rho.values)[0]
         np.testing.assert_array_equal(inside % 2 == 1, np.diff(ds.verdict.values[row]) != 0)
     assert (ds.edge_position_error < 1e-12).all()
+
+
+def test_the_plan_counts_rows_and_bytes(path):
+    planned, ds = engine.plan(check(WORKFLOW, output=path))["edges"], xr.load_dataset(path)
+    assert planned["rows"] == ds.sizes["k"]
+    for dim, key in (("edge", "bytes_per_edge"), ("curve_point", "bytes_per_curve_point")):
+        assert planned[key] * ds.sizes[dim] == sum(v.nbytes for v in ds.variables.values() if v.dims == (dim,))
 
 
 def test_the_tongue_n_2_opens_with_half_the_square(path):

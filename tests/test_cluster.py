@@ -3,6 +3,7 @@
 import dataclasses
 import os
 import pickle
+import shutil
 import subprocess
 import sys
 import time
@@ -18,25 +19,37 @@ pytest.importorskip("distributed")
 PROGRAM = "import survey.engine; survey.engine.BLOCK_POINTS = 2; from survey.cli import main; main()"
 
 
-def dask(*words, cwd):
-    command = [sys.executable, "-m", "dask", *map(str, words)]
-    return subprocess.Popen(command, cwd=cwd, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+def dask(*words, cwd, before=(), **more):
+    command = [*before, sys.executable, "-m", "dask", *map(str, words)]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    return subprocess.Popen(command, cwd=cwd, env=os.environ | more, **quiet)
+
+
+def worker(file, **more):
+    """A worker that lives in another folder."""
+    away = file.parent / "away"
+    away.mkdir(exist_ok=True)
+    return dask("worker", "--scheduler-file", file, "--nthreads", 1, "--no-dashboard", cwd=away, **more)
 
 
 @pytest.fixture
-def cluster(tmp_path):
-    """(path of the scheduler's file, the processes of scheduler and workers); workers live in another folder."""
-    away = tmp_path / "away"
-    away.mkdir()
+def scheduler(tmp_path):
+    """(path of the scheduler's file, [its process]), to which a test adds the workers; all are killed at the end."""
     file = tmp_path / "scheduler.json"
     processes = [dask("scheduler", "--scheduler-file", file, "--port", 0, "--no-dashboard", cwd=tmp_path)]
     wait_for(file.exists)
-    for _ in range(2):
-        processes.append(dask("worker", "--scheduler-file", file, "--nthreads", 1, "--no-dashboard", cwd=away))
     yield file, processes
     for process in reversed(processes):
         process.kill()
         process.wait()
+
+
+@pytest.fixture
+def cluster(scheduler):
+    """The same with two workers."""
+    file, processes = scheduler
+    processes += [worker(file), worker(file)]
+    return scheduler
 
 
 def wait_for(what, seconds=60.0):
@@ -85,6 +98,33 @@ def test_blocks_travel_where_no_folder_is_shared(small, tmp_path):
         assert content == whole
         kept.put(0, content)
         assert kept.sound() == {0}
+
+
+def test_workers_that_see_another_disk_send_their_blocks(scheduler, small, surveyed):
+    """Their own empty disk hides the folder of the run."""
+    file, processes = scheduler
+    away = file.parent / "work"
+    away.mkdir()
+    (away / small.name).write_text(small.read_text())
+    if subprocess.run(["unshare", "-m", "mount", "-t", "tmpfs", "none", away], capture_output=True).returncode:
+        pytest.skip("needs the right to mount a small tmpfs")
+    hidden = ("unshare", "-m", "sh", "-c", f'mount -t tmpfs none "{away}" && exec "$0" "$@"')
+    processes += [worker(file, before=hidden) for _ in range(2)]
+    told = start(away, file).communicate(timeout=180)[1]
+    assert "computed 6, reused 0 of 6 blocks" in told, told
+    assert store.check(away / "small.nc") == []
+    xr.testing.assert_equal(*(xr.load_dataset(path).drop_attrs() for path in (surveyed, away / "small.nc")))
+
+
+def test_a_cluster_with_an_edited_survey_is_refused(scheduler, small):
+    file, processes = scheduler
+    shutil.copytree(Path(engine.__file__).parent, file.parent / "other" / "survey")
+    with open(file.parent / "other" / "survey" / "kernels" / "sines.py", "a") as source:
+        source.write("\n# edited\n")
+    processes.append(worker(file, PYTHONPATH=str(file.parent / "other")))
+    running = start(small.parent, file, "--quiet")
+    told = running.communicate(timeout=180)[1]
+    assert running.returncode == 4 and told.count("\n") == 1 and "has other code (sources: " in told, told
 
 
 def test_a_worker_with_other_code_is_refused(small, tmp_path):

@@ -1,10 +1,39 @@
-"""What a sweep promises, on the real program: kills, faults, several processes. The long forms are marked slow."""
+"""What a sweep promises, on the real program: kills, faults, several processes. The long forms are marked slow.
 
+Where each promise is tested, here if no file is named; (slow): its long form, (beside): parts in one process.
+
+ 1 atomic                test_kills_at_random_times_lose_and_corrupt_nothing: 4 kills, 200 (slow); test_faults: a kill
+                         at each call that writes (slow), at the last ones
+ 2 nothing is lost       the same; test_cells_go_on_where_a_kill_left_them
+ 3 resume is invisible   the same; test_engine: test_any_cut_gives_the_same_file (beside)
+ 4 one bad point         test_a_bad_point_costs_itself_alone; test_evaluate (beside)
+ 5 no silent NaN         test_a_bad_point_costs_itself_alone; test_cli: test_failed_points_exit_1
+ 6 drift is refused      test_drift_and_a_second_writer_are_refused; test_store (beside)
+ 7 one writer            test_drift_and_a_second_writer_are_refused; test_store: a killed holder
+ 8 damage is found       test_a_flipped_bit_of_a_block_is_mended; test_cli: test_verify_finds_...; test_store: every
+                         bit of a block (beside); test_audit: wrong values under sound sums (beside)
+ 9 bounded memory        test_memory_is_bounded_by_blocks_not_by_the_map: 10^6 points, 10^8 (slow)
+10 prompt stop           test_workers_stop_promptly_with_the_run; test_cli: test_an_interrupted_run_can_be_resumed;
+                         test_cluster: test_the_batch_script_stops_before_the_walltime_and_is_queued_again
+11 disk faults           test_a_full_disk_..., test_a_file_size_limit_...; test_faults: an error at each call that
+                         writes (slow), at two of them, a read-only disk; test_store: each call (beside)
+12 dying workers         test_a_killed_worker_is_replaced; test_dispatch: tasks that kill (beside); test_cluster: a lost
+                         scheduler, workers on another disk, a worker with other code
+13 no stale code         test_an_edit_of_what_a_kernel_calls_takes_effect_in_the_next_process;
+                         test_two_processes_fill_one_empty_kernel_cache; test_a_home_that_cannot_be_written_is_fine
+14 an honest plan        test_the_plan_counts_what_the_run_does; test_cli: no kernel is called
+15 old files open        test_files_that_are_kept_open_and_verify; test_golden: of every scene
+16 the same answer       test_the_same_bits_on_one_processor_and_on_all; test_scenes (beside)
+"""
+
+import json
 import os
 import random
+import re
 import resource
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -135,6 +164,59 @@ def test_a_killed_worker_is_replaced(folder, unbroken):
     same(folder, unbroken)
 
 
+CELLS = """
+title = "Cells to be killed"
+scene = "mathieu"
+[axes]
+a = { start = 0.5, stop = 800.0, num = 5 }
+q = { start = 0.1, stop = 200.0, num = 5 }
+[output]
+path = "cells.nc"
+variables = ["verdict"]
+[refine]
+width = 0.001
+"""
+# the program with many small parts of cells, telling which of them it works out
+PARTS = """
+import os
+from survey import store
+from survey.measures import hill_cells
+hill_cells.BATCH = 1
+once = store.Blocks.once
+def told(kept, name, make):
+    def make_and_tell():
+        os.write(1, name.encode() + b" ")
+        return make()
+    return once(kept, name, make_and_tell)
+store.Blocks.once = told
+from survey.cli import main
+main()
+"""
+
+
+def test_cells_go_on_where_a_kill_left_them(tmp_path):
+    (tmp_path / "cells.toml").write_text(CELLS)
+    command = [sys.executable, "-c", PARTS, "run", "cells.toml"]
+    keywords = {"cwd": tmp_path, "text": True, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    whole = subprocess.run([*command, "-o", "whole.nc"], **keywords, timeout=120)
+    assert whole.returncode == 0 and "100.00% of the map settled" in whole.stderr, whole.stderr
+    parts, known = whole.stdout.split(), set()
+    for share in (0.3, 0.7):
+        running = subprocess.Popen(command, **keywords)
+        wait_for(lambda: len(_parts_of_cells(tmp_path)) > share * len(parts))  # noqa: B023
+        running.kill()
+        assert not known & set(running.communicate()[0].split())
+        known = _parts_of_cells(tmp_path)
+    done = subprocess.run(command, **keywords, timeout=120)
+    assert done.returncode == 0 and sorted([*known, *done.stdout.split()]) == sorted(parts), done.stderr
+    assert store.check(tmp_path / "cells.nc") == []
+    xr.testing.assert_equal(*(xr.load_dataset(tmp_path / name).drop_attrs() for name in ("whole.nc", "cells.nc")))
+
+
+def _parts_of_cells(folder):
+    return {file.stem for file in (folder / "cells.nc.blocks").glob("cells-*.extra")}
+
+
 @pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143)])
 def test_workers_stop_promptly_with_the_run(folder, name, code):
     heeding = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731  (a background job ignores it)
@@ -145,6 +227,78 @@ def test_workers_stop_promptly_with_the_run(folder, name, code):
     told = running.communicate(timeout=10)[1]
     assert running.returncode == code and "go on with: survey run sweep.toml --workers 2" in told
     wait_for(lambda: not any(_works(child) for child in children), 5)
+
+
+def test_drift_and_a_second_writer_are_refused(folder, unbroken):
+    running = start(folder)
+    wait_for(lambda: len(blocks(folder)) > 3)
+    running.send_signal(signal.SIGSTOP)
+    code, told = resume(folder, "--quiet")
+    assert code == 2 and told.count("\n") == 1 and f"another run is writing it (host {socket.gethostname()}, " in told
+    assert f"pid {running.pid}" in told
+    running.kill()
+    running.wait()
+    kept = len(blocks(folder))
+    code, told = resume(folder, "--quiet", "--set", "solver.rtol=1e-9")
+    assert code == 2 and told.count("\n") == 1 and "rtol changed: 1e-10 -> 1e-09); --fresh starts anew" in told
+    assert len(blocks(folder)) == kept
+    code, told = resume(folder, "--fresh")
+    assert code == 0 and "reused 0 of" in told and "--fresh" in xr.load_dataset(folder / "sweep.nc").attrs["history"]
+    same(folder, unbroken)
+
+
+def test_a_flipped_bit_of_a_block_is_mended(folder, unbroken):
+    running = start(folder)
+    wait_for(lambda: len(blocks(folder)) > 5)
+    running.kill()
+    running.wait()
+    kept = sorted(blocks(folder))
+    bits = bytearray(kept[2].read_bytes())
+    bits[len(bits) // 3] ^= 8
+    kept[2].write_bytes(bits)
+    kept[3].write_bytes(kept[3].read_bytes()[:-5])
+    code, told = resume(folder)
+    assert code == 0 and f"reused {len(kept) - 2} of 45 blocks" in told, told
+    same(folder, unbroken)
+
+
+def test_a_bad_point_costs_itself_alone(tmp_path):
+    """k = 1 is no parameter: its row has a status, and all others the bits of a map without it."""
+    axes = {"with": "[0.5, 0.9, 1.0, 1.1]", "without": "[0.5, 0.9, 1.1]"}
+    for name, values in axes.items():
+        text = f'scene = "satellite"\n[axes]\nk = {{ values = {values} }}\nrho = {{ values = [0.7, 1.9] }}\n'
+        (tmp_path / f"{name}.toml").write_text(text)
+        command = [sys.executable, "-m", "survey", "run", f"{name}.toml", "-o", f"{name}.nc"]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+        assert done.returncode == 0, done.stderr
+        assert name == "without" or "status: ok: 6, invalid_parameters: 2" in done.stderr, done.stderr
+    bad, good = (xr.load_dataset(tmp_path / f"{name}.nc") for name in axes)
+    xr.testing.assert_equal(bad.sel(k=good.k).drop_attrs(), good.drop_attrs())
+    assert store.check(tmp_path / "with.nc") == [] and bad.discriminant.sel(k=1.0).isnull().all()
+
+
+def test_a_log_gets_a_line_now_and_then(folder):
+    """Without a terminal, as under nohup; a minute is shortened to a twentieth of a second."""
+    program = "import survey.progress; survey.progress.LOG_SECONDS = 0.05; " + PROGRAM
+    done = subprocess.run(
+        [sys.executable, "-c", program, "run", "sweep.toml"], cwd=folder, capture_output=True, text=True
+    )
+    lines = [
+        line for line in done.stderr.splitlines() if re.search(r": \d+ of 45 blocks, \d+ s elapsed, ETA \d+ s$", line)
+    ]
+    assert done.returncode == 0 and 2 <= len(lines) <= 45 and "\r" not in done.stderr, done.stderr
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, "run", "sweep.toml"], cwd=folder, capture_output=True, text=True
+    )
+    assert done.stderr.count("elapsed") == 1, done.stderr  # the last
+
+
+def test_the_plan_counts_what_the_run_does(folder, unbroken):
+    command = [sys.executable, "-c", PROGRAM, "plan", "sweep.toml", "--json"]
+    planned = json.loads(subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout)
+    assert planned["points"] == unbroken.status.size == 4500 and planned["blocks"] == 45
+    assert planned["bytes"] == sum(variable.nbytes for variable in unbroken.data_vars.values())
+    assert not (folder / "sweep.nc").exists()
 
 
 def test_a_file_size_limit_is_one_line_and_the_run_can_go_on(folder, unbroken):
@@ -250,12 +404,12 @@ def test_the_same_bits_on_one_processor_and_on_all(folder, unbroken):
     assert np.isfinite(unbroken.w).all()
 
 
-@pytest.mark.slow
-def test_memory_is_bounded_by_blocks_not_by_the_map(tmp_path):
-    """10^5 and 10^8 points; asked: below 1 GiB, assembly included."""
+@pytest.mark.parametrize("side", [1000, pytest.param(10_000, marks=pytest.mark.slow)])
+def test_memory_is_bounded_by_blocks_not_by_the_map(tmp_path, side):
+    """10^5 points against 10^6, or 10^8; asked: below 1 GiB, assembly included."""
     workflow = Path(__file__).parent.parent / "workflows" / "satellite_prolate.toml"
     peaks = []
-    for k, rho in ((100, 1000), (10_000, 10_000)):
+    for k, rho in ((100, 1000), (side, side)):
         command = [sys.executable, "-m", "survey", "run", str(workflow), "-o", "map.nc", "--quiet", "--fresh"]
         asked = [f"axes.k.num={k}", f"axes.rho.num={rho}", "output.variables=['discriminant']", "output.figures=[]"]
         command += [word for text in asked for word in ("--set", text)]

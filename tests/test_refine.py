@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 import survey
-from survey import api, figures, store
+from survey import api, engine, figures, store, workflow
 from survey.dataset import percent
 
 WORKFLOW = {
@@ -62,6 +62,14 @@ def test_the_areas_are_told_with_their_bounds(path):
         "+-" in line and line.endswith(" %)") for line in lines.values()
     )
     assert ds.attrs["areas"].startswith("unstable: ")
+
+
+def test_the_plan_bounds_the_cells_and_their_bytes(path):
+    planned, ds = engine.plan(workflow.check(WORKFLOW, output=path)), xr.load_dataset(path)
+    bytes_of_cells = sum(variable.nbytes for variable in ds.variables.values() if variable.dims == ("cell",))
+    assert planned["cells"]["most"] == 2 * 32 * 64 and planned["estimated_seconds"] > 0
+    assert bytes_of_cells / ds.sizes["cell"] == planned["cells"]["bytes_at_most"] / planned["cells"]["most"]
+    assert planned["cells"]["usually"] / 5 < ds.sizes["cell"] < 5 * planned["cells"]["usually"]
 
 
 def test_a_share_is_written_to_two_digits_of_its_bar():

@@ -41,7 +41,7 @@ from survey.status import INVALID_PARAMETERS, NO_CONVERGENCE, OK
 
 TITLE = "Rotation of an axisymmetric body in a Newtonian field (Brun's problem)"
 FAMILY = "nutation"
-AUDIT = ("chebyshev",)
+AUDIT = ("chebyshev", "carlson")  # the second where the first needs too many nodes
 REFERENCES = (
     "Bekov, Shinibaev et al.: quadratures of Kobb's type, a body in a Newtonian field (errata: survey/scenes/brun.md)",
 )
