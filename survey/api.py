@@ -2,7 +2,7 @@
 
 import inspect
 import os
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -288,6 +288,8 @@ def areas(ds: xr.Dataset) -> dict[str, str]:
     rows = zip(ds.area_verdict.attrs["flag_meanings"].split(), *(ds[name].values for name in names), strict=True)
     return {name: f"{area:.12g} +- {bar:.2g} ({percent(part, off)})" for name, area, bar, part, off in rows}
 
+
+def _beside(option: Option) -> str:
     words = f"; only with {option.only_with}" if option.only_with else ""
     return words + (f"; not beside {option.said_by}, which says it" if option.said_by else "")
 
