@@ -283,7 +283,10 @@ def _compiling_ahead(scene):
     ahead = getattr(scene, "AHEAD", None)
     if ahead and jit.is_new() and cpus() > 1:
         words = f"import gc; gc.disable(); from survey.measures import {ahead}; {ahead}.compile_ahead()"
-        return subprocess.Popen([sys.executable, "-c", words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        jit.ahead = subprocess.Popen(
+            [sys.executable, "-c", words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        return jit.ahead
     return None
 
 

@@ -102,16 +102,23 @@ Peak memory of the command: {peak:.0f} MiB; asked: below 1024.
 
 | the first block is solved, after the command was given | seconds |
 |---|---|
-| on a new machine: nothing compiled; asked: 5 | {cold:.2f} |
-| in a later process; asked: 1.5 | {warm:.2f} |
+| on a new machine: nothing compiled; asked: 5 | {_spread(cold)} |
+| in a later process; asked: 1.5 | {_spread(warm)} |
 """
 
 
 def starts(command):
-    """Seconds until the first block is solved: with an empty kernel cache, and (median) with a filled one."""
-    with tempfile.TemporaryDirectory() as cache:
-        seconds = [first_block(command, cache) for _ in range(1 + REPEATS)]
-    return seconds[0], statistics.median(seconds[1:])
+    """Seconds until the first block is solved, several times: with an empty kernel cache, and with a filled one."""
+    cold, warm = [], []
+    for _ in range(REPEATS):
+        with tempfile.TemporaryDirectory() as cache:
+            cold.append(first_block(command, cache))
+            warm.append(first_block(command, cache))
+    return cold, warm
+
+
+def _spread(seconds):
+    return f"{statistics.median(seconds):.2f} ({min(seconds):.2f} to {max(seconds):.2f})"
 
 
 def first_block(command, cache):

@@ -17,7 +17,8 @@ def expand(values, matrix, place, series, doubts):
     """The series of each row of `values` (R, n) at nodes, by `matrix` (columns: [from, to]), and its `_doubt`."""
     for r in range(len(values)):
         out = series[r]
-        out[:] = 0.0
+        for j in range(len(matrix)):  # by hand: array assignments take longer to compile
+            out[j] = 0.0
         for i in range(len(matrix)):
             for j in range(len(matrix)):
                 out[j] += values[r, i] * matrix[i, j]
@@ -33,7 +34,8 @@ def transform(rows, matrix, place, out):
     n, m = rows.shape
     sizes = np.empty(n)
     for k in range(n):
-        out[k] = 0.0
+        for i in range(m):
+            out[k, i] = 0.0
         for j in range(n):
             for i in range(m):
                 out[k, i] += matrix[j, k] * rows[j, i]
@@ -49,8 +51,8 @@ def restrict(series, x, out):
     n, m = series.shape
     last, before = np.empty(m), np.empty(m)
     for r in range(len(x)):
-        last[:] = 0.0
-        before[:] = 0.0
+        for i in range(m):
+            last[i], before[i] = 0.0, 0.0
         for k in range(n - 1, 0, -1):
             for i in range(m):
                 before[i] = series[k, i] + 2.0 * x[r] * last[i] - before[i]

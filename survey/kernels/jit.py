@@ -10,6 +10,7 @@ every source that can reach a kernel, of the versions and of the CPU, so that an
 
 import hashlib
 import os
+import subprocess
 from pathlib import Path
 
 import llvmlite
@@ -60,6 +61,15 @@ event.register("numba:compile", _COMPILING)
 def is_new():
     """Has this machine compiled no kernel of these sources yet, and can it keep them?"""
     return _DIRECTORY is not None and not numba.config.DISABLE_JIT and next(_DIRECTORY.rglob("*.nbi"), None) is None
+
+
+ahead: subprocess.Popen | None = None  # a process that compiles for this one, on a new machine
+
+
+def wait_for_ahead():
+    """Wait until the process that compiles ahead has ended: it has begun sooner than this one would."""
+    if ahead is not None:
+        ahead.wait()
 
 
 def compile_seconds():

@@ -20,6 +20,7 @@ import numpy as np
 
 from survey.kernels import hill as kernels
 from survey.kernels.chebyshev import discriminants, expand, restrict, transform
+from survey.kernels.jit import wait_for_ahead
 from survey.measures import hill_effort
 from survey.measures.hill_answers import Answers, Asked
 
@@ -208,6 +209,7 @@ def _series(problem, method, rtol, rows, n, axis):
     hill_effort.solve(nodes, method, finer, own)
     values, bars = (own.floats[c].reshape(nodes.p.shape) for c in (kernels.DISCRIMINANT, kernels.DISCRIMINANT + 1))
     series, totals = np.empty(values.shape), np.empty(rows.size)
+    wait_for_ahead()
     expand(values, _transform(x.size), (abs(axis.middle) + axis.radius) / axis.radius, series, totals)
     return values, series, totals + _lebesgue(x.size) * bars.max(axis=1)
 
