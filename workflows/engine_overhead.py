@@ -19,7 +19,7 @@ from survey import engine, workflow
 from survey.dataset import now, provenance
 
 WORKFLOW = Path(__file__).with_name("satellite_prolate.toml")
-REPEATS = 3
+REPEATS = 5
 # the program, telling when its first block was solved
 FIRST_BLOCK = """
 import sys, time
