@@ -135,6 +135,12 @@ def test_kills_at_random_times_lose_and_corrupt_nothing(folder, unbroken, kills,
             same(folder, unbroken)
             (folder / "sweep.nc").unlink()
             continue
+        workers = [child for child in children if _is_worker(child)]
+        if workers and dice.random() < 0.5:  # a worker first: the run goes on, until it is killed too
+            dice.choice(workers).kill()
+            killed += 1
+            time.sleep(dice.uniform(0.0, 1.0))
+            children = begun.children(recursive=True) if running.poll() is None else []
         running.kill()
         running.wait()
         killed += 1
@@ -148,6 +154,13 @@ def test_kills_at_random_times_lose_and_corrupt_nothing(folder, unbroken, kills,
     same(folder, unbroken)
 
 
+def _is_worker(process):
+    try:
+        return "spawn_main" in " ".join(process.cmdline())
+    except psutil.NoSuchProcess:
+        return False
+
+
 def _works(process):
     try:
         return process.status() != psutil.STATUS_ZOMBIE
@@ -158,8 +171,7 @@ def _works(process):
 def test_a_killed_worker_is_replaced(folder, unbroken):
     running = start(folder, "--workers", "2")
     wait_for(lambda: len(blocks(folder)) > 3)
-    workers = [child for child in psutil.Process(running.pid).children() if "spawn_main" in " ".join(child.cmdline())]
-    workers[0].kill()
+    next(child for child in psutil.Process(running.pid).children() if _is_worker(child)).kill()
     assert running.wait(120) == 0
     same(folder, unbroken)
 
