@@ -1,11 +1,11 @@
 """Method "auto" for flows on the cylinder: closed forms where they apply and keep their digits, point by point.
 
 The rule is read off the true errors that `workflows/gyrostat_methods.py` maps (rtol = 1e-10). Of all initial states of
-a system with b = 0 a closed form serves 97 %, with a median error of 6e-16 against 2e-14 of the Taylor series and at a
-cost free of t. Next to double and triple roots (separatrices, folds) it serves 16 % of the plane, the series 85 %; on
-(61), from conservative to stiff, 55 % and 100 %. The bars tell where: so `method`, the Taylor series, is asked where no
-closed form answers or its bar misses rtol, and its answer is taken where its bar is no wider. No third method is
-needed: dop853, rk4 or full alone serve 4 points of 4776.
+a system with b = 0 a closed form serves every one on that plane, with a median error of 4e-16 against 9e-15 of the
+Taylor series and at a cost free of t. Next to double and triple roots (separatrices, folds) it serves 38 % of the
+plane, the series 84 %; on (61), from conservative to stiff, 87 % and 100 %. The bars tell where: so `method`, the
+Taylor series, is asked where no closed form answers or its bar misses rtol, and its answer is taken where its bar is no
+wider. No third method is needed: dop853, rk4 or full alone serve 5 points of 4776.
 """
 
 import numpy as np
