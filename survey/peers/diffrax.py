@@ -18,6 +18,7 @@ from survey.peers import batches
 
 POINTS = 600
 LANES = 300
+MOST_STEPS = 10_000  # beyond, a solution is lost: one that has slipped past a pole takes ever smaller steps
 
 jax.config.update("jax_enable_x64", True)
 
@@ -40,7 +41,7 @@ def _compiled(slope):
         solved = diffrax.diffeqsolve(
             diffrax.ODETerm(field), diffrax.Dopri8(), 0.0, span, None, start,
             args=parameters, stepsize_controller=diffrax.PIDController(rtol=rtol, atol=rtol),
-            saveat=diffrax.SaveAt(t1=True), max_steps=None, throw=False,
+            saveat=diffrax.SaveAt(t1=True), max_steps=MOST_STEPS, throw=False,
         )  # fmt: skip
         return [values[0] for values in solved.ys]
 
