@@ -6,6 +6,7 @@ build/docs/source/notebooks.
 
 import argparse
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -66,7 +67,9 @@ def main():
 
 
 def run(module, *arguments):
-    done = subprocess.run([sys.executable, "-m", module, *arguments], cwd=ROOT)
+    # `!survey` in a notebook is that of this environment, active or not
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+    done = subprocess.run([sys.executable, "-m", module, *arguments], cwd=ROOT, env=os.environ | {"PATH": path})
     if done.returncode:
         sys.exit(done.returncode)
 
