@@ -13,7 +13,7 @@ from survey.kernels.brun import of_state
 from survey.kernels.jit import inline, kernel
 from survey.kernels.nutation_lanes import GIVEN, GOOD, OUTPUTS, TILE, WELLS, A, B, finish, put
 
-FEW, MORE = (7, 1, 6), (30, 4, 26)  # steps of Laguerre's method and of Newton's, means
+FEW, MORE = (8, 1, 8), (30, 4, 26)  # steps of Laguerre's method and of Newton's, means
 LEFT, DONE, CANCELLED = 0, 1, 2
 
 

@@ -12,7 +12,7 @@ from survey.scenes import brun
 
 ERROR = "precession"
 MOST = {"chebyshev": 200}  # points that a slow method is timed on
-_POINTS = 30_000
+_POINTS = 100_000  # as in a block of a map
 _STATE = ("A", "C", "epsilon", "theta0", "p_theta0", "p_psi", "p_phi")
 # the family of references of each work and its least distance: nearer a pole some peers do not come to an end
 _WORKS = {
