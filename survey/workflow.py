@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, Validatio
 
 import survey.methods
 from survey import modules, own
-from survey.errors import BadInput
+from survey.errors import BadInput, Stopped
 from survey.grid import Grid, check_axis, coordinates
 from survey.scene import Request, condition, exists
 
@@ -342,7 +342,7 @@ def _fits(method, options):
 
 
 def check_path(path):
-    """The output path; raises BadInput unless a file can be made there."""
+    """The output path; raises BadInput unless a file can be made there, Stopped where the disk is read-only."""
     if not str(path):
         raise BadInput("output.path is empty; name a file, such as 'map.nc'")
     path = Path(path)
@@ -356,6 +356,11 @@ def check_path(path):
     if not folder.is_dir():
         raise BadInput(
             f"output.path = {str(path)!r}: there is no folder {str(folder)!r}; make it first, or use -o OUT.nc"
+        )
+    if os.statvfs(folder).f_flag & os.ST_RDONLY:
+        raise Stopped(
+            f"output.path = {str(path)!r}: the disk of the folder {str(folder)!r} is read-only; make it writable and "
+            "run the command again, or use -o OUT.nc"
         )
     if not os.access(folder, os.W_OK | os.X_OK) or str(folder.resolve()).startswith(("/proc", "/sys")):
         raise BadInput(f"output.path = {str(path)!r}: the folder {str(folder)!r} cannot be written to; use -o OUT.nc")

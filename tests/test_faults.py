@@ -88,7 +88,7 @@ def test_a_fault_at_a_call_that_writes_loses_nothing(whole, tmp_path, what, ever
         assert {file.name for file in folder.iterdir()} == {"sweep.toml", "sweep.nc", "sweep.nc.sha256"}, at
 
 
-def test_a_disk_that_is_read_only_is_refused_before_any_work(tmp_path):
+def test_a_disk_that_is_read_only_stops_the_run_before_any_work(tmp_path):
     disk = tmp_path / "disk"
     disk.mkdir()
     if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=20m", "none", disk], capture_output=True).returncode:
@@ -97,8 +97,8 @@ def test_a_disk_that_is_read_only_is_refused_before_any_work(tmp_path):
         (disk / "sweep.toml").write_text(SWEEP)
         subprocess.run(["mount", "-o", "remount,ro", disk], check=True)
         refused = run(disk)
-        assert refused.returncode == 2 and refused.stderr.count("\n") == 1, refused.stderr
-        assert "cannot be written to" in refused.stderr and list(disk.iterdir()) == [disk / "sweep.toml"]
+        assert refused.returncode == 4 and refused.stderr.count("\n") == 1, refused.stderr
+        assert "is read-only" in refused.stderr and list(disk.iterdir()) == [disk / "sweep.toml"]
         subprocess.run(["mount", "-o", "remount,rw", disk], check=True)
         assert run(disk).returncode == 0
     finally:
