@@ -81,7 +81,21 @@ def cluster():
         yield cluster
 
 
-def test_a_cluster_ends_every_number_and_survives_deaths(cluster, tmp_path):
+@pytest.fixture
+def in_time():
+    """A cluster that loses every worker waits for new ones for ever: the test fails instead."""
+
+    def late(*_):
+        raise TimeoutError("the cluster has not ended within three minutes")
+
+    before = signal.signal(signal.SIGALRM, late)
+    signal.alarm(180)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+def test_a_cluster_ends_every_number_and_survives_deaths(cluster, in_time, tmp_path):
     def deadly(number):
         once = tmp_path / f"killed-{number}"
         if number == 4 or (number == 7 and not once.exists()):
