@@ -4,6 +4,7 @@ A task is called once for each number; `finished(done, result)` hears of each as
 `died(number)` is called in its place where a task has killed its worker DEATHS times.
 """
 
+import contextlib
 import itertools
 import logging
 import multiprocessing
@@ -21,6 +22,7 @@ from survey.errors import BadInput, Stopped, SurveyError
 
 DEATHS = 3
 SCHEDULER_SECONDS = 10
+WORKERLESS_SECONDS = 60
 
 
 def cpus():
@@ -73,20 +75,40 @@ def on_cluster(task, numbers, finished, died, client):
     done = itertools.count(1)
     finished(0)
     futures = dict(zip(client.map(task, numbers, pure=False, allow_other_workers=False), numbers, strict=True))
-    for future in as_completed(list(futures)):
-        try:
-            result = future.result()
-        except KilledWorker:
-            result = died(futures[future])
-        except SurveyError:
-            raise
-        except Exception as error:
-            raise Stopped(
-                f"the dask cluster at {address} failed ({_brief(error)}); start one and run the command again to go on"
-            ) from None
-        del futures[future]
-        future.release()
-        finished(next(done), result)
+    with _watched(client):
+        for future in as_completed(list(futures)):
+            try:
+                result = future.result()
+            except KilledWorker:
+                result = died(futures[future])
+            except SurveyError:
+                raise
+            except Exception as error:
+                told = f"the dask cluster at {address} failed ({_brief(error)})"
+                raise Stopped(f"{told}; start one and run the command again to go on") from None
+            del futures[future]
+            future.release()
+            finished(next(done), result)
+
+
+@contextlib.contextmanager
+def _watched(client):
+    """Say so now and then where the cluster has no workers: dask waits, as a batch queue may yet start some."""
+    ended = threading.Event()
+
+    def watch():
+        while not ended.wait(WORKERLESS_SECONDS):
+            with contextlib.suppress(OSError, TimeoutError, ValueError):
+                if not client.nthreads():
+                    where = client.scheduler.address
+                    words = "the dask cluster at %s has no workers; waiting for some (dask worker %s starts one)"
+                    logging.getLogger("survey").warning(words, where, where)
+
+    threading.Thread(target=watch, daemon=True).start()
+    try:
+        yield
+    finally:
+        ended.set()
 
 
 def client_of(address):

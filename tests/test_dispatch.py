@@ -2,6 +2,7 @@
 
 import os
 import signal
+import threading
 import time
 
 import pytest
@@ -109,6 +110,24 @@ def test_a_cluster_ends_every_number_and_survives_deaths(cluster, in_time, tmp_p
     assert 4 in heard.dead and sorted(heard.counts) == list(range(13))
     innocent = {n * n for n in NUMBERS if n not in heard.dead}
     assert innocent <= set(heard.results)
+
+
+def test_a_cluster_without_workers_is_told_and_waited_for(in_time, monkeypatch, caplog):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(dispatch, "WORKERLESS_SECONDS", 0.2)
+    heard = Heard()
+    with distributed.LocalCluster(n_workers=0, processes=False, dashboard_address=None) as empty:
+        with dispatch.client_of(empty.scheduler_address) as client:
+            run = threading.Thread(
+                target=dispatch.on_cluster, args=(abs, range(3), heard.finished, heard.died, client), daemon=True
+            )
+            run.start()
+            while "has no workers; waiting for some" not in caplog.text:
+                time.sleep(0.05)
+            assert empty.scheduler_address in caplog.text and heard.results == []
+            empty.scale(1)
+            run.join()
+    assert sorted(heard.results) == [0, 1, 2]
 
 
 def test_no_scheduler_is_told_in_one_line(monkeypatch):
