@@ -116,7 +116,7 @@ def client_of(address):
     try:
         from dask.distributed import Client
     except ImportError:
-        raise BadInput("--scheduler needs dask.distributed: pip install 'survey[cluster]'") from None
+        raise BadInput("--scheduler needs dask.distributed: pip install distributed") from None
     try:
         where = {"scheduler_file": address} if os.path.exists(address) else {"address": address}
         client = Client(**where, timeout=SCHEDULER_SECONDS)

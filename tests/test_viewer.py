@@ -25,9 +25,7 @@ from survey.viewer.shown import Map
 
 ROOT = Path(__file__).parent.parent
 MAP = ROOT / "results/satellite_prolate_small.nc"
-served = pytest.mark.skipif(
-    not importlib.util.find_spec("bokeh"), reason="bokeh is missing (pip install 'survey[view]')"
-)
+served = pytest.mark.skipif(not importlib.util.find_spec("bokeh"), reason="bokeh is missing (pip install bokeh)")
 browsed = pytest.mark.skipif(bool(picture.missing()), reason=f"no browser: missing {picture.missing()}")
 FLAGS = {"flag_values": np.array([-1, 0, 1, 2], np.int8), "flag_meanings": "undecided unstable stable marginal"}
 
@@ -282,7 +280,7 @@ def test_without_its_package_the_command_names_it(tmp_path):
     done = subprocess.run([sys.executable, "-c", blocked], cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (
         2,
-        "survey: survey view needs the package bokeh: pip install 'survey[view]'\n",
+        "survey: survey view needs the package bokeh: pip install bokeh\n",
     )
 
 

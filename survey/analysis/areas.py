@@ -30,7 +30,9 @@ def of_map(ds):
     kept = [i for i, name in enumerate(codes) if most[i] > 0 or name == "undecided"]
     bar = np.where(most > 0, np.maximum(most - area, area - least) + 1e-13 * total, 0.0)
     units = " ".join(u for u in (ds[dim].attrs.get("units", "1") for dim in ds.status.dims) if u != "1") or "1"
-    return _described([list(codes)[i] for i in kept], area[kept], bar[kept], total, units, COMMENT)
+    found = _described([list(codes)[i] for i in kept], area[kept], bar[kept], total, units, COMMENT)
+    found.attrs["areas"] += "; from points: what is narrower than their spacing is not seen ([refine] bounds it)"
+    return found
 
 
 def _of_cells(ds):
@@ -56,7 +58,8 @@ def _counted(ds, codes):
         some = {dims[0]: slice(first, first + step + 1)}
         verdict = ds.verdict.transpose(*dims).isel(some).values
         state = ds.status.isel(some).values
-        verdict = np.where(np.isin(state, [*status.FAILURES, status.INVALID_PARAMETERS]), NO_ANSWER, verdict)
+        unanswered = np.isin(state, [*status.FAILURES, status.INVALID_PARAMETERS])
+        verdict = np.where(unanswered | ((state != status.OK) & (verdict < 0)), NO_ANSWER, verdict)
         own = [widths[0][first : first + step], *widths[1:]]
         cell = np.ones(())
         for width in own:

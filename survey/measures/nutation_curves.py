@@ -210,7 +210,7 @@ def _joined(found, square, axes):
     places = np.stack([all_of(name, 0) for name in axes], axis=-1)
     bars = np.stack([all_of(name, 1) for name in axes], axis=-1)
     ends = _positive(np.stack([square.low, square.high]), square)
-    ratios = np.log(np.where(square.log, ends[1] / ends[0], 1.0))
+    ratios = np.log(np.divide(ends[1], ends[0], out=np.ones(2), where=square.log))
     width = np.where(square.log, ratios * abs(places), square.high - square.low)
     return Curves(
         count=np.array([here["l"][0].size for _, here in found], int),

@@ -39,7 +39,7 @@ class Page:
         self._plot()
         self._side()
         document.add_root(row(self.plot, self.side, sizing_mode="stretch_both"))
-        document.title = html.escape(shown.ds.attrs["title"])
+        document.title = shown.ds.attrs["title"]
         if self.curves:
             self._fill()
         self.changed()

@@ -25,7 +25,7 @@ try:
     from survey.viewer.page import Page
 except ModuleNotFoundError as error:
     needed = error.name.partition(".")[0]
-    raise BadInput(f"survey view needs the package {needed}: pip install 'survey[view]'") from None
+    raise BadInput(f"survey view needs the package {needed}: pip install {needed}") from None
 
 HOST = "127.0.0.1"  # loopback: no other machine reaches it
 
