@@ -12,7 +12,7 @@ import xarray as xr
 from survey import own, status
 from survey import workflow as workflows
 from survey.api import evaluate
-from survey.dataset import outputs_of
+from survey.dataset import options_of, outputs_of
 from survey.measures.hill_edges import FACTORS
 from survey.scene import Request, exists
 
@@ -25,7 +25,7 @@ def audit(ds, points, seed=0):
     """
     name = own.of_dataset(ds)
     _, module = own.find(name)
-    options = dict(pair.split("=") for pair in ds.attrs["options"].split(", ") if pair)
+    options = options_of(ds)
     others = [m for m in workflows.methods_of(module, options) if m != ds.attrs["method"]]
     used = [m for m in module.AUDIT if m in others] or others[:1]
     report = {"points": 0, "silent": 0, "edges": 0, "cells": 0, "method": " and ".join(used), "complaints": []}
@@ -36,11 +36,11 @@ def audit(ds, points, seed=0):
     arrays = {key: xr.DataArray(values, dims="_point") for key, values in given.items()}
     outputs = outputs_of(module, Request(options, variables=frozenset(flat.data_vars)))
     answered = np.zeros(flat.status.size, bool)
+    decided = any(o.name == "verdict" and exists(o, options) for o in module.OUTPUTS)
     rtol, wanted = max(ds.attrs["rtol"] / 100, 1e-13), [o.name for o in outputs]
     for method in used:
         again = evaluate(name, method=method, rtol=rtol, variables=wanted, **options, **arrays).transpose("_point", ...)
         answered |= (again.status == status.OK).values | (again.status == flat.status).values
-        decided = any(o.name == "verdict" and exists(o, options) for o in module.OUTPUTS)
         for output, wrong, told in _differences(flat, again, outputs, decided):
             for i in np.flatnonzero(wrong.reshape(len(wrong), -1).any(axis=1)):
                 report["complaints"].append(f"{output} at {_place(given, i)}: {told(i)}, by {method}")

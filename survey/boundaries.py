@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from survey import measures, modules
-from survey.dataset import meaning
+from survey.dataset import flag_attributes, meaning
 from survey.grid import logarithmic
 from survey.measures import hill_curves, hill_edges, hill_folds, hill_look
 from survey.scene import Request
@@ -256,8 +256,7 @@ def _class(kind):
 
 
 def _flags(title, classes, kind):
-    codes = {"flag_values": np.array(list(classes.values()), np.int8), "flag_meanings": " ".join(classes)}
-    return kind.astype(np.int8), codes | {"long_name": title, "units": "1"}
+    return kind.astype(np.int8), flag_attributes(classes) | {"long_name": title, "units": "1"}
 
 
 def _index(index):

@@ -106,7 +106,7 @@ class Tally:
     """
 
     def __init__(self, flags, rtol):
-        self.codes = {name: _codes(meaning) for name, meaning in flags.items()}
+        self.codes = {name: flag_codes(meaning) for name, meaning in flags.items()}
         self.counts = {name: dict.fromkeys(codes, 0) for name, codes in self.codes.items()}
         self.rtol = rtol
         self.points = self.missed = 0
@@ -163,12 +163,17 @@ def count(ds):
 def counts(variable):
     """{flag meaning: number of points} of a CF flag variable."""
     values = variable.values
-    return {name: int(np.count_nonzero(values == code)) for name, code in _codes(variable.attrs).items()}
+    return {name: int(np.count_nonzero(values == code)) for name, code in flag_codes(variable.attrs).items()}
 
 
-def _codes(meaning):
-    """{flag meaning: code} from a variable's attributes."""
+def flag_codes(meaning):
+    """{flag meaning: code} from the attributes of a CF flag variable."""
     return dict(zip(meaning["flag_meanings"].split(), np.atleast_1d(meaning["flag_values"]).tolist(), strict=True))
+
+
+def options_of(ds):
+    """{name: value} of the scene's options."""
+    return dict(pair.split("=") for pair in ds.attrs["options"].split(", ") if pair)
 
 
 def error_bars(ds):
@@ -247,7 +252,7 @@ def meaning(output):
     attributes = {"long_name": output.long_name, "coverage_content_type": "modelResult"}
     attributes |= {"units": output.units, "symbol": output.symbol or output.name}
     if output.flags is not None:
-        attributes |= _flags(output.flags)
+        attributes |= flag_attributes(output.flags)
     if output.dtype.kind == "f":
         attributes["ancillary_variables"] = f"{output.name}_error"
     comment = [output.applies] if output.applies else []
@@ -263,7 +268,8 @@ def fill_of(variable):
     return int(told[1]) if told else None
 
 
-def _flags(codes):
+def flag_attributes(codes):
+    """The attributes of a CF flag variable, from {flag meaning: code}."""
     return {"flag_values": np.array(list(codes.values()), np.int8), "flag_meanings": " ".join(codes)}
 
 
@@ -274,6 +280,6 @@ def _status_attributes(scene):
         "coverage_content_type": "qualityInformation",
         "units": "1",
         "symbol": "status",
-        **_flags({name: code for name, (code, _) in table.items()}),
+        **flag_attributes({name: code for name, (code, _) in table.items()}),
         "comment": "; ".join(f"{name}: {sentence}" for name, (_, sentence) in table.items()),
     }

@@ -19,7 +19,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from survey import modules, status
-from survey.dataset import percent
+from survey.dataset import flag_codes, percent
 from survey.errors import BadInput
 from survey.grid import logarithmic
 
@@ -139,9 +139,9 @@ def _map(axes, ds, variable, state, boundaries, paper):
         shown = np.where((failed | outside)[some], np.nan, variable[some].values.astype(float))
         shown = np.ma.masked_invalid(shown)
         look = {"cmap": "viridis", "shading": "nearest", "rasterized": True}
-        drawn = axes.pcolormesh(x[some[0]], y[some[1]], shown.T, **look, **_limits(shown))
+        drawn = axes.pcolormesh(x[some[0]], y[some[1]], shown.T, **look, **limits(shown))
         whole = MaxNLocator(integer=True) if variable.dtype.kind == "i" else None
-        axes.figure.colorbar(drawn, ax=axes, label=_label(variable), ticks=whole)
+        axes.figure.colorbar(drawn, ax=axes, label=label_of(variable), ticks=whole)
         axes.set_facecolor("#dddddd")
         handles = _marks(axes, x, y, failed, "failed", paper) + _marks(axes, x, y, outside, "outside the domain", paper)
         handles += [Patch(color="#dddddd", label="does not apply")] if shown.mask.any() else []
@@ -150,7 +150,7 @@ def _map(axes, ds, variable, state, boundaries, paper):
     if handles:
         _legend(axes, handles, paper)
     for axis, coord in ((axes.xaxis, x), (axes.yaxis, y)):
-        axis.set_label_text(_label(coord))
+        axis.set_label_text(label_of(coord))
         if logarithmic(coord.values):
             (axes.set_xscale if axis is axes.xaxis else axes.set_yscale)("log")
 
@@ -169,7 +169,7 @@ def in_plane(ds, variable):
 
 def curves_of(ds):
     """{class: slices of its curves in `curve_point`}, in the order in which they are drawn."""
-    names = {code: name for name, code in _flags(ds.curve_class).items()}
+    names = {code: name for name, code in flag_codes(ds.curve_class.attrs).items()}
     kinds, ends = ds.curve_class.values, np.cumsum(ds.curve_count.values)
     found = {}
     for kind, last, number in zip(kinds, ends, ds.curve_count.values, strict=True):
@@ -198,11 +198,11 @@ def _cells(axes, ds, x, y, failed, paper):
     """The map's cells instead of its points, with the area of each verdict. Returns the handles."""
     left, right, low, high = (ds[f"cell_{axis.name}_{end}"].values for axis in (x, y) for end in ("low", "high"))
     corners = np.stack([left, low, left, high, right, high, right, low], axis=1).reshape(-1, 4, 2)
-    table = _flags(ds.cell_verdict)
-    shares = dict(zip(_flags(ds.area_verdict), ds.area_fraction.values, strict=True))
+    table = flag_codes(ds.cell_verdict.attrs)
+    shares = dict(zip(flag_codes(ds.area_verdict.attrs), ds.area_fraction.values, strict=True))
     handles = []
     for name, code in reversed(table.items()):
-        own, colour = ds.cell_verdict.values == code, _palette(table)[name]
+        own, colour = ds.cell_verdict.values == code, colours_of(table)[name]
         # without smoothing there are no seams between neighbours; a hairline keeps small undecided cells in sight
         line = {"edgecolors": "none", "antialiased": False}
         line = {"edgecolors": colour, "lw": 0.4, "snap": False} if name == "undecided" else line
@@ -220,8 +220,8 @@ def _cells(axes, ds, x, y, failed, paper):
 
 def _verdicts(axes, x, y, variable, failed, outside, paper):
     """A colour per flag; failed and outside points white and hatched; rare points ringed. Returns the handles."""
-    table = _flags(variable)
-    palette = _palette(table)
+    table = flag_codes(variable.attrs)
+    palette = colours_of(table)
     codes = sorted(table.values())
     names = {code: name for name, code in table.items()}
     cmap = ListedColormap([palette.get(names[code], "#444444") for code in codes])
@@ -278,13 +278,7 @@ def _thinned(variable):
     return tuple(slice(None, None, -(-size // CELLS)) for size in variable.shape)
 
 
-def _flags(variable):
-    """{meaning: code} of a CF flag variable."""
-    codes = np.atleast_1d(variable.attrs["flag_values"])
-    return dict(zip(variable.attrs["flag_meanings"].split(), codes, strict=True))
-
-
-def _palette(table):
+def colours_of(table):
     """A colour per meaning; "ok" takes that of stable."""
     meant = [name for name in table if name not in ("undecided", "ok")]
     first = [c for c in COLOURS if "ok" not in table or c != COLOURS[1]]
@@ -321,12 +315,12 @@ def _widened(values):
 def _curve(axes, ds, variable, state, paper):
     x = variable[variable.dims[0]]
     if "flag_values" in variable.attrs:
-        palette = _palette(_flags(variable))
-        for height, (name, code) in enumerate(_flags(variable).items()):
+        palette = colours_of(flag_codes(variable.attrs))
+        for height, (name, code) in enumerate(flag_codes(variable.attrs).items()):
             here = x.values[variable.values == code]
             colour = palette.get(name, "#444444")
             axes.plot(here, np.full(here.size, height), "s", markersize=4, color=colour)
-        names = [name.replace("_", " ") for name in _flags(variable)]
+        names = [name.replace("_", " ") for name in flag_codes(variable.attrs)]
         axes.set_yticks(range(len(names)), names, fontsize=8)
     else:
         label = textwrap.fill(variable.attrs.get("long_name", variable.name), 60)
@@ -335,10 +329,10 @@ def _curve(axes, ds, variable, state, paper):
     if f"{variable.name}_error" in ds:
         bar = ds[f"{variable.name}_error"].isel({d: 0 for d in ds[variable.name].dims if d not in variable.dims})
         axes.fill_between(x, variable - bar, variable + bar, color="#56B4E9", alpha=0.5, lw=0, label="error bar")
-    bad = np.isin(state.values, [*status.FAILURES, status.INVALID_PARAMETERS])
+    bad = np.isin(state.values, list(status.UNANSWERED))
     if bad.any():
         axes.plot(x.values[bad], np.full(bad.sum(), axes.get_ylim()[0]), "x", color="#D55E00", label="no answer")
-    axes.set(xlabel=_label(x), ylabel=_label(variable))
+    axes.set(xlabel=label_of(x), ylabel=label_of(variable))
     handles = axes.get_legend_handles_labels()[0]
     if handles and paper:
         _legend(axes, handles, paper)
@@ -359,7 +353,7 @@ def _legend(axes, handles, paper):
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), **look)
 
 
-def _limits(shown):
+def limits(shown):
     """Colour limits that a few far values, or a plain of zeros, do not spoil."""
     values = shown.compressed()
     values = values[values != 0] if (values == 0).any() and (values >= 0).all() else values
@@ -370,7 +364,7 @@ def _limits(shown):
     return {"vmin": low, "vmax": high} if high > low else {}
 
 
-def _label(variable):
+def label_of(variable):
     """`long name, symbol (unit)`."""
     symbol, units = variable.attrs.get("symbol", ""), variable.attrs.get("units", "1")
     text = variable.attrs.get("long_name", variable.name)

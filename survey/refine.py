@@ -10,7 +10,7 @@ from itertools import count, pairwise
 import numpy as np
 import xarray as xr
 
-from survey.dataset import percent, round_up
+from survey.dataset import flag_attributes, percent, round_up
 from survey.errors import BadInput
 from survey.measures import hill, hill_cells
 from survey.measures.hill_edges import FACTORS
@@ -146,8 +146,8 @@ def _describe(workflow, found, points):
     flags = {key: code for key, code in hill.VERDICTS.items() if key != "marginal"}
     variables["cell_verdict"] = ("cell", verdict, {
         "long_name": "stability everywhere in the cell", "units": "1",
-        "flag_values": np.array(list(flags.values()), np.int8), "flag_meanings": " ".join(flags),
-        "comment": "undecided: an edge of a tongue may lie in it, or the verdict could not be shown"})  # fmt: skip
+        "comment": "undecided: an edge of a tongue may lie in it, or the verdict could not be shown",
+        **flag_attributes(flags)})  # fmt: skip
     total = sum(cells.total for cells in found)
     least = np.array([sum(getattr(cells, name) for cells in found) for name in LABELS])
     bar = 0.5 * max(0.0, total - least.sum())

@@ -18,7 +18,7 @@ import viewer as picture
 import xarray as xr
 
 from survey import status
-from survey.analysis.point import _told
+from survey.analysis.point import reading
 from survey.errors import BadInput
 from survey.viewer import raster
 from survey.viewer.shown import Map
@@ -147,7 +147,7 @@ def test_a_link_tells_its_view():
     lines = list(shown.under(view, view.point))
     ds = xr.open_dataset(MAP).isel(k=3, rho=5)
     assert lines[0] == f"k = {float(ds.k):.8g}, rho = {float(ds.rho):.8g}"
-    assert lines[1] == f"exponent = {_told(ds, 'exponent', True)}".replace("+-", "±") and "±" in lines[1]
+    assert lines[1] == f"exponent = {reading(ds, 'exponent', True)}".replace("+-", "±") and "±" in lines[1]
 
 
 def test_a_falling_axis_is_drawn_rising(tmp_path):

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from survey import status
-from survey.dataset import percent
+from survey.dataset import flag_codes, percent
 from survey.errors import BadInput
 
 NO_ANSWER = -2
@@ -23,7 +23,7 @@ def of_map(ds):
         raise BadInput("this survey has no verdict, so there are no areas of it")
     if not ds.status.dims or min(ds.status.shape) < 2:
         raise BadInput("areas: every axis needs two values or more; slice the others away")
-    codes = dict(zip(ds.verdict.attrs["flag_meanings"].split(), ds.verdict.attrs["flag_values"].tolist(), strict=True))
+    codes = flag_codes(ds.verdict.attrs)
     codes["no_answer"] = NO_ANSWER
     area, least, most = _counted(ds, list(codes.values()))
     total = area.sum()
@@ -37,7 +37,7 @@ def of_map(ds):
 
 def _of_cells(ds):
     """The areas of decided cells; what is left is undecided, all or none of it an area of either verdict."""
-    names = ds.area_verdict.attrs["flag_meanings"].split()
+    names = list(flag_codes(ds.area_verdict.attrs))
     share = ds.area_fraction.values
     total = float(ds.area.values[share.argmax()] / share.max())
     bar = ds.area_error.values.astype(float)
@@ -58,8 +58,9 @@ def _counted(ds, codes):
         some = {dims[0]: slice(first, first + step + 1)}
         verdict = ds.verdict.transpose(*dims).isel(some).values
         state = ds.status.isel(some).values
-        unanswered = np.isin(state, [*status.FAILURES, status.INVALID_PARAMETERS])
-        verdict = np.where(unanswered | ((state != status.OK) & (verdict < 0)), NO_ANSWER, verdict)
+        verdict = np.where(
+            np.isin(state, list(status.UNANSWERED)) | ((state != status.OK) & (verdict < 0)), NO_ANSWER, verdict
+        )
         own = [widths[0][first : first + step], *widths[1:]]
         cell = np.ones(())
         for width in own:

@@ -4,6 +4,7 @@ import numpy as np
 import xarray as xr
 
 from survey import modules
+from survey.dataset import flag_codes
 from survey.errors import BadInput
 
 
@@ -19,7 +20,7 @@ def find(ds, kind=None, index=None):
         if asked is not None and name not in found:
             raise BadInput(f"{name}: the file holds no boundary that has one; run the workflow with [boundaries]")
     if kind is not None:
-        classes = dict(zip(found.kind.attrs["flag_meanings"].split(), found.kind.attrs["flag_values"], strict=True))
+        classes = flag_codes(found.kind.attrs)
         if kind not in classes:
             raise BadInput(modules.unknown("kind", kind, list(classes)))
         found = found.isel(place=np.flatnonzero(found.kind.values == classes[kind]))

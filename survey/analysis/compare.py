@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 
 from survey.analysis.point import of_points
-from survey.dataset import error_bars
+from survey.dataset import error_bars, flag_attributes
 from survey.errors import BadInput
 
 VERDICTS = {"same": 0, "one_undecided": 1, "differ": 2}
@@ -78,8 +78,8 @@ def _outputs(one, other):
 def _verdicts(one, other):
     open_ = (one == -1) | (other == -1)
     code = xr.where(one == other, VERDICTS["same"], xr.where(open_, VERDICTS["one_undecided"], VERDICTS["differ"]))
-    flags = {"flag_values": np.array(list(VERDICTS.values()), np.int8), "flag_meanings": " ".join(VERDICTS)}
-    return code.astype(np.int8).assign_attrs(long_name="do the verdicts differ", units="1", **flags)
+    meaning = {"long_name": "do the verdicts differ", "units": "1"} | flag_attributes(VERDICTS)
+    return code.astype(np.int8).assign_attrs(meaning)
 
 
 def _unlike(one, other):

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from survey import modules, own, status
-from survey.dataset import error_bars, fill_of
+from survey.dataset import error_bars, fill_of, flag_codes, options_of
 from survey.errors import BadInput
 
 # Attributes that tell of a whole file.
@@ -59,19 +59,13 @@ def place(ds, coords):
 
 def meaning(variable):
     """The word of a flag's code, of a single value."""
-    codes = np.atleast_1d(variable.attrs["flag_values"]).tolist()
-    words = variable.attrs["flag_meanings"].split()
-    return dict(zip(codes, words, strict=True)).get(int(variable), str(int(variable)))
+    words = {code: word for word, code in flag_codes(variable.attrs).items()}
+    return words.get(int(variable), str(int(variable)))
 
 
 def parameters(ds):
     """{name: value} of a point's parameters."""
     return {name: float(c) for name, c in ds.coords.items() if c.ndim == 0 and c.dtype.kind in "fi"}
-
-
-def options(ds):
-    """{name: value} of the scene's options."""
-    return dict(pair.split("=") for pair in ds.attrs["options"].split(", ") if pair)
 
 
 @dataclass(frozen=True, repr=False)
@@ -103,10 +97,10 @@ class Point:
         """What decided the verdict, by which margin against which error bar; or why there is no answer."""
         ds = self.dataset
         if int(ds.status) != status.OK:
-            return _sentence(ds)
+            return sentence(ds)
         judge = getattr(_scene(ds), "why", None)
         if judge is None or "verdict" not in ds:
-            return _sentence(ds)
+            return sentence(ds)
         try:
             return judge(values(ds))
         except KeyError as missing:
@@ -135,7 +129,7 @@ class Point:
         yield "why", self.why, ""
         if int(ds.status) == status.OK:
             yield "status", "ok", ""
-        told = [f"{key} = {value}" for key, value in options(ds).items()]
+        told = [f"{key} = {value}" for key, value in options_of(ds).items()]
         told += [f"method {ds.attrs.get('method', 'auto')}", f"rtol {ds.attrs.get('rtol', float('nan')):g}"]
         yield "solved with", ", ".join(told), ""
         for name, value in self.parameters.items():
@@ -163,7 +157,7 @@ def _scene(ds):
         return None
 
 
-def _sentence(ds):
+def sentence(ds):
     """What the status says of the point."""
     said = dict(part.split(": ", 1) for part in ds.status.attrs.get("comment", "").split("; ") if ": " in part)
     word = meaning(ds.status)
@@ -174,16 +168,16 @@ def _outputs(ds, name, variable, has_bar):
     """The rows of an output: one, or one for each place of its own dimension that has a value."""
     about = _about(variable)
     if not variable.ndim:
-        yield name, _told(ds, name, has_bar), about
+        yield name, reading(ds, name, has_bar), about
         return
     label = variable.dims[0]
     for i in range(ds.sizes[label]):
-        value = _told(ds.isel({label: i}), name, has_bar)
+        value = reading(ds.isel({label: i}), name, has_bar)
         if value not in ("does not apply", "none"):
             yield f"{name}[{ds[label].values[i]}]", value, about
 
 
-def _told(ds, name, has_bar):
+def reading(ds, name, has_bar):
     """A value, to the digits that its error bar leaves it."""
     variable = ds[name]
     if "flag_values" in variable.attrs:

@@ -6,7 +6,7 @@ cylinder among its neighbours; `plane x y`, a path; `sphere x y z`, a path on th
 
 import numpy as np
 
-from survey.figures import COLOURS, _label
+from survey.figures import COLOURS, label_of
 
 LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 GREY = "#999999"
@@ -28,7 +28,7 @@ def _lines(axes, ds, x, *names):
         axes.fill_between(ds[x], value - bar, value + bar, color=colour, alpha=0.3, lw=0)
     if min(axes.get_ylim()) < 0 < max(axes.get_ylim()):
         axes.axhline(0.0, color=GREY, lw=0.6, zorder=0)
-    axes.set(xlabel=_label(ds[x]), ylabel=_label(ds[names[0]]) if len(names) == 1 else "")
+    axes.set(xlabel=label_of(ds[x]), ylabel=label_of(ds[names[0]]) if len(names) == 1 else "")
     if len(names) > 1:
         axes.legend(fontsize=8, frameon=False)
 
@@ -66,7 +66,7 @@ def _cylinder(axes, ds, x, y):
     size = 1.3 * max(1.0, np.nanmax(np.abs(ds[y].values), initial=0))
     axes.set_ylim(-min(size, 50), min(size, 50))
     axes.set_xticks(np.arange(5) * np.pi / 2, ["0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$"])
-    axes.set(xlabel=f"${ds[x].attrs['symbol']}$ mod $2\\pi$ (rad)", ylabel=_label(ds[y]))
+    axes.set(xlabel=f"${ds[x].attrs['symbol']}$ mod $2\\pi$ (rad)", ylabel=label_of(ds[y]))
 
 
 def _wrapped(angle, value):

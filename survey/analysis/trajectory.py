@@ -4,7 +4,8 @@ import numpy as np
 import xarray as xr
 
 from survey import api, own
-from survey.analysis.point import options, parameters, values
+from survey.analysis.point import parameters, values
+from survey.dataset import options_of
 from survey.errors import BadInput
 from survey.scene import exists
 
@@ -17,7 +18,7 @@ def solve(point, time=None):
     make = getattr(scene, "trajectory", None)
     if make is None:
         raise BadInput(f"the scene {name} has no trajectory; it would be a function of that name in its file")
-    given, chosen = parameters(point), options(point)
+    given, chosen = parameters(point), options_of(point)
     needed = {o.name for o in scene.OUTPUTS if exists(o, chosen)}
     known = point if needed <= set(point) else api.evaluate(own.of_dataset(point), **given, **chosen)
     found = make(given, values(known), chosen, time)

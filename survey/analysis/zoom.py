@@ -5,8 +5,7 @@ import tomllib
 import numpy as np
 
 from survey import api, engine, modules, own, workflow
-from survey.analysis.point import options
-from survey.dataset import count, describe
+from survey.dataset import count, describe, options_of
 from survey.errors import BadInput
 from survey.grid import coordinates, logarithmic
 
@@ -41,7 +40,7 @@ def _workflow(ds, ranges, num):
     """The workflow as a mapping: that in the file, or what the attributes say, with other axes."""
     data = tomllib.loads(ds.attrs["workflow"]) if "workflow" in ds.attrs else {}
     data |= {"title": f"{ds.attrs.get('title', '')}, a part".lstrip(", "), "scene": own.of_dataset(ds)}
-    data |= {"options": options(ds), "axes": _axes(ds, ranges, num)}
+    data |= {"options": options_of(ds), "axes": _axes(ds, ranges, num)}
     data |= {"solver": {"method": ds.attrs["method"], "rtol": float(ds.attrs["rtol"])}}
     known = {o.name for o in own.find(data["scene"])[1].OUTPUTS}
     data["output"] = {"variables": [name for name in ds.data_vars if name in known]}

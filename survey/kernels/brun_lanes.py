@@ -10,7 +10,7 @@ from survey.kernels import double as dd
 from survey.kernels import nutation_fine
 from survey.kernels import nutation_lanes as nl
 from survey.kernels.brun import of_state
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.nutation_lanes import GIVEN, GOOD, OUTPUTS, TILE, WELLS, A, B, finish, put
 
 FEW, MORE = (8, 1, 8), (30, 4, 26)  # steps of Laguerre's method and of Newton's, means
@@ -94,28 +94,28 @@ def tell_integrals(work, told):
         finish(work, 1.0, work[A + i] * ((1.0 - ratio) / ratio), i, told)
 
 
+@splice
+def answer(polynomials, tell, points, steps, exactly, actions, out, wells, done):
+    """Tile after tile: the polynomials of its points, their wells, and what is told of these."""
+    work, told = np.zeros(nutation_fine.ALL), np.empty(OUTPUTS * TILE)
+    for first in range(0, len(done), TILE):
+        enter(points, first, work)
+        polynomials(work)
+        solve(work, steps, exactly, actions)
+        tell(work, told)
+        leave(work, told, first, out, wells, done)
+
+
 @kernel
 def of_states(points, steps, exactly, actions, out, wells, done):
     """Outputs (OUTPUTS, n) of initial states (GIVEN, n), the numbers of wells (n), and which are DONE (n).
 
     exactly: CANCELLED ones too; actions: accurate ones of small wells.
     """
-    work, told = np.zeros(nutation_fine.ALL), np.empty(OUTPUTS * TILE)
-    for first in range(0, len(done), TILE):
-        enter(points, first, work)
-        states(work)
-        solve(work, steps, exactly, actions)
-        tell_states(work, told)
-        leave(work, told, first, out, wells, done)
+    answer(states, tell_states, points, steps, exactly, actions, out, wells, done)
 
 
 @kernel
 def of_integrals(points, steps, exactly, actions, out, wells, done):
     """As `of_states`, at scaled integrals."""
-    work, told = np.zeros(nutation_fine.ALL), np.empty(OUTPUTS * TILE)
-    for first in range(0, len(done), TILE):
-        enter(points, first, work)
-        integrals(work)
-        solve(work, steps, exactly, actions)
-        tell_integrals(work, told)
-        leave(work, told, first, out, wells, done)
+    answer(integrals, tell_integrals, points, steps, exactly, actions, out, wells, done)

@@ -139,6 +139,15 @@ def reduced(phi):
 
 
 @inline
+def centred(phi):
+    """phi in [-pi, pi], and how far off it is where turns were taken out."""
+    if abs(phi) <= math.pi:
+        return phi, 0.0
+    rest, _turns = reduced(phi)
+    return rest, 4.0 * UNIT
+
+
+@inline
 def longest_step(p, w):
     """A step within which w has at most one zero.
 

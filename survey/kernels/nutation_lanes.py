@@ -366,12 +366,19 @@ def small_actions(work):
         judge(work, i)
 
 
+@inline
+def begin(work, i, v, w):
+    """1 - u and 1 + u of the turning points, in float64 so far, and nothing known beyond."""
+    put(work, V_HIGH, i, (v, 0.0))
+    put(work, W_LOW, i, (w, 0.0))
+    work[FINE + i], work[ACTION + i] = 0.0, 0.0
+
+
 @kernel
 def approach(work, steps):
     """From the polynomial to the turning points, in float64."""
     for i in range(TILE):
-        work[V_HIGH + i], work[W_LOW + i], work[FINE + i], work[ACTION + i] = 0.0, 0.0, 0.0, 0.0
-        work[V_HIGH + TILE + i], work[W_LOW + TILE + i] = 0.0, 0.0
+        begin(work, i, 0.0, 0.0)
     for _ in range(steps):
         for i in range(TILE):
             step(work, i)
@@ -390,8 +397,7 @@ def approach_slowly(work, steps):
         for i in range(TILE):
             search(work, i)
     for i in range(TILE):
-        work[V_HIGH + i], work[W_LOW + i], work[FINE + i], work[ACTION + i] = work[UP + i], work[DOWN + i], 0.0, 0.0
-        work[V_HIGH + TILE + i], work[W_LOW + TILE + i] = 0.0, 0.0
+        begin(work, i, work[UP + i], work[DOWN + i])
         choose(work, i)
     for i in range(TILE):
         narrow(work, i)

@@ -19,7 +19,7 @@ import numpy as np
 from survey.kernels import flow
 from survey.kernels.along import UNTOLD
 from survey.kernels.double import two_prod
-from survey.kernels.flow import TWO_PI, TWO_PI_LOW, UNIT, reduced
+from survey.kernels.flow import TWO_PI, TWO_PI_LOW, UNIT, centred
 from survey.kernels.jit import inline
 from survey.kernels.lockstep import sine_cosine
 from survey.kernels.weierstrass import BAR_W, BAR_X, COUNT, LANES, W, X, arctangent
@@ -214,10 +214,7 @@ def solve(T):
 @inline
 def enter(T, i, p, phi0, w0, t, curve):
     """Set lane i to one solution of the coefficients p, on the curve of (mu, 1 - mu), at one time."""
-    rest, slip = phi0, 0.0
-    if abs(phi0) > math.pi:
-        rest, _turns = reduced(phi0)
-        slip = 4.0 * UNIT
+    rest, slip = centred(phi0)
     T[B12, i], T[B31, i], T[D, i], T[C23, i] = p[flow.B12], p[flow.B31], p[flow.D], p[flow.C23]
     T[S2, i], T[S3, i], T[MU, i], T[OTHER, i] = p[flow.S2], p[flow.S3], curve[0], curve[1]
     T[PHI, i], T[SLIP, i], T[W0, i], T[TIME, i] = rest, slip, w0, t

@@ -100,15 +100,16 @@ def _value(x):
 
 def largest(a, b):
     """max(a, b) of numbers or symbols."""
-    return _chosen(lambda: max(a, b), lambda builder, x, y: builder.select(_compared(builder, ">", y, x), y, x), a, b)
+    return _chosen(lambda: max(a, b), lambda builder, x, y: builder.select(builder.fcmp_ordered(">", y, x), y, x), a, b)
 
 
 def changes_sign(a, b):
     """1.0 where one of two numbers or symbols is negative and the other is not, else 0.0."""
 
     def emit(builder, x, y):
-        differ = builder.xor(_compared(builder, "<", x, _value(0.0)), _compared(builder, "<", y, _value(0.0)))
-        return builder.select(differ, _value(1.0), _value(0.0))
+        zero = _value(0.0)
+        differ = builder.xor(builder.fcmp_ordered("<", x, zero), builder.fcmp_ordered("<", y, zero))
+        return builder.select(differ, _value(1.0), zero)
 
     return _chosen(lambda: 1.0 if (a < 0.0) != (b < 0.0) else 0.0, emit, a, b)
 
@@ -120,10 +121,6 @@ def _chosen(plain, emit, a, b):
         return plain()
     builder = a.builder if isinstance(a, _Number) else b.builder
     return _Number(builder, emit(builder, _value(a), _value(b)))
-
-
-def _compared(builder, how, a, b):
-    return builder.fcmp_ordered(how, a, b)
 
 
 def unroll(function):

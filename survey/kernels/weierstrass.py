@@ -22,7 +22,7 @@ import numpy as np
 
 from survey.kernels import flow
 from survey.kernels.along import UNTOLD
-from survey.kernels.flow import TWO_PI, TWO_PI_LOW, UNIT, reduced
+from survey.kernels.flow import TWO_PI, TWO_PI_LOW, UNIT, centred
 from survey.kernels.jit import inline
 from survey.kernels.lockstep import sine_cosine
 
@@ -302,10 +302,7 @@ def solve(T):
 @inline
 def enter(T, i, p, phi0, w0, t, curve):
     """Set lane i to one solution of the coefficients p at one time; `curve` has no meaning here."""
-    rest, slip = phi0, 0.0
-    if abs(phi0) > math.pi:
-        rest, _turns = reduced(phi0)
-        slip = 4.0 * UNIT
+    rest, slip = centred(phi0)
     T[D, i], T[C23, i], T[S2, i], T[S3, i] = p[flow.D], p[flow.C23], p[flow.S2], p[flow.S3]
     T[PHI, i], T[SLIP, i], T[W0, i], T[TIME, i] = rest, slip, w0, t
 

@@ -12,8 +12,8 @@ import numpy as np
 from matplotlib import colormaps
 
 from survey import status
-from survey.dataset import fill_of
-from survey.figures import _flags, _limits, _palette
+from survey.dataset import fill_of, flag_codes
+from survey.figures import colours_of, limits
 from survey.grid import logarithmic
 
 DIRECT = 2**22  # points: a smaller window is read from the file, a larger one from the overview
@@ -128,8 +128,8 @@ class Layer:
         self.status = ds.status.isel(state).transpose(*dims)
         self.flagged = "flag_values" in self.variable.attrs
         self.fill = np.nan if self.flagged or fill_of(self.variable) is None else fill_of(self.variable)
-        flags = _flags(self.variable) if self.flagged else {}
-        palette = _palette(flags)
+        flags = flag_codes(self.variable.attrs) if self.flagged else {}
+        palette = colours_of(flags)
         self.kinds = {flag: palette.get(flag, UNKNOWN) for flag in flags} | dict.fromkeys(NO_ANSWER, WHITE)
         self.dtype = np.uint16 if len(self.kinds) <= 16 else np.uint32
         self.bits = {kind: self.dtype(1 << i) for i, kind in enumerate(self.kinds)}
@@ -175,7 +175,7 @@ class Layer:
         rank = self._overview[0][1]
         starts = (np.arange(0, size, -(-size // LIMITS)) for size in rank.shape)
         shown = np.ma.masked_invalid(_unranked(_blocks(np.maximum, rank, *starts)))
-        found = _limits(shown) or {"vmin": shown.min(), "vmax": shown.max()}
+        found = limits(shown) or {"vmin": shown.min(), "vmax": shown.max()}
         return (0.0, 1.0) if shown.mask.all() else (float(found["vmin"]), float(found["vmax"]))
 
     @cached_property
@@ -210,7 +210,7 @@ class CellLayer(Layer):
             for axis, dim in zip(axes, dims, strict=True)
         ]
         self.codes = ds.cell_verdict.values
-        self.flags = _flags(ds.cell_verdict)
+        self.flags = flag_codes(ds.cell_verdict.attrs)
 
     def pixels(self, xs, ys):
         """(mask, None): the kinds of the cells that reach into each pixel; points count where they failed."""

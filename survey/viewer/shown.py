@@ -7,10 +7,9 @@ from math import isfinite
 from urllib.parse import parse_qsl, urlencode
 
 from survey import modules, status, store
-from survey.analysis.point import _sentence, _told, meaning
-from survey.dataset import percent
+from survey.analysis.point import meaning, reading, sentence
+from survey.dataset import flag_codes, percent
 from survey.errors import BadInput
-from survey.figures import _flags
 from survey.viewer import raster
 
 LINES = 6  # outputs told of the point under the pointer
@@ -99,7 +98,9 @@ class Map:
         """{flag: how much of the whole map bears it, in words}."""
         ds = self.ds
         if name == "verdict" and "area_fraction" in ds:
-            shares = zip(_flags(ds.area_verdict), ds.area_fraction.values, ds.area_fraction_error.values, strict=True)
+            shares = zip(
+                flag_codes(ds.area_verdict.attrs), ds.area_fraction.values, ds.area_fraction_error.values, strict=True
+            )
             return {flag: f" ({percent(share, bar)})".replace("+-", "±") for flag, share, bar in shares}
         told = ds.attrs.get(f"{name}_counts", "")
         counts = (part.split(": ") for part in told.split(", ") if part)
@@ -125,9 +126,9 @@ class Map:
         if view.name == "verdict" and "cell_verdict" in ds:
             yield from self._cell(*self.position(point))
         if here.status != status.OK:
-            yield from textwrap.wrap(_sentence(here), 60)
+            yield from textwrap.wrap(sentence(here), 60)
         for name in names:
-            value = _told(here, name, f"{name}_error" in bars).replace("+-", "±")
+            value = reading(here, name, f"{name}_error" in bars).replace("+-", "±")
             yield f"{name}: {value.replace('_', ' ')}" if "flag_values" in here[name].attrs else f"{name} = {value}"
 
     def _cell(self, *position):
