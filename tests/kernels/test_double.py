@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from mpmath import mp, mpf
 
 from survey.kernels import double as dd
-from survey.kernels.jit import kernel
+from survey.kernels.jit import inline, kernel
 from survey.kernels.satellite import half_period
 
 
@@ -26,6 +26,15 @@ def all_of(x, y, out):
     positive = a if x[0] > 0.0 else dd.neg(a)
     out[8, 0], out[8, 1] = dd.sqrt(positive)
     out[9, 0], out[9, 1] = dd.mean(positive, b if y[0] > 0.0 else dd.neg(b))
+
+
+split = inline(dd.split_error)
+
+
+@kernel
+def both_errors(x, y, out):
+    for i in range(len(x)):
+        out[0, i], out[1, i] = dd.fused_error(x[i], y[i], x[i] * y[i]), split(x[i], y[i], x[i] * y[i])
 
 
 def exact(x, y):
@@ -118,3 +127,10 @@ def test_half_period_from_one_minus_k(short):
         k = 1 - mpf(short)
         wanted = 2 * mp.ellipk(k**2) if k < 1 else mp.ellipk(1 / k**2) / k
         assert abs(value(half_of(row)) / wanted - 1) < 16 * dd.UNIT
+
+
+def test_both_ways_to_the_error_of_a_product_give_the_same_bits():
+    rng, out = np.random.default_rng(3), np.empty((2, 3000))
+    x, y = rng.standard_normal((2, 3000)) * 10.0 ** rng.integers(-120, 120, (2, 3000))
+    both_errors(x, y, out)
+    assert out[0].tobytes() == out[1].tobytes() and (out[0] != 0.0).sum() > 2900
