@@ -20,6 +20,7 @@ from survey.errors import BadInput
 from survey.grid import Grid, line
 from survey.hill_scene import HillScene
 from survey.scene import Option, Output, Parameter, Request, condition, exists
+from survey.wording import counted
 
 
 def run(
@@ -186,7 +187,8 @@ def _grid(used: dict[str, Parameter], given: dict[str, xr.DataArray]) -> Grid:
     for key, array in given.items():
         for dim, size in array.sizes.items():
             if sizes.setdefault(dim, size) != size:
-                raise BadInput(f"{key}: dimension {dim!r} has {size} values here and {sizes[dim]} in another parameter")
+                here = counted(size, "value")
+                raise BadInput(f"{key}: dimension {dim!r} has {here} here and {sizes[dim]:,} in another parameter")
     return Grid(
         sizes=sizes,
         parameters={key: (array.dims, array.values) for key, array in given.items()},
@@ -259,7 +261,7 @@ def scene(name: Any) -> dict[str, Any]:
 def summary(ds: xr.Dataset) -> dict[str, Any]:
     """What is in a survey's dataset: axes, fixed numbers, variables, counts, provenance."""
     axes = {
-        dim: f"{ds.sizes[dim]} values from {ds[dim].values[0]!s} to {ds[dim].values[-1]!s}"
+        dim: f"{counted(ds.sizes[dim], 'value')} from {ds[dim].values[0]!s} to {ds[dim].values[-1]!s}"
         for dim in ds.status.dims
         if dim in ds.coords
     }

@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from survey.errors import BadInput, SurveyError
+from survey.wording import counted
 
 out = Console(highlight=False, soft_wrap=True)
 err = Console(stderr=True, highlight=False, soft_wrap=True)
@@ -61,18 +62,15 @@ def run(workflow, output, overrides, workers, scheduler, fresh, quiet):
     from survey import workflow as workflows
     from survey.progress import Progress
 
-    checked = workflows.read(workflow, overrides, output)
+    checked, finished = workflows.read(workflow, overrides, output), None
+    again = shlex.join(["survey", *(word for word in sys.argv[1:] if word != "--fresh")])
     _stop_on_sigterm()
     try:
         with Progress(err, checked, silent=quiet) as progress:
-            finished = engine.run(checked, workers, scheduler, fresh, progress)
+            finished = engine.run(checked, workers, scheduler, fresh, progress, again)
             pictures = _draw(checked)
     except KeyboardInterrupt as stop:
-        code = stop.args[0] if stop.args else 130
-        again = shlex.join(["survey", *(word for word in sys.argv[1:] if word != "--fresh")])
-        complain(f"interrupted; finished blocks are safe; go on with: {again}", code)
-        sys.stderr.flush()
-        os._exit(code)  # threads inside a kernel cannot be interrupted, and need not be waited for
+        _end_interrupted(stop.args[0] if stop.args else 130, checked.path, finished, again)
     if not quiet:
         _closing(finished, [checked.path, *pictures])
     return 1 if _failed(finished) else 0
@@ -97,35 +95,48 @@ def plan(workflow, overrides, output, as_json):
 @click.option("--seed", type=int, default=0, show_default=True, help="Which random points.")
 def verify(path, points, seed):
     """Check digest, completeness and counts; solve N random points again by another method."""
-    from survey import api, store
+    from survey import store
     from survey.audit import audit
 
-    complaints = store.check(path)
+    ds = store.load(path)
+    complaints = store.check(path, ds)
     for complaint in complaints:
         complain(complaint, 3)
-    if complaints:
+    if complaints != store.undigested(path):
         return 3
-    again = audit(api.open(path), points, seed)
+    again = audit(ds, points, seed)
     for complaint in again["complaints"]:
         complain(f"{path}: {complaint}", 3)
     if not again["complaints"]:
-        silent = f", which do not answer at {again['silent']} others" if again["silent"] else ""
-        beside = "".join(f", {again[what]} {what}" for what in ("edges", "cells") if again[what])
-        out.print(
-            f"{path}: sound; {again['points']} points{beside} solved again by {again['method']}{silent}, "
-            "all within the error bars", markup=False,
-        )  # fmt: skip
-    return 3 if again["complaints"] else 0
+        out.print(f"{path}: {'sound but for the digest' if complaints else 'sound'}; {_audited(again)}", markup=False)
+    return 3 if complaints or again["complaints"] else 0
+
+
+def _audited(again):
+    """What an audit without complaints has done."""
+    parts = {"point": again["points"], "edge": again["edges"], "cell": again["cells"]}
+    told = [counted(number, noun) for noun, number in parts.items() if number]
+    silent = f" (no answer at {counted(again['silent'], 'other')})" if again["silent"] else ""
+    if not told:
+        return "no points were solved again"
+    return f"{', '.join(told)} solved again by {again['method']}{silent}, all within the error bars"
 
 
 @program.command()
 @click.argument("path", metavar="OUT.nc")
 @click.option("--json", "as_json", is_flag=True, help="For a program to read.")
 def info(path, as_json):
-    """What is in the file: axes, variables, counts by verdict and status, provenance."""
-    from survey import api
+    """What is in the file: axes, variables, counts, provenance; and what an unfinished run has left beside it."""
+    from survey import api, unfinished
 
-    _show(api.summary(api.open(path)), as_json)
+    left = unfinished.told(path)
+    table = api.summary(api.open(path)) if os.path.exists(path) or not left else {}
+    if as_json:
+        return _show(table | ({"unfinished": left} if left else {}), True)
+    if left:
+        out.print(unfinished.sentence(left), markup=False)
+    if table:
+        _show(table, False)
 
 
 @program.command()
@@ -241,10 +252,31 @@ def _closing(finished, paths):
         if key in attributes:
             err.print(f"{key.removesuffix('_counts')}: {attributes[key]}", markup=False)
     if attributes["accuracy_missed"]:
-        err.print(f"accuracy_missed: {attributes['accuracy_missed']} points have an error bar above rtol")
+        missed = attributes["accuracy_missed"]
+        verb = "has" if missed == 1 else "have"
+        err.print(f"accuracy_missed: {counted(missed, 'point')} {verb} an error bar above rtol")
     took = {"compiled": finished.compiling, "kernels": finished.computing, "file": finished.writing}
     took |= {"edges and cells": finished.beside} if finished.beside else {}
     err.print(", ".join(f"{name} {seconds:.1f} s" for name, seconds in took.items()))
+
+
+def _end_interrupted(code, path, finished, again):
+    """Say what is safe and how to go on (`finished`: only the pictures are missing), and end the process at once.
+
+    Threads inside a kernel cannot be interrupted, and need not be waited for.
+    """
+    from survey import unfinished
+
+    for impatient in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(impatient, signal.SIG_IGN)
+    done, blocks = unfinished.finished(path)
+    told = f"finished blocks are safe: {done:,} of {blocks:,}" if done else "no block was finished yet"
+    told += f"; go on with: {again}"
+    if finished:
+        told = f"{path} is complete, its pictures are not; draw it with: survey plot {path}"
+    complain(f"interrupted; {told}", code)
+    sys.stderr.flush()
+    os._exit(code)
 
 
 def _failed(finished):

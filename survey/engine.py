@@ -23,6 +23,7 @@ from survey.dispatch import cpus
 from survey.errors import BadInput, Stopped
 from survey.kernels import jit
 from survey.kernels.jit import compile_seconds
+from survey.wording import counted
 
 BLOCK_SECONDS = 0.5
 BLOCK_POINTS = 2**17
@@ -159,19 +160,21 @@ class Job:
         return Solved(number, "", 0.0, None)
 
 
-def run(workflow, workers=None, scheduler=None, fresh=False, progress=None):
+def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, again=None):
     """Run or resume the survey and write its netCDF file; returns what was Finished.
 
     A part of the file is written as soon as the blocks of its region are there, while others are computed.
     `progress(done, total, reused, what, left)` is called as blocks finish, and as parts of the boundaries do;
-    `left()` estimates the seconds that are left. Raises BadInput, Damaged or Stopped.
+    `left()` estimates the seconds that are left. `again` is the command that goes on after an interruption.
+    Raises BadInput, Damaged or Stopped.
     """
     started = time.perf_counter()
     _refuse_too_large(workflow)
     client = dispatch.client_of(scheduler) if scheduler else None
     tile, regions = regions_of(workflow)
     blocks = [block for _, blocks in regions for block in blocks]
-    with store.Blocks(workflow.path, fingerprint(workflow), fresh) as kept:
+    about = {"points": workflow.grid.points, "code": _code() | _compilers()}
+    with store.Blocks(workflow.path, fingerprint(workflow), fresh, about, workflow.text, again) as kept:
         reused = kept.sound()
         job = Job(workflow.scene, workflow.request, workflow.grid, blocks, kept, _code())
         left = Remaining(workflow.grid.shape, blocks, reused)
@@ -265,6 +268,11 @@ def _process():
 def _code():
     """What names the code that solves blocks: it must be the same on every worker, the processor need not."""
     return {"survey": version("survey"), "sources": jit.SOURCE_HASH}
+
+
+def _compilers():
+    """What else makes the code another one."""
+    return {name: version(name) for name in ("numba", "llvmlite")}
 
 
 def _refuse_other_code(code):
@@ -394,7 +402,7 @@ def plan(workflow):
     return {
         "scene": workflow.name,
         "options": ", ".join(f"{key}={value}" for key, value in request.options.items()),
-        "axes": {name: f"{size} values" for name, size in grid.sizes.items()},
+        "axes": {name: counted(size, "value") for name, size in grid.sizes.items()},
         "points": grid.points,
         "blocks": len(blocks_of(workflow)),
         "bytes": grid.points * bytes_per_point(scene, request),
@@ -415,7 +423,7 @@ def _refuse_too_large(workflow):
     room = shutil.disk_usage(workflow.path.parent).free
     if needed > room:
         raise BadInput(
-            f"{grid.points:,} points need {needed / 2**30:,.0f} GiB, and the disk of {workflow.path} has "
+            f"{counted(grid.points, 'point')} need {needed / 2**30:,.0f} GiB, and the disk of {workflow.path} has "
             f"{room / 2**30:,.0f} GiB free; take fewer points, or name fewer outputs in output.variables"
         )
 

@@ -5,6 +5,8 @@ import time
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
 
+from survey.wording import counted
+
 LOG_SECONDS = 60
 SHOWN_SECONDS = 0.2
 
@@ -48,16 +50,19 @@ class Progress:
         elif done != reused and (done == total or time.monotonic() - self.logged > LOG_SECONDS):
             self.logged = time.monotonic()
             eta = _left(done, total, reused, elapsed, left)
-            self._line(f"{done} of {total} {what}, {elapsed:.0f} s elapsed, ETA {eta:.0f} s")
+            first, space, rest = what.partition(" ")
+            words = counted(total, first.removesuffix("s")) + space + rest
+            self._line(f"{done:,} of {words}, {elapsed:.0f} s elapsed, ETA {eta:.0f} s")
         if done == total and what == "blocks":
-            self._line(f"computed {done - reused}, reused {reused} of {total} blocks")
+            self._line(f"computed {done - reused:,}, reused {reused:,} of {counted(total, 'block')}")
 
     def _begin(self, total, reused, what):
         self.started = self.logged = time.monotonic()
         if self.bar:
             self.task = self.bar.add_task(self.workflow.name, total=total, completed=reused, what=what, eta="-")
         if what == "blocks":
-            self._line(f"{self.workflow.grid.points:,} points in {total} blocks, {reused} already done")
+            points = counted(self.workflow.grid.points, "point")
+            self._line(f"{points} in {counted(total, 'block')}, {reused:,} already done")
 
     def refining(self, settled, points, left):
         """Told as cells are refined: the part of the map that is settled, points solved, seconds for the known rest.
@@ -66,7 +71,7 @@ class Progress:
         """
         if self.silent:
             return
-        text = f"cells: {settled:.2%} of the map settled, {points:,} points solved"
+        text = f"cells: {settled:.2%} of the map settled, {counted(points, 'point')} solved"
         if self.bar and settled < 1:
             eta = time.strftime("%H:%M:%S or more", time.gmtime(left))
             self.bar.update(self.task, description=f"{self.workflow.name}: {text}", what="cells", eta=eta)

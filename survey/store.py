@@ -5,6 +5,7 @@ import hashlib
 import io
 import json
 import os
+import shlex
 import shutil
 import socket
 import uuid
@@ -16,7 +17,7 @@ import filelock
 import netCDF4
 import numpy as np
 
-from survey import status
+from survey import status, unfinished
 from survey.dataset import tally
 from survey.errors import BadInput, Damaged, Stopped, SurveyError
 from survey.grid import halved
@@ -24,6 +25,8 @@ from survey.grid import halved
 FORMAT = 2
 TILE_POINTS = 2**16
 CACHE = 2**20  # bytes: a tile and more
+LOCK_SECONDS = 0.2  # a look at the lock takes less
+NETCDF = (b"\x89HDF", b"CDF")  # how a netCDF file begins
 IN_MEMORY = 2**28  # bytes: a larger file is opened lazily
 # checksummed compression: readable everywhere, and every flipped bit is found; measured: level 4 takes half as long
 # again and saves one part in a hundred
@@ -34,16 +37,19 @@ class Blocks:
     """The finished blocks of a run in `OUT.nc.blocks/`: one writer, each block durable as it finishes.
 
     Use as a context manager; raises BadInput if another run holds the output, or if the blocks that are there
-    belong to another survey (unless `fresh`).
+    belong to another survey (unless `fresh`), Damaged if it cannot be told to which. For users the folder keeps
+    what `about` tells, the text of the `workflow`, and `again`, the command that goes on.
     """
 
-    def __init__(self, path, fingerprint, fresh=False):
-        self.folder = Path(f"{path}.blocks")
+    def __init__(self, path, fingerprint, fresh=False, about=None, workflow="", again=None):
+        self.folder = unfinished.folder_of(path)
         self.path = Path(path)
         self.fingerprint = {"format": FORMAT, **fingerprint}
         self.fresh = fresh
-        self.lock = filelock.FileLock(f"{path}.lock", timeout=0)
+        self.about, self.workflow = about or {}, workflow
+        self.lock = filelock.FileLock(f"{path}.lock", timeout=LOCK_SECONDS)
         self.holder = {"host": socket.gethostname(), "pid": os.getpid(), "run": uuid.uuid4().hex}
+        self.holder |= {"folder": os.getcwd(), "again": again}
 
     def __enter__(self):
         with refused(self.path):
@@ -129,8 +135,8 @@ class Blocks:
         return self.folder / f"{number:08d}.block"
 
     def _prepare(self):
-        if self.fresh:
-            shutil.rmtree(self.folder, ignore_errors=True)
+        if self.fresh or not any(file.suffix in (".block", ".extra") for file in self.folder.glob("*")):
+            shutil.rmtree(self.folder, ignore_errors=True)  # nothing is finished there: nothing is lost
         self.folder.mkdir(exist_ok=True)
         self._same_survey()
         write_atomically(self.folder / "holder.json", json.dumps(self.holder).encode())
@@ -139,26 +145,29 @@ class Blocks:
         try:
             self.lock.acquire()
         except filelock.Timeout:
-            try:
-                holder = json.loads((self.folder / "holder.json").read_text())
-            except (OSError, ValueError):
-                holder = {"host": "another host", "pid": "unknown"}
+            holder = {"host": "another host", "pid": "unknown"}
+            with contextlib.suppress(OSError, ValueError):
+                holder |= json.loads((self.folder / "holder.json").read_bytes())
             raise BadInput(
                 f"{self.path}: another run is writing it (host {holder['host']}, pid {holder['pid']}); wait, or use -o"
             ) from None
 
     def _same_survey(self):
-        manifest = self.folder / "manifest.json"
-        if manifest.exists():
-            old = json.loads(manifest.read_text())
-            changed = [key for key in self.fingerprint if old.get(key) != self.fingerprint[key]]
-            if changed:
-                raise BadInput(
-                    f"{self.folder}: these blocks belong to another survey ({', '.join(changed)} changed: "
-                    f"{_short(old.get(changed[0]))} -> {_short(self.fingerprint[changed[0]])}); --fresh starts anew"
-                )
-        else:
-            write_atomically(manifest, json.dumps(self.fingerprint, indent=1).encode())
+        manifest, known = self.folder / "manifest.json", self.fingerprint | self.about
+        if not any(self.folder.iterdir()):
+            write_atomically(self.folder / "workflow.toml", self.workflow.encode())
+            write_atomically(manifest, json.dumps(known, indent=1).encode())
+            return
+        try:
+            old = json.loads(manifest.read_bytes())
+        except (OSError, ValueError):
+            raise Damaged(
+                f"{manifest} is missing or damaged: nobody knows of which survey these blocks are; "
+                "--fresh deletes them and starts anew, -o writes another file"
+            ) from None
+        changed = [key for key in self.fingerprint if old.get(key) != self.fingerprint[key]]
+        if changed:
+            raise BadInput(unfinished.drift(self.path, old, known, changed, self.workflow))
 
 
 def pack(arrays, file):
@@ -302,50 +311,95 @@ class Output:
         with open(self.part, "rb+") as file:
             os.fsync(file.fileno())
             digest = hashlib.file_digest(file, "sha256").hexdigest()
-        beside = Path(f"{self.path}.sha256")
+        beside = digest_of(self.path)
         # both digests stand until the rename is done, so that no instant shows a sound file as damaged
-        old = beside.read_text() if beside.exists() and self.path.exists() else ""
-        line = f"{digest}  {self.path.name}\n"
-        write_atomically(beside, (old + line).encode(), self.part.parent)
+        old = beside.read_bytes() if beside.exists() and self.path.exists() else b""
+        line = f"{digest}  {self.path.name}\n".encode()
+        write_atomically(beside, old + line, self.part.parent)
         publish(self.part, self.path)
-        write_atomically(beside, line.encode(), self.part.parent)
+        write_atomically(beside, line, self.part.parent)
 
 
 def load(path, chunks="auto"):
     """The complete dataset in `path`: in memory and the file closed if it takes at most IN_MEMORY bytes, else lazy.
 
     Lazy means dask arrays; with `chunks` None, arrays that read from the file what is indexed, at once.
-    Raises BadInput or Damaged.
+    Raises BadInput (no file of survey) or Damaged (one that is incomplete, or whose bits have changed).
     """
     import xarray as xr
 
     path = Path(path)
-    if not _digest_holds(path):
-        raise Damaged(f"{path}: the file's bits differ from the digest in {path.name}.sha256; run the workflow again")
+    _refuse_absent(path)
     try:
+        _refuse_changed(path)
+        with netCDF4.Dataset(path) as file:
+            _refuse_foreign(path, file)
         with xr.open_dataset(path, engine="netcdf4") as ds:
-            _refuse_foreign(path, ds)
             if ds.nbytes <= IN_MEMORY:
                 return ds.load()
         return xr.open_dataset(path, engine="netcdf4", chunks=chunks)
     except SurveyError:
         raise
+    except PermissionError:
+        raise BadInput(f"{path}: this file must not be read; allow it, such as with chmod u+r") from None
     except (OSError, RuntimeError, ValueError) as error:
         raise Damaged(f"{path}: cannot be read ({error}); run the workflow again") from None
 
 
-def _refuse_foreign(path, ds):
-    if "status" not in ds or "scene" not in ds.attrs:
-        raise BadInput(f"{path}: this netCDF file was not written by survey run")
-    if ds.attrs.get("complete") != 1:
+def _refuse_absent(path):
+    left = {} if path.exists() else unfinished.told(path)
+    if left:
+        raise Damaged(f"{path}: it is not there yet; {unfinished.sentence(left)}")
+    if not path.is_file():
+        what = "is a folder" if path.is_dir() else "there is no such file"
+        raise BadInput(f"{path}: {what}; name the netCDF file that survey run wrote")
+
+
+def _refuse_changed(path):
+    """Raise Damaged if the digest beside the file is of other bits, BadInput if it has none and is no netCDF file."""
+    beside = digest_of(path)
+    with open(path, "rb") as file:
+        if beside.exists():
+            if hashlib.file_digest(file, "sha256").hexdigest().encode() not in beside.read_bytes():
+                raise Damaged(
+                    f"{path}: the file's bits differ from the digest in {beside.name}; run the workflow again"
+                )
+        elif not file.read(4).startswith(NETCDF):
+            raise BadInput(f"{path}: this is not a netCDF file of survey; name one that survey run wrote")
+
+
+def _refuse_foreign(path, file):
+    """Raise BadInput if the open netCDF file is not of survey, Damaged if it is not complete."""
+    if "status" not in file.variables or "scene" not in file.ncattrs():
+        raise BadInput(f"{path}: this netCDF file was not written by survey; name one that survey run wrote")
+    if getattr(file, "complete", 0) != 1:
         raise Damaged(f"{path}: the file is incomplete; run the workflow again")
 
 
-def check(path):
-    """Sentences that say what is wrong with the file (none if it is sound): digest, reading, counts, status."""
-    beside = Path(f"{path}.sha256")
-    ds = load(path)
-    complaints = [] if beside.exists() else [f"{path}: there is no digest {beside.name} beside it"]
+def digest_of(path):
+    """Where the digest of the file at `path` lies."""
+    return Path(f"{path}.sha256")
+
+
+def undigested(path):
+    """[a sentence that says what is checked nonetheless] where no digest lies beside the file, else []."""
+    path, beside = Path(path), digest_of(path)
+    if beside.exists():
+        return []
+    return [
+        f"{path}: there is no digest {beside.name} beside it, so changes of its labels, coordinates and attributes go "
+        "unseen (what is checked: the checksums of its data, counts, status, points); copy the digest here too, or "
+        f"take the file as it is: sha256sum {shlex.quote(str(path))} > {shlex.quote(str(beside))}"
+    ]
+
+
+def check(path, ds=None):
+    """Sentences that say what is wrong with the file (none if it is sound): digest, reading, counts, status.
+
+    `ds` is what `load` gave, if that is known. Raises what `load` raises.
+    """
+    ds = load(path) if ds is None else ds
+    complaints = undigested(path)
     again, wrong = tally(ds), {}
     for arrays in pieces(ds):
         again.add(arrays)
@@ -379,18 +433,3 @@ def _unsound(path, arrays):
             yield f"{path}: {name} and its error bar are not finite at the same points"
         if np.isinf(arrays[name].reshape(*bad.shape, -1)[~bad]).any():
             yield f"{path}: {name} is infinite where status is ok"
-
-
-def _digest_holds(path):
-    """Has the file at `path` the bits of the digest beside it (or no digest)? Raises BadInput if there is no file."""
-    beside = Path(f"{path}.sha256")
-    if not path.is_file():
-        what = "is a folder" if path.is_dir() else "there is no such file"
-        raise BadInput(f"{path}: {what}; name the netCDF file that survey run wrote")
-    with open(path, "rb") as file:
-        return not beside.exists() or hashlib.file_digest(file, "sha256").hexdigest() in beside.read_text()
-
-
-def _short(value):
-    text = str(value)
-    return text if len(text) < 40 else text[:37] + "..."

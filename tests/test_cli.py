@@ -2,6 +2,8 @@
 
 import json
 import os
+import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -55,6 +57,8 @@ def test_worker_processes_give_the_same_file(program, small):
         (["info", "absent.nc"], "absent.nc: there is no such file"),
         (["verify", "absent.nc"], "absent.nc: there is no such file"),
         (["plot", "absent.nc"], "absent.nc: there is no such file"),
+        (["info", "small.toml"], "small.toml: this is not a netCDF file of survey; name one that survey run wrote"),
+        (["verify", "small.toml"], "small.toml: this is not a netCDF file of survey"),
         (["scenes", "gyroscope"], "did you mean 'gyrostat'"),
         (["precision", "gyroscope"], "did you mean 'gyrostat'"),
     ],
@@ -95,6 +99,25 @@ def test_verify_finds_a_flipped_bit(program, ran):
     path.write_bytes(bits)
     found = program("verify", "small.nc")
     assert found.returncode == 3 and "digest" in found.stderr and found.stderr.count("\n") == 1
+
+
+def test_verify_says_what_it_checks_without_a_digest(program, ran):
+    (program.folder / "small.nc.sha256").unlink()
+    found = program("verify", "small.nc")
+    assert found.returncode == 3 and found.stderr.count("\n") == 1, found.stderr
+    assert "there is no digest small.nc.sha256 beside it" in found.stderr and "(what is checked: " in found.stderr
+    assert "sound but for the digest; 20 points solved again by dop853 and full, all within" in found.stdout
+    accepted = found.stderr.rpartition("take the file as it is: ")[2]
+    subprocess.run(accepted, shell=True, cwd=program.folder, check=True)
+    found = program("verify", "small.nc", "--points", "1")
+    assert (found.returncode, found.stderr) == (0, "") and "small.nc: sound; 1 point solved again by" in found.stdout
+
+
+def test_a_single_point_and_block_are_told_as_one(program, small):
+    words = [word for key in ("w0=0.5", "t=1.0") for word in ("--set", f"axes.{key}")]
+    done = program("run", "small.toml", *words, "--set", "output.figures=[]")
+    assert "gyrostat: 1 point in 1 block, 0 already done" in done.stderr, done.stderr
+    assert "1 of 1 block, " in done.stderr and "computed 1, reused 0 of 1 block\n" in done.stderr
 
 
 def test_verify_finds_a_wrong_value_by_solving_again(program, ran):
@@ -139,6 +162,12 @@ def test_an_interrupted_run_can_be_resumed(program, small, name, code):
     assert running.returncode == code and "go on with: survey run small.toml" in told, told
     finished = len(list(blocks.glob("*.block")))
     assert finished and not (program.folder / "small.nc").exists()
+    left = json.loads(program("info", "small.nc", "--json").stdout)["unfinished"]
+    safe, blocks_asked = map(int, re.search(r"finished blocks are safe: (\d+) of (\d+); go on", told).groups())
+    assert 1 <= safe <= left["blocks_done"] == finished and blocks_asked == left["blocks"]
+    assert 0 < left["points_done"] <= left["points"] == 160_000 and left["resume"] == shlex.join(["survey", *command])
+    seen = program("verify", "small.nc")
+    assert seen.returncode == 3 and f"{finished} of {left['blocks']} blocks" in seen.stderr, seen.stderr
     resumed = program(*command)
     assert resumed.returncode == 0 and f", reused {finished} of" in resumed.stderr, resumed.stderr
     assert not blocks.exists() and not os.path.exists(program.folder / "small.nc.lock")

@@ -252,7 +252,8 @@ def test_drift_and_a_second_writer_are_refused(folder, unbroken):
     running.wait()
     kept = len(blocks(folder))
     code, told = resume(folder, "--quiet", "--set", "solver.rtol=1e-9")
-    assert code == 2 and told.count("\n") == 1 and "rtol changed: 1e-10 -> 1e-09); --fresh starts anew" in told
+    assert code == 2 and told.count("\n") == 1 and "of another workflow (solver.rtol 1e-10 -> 1e-09); go back" in told
+    assert f"--fresh, which deletes {kept} finished blocks" in told
     assert len(blocks(folder)) == kept
     code, told = resume(folder, "--fresh")
     assert code == 0 and "reused 0 of" in told and "--fresh" in xr.load_dataset(folder / "sweep.nc").attrs["history"]

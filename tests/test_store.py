@@ -27,6 +27,27 @@ def test_a_sound_file_has_no_complaints(copy):
     assert store.check(copy) == []
 
 
+@pytest.mark.parametrize("place", [0, 10, 40])
+def test_a_flipped_bit_of_the_digest_is_found_and_mended(copy, small, place):
+    beside = copy.with_name("copy.nc.sha256")
+    bits = bytearray(beside.read_bytes())
+    bits[place] ^= 128  # no text any more
+    beside.write_bytes(bits)
+    with pytest.raises(Damaged, match="differ from the digest"):
+        store.check(copy)
+    survey.run(small, output=copy)
+    assert store.check(copy) == []
+
+
+def test_a_file_of_another_kind_is_told_from_a_damaged_one(copy, tmp_path):
+    (tmp_path / "picture.nc").write_bytes(b"\x89PNG\r\n")
+    with pytest.raises(BadInput, match=r"picture\.nc: this is not a netCDF file of survey"):
+        survey.open(tmp_path / "picture.nc")
+    copy.write_bytes(b"\x89PNG" + copy.read_bytes()[4:])  # its digest says that it was one of ours
+    with pytest.raises(Damaged, match="digest"):
+        survey.open(copy)
+
+
 @pytest.mark.parametrize("where", [0.01, 0.3, 0.5, 0.8, 0.99])
 def test_a_flipped_bit_is_found_anywhere(copy, where):
     bits = bytearray(copy.read_bytes())
@@ -87,16 +108,6 @@ def _flip(file):
     bits = bytearray(file.read_bytes())
     bits[len(bits) // 2] ^= 1
     file.write_bytes(bits)
-
-
-def test_blocks_of_another_survey_are_refused_unless_fresh(small, tmp_path):
-    checked = workflow.read(small, output=tmp_path / "o.nc")
-    with store.Blocks(checked.path, engine.fingerprint(checked)):
-        pass
-    changed = workflow.read(small, ["solver.rtol=1e-6"], tmp_path / "o.nc")
-    with pytest.raises(BadInput, match=r"rtol changed: 1e-09 -> 1e-06\); --fresh"):
-        engine.run(changed)
-    engine.run(changed, fresh=True)
 
 
 def test_a_damaged_block_is_found_and_dropped(small, tmp_path):

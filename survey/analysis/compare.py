@@ -6,6 +6,7 @@ import xarray as xr
 from survey.analysis.point import of_points
 from survey.dataset import error_bars, flag_attributes
 from survey.errors import BadInput
+from survey.wording import counted
 
 VERDICTS = {"same": 0, "one_undecided": 1, "differ": 2}
 
@@ -102,7 +103,7 @@ def _summary(ds, points):
         if name.endswith("_excess"):
             asked[name], asked[f"{name}_most"] = (ds[name] > 1).sum(), ds[name].max()
     found = {key: value.item() for key, value in xr.Dataset(asked).compute().data_vars.items()}
-    told = [f"{points:,} points in common"]
+    told = [f"{counted(points, 'point')} in common"]
     if "verdict_differs" in ds:
         told.append(f"verdicts differ at {found['differ']:,}, one is undecided at {found['one_undecided']:,}")
     for name in (key for key in found if key.endswith("_excess")):

@@ -15,6 +15,7 @@ from urllib.parse import urlsplit
 
 from survey.errors import BadInput
 from survey.viewer.shown import Map
+from survey.wording import counted
 
 try:
     from bokeh.application import Application
@@ -42,7 +43,7 @@ def serve(path, port, link="", say=print, browser=False):
 
     async def run():
         server, address = start(shown, port)
-        say(f"{path}: {shown.ds.status.size:,} points at {address}{query}")
+        say(f"{path}: {counted(shown.ds.status.size, 'point')} at {address}{query}")
         say("Only this machine can reach it, and only with the token in that address. Ctrl-C ends it.")
         at = urlsplit(address).port
         say(f"From elsewhere: ssh -L {at}:{HOST}:{at} THIS_MACHINE, and open the same address there.")

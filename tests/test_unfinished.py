@@ -1,0 +1,109 @@
+"""What an unfinished run has left is told: how much is done, how to go on, what differs from the run that is asked."""
+
+import json
+import re
+
+import pytest
+
+import survey
+from survey import engine, store, unfinished, workflow
+from survey.errors import BadInput, Damaged
+
+DONE = (1, 3, 4)
+
+
+@pytest.fixture
+def left(small, tmp_path, monkeypatch):
+    """The folder of a run that was stopped when three of its six blocks were kept."""
+    monkeypatch.setattr(engine, "BLOCK_POINTS", 4)
+    monkeypatch.chdir(tmp_path)
+
+    def stop(job, numbers, finished):
+        for number in DONE:
+            job(number)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(engine.dispatch, "on_threads", stop)
+        engine.run(workflow.read(small))
+    return tmp_path / "small.nc.blocks"
+
+
+def refusal(small, *overrides):
+    """The line that refuses the run."""
+    with pytest.raises(BadInput) as refused:
+        engine.run(workflow.read(small, overrides))
+    return str(refused.value)
+
+
+def test_what_is_left_is_told(left, small):
+    told = unfinished.told("small.nc")
+    assert (told["blocks_done"], told["blocks"], told["points_done"], told["points"]) == (3, 6, 12, 24)
+    assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ", told["last_written"])
+    assert told["resume"] == "survey run small.nc.blocks/workflow.toml -o small.nc"
+    with pytest.raises(Damaged, match=r"not there yet; .* 3 of 6 blocks \(12 of 24 points\).* go on with: survey run"):
+        survey.open("small.nc")
+    again = workflow.read(left / "workflow.toml", output="small.nc")  # the command that was told
+    seen = []
+    engine.run(again, progress=lambda done, total, reused, **_: seen.append((done, total, reused)))
+    assert seen[0] == (3, 6, 3) and store.check("small.nc") == [] and unfinished.told("small.nc") == {}
+
+
+def test_the_command_that_began_is_told_with_its_folder(left, small, tmp_path, monkeypatch):
+    holder = json.loads((left / "holder.json").read_text())
+    (left / "holder.json").write_text(json.dumps(holder | {"again": "survey run small.toml --workers 2"}))
+    assert unfinished.told("small.nc")["resume"] == "survey run small.toml --workers 2"
+    monkeypatch.chdir("/")
+    assert unfinished.told(tmp_path / "small.nc")["resume"] == f"cd {tmp_path} && survey run small.toml --workers 2"
+
+
+def test_a_run_at_work_is_told_and_not_disturbed(left, small):
+    checked = workflow.read(small)
+    with store.Blocks(checked.path, engine.fingerprint(checked)) as kept:
+        told = unfinished.told("small.nc")
+        assert f"pid {kept.holder['pid']}" in told["at_work"] and "resume" not in told
+        assert unfinished.sentence(told).endswith("is at work on it")
+
+
+def test_drift_names_the_keys_and_the_ways_on(left, small):
+    told = refusal(small, "solver.rtol=1e-6")
+    assert told == (
+        "small.nc.blocks holds 3 finished blocks of another workflow (solver.rtol 1e-09 -> 1e-06); go back to that "
+        "workflow (survey run small.nc.blocks/workflow.toml -o small.nc), or write another file with -o, or start anew "
+        "with --fresh, which deletes 3 finished blocks"
+    )
+    told = refusal(small, "axes.w0.num=7", "axes.t=1.5", "title='other'")
+    assert "(axes.t {'start': 0.0, 'stop': 3.0, 'num': 4} -> 1.5, axes.w0.num 6 -> 7)" in told
+    told = refusal(small, *[f"axes.{key}=0.1" for key in ("b12", "b31", "d", "s2", "s3")])
+    assert "(axes.b12 0.7 -> 0.1, axes.b31 -0.4 -> 0.1, axes.d 1.1 -> 0.1 and 2 more)" in told
+    engine.run(workflow.read(small, ["solver.rtol=1e-6"]), fresh=True)
+    assert survey.open("small.nc").attrs["blocks_reused"] == 0
+
+
+def test_other_code_is_told_plainly(left, small):
+    manifest = json.loads((left / "manifest.json").read_text())
+    manifest["code"]["survey"], manifest["kernels"] = "0.0.9", "old"
+    (left / "manifest.json").write_text(json.dumps(manifest))
+    now = manifest["code"] | {"survey": engine.version("survey")}
+    assert f"blocks of another version of the code (survey 0.0.9 -> {now['survey']}); go back to that" in refusal(small)
+    told = refusal(small, "solver.rtol=1e-6")
+    assert "-> 1e-06)" in told and "go back to that version and that workflow" in told
+
+
+def test_without_a_sound_manifest_no_block_is_taken(left, small):
+    bits = bytearray((left / "manifest.json").read_bytes())
+    bits[3] ^= 128
+    (left / "manifest.json").write_bytes(bits)
+    with pytest.raises(Damaged, match=r"manifest\.json is missing or damaged"):
+        engine.run(workflow.read(small))
+    (left / "manifest.json").unlink()
+    with pytest.raises(Damaged, match="--fresh deletes them"):
+        engine.run(workflow.read(small))
+    assert len(list(left.glob("*.block"))) == 3
+
+
+def test_where_nothing_is_finished_another_survey_begins(left, small):
+    for number in DONE:
+        (left / f"{number:08d}.block").unlink()
+    engine.run(workflow.read(small, ["solver.rtol=1e-6"]))
+    assert survey.open("small.nc").attrs["rtol"] == 1e-6
