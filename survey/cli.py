@@ -6,6 +6,7 @@ import os
 import shlex
 import signal
 import sys
+import traceback
 
 import click
 from rich.console import Console
@@ -70,6 +71,7 @@ def run(workflow, output, overrides, workers, scheduler, fresh, quiet):
             finished = engine.run(checked, workers, scheduler, fresh, progress, again)
             pictures = _draw(checked)
     except KeyboardInterrupt as stop:
+        traceback.clear_frames(stop.__traceback__)  # the semaphores they hold would be reported as leaked
         _end_interrupted(stop.args[0] if stop.args else 130, checked.path, finished, again)
     if not quiet:
         _closing(finished, [checked.path, *pictures])

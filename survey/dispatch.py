@@ -7,11 +7,13 @@ A task is called once for each number; `finished(done, result)` hears of each as
 import contextlib
 import itertools
 import logging
-import multiprocessing
+import multiprocessing.context
 import os
 import signal
 import threading
+from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import resource_tracker
 
 import dask
 import dask.multiprocessing
@@ -54,7 +56,8 @@ def on_processes(task, numbers, finished, died, workers):
         """The numbers that were under way when a worker died."""
         begun = set()
         try:
-            _compute(task, some, end, dask.multiprocessing.get, workers, begun.add, initializer=_serve)
+            with _pool(workers) as pool:
+                _compute(task, some, end, dask.multiprocessing.get, workers, begun.add, pool=pool)
         except BrokenProcessPool:
             return sorted(begun - ended)
         return []
@@ -127,9 +130,56 @@ def client_of(address):
         raise Stopped(f"no dask scheduler answers at {address!r} ({error}); start one with dask scheduler") from None
 
 
+@contextlib.contextmanager
+def _pool(workers):
+    """Worker processes; an error or an interruption kills them: nobody waits for what they are at."""
+    resource_tracker.ensure_running()  # else the first worker's start would, and unblock the signal
+    with ProcessPoolExecutor(workers, _Spawning(), _serve) as pool:
+        try:
+            yield pool
+        except BaseException:
+            for worker in multiprocessing.active_children():
+                if isinstance(worker, _Worker) and worker.starter == threading.get_ident():
+                    worker.kill()
+            raise
+
+
+class _Worker(multiprocessing.context.SpawnProcess):
+    """A process that is started as a whole, and never hears the terminal's interrupt: either would print tracebacks."""
+
+    def start(self):
+        self.starter = threading.get_ident()
+        with _deferred(signal.SIGINT, signal.SIGTERM):
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # the process inherits it
+            try:
+                super().start()
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextlib.contextmanager
+def _deferred(*signals):
+    """What these signals do is done at the end of the block. (Python hears them on the main thread alone.)"""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    heard = []
+    before = {number: signal.signal(number, lambda number, _: heard.append(number)) for number in signals}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler or signal.SIG_DFL)
+        for number in heard[:1]:
+            signal.raise_signal(number)
+
+
+class _Spawning(multiprocessing.context.SpawnContext):
+    Process = _Worker
+
+
 def _serve():
-    """A worker process leaves the terminal's interrupt to its parent, and goes when that is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """A worker process goes when its parent is gone."""
     threading.Thread(target=_follow, args=(multiprocessing.parent_process(),), daemon=True).start()
 
 

@@ -1,5 +1,6 @@
 """Blocks -> dataset: what is solved where and when, what is kept, what the file gets."""
 
+import contextlib
 import hashlib
 import json
 import os
@@ -178,10 +179,9 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, agai
         reused = kept.sound()
         job = Job(workflow.scene, workflow.request, workflow.grid, blocks, kept, _code())
         left = Remaining(workflow.grid.shape, blocks, reused)
-        helper = _compiling_ahead(workflow.scene)
         compiled = {}
 
-        with Assembly(workflow, kept, tile, regions) as assembly:
+        with _compiling_ahead(workflow.scene), Assembly(workflow, kept, tile, regions) as assembly:
 
             def finished(done, solved=None):
                 if solved:
@@ -216,9 +216,6 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, agai
             }
             written = assembly.finish(further, told)
         kept.remove()
-        if helper:
-            helper.kill()
-            helper.wait()
     writing = time.perf_counter() - computed - beside
     computing = max(0.0, computed - began - compiling)
     return Finished(written, assembly.tally.counts, compiling, computing, beside if further else 0.0, writing)
@@ -286,16 +283,20 @@ def _refuse_other_code(code):
             )
 
 
+@contextlib.contextmanager
 def _compiling_ahead(scene):
-    """On a new machine, a process that compiles the kernels needed last while this one compiles those needed first."""
+    """On a new machine, a process compiles the kernels needed last while this one compiles those needed first."""
     ahead = getattr(scene, "AHEAD", None)
-    if ahead and jit.is_new() and cpus() > 1:
-        words = f"import gc; gc.disable(); from survey.measures import {ahead}; {ahead}.compile_ahead()"
-        jit.ahead = subprocess.Popen(
-            [sys.executable, "-c", words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-        )
-        return jit.ahead
-    return None
+    if not (ahead and jit.is_new() and cpus() > 1):
+        yield
+        return
+    words = f"import gc; gc.disable(); from survey.measures import {ahead}; {ahead}.compile_ahead()"
+    jit.ahead = subprocess.Popen([sys.executable, "-c", words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        yield
+    finally:
+        jit.ahead.kill()
+        jit.ahead.wait()
 
 
 def extras(workflow, once, progress=None):

@@ -1,5 +1,6 @@
 """Tasks on threads, on processes that die, on a cluster: each number once, deaths told of the task that caused them."""
 
+import multiprocessing
 import os
 import signal
 import threading
@@ -75,6 +76,23 @@ def test_a_worker_killed_from_outside_costs_nothing(tmp_path):
     assert heard.dead == [] and sorted(heard.results) == [n * n for n in NUMBERS]
 
 
+def test_an_interruption_waits_for_no_worker(tmp_path, in_time):
+    def endless(number):
+        (tmp_path / str(number)).touch()
+        time.sleep(10_000)
+
+    def interrupt():
+        while len(list(tmp_path.iterdir())) < 2:
+            time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=interrupt, daemon=True).start()
+    heard = Heard()
+    with pytest.raises(KeyboardInterrupt):
+        dispatch.on_processes(endless, NUMBERS, heard.finished, heard.died, 2)
+    assert heard.results == [] and not multiprocessing.active_children()
+
+
 @pytest.fixture(scope="module")
 def cluster():
     distributed = pytest.importorskip("distributed")
@@ -84,10 +102,10 @@ def cluster():
 
 @pytest.fixture
 def in_time():
-    """A cluster that loses every worker waits for new ones for ever: the test fails instead."""
+    """What waits for ever, as a cluster that loses every worker does, fails instead."""
 
     def late(*_):
-        raise TimeoutError("the cluster has not ended within three minutes")
+        raise TimeoutError("this has not ended within three minutes")
 
     before = signal.signal(signal.SIGALRM, late)
     signal.alarm(180)

@@ -13,7 +13,8 @@ Where each promise is tested, here if no file is named; (slow): its long form, (
  8 damage is found       test_a_flipped_bit_of_a_block_is_mended; test_cli: test_verify_finds_...; test_store: every
                          bit of a block (beside); test_audit: wrong values under sound sums (beside)
  9 bounded memory        test_memory_is_bounded_by_blocks_not_by_the_map: 10^6 points, 10^8 (slow)
-10 prompt stop           test_workers_stop_promptly_with_the_run; test_cli: test_an_interrupted_run_can_be_resumed;
+10 prompt stop           test_workers_stop_promptly_with_the_run; test_an_interrupt_from_the_terminal_...;
+                         test_dispatch: an interruption (beside); test_cli: test_an_interrupted_run_can_be_resumed;
                          test_cluster: test_the_batch_script_stops_before_the_walltime_and_is_queued_again
 11 disk faults           test_a_full_disk_..., test_a_file_size_limit_...; test_faults: an error at each call that
                          writes (slow), at two of them, a read-only disk; test_store: each call (beside)
@@ -239,6 +240,16 @@ def test_workers_stop_promptly_with_the_run(folder, name, code):
     told = running.communicate(timeout=10)[1]
     assert running.returncode == code and "go on with: survey run sweep.toml --workers 2" in told
     wait_for(lambda: not any(_works(child) for child in children), 5)
+
+
+def test_an_interrupt_from_the_terminal_is_one_line_while_workers_start(folder):
+    """The terminal sends it to every process of the group."""
+    heeding = lambda: (os.setsid(), signal.signal(signal.SIGINT, signal.SIG_DFL))  # noqa: E731
+    running = start(folder, "--workers", "2", "--quiet", stderr=subprocess.PIPE, preexec_fn=heeding)
+    wait_for(lambda: any(_is_worker(child) for child in psutil.Process(running.pid).children()))
+    os.killpg(running.pid, signal.SIGINT)
+    told = running.communicate(timeout=60)[1]
+    assert running.returncode == 130 and told.count("\n") == 1 and "interrupted; no block was finished yet; go" in told
 
 
 def test_drift_and_a_second_writer_are_refused(folder, unbroken):
