@@ -47,7 +47,7 @@ def run(
 
     Raises
     ------
-    survey.BadInput, survey.Stopped (resumable): one line each.
+    survey.BadInput, survey.Damaged, survey.Stopped (resumable): one line each.
     """
     read = workflows.read if isinstance(workflow, (str, os.PathLike)) else workflows.check
     checked = read(workflow, output=output)

@@ -1,7 +1,7 @@
 """Tasks through dask: on threads of this machine, on processes of it, or on a cluster. The only place that knows dask.
 
-A task is called once for each number; `finished(done, result)` hears of each as it ends, and of (0, None) before.
-`died(number)` is called in its place where a task has killed its worker DEATHS times.
+A task is called once for each number (or what else can be hashed and sorted); `finished(done, result)` hears of each as
+it ends, and of (0, None) before. `died(number)` is called in its place where it kills its worker, and DEATHS times again.
 """
 
 import contextlib
@@ -79,7 +79,7 @@ def on_cluster(task, numbers, finished, died, client):
     finished(0)
     futures = dict(zip(client.map(task, numbers, pure=False, allow_other_workers=False), numbers, strict=True))
     with _watched(client):
-        for future in as_completed(list(futures)):
+        for future in as_completed(list(futures), loop=client.loop):
             try:
                 result = future.result()
             except KilledWorker:
@@ -122,7 +122,7 @@ def client_of(address):
         raise BadInput("--scheduler needs dask.distributed: pip install distributed") from None
     try:
         where = {"scheduler_file": address} if os.path.exists(address) else {"address": address}
-        client = Client(**where, timeout=SCHEDULER_SECONDS)
+        client = Client(**where, timeout=SCHEDULER_SECONDS, set_as_default=False)
         for name in [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]:
             logging.getLogger(name).setLevel(logging.CRITICAL)  # what they would log is told in one line
         return client

@@ -11,6 +11,7 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import cache
 from importlib import import_module
 from importlib.metadata import version
 from math import prod
@@ -18,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from survey import dispatch, methods, modules, status, store
+from survey import dispatch, methods, modules, status, store, unfinished
 from survey.dataset import Tally, attributes, command, coordinates, layout, now, round_up, variables
 from survey.dispatch import cpus
 from survey.errors import BadInput, Stopped
@@ -132,28 +133,38 @@ class Solved(NamedTuple):
     content: bytes | None = None
 
 
+def numbered(number, block):
+    """A block as a Job takes it: (number, ((start, stop), ...)), which is small and can be hashed."""
+    return number, tuple((cut.start, cut.stop) for cut in block)
+
+
 @dataclass(frozen=True)
 class Job:
-    """All that a worker needs; called with the number of a block, it solves and keeps it."""
+    """All that a worker needs; called with a numbered block, it solves and keeps it.
+
+    It is sent with each block, so it does not hold them all.
+    """
 
     scene: Any
     request: Any
     grid: Any
-    blocks: list
     kept: store.Blocks
     code: dict[str, str]
 
-    def __call__(self, number):
+    def __call__(self, numbered):
         _refuse_other_code(self.code)
+        number, ends = numbered
+        block = tuple(slice(*pair) for pair in ends)
         began, before = time.perf_counter(), compile_seconds()
-        content = self.kept.keep(number, solve_block(self.scene, self.request, self.grid, self.blocks[number]))
+        content = self.kept.keep(number, solve_block(self.scene, self.request, self.grid, block))
         compiled = compile_seconds()
         seconds = time.perf_counter() - began - (compiled - before)
         return Solved(number, _process(), compiled, max(seconds, 0.0), content)
 
-    def died(self, number):
-        """Keep block `number` with the status of points whose worker died again and again."""
-        shape = _shape(self.grid, self.blocks[number])
+    def died(self, numbered):
+        """Keep a block with the status of points whose worker died again and again."""
+        number, ends = numbered
+        shape = tuple(stop - start for start, stop in ends)
         table = layout(self.scene, self.request)
         arrays = {name: np.full(shape + extra, fill, kind) for name, (kind, fill, extra) in table.items()}
         arrays["status"][...] = status.WORKER_DIED
@@ -171,13 +182,13 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, agai
     """
     started = time.perf_counter()
     _refuse_too_large(workflow)
-    client = dispatch.client_of(scheduler) if scheduler else None
+    client = dispatch.client_of(scheduler) if scheduler else contextlib.nullcontext()
     tile, regions = regions_of(workflow)
     blocks = [block for _, blocks in regions for block in blocks]
     about = {"points": workflow.grid.points, "code": _code() | _compilers()}
-    with store.Blocks(workflow.path, fingerprint(workflow), fresh, about, workflow.text, again) as kept:
+    with client, store.Blocks(workflow.path, fingerprint(workflow), fresh, about, workflow.text, again) as kept:
         reused = kept.sound()
-        job = Job(workflow.scene, workflow.request, workflow.grid, blocks, kept, _code())
+        job = Job(workflow.scene, workflow.request, workflow.grid, kept, _code())
         left = Remaining(workflow.grid.shape, blocks, reused)
         compiled = {}
 
@@ -197,7 +208,8 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, agai
             for number in sorted(reused):
                 assembly.has(number)
             todo = _spread([number for number in range(len(blocks)) if number not in reused])
-            if client:
+            todo = [numbered(number, blocks[number]) for number in todo]
+            if scheduler:
                 dispatch.on_cluster(job, todo, finished, job.died, client)
             elif workers:
                 dispatch.on_processes(job, todo, finished, job.died, workers)
@@ -262,6 +274,7 @@ def _process():
     return f"{socket.gethostname()} {os.getpid()}"
 
 
+@cache
 def _code():
     """What names the code that solves blocks: it must be the same on every worker, the processor need not."""
     return {"survey": version("survey"), "sources": jit.SOURCE_HASH}
@@ -418,11 +431,14 @@ def plan(workflow):
 
 
 def _refuse_too_large(workflow):
-    """Raise BadInput if the map's blocks and its file do not fit onto the disk of its output."""
+    """Raise BadInput if the map's blocks and its file do not fit onto the disk of its output.
+
+    What an interrupted run has written there already needs no more room.
+    """
     grid = workflow.grid
     needed = 2 * grid.points * bytes_per_point(workflow.scene, workflow.request)
     room = shutil.disk_usage(workflow.path.parent).free
-    if needed > room:
+    if needed > room and needed > room + unfinished.size(workflow.path):
         raise BadInput(
             f"{counted(grid.points, 'point')} need {needed / 2**30:,.0f} GiB, and the disk of {workflow.path} has "
             f"{room / 2**30:,.0f} GiB free; take fewer points, or name fewer outputs in output.variables"

@@ -66,7 +66,7 @@ class Blocks:
 
     def __getstate__(self):
         # a worker saves blocks, wherever it runs; only the parent holds the lock
-        return self.__dict__ | {"lock": None, "folder": self.folder.absolute()}
+        return self.__dict__ | {"lock": None, "workflow": "", "folder": self.folder.absolute()}
 
     def done(self):
         """Numbers of the blocks that are finished."""
@@ -128,8 +128,8 @@ class Blocks:
     def remove(self):
         """Drop the blocks once the output is complete."""
         shutil.rmtree(self.folder, ignore_errors=True)
+        Path(f"{self.path}.lock").unlink(missing_ok=True)  # while it is held: nobody else holds a lock of that name
         self.lock.release()
-        Path(f"{self.path}.lock").unlink(missing_ok=True)
 
     def _file(self, number):
         return self.folder / f"{number:08d}.block"

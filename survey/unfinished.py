@@ -52,6 +52,11 @@ def told(path):
     }
 
 
+def size(path):
+    """The bytes that the unfinished run that was to write `path` has written."""
+    return sum(file.stat().st_size for file in folder_of(path).glob("*") if file.is_file())
+
+
 def sentence(left):
     """What `told` has found, in words."""
     points = counted(left["points"], "point") if left["points"] else "them"

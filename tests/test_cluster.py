@@ -87,12 +87,13 @@ def test_blocks_travel_where_no_folder_is_shared(small, tmp_path):
     checked = workflow.read(small, output=tmp_path / "o.nc")
     with store.Blocks(checked.path, engine.fingerprint(checked)) as kept:
         blocks = engine.blocks_of(checked)
-        job = engine.Job(checked.scene, checked.request, checked.grid, blocks, kept, engine._code())
+        job = engine.Job(checked.scene, checked.request, checked.grid, kept, engine._code())
+        first = engine.numbered(0, blocks[0])
         far = pickle.loads(pickle.dumps(kept))
         assert far.folder.is_absolute()
-        assert job(0).content is None and kept.done() == {0}
+        assert job(first).content is None and kept.done() == {0}
         os.rename(kept.folder, tmp_path / "elsewhere")  # as a worker sees it that has another disk
-        content = dataclasses.replace(job, kept=far)(0).content
+        content = dataclasses.replace(job, kept=far)(first).content
         os.rename(tmp_path / "elsewhere", kept.folder)
         whole = (kept.folder / "00000000.block").read_bytes()
         assert content == whole
@@ -129,9 +130,9 @@ def test_a_cluster_with_an_edited_survey_is_refused(scheduler, small):
 
 def test_a_worker_with_other_code_is_refused(small, tmp_path):
     checked = workflow.read(small, output=tmp_path / "o.nc")
-    job = engine.Job(checked.scene, checked.request, checked.grid, [], None, engine._code() | {"sources": "other"})
+    job = engine.Job(checked.scene, checked.request, checked.grid, None, engine._code() | {"sources": "other"})
     with pytest.raises(Stopped, match=r"has other code \(sources: \w+, this run: other\); install the same survey"):
-        job(0)
+        job(engine.numbered(0, engine.blocks_of(checked)[0]))
 
 
 def queue(folder, *words):

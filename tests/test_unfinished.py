@@ -18,9 +18,9 @@ def left(small, tmp_path, monkeypatch):
     monkeypatch.setattr(engine, "BLOCK_POINTS", 4)
     monkeypatch.chdir(tmp_path)
 
-    def stop(job, numbers, finished):
+    def stop(job, blocks, finished):
         for number in DONE:
-            job(number)
+            job(blocks[number])
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
@@ -100,6 +100,18 @@ def test_without_a_sound_manifest_no_block_is_taken(left, small):
     with pytest.raises(Damaged, match="--fresh deletes them"):
         engine.run(workflow.read(small))
     assert len(list(left.glob("*.block"))) == 3
+
+
+def test_what_is_there_already_needs_no_more_room(left, small, monkeypatch):
+    written = sum(file.stat().st_size for file in left.iterdir())
+    needed = 2 * 24 * engine.bytes_per_point(workflow.read(small).scene, workflow.read(small).request)
+    assert written > needed // 4
+    usage = engine.shutil.disk_usage(left)
+    monkeypatch.setattr(engine.shutil, "disk_usage", lambda _: usage._replace(free=needed - 1))
+    with pytest.raises(BadInput, match="24 points need 0 GiB, and the disk"):
+        engine.run(workflow.read(small, output="other.nc"))
+    engine.run(workflow.read(small))
+    assert survey.open("small.nc").attrs["blocks_reused"] == 3
 
 
 def test_where_nothing_is_finished_another_survey_begins(left, small):
