@@ -1,7 +1,7 @@
 """Tasks through dask: on threads of this machine, on processes of it, or on a cluster. The only place that knows dask.
 
 A task is called once for each number (or what else can be hashed and sorted); `finished(done, result)` hears of each as
-it ends, and of (0, None) before. `died(number)` is called in its place where it kills its worker, and DEATHS times again.
+it ends, and of (0, None) before. `died(number)` is called instead where it kills its worker, and DEATHS times again.
 """
 
 import contextlib
