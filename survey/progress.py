@@ -1,6 +1,7 @@
 """Progress and ETA on stderr: a bar on a terminal, a line now and then in a log."""
 
 import time
+from datetime import timedelta
 
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
@@ -45,7 +46,7 @@ class Progress:
         if self.bar:
             if time.monotonic() - self.logged > SHOWN_SECONDS or done == total:
                 self.logged = time.monotonic()
-                eta = time.strftime("%H:%M:%S", time.gmtime(_left(done, total, reused, elapsed, left)))
+                eta = _clock(_left(done, total, reused, elapsed, left))
                 self.bar.update(self.task, completed=done, eta=eta)
         elif done != reused and (done == total or time.monotonic() - self.logged > LOG_SECONDS):
             self.logged = time.monotonic()
@@ -73,7 +74,7 @@ class Progress:
             return
         text = f"cells: {settled:.2%} of the map settled, {counted(points, 'point')} solved"
         if self.bar and settled < 1:
-            eta = time.strftime("%H:%M:%S or more", time.gmtime(left))
+            eta = f"{_clock(left)} or more"
             self.bar.update(self.task, description=f"{self.workflow.name}: {text}", what="cells", eta=eta)
         elif settled == 1:
             self._line(text)
@@ -83,6 +84,11 @@ class Progress:
 
     def _line(self, text):
         self.console.print(f"{self.workflow.name}: {text}", markup=False)
+
+
+def _clock(seconds):
+    """'0:01:05', '1 day, 1:00:00'."""
+    return str(timedelta(seconds=round(seconds)))
 
 
 def _left(done, total, reused, elapsed, left):
