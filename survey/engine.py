@@ -30,6 +30,7 @@ from survey.wording import counted
 BLOCK_SECONDS = 0.5
 BLOCK_POINTS = 2**17
 SAMPLES = 16  # blocks from all over the map that are solved first
+NEAR = 0.02  # of the map: what a block so near has cost tells this one's cost well enough
 # what the writer holds at a time: enough for the tiles to be square, little beside what else a process takes
 REGION_POINTS, REGION_BYTES = 2**20, 2**25
 
@@ -258,6 +259,8 @@ class Remaining:
             return
         self.began = min(self.began, time.perf_counter() - seconds)
         self.worked += seconds
+        if self.nearest[number] < NEAR**2:
+            return  # so that a million blocks take no longer, each, than some
         distance = ((self.places - self.places[number]) ** 2).sum(axis=1)
         nearer = distance < self.nearest
         self.nearest[nearer], self.cost[nearer] = distance[nearer], seconds / self.points[number]
