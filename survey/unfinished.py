@@ -39,7 +39,7 @@ def told(path):
     if "blocks" not in known:
         return {}
     at_work = _is_locked(Path(f"{path}.lock"))
-    last = max(_when(file) for file in [*files, *folder.glob("*.extra"), folder / "manifest.json"])
+    last = max(_stat(file, "st_mtime") for file in [*files, *folder.glob("*.extra"), folder / "manifest.json"])
     return {
         "folder": str(folder),
         "blocks_done": len(files),
@@ -54,7 +54,7 @@ def told(path):
 
 def size(path):
     """The bytes that the unfinished run that was to write `path` has written."""
-    return sum(file.stat().st_size for file in folder_of(path).glob("*") if file.is_file())
+    return sum(_stat(file, "st_size") for file in folder_of(path).glob("*"))
 
 
 def sentence(left):
@@ -116,10 +116,8 @@ def _changes(old, new, prefix=""):
 
 def _code(old, new):
     """What differs in the code of two manifests."""
-    own = old.get("code", {})
-    return (
-        ", ".join(f"{k} {own.get(k)} -> {v}" for k, v in new.get("code", {}).items() if own.get(k) != v) or "its format"
-    )
+    before, now = (manifest.get("code", {}) for manifest in (old, new))
+    return ", ".join(f"{key} {before.get(key)} -> {now[key]}" for key in now if before.get(key) != now[key]) or "format"
 
 
 def _short(value):
@@ -148,11 +146,12 @@ def _points(file):
         return 0
 
 
-def _when(file):
+def _stat(file, what):
+    """A figure of the file; 0 if it went meanwhile."""
     try:
-        return file.stat().st_mtime
-    except OSError:  # it went meanwhile
-        return 0.0
+        return getattr(file.stat(), what)
+    except OSError:
+        return 0
 
 
 def _table(file):
