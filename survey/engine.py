@@ -9,6 +9,7 @@ import socket
 import subprocess
 import sys
 import time
+import tomllib
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache
@@ -18,6 +19,7 @@ from math import prod
 from typing import Any, NamedTuple
 
 import numpy as np
+import tomli_w
 
 from survey import dispatch, methods, modules, status, store, unfinished
 from survey.dataset import Tally, attributes, command, coordinates, layout, now, round_up, variables
@@ -187,7 +189,7 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, agai
     tile, regions = regions_of(workflow)
     blocks = [block for _, blocks in regions for block in blocks]
     about = {"points": workflow.grid.points, "code": _code() | _compilers()}
-    with client, store.Blocks(workflow.path, fingerprint(workflow), fresh, about, workflow.text, again) as kept:
+    with client, store.Blocks(workflow.path, fingerprint(workflow), fresh, about, _findable(workflow), again) as kept:
         reused = kept.sound()
         job = Job(workflow.scene, workflow.request, workflow.grid, kept, _code())
         left = Remaining(workflow.grid.shape, blocks, reused)
@@ -232,6 +234,12 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, agai
     writing = time.perf_counter() - computed - beside
     computing = max(0.0, computed - began - compiling)
     return Finished(written, assembly.tally.counts, compiling, computing, beside if further else 0.0, writing)
+
+
+def _findable(workflow):
+    """The workflow's text, a scene that is a file named as it is found from here, not from beside the workflow."""
+    table = tomllib.loads(workflow.text)
+    return workflow.text if table["scene"] == workflow.name else tomli_w.dumps(table | {"scene": workflow.name})
 
 
 def _spread(numbers):

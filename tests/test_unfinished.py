@@ -3,6 +3,7 @@
 import json
 import re
 
+import numpy as np
 import pytest
 
 import survey
@@ -112,6 +113,27 @@ def test_what_is_there_already_needs_no_more_room(left, small, monkeypatch):
         engine.run(workflow.read(small, output="other.nc"))
     engine.run(workflow.read(small))
     assert survey.open("small.nc").attrs["blocks_reused"] == 3
+
+
+def test_the_kept_workflow_finds_a_scene_that_lay_beside_it(tmp_path, monkeypatch):
+    away = tmp_path / "away"
+    away.mkdir()
+    (away / "own.py").write_text("PARAMETERS = ('a',)\nPERIOD = 1.0\n\n\ndef z(u, p):\n    return p[0]\n")
+    (away / "own.toml").write_text('scene = "own.py"\naxes = { a = { values = [1.0, 2.0] } }\n')
+    monkeypatch.chdir(tmp_path)
+
+    def stop(job, blocks, finished):
+        job.kept.save(0, {"status": np.zeros(2, np.int8)})
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(engine.dispatch, "on_threads", stop)
+    with pytest.raises(KeyboardInterrupt):
+        engine.run(workflow.read(away / "own.toml"))
+    assert "of another workflow (axes.a.values [1.0, 2.0] -> [1.5])" in refusal(
+        away / "own.toml", "axes.a.values=[1.5]"
+    )
+    kept = workflow.read("own.nc.blocks/workflow.toml", output="own.nc")
+    assert engine.fingerprint(kept) == engine.fingerprint(workflow.read(away / "own.toml"))
 
 
 def test_where_nothing_is_finished_another_survey_begins(left, small):
