@@ -17,7 +17,6 @@ from survey import figures
 from survey.errors import BadInput, SurveyError
 from survey.viewer import raster
 from survey.viewer.shown import short
-from survey.wording import counted
 
 SIDE, WIDTH = 510, 470  # width in pixels of what stands beside the map, and of its parts
 SOON = 30  # ms: changes that follow each other faster are answered once
@@ -169,7 +168,7 @@ class Page:
             curve.visible = view.boundaries
         plot.name = self.map.link(view)
         if not self.map.layer(view).ready:
-            self._say(f"reading {counted(ds.status.size, 'point')}, once ...")
+            self._say(f"reading {ds.status.size:,} points, once ...")
         self.soon(self.draw)
 
     def draw(self):
