@@ -12,8 +12,8 @@ import numpy as np
 from matplotlib import colormaps
 
 from survey import status
-from survey.dataset import fill_of, flag_codes
-from survey.figures import colours_of, limits
+from survey.dataset import fill_of, flag_codes, unanswered
+from survey.figures import colours_of, greys_of, limits
 from survey.grid import logarithmic
 
 DIRECT = 2**22  # points: a smaller window is read from the file, a larger one from the overview
@@ -118,8 +118,8 @@ class Pixels:
 class Layer:
     """One variable of a survey over two of its axes, for drawing; `place` is {other dimension: place in it}.
 
-    `kinds` is {name: colour} of what a point may be: its flags, if it has any, and last why it has no answer. Bit i of
-    a mask says that the i-th of them occurs in a pixel.
+    `kinds` is {name: colour} of what a point may be: its flags, if it has any, and last why it has no answer, by nature
+    (grey) or not. Bit i of a mask says that the i-th of them occurs in a pixel.
     """
 
     def __init__(self, ds, name, dims, place):
@@ -130,15 +130,19 @@ class Layer:
         self.fill = np.nan if self.flagged or fill_of(self.variable) is None else fill_of(self.variable)
         flags = flag_codes(self.variable.attrs) if self.flagged else {}
         palette = colours_of(flags)
-        self.kinds = {flag: palette.get(flag, UNKNOWN) for flag in flags} | dict.fromkeys(NO_ANSWER, WHITE)
+        self.grey = greys_of(ds, flags)
+        self.kinds = {flag: palette.get(flag, UNKNOWN) for flag in flags} | self.grey | dict.fromkeys(NO_ANSWER, WHITE)
         self.dtype = np.uint16 if len(self.kinds) <= 16 else np.uint32
         self.bits = {kind: self.dtype(1 << i) for i, kind in enumerate(self.kinds)}
-        self._of_code, self._of_status = np.zeros(256, self.dtype), np.zeros(256, self.dtype)
+        self._of_code, self._of_status, self._of_open = np.zeros((3, 256), self.dtype)
         for flag, code in flags.items():
             self._of_code[np.int8(code).view(np.uint8)] = self.bits[flag]
         for code in status.FAILURES:
             self._of_status[code] = self.bits["failed"]
         self._of_status[status.INVALID_PARAMETERS] = self.bits["outside the domain"]
+        self._of_open[:] = self.bits.get("undecided", 0)  # of points without a verdict, by status
+        for name in self.grey:
+            self._of_open[unanswered(ds)[name]] = self.bits[name]
 
     def pixels(self, xs, ys):
         """(mask, value), each (len(ys), len(xs)): kinds that occur in each pixel; value None for a flagged variable."""
@@ -159,6 +163,8 @@ class Layer:
         mask = self._of_status[state.view(np.uint8)]
         if self.flagged:
             flags = self._of_code[array.astype(np.int8, copy=False).view(np.uint8)]
+            if self.grey:
+                flags = np.where(flags == self._of_open[0], self._of_open[state.view(np.uint8)], flags)
             return np.where(mask == 0, flags, mask), None
         value = array.astype(np.float32)
         value[(mask != 0) | (array == self.fill) | ~np.isfinite(value)] = np.nan
