@@ -83,8 +83,9 @@ class Survey:
     def zoom(self, num=None, output=None, **ranges):
         """A finer sweep of a part of the map, such as `zoom(k=(0.2, 0.3), num=200)`, the same workflow otherwise.
 
-        `num`: values along each axis with a range (by default as many as now; a dict gives one for each). Returns the
-        Dataset, in memory; with `output` it is written to that netCDF file by `survey.run`.
+        `num`: values along each axis with a range (by default as many as now; a dict gives one for each). Ranges may
+        reach beyond the map, as far as the parameters' domains allow; a warning says so. Returns the Dataset, in
+        memory; with `output` it is written to that netCDF file by `survey.run`.
         """
         from survey.analysis import zoom
 
