@@ -46,7 +46,8 @@ def test_undecided_is_not_counted_where_the_point_failed(toy):
     plt.close("all")
 
 
-def test_a_large_map_is_thinned_for_the_picture_and_counted_in_full(toy, monkeypatch):
+def test_a_large_map_is_reduced_for_the_picture_and_counted_in_full(toy, monkeypatch):
+    monkeypatch.setattr(figures, "WHOLE", 20)
     monkeypatch.setattr(figures, "CELLS", 20)
     figure = figures.draw(toy)
     labels = [text.get_text() for text in figure.legends[0].get_texts()]

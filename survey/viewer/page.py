@@ -2,6 +2,7 @@
 
 import html
 import io
+import time
 from base64 import b64encode
 
 import numpy as np
@@ -20,6 +21,8 @@ from survey.viewer.shown import short
 
 SIDE, WIDTH = 510, 470  # width in pixels of what stands beside the map, and of its parts
 SOON = 30  # ms: changes that follow each other faster are answered once
+MOMENT = 0.4  # seconds: the map is read for so long before it is drawn again, while it is read
+GROWTH = 1.5  # and by so much more of it: a picture costs time, too
 RINGS = 100  # pixels with undecided or failed points: if they are fewer, each is ringed
 RED = "#D40000"
 CURVE_POINTS = 300_000  # edges of more points are thinned
@@ -64,8 +67,9 @@ class Page:
         scales = ["log" if axis.log else "linear" for axis in axes]
         plot = self.plot = figure(
             x_range=ranges[0], y_range=ranges[1], x_axis_type=scales[0], y_axis_type=scales[1],
-            tools="pan,wheel_zoom,box_zoom,reset,save", active_scroll="wheel_zoom", background_fill_color="#f4f4f4",
-            sizing_mode="stretch_both", min_width=300, min_height=300, stylesheets=[":host(:focus) {outline: none}"],
+            tools="pan,wheel_zoom,box_zoom,reset,save", active_scroll="wheel_zoom",
+            background_fill_color=raster.BACKGROUND, sizing_mode="stretch_both", min_width=300, min_height=300,
+            stylesheets=[":host(:focus) {outline: none}"],
         )  # fmt: skip
         plot.xaxis.axis_label, plot.yaxis.axis_label = (_label(self.map.ds[dim]) for dim in self.map.dims)
         plot.grid.visible, plot.toolbar.logo = False, None
@@ -167,12 +171,10 @@ class Page:
         for curve in self.curves.values():
             curve.visible = view.boundaries
         plot.name = self.map.link(view)
-        if not self.map.layer(view).ready:
-            self._say(f"reading {ds.status.size:,} points, once ...")
         self.soon(self.draw)
 
     def draw(self):
-        """Draw the window of the map that is seen, its legend, and what a pixel stands for."""
+        """Draw the window of the map that is seen, its legend, and what a pixel stands for; more of it is read then."""
         layer = self.map.layer(self.view)
         try:
             sizes = self.plot.inner_width, self.plot.inner_height
@@ -185,40 +187,49 @@ class Page:
         if xs is None or ys is None:
             return
         mask, value = layer.pixels(xs, ys)
+        image, kinds = raster.paint(mask, value, layer)
         corner = {
             "x": [xs.ends[0]],
             "y": [ys.ends[0]],
             "dw": [xs.ends[1] - xs.ends[0]],
             "dh": [ys.ends[1] - ys.ends[0]],
         }
-        self.image.data = corner | {"image": [raster.paint(mask, value, layer)]}
-        kinds = raster.rarest(mask, layer)
+        self.image.data = corner | {"image": [image]}
         self._ring(mask, layer, kinds, xs, ys)
-        self._legend(layer, kinds, value)
-        several = f"a pixel stands for up to {xs.points} × {ys.points} points" if max(xs.points, ys.points) > 1 else ""
-        shows = "its rarest kind" if layer.flagged else "the value largest in magnitude"
-        self._say(self.complaint + (f"{several} and shows {shows}" if several else ""))
-
-    def _say(self, words):
+        self._legend(layer, kinds, value is not None and (np.isnan(value) & (mask == 0)).any())
+        words = self.complaint
+        if max(xs.points, ys.points) > 1:
+            shows = "its rarest kind" if layer.flagged else "the value largest in magnitude"
+            words += f"a pixel stands for up to {xs.points} × {ys.points} points and shows {shows}"
+        if layer.waits(xs, ys):
+            self.share = layer.overview.share
+            words = f"an overview, {self.share:.0%} of {layer.variable.size:,} points read; {words} ..."
+            self.soon(self.refine)
         self.caption.update(text=html.escape(words), visible=bool(words))
+
+    def refine(self):
+        """Read some more of the map, and draw it again."""
+        overview, end = self.map.layer(self.view).overview, time.monotonic() + MOMENT
+        while overview.read() and time.monotonic() < end:
+            pass
+        self.soon(self.draw if overview.share >= min(1.0, GROWTH * self.share) else self.refine)
 
     def _ring(self, mask, layer, kinds, xs, ys):
         """Ring the pixels with undecided or failed points, where these are few."""
         few = [kind for kind in ("undecided", "failed") if 0 < kinds.get(kind, 0) <= RINGS]
-        places = [(*np.nonzero(mask & layer.bits[kind]), layer.kinds[kind]) for kind in few]
+        places = [(*np.nonzero(mask & layer.bits[kind]), layer.colours[kind]) for kind in few]
         self.rings.data = {
             "x": [x for _, j, _ in places for x in xs.middles[j]],
             "y": [y for i, _, _ in places for y in ys.middles[i]],
             "colour": [colour for i, _, colour in places for _ in i],
         }
 
-    def _legend(self, layer, kinds, value):
-        """The kinds that are seen, with their share of the whole map; or the colour bar."""
+    def _legend(self, layer, kinds, empty):
+        """The kinds that are seen, with their share of the whole map; or the colour bar. Are some pixels `empty`?"""
         ds, name = self.map.ds, self.view.name
         shares = self.map.shares(name)
-        entries = [(kind, layer.kinds[kind]) for kind in layer.kinds if kind in kinds]
-        if value is not None and np.isnan(value).any():
-            entries.append(("does not apply", raster.NOT_APPLY))
+        entries = [(kind, colour) for kind, colour in layer.colours.items() if kind in kinds]
+        entries += [("does not apply", raster.NOT_APPLY)] if empty else []
         self.legend.text = "".join(
             f"<span style='{ENTRY}'><span style='{SWATCH};background:{_swatch(kind, colour)}'></span>"
             f"{html.escape(kind.replace('_', ' '))}{shares.get(kind, '')}</span> "
