@@ -137,6 +137,7 @@ def test_a_fate_says_why():
         ("mathieu", {"a": 3.0, "q": 0.7}),
         ("mathieu", {"a": 1.0, "q": 0.5}),
         ("satellite", {"k": 0.5, "rho": 1.2, "body": "oblate"}),
+        ("satellite", {"amplitude": 0.974, "inertia_ratio": 0.69}),  # 173 steps would do for half a period
         ("satellite", {"one_minus_k": -0.5, "inertia_ratio": 0.6, "direction": "-1"}),
     ],
 )

@@ -8,7 +8,7 @@ from survey.measures import linear_motion
 from survey.scene import Trajectory
 
 PERIODS, GROWTH = 6, 7.0  # so many periods, but not beyond e^7
-PHASE, LEAST, MOST = 0.05, 240, 20_000  # radians per step; steps per period
+PHASE, LEAST, MOST = 0.05, 240, 20_000  # radians per step; steps per period, and half of them, are even
 
 
 def solve(problem, answer, time, name="t"):
@@ -16,7 +16,7 @@ def solve(problem, answer, time, name="t"):
     period = float(answer["period"])
     periods = _number(float(answer["exponent"])) if time is None else max(1, ceil(time / period))
     fastest = np.sqrt(float(problem.bound[0] @ abs(problem.p[0, 0]) ** np.arange(3)))
-    steps = int(np.clip(fastest * period / PHASE, LEAST, MOST)) // 2 * 2
+    steps = int(np.clip(fastest * period / PHASE, LEAST, MOST)) // 4 * 4
     z, size, lengths = _sampled(problem, steps if problem.whole else steps // 2)
     matrices = np.zeros((*z.shape, 2, 2))
     matrices[..., 0, 1], matrices[..., 1, 0] = 1.0, -z

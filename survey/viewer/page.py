@@ -2,6 +2,7 @@
 
 import html
 import io
+import re
 import time
 from base64 import b64encode
 
@@ -9,7 +10,18 @@ import numpy as np
 from bokeh import events
 from bokeh.core.property.descriptors import UnsetValueError
 from bokeh.layouts import column, row
-from bokeh.models import Checkbox, ColorBar, CustomJS, Div, Label, LinearColorMapper, Range1d, Select, Slider
+from bokeh.models import (
+    Checkbox,
+    ColorBar,
+    CustomJS,
+    CustomJSTickFormatter,
+    Div,
+    Label,
+    LinearColorMapper,
+    Range1d,
+    Select,
+    Slider,
+)
 from bokeh.palettes import Viridis256
 from bokeh.plotting import figure
 from matplotlib.figure import Figure
@@ -130,7 +142,9 @@ class Page:
         self.edges = Checkbox(label=told, active=view.boundaries, visible=bool(self.curves))
         _on(self.edges, ("active",), self.changed)
         self.sliders = {
-            dim: Slider(start=0, end=ds.sizes[dim] - 1, value=at, show_value=False, width=WIDTH)
+            dim: Slider(
+                title=dim, start=0, end=ds.sizes[dim] - 1, value=at, width=WIDTH, format=_labels(ds[dim].values)
+            )
             for dim, at in view.others.items()
             if ds.sizes[dim] > 1
         }
@@ -167,11 +181,11 @@ class Page:
         for dim, slider in self.sliders.items():
             view.others[dim] = int(slider.value)
             slider.visible = dim in (*ds.status.dims, *ds[view.name].dims)
-            slider.title = f"{dim} = {short(ds[dim].values[view.others[dim]])}"
         for curve in self.curves.values():
             curve.visible = view.boundaries
         plot.name = self.map.link(view)
         self.soon(self.draw)
+        self.soon(self.tell)
 
     def draw(self):
         """Draw the window of the map that is seen, its legend, and what a pixel stands for; more of it is read then."""
@@ -230,6 +244,7 @@ class Page:
         shares = self.map.shares(name)
         entries = [(kind, colour) for kind, colour in layer.colours.items() if kind in kinds]
         entries += [("does not apply", raster.NOT_APPLY)] if empty else []
+        self.legend.visible = bool(entries)
         self.legend.text = "".join(
             f"<span style='{ENTRY}'><span style='{SWATCH};background:{_swatch(kind, colour)}'></span>"
             f"{html.escape(kind.replace('_', ' '))}{shares.get(kind, '')}</span> "
@@ -319,6 +334,11 @@ def _picture(drawn):
     return f"<img class='motion' style='width:100%' src='data:image/png;base64,{b64encode(file.getvalue()).decode()}'>"
 
 
+def _labels(values):
+    """A slider's formatter, from places to the values there."""
+    return CustomJSTickFormatter(args={"values": [short(value) for value in values]}, code="return values[tick]")
+
+
 def _swatch(kind, colour):
     if kind not in raster.NO_ANSWER:
         return colour
@@ -329,5 +349,7 @@ def _swatch(kind, colour):
 def _label(variable, tex=True):
     """`long name, symbol (unit)`."""
     symbol, units = variable.attrs.get("symbol", ""), variable.attrs.get("units", "1")
-    text = variable.attrs.get("long_name", variable.name) + (f", $${symbol}$$" if symbol and tex else "")
+    text = variable.attrs.get("long_name", variable.name)
+    if symbol and tex:
+        text = re.sub(r"([_%&#])", r"\\\1", text) + f", $${symbol}$$"  # TeX reads the words, too
     return text + ("" if units in ("1", "") else f" ({units})")

@@ -159,8 +159,12 @@ class Layer(Points):
         rank = self.overview.rank
         starts = (np.arange(0, size, -(-size // LIMITS)) for size in rank.shape)
         shown = np.ma.masked_invalid(unranked(over(np.maximum, rank, *starts)))
+        if shown.mask.all():
+            return 0.0, 1.0
         found = limits(shown) or {"vmin": shown.min(), "vmax": shown.max()}
-        return (0.0, 1.0) if shown.mask.all() else (float(found["vmin"]), float(found["vmax"]))
+        low, high = (float(found[key]) for key in ("vmin", "vmax"))
+        spare = 0.0 if high > low else 0.5 * abs(low) or 0.5  # one value: in the middle
+        return low - spare, high + spare
 
 
 def _large(xs, ys):
@@ -208,7 +212,7 @@ def paint(mask, value, layer):
     image = np.zeros((*mask.shape, 4), np.uint8)  # where nothing is known, nothing is drawn
     if value is not None:
         low, high = layer.limits
-        image[...] = viridis((value - low) / ((high - low) or 1.0), bytes=True)
+        image[...] = viridis((value - low) / (high - low), bytes=True)
         image[np.isnan(value)] = _rgba(NOT_APPLY)
     kind, number = layer.shown(mask)
     for name in number:
