@@ -15,6 +15,7 @@ NO_ANSWER = ("outside the domain", "failed")
 UNREAD = "not read yet"
 LATE = ("undecided", *NO_ANSWER, UNREAD)  # these are shown before all others, the last first
 UNIONS = np.bitwise_or, np.maximum  # of masks, of ranks
+PIECE = 2**22  # points that are read at once, at most
 STRIDE = 8  # pieces are read in so many rounds, each of which spans the map
 
 
@@ -94,8 +95,9 @@ class Overview:
         self.rank = None if points.flagged else np.zeros(size, np.uint32)
         self.number = dict.fromkeys(points.kinds, 0)
         self._left = np.diff(self.starts[0], append=shape[0])  # rows of points of each row of cells
-        chunks = points.variable.encoding.get("chunksizes") or (256,)
-        pieces = [slice(first, min(first + chunks[0], shape[0])) for first in range(0, shape[0], chunks[0])]
+        rows = (points.variable.encoding.get("chunksizes") or (256,))[0]
+        rows = min(rows, max(1, PIECE // shape[1]))
+        pieces = [slice(first, min(first + rows, shape[0])) for first in range(0, shape[0], rows)]
         self._pieces = [piece for i in range(STRIDE) for piece in pieces[i::STRIDE]][::-1]
         self._whole = len(pieces)
 
