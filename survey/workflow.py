@@ -199,7 +199,7 @@ def _check_closed(measure, name, asked, sizes):
     if refusal:
         raise BadInput(f"boundaries: of {name} {refusal}; change the axes, or leave the table out")
     if asked.axis is not None:
-        raise BadInput(f"boundaries.axis: the curves of {name} are closed forms, no axis is searched; leave it out")
+        raise BadInput(f"boundaries.axis: the curves of {name} are of the whole map: no axis is searched; leave it out")
     for key in axes[:2]:
         if sizes[key] < 2:
             raise BadInput(f"boundaries: the axis {key} has one value, and curves need a range; give two or more")
