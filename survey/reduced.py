@@ -22,24 +22,28 @@ STRIDE = 8  # pieces are read in so many rounds, each of which spans the map
 class Points:
     """One variable of a survey over two of its axes, and why points have no value: DataArrays, lazy ones too.
 
-    `kinds` names what a point may be: the variable's flags, if it has any, and last why it has no answer. Bit i of a
-    mask says that the i-th of them occurs.
+    `kinds` names what a point may be: the variable's flags, if it has any, and after them why it has no answer, by
+    nature (`own`, {status: code}) or not. Bit i of a mask says that the i-th of them occurs.
     """
 
-    def __init__(self, variable, state):
+    def __init__(self, variable, state, own):
         self.variable, self.status, self.shape = variable, state, variable.shape
         self.flagged = "flag_values" in variable.attrs
         self.flags = flag_codes(variable.attrs) if self.flagged else {}
         self.fill = np.nan if self.flagged or fill_of(variable) is None else fill_of(variable)
-        self.kinds = [*self.flags, *NO_ANSWER, UNREAD]
+        self.own = own if "undecided" in self.flags else {}
+        self.kinds = [*self.flags, *self.own, *NO_ANSWER, UNREAD]
         self.dtype = np.uint16 if len(self.kinds) <= 16 else np.uint32
         self.bits = {kind: self.dtype(1 << i) for i, kind in enumerate(self.kinds)}
-        self._of_code, self._of_status = np.zeros(256, self.dtype), np.zeros(256, self.dtype)
+        self._of_code, self._of_status, self._of_open = np.zeros((3, 256), self.dtype)
         for flag, code in self.flags.items():
             self._of_code[np.int8(code).view(np.uint8)] = self.bits[flag]
         for code in status.FAILURES:
             self._of_status[code] = self.bits["failed"]
         self._of_status[status.INVALID_PARAMETERS] = self.bits["outside the domain"]
+        self._of_open[:] = self.bits.get("undecided", 0)  # of points without a verdict, by status
+        for name, code in self.own.items():
+            self._of_open[code] = self.bits[name]
 
     def read(self, rows, columns):
         """(mask, rank) of points; the rank, which stands for a value, is None for a flagged variable."""
@@ -47,6 +51,8 @@ class Points:
         mask = self._of_status[state.view(np.uint8)]
         if self.flagged:
             flags = self._of_code[array.astype(np.int8, copy=False).view(np.uint8)]
+            if self.own:
+                flags = np.where(flags == self._of_open[0], self._of_open[state.view(np.uint8)], flags)
             return np.where(mask == 0, flags, mask), None
         value = array.astype(np.float32)
         value[(mask != 0) | (array == self.fill) | ~np.isfinite(value)] = np.nan
@@ -69,13 +75,12 @@ class Points:
     def cells(self, overview):
         """(values, statuses) of the cells, as if each were one point: of the kind, or of the value, that it shows."""
         kind, _ = self.shown(overview.mask)
-        state = np.select(
-            [kind == self.kinds.index(name) for name in NO_ANSWER],
-            [status.INVALID_PARAMETERS, status.NO_CONVERGENCE], status.OK,
-        )  # fmt: skip
+        told = [status.OK] * len(self.flags), self.own.values(), (status.INVALID_PARAMETERS, status.NO_CONVERGENCE)
+        state = np.array([*(code for codes in told for code in codes), status.OK], np.int8)[kind]
         if not self.flagged:
             return unranked(overview.rank), state
-        codes = np.array([*self.flags.values(), *[min(self.flags.values())] * (len(NO_ANSWER) + 1)])
+        other = self.flags.get("undecided", min(self.flags.values()))
+        codes = np.array([*self.flags.values(), *[other] * (len(self.kinds) - len(self.flags))], np.int8)
         return codes[kind], state
 
 

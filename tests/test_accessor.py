@@ -287,6 +287,17 @@ def test_a_zoom_is_the_same_workflow_on_a_part(tongues, tmp_path):
     assert row.sizes["a"] == 6 and set(row.edge_position.dims) == {"edge"} and float(row.q) == float(ds.q[1])
 
 
+def test_a_zoom_beyond_the_map_is_solved_and_said(mathieu, recwarn):
+    inside = mathieu.survey.zoom(a=(-1.0, 5.0), num=3)
+    assert not recwarn.list
+    with pytest.warns(UserWarning, match=r"zoom: a = \(4, 7\) reaches beyond the map's -1 to 5; it is solved") as said:
+        beyond = mathieu.survey.zoom(a=(4.0, 7.0), num=4)
+    assert said[0].filename == __file__ and "\n" not in str(said[0].message)
+    assert float(beyond.a.max()) == 7.0 and int(beyond.status.sum()) == 0 and inside.sizes["a"] == 3
+    with pytest.raises(BadInput, match=r"axes\.a has an end 2e\+12, outside its domain"):
+        mathieu.survey.zoom(a=(0.0, 2e12))
+
+
 def test_areas_of_points_and_cells(toy, tongues):
     found = toy.survey.areas()
     disc = found.sel(area_verdict="unstable")

@@ -17,6 +17,7 @@ import pytest
 import viewer as picture
 import xarray as xr
 
+import survey
 from survey import status
 from survey.analysis.point import reading
 from survey.errors import BadInput
@@ -148,6 +149,29 @@ def test_what_is_not_read_yet_is_not_drawn_and_what_is_drawn_is_true(name, monke
         drawn.append(known.mean())
     assert len(drawn) == 22 and drawn[1] < 0.15 and drawn[-1] == 1 and sorted(drawn) == drawn
     assert layer.limits == last.limits if name == "value" else layer.overview.number == last.overview.number
+
+
+def test_no_answer_by_nature_is_grey_and_told_by_its_status(tmp_path):
+    """A map of Brun's problem: below the least effective potential there is no motion."""
+    ds = survey.evaluate("brun", l=np.linspace(-1, 1, 12), beta=np.linspace(-1, 1, 10), alpha=0.1, sign="1")
+    bare = ds.status.values == status.FIRST_OF_SCENE
+    layer = raster.Layer(ds, "verdict", ("l", "beta"), {})
+    xs, ys = (raster.Axis(ds[dim].values).pixels(-2, 2, 400) for dim in ("l", "beta"))
+    mask, _ = layer.pixels(xs, ys)
+    image, kinds = raster.paint(mask, None, layer)
+    seen = image.view(np.uint8).reshape(*mask.shape, 4)[..., :3]
+    grey = (seen == 0x80).all(axis=-1)
+    np.testing.assert_array_equal(grey, bare[np.ix_(xs.starts, ys.starts)].T)
+    assert 0 < grey.sum() < grey.size and set(kinds) == {"no_motion", "regular_nutation"}
+    told = ds.attrs["verdict_counts"]
+    assert told == f"regular_nutation: {(~bare).sum()}, no_motion: {bare.sum()}"
+    ds.attrs["complete"] = 1
+    ds.to_netcdf(tmp_path / "map.nc")
+    shown = Map(tmp_path / "map.nc")
+    assert shown.shares("verdict")["no_motion"] == f" ({bare.sum()} in all)"
+    lines = list(shown.under(shown.read(""), (0, 0)))
+    assert any("no_motion: " in line for line in lines) and not any("undecided" in line for line in lines)
+    assert "undecided" not in str(ds.survey.point(l=-1, beta=-1))
 
 
 def test_of_a_refined_map_each_cell_is_seen_where_it_lies():

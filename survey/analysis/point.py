@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from survey import modules, own, status
-from survey.dataset import error_bars, fill_of, flag_codes, options_of
+from survey.dataset import UNDECIDED, error_bars, fill_of, flag_codes, options_of
 from survey.errors import BadInput
 
 # Attributes that tell of a whole file.
@@ -124,7 +124,7 @@ class Point:
     def _rows(self):
         """(name, value, what it is) of everything; words have nothing in the third place."""
         ds = self.dataset
-        if self.verdict:
+        if self.verdict and has_verdict(ds):
             yield "verdict", self.verdict, ""
         yield "why", self.why, ""
         if int(ds.status) == status.OK:
@@ -159,6 +159,11 @@ def _scene(ds):
         return own.find(own.of_dataset(ds))[1]
     except BadInput:
         return None
+
+
+def has_verdict(ds):
+    """Has the point a verdict, be it undecided? Else its status says why there is no answer."""
+    return int(ds.status) == status.OK or int(ds.verdict) != UNDECIDED
 
 
 def sentence(ds):

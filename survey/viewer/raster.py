@@ -9,8 +9,8 @@ from functools import cached_property, lru_cache
 import numpy as np
 from matplotlib import colormaps
 
-from survey.dataset import flag_codes
-from survey.figures import colours_of, limits
+from survey.dataset import flag_codes, unanswered
+from survey.figures import colours_of, greys_of, limits
 from survey.grid import logarithmic
 from survey.reduced import NO_ANSWER, UNIONS, UNREAD, Overview, Points, over, unranked
 
@@ -120,9 +120,10 @@ class Layer(Points):
 
     def __init__(self, ds, name, dims, place):
         own, state = ({dim: at for dim, at in place.items() if dim in ds[key].dims} for key in (name, "status"))
-        super().__init__(ds[name].isel(own).transpose(*dims), ds.status.isel(state).transpose(*dims))
-        palette = colours_of(self.flags)
-        self.colours = {flag: palette.get(flag, UNKNOWN) for flag in self.flags}
+        values, states = ds[name].isel(own).transpose(*dims), ds.status.isel(state).transpose(*dims)
+        super().__init__(values, states, unanswered(ds))
+        palette = colours_of(self.flags) | greys_of(ds, self.flags)
+        self.colours = {kind: palette.get(kind, UNKNOWN) for kind in (*self.flags, *self.own)}
         self.colours |= dict.fromkeys(NO_ANSWER, WHITE) | {UNREAD: BACKGROUND}
         self._limits = lru_cache(maxsize=1)(self._limits)
 
