@@ -32,7 +32,9 @@ class Points:
         self.flags = flag_codes(variable.attrs) if self.flagged else {}
         self.fill = np.nan if self.flagged or fill_of(variable) is None else fill_of(variable)
         self.kinds = [*self.flags, *NO_ANSWER, UNREAD]
-        self.dtype = np.uint16 if len(self.kinds) <= 16 else np.uint32
+        self.dtype = next(
+            dtype for dtype in (np.uint8, np.uint16, np.uint32) if len(self.kinds) <= np.iinfo(dtype).bits
+        )
         self.bits = {kind: self.dtype(1 << i) for i, kind in enumerate(self.kinds)}
         self._of_code, self._of_status = np.zeros(256, self.dtype), np.zeros(256, self.dtype)
         for flag, code in self.flags.items():
@@ -44,10 +46,10 @@ class Points:
     def read(self, rows, columns):
         """(mask, rank) of points; the rank, which stands for a value, is None for a flagged variable."""
         state, array = self.status[rows, columns].values, self.variable[rows, columns].values
-        mask = self._of_status[state.view(np.uint8)]
+        mask = self._of_status[state.view(np.uint8)] if state.any() else np.zeros(state.shape, self.dtype)
         if self.flagged:
             flags = self._of_code[array.astype(np.int8, copy=False).view(np.uint8)]
-            return np.where(mask == 0, flags, mask), None
+            return np.where(mask == 0, flags, mask) if state.any() else flags, None
         value = array.astype(np.float32)
         value[(mask != 0) | (array == self.fill) | ~np.isfinite(value)] = np.nan
         return mask, _ranked(value)
