@@ -14,6 +14,7 @@ from survey.dataset import fill_of, flag_codes
 NO_ANSWER = ("outside the domain", "failed")
 UNREAD = "not read yet"
 LATE = ("undecided", *NO_ANSWER, UNREAD)  # these are shown before all others, the last first
+MASKS = np.uint8, np.uint16, np.uint32
 UNIONS = np.bitwise_or, np.maximum  # of masks, of ranks
 PIECE = 2**22  # points that are read at once, at most
 STRIDE = 8  # pieces are read in so many rounds, each of which spans the map
@@ -32,9 +33,7 @@ class Points:
         self.flags = flag_codes(variable.attrs) if self.flagged else {}
         self.fill = np.nan if self.flagged or fill_of(variable) is None else fill_of(variable)
         self.kinds = [*self.flags, *NO_ANSWER, UNREAD]
-        self.dtype = next(
-            dtype for dtype in (np.uint8, np.uint16, np.uint32) if len(self.kinds) <= np.iinfo(dtype).bits
-        )
+        self.dtype = next(dtype for dtype in MASKS if len(self.kinds) <= np.iinfo(dtype).bits)
         self.bits = {kind: self.dtype(1 << i) for i, kind in enumerate(self.kinds)}
         self._of_code, self._of_status = np.zeros(256, self.dtype), np.zeros(256, self.dtype)
         for flag, code in self.flags.items():
