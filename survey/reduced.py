@@ -14,6 +14,7 @@ from survey.dataset import fill_of, flag_codes
 NO_ANSWER = ("outside the domain", "failed")
 UNREAD = "not read yet"
 LATE = ("undecided", *NO_ANSWER, UNREAD)  # these are shown before all others, the last first
+MASKS = np.uint8, np.uint16, np.uint32
 UNIONS = np.bitwise_or, np.maximum  # of masks, of ranks
 PIECE = 2**22  # points that are read at once, at most
 STRIDE = 8  # pieces are read in so many rounds, each of which spans the map
@@ -33,7 +34,7 @@ class Points:
         self.fill = np.nan if self.flagged or fill_of(variable) is None else fill_of(variable)
         self.own = own if "undecided" in self.flags else {}
         self.kinds = [*self.flags, *self.own, *NO_ANSWER, UNREAD]
-        self.dtype = np.uint16 if len(self.kinds) <= 16 else np.uint32
+        self.dtype = next(dtype for dtype in MASKS if len(self.kinds) <= np.iinfo(dtype).bits)
         self.bits = {kind: self.dtype(1 << i) for i, kind in enumerate(self.kinds)}
         self._of_code, self._of_status, self._of_open = np.zeros((3, 256), self.dtype)
         for flag, code in self.flags.items():
@@ -48,12 +49,12 @@ class Points:
     def read(self, rows, columns):
         """(mask, rank) of points; the rank, which stands for a value, is None for a flagged variable."""
         state, array = self.status[rows, columns].values, self.variable[rows, columns].values
-        mask = self._of_status[state.view(np.uint8)]
+        mask = self._of_status[state.view(np.uint8)] if state.any() else np.zeros(state.shape, self.dtype)
         if self.flagged:
             flags = self._of_code[array.astype(np.int8, copy=False).view(np.uint8)]
-            if self.own:
+            if self.own and state.any():
                 flags = np.where(flags == self._of_open[0], self._of_open[state.view(np.uint8)], flags)
-            return np.where(mask == 0, flags, mask), None
+            return np.where(mask == 0, flags, mask) if state.any() else flags, None
         value = array.astype(np.float32)
         value[(mask != 0) | (array == self.fill) | ~np.isfinite(value)] = np.nan
         return mask, _ranked(value)
