@@ -102,8 +102,8 @@ class Map:
                 flag_codes(ds.area_verdict.attrs), ds.area_fraction.values, ds.area_fraction_error.values, strict=True
             )
             return {flag: f" ({percent(share, bar)})".replace("+-", "±") for flag, share, bar in shares}
-        told = ds.attrs.get(f"{name}_counts", "")
-        counts = (part.split(": ") for part in told.split(", ") if part)
+        told = [ds.attrs.get(f"{counted}_counts", "") for counted in ("status", name)]
+        counts = (part.split(": ") for part in ", ".join(told).split(", ") if part)
         return {flag: f" ({int(number):,} in all)" for flag, number in counts}
 
     def position(self, point):
