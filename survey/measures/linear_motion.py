@@ -39,7 +39,8 @@ def fundamental(matrices, lengths, periods, scale=1.0, terms=None):
     y, bars = _chain(steps, local, units, periods)
     ends = np.cumsum(lengths.astype(np.longdouble))
     t = np.concatenate([[0.0], (ends + ends[-1] * np.arange(periods)[:, None]).ravel()]).astype(float)
-    return t, y, bars + 4 * EPS * t[:, None, None] * (terms.max(axis=0) @ abs(y))  # t is rounded
+    with np.errstate(all="ignore"):
+        return t, y, bars + 4 * EPS * t[:, None, None] * (terms.max(axis=0) @ abs(y))  # t is rounded
 
 
 def _step(a, h):
