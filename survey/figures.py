@@ -25,6 +25,7 @@ from survey import modules, status
 from survey.dataset import flag_codes, percent, unanswered
 from survey.errors import BadInput
 from survey.grid import logarithmic
+from survey.reduced import Overview, Points
 
 # after Okabe and Ito, safe for the colour-blind, the first two far apart in grey print too;
 # black is kept for undecided, white with hatching for failed
@@ -34,7 +35,9 @@ UNDECIDED = "#000000"
 GREYS = ("#808080", "#B3B3B3", "#5E5E5E")
 HATCHES = ("//////", "", "....", "\\\\\\\\", "xxxx", "----", "||||", "++++", "oo", "**")  # of the COLOURS, in papers
 HATCHED = 500  # cells along an axis: hatching is drawn as outlines
-CELLS = 2000  # along an axis: more than a picture has pixels, and each costs a hundred bytes
+WHOLE = 2000  # points along an axis: of larger maps a cell of the picture stands for several points
+CELLS = 1000  # along an axis then, at most: each costs a hundred bytes
+FINE = 0.8  # cells for each pixel of the axes, before legend and labels take their share
 SPARE = 0.95  # of the room for a text: fonts are a little wider at other resolutions
 BESIDE = 1.2  # of the width of axes that have neighbours: texts may reach into the gap
 MARK_BELOW = 0.002  # a share of the map: rarer points are also marked with a ring, or nobody would see them
@@ -144,32 +147,48 @@ def _flat(ds, name):
 
 
 def _map(axes, ds, variable, state, boundaries, paper):
+    scales = ["log" if logarithmic(variable[dim].values) else "linear" for dim in variable.dims]
+    whole = MaxNLocator(integer=True) if variable.dtype.kind == "i" else None
+    variable, state, number = _shown(axes, ds, variable, state, look("paper" if paper else None).dpi)
     x, y = (variable[dim] for dim in variable.dims)
     failed = np.isin(state.values, list(status.FAILURES))
     outside = state.values == status.INVALID_PARAMETERS
     if variable.name == "verdict" and "cell_verdict" in ds:
-        handles = _cells(axes, ds, x, y, failed, paper)
+        handles = _cells(axes, ds, x, y, failed, number, paper)
     elif "flag_values" in variable.attrs:
-        handles = _verdicts(axes, x, y, ds, variable, state, paper)
+        handles = _verdicts(axes, x, y, ds, variable, state, number, paper)
     else:
-        some = _thinned(variable)
-        shown = np.where((failed | outside)[some], np.nan, variable[some].values.astype(float))
-        shown = np.ma.masked_invalid(shown)
-        look = {"cmap": "viridis", "shading": "nearest", "rasterized": True}
-        drawn = axes.pcolormesh(x[some[0]], y[some[1]], shown.T, **look, **limits(shown))
-        whole = MaxNLocator(integer=True) if variable.dtype.kind == "i" else None
+        shown = np.ma.masked_invalid(np.where(failed | outside, np.nan, variable.values.astype(float)))
+        drawn = axes.pcolormesh(x, y, shown.T, cmap="viridis", shading="nearest", rasterized=True, **limits(shown))
         axes.figure.colorbar(drawn, ax=axes, label=label_of(variable), ticks=whole)
         axes.set_facecolor("#dddddd")
-        handles = _marks(axes, x, y, failed, "failed", paper) + _marks(axes, x, y, outside, "outside the domain", paper)
-        handles += [Patch(color="#dddddd", label="does not apply")] if shown.mask.any() else []
+        handles = _no_answer(axes, x, y, failed, outside, number, paper)
+        handles += [Patch(color="#dddddd", label="does not apply")] if (shown.mask & ~(failed | outside)).any() else []
     if boundaries and "curve_count" in ds:
         handles += _curves(axes, in_plane(ds, variable), x, y)
     if handles:
         _legend(axes, handles)
-    for axis, coord in ((axes.xaxis, x), (axes.yaxis, y)):
-        axis.set_label_text(label_of(coord))
-        if logarithmic(coord.values):
-            (axes.set_xscale if axis is axes.xaxis else axes.set_yscale)("log")
+    axes.set(xlabel=label_of(x), ylabel=label_of(y))
+    for setting, scale in zip((axes.set_xscale, axes.set_yscale), scales, strict=True):
+        if scale == "log":
+            setting(scale)
+
+
+def _shown(axes, ds, variable, state, dpi):
+    """(variable, status, {}) in memory; of a large map for the cells of the picture, and {kind: number of points}."""
+    if max(variable.shape) <= WHOLE:
+        return variable.compute(), state.compute(), {}
+    box, points = axes.get_window_extent(), Points(variable, state, unanswered(ds))
+    pixels = np.array([box.width, box.height]) * dpi / axes.figure.dpi
+    whole = Overview(points, np.clip(FINE * pixels, 1, CELLS).astype(int)).complete
+    values, states = points.cells(whole)
+    for dim, starts in zip(variable.dims, whole.starts, strict=True):
+        ends = np.append(starts[1:], variable.sizes[dim]) - 1
+        middles = 0.5 * (variable[dim].values[starts] + variable[dim].values[ends])
+        variable, state = (
+            v.isel({dim: starts}).assign_coords({dim: (dim, middles, v[dim].attrs)}) for v in (variable, state)
+        )
+    return variable.copy(data=values), state.copy(data=states), whole.number
 
 
 def in_plane(ds, variable):
@@ -211,7 +230,7 @@ def _curves(axes, ds, x, y):
     return list(handles.values())
 
 
-def _cells(axes, ds, x, y, failed, paper):
+def _cells(axes, ds, x, y, failed, number, paper):
     """The map's cells instead of its points, with the area of each verdict. Returns the handles."""
     left, right, low, high = (ds[f"cell_{axis.name}_{end}"].values for axis in (x, y) for end in ("low", "high"))
     corners = np.stack([left, low, left, high, right, high, right, low], axis=1).reshape(-1, 4, 2)
@@ -232,7 +251,7 @@ def _cells(axes, ds, x, y, failed, paper):
         patch = Patch(facecolor=colour, edgecolor="black", lw=0.5, hatch=hatch, label=f"{name} ({part})")
         handles += [patch] if own.any() else []
     axes.set(xlim=(left.min(), right.max()), ylim=(low.min(), high.max()))
-    return handles + _marks(axes, x, y, failed, "failed", paper)
+    return handles + _marks(axes, x, y, failed, "failed", number, paper)
 
 
 def _kinds(ds, variable, state):
@@ -248,7 +267,7 @@ def _kinds(ds, variable, state):
     return np.ma.masked_array(shown, np.isin(state.values, list(status.UNANSWERED))), table, colours
 
 
-def _verdicts(axes, x, y, ds, variable, state, paper):
+def _verdicts(axes, x, y, ds, variable, state, number, paper):
     """A colour per kind; failed and outside points white and hatched; rare points ringed. Returns the handles."""
     failed = np.isin(state.values, list(status.FAILURES))
     outside = state.values == status.INVALID_PARAMETERS
@@ -258,10 +277,9 @@ def _verdicts(axes, x, y, ds, variable, state, paper):
     names = {code: name for name, code in table.items()}
     cmap = ListedColormap([palette[names[code]] for code in codes])
     edges = np.append(np.array(codes) - 0.5, codes[-1] + 0.5)
-    some = _thinned(variable)
     look = {"cmap": cmap, "norm": BoundaryNorm(edges, cmap.N), "shading": "nearest", "rasterized": True}
-    axes.pcolormesh(x[some[0]], y[some[1]], shown[some].T, **look)
-    number = {name: int((shown == code).sum()) for name, code in table.items()}
+    axes.pcolormesh(x, y, shown.T, **look)
+    number = number or {name: int((shown == code).sum()) for name, code in table.items()}
     handles = [
         Patch(
             facecolor=palette[names[code]],
@@ -278,9 +296,13 @@ def _verdicts(axes, x, y, ds, variable, state, paper):
             if number[names[code]] and _hatch(flags, names[code]):
                 _hatched(axes, x, y, (shown == code).filled(False), _hatch(flags, names[code]))
     undecided = (shown == table.get("undecided", -1)).filled(False)
-    handles += _marks(axes, x, y, undecided, "undecided", paper, UNDECIDED)
-    handles += _marks(axes, x, y, failed, "failed", paper) + _marks(axes, x, y, outside, "outside the domain", paper)
-    return handles
+    handles += _marks(axes, x, y, undecided, "undecided", number, paper, UNDECIDED)
+    return handles + _no_answer(axes, x, y, failed, outside, number, paper)
+
+
+def _no_answer(axes, x, y, failed, outside, number, paper):
+    handles = _marks(axes, x, y, failed, "failed", number, paper)
+    return handles + _marks(axes, x, y, outside, "outside the domain", number, paper)
 
 
 def _hatch(table, name):
@@ -304,11 +326,6 @@ def _cornered(values):
     return np.concatenate([outer[:1], np.repeat(middles, 2), outer[1:]])
 
 
-def _thinned(variable):
-    """The places of a map that are drawn: all, or every so many where there are more than CELLS along an axis."""
-    return tuple(slice(None, None, -(-size // CELLS)) for size in variable.shape)
-
-
 def colours_of(table):
     """A colour per meaning; "ok" takes that of stable."""
     meant = [name for name in table if name not in ("undecided", "ok")]
@@ -322,10 +339,13 @@ def greys_of(ds, table):
     return {name: GREYS[i % len(GREYS)] for i, name in enumerate(names)}
 
 
-def _marks(axes, x, y, where, label, paper=False, colour="white"):
-    """Show the points `where`: hatched where they fill an area, ringed where they are rare; their legend handle."""
+def _marks(axes, x, y, where, label, number, paper=False, colour="white"):
+    """Show the cells `where`: hatched where they fill an area, ringed where they are rare; their legend handle.
+
+    `number` holds how many points they stand for, where that is not one each.
+    """
     total = int(where.sum())
-    label = label if paper else f"{label} ({total:,})"
+    label = label if paper else f"{label} ({number.get(label, total):,})"
     if total == 0:
         return []
     if total <= MARK_BELOW * where.size:
@@ -334,11 +354,9 @@ def _marks(axes, x, y, where, label, paper=False, colour="white"):
         axes.plot(x.values[i], y.values[j], markersize=4, **ring)
         return [Line2D([], [], markersize=6, label=label, **ring)]
     if colour == "white":
-        some = _thinned(where)
         # one more cell all round, or the hatching would end at the centres of the outermost cells
-        wide = np.pad(where[some].T.astype(float), 1, mode="edge")
-        x, y = _widened(x.values[some[0]]), _widened(y.values[some[1]])
-        axes.contourf(x, y, wide, levels=[0.5, 1.5], colors="none", hatches=["xxx"])
+        wide = np.pad(where.T.astype(float), 1, mode="edge")
+        axes.contourf(_widened(x.values), _widened(y.values), wide, levels=[0.5, 1.5], colors="none", hatches=["xxx"])
         return [Patch(facecolor="white", edgecolor="grey", hatch="xxx", label=label)]
     return [Patch(facecolor=colour, label=label)]
 

@@ -74,6 +74,18 @@ def test_no_answer_by_nature_is_grey_and_told_by_its_status(bare, style):
     plt.close(figure)
 
 
+def test_no_answer_by_nature_is_grey_in_a_large_map_too(bare, monkeypatch):
+    monkeypatch.setattr(figures, "WHOLE", 20)
+    monkeypatch.setattr(figures, "CELLS", 20)
+    figure = figures.draw(bare)
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "no motion (50)" in labels and "undecided (1)" in labels
+    mesh = figure.axes[0].collections[0]
+    drawn = mesh.cmap(mesh.norm(mesh.get_array()))[2]
+    assert to_hex(drawn[5]).upper() == figures.GREYS[0] and to_hex(drawn[12]).upper() == figures.COLOURS[1]
+    plt.close(figure)
+
+
 def test_a_row_tells_no_answer_by_nature_apart(bare):
     figure = figures.draw(bare.isel(rho=0))
     axes = figure.axes[0]
@@ -83,7 +95,8 @@ def test_a_row_tells_no_answer_by_nature_apart(bare):
     plt.close(figure)
 
 
-def test_a_large_map_is_thinned_for_the_picture_and_counted_in_full(toy, monkeypatch):
+def test_a_large_map_is_reduced_for_the_picture_and_counted_in_full(toy, monkeypatch):
+    monkeypatch.setattr(figures, "WHOLE", 20)
     monkeypatch.setattr(figures, "CELLS", 20)
     figure = figures.draw(toy)
     labels = [text.get_text() for text in figure.legends[0].get_texts()]

@@ -114,9 +114,9 @@ class Point:
         return "\n".join([self.dataset.attrs.get("title", self.dataset.attrs["scene"]), *lines])
 
     def _repr_html_(self):
-        cell = "<td style='text-align:left;vertical-align:top'>"
         rows = "".join(
-            "<tr>" + "".join(f"{cell}{html.escape(text)}</td>" for text in row) + "</tr>" for row in self._rows()
+            "<tr>" + _cell(name) + (_cell(value) + _cell(about) if about else _cell(value, 2)) + "</tr>"
+            for name, value, about in self._rows()
         )
         title = html.escape(self.dataset.attrs.get("title", self.dataset.attrs["scene"]))
         return f"<table><caption>{title}</caption>{rows}</table>"
@@ -138,6 +138,10 @@ class Point:
         for name, variable in ds.data_vars.items():
             if not name.endswith("_error") and name not in ("verdict", "status"):
                 yield from _outputs(ds, name, variable, name in bars)
+
+
+def _cell(text, columns=1):
+    return f"<td colspan='{columns}' style='text-align:left;vertical-align:top'>{html.escape(text)}</td>"
 
 
 def values(ds):

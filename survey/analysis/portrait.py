@@ -47,7 +47,8 @@ def _multipliers(axes, ds):
         axes.plot(x[where], y[where], look, ms=6, mfc=COLOURS[1] if look == "o" else COLOURS[0], mec="black")
     axes.axhline(0.0, color=GREY, lw=0.6, zorder=0)
     axes.axvline(0.0, color=GREY, lw=0.6, zorder=0)
-    axes.set(xlabel=r"$\mathrm{Re}\,\lambda$", ylabel=r"$\mathrm{Im}\,\lambda$", aspect="equal")
+    axes.set(xlabel=r"$\mathrm{Re}\,\lambda$", ylabel=r"$\mathrm{Im}\,\lambda$")
+    axes.set_aspect("equal", adjustable="datalim")
     far = np.abs([x, y]).max()
     axes.set_title(f"multipliers, error bars to {off.max():.1g}", fontsize=9)
     if far > 30:  # one multiplier is far out: no circle would be seen
@@ -82,7 +83,8 @@ def _plane(axes, ds, x, y):
     axes.plot(ds[x], ds[y], lw=0.8, color=LINES[0])
     axes.plot(ds[x].values[0], ds[y].values[0], "o", color=LINES[1], mec="black", ms=6)
     axes.plot(0, 0, "+", color="black", ms=8)
-    axes.set(xlabel=f"${ds[x].attrs['symbol']}$", ylabel=f"${ds[y].attrs['symbol']}$", aspect="equal")
+    axes.set(xlabel=f"${ds[x].attrs['symbol']}$", ylabel=f"${ds[y].attrs['symbol']}$")
+    axes.set_aspect("equal", adjustable="datalim")
 
 
 def _sphere(axes, ds, x, y, z):
