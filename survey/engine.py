@@ -35,6 +35,9 @@ SAMPLES = 16  # blocks from all over the map that are solved first
 NEAR = 0.02  # of the map: what a block so near has cost tells this one's cost well enough
 # what the writer holds at a time: enough for the tiles to be square, little beside what else a process takes
 REGION_POINTS, REGION_BYTES = 2**20, 2**25
+# what a plan says of the kernels
+NEW = "all kernels, once: this machine has none of them yet (up to a minute)"
+KNOWN = "kernels that no run on this machine has needed yet, once"
 
 
 def seconds_per_point(scene, request, grid):
@@ -438,6 +441,7 @@ def plan(workflow):
         "output": str(workflow.path),
         "threads": cpus(),
         "estimated_seconds": float(f"{seconds / cpus():.2g}"),
+        "not_estimated": f"writing the file; compiling {NEW if jit.is_new() else KNOWN}",
     }
 
 
