@@ -26,6 +26,7 @@ from survey.dataset import flag_codes, percent, unanswered
 from survey.errors import BadInput
 from survey.grid import logarithmic
 from survey.reduced import Overview, Points
+from survey.wording import counted
 
 # after Okabe and Ito, safe for the colour-blind, the first two far apart in grey print too;
 # black is kept for undecided, white with hatching for failed
@@ -246,7 +247,7 @@ def _cells(axes, ds, x, y, failed, number, paper):
         axes.add_collection(PolyCollection(corners[own], facecolors=colour, rasterized=True, **line))
         if hatch:
             axes.add_collection(PolyCollection(corners[own], facecolors="none", lw=0, hatch=hatch, rasterized=True))
-        part = percent(shares[name], float(ds.area_fraction_error[0])) if name in shares else f"{own.sum():,} cells"
+        part = percent(shares[name], float(ds.area_fraction_error[0])) if name in shares else counted(own.sum(), "cell")
         part = part.replace("+-", "±")
         patch = Patch(facecolor=colour, edgecolor="black", lw=0.5, hatch=hatch, label=f"{name} ({part})")
         handles += [patch] if own.any() else []
