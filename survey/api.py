@@ -51,6 +51,8 @@ def run(
     """
     read = workflows.read if isinstance(workflow, (str, os.PathLike)) else workflows.check
     checked = read(workflow, output=output)
+    if workers is not None and (not isinstance(workers, int) or workers < 1):
+        raise BadInput(f"workers = {workers!r}: it must be a whole number from 1 on, or None for threads")
     engine.run(checked, workers, scheduler, fresh)
     ds = store.load(checked.path)
     draw(ds, checked)
@@ -119,7 +121,8 @@ def evaluate(
     given = {key: _labelled(key, value) for key, value in parameters.items() if key not in names}
     options = workflows.check_options(module, {key: parameters[key] for key in parameters if key in names}, given)
     used = workflows.check_parameters(module, scene, options, given)
-    variables = [variables] if isinstance(variables, str) else variables
+    if variables is not None and (isinstance(variables, str) or not isinstance(variables, Iterable)):
+        variables = [variables]
     request = workflows.check_request(module, options, method, rtol, variables)
     given |= {key: xr.DataArray(float(p.default)) for key, p in used.items() if key not in given}
     _check_lone_values(used, given)
@@ -151,15 +154,31 @@ def _labelled(key: str, value: Any) -> xr.DataArray:
     if isinstance(value, xr.Variable):
         value = xr.DataArray(value)
     if not isinstance(value, xr.DataArray):
-        array = value if hasattr(value, "dask") else np.asarray(value)
+        array = value if hasattr(value, "dask") else _array(key, value)
         if array.ndim > 1:
             raise BadInput(f"{key}: an array of {array.ndim} dimensions has no names for them; give a DataArray")
         value = xr.DataArray(array, dims=(key,) if array.ndim else ())
     if value.dtype.kind not in "iuf":
-        raise BadInput(f"{key} = {value.values!r}: it must be a real number or an array of real numbers")
+        raise _not_real(key, value.values)
     if value.size == 0:
         raise BadInput(f"{key}: an empty array has no points; give at least one value")
     return value.astype(float)
+
+
+def _array(key: str, value: Any) -> npt.NDArray[Any]:
+    """The parameter as an array; what is masked is NaN, so that it costs its points alone."""
+    try:
+        if np.ma.isMaskedArray(value):
+            return np.ma.filled(value.astype(float), np.nan)
+        return np.asarray(value)
+    except ValueError:  # a list of lists of unequal lengths
+        raise _not_real(key, value) from None
+
+
+def _not_real(key: str, value: Any) -> BadInput:
+    told = " ".join(repr(value).split())
+    told = told if len(told) <= 120 else f"{told[:116]} ..."
+    return BadInput(f"{key} = {told}: it must be a real number or an array of real numbers")
 
 
 def _check_dimensions(module: Any, given: dict[str, xr.DataArray]) -> None:
@@ -172,7 +191,11 @@ def _check_dimensions(module: Any, given: dict[str, xr.DataArray]) -> None:
         ) from None
     outputs = {output.name for output in module.OUTPUTS} | {"status", *getattr(module, "DIMENSIONS", ())}
     for key, array in given.items():
-        for dim in set(array.dims) & outputs - {key}:
+        for dim in set(array.dims) & (outputs | {name for name, other in given.items() if not other.ndim}) - {key}:
+            if dim not in outputs:
+                raise BadInput(
+                    f"{key}: its dimension {dim!r} bears the name of a parameter that is one number; rename it"
+                )
             raise BadInput(f"{key}: its dimension {dim!r} bears the name of an output or of its dimension; rename it")
 
 

@@ -92,11 +92,19 @@ def solve_point(scene, request, point, shape):
 
 
 def stored(scene, request, solved, shape):
-    """What a scene solved, in the types of the file and the block's shape."""
-    arrays = {}
-    for name, (dtype, _, extra) in layout(scene, request).items():
+    """What a scene solved, in the types of the file and the block's shape; `overflow` where these cannot hold a bar."""
+    arrays, table = {}, layout(scene, request)
+    for name, (dtype, _, extra) in table.items():
         values = round_up(solved[name]) if name.endswith("_error") else np.asarray(solved[name])
         arrays[name] = values.astype(dtype, copy=False).reshape(shape + extra)
+    unbounded = [bad for bad in (np.isinf(arrays[name]) for name in table if name.endswith("_error")) if bad.any()]
+    for bad in unbounded:
+        lost = bad.reshape(*shape, -1).any(axis=-1)
+        for name, (dtype, fill, extra) in table.items():
+            where = lost.reshape(shape + (1,) * len(extra))
+            if name == "status":
+                where, fill = lost & ~np.isin(arrays[name], list(status.UNANSWERED)), status.OVERFLOW
+            arrays[name] = np.where(where, dtype.type(fill), arrays[name])
     return arrays
 
 

@@ -65,12 +65,28 @@ def test_integers_and_lists_are_taken():
         ({"method": "tailor"}, "'tailor'; did you mean 'taylor"),
         ({"variables": ["phy"]}, "'phy'; did you mean 'phi'"),
         ({"rtol": 0.0}, "rtol = 0.0"),
+        ({"variables": 3}, "unknown variable 3"),
+        ({"w0": 10**400}, "w0 = array.*real number"),
+        ({"w0": (x for x in (1.0, 2.0))}, "w0 = .*real number"),
+        ({"w0": [[1.0], [2.0, 3.0]]}, "w0 = .*real number"),
+        ({"w0": xr.DataArray(W0, dims="b12")}, "dimension 'b12' bears the name of a parameter"),
     ],
 )
 def test_bad_input_is_refused_in_one_line(given, words):
     with pytest.raises(survey.BadInput, match=words) as refusal:
         evaluate(**({"w0": 1.0, "t": 1.0} | given))
     assert "\n" not in str(refusal.value)
+
+
+def test_what_is_masked_costs_itself_alone_and_numbers_of_numpy_are_numbers():
+    ds = evaluate(w0=np.ma.array([1.0, 2.0], mask=[False, True]), t=1.0, rtol=np.float32(1e-6))
+    assert ds.status.values.tolist() == [0, 1]
+
+
+@pytest.mark.parametrize("workers", [0, -1, "two"])
+def test_a_number_of_workers_that_is_none_is_refused(workers, tmp_path):
+    with pytest.raises(survey.BadInput, match="workers = "):
+        survey.run({"scene": "libration", "axes": {"mu": 0.01}}, output=tmp_path / "map.nc", workers=workers)
 
 
 def test_a_missing_parameter_and_unequal_dimensions_are_named():

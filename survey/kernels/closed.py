@@ -311,17 +311,19 @@ def start_rotation(data):
             break
         y -= move
     q = y * y - tail
+    if not (mean > 0.0 and q > 0.0):
+        return False
     sigma, pi = (second.conjugate() * first - y * first.conjugate()) / q, second.conjugate() / y
     spread = cmath.sqrt(0.25 * sigma * sigma - pi)
     r, s = 0.5 * sigma + spread, 0.5 * sigma - spread
-    if not (abs2(r) < 1.0 and abs2(s) < 1.0 and q > 0.0):
+    if not (abs2(r) < 1.0 and abs2(s) < 1.0):
         return False
     kappa = mean / ((1.0 + abs2(r)) * (1.0 + abs2(s)) + 2.0 * (r * s.conjugate()).real)
     c1 = -2.0 * kappa * (r.conjugate() * (1.0 + abs2(s)) + s.conjugate() * (1.0 + abs2(r)))
     c2 = 2.0 * kappa * r.conjugate() * s.conjugate()
     gaps = abs(c1 - first) + abs(c2 - second) + 12.0 * UNIT * (abs(mean) + abs(first) + abs(second))
     least = kappa * ((1.0 - abs(r)) * (1.0 - abs(s))) ** 2
-    if not (mean > 0.0 and least > 30.0 * gaps):
+    if not least > 30.0 * gaps:
         return False
     gap = (s - r) / (1.0 - r.conjugate() * s)
     kc2 = (1.0 - abs2(r)) * (1.0 - abs2(s)) / abs2(1.0 - r.conjugate() * s)

@@ -20,6 +20,7 @@ TILE = 64
 VECTOR = 8
 STATE = 13
 WORST = 300.0
+ROUNDING = 1.8e-15
 
 
 @splice
@@ -130,9 +131,11 @@ def column(matrix, y, v, s, t, w):
     error_v = lower * abs(y) + diagonal * abs(v)
     left, right = a * s + b * t, a * t + b * w
     low, high = c * s + d * t, c * t + d * w
-    s = left * a + right * b + error_y * error_y
+    # rounding: where one solution outgrows the other by 1e16 in square, a thin ellipse would lose its positive sign
+    round_y, round_v = ROUNDING * (a * a * s + b * b * w), ROUNDING * (c * c * s + d * d * w)
+    s = left * a + right * b + (error_y * error_y + round_y)
     t = left * c + right * d
-    w = low * c + high * d + error_v * error_v
+    w = low * c + high * d + (error_v * error_v + round_v)
     return a * y + b * v, c * y + d * v, s, t, w
 
 

@@ -4,7 +4,7 @@ u = (ul wl + uh wh)/(wl + wh), wl = sqrt Q(uh) (1 + c)/2, wh = sqrt Q(ul) (1 - c
 (s + g)/(2 g), of any size (S17): real roots and conjugate ones are one case.
 """
 
-from math import floor, hypot, sqrt
+from math import hypot, sqrt
 
 import numpy as np
 
@@ -99,7 +99,7 @@ def motion(cosine, row, start, period, times, out):
     relative = period[4] / period[0]
     for j in range(len(times)):
         z = z0 + rate * times[j]
-        n = floor(z / whole + 0.5)
+        n = np.floor(z / whole + 0.5)  # a float: of so many periods that no integer holds them, too
         # the number of periods is taken off in time, where the period is what has been found best
         z = z0 + rate * (times[j] - n * period[0])
         side = 1.0 if z >= 0.0 else -1.0

@@ -14,6 +14,7 @@ TURN = 2.0 * np.pi
 NAMES = ("u_min", "u_max", "period", "precession", "spin", "action")
 TRUST = 0.03  # relative errors beyond are no errors of first order
 UNDECIDED = -1
+FAR = 1e38  # distances in units of |k| beyond this say no more than that there is next to no field
 
 
 def of_states(points):
@@ -151,8 +152,11 @@ def heights(kernel, points):
 
 
 def distance(heights):
-    """The output of that name: (L - L of the separatrix)/|k|, and its bar; NaN where there is no separatrix."""
-    heights = np.where(np.isfinite(heights[:, :1]), heights, np.nan)
+    """The output of that name: (L - L of the separatrix)/|k|, and its bar; NaN where there is none, or FAR away."""
     value = heights[:, 0] / heights[:, 2]
     bar = heights[:, 1] / heights[:, 2] + 4.0 * nu.EPS * np.abs(value)
-    return {"separatrix_distance": value, "separatrix_distance_error": bar}
+    near = np.abs(value) < FAR
+    return {
+        "separatrix_distance": np.where(near, value, np.nan),
+        "separatrix_distance_error": np.where(near, bar, np.nan),
+    }

@@ -7,7 +7,7 @@ LONGEST. The independent check.
 Source: DLMF 3.5(v); integrals (S3), (S4), (S15) of `scenes/brun.md`.
 """
 
-from math import atan2, cos, exp, floor, inf, log1p, pi, sin, sqrt
+from math import atan2, cos, exp, inf, log1p, pi, sin, sqrt
 
 import numpy as np
 
@@ -167,7 +167,7 @@ def motion(row, start, n, noise, times, waves, out):
     first_up, first_down = value[1] / value[0], value[2] / value[0]
     first, base_up, base_down = start[2] * here[0], start[2] * here[1], start[2] * here[2]
     for j in range(len(times)):
-        turns = floor((first + times[j]) / (2.0 * half) + 0.5)
+        turns = np.floor((first + times[j]) / (2.0 * half) + 0.5)
         time = first + times[j] - turns * 2.0 * half
         side = 1.0 if time >= 0.0 else -1.0
         x = when(row, waves, n, min(abs(time), half), value, here)

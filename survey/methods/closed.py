@@ -142,6 +142,8 @@ def _elliptic(kind, side, data, phi0, x, out):
         edge, right = data[closed.BAR_RIGHT] + 4.0 * UNIT * (abs(phi0) + abs(x)), data[closed.RIGHT]
         if x >= right - edge:
             t, bar = closed.flight(data, math.pi, 0.0)
+            if not bar < math.inf:
+                return NO_CONVERGENCE
             out[0], out[1], out[2] = phi0 + right, t, edge + 4.0 * UNIT * (abs(phi0) + right)
             out[3] = bar + 2.0 * UNIT * t
             return TURNING

@@ -51,14 +51,14 @@ STATUS = {
 _NO_MOTION = 16
 _STATE, _SCALED, _MOTION = {"sign": ("",)}, {"sign": ("1", "-1")}, {"motion": ("at_t",)}
 _HARMLESS = (1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0)
-_LARGE = {"minimum": -1e25, "maximum": 1e25}  # products of four such numbers are floats
+_LARGE = {"minimum": -1e25, "maximum": 1e25}  # products of four such numbers, and of their inverses, are floats
 MOTION_PERIODS, MOTION_POINTS = 6, 3001  # of a trajectory
 DIMENSIONS = {"well": np.array([1, 2])}
 
 PARAMETERS = (
-    Parameter("A", "equatorial moment of inertia A = B", "A", minimum=0.0, open_minimum=True, maximum=1e25,
+    Parameter("A", "equatorial moment of inertia A = B", "A", minimum=1e-25, maximum=1e25,
               when=_STATE),
-    Parameter("C", "axial moment of inertia, at most 2 A", "C", minimum=0.0, open_minimum=True, maximum=2e25,
+    Parameter("C", "axial moment of inertia, at most 2 A", "C", minimum=1e-25, maximum=2e25,
               when=_STATE),
     Parameter("epsilon", "strength of the field, 3 mu / R^3", r"\varepsilon", when=_STATE, **_LARGE),
     Parameter("theta0", "initial angle between the axis and the vertical", r"\theta_0", units="rad", minimum=0.0,
@@ -70,7 +70,7 @@ PARAMETERS = (
     Parameter("l", "scaled energy L / |k|", "l", when=_SCALED, **_LARGE),
     Parameter("alpha", "scaled momentum p_phi / sqrt|k|", r"\alpha", when=_SCALED, **_LARGE),
     Parameter("beta", "scaled momentum p_psi / sqrt|k|", r"\beta", when=_SCALED, **_LARGE),
-    Parameter("ratio", "inertia ratio C / A", "C/A", default=0.5, minimum=0.0, open_minimum=True, maximum=2.0,
+    Parameter("ratio", "inertia ratio C / A", "C/A", default=0.5, minimum=1e-25, maximum=2.0,
               when=_SCALED, number_option=True),
 )  # fmt: skip
 OPTIONS = (
@@ -117,7 +117,7 @@ OUTPUTS = (
     *_outputs(_STATE, ()),
     *_outputs(_SCALED, ("well",)),
     Output("separatrix_distance", "L less its value on the separatrix at the same p_psi, p_phi, over |k|", r"\Delta l",
-           applies="where these momenta have a separatrix: negative within a well, positive outside"),
+           applies="where these momenta have a separatrix (nearer than 1e38): negative in a well, positive outside"),
     Output("wells", "number of wells of motion at these integrals", integer=True, applies="off separatrices"),
     Output("verdict", "what the motion is (scaled integrals: the last of these that a well holds)",
            flags={"undecided": -1, "separatrix": 0, "regular_nutation": 1, "regular_precession": 2, "pole_passage": 3}),

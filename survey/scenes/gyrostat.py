@@ -89,6 +89,7 @@ STATUS = {
     "too_many_cycles": "there are more cycles than places for them: the first are given",
 }
 _TURNING = 16
+MOST_TURNINGS = 2**31 - 1  # are kept as int32
 _FATES = {
     "undecided": -1, "focus_or_node": 0, "saddle": 1, "rotation_plus": 2, "rotation_minus": 3, "libration": 4,
     "spin_up_plus": 5, "spin_up_minus": 6, "periodic_rotation": 7, "periodic_libration": 8, "equilibrium_start": 9,
@@ -107,7 +108,7 @@ OUTPUTS = (
     Output("w", "angular velocity", "w", when={"question": ("trajectory", "abel")},
            applies="at a place that the solution reaches"),
     Output("turnings", "number of turning points (sign changes of w)", "n_T", integer=True, fill=-2,
-           applies="where the error bar can tell the number; -1 means infinitely many",
+           applies="where the error bar can tell the number, if less than 2^31; -1 means infinitely many",
            when={"question": ("trajectory", "fate")}),
     Output("verdict", "where the solution ends as t -> +inf", flags=_FATES, when=_FATE),
     Output("limit_phi", "equilibrium that is reached, in [0, 2 pi), or right turning point of the libration cycle",
@@ -269,7 +270,7 @@ def _trajectory(point, measure, method, rtol):
     floats, turnings, status = measure.trajectories(method, rows, times, rtol)
     status = np.where(good, status, INVALID_PARAMETERS)
     lost = status != OK
-    floats[lost], turnings[lost] = np.nan, -2
+    floats[lost], turnings[lost | (turnings > MOST_TURNINGS)] = np.nan, -2
     names = ("phi", "w", "phi_error", "w_error")
     results = {name: back(floats[..., i]) for i, name in enumerate(names)}
     return results | {"turnings": back(turnings), "status": back(status)}

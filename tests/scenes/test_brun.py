@@ -233,6 +233,21 @@ def test_exact_cases(sign, l, alpha, beta, verdict, status, u):  # noqa: E741
         assert ds.period.isnull().all()
 
 
+def test_more_periods_than_an_integer_holds():
+    """Beside a pole the body turns over 2e15 times in a unit of time: bars are wide, not negative."""
+    state = FREE | {"epsilon": -1.0, "theta0": np.pi, "p_psi": 1.0, "p_phi": 1.0}
+    for method in ("agm", "carlson"):
+        ds = survey.evaluate("brun", **state, t=[1e3, 1e9, 1e12, 1e15], method=method)
+        assert (ds.status == 0).all() and (np.diff(abs(ds.psi)) > 0).all()
+        for name in ("psi", "phi"):
+            assert (ds[f"{name}_error"] > 1).all(), (method, name)
+
+
+def test_next_to_no_field_all_else_is_known():
+    ds = survey.evaluate("brun", **FREE | {"epsilon": 1e-60, "p_psi": 0.1, "p_phi": 0.0})
+    assert ds.status == 0 and np.isnan(ds.separatrix_distance) and ds.period_error < 1e-13
+
+
 def test_what_is_no_state():
     heavy = survey.evaluate("brun", **FREE | {"C": np.array([1.0, 4.1])})
     pole = survey.evaluate("brun", **FREE | {"theta0": 0.0, "p_psi": np.array([0.9, 1.3])})

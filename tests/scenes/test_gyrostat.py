@@ -41,6 +41,21 @@ def test_trajectory_fills_the_block():
     assert np.isfinite(out["phi"]).all() and (out["phi_error"] < 1e-10 * (1 + np.abs(out["phi"]))).all()
 
 
+def test_turning_points_beyond_what_an_int32_holds_are_not_told():
+    ds = survey.evaluate(
+        "gyrostat", question="trajectory", s3=1.0, phi0=1.0, w0=0.0, t=[1e3, 1e8, 1e10], method="closed"
+    )
+    assert ds.status.values.tolist() == [OK] * 3 and ds.turnings.values.tolist()[2] == -2
+    assert (ds.turnings[:2] > 0).all()
+
+
+@pytest.mark.parametrize("start", [{"w0": 0.0, "s3": 1e-300}, {"w0": 1e-300, "s3": 1e-300}, {"w0": 1e-300, "s3": -0.4}])
+def test_next_to_no_motion_there_is_a_bar_or_no_answer(start):
+    ds = survey.evaluate("gyrostat", question="abel", phi0=1.0, phi=[-4.0, 1e-300, 1.0, 4.0], **start)
+    for name in ("w", "t", "phi_turning", "t_turning"):
+        assert (ds[name].notnull() == np.isfinite(ds[f"{name}_error"])).all(), name
+
+
 def test_abel_tells_what_applies():
     phi0, w0, phi = grid(3, 4, 5)
     out = solve("abel", phi0=phi0, w0=w0, phi=phi)

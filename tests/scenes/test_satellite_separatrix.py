@@ -7,7 +7,7 @@ from mpmath import mp, mpf
 
 import survey
 from survey import status
-from survey.kernels.hill import STABLE, UNSTABLE
+from survey.kernels.hill import MARGINAL, STABLE, UNSTABLE
 from survey.kernels.satellite import half_periods
 
 NAMES = ("y1", "dy1", "y2", "dy2")
@@ -139,3 +139,16 @@ def test_the_same_by_mpmath(seed):
         assert abs(out["discriminant"][0] - d) < min(1e-12 * max(1, abs(d)), mpf(out["discriminant_error"][0]))
     assert out["verdict"][0] == verdict
     miss(body, rho, one_minus_k=short)
+
+
+def test_a_bar_for_every_value_where_solutions_differ_by_30_orders():
+    """An oblate body at next to no rho: the ellipse of the errors is so thin that rounding could turn it inside out."""
+    out = survey.evaluate(
+        "satellite",
+        one_minus_k=np.geomspace(1e-16, 1e-9, 8),
+        rho=np.append(0.0, np.geomspace(1e-18, 1, 19)),
+        body="oblate",
+    )
+    for name in NAMES:
+        assert (np.isfinite(out[name]) == np.isfinite(out[f"{name}_error"])).all(), name
+    assert (out.status == status.OK).all() and (out.verdict.sel(rho=0.0) == MARGINAL).all()
