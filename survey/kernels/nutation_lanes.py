@@ -35,12 +35,13 @@ Q_LOW, Q_HIGH, MIDDLE, BEND = range(29 * TILE, 37 * TILE, 2 * TILE)
 # number of wells
 U, LOW, HIGH, WIDTH, ABOVE, LEVEL, GOOD, WELLS = range(37 * TILE, 45 * TILE, TILE)
 X, Y, WEIGHT, SERIES = range(45 * TILE, 49 * TILE, TILE)  # the mean
-UP, DOWN = 49 * TILE, 53 * TILE  # the sums R of both poles: p, weight, total, 1 if complementary
-LINE_UP, POINT_UP, LINE_DOWN, POINT_DOWN = range(57 * TILE, 61 * TILE, TILE)  # l of (S11), the root of P0 of (S13)
+UP, DOWN = 49 * TILE, 54 * TILE  # the sums R of both poles: e, 1 - e, weight, total, 1 if complementary
+LINE_UP, LINE_DOWN, INCLINE = range(59 * TILE, 62 * TILE, TILE)  # l of (S11) at the poles, and its slope
 # the sum and the difference of the parts of both poles, with all their digits, and 1 if these are known
-FINE_TOTAL, FINE_DIFFERENCE, FINE = range(61 * TILE, 64 * TILE, TILE)
-BAR_V, BAR_W, ACTION = range(64 * TILE, 67 * TILE, TILE)  # of the first two pairs; (S15), where it is known
-ROWS = 67
+FINE_TOTAL, FINE_DIFFERENCE, FINE = range(62 * TILE, 65 * TILE, TILE)
+BAR_V, BAR_W, ACTION = range(65 * TILE, 68 * TILE, TILE)  # of the first two pairs; (S15), where it is known
+ROOT_LOW, ROOT_HIGH = 68 * TILE, 69 * TILE  # of Q at the turning points
+ROWS = 70
 
 
 @inline
@@ -55,20 +56,28 @@ def laguerre(c0, c1, c2, c3, c4, y):
 
 
 @inline
+def residual(c0, c1, c2, c3, c4, y):
+    """c(y) at a float64, by Horner's rule with the error of each operation: to a few UNIT of the sum of |terms|."""
+    s, e = c4
+    for high, low in (c3, c2, c1, c0):
+        p, q = dd.two_prod(s, y)
+        s, r = dd.two_sum(p, high)
+        e = e * y + (q + r + low)
+    return s + e
+
+
+@inline
 def polished(c0, c1, c2, c3, c4, y):
     """A step of Newton's method in double-double towards the root (a pair) near y, and a bound of its error then."""
-    r = dd.add(dd.mul(c4, y), c3)
-    r = dd.add(dd.mul(r, y), c2)
-    r = dd.add(dd.mul(r, y), c1)
-    r = dd.add(dd.mul(r, y), c0)
     x, a0, a1, a2, a3, a4 = y[0], abs(c0[0]), abs(c1[0]), abs(c2[0]), abs(c3[0]), abs(c4[0])
     size, steep = a0 + x * (a1 + x * (a2 + x * (a3 + x * a4))), a1 + x * (2.0 * a2 + x * (3.0 * a3 + x * 4.0 * a4))
     first = c1[0] + x * (2.0 * c2[0] + x * (3.0 * c3[0] + x * 4.0 * c4[0]))
     second = 2.0 * c2[0] + x * (6.0 * c3[0] + x * 12.0 * c4[0])
-    move = r[0] / first
+    inverse = 1.0 / first
+    move = residual(c0, c1, c2, c3, c4, x) * inverse
     bend = abs(second) + abs(move) * (6.0 * a3 + 36.0 * a4)
-    bar = (2.0 * UNIT * size + abs(move) * (8.0 * EPS * steep + abs(move) * bend)) / abs(first) + 2.0 * UNIT * x
-    return dd.add(y, (-move, 0.0)), bar
+    bar = (4.0 * UNIT * size + abs(move) * (8.0 * EPS * steep + abs(move) * bend)) * abs(inverse) + 2.0 * UNIT * x
+    return dd.quick_two_sum(x, -move), bar
 
 
 @inline
@@ -169,17 +178,19 @@ def settle(work, i):
     """All that the turning points give, with all its digits; GOOD where it is proved to have them."""
     k, level, v, w = pair(work, K, i), pair(work, L, i), pair(work, V_HIGH, i), pair(work, W_LOW, i)
     bar_v, bar_w = work[BAR_V + i], work[BAR_W + i]
-    one, two = (1.0, 0.0), (2.0, 0.0)
-    high, low, total, v_low, w_high = dd.sub(one, v), dd.sub(w, one), dd.sub(w, v), dd.sub(two, w), dd.sub(two, v)
-    width = dd.sub(v_low, v)[0]
-    square, rest, product = dd.mul(total, total), dd.sub(level, k), dd.mul(high, low)
-    near = dd.add(rest, dd.mul(k, dd.add(square, dd.times(dd.mul(high, high), 2.0))))
-    far = dd.add(rest, dd.mul(k, dd.add(square, dd.times(dd.mul(low, low), 2.0))))
-    bow = dd.mul(k, square)
-    middle = dd.add(rest, dd.times(bow, 1.5))
-    bend = dd.add(dd.times(rest, 4.0), dd.sub(dd.times(bow, 3.0), dd.times(dd.mul(k, product), 4.0)))
-    level_rest = dd.sub(level, dd.times(dd.add(rest, bow), 0.5))
-    g = sqrt(near[0]) * sqrt(far[0])
+    high, low = dd.shifted(dd.neg(v), 1.0), dd.shifted(w, -1.0)
+    v_low, w_high, total = dd.shifted(dd.neg(w), 2.0), dd.shifted(dd.neg(v), 2.0), dd.loose(w, dd.neg(v))
+    width = dd.loose(v_low, dd.neg(v))[0]
+    rest, bow, double = dd.loose(level, dd.neg(k)), dd.mul(k, dd.square(total)), dd.scaled(k, 2.0)
+    common = dd.loose(rest, bow)
+    near = dd.loose(common, dd.mul(double, dd.square(high)))
+    far = dd.loose(common, dd.mul(double, dd.square(low)))
+    middle = dd.loose(common, dd.scaled(bow, 0.5))
+    bend = dd.loose(common, dd.neg(dd.mul(k, dd.mul(high, low))))
+    bend = dd.loose(dd.scaled(bend, 4.0), dd.neg(bow))
+    level_rest = dd.loose(level, dd.scaled(common, -0.5))
+    root_low, root_high = sqrt(far[0]), sqrt(near[0])
+    g = root_low * root_high
     error = 8.0 * (abs(k[0]) * (bar_v + bar_w) + UNIT * (abs(level[0]) + 8.0 * abs(k[0])))
     smooth = middle[0] >= 0.0
     sure = (error < RIGHT * near[0]) & (error < RIGHT * far[0]) & (bar_v + bar_w < BLUR * width)
@@ -202,86 +213,82 @@ def settle(work, i):
     put(work, Q_HIGH, i, near)
     put(work, MIDDLE, i, middle)
     put(work, BEND, i, bend)
+    work[ROOT_LOW + i], work[ROOT_HIGH + i] = root_low, root_high
 
 
 @inline
-def parameter(gap, near, far, root_near, root_far, incline, y):
-    """p^2 of the sum R, the line at the pole, and (S13) P0's root if that is used, else 0."""
+def parameter(gap, near, far, q_far, root_near, incline, g, xy):
+    """p^2/(x y) of the sum R as a fraction, of (S13) where that is used, and l at the pole."""
     line = root_near + incline * near
     slanted = line <= SLANT * root_near
-    p = root_far * sqrt(near / far)
-    half = 0.5 * (p + y * y / p)
-    q = gap * gap / (near * far) * (y / line) ** 2
-    return half * half if slanted else q, line, p if slanted else 0.0
+    here, there, across = q_far * near, g * far, near * far * line * line
+    return (here + there) ** 2 if slanted else gap * gap * g, xy * (4.0 * here * far if slanted else across), line
 
 
 @inline
-def enter(work, row, square, x, y, i):
-    """The start of a sum R (S12)."""
-    xy = x * y
-    low = square < xy
-    square = xy * (xy / square) if low else square
-    work[row + i], work[row + TILE + i], work[row + 2 * TILE + i], work[row + 3 * TILE + i] = (
-        sqrt(square),
-        1.0,
-        0.0,
-        1.0 if low else 0.0,
-    )
+def enter(work, row, over, under, i):
+    """The start of a sum R (S12) for p^2/(x y) = over/under: e is odd in its logarithm."""
+    inverse = 1.0 / (over + under)
+    work[row + i], work[row + TILE + i] = abs(over - under) * inverse, 2.0 * min(over, under) * inverse
+    work[row + 2 * TILE + i], work[row + 3 * TILE + i] = 1.0, 0.0
+    work[row + 4 * TILE + i] = 1.0 if over < under else 0.0
 
 
 @inline
 def prepare(work, i):
     """The means' start."""
-    root_low, root_high = sqrt(work[Q_LOW + i]), sqrt(work[Q_HIGH + i])
-    x, y = sqrt(0.5 * work[ABOVE + i]), sqrt(root_low * root_high)
+    root_low, root_high = work[ROOT_LOW + i], work[ROOT_HIGH + i]
+    x, g = sqrt(0.5 * work[ABOVE + i]), root_low * root_high
+    y = sqrt(g)
     incline = 2.0 * work[K + i] * work[SUM + i] / (root_low + root_high)
-    square, line, point = parameter(work[MINUS + i], work[V_HIGH + i], work[V_LOW + i], root_high, root_low, incline, y)
-    enter(work, UP, square, x, y, i)
-    work[LINE_UP + i], work[POINT_UP + i] = line, point
-    square, line, point = parameter(work[PLUS + i], work[W_LOW + i], work[W_HIGH + i], root_low, root_high, -incline, y)
-    enter(work, DOWN, square, x, y, i)
-    work[LINE_DOWN + i], work[POINT_DOWN + i] = line, point
+    over, under, line = parameter(work[MINUS + i], work[V_HIGH + i], work[V_LOW + i], work[Q_LOW + i], root_high,
+                                  incline, g, x * y)  # fmt: skip
+    enter(work, UP, over, under, i)
+    work[LINE_UP + i] = line
+    over, under, line = parameter(work[PLUS + i], work[W_LOW + i], work[W_HIGH + i], work[Q_HIGH + i], root_low,
+                                  -incline, g, x * y)  # fmt: skip
+    enter(work, DOWN, over, under, i)
+    work[LINE_DOWN + i], work[INCLINE + i] = line, incline
     work[X + i], work[Y + i], work[WEIGHT + i], work[SERIES + i] = x, y, 1.0, 0.0
 
 
 @inline
-def go_on(work, row, xy, root, i):
+def go_on(work, row, i):
     """A term of the sum R."""
-    p = work[row + i]
-    size = p * p + xy
-    inverse = 1.0 / size
-    e = (p - root) * (p + root) * inverse
-    work[row + 2 * TILE + i] += work[row + TILE + i] * (2.0 * xy * inverse if work[row + 3 * TILE + i] == 1.0 else 1.0)
-    work[row + TILE + i] *= 0.5 * e
-    work[row + i] = 0.5 * size / p
+    e, rest, weight = work[row + i], work[row + TILE + i], work[row + 2 * TILE + i]
+    work[row + 3 * TILE + i] += weight * (rest if work[row + 4 * TILE + i] == 1.0 else 1.0)
+    work[row + 2 * TILE + i] = 0.5 * weight * e
+    return (1.0 + e) * rest
 
 
 @inline
 def take_mean(work, i):
+    """A step of the mean; e of both sums: with r = (1 - e^2) (x + y)/(2 sqrt(x y)) the next is (1 - r)/(1 + r)."""
     x, y = work[X + i], work[Y + i]
-    xy = x * y
-    root = sqrt(xy)
-    go_on(work, UP, xy, root, i)
-    go_on(work, DOWN, xy, root, i)
+    middle, root = 0.5 * (x + y), sqrt(x * y)
+    up, down = middle * go_on(work, UP, i), middle * go_on(work, DOWN, i)
+    above, below = root + up, root + down
+    inverse = 1.0 / (above * below)
+    above, below = above * inverse, below * inverse
+    work[UP + i], work[UP + TILE + i] = (root - up) * below, 2.0 * up * below
+    work[DOWN + i], work[DOWN + TILE + i] = (root - down) * above, 2.0 * down * above
     c, weight = 0.5 * (x - y), 2.0 * work[WEIGHT + i]
     work[SERIES + i] += weight * c * c
-    work[X + i], work[Y + i], work[WEIGHT + i] = 0.5 * (x + y), root, weight
+    work[X + i], work[Y + i], work[WEIGHT + i] = middle, root, weight
 
 
 @inline
-def advance(gap, near, far, width, root_near, root_far, incline, bend, period, line, p, ratio, g):
+def advance(gap, near, far, q_far, width, root_near, root_far, incline, bend, period, line, ratio):
     """As in methods/agm.py: whole multiples of pi, the rest, and the size of its terms."""
-    direct = 0.5 * gap * period / far * (1.0 + 0.5 * width * (1.0 + 0.5 * (p * p - g) / (p * p + g) * ratio) / near)
-    q = gap * gap / (near * far)
-    second = 0.25 * (root_far * near + root_near * far) * bend * ratio / q
-    part = 0.5 * gap * period / line
-    slanted = p > 0.0
-    value = direct if slanted else part * (incline + second)
-    return (
-        0.0 if slanted else copysign(1.0, gap),
-        value,
-        abs(value) if slanted else abs(part) * (abs(incline) + abs(second)),
-    )
+    slanted = line <= SLANT * root_near
+    here, there = q_far * near, root_near * root_far * far
+    both = here + there
+    direct = near * both + 0.5 * width * (both + 0.5 * (here - there) * ratio)
+    first, second = incline * gap * gap, 0.25 * (root_far * near + root_near * far) * bend * ratio * near * far
+    part = 0.5 * period / (far * near * both if slanted else gap * line)
+    value = part * (gap * direct if slanted else first + second)
+    size = abs(value) if slanted else abs(part) * (abs(first) + abs(second))
+    return 0.0 if slanted else copysign(1.0, gap), value, size
 
 
 @inline
@@ -289,20 +296,19 @@ def finish(work, size, drift, i, told):
     """told = values and bars, of a well of a body with A = `size`; False where they are left to the other kernels."""
     middle = 0.5 * (work[X + i] + work[Y + i])
     period = 2.0 * pi / middle
-    root_low, root_high, width = sqrt(work[Q_LOW + i]), sqrt(work[Q_HIGH + i]), work[WIDTH + i]
-    incline, g = 2.0 * work[K + i] * work[SUM + i] / (root_low + root_high), root_low * root_high
-    bend = 0.5 * work[K + i] * work[BEND + i] / work[ABOVE + i]
+    root_low, root_high, width = work[ROOT_LOW + i], work[ROOT_HIGH + i], work[WIDTH + i]
+    incline, bend = work[INCLINE + i], 0.5 * work[K + i] * work[BEND + i] / work[ABOVE + i]
     minus, plus = work[MINUS + i], work[PLUS + i]
-    line, point, ratio = work[LINE_UP + i], work[POINT_UP + i], work[UP + 2 * TILE + i]
-    turns_up, up, size_up = advance(minus, work[V_HIGH + i], work[V_LOW + i], width, root_high, root_low, incline, bend,
-                                    period, line, point, ratio, g)  # fmt: skip
-    line, point, ratio = work[LINE_DOWN + i], work[POINT_DOWN + i], work[DOWN + 2 * TILE + i]
-    turns_down, down, size_down = advance(plus, work[W_LOW + i], work[W_HIGH + i], width, root_low, root_high, -incline,
-                                          bend, period, line, point, ratio, g)  # fmt: skip
+    turns_up, up, size_up = advance(minus, work[V_HIGH + i], work[V_LOW + i], work[Q_LOW + i], width, root_high,
+                                    root_low, incline, bend, period, work[LINE_UP + i],
+                                    work[UP + 3 * TILE + i])  # fmt: skip
+    turns_down, down, size_down = advance(plus, work[W_LOW + i], work[W_HIGH + i], work[Q_HIGH + i], width, root_low,
+                                          root_high, -incline, bend, period, work[LINE_DOWN + i],
+                                          work[DOWN + 3 * TILE + i])  # fmt: skip
     total, difference, rough = down + up, down - up, size_up + size_down
     sure = (work[GOOD + i] == 1.0) & (abs(work[X + i] - work[Y + i]) <= NEAR * middle)
-    sure &= abs(work[UP + TILE + i]) <= LAST * work[UP + 2 * TILE + i]
-    sure &= abs(work[DOWN + TILE + i]) <= LAST * work[DOWN + 2 * TILE + i]
+    sure &= abs(work[UP + 2 * TILE + i]) <= LAST * work[UP + 3 * TILE + i]
+    sure &= abs(work[DOWN + 2 * TILE + i]) <= LAST * work[DOWN + 3 * TILE + i]
     bare = abs(total) if turns_up + turns_down == 0.0 else abs(difference)  # without multiples of pi
     cancelled = (bare < CANCELLED * rough) & (turns_up * turns_down != 0.0) & (work[MIDDLE + i] > 0.0)
     fine = work[FINE + i] == 1.0

@@ -5,7 +5,7 @@ from math import factorial
 
 import numpy as np
 
-from survey.kernels.double import add, mul, neg, times, two_prod
+from survey.kernels.double import loose, mul, neg, quick_two_sum, times, two_prod
 from survey.kernels.jit import inline
 
 GRID = 16.0
@@ -34,17 +34,24 @@ _C4, _C6, _C8 = (_pair(Fraction((-1) ** (n // 2), factorial(n))) for n in (4, 6,
 
 
 @inline
+def _small(a, b):
+    """a + b, where |b| is less than |a|."""
+    s, e = quick_two_sum(a[0], b[0])
+    return quick_two_sum(s, e + (a[1] + b[1]))
+
+
+@inline
 def sin_cos(x):
     """sin x and cos x of 0 <= x <= LARGEST, to a few units of 2^-104; relative, where sin x is small with x."""
     j = int(x * GRID + 0.5)
     r = x - j / GRID  # exact
     z = two_prod(r, r)
     y = z[0]
-    s = add(_S7, (y * (1 / 362880.0 - y * (1 / 39916800.0 - y / 6227020800.0)), 0.0))
-    s = mul(z, add(_S3, mul(z, add(_S5, mul(z, s)))))
-    s = add((r, 0.0), times(s, r))
-    c = add(_C8, (-y * (1 / 3628800.0 - y / 479001600.0), 0.0))
-    c = mul(z, add((-0.5, 0.0), mul(z, add(_C4, mul(z, add(_C6, mul(z, c)))))))  # cos r - 1
+    s = _small(_S7, (y * (1 / 362880.0 - y * (1 / 39916800.0 - y * (1 / 6227020800.0))), 0.0))
+    s = mul(z, _small(_S3, mul(z, _small(_S5, mul(z, s)))))
+    s = _small((r, 0.0), times(s, r))
+    c = _small(_C8, (-y * (1 / 3628800.0 - y * (1 / 479001600.0)), 0.0))
+    c = mul(z, _small((-0.5, 0.0), mul(z, _small(_C4, mul(z, _small(_C6, mul(z, c)))))))  # cos r - 1
     sine, cosine = (_TABLE[j, 0], _TABLE[j, 1]), (_TABLE[j, 2], _TABLE[j, 3])
-    whole_sine = add(sine, add(mul(cosine, s), mul(sine, c)))
-    return whole_sine, add(cosine, add(mul(cosine, c), neg(mul(sine, s))))
+    whole_sine = loose(sine, loose(mul(cosine, s), mul(sine, c)))
+    return whole_sine, loose(cosine, loose(mul(cosine, c), neg(mul(sine, s))))
