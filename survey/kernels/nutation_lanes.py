@@ -40,8 +40,9 @@ LINE_UP, LINE_DOWN, INCLINE = range(59 * TILE, 62 * TILE, TILE)  # l of (S11) at
 # the sum and the difference of the parts of both poles, with all their digits, and 1 if these are known
 FINE_TOTAL, FINE_DIFFERENCE, FINE = range(62 * TILE, 65 * TILE, TILE)
 BAR_V, BAR_W, ACTION = range(65 * TILE, 68 * TILE, TILE)  # of the first two pairs; (S15), where it is known
-ROOT_LOW, ROOT_HIGH = 68 * TILE, 69 * TILE  # of Q at the turning points
-ROWS = 70
+# the roots of Q at the turning points, P at U
+ROOT_LOW, ROOT_HIGH, HERE = range(68 * TILE, 71 * TILE, TILE)
+ROWS = 71
 
 
 @inline
@@ -51,8 +52,7 @@ def laguerre(c0, c1, c2, c3, c4, y):
     first = c1 + y * (2.0 * c2 + y * (3.0 * c3 + y * 4.0 * c4))
     second = 2.0 * c2 + y * (6.0 * c3 + y * 12.0 * c4)
     square = 9.0 * first * first - 12.0 * value * second
-    y -= 4.0 * value / (first + sqrt(square if square > 0.0 else 0.0))
-    return min(max(y, 0.0), 2.0)
+    return y - 4.0 * value / (first + sqrt(square if square > 0.0 else 0.0))
 
 
 @inline
@@ -67,17 +67,18 @@ def residual(c0, c1, c2, c3, c4, y):
 
 
 @inline
-def polished(c0, c1, c2, c3, c4, y):
-    """A step of Newton's method in double-double towards the root (a pair) near y, and a bound of its error then."""
-    x, a0, a1, a2, a3, a4 = y[0], abs(c0[0]), abs(c1[0]), abs(c2[0]), abs(c3[0]), abs(c4[0])
+def polished(c0, c1, c2, c3, c4, x):
+    """A step of Newton's method and its second order towards the root (a pair) near x, and a bound of its error then."""
+    a0, a1, a2, a3, a4 = abs(c0[0]), abs(c1[0]), abs(c2[0]), abs(c3[0]), abs(c4[0])
     size, steep = a0 + x * (a1 + x * (a2 + x * (a3 + x * a4))), a1 + x * (2.0 * a2 + x * (3.0 * a3 + x * 4.0 * a4))
     first = c1[0] + x * (2.0 * c2[0] + x * (3.0 * c3[0] + x * 4.0 * c4[0]))
     second = 2.0 * c2[0] + x * (6.0 * c3[0] + x * 12.0 * c4[0])
     inverse = 1.0 / first
-    move = residual(c0, c1, c2, c3, c4, x) * inverse
-    bend = abs(second) + abs(move) * (6.0 * a3 + 36.0 * a4)
-    bar = (4.0 * UNIT * size + abs(move) * (8.0 * EPS * steep + abs(move) * bend)) * abs(inverse) + 2.0 * UNIT * x
-    return dd.quick_two_sum(x, -move), bar
+    move, size_inverse = residual(c0, c1, c2, c3, c4, x) * inverse, abs(inverse)
+    turn = 0.5 * move * second * inverse
+    rest = 4.0 * turn * turn + size_inverse * (8.0 * EPS * steep + 2.0 * move * move * (a3 + 9.0 * a4))
+    bar = 2.0 * UNIT * (size * size_inverse + x) + abs(move) * rest
+    return dd.quick_two_sum(x, -move * (1.0 + turn)), bar
 
 
 @inline
@@ -91,13 +92,32 @@ def put(work, row, i, value):
 
 
 @inline
-def step(work, i):
-    """A step of Laguerre's method from the poles inwards."""
-    k, level = work[K + i], work[L + i]
-    c2, c3 = -level - 5.0 * k, 4.0 * k
-    minus, plus = work[MINUS + i], work[PLUS + i]
-    work[V_HIGH + i] = laguerre(-minus * minus, 2.0 * work[PLUS_POLE + i], c2, c3, -k, work[V_HIGH + i])
-    work[W_LOW + i] = laguerre(-plus * plus, 2.0 * work[MINUS_POLE + i], c2, c3, -k, work[W_LOW + i])
+def first_step(c0, c1, c2, at):
+    """The root of the parabola that rises with y, or the pole."""
+    square = c1 * c1 - 4.0 * c0 * c2
+    root = sqrt(square if square > 0.0 else 0.0)
+    y = (-2.0 * c0 if c1 > 0.0 else root - c1) / (c1 + root if c1 > 0.0 else 2.0 * c2)
+    return min(max(y if (c1 > 0.0) | (c2 < 0.0) else -at, -at), 2.0 - at)
+
+
+@inline
+def chart(work, row, at, here, slope, i):
+    """Distances from a pole, less `at`: P there and its slope, the other coefficients, the place to go on from."""
+    k = work[K + i]
+    u = 1.0 - at
+    bend = work[L + i] - k
+    bend = -bend - 6.0 * k * u * u
+    work[row + i], work[row + TILE + i], work[row + 2 * TILE + i], work[row + 3 * TILE + i] = at, here, slope, bend
+    work[row + 4 * TILE + i] = first_step(here, slope, bend, at)
+
+
+@inline
+def step(work, row, i):
+    """A step of Laguerre's method towards a turning point."""
+    at, here, slope, bend = work[row + i], work[row + TILE + i], work[row + 2 * TILE + i], work[row + 3 * TILE + i]
+    k = work[K + i]
+    y = laguerre(here, slope, bend, 4.0 * k * (1.0 - at), -k, work[row + 4 * TILE + i])
+    work[row + 4 * TILE + i] = min(max(y, -at), 2.0 - at)
 
 
 @inline
@@ -106,7 +126,7 @@ def between(c0, c1, c2, c3, c4, work, row, i):
     y, low, high = work[row + i], work[row + TILE + i], work[row + 2 * TILE + i]
     value = c0 + y * (c1 + y * (c2 + y * (c3 + y * c4)))
     low, high = y if value <= 0.0 else low, y if value > 0.0 else high
-    new = laguerre(c0, c1, c2, c3, c4, y)
+    new = min(max(laguerre(c0, c1, c2, c3, c4, y), 0.0), 2.0)
     bad = (not (new > low)) | (not (new < high))
     work[row + i] = 0.5 * (low + high) if bad & (value != 0.0) else new
     work[row + TILE + i], work[row + 2 * TILE + i] = low, high
@@ -128,9 +148,10 @@ def choose(work, i):
     k, v, w = work[K + i], work[V_HIGH + i], work[W_LOW + i]
     total, width = w - v, 2.0 - v - w
     bend = 4.0 * (work[L + i] - k) + k * (2.0 * total * total + width * width)
-    two = (k > 0.0) & (bend < 0.0)
+    middle = -0.5 * total
+    two = (k > 0.0) & (bend < 0.0) & (middle > w - 1.0) & (middle < 1.0 - v)
     half = sqrt(-0.25 * bend / k) if two else 0.0
-    upper = work[U + i] > -0.5 * total
+    upper = work[U + i] > middle
     work[V_HIGH + i] = 1.0 + 0.5 * total + half if two & (not upper) else v
     work[W_LOW + i] = 1.0 - 0.5 * total + half if two & upper else w
 
@@ -166,8 +187,8 @@ def polish(work, i):
     k, minus, plus = pair(work, K, i), pair(work, MINUS, i), pair(work, PLUS, i)
     c2, c3, c4 = dd.neg(dd.add(pair(work, L, i), dd.times(k, 5.0))), dd.times(k, 4.0), dd.neg(k)
     at_plus, at_minus = dd.times(pair(work, PLUS_POLE, i), 2.0), dd.times(pair(work, MINUS_POLE, i), 2.0)
-    v, bar_v = polished(dd.neg(dd.mul(minus, minus)), at_plus, c2, c3, c4, pair(work, V_HIGH, i))
-    w, bar_w = polished(dd.neg(dd.mul(plus, plus)), at_minus, c2, c3, c4, pair(work, W_LOW, i))
+    v, bar_v = polished(dd.neg(dd.mul(minus, minus)), at_plus, c2, c3, c4, work[V_HIGH + i])
+    w, bar_w = polished(dd.neg(dd.mul(plus, plus)), at_minus, c2, c3, c4, work[W_LOW + i])
     put(work, V_HIGH, i, v)
     put(work, W_LOW, i, w)
     work[BAR_V + i], work[BAR_W + i] = bar_v, bar_w
@@ -381,14 +402,33 @@ def begin(work, i, v, w):
 
 
 @kernel
-def approach(work, steps):
-    """From the polynomial to the turning points, in float64."""
+def inside(work):
+    """The start from U, between the turning points, where P is HERE: at once there if they nearly coincide."""
     for i in range(TILE):
-        begin(work, i, 0.0, 0.0)
+        k, u, here = work[K + i], work[U + i], work[HERE + i]
+        slope = 2.0 * (work[A + i] * work[B + i] + u * (k * (1.0 - 2.0 * u * u) - work[L + i]))
+        chart(work, UP, 1.0 - u, here, -slope, i)
+        chart(work, DOWN, 1.0 + u, here, slope, i)
+
+
+@kernel
+def poles(work):
+    """The start from the poles."""
+    for i in range(TILE):
+        minus, plus = work[MINUS + i], work[PLUS + i]
+        chart(work, UP, 0.0, -minus * minus, 2.0 * work[PLUS_POLE + i], i)
+        chart(work, DOWN, 0.0, -plus * plus, 2.0 * work[MINUS_POLE + i], i)
+
+
+@kernel
+def approach(work, steps):
+    """From the polynomial about the start to the turning points, in float64."""
     for _ in range(steps):
         for i in range(TILE):
-            step(work, i)
+            step(work, UP, i)
+            step(work, DOWN, i)
     for i in range(TILE):
+        begin(work, i, work[UP + i] + work[UP + 4 * TILE + i], work[DOWN + i] + work[DOWN + 4 * TILE + i])
         choose(work, i)
 
 
