@@ -14,7 +14,7 @@ from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.nutation_lanes import GIVEN, GOOD, OUTPUTS, TILE, WELLS, A, B, finish, put
 
 FEW, MORE, MOST = (5, 1, 8), (12, 1, 12), (30, 4, 26)  # steps of Laguerre's method and of Newton's, means
-LEFT, DONE, CANCELLED = 0, 1, 2
+LEFT, CANCELLED, DONE = 0, 1, 2
 
 
 @inline
@@ -50,14 +50,21 @@ def integrals(work):
         work[nl.U + i] = 2.0 * work[2 * TILE + i]
 
 
+@inline
+def together(which, first):
+    """The points of a tile lie side by side."""
+    return first + TILE <= len(which) and which[first + TILE - 1] == which[first] + TILE - 1
+
+
 @kernel
 def enter(points, which, first, work):
     """A tile of the points `which`, the last of which is repeated."""
     start, last = which[first], len(which) - 1
-    if which[min(first + TILE - 1, last)] == start + TILE - 1:  # side by side
+    if together(which, first):
         for j in range(GIVEN):
+            row = points[j, start : start + TILE]
             for i in range(TILE):
-                work[j * TILE + i] = points[j, start + i]
+                work[j * TILE + i] = row[i]
         return
     for j in range(GIVEN):
         for i in range(TILE):
@@ -66,12 +73,21 @@ def enter(points, which, first, work):
 
 @kernel
 def leave(work, told, which, first, out, wells, done):
-    count = min(TILE, len(which) - first)
-    for j in range(OUTPUTS):
-        for i in range(count):
-            out[j, which[first + i]] = told[j * TILE + i]
-    for i in range(count):
-        wells[which[first + i]], done[which[first + i]] = work[WELLS + i], work[GOOD + i]
+    start = which[first]
+    if together(which, first):
+        for j in range(OUTPUTS):
+            row = out[j, start : start + TILE]
+            for i in range(TILE):
+                row[i] = told[j * TILE + i]
+        number, state = wells[start : start + TILE], done[start : start + TILE]
+        for i in range(TILE):
+            number[i], state[i] = work[WELLS + i], work[GOOD + i]
+        return
+    for i in range(min(TILE, len(which) - first)):
+        at = which[first + i]
+        for j in range(OUTPUTS):
+            out[j, at] = told[j * TILE + i]
+        wells[at], done[at] = work[WELLS + i], work[GOOD + i]
 
 
 @kernel
@@ -107,13 +123,13 @@ def tell_integrals(work, told):
 
 
 @kernel
-def in_state(done, state):
-    """The places of those points."""
-    which, count = np.empty(len(done), np.int64), 0
-    for i in range(len(done)):
-        which[count] = i
-        count += done[i] == state
-    return which[:count]
+def in_state(done, low, high, which):
+    """Those of the points `which` whose state is in this range."""
+    found, count = np.empty(len(which), np.int64), 0
+    for i in which:
+        found[count] = i
+        count += (done[i] >= low) & (done[i] <= high)
+    return found[:count]
 
 
 @splice
@@ -123,16 +139,17 @@ def answer(polynomials, tell, told_u, points, actions, out, wells, done):
     All of them go with FEW steps, what these leave with MORE and then with MOST; exactly where that is asked for.
     """
     work, told = np.zeros(nutation_fine.ALL), np.empty(OUTPUTS * TILE)
-    done[:] = LEFT
+    left = which = np.arange(len(done))
     for n in range(6):
         steps, exactly = (FEW, MORE, MOST)[n // 2], n % 2 == 1
-        which = in_state(done, CANCELLED if exactly else LEFT)
         for first in range(0, len(which), TILE):
             enter(points, which, first, work)
             polynomials(work)
             solve(work, steps, told_u and n < 2, exactly, actions)
             tell(work, told)
             leave(work, told, which, first, out, wells, done)
+        left = in_state(done, LEFT, CANCELLED, left) if exactly else left
+        which = left if exactly else in_state(done, CANCELLED, CANCELLED, left)
 
 
 @kernel

@@ -31,7 +31,7 @@ K, L, PLUS_POLE, MINUS_POLE, MINUS, PLUS = range(7 * TILE, 19 * TILE, 2 * TILE)
 V_HIGH, W_LOW, V_LOW, W_HIGH, SUM = range(19 * TILE, 29 * TILE, 2 * TILE)
 # pairs: Q at the turning points, s of (S5), 4 q0 - k S^2
 Q_LOW, Q_HIGH, MIDDLE, BEND = range(29 * TILE, 37 * TILE, 2 * TILE)
-# u at the start, turning points, their distance, s + g, L - (k ul uh + q0)/2, 1 where all is right (2: but cancels),
+# u at the start, turning points, their distance, s + g, L - (k ul uh + q0)/2, 1 where all is right (at last 2, and 1: but cancels),
 # number of wells
 U, LOW, HIGH, WIDTH, ABOVE, LEVEL, GOOD, WELLS = range(37 * TILE, 45 * TILE, TILE)
 X, Y, WEIGHT, SERIES = range(45 * TILE, 49 * TILE, TILE)  # the mean
@@ -360,7 +360,7 @@ def finish(work, size, drift, i, told):
     told[7 * TILE + i] = work[BAR_V + i] + EPS * abs(work[HIGH + i])
     told[8 * TILE + i], told[9 * TILE + i], told[11 * TILE + i] = error_period, error_precession, error_action
     told[10 * TILE + i] = error_spin + 23.0 * EPS * abs(turned) + EPS * abs(spin + turned)
-    work[GOOD + i] = 0.0 if not sure else 2.0 if cancelled & (not fine) else 1.0
+    work[GOOD + i] = 0.0 if not sure else 1.0 if cancelled & (not fine) else 2.0
 
 
 @inline
