@@ -171,6 +171,14 @@ def sqrt(a):
 
 
 @inline
+def positive_root(a):
+    """As `sqrt`, of a > 0."""
+    s = root(a[0])
+    p, e = two_prod(s, s)
+    return quick_two_sum(s, ((a[0] - p) - e + a[1]) / (2.0 * s))
+
+
+@inline
 def mean(a, b):
     """The arithmetic-geometric mean of a and b > 0; K = pi / (2 mean(1, k'))."""
     for _ in range(MEANS):
