@@ -144,7 +144,10 @@ def search(work, i):
 
 @inline
 def choose(work, i):
-    """Where there are two wells, the inner turning point of the one that holds U for the outer one of the other."""
+    """Where there are two wells, the inner turning point of the one that holds U for the outer one of the other.
+
+    Where P is even and so the well, to the last bit: the advance that vanishes then does so exactly.
+    """
     k, v, w = work[K + i], work[V_HIGH + i], work[W_LOW + i]
     total, width = w - v, 2.0 - v - w
     bend = 4.0 * (work[L + i] - k) + k * (2.0 * total * total + width * width)
@@ -153,7 +156,8 @@ def choose(work, i):
     half = sqrt(-0.25 * bend / k) if two else 0.0
     upper = work[U + i] > middle
     work[V_HIGH + i] = 1.0 + 0.5 * total + half if two & (not upper) else v
-    work[W_LOW + i] = 1.0 - 0.5 * total + half if two & upper else w
+    even = ((work[A + i] == 0.0) | (work[B + i] == 0.0)) & (v < 1.0) & (w < 1.0)
+    work[W_LOW + i] = 1.0 - 0.5 * total + half if two & upper else v if even else w
 
 
 @inline
