@@ -19,7 +19,7 @@ GIVEN, OUTPUTS = 7, 12  # rows of numbers given; u_min, u_max, period, precessio
 RIGHT = 0.125 * EPS  # errors of the set-up, relative
 BLUR = 0.01  # the error of a well's width, relative
 WIDE = 0.1  # wells that are wider are no parabolas
-NEAR, LAST = 2e-9, 1e-17  # the last two means, and the last weight of R
+NEAR, LAST = 3e-5, 1e-17  # the last two means, and the last weight of R
 SLANT, CANCELLED = 0.25, 0.01  # as in methods/agm.py
 NODES = 16
 COSINES = np.cos((np.arange(NODES) + 0.5) * pi / NODES)
@@ -53,6 +53,15 @@ def laguerre(c0, c1, c2, c3, c4, y):
     second = 2.0 * c2 + y * (6.0 * c3 + y * 12.0 * c4)
     square = 9.0 * first * first - 12.0 * value * second
     return y - 4.0 * value / (first + sqrt(square if square > 0.0 else 0.0))
+
+
+@inline
+def halley(c0, c1, c2, c3, c4, y):
+    """A last step, without a root."""
+    value = c0 + y * (c1 + y * (c2 + y * (c3 + y * c4)))
+    first = c1 + y * (2.0 * c2 + y * (3.0 * c3 + y * 4.0 * c4))
+    second = c2 + y * (3.0 * c3 + y * 6.0 * c4)
+    return y - value * first / (first * first - value * second)
 
 
 @inline
@@ -112,11 +121,11 @@ def chart(work, row, at, here, slope, i):
 
 
 @inline
-def step(work, row, i):
-    """A step of Laguerre's method towards a turning point."""
+def step(method, work, row, i):
+    """A step towards a turning point."""
     at, here, slope, bend = work[row + i], work[row + TILE + i], work[row + 2 * TILE + i], work[row + 3 * TILE + i]
     k = work[K + i]
-    y = laguerre(here, slope, bend, 4.0 * k * (1.0 - at), -k, work[row + 4 * TILE + i])
+    y = method(here, slope, bend, 4.0 * k * (1.0 - at), -k, work[row + 4 * TILE + i])
     work[row + 4 * TILE + i] = min(max(y, -at), 2.0 - at)
 
 
@@ -205,7 +214,7 @@ def settle(work, i):
     bar_v, bar_w = work[BAR_V + i], work[BAR_W + i]
     high, low = dd.shifted(dd.neg(v), 1.0), dd.shifted(w, -1.0)
     v_low, w_high, total = dd.shifted(dd.neg(w), 2.0), dd.shifted(dd.neg(v), 2.0), dd.loose(w, dd.neg(v))
-    width = dd.loose(v_low, dd.neg(v))[0]
+    width = (v_low[0] - v[0]) + (v_low[1] - v[1])
     rest, bow, double = dd.loose(level, dd.neg(k)), dd.mul(k, dd.square(total)), dd.scaled(k, 2.0)
     common = dd.loose(rest, bow)
     near = dd.loose(common, dd.mul(double, dd.square(high)))
@@ -213,7 +222,7 @@ def settle(work, i):
     middle = dd.loose(common, dd.scaled(bow, 0.5))
     bend = dd.loose(common, dd.neg(dd.mul(k, dd.mul(high, low))))
     bend = dd.loose(dd.scaled(bend, 4.0), dd.neg(bow))
-    level_rest = dd.loose(level, dd.scaled(common, -0.5))
+    level_rest = (level[0] - 0.5 * common[0]) + (level[1] - 0.5 * common[1])
     root_low, root_high = sqrt(far[0]), sqrt(near[0])
     g = root_low * root_high
     error = 8.0 * (abs(k[0]) * (bar_v + bar_w) + UNIT * (abs(level[0]) + 8.0 * abs(k[0])))
@@ -230,7 +239,7 @@ def settle(work, i):
     work[WELLS + i] = 2.0 if two else 1.0
     work[GOOD + i] = 1.0 if sure else 0.0
     work[ABOVE + i] = middle[0] + g if smooth else 0.25 * k[0] * width * width * bend[0] / (g - middle[0])
-    work[LOW + i], work[HIGH + i], work[WIDTH + i], work[LEVEL + i] = low[0], high[0], width, level_rest[0]
+    work[LOW + i], work[HIGH + i], work[WIDTH + i], work[LEVEL + i] = low[0], high[0], width, level_rest
     put(work, V_LOW, i, v_low)
     put(work, W_HIGH, i, w_high)
     put(work, SUM, i, total)
@@ -278,6 +287,14 @@ def prepare(work, i):
 
 
 @inline
+def whole(work, row, i):
+    """The sum R with one more term, and the size of what is left out."""
+    e, rest, weight = work[row + i], work[row + TILE + i], work[row + 2 * TILE + i]
+    total = work[row + 3 * TILE + i] + weight * (rest if work[row + 4 * TILE + i] == 1.0 else 1.0)
+    return total, abs(0.5 * weight * e)
+
+
+@inline
 def go_on(work, row, i):
     """A term of the sum R."""
     e, rest, weight = work[row + i], work[row + TILE + i], work[row + 2 * TILE + i]
@@ -319,21 +336,21 @@ def advance(gap, near, far, q_far, width, root_near, root_far, incline, bend, pe
 @inline
 def finish(work, size, drift, i, told):
     """told = values and bars, of a well of a body with A = `size`; False where they are left to the other kernels."""
-    middle = 0.5 * (work[X + i] + work[Y + i])
-    period = 2.0 * pi / middle
+    middle, apart = 0.5 * (work[X + i] + work[Y + i]), 0.5 * (work[X + i] - work[Y + i])
+    period = 2.0 * pi / (middle - 0.25 * apart * apart / middle)  # the next mean, but for the fourth order
     root_low, root_high, width = work[ROOT_LOW + i], work[ROOT_HIGH + i], work[WIDTH + i]
     incline, bend = work[INCLINE + i], 0.5 * work[K + i] * work[BEND + i] / work[ABOVE + i]
     minus, plus = work[MINUS + i], work[PLUS + i]
+    (ratio_up, last_up), (ratio_down, last_down) = whole(work, UP, i), whole(work, DOWN, i)
     turns_up, up, size_up = advance(minus, work[V_HIGH + i], work[V_LOW + i], work[Q_LOW + i], width, root_high,
                                     root_low, incline, bend, period, work[LINE_UP + i],
-                                    work[UP + 3 * TILE + i])  # fmt: skip
+                                    ratio_up)  # fmt: skip
     turns_down, down, size_down = advance(plus, work[W_LOW + i], work[W_HIGH + i], work[Q_HIGH + i], width, root_low,
                                           root_high, -incline, bend, period, work[LINE_DOWN + i],
-                                          work[DOWN + 3 * TILE + i])  # fmt: skip
+                                          ratio_down)  # fmt: skip
     total, difference, rough = down + up, down - up, size_up + size_down
-    sure = (work[GOOD + i] == 1.0) & (abs(work[X + i] - work[Y + i]) <= NEAR * middle)
-    sure &= abs(work[UP + 2 * TILE + i]) <= LAST * work[UP + 3 * TILE + i]
-    sure &= abs(work[DOWN + 2 * TILE + i]) <= LAST * work[DOWN + 3 * TILE + i]
+    sure = (work[GOOD + i] == 1.0) & (abs(apart) <= 0.5 * NEAR * middle)
+    sure &= (last_up <= LAST * ratio_up) & (last_down <= LAST * ratio_down)
     bare = abs(total) if turns_up + turns_down == 0.0 else abs(difference)  # without multiples of pi
     cancelled = (bare < CANCELLED * rough) & (turns_up * turns_down != 0.0) & (work[MIDDLE + i] > 0.0)
     fine = work[FINE + i] == 1.0
@@ -345,7 +362,7 @@ def finish(work, size, drift, i, told):
     precession, spin = pi * (turns_down + turns_up) + total, pi * (turns_down - turns_up) + difference
     error_precession = error + rounding * abs(total) + turned * abs(turns_down + turns_up)
     error_spin = error + rounding * abs(difference) + turned * abs(turns_down - turns_up)
-    rest = 0.5 * (0.5 * work[ABOVE + i] - work[SERIES + i])
+    rest = 0.5 * (0.5 * work[ABOVE + i] - (work[SERIES + i] + 2.0 * work[WEIGHT + i] * apart * apart))
     up, down = minus * (pi * turns_up + up), plus * (pi * turns_down + down)
     action = (period * (work[LEVEL + i] + rest) - up - down) / (2.0 * pi)
     rough = period * (abs(work[LEVEL + i]) + abs(rest))
@@ -429,9 +446,11 @@ def approach(work, steps):
     """From the polynomial about the start to the turning points, in float64."""
     for _ in range(steps):
         for i in range(TILE):
-            step(work, UP, i)
-            step(work, DOWN, i)
+            step(laguerre, work, UP, i)
+            step(laguerre, work, DOWN, i)
     for i in range(TILE):
+        step(halley, work, UP, i)
+        step(halley, work, DOWN, i)
         begin(work, i, work[UP + i] + work[UP + 4 * TILE + i], work[DOWN + i] + work[DOWN + 4 * TILE + i])
         choose(work, i)
 
