@@ -35,7 +35,7 @@ Q_LOW, Q_HIGH, MIDDLE, BEND = range(29 * TILE, 37 * TILE, 2 * TILE)
 # number of wells
 U, LOW, HIGH, WIDTH, ABOVE, LEVEL, GOOD, WELLS = range(37 * TILE, 45 * TILE, TILE)
 X, Y, WEIGHT, SERIES = range(45 * TILE, 49 * TILE, TILE)  # the mean
-UP, DOWN = 49 * TILE, 54 * TILE  # the sums R of both poles: e, 1 - e, weight, total, 1 if complementary
+UP, DOWN = 49 * TILE, 54 * TILE  # the sums R of both poles: 1 - e, weight, total, 1 if complementary
 LINE_UP, LINE_DOWN, INCLINE = range(59 * TILE, 62 * TILE, TILE)  # l of (S11) at the poles, and its slope
 # the sum and the difference of the parts of both poles, with all their digits, and 1 if these are known
 FINE_TOTAL, FINE_DIFFERENCE, FINE = range(62 * TILE, 65 * TILE, TILE)
@@ -262,10 +262,9 @@ def parameter(gap, near, far, q_far, root_near, incline, g, xy):
 @inline
 def enter(work, row, over, under, i):
     """The start of a sum R (S12) for p^2/(x y) = over/under: e is odd in its logarithm."""
-    inverse = 1.0 / (over + under)
-    work[row + i], work[row + TILE + i] = abs(over - under) * inverse, 2.0 * min(over, under) * inverse
-    work[row + 2 * TILE + i], work[row + 3 * TILE + i] = 1.0, 0.0
-    work[row + 4 * TILE + i] = 1.0 if over < under else 0.0
+    work[row + i], work[row + TILE + i], work[row + 2 * TILE + i] = 2.0 * min(over, under) / (over + under), 1.0, 0.0
+    work[row + 3 * TILE + i] = 1.0 if over < under else 0.0
+
 
 
 @inline
@@ -283,40 +282,38 @@ def prepare(work, i):
                                   -incline, g, x * y)  # fmt: skip
     enter(work, DOWN, over, under, i)
     work[LINE_DOWN + i], work[INCLINE + i] = line, incline
-    work[X + i], work[Y + i], work[WEIGHT + i], work[SERIES + i] = x, y, 1.0, 0.0
+    work[X + i], work[Y + i], work[SERIES + i] = x, y, 0.0
 
 
 @inline
 def whole(work, row, i):
     """The sum R with one more term, and the size of what is left out."""
-    e, rest, weight = work[row + i], work[row + TILE + i], work[row + 2 * TILE + i]
-    total = work[row + 3 * TILE + i] + weight * (rest if work[row + 4 * TILE + i] == 1.0 else 1.0)
-    return total, abs(0.5 * weight * e)
+    rest, weight = work[row + i], work[row + TILE + i]
+    total = work[row + 2 * TILE + i] + (weight * rest if work[row + 3 * TILE + i] == 1.0 else weight)
+    return total, abs(0.5 * weight * (1.0 - rest))
 
 
 @inline
 def go_on(work, row, i):
     """A term of the sum R."""
-    e, rest, weight = work[row + i], work[row + TILE + i], work[row + 2 * TILE + i]
-    work[row + 3 * TILE + i] += weight * (rest if work[row + 4 * TILE + i] == 1.0 else 1.0)
-    work[row + 2 * TILE + i] = 0.5 * weight * e
-    return (1.0 + e) * rest
+    rest, weight = work[row + i], work[row + TILE + i]
+    work[row + 2 * TILE + i] += weight * rest if work[row + 3 * TILE + i] == 1.0 else weight
+    work[row + TILE + i] = 0.5 * weight * (1.0 - rest)
+    return (2.0 - rest) * rest
 
 
 @inline
-def take_mean(work, i):
+def take_mean(work, weight, i):
     """A step of the mean; e of both sums: with r = (1 - e^2) (x + y)/(2 sqrt(x y)) the next is (1 - r)/(1 + r)."""
     x, y = work[X + i], work[Y + i]
     middle, root = 0.5 * (x + y), sqrt(x * y)
     up, down = middle * go_on(work, UP, i), middle * go_on(work, DOWN, i)
     above, below = root + up, root + down
-    inverse = 1.0 / (above * below)
-    above, below = above * inverse, below * inverse
-    work[UP + i], work[UP + TILE + i] = (root - up) * below, 2.0 * up * below
-    work[DOWN + i], work[DOWN + TILE + i] = (root - down) * above, 2.0 * down * above
-    c, weight = 0.5 * (x - y), 2.0 * work[WEIGHT + i]
+    inverse = 2.0 / (above * below)
+    work[UP + i], work[DOWN + i] = up * below * inverse, down * above * inverse
+    c = x - y
     work[SERIES + i] += weight * c * c
-    work[X + i], work[Y + i], work[WEIGHT + i] = middle, root, weight
+    work[X + i], work[Y + i] = middle, root
 
 
 @inline
@@ -486,6 +483,9 @@ def wells(work, steps):
 def means(work, number):
     for i in range(TILE):
         prepare(work, i)
+        work[WEIGHT + i] = 2.0**number
+    weight = 0.5
     for _ in range(number):
         for i in range(TILE):
-            take_mean(work, i)
+            take_mean(work, weight, i)
+        weight *= 2.0
