@@ -90,7 +90,7 @@ def leave(work, told, which, first, out, wells, done):
         wells[at], done[at] = work[WELLS + i], work[GOOD + i]
 
 
-@kernel
+@splice
 def solve(work, steps, within, exactly, actions):
     if steps[1] > 1:
         nl.approach_slowly(work, steps[0])

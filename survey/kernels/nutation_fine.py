@@ -1,7 +1,7 @@
 """As `nutation_lanes`, in double-double: what the poles add to multiples of pi, where both nearly cancel."""
 
 from survey.kernels import double as dd
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.nutation_lanes import (
     BEND,
     FINE,
@@ -131,9 +131,14 @@ def go(work):
 
 
 @kernel
+def end(work):
+    for i in range(TILE):
+        finish(work, i)
+
+
+@splice
 def fine(work):
     """Fill the rows FINE of `work` (ALL)."""
     begin(work)
     go(work)
-    for i in range(TILE):
-        finish(work, i)
+    end(work)
