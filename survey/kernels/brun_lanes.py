@@ -66,9 +66,10 @@ def enter(points, which, first, work):
             for i in range(TILE):
                 work[j * TILE + i] = row[i]
         return
-    for j in range(GIVEN):
-        for i in range(TILE):
-            work[j * TILE + i] = points[j, which[min(first + i, last)]]
+    for i in range(TILE):
+        at = which[min(first + i, last)]
+        for j in range(GIVEN):
+            work[j * TILE + i] = points[j, at]
 
 
 @kernel

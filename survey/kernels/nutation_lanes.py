@@ -31,11 +31,12 @@ K, L, PLUS_POLE, MINUS_POLE, MINUS, PLUS = range(7 * TILE, 19 * TILE, 2 * TILE)
 V_HIGH, W_LOW, V_LOW, W_HIGH, SUM = range(19 * TILE, 29 * TILE, 2 * TILE)
 # pairs: Q at the turning points, s of (S5), 4 q0 - k S^2
 Q_LOW, Q_HIGH, MIDDLE, BEND = range(29 * TILE, 37 * TILE, 2 * TILE)
-# u at the start, turning points, their distance, s + g, L - (k ul uh + q0)/2, 1 where all is right (at last 2, and 1: but cancels),
-# number of wells
+# u at the start, turning points, their distance, s + g, L - (k ul uh + q0)/2, 1 where all is right (when all is told 2,
+# or 1 where it cancels), number of wells
 U, LOW, HIGH, WIDTH, ABOVE, LEVEL, GOOD, WELLS = range(37 * TILE, 45 * TILE, TILE)
 X, Y, WEIGHT, SERIES = range(45 * TILE, 49 * TILE, TILE)  # the mean
-UP, DOWN = 49 * TILE, 54 * TILE  # the sums R of both poles: 1 - e, weight, total, 1 if complementary
+# Both poles: the charts, see `chart`; then the sums R: 1 - e, weight, total, 1 if complementary
+UP, DOWN = 49 * TILE, 54 * TILE
 LINE_UP, LINE_DOWN, INCLINE = range(59 * TILE, 62 * TILE, TILE)  # l of (S11) at the poles, and its slope
 # the sum and the difference of the parts of both poles, with all their digits, and 1 if these are known
 FINE_TOTAL, FINE_DIFFERENCE, FINE = range(62 * TILE, 65 * TILE, TILE)
@@ -77,7 +78,7 @@ def residual(c0, c1, c2, c3, c4, y):
 
 @inline
 def polished(c0, c1, c2, c3, c4, x):
-    """A step of Newton's method and its second order towards the root (a pair) near x, and a bound of its error then."""
+    """The root near x as a pair, by Newton's step and the second order of its error, and a bound of what is left."""
     a0, a1, a2, a3, a4 = abs(c0[0]), abs(c1[0]), abs(c2[0]), abs(c3[0]), abs(c4[0])
     size, steep = a0 + x * (a1 + x * (a2 + x * (a3 + x * a4))), a1 + x * (2.0 * a2 + x * (3.0 * a3 + x * 4.0 * a4))
     first = c1[0] + x * (2.0 * c2[0] + x * (3.0 * c3[0] + x * 4.0 * c4[0]))
@@ -102,7 +103,7 @@ def put(work, row, i, value):
 
 @inline
 def first_step(c0, c1, c2, at):
-    """The root of the parabola that rises with y, or the pole."""
+    """The root of the parabola where P rises with y, or the pole."""
     square = c1 * c1 - 4.0 * c0 * c2
     root = sqrt(square if square > 0.0 else 0.0)
     y = (-2.0 * c0 if c1 > 0.0 else root - c1) / (c1 + root if c1 > 0.0 else 2.0 * c2)
@@ -111,11 +112,9 @@ def first_step(c0, c1, c2, at):
 
 @inline
 def chart(work, row, at, here, slope, i):
-    """Distances from a pole, less `at`: P there and its slope, the other coefficients, the place to go on from."""
-    k = work[K + i]
-    u = 1.0 - at
-    bend = work[L + i] - k
-    bend = -bend - 6.0 * k * u * u
+    """P by a pole's distance less `at`: `at`, P there, its slope, half its curvature; and the place to go on from."""
+    k, u = work[K + i], 1.0 - at
+    bend = (k - work[L + i]) - 6.0 * k * u * u
     work[row + i], work[row + TILE + i], work[row + 2 * TILE + i], work[row + 3 * TILE + i] = at, here, slope, bend
     work[row + 4 * TILE + i] = first_step(here, slope, bend, at)
 
@@ -264,7 +263,6 @@ def enter(work, row, over, under, i):
     """The start of a sum R (S12) for p^2/(x y) = over/under: e is odd in its logarithm."""
     work[row + i], work[row + TILE + i], work[row + 2 * TILE + i] = 2.0 * min(over, under) / (over + under), 1.0, 0.0
     work[row + 3 * TILE + i] = 1.0 if over < under else 0.0
-
 
 
 @inline
@@ -421,7 +419,7 @@ def begin(work, i, v, w):
 
 @kernel
 def inside(work):
-    """The start from U, between the turning points, where P is HERE: at once there if they nearly coincide."""
+    """The start from U, between the turning points, where P is HERE: nearly there at once if they nearly coincide."""
     for i in range(TILE):
         k, u, here = work[K + i], work[U + i], work[HERE + i]
         slope = 2.0 * (work[A + i] * work[B + i] + u * (k * (1.0 - 2.0 * u * u) - work[L + i]))
