@@ -13,7 +13,7 @@ from survey.kernels.brun import of_state
 from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.nutation_lanes import GIVEN, GOOD, OUTPUTS, TILE, WELLS, A, B, finish, put
 
-FEW, MORE, MOST = (3, 1, 7), (12, 1, 12), (30, 4, 26)  # steps of Laguerre's method and of Newton's, means
+FEW, MORE, MOST = (3, 1, 8), (12, 1, 12), (30, 4, 26)  # steps of Laguerre's method and of Newton's, means
 LEFT, CANCELLED, DONE = 0, 1, 2
 
 
