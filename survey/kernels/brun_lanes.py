@@ -13,7 +13,8 @@ from survey.kernels.brun import of_state
 from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.nutation_lanes import GIVEN, GOOD, OUTPUTS, TILE, WELLS, A, B, finish, put
 
-FEW, MORE, MOST = (3, 1, 8), (12, 1, 12), (30, 4, 26)  # steps of Laguerre's method and of Newton's, means
+# steps of Laguerre's method and of Newton's, means; at first from the initial state or from the poles
+FEW, FEW_FROM_POLES, MORE, MOST = (3, 1, 8), (6, 1, 8), (12, 1, 12), (30, 4, 26)
 LEFT, CANCELLED, DONE = 0, 1, 2
 
 
@@ -142,7 +143,7 @@ def answer(polynomials, tell, told_u, points, actions, out, wells, done):
     work, told = np.zeros(nutation_fine.ALL), np.empty(OUTPUTS * TILE)
     left = which = np.arange(len(done))
     for n in range(6):
-        steps, exactly = (FEW, MORE, MOST)[n // 2], n % 2 == 1
+        steps, exactly = (FEW if told_u else FEW_FROM_POLES, MORE, MOST)[n // 2], n % 2 == 1
         for first in range(0, len(which), TILE):
             enter(points, which, first, work)
             polynomials(work)
