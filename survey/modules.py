@@ -1,5 +1,6 @@
 """Names resolve to modules: a scene or a method is found by its file name, and no list is kept by hand."""
 
+import sys
 from difflib import get_close_matches
 from importlib import import_module
 from pkgutil import iter_modules
@@ -14,10 +15,13 @@ def names(package):
 
 def load(package, name, what):
     """The module `name` of `package`; raises BadInput, naming the nearest, if there is none."""
+    whole = f"{package.__name__}.{name}"
+    if whole in sys.modules:  # the folder is not read anew for every block
+        return sys.modules[whole]
     known = names(package)
     if name not in known:
         raise BadInput(unknown(what, name, known))
-    return import_module(f"{package.__name__}.{name}")
+    return import_module(whole)
 
 
 def unknown(what, name, known):

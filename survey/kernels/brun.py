@@ -38,17 +38,17 @@ def of_state(size_a, size_c, epsilon, theta, p_theta, b, a):
     sine, cosine = sin_cos(0.5 * theta)
     k = dd.mul(dd.two_prod(epsilon, size_a), dd.two_sum(size_a, -size_c))
     inside = sine[0] != 0.0 or a == b
-    high, low = dd.mul(cosine, cosine), dd.mul(sine, sine)  # (1 + u)/2, (1 - u)/2
-    double = dd.times(dd.mul(sine, cosine), 2.0)
+    high, low = dd.square(cosine), dd.square(sine)  # (1 + u)/2, (1 - u)/2
+    double = dd.scaled(dd.mul(sine, cosine), 2.0)
     minus, plus = dd.two_sum(b, -a), dd.two_sum(b, a)
     divisor = double[0] if sine[0] != 0.0 else 1.0, double[1]  # at the pole x is 0
-    x = dd.div(dd.add(dd.mul(minus, high), dd.mul(plus, low)), divisor)
-    kinetic = dd.add(dd.two_prod(p_theta, p_theta), dd.mul(x, x))
-    common = dd.add(kinetic, dd.mul(k, dd.mul(double, double)))
-    at_plus = dd.sub(common, dd.times(minus, a))
-    at_minus = dd.add(common, dd.times(plus, a))
-    u = dd.mul(dd.sub(cosine, sine), dd.add(cosine, sine))
-    level = dd.add(dd.sub(kinetic, dd.mul(k, dd.mul(u, u))), dd.two_prod(a, a))
+    x = dd.ratio(dd.loose(dd.mul(minus, high), dd.mul(plus, low)), divisor)
+    kinetic = dd.loose(dd.two_prod(p_theta, p_theta), dd.square(x))
+    common = dd.loose(kinetic, dd.mul(k, dd.square(double)))
+    at_plus = dd.loose(common, dd.times(minus, -a))
+    at_minus = dd.loose(common, dd.times(plus, a))
+    u = dd.loose(high, dd.neg(low))
+    level = dd.loose(dd.loose(kinetic, dd.neg(dd.mul(k, dd.square(u)))), dd.two_prod(a, a))
     return k, level, at_plus, at_minus, u[0], inside
 
 

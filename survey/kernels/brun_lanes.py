@@ -13,8 +13,9 @@ from survey.kernels.brun import of_state
 from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.nutation_lanes import GIVEN, GOOD, OUTPUTS, TILE, WELLS, A, B, finish, put
 
-FEW, MORE = (8, 1, 8), (30, 4, 26)  # steps of Laguerre's method and of Newton's, means
-LEFT, DONE, CANCELLED = 0, 1, 2
+# steps of Laguerre's method and of Newton's, means; at first from the initial state or from the poles
+FEW, FEW_FROM_POLES, MORE, MOST = (3, 1, 8), (6, 1, 8), (12, 1, 12), (30, 4, 26)
+LEFT, CANCELLED, DONE = 0, 1, 2
 
 
 @inline
@@ -37,6 +38,7 @@ def states(work):
         )
         polynomial(work, (k[0] if inside else np.nan, k[1]), level, at_plus, at_minus, i)
         work[nl.U + i] = u
+        work[nl.HERE + i] = work[4 * TILE + i] ** 2 * (1.0 - u) * (1.0 + u)
 
 
 @kernel
@@ -49,28 +51,56 @@ def integrals(work):
         work[nl.U + i] = 2.0 * work[2 * TILE + i]
 
 
-@kernel
-def enter(points, first, work):
-    """A tile of points, the last of which is repeated."""
-    last = points.shape[1] - 1
-    for j in range(GIVEN):
-        for i in range(TILE):
-            work[j * TILE + i] = points[j, min(first + i, last)]
+@inline
+def together(which, first):
+    """The points of a tile lie side by side."""
+    return first + TILE <= len(which) and which[first + TILE - 1] == which[first] + TILE - 1
 
 
 @kernel
-def leave(work, told, first, out, wells, done):
-    for i in range(min(TILE, len(done) - first)):
+def enter(points, which, first, work):
+    """A tile of the points `which`, the last of which is repeated."""
+    start, last = which[first], len(which) - 1
+    if together(which, first):
+        for j in range(GIVEN):
+            row = points[j, start : start + TILE]
+            for i in range(TILE):
+                work[j * TILE + i] = row[i]
+        return
+    for i in range(TILE):
+        at = which[min(first + i, last)]
+        for j in range(GIVEN):
+            work[j * TILE + i] = points[j, at]
+
+
+@kernel
+def leave(work, told, which, first, out, wells, done):
+    start = which[first]
+    if together(which, first):
         for j in range(OUTPUTS):
-            out[j, first + i] = told[j * TILE + i]
-        wells[first + i], done[first + i] = work[WELLS + i], work[GOOD + i]
+            row = out[j, start : start + TILE]
+            for i in range(TILE):
+                row[i] = told[j * TILE + i]
+        number, state = wells[start : start + TILE], done[start : start + TILE]
+        for i in range(TILE):
+            number[i], state[i] = work[WELLS + i], work[GOOD + i]
+        return
+    for i in range(min(TILE, len(which) - first)):
+        at = which[first + i]
+        for j in range(OUTPUTS):
+            out[j, at] = told[j * TILE + i]
+        wells[at], done[at] = work[WELLS + i], work[GOOD + i]
 
 
-@kernel
-def solve(work, steps, exactly, actions):
+@splice
+def solve(work, steps, within, exactly, actions):
     if steps[1] > 1:
         nl.approach_slowly(work, steps[0])
     else:
+        if within:
+            nl.inside(work)
+        else:
+            nl.poles(work)
         nl.approach(work, steps[0])
     nl.wells(work, steps[1])
     nl.means(work, steps[2])
@@ -94,28 +124,46 @@ def tell_integrals(work, told):
         finish(work, 1.0, work[A + i] * ((1.0 - ratio) / ratio), i, told)
 
 
+@kernel
+def in_state(done, low, high, which):
+    """Those of the points `which` whose state is in this range."""
+    found, count = np.empty(len(which), np.int64), 0
+    for i in which:
+        found[count] = i
+        count += (done[i] >= low) & (done[i] <= high)
+    return found[:count]
+
+
 @splice
-def answer(polynomials, tell, points, steps, exactly, actions, out, wells, done):
-    """Tile after tile: the polynomials of its points, their wells, and what is told of these."""
+def answer(polynomials, tell, told_u, points, actions, out, wells, done):
+    """Tile after tile: the polynomials of its points, their wells, and what is told of these.
+
+    All of them go with FEW steps, what these leave with MORE and then with MOST; exactly where that is asked for.
+    """
     work, told = np.zeros(nutation_fine.ALL), np.empty(OUTPUTS * TILE)
-    for first in range(0, len(done), TILE):
-        enter(points, first, work)
-        polynomials(work)
-        solve(work, steps, exactly, actions)
-        tell(work, told)
-        leave(work, told, first, out, wells, done)
+    left = which = np.arange(len(done))
+    for n in range(6):
+        steps, exactly = (FEW if told_u else FEW_FROM_POLES, MORE, MOST)[n // 2], n % 2 == 1
+        for first in range(0, len(which), TILE):
+            enter(points, which, first, work)
+            polynomials(work)
+            solve(work, steps, told_u and n < 2, exactly, actions)
+            tell(work, told)
+            leave(work, told, which, first, out, wells, done)
+        left = in_state(done, LEFT, CANCELLED, left) if exactly else left
+        which = left if exactly else in_state(done, CANCELLED, CANCELLED, left)
 
 
 @kernel
-def of_states(points, steps, exactly, actions, out, wells, done):
+def of_states(points, actions, out, wells, done):
     """Outputs (OUTPUTS, n) of initial states (GIVEN, n), the numbers of wells (n), and which are DONE (n).
 
-    exactly: CANCELLED ones too; actions: accurate ones of small wells.
+    actions: accurate ones of small wells.
     """
-    answer(states, tell_states, points, steps, exactly, actions, out, wells, done)
+    answer(states, tell_states, True, points, actions, out, wells, done)
 
 
 @kernel
-def of_integrals(points, steps, exactly, actions, out, wells, done):
+def of_integrals(points, actions, out, wells, done):
     """As `of_states`, at scaled integrals."""
-    answer(integrals, tell_integrals, points, steps, exactly, actions, out, wells, done)
+    answer(integrals, tell_integrals, False, points, actions, out, wells, done)

@@ -97,6 +97,20 @@ def sub(a, b):
 
 
 @inline
+def loose(a, b):
+    """a + b to a UNIT of |a| + |b|: half the work of `add`, for terms that have errors themselves, or one sign."""
+    s, e = two_sum(a[0], b[0])
+    return quick_two_sum(s, e + (a[1] + b[1]))
+
+
+@inline
+def shifted(a, number):
+    """a plus a float64."""
+    s, e = two_sum(a[0], number)
+    return quick_two_sum(s, e + a[1])
+
+
+@inline
 def mul(a, b):
     p, e = two_prod(a[0], b[0])
     return quick_two_sum(p, e + (a[0] * b[1] + a[1] * b[0]))
@@ -107,6 +121,18 @@ def times(a, number):
     """a times a float64."""
     p, e = two_prod(a[0], number)
     return quick_two_sum(p, e + a[1] * number)
+
+
+@inline
+def scaled(a, power):
+    """a times a power of two, exactly."""
+    return a[0] * power, a[1] * power
+
+
+@inline
+def square(a):
+    p, e = two_prod(a[0], a[0])
+    return quick_two_sum(p, e + 2.0 * a[0] * a[1])
 
 
 @inline
@@ -127,6 +153,14 @@ def div(a, b):
 
 
 @inline
+def ratio(a, b):
+    """a/b to 4 UNIT: a third of the work of `div` (Joldes, Muller, Popescu 2017, algorithm 17)."""
+    q = a[0] / b[0]
+    p = times(b, q)
+    return quick_two_sum(q, ((a[0] - p[0]) + (a[1] - p[1])) / b[0])
+
+
+@inline
 def sqrt(a):
     """The square root of a >= 0, by one step of Newton's from float64's."""
     if a[0] == 0.0:
@@ -134,6 +168,14 @@ def sqrt(a):
     s = root(a[0])
     rest = sub(a, two_prod(s, s))
     return quick_two_sum(s, rest[0] / (2.0 * s))
+
+
+@inline
+def positive_root(a):
+    """As `sqrt`, of a > 0."""
+    s = root(a[0])
+    p, e = two_prod(s, s)
+    return quick_two_sum(s, ((a[0] - p) - e + a[1]) / (2.0 * s))
 
 
 @inline

@@ -1,7 +1,7 @@
 """As `nutation_lanes`, in double-double: what the poles add to multiples of pi, where both nearly cancel."""
 
 from survey.kernels import double as dd
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.nutation_lanes import (
     BEND,
     FINE,
@@ -25,38 +25,20 @@ from survey.kernels.nutation_lanes import (
 )
 
 MEANS = 8
-LAST = 1e-30
-# rows of the tile that follow those of `nutation_lanes`: pairs x, y; p, weight, total of both poles; complementary?
-X, Y, UP, DOWN, LOW_UP, LOW_DOWN, ALL = (TILE * (ROWS + n) for n in (0, 2, 4, 10, 16, 17, 18))
-P, WEIGHT, TOTAL = 0, 2 * TILE, 4 * TILE
+LAST = 1e-20
+# rows of the tile that follow those of `nutation_lanes`: pairs x, y; 1 - e, weight, total of both poles; complementary?
+X, Y, UP, DOWN, LOW_UP, LOW_DOWN = (TILE * (ROWS + n) for n in (0, 2, 4, 10, 16, 17))
+REST, WEIGHT, TOTAL = 0, 2 * TILE, 4 * TILE
+# pairs: the roots of Q at the turning points, h and k - h^2 of (S11), l at both poles
+HIGH, LOW, INCLINE, BOW, LINE_UP, LINE_DOWN, ALL = (TILE * (ROWS + n) for n in range(18, 32, 2))
 
 
 @inline
-def ingredients(work, i):
-    """The roots of Q at the turning points, h and k - h^2 of (S11), x and y."""
-    k, near, far = pair(work, K, i), pair(work, Q_HIGH, i), pair(work, Q_LOW, i)
-    high, low = dd.sqrt(near), dd.sqrt(far)
-    g = dd.mul(high, low)
-    above = dd.add(pair(work, MIDDLE, i), g)
-    incline = dd.times(dd.div(dd.mul(k, pair(work, SUM, i)), dd.add(high, low)), 2.0)
-    bend = dd.times(dd.div(dd.mul(k, pair(work, BEND, i)), above), 0.5)
-    return high, low, incline, bend, dd.sqrt(dd.times(above, 0.5)), dd.sqrt(g)
-
-
-@inline
-def parameter(gap, near, far, root_near, incline):
-    """l and Q at the pole."""
-    return dd.add(root_near, dd.mul(incline, near)), dd.div(dd.mul(gap, gap), dd.mul(near, far))
-
-
-@inline
-def enter(work, row, low_row, line, q, x, y, i):
-    ratio, xy = dd.div(y, line), dd.mul(x, y)
-    square = dd.mul(q, dd.mul(ratio, ratio))
-    low = square[0] < xy[0]
-    other = dd.mul(xy, dd.div(xy, square))
-    square = other[0] if low else square[0], other[1] if low else square[1]
-    put(work, row + P, i, dd.sqrt(square))
+def enter(work, row, low_row, over, under, i):
+    """The start of a sum R (S12) for p^2/(x y) = over/under."""
+    low = over[0] < under[0]
+    less = over[0] if low else under[0], over[1] if low else under[1]
+    put(work, row + REST, i, dd.ratio(dd.scaled(less, 2.0), dd.loose(over, under)))
     put(work, row + WEIGHT, i, (1.0, 0.0))
     put(work, row + TOTAL, i, (0.0, 0.0))
     work[low_row + i] = 1.0 if low else 0.0
@@ -64,55 +46,71 @@ def enter(work, row, low_row, line, q, x, y, i):
 
 @inline
 def prepare(work, i):
-    high, low, incline, _bend, x, y = ingredients(work, i)
-    line, q = parameter(pair(work, MINUS, i), pair(work, V_HIGH, i), pair(work, V_LOW, i), high, incline)
-    enter(work, UP, LOW_UP, line, q, x, y, i)
-    line, q = parameter(pair(work, PLUS, i), pair(work, W_LOW, i), pair(work, W_HIGH, i), low, dd.neg(incline))
-    enter(work, DOWN, LOW_DOWN, line, q, x, y, i)
+    k, near, far = pair(work, K, i), pair(work, Q_HIGH, i), pair(work, Q_LOW, i)
+    high, low = dd.positive_root(near), dd.positive_root(far)
+    g = dd.mul(high, low)
+    above = dd.loose(pair(work, MIDDLE, i), g)
+    incline = dd.scaled(dd.ratio(dd.mul(k, pair(work, SUM, i)), dd.loose(high, low)), 2.0)
+    x, y = dd.positive_root(dd.scaled(above, 0.5)), dd.positive_root(g)
+    xy = dd.mul(x, y)
+    gap, v, other = pair(work, MINUS, i), pair(work, V_HIGH, i), pair(work, V_LOW, i)
+    line = dd.loose(high, dd.mul(incline, v))
+    put(work, LINE_UP, i, line)
+    under = dd.mul(dd.mul(dd.mul(v, other), dd.square(line)), xy)
+    enter(work, UP, LOW_UP, dd.mul(dd.square(gap), g), under, i)
+    gap, w, other = pair(work, PLUS, i), pair(work, W_LOW, i), pair(work, W_HIGH, i)
+    line = dd.loose(low, dd.neg(dd.mul(incline, w)))
+    put(work, LINE_DOWN, i, line)
+    under = dd.mul(dd.mul(dd.mul(w, other), dd.square(line)), xy)
+    enter(work, DOWN, LOW_DOWN, dd.mul(dd.square(gap), g), under, i)
     put(work, X, i, x)
     put(work, Y, i, y)
+    put(work, HIGH, i, high)
+    put(work, LOW, i, low)
+    put(work, INCLINE, i, incline)
+    put(work, BOW, i, dd.scaled(dd.ratio(dd.mul(k, pair(work, BEND, i)), above), 0.5))
 
 
 @inline
-def go_on(work, row, low_row, xy, i):
-    """A term of the sum R (S12)."""
-    p, weight, total = pair(work, row + P, i), pair(work, row + WEIGHT, i), pair(work, row + TOTAL, i)
-    size = dd.add(dd.mul(p, p), xy)
-    rest = dd.div(dd.times(xy, 2.0), size)
+def go_on(work, row, low_row, middle, root, i):
+    """A term of the sum R (S12), see `nutation_lanes.take_mean`."""
+    rest, weight, total = pair(work, row + REST, i), pair(work, row + WEIGHT, i), pair(work, row + TOTAL, i)
+    lower, e = dd.neg(rest), dd.shifted(dd.neg(rest), 1.0)
     term = dd.mul(weight, rest)
     low = work[low_row + i] == 1.0
-    put(work, row + TOTAL, i, dd.add(total, (term[0] if low else weight[0], term[1] if low else weight[1])))
-    put(work, row + WEIGHT, i, dd.times(dd.mul(weight, dd.sub((1.0, 0.0), rest)), 0.5))
-    put(work, row + P, i, dd.div(size, dd.times(p, 2.0)))
+    put(work, row + TOTAL, i, dd.loose(total, (term[0] if low else weight[0], term[1] if low else weight[1])))
+    put(work, row + WEIGHT, i, dd.scaled(dd.mul(weight, e), 0.5))
+    part = dd.mul(middle, dd.mul(dd.shifted(lower, 2.0), rest))
+    put(work, row + REST, i, dd.ratio(dd.scaled(part, 2.0), dd.loose(root, part)))
 
 
 @inline
 def take_mean(work, i):
     x, y = pair(work, X, i), pair(work, Y, i)
-    xy = dd.mul(x, y)
-    go_on(work, UP, LOW_UP, xy, i)
-    go_on(work, DOWN, LOW_DOWN, xy, i)
-    put(work, X, i, dd.times(dd.add(x, y), 0.5))
-    put(work, Y, i, dd.sqrt(xy))
+    middle, root = dd.scaled(dd.loose(x, y), 0.5), dd.positive_root(dd.mul(x, y))
+    go_on(work, UP, LOW_UP, middle, root, i)
+    go_on(work, DOWN, LOW_DOWN, middle, root, i)
+    put(work, X, i, middle)
+    put(work, Y, i, root)
 
 
 @inline
-def part(gap, near, far, root_near, root_far, incline, bend, ratio):
+def part(gap, near, far, root_near, root_far, incline, bow, line, ratio):
     """(b -+ a) J/A less pi, times 2/T (S11)."""
-    line, q = parameter(gap, near, far, root_near, incline)
-    level = dd.add(dd.mul(root_far, near), dd.mul(root_near, far))
-    second = dd.times(dd.div(dd.mul(dd.mul(level, bend), ratio), q), 0.25)
-    return dd.mul(dd.div(gap, line), dd.add(incline, second))
+    level = dd.loose(dd.mul(root_far, near), dd.mul(root_near, far))
+    second = dd.scaled(dd.mul(dd.mul(dd.mul(level, bow), ratio), dd.mul(near, far)), 0.25)
+    return dd.ratio(dd.loose(dd.mul(incline, dd.square(gap)), second), dd.mul(gap, line))
 
 
 @inline
 def finish(work, i):
-    high, low, incline, bend, _x, _y = ingredients(work, i)
-    up = part(pair(work, MINUS, i), pair(work, V_HIGH, i), pair(work, V_LOW, i), high, low, incline, bend,
-              pair(work, UP + TOTAL, i))  # fmt: skip
-    down = part(pair(work, PLUS, i), pair(work, W_LOW, i), pair(work, W_HIGH, i), low, high, dd.neg(incline), bend,
-                pair(work, DOWN + TOTAL, i))  # fmt: skip
-    work[FINE_TOTAL + i], work[FINE_DIFFERENCE + i] = 0.5 * dd.add(down, up)[0], 0.5 * dd.sub(down, up)[0]
+    high, low, incline, bow = (pair(work, HIGH, i), pair(work, LOW, i), pair(work, INCLINE, i), pair(work, BOW, i))
+    up = part(pair(work, MINUS, i), pair(work, V_HIGH, i), pair(work, V_LOW, i), high, low, incline, bow,
+              pair(work, LINE_UP, i), pair(work, UP + TOTAL, i))  # fmt: skip
+    down = part(pair(work, PLUS, i), pair(work, W_LOW, i), pair(work, W_HIGH, i), low, high, dd.neg(incline), bow,
+                pair(work, LINE_DOWN, i), pair(work, DOWN + TOTAL, i))  # fmt: skip
+    total, difference = dd.loose(down, up), dd.loose(down, dd.neg(up))
+    work[FINE_TOTAL + i], work[FINE_DIFFERENCE + i] = 0.5 * total[0], 0.5 * difference[0]
     known = (abs(work[UP + WEIGHT + i]) <= LAST * work[UP + TOTAL + i]) & (
         abs(work[DOWN + WEIGHT + i]) <= LAST * work[DOWN + TOTAL + i]
     )
@@ -133,9 +131,14 @@ def go(work):
 
 
 @kernel
+def end(work):
+    for i in range(TILE):
+        finish(work, i)
+
+
+@splice
 def fine(work):
     """Fill the rows FINE of `work` (ALL)."""
     begin(work)
     go(work)
-    for i in range(TILE):
-        finish(work, i)
+    end(work)

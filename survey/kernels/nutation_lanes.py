@@ -19,7 +19,7 @@ GIVEN, OUTPUTS = 7, 12  # rows of numbers given; u_min, u_max, period, precessio
 RIGHT = 0.125 * EPS  # errors of the set-up, relative
 BLUR = 0.01  # the error of a well's width, relative
 WIDE = 0.1  # wells that are wider are no parabolas
-NEAR, LAST = 2e-9, 1e-17  # the last two means, and the last weight of R
+NEAR, LAST = 3e-5, 1e-17  # the last two means, and the last weight of R
 SLANT, CANCELLED = 0.25, 0.01  # as in methods/agm.py
 NODES = 16
 COSINES = np.cos((np.arange(NODES) + 0.5) * pi / NODES)
@@ -31,16 +31,19 @@ K, L, PLUS_POLE, MINUS_POLE, MINUS, PLUS = range(7 * TILE, 19 * TILE, 2 * TILE)
 V_HIGH, W_LOW, V_LOW, W_HIGH, SUM = range(19 * TILE, 29 * TILE, 2 * TILE)
 # pairs: Q at the turning points, s of (S5), 4 q0 - k S^2
 Q_LOW, Q_HIGH, MIDDLE, BEND = range(29 * TILE, 37 * TILE, 2 * TILE)
-# u at the start, turning points, their distance, s + g, L - (k ul uh + q0)/2, 1 where all is right (2: but cancels),
-# number of wells
+# u at the start, turning points, their distance, s + g, L - (k ul uh + q0)/2, 1 where all is right (when all is told 2,
+# or 1 where it cancels), number of wells
 U, LOW, HIGH, WIDTH, ABOVE, LEVEL, GOOD, WELLS = range(37 * TILE, 45 * TILE, TILE)
 X, Y, WEIGHT, SERIES = range(45 * TILE, 49 * TILE, TILE)  # the mean
-UP, DOWN = 49 * TILE, 53 * TILE  # the sums R of both poles: p, weight, total, 1 if complementary
-LINE_UP, POINT_UP, LINE_DOWN, POINT_DOWN = range(57 * TILE, 61 * TILE, TILE)  # l of (S11), the root of P0 of (S13)
+# Both poles: the charts, see `chart`; then the sums R: 1 - e, weight, total, 1 if complementary
+UP, DOWN = 49 * TILE, 54 * TILE
+LINE_UP, LINE_DOWN, INCLINE = range(59 * TILE, 62 * TILE, TILE)  # l of (S11) at the poles, and its slope
 # the sum and the difference of the parts of both poles, with all their digits, and 1 if these are known
-FINE_TOTAL, FINE_DIFFERENCE, FINE = range(61 * TILE, 64 * TILE, TILE)
-BAR_V, BAR_W, ACTION = range(64 * TILE, 67 * TILE, TILE)  # of the first two pairs; (S15), where it is known
-ROWS = 67
+FINE_TOTAL, FINE_DIFFERENCE, FINE = range(62 * TILE, 65 * TILE, TILE)
+BAR_V, BAR_W, ACTION = range(65 * TILE, 68 * TILE, TILE)  # of the first two pairs; (S15), where it is known
+# the roots of Q at the turning points, P at U
+ROOT_LOW, ROOT_HIGH, HERE = range(68 * TILE, 71 * TILE, TILE)
+ROWS = 71
 
 
 @inline
@@ -50,25 +53,42 @@ def laguerre(c0, c1, c2, c3, c4, y):
     first = c1 + y * (2.0 * c2 + y * (3.0 * c3 + y * 4.0 * c4))
     second = 2.0 * c2 + y * (6.0 * c3 + y * 12.0 * c4)
     square = 9.0 * first * first - 12.0 * value * second
-    y -= 4.0 * value / (first + sqrt(square if square > 0.0 else 0.0))
-    return min(max(y, 0.0), 2.0)
+    return y - 4.0 * value / (first + sqrt(square if square > 0.0 else 0.0))
 
 
 @inline
-def polished(c0, c1, c2, c3, c4, y):
-    """A step of Newton's method in double-double towards the root (a pair) near y, and a bound of its error then."""
-    r = dd.add(dd.mul(c4, y), c3)
-    r = dd.add(dd.mul(r, y), c2)
-    r = dd.add(dd.mul(r, y), c1)
-    r = dd.add(dd.mul(r, y), c0)
-    x, a0, a1, a2, a3, a4 = y[0], abs(c0[0]), abs(c1[0]), abs(c2[0]), abs(c3[0]), abs(c4[0])
+def halley(c0, c1, c2, c3, c4, y):
+    """A last step, without a root."""
+    value = c0 + y * (c1 + y * (c2 + y * (c3 + y * c4)))
+    first = c1 + y * (2.0 * c2 + y * (3.0 * c3 + y * 4.0 * c4))
+    second = c2 + y * (3.0 * c3 + y * 6.0 * c4)
+    return y - value * first / (first * first - value * second)
+
+
+@inline
+def residual(c0, c1, c2, c3, c4, y):
+    """c(y) at a float64, by Horner's rule with the error of each operation: to a few UNIT of the sum of |terms|."""
+    s, e = c4
+    for high, low in (c3, c2, c1, c0):
+        p, q = dd.two_prod(s, y)
+        s, r = dd.two_sum(p, high)
+        e = e * y + (q + r + low)
+    return s + e
+
+
+@inline
+def polished(c0, c1, c2, c3, c4, x):
+    """The root near x as a pair, by Newton's step and the second order of its error, and a bound of what is left."""
+    a0, a1, a2, a3, a4 = abs(c0[0]), abs(c1[0]), abs(c2[0]), abs(c3[0]), abs(c4[0])
     size, steep = a0 + x * (a1 + x * (a2 + x * (a3 + x * a4))), a1 + x * (2.0 * a2 + x * (3.0 * a3 + x * 4.0 * a4))
     first = c1[0] + x * (2.0 * c2[0] + x * (3.0 * c3[0] + x * 4.0 * c4[0]))
     second = 2.0 * c2[0] + x * (6.0 * c3[0] + x * 12.0 * c4[0])
-    move = r[0] / first
-    bend = abs(second) + abs(move) * (6.0 * a3 + 36.0 * a4)
-    bar = (2.0 * UNIT * size + abs(move) * (8.0 * EPS * steep + abs(move) * bend)) / abs(first) + 2.0 * UNIT * x
-    return dd.add(y, (-move, 0.0)), bar
+    inverse = 1.0 / first
+    move, size_inverse = residual(c0, c1, c2, c3, c4, x) * inverse, abs(inverse)
+    turn = 0.5 * move * second * inverse
+    rest = 4.0 * turn * turn + size_inverse * (8.0 * EPS * steep + 2.0 * move * move * (a3 + 9.0 * a4))
+    bar = 2.0 * UNIT * (size * size_inverse + x) + abs(move) * rest
+    return dd.quick_two_sum(x, -move * (1.0 + turn)), bar
 
 
 @inline
@@ -82,13 +102,30 @@ def put(work, row, i, value):
 
 
 @inline
-def step(work, i):
-    """A step of Laguerre's method from the poles inwards."""
-    k, level = work[K + i], work[L + i]
-    c2, c3 = -level - 5.0 * k, 4.0 * k
-    minus, plus = work[MINUS + i], work[PLUS + i]
-    work[V_HIGH + i] = laguerre(-minus * minus, 2.0 * work[PLUS_POLE + i], c2, c3, -k, work[V_HIGH + i])
-    work[W_LOW + i] = laguerre(-plus * plus, 2.0 * work[MINUS_POLE + i], c2, c3, -k, work[W_LOW + i])
+def first_step(c0, c1, c2, at):
+    """The root of the parabola where P rises with y, or the pole."""
+    square = c1 * c1 - 4.0 * c0 * c2
+    root = sqrt(square if square > 0.0 else 0.0)
+    y = (-2.0 * c0 if c1 > 0.0 else root - c1) / (c1 + root if c1 > 0.0 else 2.0 * c2)
+    return min(max(y if (c1 > 0.0) | (c2 < 0.0) else -at, -at), 2.0 - at)
+
+
+@inline
+def chart(work, row, at, here, slope, i):
+    """P by a pole's distance less `at`: `at`, P there, its slope, half its curvature; and the place to go on from."""
+    k, u = work[K + i], 1.0 - at
+    bend = (k - work[L + i]) - 6.0 * k * u * u
+    work[row + i], work[row + TILE + i], work[row + 2 * TILE + i], work[row + 3 * TILE + i] = at, here, slope, bend
+    work[row + 4 * TILE + i] = first_step(here, slope, bend, at)
+
+
+@inline
+def step(method, work, row, i):
+    """A step towards a turning point."""
+    at, here, slope, bend = work[row + i], work[row + TILE + i], work[row + 2 * TILE + i], work[row + 3 * TILE + i]
+    k = work[K + i]
+    y = method(here, slope, bend, 4.0 * k * (1.0 - at), -k, work[row + 4 * TILE + i])
+    work[row + 4 * TILE + i] = min(max(y, -at), 2.0 - at)
 
 
 @inline
@@ -97,7 +134,7 @@ def between(c0, c1, c2, c3, c4, work, row, i):
     y, low, high = work[row + i], work[row + TILE + i], work[row + 2 * TILE + i]
     value = c0 + y * (c1 + y * (c2 + y * (c3 + y * c4)))
     low, high = y if value <= 0.0 else low, y if value > 0.0 else high
-    new = laguerre(c0, c1, c2, c3, c4, y)
+    new = min(max(laguerre(c0, c1, c2, c3, c4, y), 0.0), 2.0)
     bad = (not (new > low)) | (not (new < high))
     work[row + i] = 0.5 * (low + high) if bad & (value != 0.0) else new
     work[row + TILE + i], work[row + 2 * TILE + i] = low, high
@@ -115,15 +152,20 @@ def search(work, i):
 
 @inline
 def choose(work, i):
-    """Where there are two wells, the inner turning point of the one that holds U for the outer one of the other."""
+    """Where there are two wells, the inner turning point of the one that holds U for the outer one of the other.
+
+    Where P is even and so the well, to the last bit: the advance that vanishes then does so exactly.
+    """
     k, v, w = work[K + i], work[V_HIGH + i], work[W_LOW + i]
     total, width = w - v, 2.0 - v - w
     bend = 4.0 * (work[L + i] - k) + k * (2.0 * total * total + width * width)
-    two = (k > 0.0) & (bend < 0.0)
+    middle = -0.5 * total
+    two = (k > 0.0) & (bend < 0.0) & (middle > w - 1.0) & (middle < 1.0 - v)
     half = sqrt(-0.25 * bend / k) if two else 0.0
-    upper = work[U + i] > -0.5 * total
+    upper = work[U + i] > middle
     work[V_HIGH + i] = 1.0 + 0.5 * total + half if two & (not upper) else v
-    work[W_LOW + i] = 1.0 - 0.5 * total + half if two & upper else w
+    even = ((work[A + i] == 0.0) | (work[B + i] == 0.0)) & (v < 1.0) & (w < 1.0)
+    work[W_LOW + i] = 1.0 - 0.5 * total + half if two & upper else v if even else w
 
 
 @inline
@@ -157,8 +199,8 @@ def polish(work, i):
     k, minus, plus = pair(work, K, i), pair(work, MINUS, i), pair(work, PLUS, i)
     c2, c3, c4 = dd.neg(dd.add(pair(work, L, i), dd.times(k, 5.0))), dd.times(k, 4.0), dd.neg(k)
     at_plus, at_minus = dd.times(pair(work, PLUS_POLE, i), 2.0), dd.times(pair(work, MINUS_POLE, i), 2.0)
-    v, bar_v = polished(dd.neg(dd.mul(minus, minus)), at_plus, c2, c3, c4, pair(work, V_HIGH, i))
-    w, bar_w = polished(dd.neg(dd.mul(plus, plus)), at_minus, c2, c3, c4, pair(work, W_LOW, i))
+    v, bar_v = polished(dd.neg(dd.mul(minus, minus)), at_plus, c2, c3, c4, work[V_HIGH + i])
+    w, bar_w = polished(dd.neg(dd.mul(plus, plus)), at_minus, c2, c3, c4, work[W_LOW + i])
     put(work, V_HIGH, i, v)
     put(work, W_LOW, i, w)
     work[BAR_V + i], work[BAR_W + i] = bar_v, bar_w
@@ -169,17 +211,19 @@ def settle(work, i):
     """All that the turning points give, with all its digits; GOOD where it is proved to have them."""
     k, level, v, w = pair(work, K, i), pair(work, L, i), pair(work, V_HIGH, i), pair(work, W_LOW, i)
     bar_v, bar_w = work[BAR_V + i], work[BAR_W + i]
-    one, two = (1.0, 0.0), (2.0, 0.0)
-    high, low, total, v_low, w_high = dd.sub(one, v), dd.sub(w, one), dd.sub(w, v), dd.sub(two, w), dd.sub(two, v)
-    width = dd.sub(v_low, v)[0]
-    square, rest, product = dd.mul(total, total), dd.sub(level, k), dd.mul(high, low)
-    near = dd.add(rest, dd.mul(k, dd.add(square, dd.times(dd.mul(high, high), 2.0))))
-    far = dd.add(rest, dd.mul(k, dd.add(square, dd.times(dd.mul(low, low), 2.0))))
-    bow = dd.mul(k, square)
-    middle = dd.add(rest, dd.times(bow, 1.5))
-    bend = dd.add(dd.times(rest, 4.0), dd.sub(dd.times(bow, 3.0), dd.times(dd.mul(k, product), 4.0)))
-    level_rest = dd.sub(level, dd.times(dd.add(rest, bow), 0.5))
-    g = sqrt(near[0]) * sqrt(far[0])
+    high, low = dd.shifted(dd.neg(v), 1.0), dd.shifted(w, -1.0)
+    v_low, w_high, total = dd.shifted(dd.neg(w), 2.0), dd.shifted(dd.neg(v), 2.0), dd.loose(w, dd.neg(v))
+    width = (v_low[0] - v[0]) + (v_low[1] - v[1])
+    rest, bow, double = dd.loose(level, dd.neg(k)), dd.mul(k, dd.square(total)), dd.scaled(k, 2.0)
+    common = dd.loose(rest, bow)
+    near = dd.loose(common, dd.mul(double, dd.square(high)))
+    far = dd.loose(common, dd.mul(double, dd.square(low)))
+    middle = dd.loose(common, dd.scaled(bow, 0.5))
+    bend = dd.loose(common, dd.neg(dd.mul(k, dd.mul(high, low))))
+    bend = dd.loose(dd.scaled(bend, 4.0), dd.neg(bow))
+    level_rest = (level[0] - 0.5 * common[0]) + (level[1] - 0.5 * common[1])
+    root_low, root_high = sqrt(far[0]), sqrt(near[0])
+    g = root_low * root_high
     error = 8.0 * (abs(k[0]) * (bar_v + bar_w) + UNIT * (abs(level[0]) + 8.0 * abs(k[0])))
     smooth = middle[0] >= 0.0
     sure = (error < RIGHT * near[0]) & (error < RIGHT * far[0]) & (bar_v + bar_w < BLUR * width)
@@ -194,7 +238,7 @@ def settle(work, i):
     work[WELLS + i] = 2.0 if two else 1.0
     work[GOOD + i] = 1.0 if sure else 0.0
     work[ABOVE + i] = middle[0] + g if smooth else 0.25 * k[0] * width * width * bend[0] / (g - middle[0])
-    work[LOW + i], work[HIGH + i], work[WIDTH + i], work[LEVEL + i] = low[0], high[0], width, level_rest[0]
+    work[LOW + i], work[HIGH + i], work[WIDTH + i], work[LEVEL + i] = low[0], high[0], width, level_rest
     put(work, V_LOW, i, v_low)
     put(work, W_HIGH, i, w_high)
     put(work, SUM, i, total)
@@ -202,107 +246,106 @@ def settle(work, i):
     put(work, Q_HIGH, i, near)
     put(work, MIDDLE, i, middle)
     put(work, BEND, i, bend)
+    work[ROOT_LOW + i], work[ROOT_HIGH + i] = root_low, root_high
 
 
 @inline
-def parameter(gap, near, far, root_near, root_far, incline, y):
-    """p^2 of the sum R, the line at the pole, and (S13) P0's root if that is used, else 0."""
+def parameter(gap, near, far, q_far, root_near, incline, g, xy):
+    """p^2/(x y) of the sum R as a fraction, of (S13) where that is used, and l at the pole."""
     line = root_near + incline * near
     slanted = line <= SLANT * root_near
-    p = root_far * sqrt(near / far)
-    half = 0.5 * (p + y * y / p)
-    q = gap * gap / (near * far) * (y / line) ** 2
-    return half * half if slanted else q, line, p if slanted else 0.0
+    here, there, across = q_far * near, g * far, near * far * line * line
+    return (here + there) ** 2 if slanted else gap * gap * g, xy * (4.0 * here * far if slanted else across), line
 
 
 @inline
-def enter(work, row, square, x, y, i):
-    """The start of a sum R (S12)."""
-    xy = x * y
-    low = square < xy
-    square = xy * (xy / square) if low else square
-    work[row + i], work[row + TILE + i], work[row + 2 * TILE + i], work[row + 3 * TILE + i] = (
-        sqrt(square),
-        1.0,
-        0.0,
-        1.0 if low else 0.0,
-    )
+def enter(work, row, over, under, i):
+    """The start of a sum R (S12) for p^2/(x y) = over/under: e is odd in its logarithm."""
+    work[row + i], work[row + TILE + i], work[row + 2 * TILE + i] = 2.0 * min(over, under) / (over + under), 1.0, 0.0
+    work[row + 3 * TILE + i] = 1.0 if over < under else 0.0
 
 
 @inline
 def prepare(work, i):
     """The means' start."""
-    root_low, root_high = sqrt(work[Q_LOW + i]), sqrt(work[Q_HIGH + i])
-    x, y = sqrt(0.5 * work[ABOVE + i]), sqrt(root_low * root_high)
+    root_low, root_high = work[ROOT_LOW + i], work[ROOT_HIGH + i]
+    x, g = sqrt(0.5 * work[ABOVE + i]), root_low * root_high
+    y = sqrt(g)
     incline = 2.0 * work[K + i] * work[SUM + i] / (root_low + root_high)
-    square, line, point = parameter(work[MINUS + i], work[V_HIGH + i], work[V_LOW + i], root_high, root_low, incline, y)
-    enter(work, UP, square, x, y, i)
-    work[LINE_UP + i], work[POINT_UP + i] = line, point
-    square, line, point = parameter(work[PLUS + i], work[W_LOW + i], work[W_HIGH + i], root_low, root_high, -incline, y)
-    enter(work, DOWN, square, x, y, i)
-    work[LINE_DOWN + i], work[POINT_DOWN + i] = line, point
-    work[X + i], work[Y + i], work[WEIGHT + i], work[SERIES + i] = x, y, 1.0, 0.0
+    over, under, line = parameter(work[MINUS + i], work[V_HIGH + i], work[V_LOW + i], work[Q_LOW + i], root_high,
+                                  incline, g, x * y)  # fmt: skip
+    enter(work, UP, over, under, i)
+    work[LINE_UP + i] = line
+    over, under, line = parameter(work[PLUS + i], work[W_LOW + i], work[W_HIGH + i], work[Q_HIGH + i], root_low,
+                                  -incline, g, x * y)  # fmt: skip
+    enter(work, DOWN, over, under, i)
+    work[LINE_DOWN + i], work[INCLINE + i] = line, incline
+    work[X + i], work[Y + i], work[SERIES + i] = x, y, 0.0
 
 
 @inline
-def go_on(work, row, xy, root, i):
+def whole(work, row, i):
+    """The sum R with one more term, and the size of what is left out."""
+    rest, weight = work[row + i], work[row + TILE + i]
+    total = work[row + 2 * TILE + i] + (weight * rest if work[row + 3 * TILE + i] == 1.0 else weight)
+    return total, abs(0.5 * weight * (1.0 - rest))
+
+
+@inline
+def go_on(work, row, i):
     """A term of the sum R."""
-    p = work[row + i]
-    size = p * p + xy
-    inverse = 1.0 / size
-    e = (p - root) * (p + root) * inverse
-    work[row + 2 * TILE + i] += work[row + TILE + i] * (2.0 * xy * inverse if work[row + 3 * TILE + i] == 1.0 else 1.0)
-    work[row + TILE + i] *= 0.5 * e
-    work[row + i] = 0.5 * size / p
+    rest, weight = work[row + i], work[row + TILE + i]
+    work[row + 2 * TILE + i] += weight * rest if work[row + 3 * TILE + i] == 1.0 else weight
+    work[row + TILE + i] = 0.5 * weight * (1.0 - rest)
+    return (2.0 - rest) * rest
 
 
 @inline
-def take_mean(work, i):
+def take_mean(work, weight, i):
+    """A step of the mean; e of both sums: with r = (1 - e^2) (x + y)/(2 sqrt(x y)) the next is (1 - r)/(1 + r)."""
     x, y = work[X + i], work[Y + i]
-    xy = x * y
-    root = sqrt(xy)
-    go_on(work, UP, xy, root, i)
-    go_on(work, DOWN, xy, root, i)
-    c, weight = 0.5 * (x - y), 2.0 * work[WEIGHT + i]
+    middle, root = 0.5 * (x + y), sqrt(x * y)
+    up, down = middle * go_on(work, UP, i), middle * go_on(work, DOWN, i)
+    above, below = root + up, root + down
+    inverse = 2.0 / (above * below)
+    work[UP + i], work[DOWN + i] = up * below * inverse, down * above * inverse
+    c = x - y
     work[SERIES + i] += weight * c * c
-    work[X + i], work[Y + i], work[WEIGHT + i] = 0.5 * (x + y), root, weight
+    work[X + i], work[Y + i] = middle, root
 
 
 @inline
-def advance(gap, near, far, width, root_near, root_far, incline, bend, period, line, p, ratio, g):
+def advance(gap, near, far, q_far, width, root_near, root_far, incline, bend, period, line, ratio):
     """As in methods/agm.py: whole multiples of pi, the rest, and the size of its terms."""
-    direct = 0.5 * gap * period / far * (1.0 + 0.5 * width * (1.0 + 0.5 * (p * p - g) / (p * p + g) * ratio) / near)
-    q = gap * gap / (near * far)
-    second = 0.25 * (root_far * near + root_near * far) * bend * ratio / q
-    part = 0.5 * gap * period / line
-    slanted = p > 0.0
-    value = direct if slanted else part * (incline + second)
-    return (
-        0.0 if slanted else copysign(1.0, gap),
-        value,
-        abs(value) if slanted else abs(part) * (abs(incline) + abs(second)),
-    )
+    slanted = line <= SLANT * root_near
+    here, there = q_far * near, root_near * root_far * far
+    both = here + there
+    direct = near * both + 0.5 * width * (both + 0.5 * (here - there) * ratio)
+    first, second = incline * gap * gap, 0.25 * (root_far * near + root_near * far) * bend * ratio * near * far
+    part = 0.5 * period / (far * near * both if slanted else gap * line)
+    value = part * (gap * direct if slanted else first + second)
+    size = abs(value) if slanted else abs(part) * (abs(first) + abs(second))
+    return 0.0 if slanted else copysign(1.0, gap), value, size
 
 
 @inline
 def finish(work, size, drift, i, told):
     """told = values and bars, of a well of a body with A = `size`; False where they are left to the other kernels."""
-    middle = 0.5 * (work[X + i] + work[Y + i])
-    period = 2.0 * pi / middle
-    root_low, root_high, width = sqrt(work[Q_LOW + i]), sqrt(work[Q_HIGH + i]), work[WIDTH + i]
-    incline, g = 2.0 * work[K + i] * work[SUM + i] / (root_low + root_high), root_low * root_high
-    bend = 0.5 * work[K + i] * work[BEND + i] / work[ABOVE + i]
+    middle, apart = 0.5 * (work[X + i] + work[Y + i]), 0.5 * (work[X + i] - work[Y + i])
+    period = 2.0 * pi / (middle - 0.25 * apart * apart / middle)  # the next mean, but for the fourth order
+    root_low, root_high, width = work[ROOT_LOW + i], work[ROOT_HIGH + i], work[WIDTH + i]
+    incline, bend = work[INCLINE + i], 0.5 * work[K + i] * work[BEND + i] / work[ABOVE + i]
     minus, plus = work[MINUS + i], work[PLUS + i]
-    line, point, ratio = work[LINE_UP + i], work[POINT_UP + i], work[UP + 2 * TILE + i]
-    turns_up, up, size_up = advance(minus, work[V_HIGH + i], work[V_LOW + i], width, root_high, root_low, incline, bend,
-                                    period, line, point, ratio, g)  # fmt: skip
-    line, point, ratio = work[LINE_DOWN + i], work[POINT_DOWN + i], work[DOWN + 2 * TILE + i]
-    turns_down, down, size_down = advance(plus, work[W_LOW + i], work[W_HIGH + i], width, root_low, root_high, -incline,
-                                          bend, period, line, point, ratio, g)  # fmt: skip
+    (ratio_up, last_up), (ratio_down, last_down) = whole(work, UP, i), whole(work, DOWN, i)
+    turns_up, up, size_up = advance(minus, work[V_HIGH + i], work[V_LOW + i], work[Q_LOW + i], width, root_high,
+                                    root_low, incline, bend, period, work[LINE_UP + i],
+                                    ratio_up)  # fmt: skip
+    turns_down, down, size_down = advance(plus, work[W_LOW + i], work[W_HIGH + i], work[Q_HIGH + i], width, root_low,
+                                          root_high, -incline, bend, period, work[LINE_DOWN + i],
+                                          ratio_down)  # fmt: skip
     total, difference, rough = down + up, down - up, size_up + size_down
-    sure = (work[GOOD + i] == 1.0) & (abs(work[X + i] - work[Y + i]) <= NEAR * middle)
-    sure &= abs(work[UP + TILE + i]) <= LAST * work[UP + 2 * TILE + i]
-    sure &= abs(work[DOWN + TILE + i]) <= LAST * work[DOWN + 2 * TILE + i]
+    sure = (work[GOOD + i] == 1.0) & (abs(apart) <= 0.5 * NEAR * middle)
+    sure &= (last_up <= LAST * ratio_up) & (last_down <= LAST * ratio_down)
     bare = abs(total) if turns_up + turns_down == 0.0 else abs(difference)  # without multiples of pi
     cancelled = (bare < CANCELLED * rough) & (turns_up * turns_down != 0.0) & (work[MIDDLE + i] > 0.0)
     fine = work[FINE + i] == 1.0
@@ -314,7 +357,7 @@ def finish(work, size, drift, i, told):
     precession, spin = pi * (turns_down + turns_up) + total, pi * (turns_down - turns_up) + difference
     error_precession = error + rounding * abs(total) + turned * abs(turns_down + turns_up)
     error_spin = error + rounding * abs(difference) + turned * abs(turns_down - turns_up)
-    rest = 0.5 * (0.5 * work[ABOVE + i] - work[SERIES + i])
+    rest = 0.5 * (0.5 * work[ABOVE + i] - (work[SERIES + i] + 2.0 * work[WEIGHT + i] * apart * apart))
     up, down = minus * (pi * turns_up + up), plus * (pi * turns_down + down)
     action = (period * (work[LEVEL + i] + rest) - up - down) / (2.0 * pi)
     rough = period * (abs(work[LEVEL + i]) + abs(rest))
@@ -333,7 +376,7 @@ def finish(work, size, drift, i, told):
     told[7 * TILE + i] = work[BAR_V + i] + EPS * abs(work[HIGH + i])
     told[8 * TILE + i], told[9 * TILE + i], told[11 * TILE + i] = error_period, error_precession, error_action
     told[10 * TILE + i] = error_spin + 23.0 * EPS * abs(turned) + EPS * abs(spin + turned)
-    work[GOOD + i] = 0.0 if not sure else 2.0 if cancelled & (not fine) else 1.0
+    work[GOOD + i] = 0.0 if not sure else 1.0 if cancelled & (not fine) else 2.0
 
 
 @inline
@@ -375,14 +418,35 @@ def begin(work, i, v, w):
 
 
 @kernel
-def approach(work, steps):
-    """From the polynomial to the turning points, in float64."""
+def inside(work):
+    """The start from U, between the turning points, where P is HERE: nearly there at once if they nearly coincide."""
     for i in range(TILE):
-        begin(work, i, 0.0, 0.0)
+        k, u, here = work[K + i], work[U + i], work[HERE + i]
+        slope = 2.0 * (work[A + i] * work[B + i] + u * (k * (1.0 - 2.0 * u * u) - work[L + i]))
+        chart(work, UP, 1.0 - u, here, -slope, i)
+        chart(work, DOWN, 1.0 + u, here, slope, i)
+
+
+@kernel
+def poles(work):
+    """The start from the poles."""
+    for i in range(TILE):
+        minus, plus = work[MINUS + i], work[PLUS + i]
+        chart(work, UP, 0.0, -minus * minus, 2.0 * work[PLUS_POLE + i], i)
+        chart(work, DOWN, 0.0, -plus * plus, 2.0 * work[MINUS_POLE + i], i)
+
+
+@kernel
+def approach(work, steps):
+    """From the polynomial about the start to the turning points, in float64."""
     for _ in range(steps):
         for i in range(TILE):
-            step(work, i)
+            step(laguerre, work, UP, i)
+            step(laguerre, work, DOWN, i)
     for i in range(TILE):
+        step(halley, work, UP, i)
+        step(halley, work, DOWN, i)
+        begin(work, i, work[UP + i] + work[UP + 4 * TILE + i], work[DOWN + i] + work[DOWN + 4 * TILE + i])
         choose(work, i)
 
 
@@ -417,6 +481,9 @@ def wells(work, steps):
 def means(work, number):
     for i in range(TILE):
         prepare(work, i)
+        work[WEIGHT + i] = 2.0**number
+    weight = 0.5
     for _ in range(number):
         for i in range(TILE):
-            take_mean(work, i)
+            take_mean(work, weight, i)
+        weight *= 2.0

@@ -5,7 +5,7 @@ from math import factorial
 
 import numpy as np
 
-from survey.kernels.double import add, mul, neg, times, two_prod
+from survey.kernels.double import loose, mul, neg, quick_two_sum, times, two_prod
 from survey.kernels.jit import inline
 
 GRID = 16.0
@@ -30,7 +30,14 @@ def _row(x):
 _TABLE = np.array([_row(Fraction(j, int(GRID))) for j in range(int(LARGEST * GRID) + 2)])
 # 1/n!, whose sign alternates in pairs
 _S3, _S5, _S7 = (_pair(Fraction((-1) ** (n // 2), factorial(n))) for n in (3, 5, 7))
-_C4, _C6, _C8 = (_pair(Fraction((-1) ** (n // 2), factorial(n))) for n in (4, 6, 8))
+_C4, _C6 = (_pair(Fraction((-1) ** (n // 2), factorial(n))) for n in (4, 6))
+
+
+@inline
+def _small(a, b):
+    """a + b, where |b| is less than |a|."""
+    s, e = quick_two_sum(a[0], b[0])
+    return quick_two_sum(s, e + (a[1] + b[1]))
 
 
 @inline
@@ -40,11 +47,11 @@ def sin_cos(x):
     r = x - j / GRID  # exact
     z = two_prod(r, r)
     y = z[0]
-    s = add(_S7, (y * (1 / 362880.0 - y * (1 / 39916800.0 - y / 6227020800.0)), 0.0))
-    s = mul(z, add(_S3, mul(z, add(_S5, mul(z, s)))))
-    s = add((r, 0.0), times(s, r))
-    c = add(_C8, (-y * (1 / 3628800.0 - y / 479001600.0), 0.0))
-    c = mul(z, add((-0.5, 0.0), mul(z, add(_C4, mul(z, add(_C6, mul(z, c)))))))  # cos r - 1
+    s = _small(_S7, (y * (1 / 362880.0 - y * (1 / 39916800.0 - y * (1 / 6227020800.0))), 0.0))
+    s = mul(z, _small(_S3, mul(z, _small(_S5, mul(z, s)))))
+    s = _small((r, 0.0), times(s, r))
+    c = _small(_C6, (y * (1 / 40320.0 - y * (1 / 3628800.0 - y * (1 / 479001600.0))), 0.0))
+    c = mul(z, _small((-0.5, 0.0), mul(z, _small(_C4, mul(z, c)))))  # cos r - 1
     sine, cosine = (_TABLE[j, 0], _TABLE[j, 1]), (_TABLE[j, 2], _TABLE[j, 3])
-    whole_sine = add(sine, add(mul(cosine, s), mul(sine, c)))
-    return whole_sine, add(cosine, add(mul(cosine, c), neg(mul(sine, s))))
+    whole_sine = loose(sine, loose(mul(cosine, s), mul(sine, c)))
+    return whole_sine, loose(cosine, loose(mul(cosine, c), neg(mul(sine, s))))

@@ -42,16 +42,7 @@ def in_lanes(kernel, points, actions):
     """
     n = points.shape[1]
     out, wells, done = np.empty((2 * len(NAMES), n)), np.empty(n), np.empty(n)
-    for steps in (brun_lanes.FEW, brun_lanes.MORE):
-        for state, exactly in ((brun_lanes.LEFT, False), (brun_lanes.CANCELLED, True)):
-            if steps == brun_lanes.FEW and not exactly:
-                kernel(points, steps, exactly, actions, out, wells, done)
-                continue
-            again = np.flatnonzero(done == state)
-            if again.size:
-                part = np.empty((len(out), again.size)), np.empty(again.size), np.empty(again.size)
-                kernel(np.ascontiguousarray(points[:, again]), steps, exactly, actions, *part)
-                out[:, again], wells[again], done[again] = part
+    kernel(points, actions, out, wells, done)
     return out, wells, done == brun_lanes.DONE
 
 

@@ -21,14 +21,24 @@ class Rows:
         axis -= len(self.shape) - np.ndim(array)
         return np.shape(array)[axis] if axis >= 0 else 1
 
+    def columns(self, arrays):
+        """`per_row` of several arrays, (arrays, rows)."""
+        found = np.empty((len(arrays), self.rows))
+        for column, array in zip(found, arrays, strict=True):
+            column[:] = self._whole(array)[:, 0]
+        return found
+
     def per_row(self, array):
         """One value per row, of an array that is constant along the lanes."""
         return np.ascontiguousarray(self.per_point(array)[:, 0])
 
     def per_point(self, array):
         """All values, as (rows, lanes), contiguous float64; a copy, as a read-only view would be compiled for anew."""
+        return np.array(self._whole(array), order="C")
+
+    def _whole(self, array):
         whole = np.broadcast_to(np.asarray(array, dtype=float), self.shape).transpose(self.order)
-        return np.array(whole.reshape(self.rows, self.lanes), order="C")
+        return whole.reshape(self.rows, self.lanes)
 
     def back(self, array):
         """(rows, lanes), or (rows, 1), in the block's shape."""

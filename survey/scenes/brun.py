@@ -135,8 +135,8 @@ def solve(point, request):
     method = load(methods, "agm" if request.method == "auto" else request.method, "method")
     shared = {p.name: point[p.name] for p in PARAMETERS if p.name in point and p.name != "t"}
     block = Rows(tuple(shared.values()), *([point["t"]] if "t" in point else []))
-    given = {name: block.per_row(values) for name, values in shared.items()}
-    valid = np.logical_and.reduce([np.isfinite(values) for values in given.values()])
+    columns = block.columns(shared.values())
+    given, valid = dict(zip(shared, columns, strict=True)), np.isfinite(columns).all(axis=0)
     wanted = request.variables or {"action", "separatrix_distance"}
     if "l" in given:
         sign = int(request.options["sign"])
@@ -146,7 +146,7 @@ def solve(point, request):
         times = block.per_point(point["t"]) if "t" in point else None
         valid &= given["C"] <= 2.0 * given["A"]
         slowly = partial(_state, method=method, rtol=request.rtol, times=times)
-        out = _state_in_lanes(given, valid, slowly, wanted) if auto else slowly(given, valid)
+        out = _state_in_lanes(given, columns, valid, slowly, wanted) if auto else slowly(given, valid)
     out |= nutation.rates(out, request.variables)
     return {name: _back(block, values) for name, values in out.items()}
 
@@ -158,8 +158,7 @@ def _back(block, values):
     return block.back(values.reshape(block.rows, -1))
 
 
-def _state_in_lanes(given, valid, slowly, wanted):
-    columns = np.stack([given[p.name] for p in PARAMETERS[:7]])
+def _state_in_lanes(given, columns, valid, slowly, wanted):
     values, wells, done = nutation.in_lanes(brun_lanes.of_states, columns, "action" in wanted)
     out = nutation.named(values) | {"wells": wells.astype(np.int64)}
     if "separatrix_distance" in wanted:

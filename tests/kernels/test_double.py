@@ -26,6 +26,11 @@ def all_of(x, y, out):
     positive = a if x[0] > 0.0 else dd.neg(a)
     out[8, 0], out[8, 1] = dd.sqrt(positive)
     out[9, 0], out[9, 1] = dd.mean(positive, b if y[0] > 0.0 else dd.neg(b))
+    out[10, 0], out[10, 1] = dd.shifted(a, y[0])
+    out[11, 0], out[11, 1] = dd.square(a)
+    out[12, 0], out[12, 1] = dd.ratio(a, b)
+    out[13, 0], out[13, 1] = dd.positive_root(positive)
+    out[14, 0], out[14, 1] = dd.loose(a, b)
 
 
 split = inline(dd.split_error)
@@ -41,7 +46,7 @@ def exact(x, y):
     a, b = mpf(x[0]) + mpf(x[1]), mpf(y[0]) + mpf(y[1])
     first, second = mpf(x[0]), mpf(y[0])
     return [first + second, first * second, a + b, a - b, a * b, a * second, a / second, a / b, mp.sqrt(abs(a)),
-            mp.agm(abs(a), abs(b))]  # fmt: skip
+            mp.agm(abs(a), abs(b)), a + second, a * a, a / b, mp.sqrt(abs(a)), a + b]  # fmt: skip
 
 
 def value(pair):
@@ -49,13 +54,14 @@ def value(pair):
 
 
 def check(x, y):
-    out = np.empty((10, 2))
+    out = np.empty((15, 2))
     all_of(np.array(x), np.array(y), out)
     with mp.workdps(80):
         wanted = exact(x, y)
         assert value(out[0]) == wanted[0] and value(out[1]) == wanted[1]
         for i, (pair, number) in enumerate(zip(out[2:], wanted[2:], strict=True)):
-            assert abs(value(pair) - number) <= (8 if i == 7 else 4) * dd.UNIT * abs(number), i
+            size = abs(number) if i < 12 else abs(value(x)) + abs(value(y))  # the last one may cancel
+            assert abs(value(pair) - number) <= (8 if i == 7 else 4) * dd.UNIT * size, i
             assert pair[0] == pair[0] + pair[1], i
 
 
