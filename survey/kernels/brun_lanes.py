@@ -7,7 +7,7 @@ wells and 1 for the upper one, C/A, nothing, b, a.
 import numpy as np
 
 from survey.kernels import double as dd
-from survey.kernels import nutation_fine
+from survey.kernels import nutation_action, nutation_fine
 from survey.kernels import nutation_lanes as nl
 from survey.kernels.brun import of_state
 from survey.kernels.jit import inline, kernel, splice
@@ -103,6 +103,8 @@ def answer(polynomials, tell, points, steps, exactly, actions, out, wells, done)
         polynomials(work)
         solve(work, steps, exactly, actions)
         tell(work, told)
+        if actions:
+            nutation_action.mend(work, told)
         leave(work, told, first, out, wells, done)
 
 

@@ -15,9 +15,9 @@ from survey.kernels.quartic import ROUGH, UNIT, root, roughly, slope, slopes, va
 LOW, HIGH, LOW_PLUS, LOW_MINUS, HIGH_PLUS, HIGH_MINUS, WIDTH, SUM = range(8)
 Q_LOW, Q_HIGH, Q_PLUS, Q_MINUS, BEND, MIDDLE = range(8, 14)  # BEND: 4 q0 - k S^2; MIDDLE: s of (S5)
 K, L, MINUS, PLUS, LEVEL = range(14, 19)  # k, L, b - a, b + a, L - (k ul uh + q0)/2
-# of the turning points and, relative, of Q, BEND and WIDTH
-BAR_LOW, BAR_HIGH, NOISE_LOW, NOISE_HIGH, NOISE_BEND, NOISE_WIDTH = range(19, 25)
-REST = 25  # from here on what float64 leaves of each number
+# of the turning points and, relative, of Q, s + g of (S5), WIDTH and the distances from the poles
+BAR_LOW, BAR_HIGH, NOISE_LOW, NOISE_HIGH, NOISE_ABOVE, NOISE_WIDTH, NOISE_ENDS = range(19, 26)
+REST = 26  # from here on what float64 leaves of each number
 SIZE = 2 * REST
 # kinds of wells
 NONE, LOST, SEPARATRIX, NUTATION, PRECESSION, PASSAGE = -2, -1, 0, 1, 2, 3
@@ -212,7 +212,8 @@ def fill(gaps, k, level, ats, equatorial, right, left, row):
     direct(k, dd.sub(level, k), square, ul, bar, row, Q_LOW, NOISE_LOW)
     beside_saddle(equatorial, uh, bar_v, -1.0, row, Q_HIGH, NOISE_HIGH)
     beside_saddle(equatorial, ul, bar_w, 1.0, row, Q_LOW, NOISE_LOW)
-    row[NOISE_BEND] = 8.0 * (moved + UNIT * (abs(level[0]) + abs(k[0]))) / max(abs(row[BEND]), TINY)
+    row[NOISE_ENDS] = max(bar_v / max(v[0], TINY), bar_w / max(w[0], TINY), bar_v / wh[0], bar_w / vl[0])
+    row[NOISE_ABOVE] = noise_above(row, 8.0 * (moved + UNIT * (abs(level[0]) + abs(k[0]))))
 
 
 @inline
@@ -261,6 +262,14 @@ def above(row, g):
     """s + g of (S5), whose terms cancel where the motion nearly stops between its turning points."""
     s = row[MIDDLE]
     return s + g if s >= 0.0 else 0.25 * row[K] * row[WIDTH] ** 2 * row[BEND] / (g - s)
+
+
+@inline
+def noise_above(row, bar):
+    """The relative error of `above`, `bar` that of s and of BEND, besides 8 roundings."""
+    s, g = row[MIDDLE], sqrt(row[Q_LOW]) * sqrt(row[Q_HIGH])
+    noise = (bar + 0.5 * (row[NOISE_LOW] + row[NOISE_HIGH]) * g) / max(abs(s) + g, TINY)
+    return noise if s >= 0.0 else noise + bar / max(abs(row[BEND]), TINY) + 2.0 * row[NOISE_WIDTH]
 
 
 @kernel

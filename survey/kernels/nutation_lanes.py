@@ -358,7 +358,7 @@ def judge(work, i):
 
 @kernel
 def small_actions(work):
-    """Fill the row ACTION by Gauss-Chebyshev quadrature, see methods/agm.py."""
+    """Fill the row ACTION by Gauss-Chebyshev quadrature, see `nutation_action.small`."""
     for j in range(NODES):
         for i in range(TILE):
             add_node(work, COSINES[j], i)

@@ -2,25 +2,22 @@
 
 Domain: every motion between turning points; near separatrices and poles too. Bars are a few roundings.
 
-Source: DLMF 19.8(i), 19.22(ii); formulas (S5), (S10)-(S14) of `scenes/brun.md`.
+Source: DLMF 19.8(i), 19.22(ii); formulas (S5), (S10)-(S14), (S22) of `scenes/brun.md`.
 """
 
 from math import copysign, pi, sqrt
-
-import numpy as np
 
 from survey.kernels import double as dd
 from survey.kernels import nutation as nu
 from survey.kernels.elliptic import jacobi
 from survey.kernels.jit import inline, kernel
+from survey.kernels.nutation_action import ROUGH, action
 from survey.kernels.nutation_time import motion
 from survey.kernels.third_kind import mean, third, third_double
 
 ORDER = 0  # no steps
 SERVES = ("nutation",)
 EPS = nu.EPS
-NODES = 16
-_COSINES = np.cos((np.arange(NODES) + 0.5) * pi / NODES)
 CANCELLED = 0.01  # advances that are a smaller part of their terms are computed in double-double
 FINE = 2.0**-94
 SLANT = 0.25  # where the line through the roots of Q is lower at the pole, relative, pi is not split off
@@ -77,29 +74,6 @@ def fine_parts(row):
     return dd.add(down, up)[0] * (pi / middle[0]), dd.sub(down, up)[0] * (pi / middle[0])
 
 
-@kernel
-def smooth_action(row, root_low, root_high):
-    """The action by Gauss-Chebyshev quadrature, or -1 where singularities are too near for its few nodes."""
-    k, width, total, bend = row[nu.K], row[nu.WIDTH], row[nu.SUM], row[nu.BEND]
-    if width == 0.0:
-        return 0.0
-    if min(row[nu.HIGH_PLUS], row[nu.LOW_MINUS]) < 0.5 * width:
-        return -1.0
-    if k * bend < 0.0:
-        far = abs(sqrt(-0.25 * bend / k) - abs(total))
-    else:
-        far = sqrt(total * total + 0.25 * bend / k) if k != 0.0 else 2.0
-    if far < 1.1 * width:
-        return -1.0
-    low, high, result = root_low * root_low, root_high * root_high, 0.0
-    for i in range(NODES):
-        up, down = 0.5 * (1.0 + _COSINES[i]), 0.5 * (1.0 - _COSINES[i])
-        q = low * down + high * up - k * width * width * up * down
-        rest = (row[nu.LOW_PLUS] * down + row[nu.HIGH_PLUS] * up) * (row[nu.LOW_MINUS] * down + row[nu.HIGH_MINUS] * up)
-        result += up * down * sqrt(q) / rest
-    return width * width * result / NODES
-
-
 @inline
 def periods_of(row, out):
     """T / A, the precession, the spin less a (1/C - 1/A) T, the action, and their bars; of one well."""
@@ -117,7 +91,7 @@ def periods_of(row, out):
     turns_down, down, size_down = advance(
         *minus, width, root_low, root_high, -incline, row[nu.Q_MINUS], bend, period, x, y
     )
-    noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + (row[nu.NOISE_BEND] if row[nu.MIDDLE] < 0.0 else 0.0)
+    noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + (row[nu.NOISE_ABOVE] if row[nu.MIDDLE] < 0.0 else 0.0)
     out[0], out[4] = period, (12.0 * EPS + noise) * period
     total, difference, size = down + up, down - up, size_up + size_down
     error, rounding = (24.0 * EPS + 4.0 * noise) * size, 2.0 * EPS
@@ -135,10 +109,8 @@ def periods_of(row, out):
     size = period * (abs(row[nu.LEVEL]) + abs(rest))
     size += abs(row[nu.MINUS]) * (pi + size_up) + abs(row[nu.PLUS]) * (pi + size_down)
     out[7] = (24.0 * EPS + 4.0 * noise) * size / (2.0 * pi)
-    if out[7] > 1e-14 * abs(out[3]):
-        action = smooth_action(row, root_low, root_high)
-        if action >= 0.0:
-            out[3], out[7] = action, (64.0 * EPS + noise + 2.5 * row[nu.NOISE_WIDTH]) * action
+    if out[7] > ROUGH * abs(out[3]):
+        out[3], out[7] = action(row)
 
 
 @kernel

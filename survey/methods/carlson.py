@@ -2,7 +2,7 @@
 
 Domain: every motion between turning points. Precessions that nearly cancel keep an absolute accuracy only.
 
-Source: B. C. Carlson, Numer. Algorithms 10 (1995) 13-26; formulas (S5), (S6), (S15) of `scenes/brun.md`.
+Source: B. C. Carlson, Numer. Algorithms 10 (1995) 13-26; formulas (S5), (S6), (S14), (S22) of `scenes/brun.md`.
 """
 
 from math import cos, hypot, pi, sin, sqrt
@@ -10,6 +10,7 @@ from math import cos, hypot, pi, sin, sqrt
 from survey.kernels import nutation as nu
 from survey.kernels.carlson import rf, rj
 from survey.kernels.jit import inline, kernel
+from survey.kernels.nutation_action import ROUGH, action
 from survey.kernels.nutation_time import first_kind, motion
 
 ORDER = 0  # no steps
@@ -51,6 +52,8 @@ def periods_of(row, out):
     parts = out[0] * row[nu.LEVEL], 4.0 * square, row[nu.MINUS] * up, row[nu.PLUS] * down
     out[3] = (parts[0] + parts[1] - parts[2] - parts[3]) / (2.0 * pi)
     out[7] = (48.0 * EPS + 4.0 * noise) * (abs(parts[0]) + parts[1] + abs(parts[2]) + abs(parts[3])) / (2.0 * pi)
+    if out[7] > ROUGH * abs(out[3]):
+        out[3], out[7] = action(row)
 
 
 @kernel
