@@ -5,7 +5,7 @@ Domain: every motion between turning points; near separatrices and poles too. Ba
 Source: DLMF 19.8(i), 19.22(ii); formulas (S5), (S10)-(S14), (S22) of `scenes/brun.md`.
 """
 
-from math import copysign, pi, sqrt
+from math import copysign, log, pi, sqrt
 
 from survey.kernels import double as dd
 from survey.kernels import nutation as nu
@@ -75,6 +75,21 @@ def fine_parts(row):
 
 
 @inline
+def shares(x, y):
+    """What part of relative changes of x and of y, at most, their mean changes by (S23)."""
+    least = 1.0 / log(4.0 * max(x, y) / min(x, y))
+    return (least, 1.0) if x < y else (1.0, least)
+
+
+@inline
+def blurred(advance, ends, noise_far, noise_near, noise_above, share):
+    """What errors of Q at the turning points and of s + g make of an advance (S23); ends: its b -+ a, near, far."""
+    _gap, near, far = ends
+    beside = min(0.5, 0.5 * share[1] * far / near) if near > 0.0 else 0.5
+    return abs(advance) * (share[0] * noise_above + share[1] * noise_far + beside * noise_near)
+
+
+@inline
 def periods_of(row, out):
     """T / A, the precession, the spin less a (1/C - 1/A) T, the action, and their bars; of one well."""
     root_low, root_high = sqrt(row[nu.Q_LOW]), sqrt(row[nu.Q_HIGH])
@@ -91,14 +106,19 @@ def periods_of(row, out):
     turns_down, down, size_down = advance(
         *minus, width, root_low, root_high, -incline, row[nu.Q_MINUS], bend, period, x, y
     )
-    noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + (row[nu.NOISE_ABOVE] if row[nu.MIDDLE] < 0.0 else 0.0)
-    out[0], out[4] = period, (12.0 * EPS + noise) * period
+    low, high = row[nu.NOISE_LOW], row[nu.NOISE_HIGH]
+    noise, share = low + high + (row[nu.NOISE_ABOVE] if row[nu.MIDDLE] < 0.0 else 0.0), shares(x, y)
+    out[0] = period
+    out[4] = (12.0 * EPS + 0.5 * share[0] * row[nu.NOISE_ABOVE] + 0.25 * share[1] * (low + high)) * period
     total, difference, size = down + up, down - up, size_up + size_down
-    error, rounding = (24.0 * EPS + 4.0 * noise) * size, 2.0 * EPS
+    blur = blurred(pi * turns_up + up, plus, low, high, row[nu.NOISE_ABOVE], share)
+    blur += blurred(pi * turns_down + down, minus, high, low, row[nu.NOISE_ABOVE], share)
+    blur = min(4.0 * noise * size, blur)
+    error, rounding = 24.0 * EPS * size + blur, 2.0 * EPS
     bare = abs(total) if turns_up + turns_down == 0.0 else abs(difference)  # without multiples of pi
     if bare < CANCELLED * size and turns_up * turns_down != 0.0 and row[nu.MIDDLE] > 0.0:
         total, difference = fine_parts(row)
-        error, rounding = (FINE + 4.0 * noise) * size, 12.0 * EPS
+        error, rounding = FINE * size + blur, 12.0 * EPS
     out[1], out[2] = pi * (turns_down + turns_up) + total, pi * (turns_down - turns_up) + difference
     turned = 2.0 * EPS * pi
     out[5] = error + rounding * abs(total) + turned * abs(turns_down + turns_up)
