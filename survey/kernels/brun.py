@@ -27,6 +27,7 @@ from survey.kernels.nutation import (
     about_equator,
     barrier,
     find,
+    looseness,
 )
 from survey.kernels.sines import sin_cos
 
@@ -98,7 +99,8 @@ def of_states(points, rows, kinds, count, heights, starts):
         if not inside:
             kinds[i] = LOST
             continue
-        heights[i, 0], heights[i, 1] = find(a, b, k, level, at_plus, at_minus, both, two)
+        rough = abs(level[0]) + 2.0 * abs(k[0]) * u * u
+        heights[i, 0], heights[i, 1] = find(a, b, k, level, at_plus, at_minus, rough, both, two)
         heights[i, 2] = abs(k[0])
         place = 1 if two[1] != NONE and u > 0.5 * (both[0, HIGH] + both[1, LOW]) else 0
         count[i] = (two[0] != NONE) + (two[1] != NONE) if two[0] != SEPARATRIX else -1
@@ -119,7 +121,7 @@ def of_integrals(points, sign, rows, kinds, heights):
         high = dd.two_sum(level, sign)
         pair = level, 0.0
         heights[i, 0], heights[i, 1] = find(
-            a, b, k, pair, dd.sub(high, product), dd.add(high, product), rows[i], kinds[i]
+            a, b, k, pair, dd.sub(high, product), dd.add(high, product), 0.0, rows[i], kinds[i]
         )
         heights[i, 2] = 1.0
 
@@ -129,10 +131,11 @@ def heights_of_states(points, heights):
     """Fill `heights` (n, 3) as `of_states`, for points in columns (7, n)."""
     for i in range(len(heights)):
         b, a = points[5, i], points[6, i]
-        k, level, at_plus, at_minus, _u, _inside = of_state(
+        k, level, at_plus, at_minus, u, _inside = of_state(
             points[0, i], points[1, i], points[2, i], points[3, i], points[4, i], b, a
         )
-        found = barrier(a, b, k, about_equator(a, b, level, k), at_plus[0], at_minus[0])
+        loose = looseness(a, b, abs(level[0]) + 2.0 * abs(k[0]) * u * u)
+        found = barrier(a, b, k, about_equator(a, b, level, k), loose, at_plus[0], at_minus[0])
         heights[i, 0], heights[i, 1], heights[i, 2] = found[0], found[1], abs(k[0])
 
 
@@ -143,5 +146,5 @@ def heights_of_integrals(points, heights):
         level, sign, b, a = points[0, i], points[1, i], points[5, i], points[6, i]
         pair, k, high, product = (level, 0.0), (sign, 0.0), dd.two_sum(level, sign), dd.two_prod(a, b)
         at_plus, at_minus = dd.sub(high, product)[0], dd.add(high, product)[0]
-        found = barrier(a, b, k, about_equator(a, b, pair, k), at_plus, at_minus)
+        found = barrier(a, b, k, about_equator(a, b, pair, k), looseness(a, b, 0.0), at_plus, at_minus)
         heights[i, 0], heights[i, 1], heights[i, 2] = found[0], found[1], 1.0
