@@ -3,6 +3,8 @@
 from survey.kernels import double as dd
 from survey.kernels.jit import inline, kernel
 from survey.kernels.nutation_lanes import (
+    BAR_V,
+    BAR_W,
     BEND,
     FINE,
     FINE_DIFFERENCE,
@@ -19,13 +21,17 @@ from survey.kernels.nutation_lanes import (
     V_LOW,
     W_HIGH,
     W_LOW,
+    WIDTH,
     K,
+    L,
     pair,
     put,
 )
+from survey.kernels.quartic import UNIT
 
 MEANS = 8
 LAST = 1e-30
+FINEST = 2.0**-96
 # rows of the tile that follow those of `nutation_lanes`: pairs x, y; p, weight, total of both poles; complementary?
 X, Y, UP, DOWN, LOW_UP, LOW_DOWN, ALL = (TILE * (ROWS + n) for n in (0, 2, 4, 10, 16, 17, 18))
 P, WEIGHT, TOTAL = 0, 2 * TILE, 4 * TILE
@@ -36,10 +42,13 @@ def ingredients(work, i):
     """The roots of Q at the turning points, h and k - h^2 of (S11), x and y."""
     k, near, far = pair(work, K, i), pair(work, Q_HIGH, i), pair(work, Q_LOW, i)
     high, low = dd.sqrt(near), dd.sqrt(far)
-    g = dd.mul(high, low)
-    above = dd.add(pair(work, MIDDLE, i), g)
+    g, middle, n = dd.mul(high, low), pair(work, MIDDLE, i), pair(work, BEND, i)
+    above = dd.add(middle, g)
+    if middle[0] < 0.0:  # (S10)
+        width = dd.sub(pair(work, V_LOW, i), pair(work, V_HIGH, i))
+        above = dd.div(dd.mul(dd.mul(k, n), dd.mul(width, width)), dd.times(dd.sub(g, middle), 4.0))
     incline = dd.times(dd.div(dd.mul(k, pair(work, SUM, i)), dd.add(high, low)), 2.0)
-    bend = dd.times(dd.div(dd.mul(k, pair(work, BEND, i)), above), 0.5)
+    bend = dd.times(dd.div(dd.mul(k, n), above), 0.5)
     return high, low, incline, bend, dd.sqrt(dd.times(above, 0.5)), dd.sqrt(g)
 
 
@@ -106,6 +115,16 @@ def part(gap, near, far, root_near, root_far, incline, bend, ratio):
 
 
 @inline
+def noise(work, i):
+    """What the bars of the set-up leave of the parts, relative to their terms, as in methods/agm.py."""
+    bar_v, bar_w, size_k = work[BAR_V + i], work[BAR_W + i], abs(work[K + i])
+    error = 8.0 * (size_k * (bar_v + bar_w) + UNIT * (abs(work[L + i]) + 8.0 * size_k))
+    total = error / work[Q_LOW + i] + error / work[Q_HIGH + i] + FINEST
+    total += error / abs(work[BEND + i]) + 2.0 * (bar_v + bar_w) / work[WIDTH + i] if work[MIDDLE + i] < 0.0 else 0.0
+    return 4.0 * total + bar_v / work[V_HIGH + i] + bar_w / work[W_LOW + i]
+
+
+@inline
 def finish(work, i):
     high, low, incline, bend, _x, _y = ingredients(work, i)
     up = part(pair(work, MINUS, i), pair(work, V_HIGH, i), pair(work, V_LOW, i), high, low, incline, bend,
@@ -116,7 +135,7 @@ def finish(work, i):
     known = (abs(work[UP + WEIGHT + i]) <= LAST * work[UP + TOTAL + i]) & (
         abs(work[DOWN + WEIGHT + i]) <= LAST * work[DOWN + TOTAL + i]
     )
-    work[FINE + i] = 1.0 if known else 0.0
+    work[FINE + i] = noise(work, i) if known else 0.0
 
 
 @kernel

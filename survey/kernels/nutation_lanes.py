@@ -20,7 +20,7 @@ RIGHT = 0.125 * EPS  # errors of the set-up, relative
 BLUR = 0.01  # the error of a well's width, relative
 WIDE = 0.1  # wells that are wider are no parabolas
 NEAR, LAST = 2e-9, 1e-17  # the last two means, and the last weight of R
-SLANT, CANCELLED = 0.25, 0.01  # as in methods/agm.py
+SLANT, CANCELLED = 0.25, 0.05  # as in methods/agm.py
 NODES = 16
 COSINES = np.cos((np.arange(NODES) + 0.5) * pi / NODES)
 # places of the rows of a tile: of what is given the last two, b and a
@@ -37,7 +37,7 @@ U, LOW, HIGH, WIDTH, ABOVE, LEVEL, GOOD, WELLS = range(37 * TILE, 45 * TILE, TIL
 X, Y, WEIGHT, SERIES = range(45 * TILE, 49 * TILE, TILE)  # the mean
 UP, DOWN = 49 * TILE, 53 * TILE  # the sums R of both poles: p, weight, total, 1 if complementary
 LINE_UP, POINT_UP, LINE_DOWN, POINT_DOWN = range(57 * TILE, 61 * TILE, TILE)  # l of (S11), the root of P0 of (S13)
-# the sum and the difference of the parts of both poles, with all their digits, and 1 if these are known
+# the sum and the difference of the parts of both poles, with all their digits, and their relative error (0: unknown)
 FINE_TOTAL, FINE_DIFFERENCE, FINE = range(61 * TILE, 64 * TILE, TILE)
 BAR_V, BAR_W, ACTION = range(64 * TILE, 67 * TILE, TILE)  # of the first two pairs; (S15), where it is known
 ROWS = 67
@@ -303,13 +303,14 @@ def finish(work, size, drift, i, told):
     sure = (work[GOOD + i] == 1.0) & (abs(work[X + i] - work[Y + i]) <= NEAR * middle)
     sure &= abs(work[UP + TILE + i]) <= LAST * work[UP + 2 * TILE + i]
     sure &= abs(work[DOWN + TILE + i]) <= LAST * work[DOWN + 2 * TILE + i]
-    bare = abs(total) if turns_up + turns_down == 0.0 else abs(difference)  # without multiples of pi
-    cancelled = (bare < CANCELLED * rough) & (turns_up * turns_down != 0.0) & (work[MIDDLE + i] > 0.0)
-    fine = work[FINE + i] == 1.0
+    # without multiples of pi
+    bare = abs(total) if turns_up + turns_down == 0.0 else abs(difference + drift * size * period)
+    cancelled = (bare < CANCELLED * rough) & (turns_up * turns_down != 0.0)
+    fine = work[FINE + i] > 0.0
     exactly = fine & cancelled
     total = work[FINE_TOTAL + i] * period if exactly else total
     difference = work[FINE_DIFFERENCE + i] * period if exactly else difference
-    error, rounding = (EPS / 32.0 * rough, 12.0 * EPS) if exactly else (25.0 * EPS * rough, 2.0 * EPS)
+    error, rounding = (work[FINE + i] * rough, 12.0 * EPS) if exactly else (25.0 * EPS * rough, 2.0 * EPS)
     turned = 2.0 * EPS * pi
     precession, spin = pi * (turns_down + turns_up) + total, pi * (turns_down - turns_up) + difference
     error_precession = error + rounding * abs(total) + turned * abs(turns_down + turns_up)

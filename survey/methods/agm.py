@@ -18,7 +18,7 @@ from survey.kernels.third_kind import mean, third, third_double
 ORDER = 0  # no steps
 SERVES = ("nutation",)
 EPS = nu.EPS
-CANCELLED = 0.01  # advances that are a smaller part of their terms are computed in double-double
+CANCELLED = 0.05  # advances that are a smaller part of their terms are computed in double-double
 FINE = 2.0**-94
 SLANT = 0.25  # where the line through the roots of Q is lower at the pole, relative, pi is not split off
 
@@ -63,9 +63,13 @@ def fine_parts(row):
     k, total, near, far = nu.pair(row, nu.K), nu.pair(row, nu.SUM), nu.pair(row, nu.Q_HIGH), nu.pair(row, nu.Q_LOW)
     high, low = dd.sqrt(near), dd.sqrt(far)
     g = dd.mul(high, low)
-    above = dd.add(nu.pair(row, nu.MIDDLE), g)
+    above, n = dd.add(nu.pair(row, nu.MIDDLE), g), nu.pair(row, nu.BEND)
+    if row[nu.MIDDLE] < 0.0:  # (S10)
+        width = dd.sub(nu.pair(row, nu.LOW_PLUS), nu.pair(row, nu.HIGH_PLUS))
+        rest = dd.times(dd.sub(g, nu.pair(row, nu.MIDDLE)), 4.0)
+        above = dd.div(dd.mul(dd.mul(k, n), dd.mul(width, width)), rest)
     incline = dd.times(dd.div(dd.mul(k, total), dd.add(high, low)), 2.0)
-    bend = dd.times(dd.div(dd.mul(k, nu.pair(row, nu.BEND)), above), 0.5)
+    bend = dd.times(dd.div(dd.mul(k, n), above), 0.5)
     x, y = dd.sqrt(dd.times(above, 0.5)), dd.sqrt(g)
     plus = nu.pair(row, nu.MINUS), nu.pair(row, nu.HIGH_PLUS), nu.pair(row, nu.LOW_PLUS)
     minus = nu.pair(row, nu.PLUS), nu.pair(row, nu.LOW_MINUS), nu.pair(row, nu.HIGH_MINUS)
@@ -116,9 +120,9 @@ def periods_of(row, out):
     blur = min(4.0 * noise * size, blur)
     error, rounding = 24.0 * EPS * size + blur, 2.0 * EPS
     bare = abs(total) if turns_up + turns_down == 0.0 else abs(difference)  # without multiples of pi
-    if bare < CANCELLED * size and turns_up * turns_down != 0.0 and row[nu.MIDDLE] > 0.0:
+    if bare < CANCELLED * size and turns_up * turns_down != 0.0:
         total, difference = fine_parts(row)
-        error, rounding = FINE * size + blur, 12.0 * EPS
+        error, rounding = (FINE + 2.0 * row[nu.NOISE_ENDS]) * size + blur, 12.0 * EPS
     out[1], out[2] = pi * (turns_down + turns_up) + total, pi * (turns_down - turns_up) + difference
     turned = 2.0 * EPS * pi
     out[5] = error + rounding * abs(total) + turned * abs(turns_down + turns_up)
