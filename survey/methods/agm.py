@@ -20,6 +20,7 @@ SERVES = ("nutation",)
 EPS = nu.EPS
 CANCELLED = 0.05  # advances that are a smaller part of their terms are computed in double-double
 FINE = 2.0**-94
+CLOSE = 0.1  # poles that are nearer, in units of a well's width, bound rates by nothing
 SLANT = 0.25  # where the line through the roots of Q is lower at the pole, relative, pi is not split off
 
 
@@ -86,11 +87,31 @@ def shares(x, y):
 
 
 @inline
-def blurred(advance, ends, noise_far, noise_near, noise_above, share):
-    """What errors of Q at the turning points and of s + g make of an advance (S23); ends: its b -+ a, near, far."""
-    _gap, near, far = ends
-    beside = min(0.5, 0.5 * share[1] * far / near) if near > 0.0 else 0.5
-    return abs(advance) * (share[0] * noise_above + share[1] * noise_far + beside * noise_near)
+def rates(row, to_plus, to_minus):
+    """2 psi' and 2 phi' (S4), less the drift, in size, where 1 - u and 1 + u are these."""
+    up = row[nu.MINUS] / to_plus if row[nu.MINUS] != 0.0 else 0.0
+    down = row[nu.PLUS] / to_minus if row[nu.PLUS] != 0.0 else 0.0
+    return abs(down + up), abs(down - up)
+
+
+@inline
+def blurred(row, roots, up, down, period, x, y):
+    """What errors of Q at the turning points and of s + g make of precession and spin (S23); of advances up, down."""
+    share, low, high, above = shares(x, y), row[nu.NOISE_LOW], row[nu.NOISE_HIGH], row[nu.NOISE_ABOVE]
+    full, rest, time = abs(up) + abs(down), min(x, y) / max(x, y), 0.5 * period
+    if x < y:  # the motion is slow where Q is least
+        to_plus = (row[nu.LOW_PLUS] * roots[1] + row[nu.HIGH_PLUS] * roots[0]) / (roots[0] + roots[1])
+        to_minus = (row[nu.LOW_MINUS] * roots[1] + row[nu.HIGH_MINUS] * roots[0]) / (roots[0] + roots[1])
+        psi, phi = rates(row, to_plus, to_minus)
+        generic, part = (low + high + rest * above) * full, share[0] * above * time
+        return generic + part * psi, generic + part * phi
+    if min(row[nu.HIGH_PLUS], row[nu.LOW_MINUS]) < CLOSE * row[nu.WIDTH]:
+        generic = (low + high + above) * full
+        return generic, generic
+    generic, part = (above + rest * (low + high)) * full, share[1] * time
+    psi, phi = rates(row, row[nu.LOW_PLUS], row[nu.LOW_MINUS])
+    other_psi, other_phi = rates(row, row[nu.HIGH_PLUS], row[nu.HIGH_MINUS])
+    return generic + part * (low * psi + high * other_psi), generic + part * (low * phi + high * other_phi)
 
 
 @inline
@@ -115,18 +136,19 @@ def periods_of(row, out):
     out[0] = period
     out[4] = (12.0 * EPS + 0.5 * share[0] * row[nu.NOISE_ABOVE] + 0.25 * share[1] * (low + high)) * period
     total, difference, size = down + up, down - up, size_up + size_down
-    blur = blurred(pi * turns_up + up, plus, low, high, row[nu.NOISE_ABOVE], share)
-    blur += blurred(pi * turns_down + down, minus, high, low, row[nu.NOISE_ABOVE], share)
-    blur = min(4.0 * noise * size, blur)
-    error, rounding = 24.0 * EPS * size + blur, 2.0 * EPS
+    roots = root_low, root_high
+    blur_psi, blur_phi = blurred(row, roots, pi * turns_up + up, pi * turns_down + down, period, x, y)
+    error, rounding = 24.0 * EPS * size, 2.0 * EPS
     bare = abs(total) if turns_up + turns_down == 0.0 else abs(difference)  # without multiples of pi
     if bare < CANCELLED * size and turns_up * turns_down != 0.0:
         total, difference = fine_parts(row)
-        error, rounding = (FINE + 2.0 * row[nu.NOISE_ENDS]) * size + blur, 12.0 * EPS
+        error, rounding = (FINE + 2.0 * row[nu.NOISE_ENDS]) * size, 12.0 * EPS
     out[1], out[2] = pi * (turns_down + turns_up) + total, pi * (turns_down - turns_up) + difference
     turned = 2.0 * EPS * pi
-    out[5] = error + rounding * abs(total) + turned * abs(turns_down + turns_up)
-    out[6] = error + rounding * abs(difference) + turned * abs(turns_down - turns_up)
+    out[5] = error + min(4.0 * noise * size, blur_psi) + rounding * abs(total) + turned * abs(turns_down + turns_up)
+    out[6] = (
+        error + min(4.0 * noise * size, blur_phi) + rounding * abs(difference) + turned * abs(turns_down - turns_up)
+    )
     up, down = row[nu.MINUS] * (pi * turns_up + up), row[nu.PLUS] * (pi * turns_down + down)
     rest = 0.5 * (0.5 * above - series)
     out[3] = (period * (row[nu.LEVEL] + rest) - up - down) / (2.0 * pi)
