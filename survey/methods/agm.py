@@ -138,11 +138,12 @@ def periods_of(row, out):
     total, difference, size = down + up, down - up, size_up + size_down
     roots = root_low, root_high
     blur_psi, blur_phi = blurred(row, roots, pi * turns_up + up, pi * turns_down + down, period, x, y)
-    error, rounding = 24.0 * EPS * size, 2.0 * EPS
+    ends = 4.0 * row[nu.WIDTH] * (row[nu.NOISE_ENDS] + row[nu.NOISE_WIDTH])
+    error, rounding = (24.0 * EPS + ends) * size, 2.0 * EPS
     bare = abs(total) if turns_up + turns_down == 0.0 else abs(difference)  # without multiples of pi
     if bare < CANCELLED * size and turns_up * turns_down != 0.0:
         total, difference = fine_parts(row)
-        error, rounding = (FINE + 2.0 * row[nu.NOISE_ENDS]) * size, 12.0 * EPS
+        error, rounding = (FINE + ends) * size, 12.0 * EPS
     out[1], out[2] = pi * (turns_down + turns_up) + total, pi * (turns_down - turns_up) + difference
     turned = 2.0 * EPS * pi
     out[5] = error + min(4.0 * noise * size, blur_psi) + rounding * abs(total) + turned * abs(turns_down + turns_up)

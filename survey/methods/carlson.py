@@ -47,6 +47,8 @@ def periods_of(row, out):
     noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + 8.0 * EPS * g / nu.above(row, g)
     out[0], out[1], out[2] = 4.0 * time, up + down, down - up
     out[4] = (32.0 * EPS + noise) * out[0]
+    # here, other than in agm, advances know the distances from poles by these alone
+    noise += 0.5 * row[nu.NOISE_ENDS]
     out[5] = out[6] = (48.0 * EPS + 4.0 * noise) * (abs(up) + abs(down))
     square = second_kind(time, 0.5 * nu.above(row, g), g, g)
     parts = out[0] * row[nu.LEVEL], 4.0 * square, row[nu.MINUS] * up, row[nu.PLUS] * down
