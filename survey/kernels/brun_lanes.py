@@ -36,7 +36,7 @@ def states(work):
             work[i], work[TILE + i], work[2 * TILE + i], work[3 * TILE + i], work[4 * TILE + i], b, a
         )
         polynomial(work, (k[0] if inside else np.nan, k[1]), level, at_plus, at_minus, i)
-        work[nl.U + i] = u
+        work[nl.U + i] = u[0]
 
 
 @kernel
