@@ -15,7 +15,7 @@ from survey.kernels import nutation_lanes as nl
 from survey.kernels.jit import kernel
 
 EPS = nu.EPS
-ROUGH = 1e-13  # bars of (S14), relative, beyond which the action is a sum
+ROUGH = 2e-13  # bars of (S14), relative, beyond which the action is a sum
 NODES = 16
 _COSINES = np.cos((np.arange(NODES) + 0.5) * pi / NODES)
 # (S22): nodes w = STEP n, DOWN <= n <= UP; there c, 1 - c^2, (1 + c)/2, (1 - c)/2, and the weight c s^3
