@@ -25,10 +25,11 @@ class Survey:
     def map(self, var=None, ax=None, boundaries=True, style=None, width="single"):
         """Draw the stability map, or the variable `var`; along one axis, its curve and error band.
 
-        Undecided, failed and outside points are marked and counted in the legend; edges of tongues are drawn where
-        the file holds them, unless `boundaries` is False. Draws onto the matplotlib Axes `ax`, by default a new
-        figure's, and returns it (`ax.figure.savefig("map.pdf")`). `style="paper"`: for print, hatched, without title,
-        a single or double column wide; `survey plot --style paper` also embeds the fonts as journals ask.
+        Undecided, failed and outside points are marked and counted in the legend, and points that have no answer by
+        nature are grey, under their status; edges of tongues are drawn where the file holds them, unless `boundaries`
+        is False. Draws onto the matplotlib Axes `ax`, by default a new figure's, and returns it
+        (`ax.figure.savefig("map.pdf")`). `style="paper"`: for print, hatched, without title, a single or double column
+        wide; `survey plot --style paper` also embeds the fonts as journals ask.
         """
         import matplotlib
         import matplotlib.pyplot as plt
@@ -82,8 +83,9 @@ class Survey:
     def zoom(self, num=None, output=None, **ranges):
         """A finer sweep of a part of the map, such as `zoom(k=(0.2, 0.3), num=200)`, the same workflow otherwise.
 
-        `num`: values along each axis with a range (by default as many as now; a dict gives one for each). Returns the
-        Dataset, in memory; with `output` it is written to that netCDF file by `survey.run`.
+        `num`: values along each axis with a range (by default as many as now; a dict gives one for each). Ranges may
+        reach beyond the map, as far as the parameters' domains allow; a warning says so. Returns the Dataset, in
+        memory; with `output` it is written to that netCDF file by `survey.run`.
         """
         from survey.analysis import zoom
 

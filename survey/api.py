@@ -273,7 +273,7 @@ def summary(ds: xr.Dataset) -> dict[str, Any]:
             name: v.attrs.get("long_name", "") for name, v in ds.data_vars.items() if not str(name).endswith("_error")
         },
         **({"areas": areas(ds)} if "area" in ds else {}),
-        "counts": {name: counts(ds[name]) for name in ("verdict", "status") if name in ds},
+        "counts": counts(ds),
         "provenance": {
             k: v
             for k, v in ds.attrs.items()

@@ -15,6 +15,7 @@ from survey import status
 from survey.scene import exists
 
 CONVENTIONS = "CF-1.11, ACDD-1.3"
+UNDECIDED = -1  # of every verdict
 CHUNK = 2**14  # points: what is computed of them stays in the cache
 
 
@@ -102,12 +103,14 @@ def attributes(scene, name, request):
 class Tally:
     """Counts by status and verdict, and of points whose bar exceeds the asked accuracy, over pieces of a map.
 
-    `flags` is {"status": its attributes, "verdict": its attributes (where there is one)}.
+    `flags` is {"status": its attributes, "verdict": its attributes (where there is one)}. `unanswered` counts, by
+    status, the points whose verdict is -1 because there is no answer.
     """
 
     def __init__(self, flags, rtol):
         self.codes = {name: flag_codes(meaning) for name, meaning in flags.items()}
         self.counts = {name: dict.fromkeys(codes, 0) for name, codes in self.codes.items()}
+        self.unanswered = {name: 0 for name, code in self.codes["status"].items() if code != status.OK}
         self.rtol = rtol
         self.points = self.missed = 0
 
@@ -126,14 +129,33 @@ class Tally:
         for name, codes in self.codes.items():
             for key, code in codes.items():
                 self.counts[name][key] += int(np.count_nonzero(arrays[name] == code))
+        if "verdict" in self.codes:
+            why = arrays["status"][(arrays["verdict"] == UNDECIDED) & (arrays["status"] != status.OK)]
+            for key in self.unanswered if why.size else ():
+                self.unanswered[key] += int(np.count_nonzero(why == self.codes["status"][key]))
+
+    @property
+    def kinds(self):
+        """{"status" and "verdict": {kind: points}}: a point without an answer is of its status, not undecided."""
+        told = {name: dict(number) for name, number in self.counts.items()}
+        if "undecided" in told.get("verdict", ()):
+            told["verdict"]["undecided"] -= sum(self.unanswered.values())
+            told["verdict"] |= {name: n for name, n in self.unanswered.items() if n}
+        return told
 
     @property
     def attributes(self):
         """The counts as global attributes."""
-        told = {"points": self.points, "accuracy_missed": self.missed}
-        for name, number in self.counts.items():
-            told[f"{name}_counts"] = ", ".join(f"{key}: {n}" for key, n in number.items() if n)
-        return told
+        return {"points": self.points, "accuracy_missed": self.missed} | _counts(self.kinds)
+
+    @property
+    def before(self):
+        """The counts as older files tell them, where what has no answer is undecided."""
+        return _counts(self.counts)
+
+
+def _counts(table):
+    return {f"{name}_counts": ", ".join(f"{k}: {n}" for k, n in number.items() if n) for name, number in table.items()}
 
 
 def _above(value, bar, rtol):
@@ -160,10 +182,17 @@ def count(ds):
     return ds
 
 
-def counts(variable):
-    """{flag meaning: number of points} of a CF flag variable."""
-    values = variable.values
-    return {name: int(np.count_nonzero(values == code)) for name, code in flag_codes(variable.attrs).items()}
+def counts(ds):
+    """{"verdict" (where there is one) and "status": {kind: number of points}}, as `Tally.kinds`."""
+    whole = tally(ds)
+    whole.add({name: ds[name].values for name in whole.codes})
+    return {name: whole.kinds[name] for name in ("verdict", "status") if name in whole.codes}
+
+
+def unanswered(ds):
+    """{name: code} of the scene's own statuses: why a point has no answer by nature."""
+    codes = flag_codes(ds.status.attrs) if "flag_values" in ds.status.attrs else {}
+    return {name: code for name, code in codes.items() if code >= status.FIRST_OF_SCENE}
 
 
 def flag_codes(meaning):

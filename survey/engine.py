@@ -29,6 +29,9 @@ BLOCK_POINTS = 2**17
 SAMPLES = 16  # blocks from all over the map that are solved first
 # what the writer holds at a time: enough for the tiles to be square, little beside what else a process takes
 REGION_POINTS, REGION_BYTES = 2**20, 2**25
+# what a plan says of the kernels
+NEW = "all kernels, once: this machine has none of them yet (up to a minute)"
+KNOWN = "kernels that no run on this machine has needed yet, once"
 
 
 def seconds_per_point(scene, request, grid):
@@ -405,6 +408,7 @@ def plan(workflow):
         "output": str(workflow.path),
         "threads": cpus(),
         "estimated_seconds": float(f"{seconds / cpus():.2g}"),
+        "not_estimated": f"writing the file; compiling {NEW if jit.is_new() else KNOWN}",
     }
 
 

@@ -4,9 +4,11 @@ Pictures are for the screen (`style` "screen") or for papers ("paper": column wi
 verdicts differ in grey print too).
 """
 
+import re
 import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import inf
 
 import matplotlib
 import numpy as np
@@ -17,19 +19,27 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
+from matplotlib.transforms import ScaledTranslation
 
 from survey import modules, status
-from survey.dataset import flag_codes, percent
+from survey.dataset import flag_codes, percent, unanswered
 from survey.errors import BadInput
 from survey.grid import logarithmic
+from survey.reduced import Overview, Points
 
 # after Okabe and Ito, safe for the colour-blind, the first two far apart in grey print too;
 # black is kept for undecided, white with hatching for failed
 COLOURS = ("#D55E00", "#A6D8F5", "#E69F00", "#F0E442", "#009E73", "#CC79A7", "#0072B2", "#999999", "#B8E0D2", "#5D3A9B")
 UNDECIDED = "#000000"
+# of points that have no answer by nature, by the scene's own statuses: in print between unstable, stable and black
+GREYS = ("#808080", "#B3B3B3", "#5E5E5E")
 HATCHES = ("//////", "", "....", "\\\\\\\\", "xxxx", "----", "||||", "++++", "oo", "**")  # of the COLOURS, in papers
 HATCHED = 500  # cells along an axis: hatching is drawn as outlines
-CELLS = 2000  # along an axis: more than a picture has pixels, and each costs a hundred bytes
+WHOLE = 2000  # points along an axis: of larger maps a cell of the picture stands for several points
+CELLS = 1000  # along an axis then, at most: each costs a hundred bytes
+FINE = 0.8  # cells for each pixel of the axes, before legend and labels take their share
+SPARE = 0.95  # of the room for a text: fonts are a little wider at other resolutions
+BESIDE = 1.2  # of the width of axes that have neighbours: texts may reach into the gap
 MARK_BELOW = 0.002  # a share of the map: rarer points are also marked with a ring, or nobody would see them
 _EDGES = "edges: even dark, odd grey;\nperiodic solid, antiperiodic dashed"
 _RIM = withStroke(linewidth=2.0, foreground="#444444")
@@ -116,7 +126,17 @@ def onto(axes, ds, name=None, boundaries=True, style=None):
     else:
         raise BadInput(f"{name} is a single number; a figure needs at least one axis")
     if not paper:
-        axes.set_title(_title(ds, variable), fontsize=10)
+        axes.set_title(_title(ds, variable), fontsize=10 if _alone(axes) else 8)
+    _fit(axes)
+
+
+def _fit(axes):
+    """Wrap the title and the labels that would not fit, as the figure is laid out now."""
+    axes.figure.figure.draw_without_rendering()
+    for own in [axes, *(other for other in axes.figure.axes if other.get_label() == "<colorbar>")]:
+        x, y = _room(own, inf if _alone(axes) else BESIDE)
+        for text, room in ((own.title, x), (own.xaxis.label, x), (own.yaxis.label, y)):
+            wrap(text, room)
 
 
 def _flat(ds, name):
@@ -127,32 +147,48 @@ def _flat(ds, name):
 
 
 def _map(axes, ds, variable, state, boundaries, paper):
+    scales = ["log" if logarithmic(variable[dim].values) else "linear" for dim in variable.dims]
+    whole = MaxNLocator(integer=True) if variable.dtype.kind == "i" else None
+    variable, state, number = _shown(axes, ds, variable, state, look("paper" if paper else None).dpi)
     x, y = (variable[dim] for dim in variable.dims)
     failed = np.isin(state.values, list(status.FAILURES))
     outside = state.values == status.INVALID_PARAMETERS
     if variable.name == "verdict" and "cell_verdict" in ds:
-        handles = _cells(axes, ds, x, y, failed, paper)
+        handles = _cells(axes, ds, x, y, failed, number, paper)
     elif "flag_values" in variable.attrs:
-        handles = _verdicts(axes, x, y, variable, failed, outside, paper)
+        handles = _verdicts(axes, x, y, ds, variable, state, number, paper)
     else:
-        some = _thinned(variable)
-        shown = np.where((failed | outside)[some], np.nan, variable[some].values.astype(float))
-        shown = np.ma.masked_invalid(shown)
-        look = {"cmap": "viridis", "shading": "nearest", "rasterized": True}
-        drawn = axes.pcolormesh(x[some[0]], y[some[1]], shown.T, **look, **limits(shown))
-        whole = MaxNLocator(integer=True) if variable.dtype.kind == "i" else None
+        shown = np.ma.masked_invalid(np.where(failed | outside, np.nan, variable.values.astype(float)))
+        drawn = axes.pcolormesh(x, y, shown.T, cmap="viridis", shading="nearest", rasterized=True, **limits(shown))
         axes.figure.colorbar(drawn, ax=axes, label=label_of(variable), ticks=whole)
         axes.set_facecolor("#dddddd")
-        handles = _marks(axes, x, y, failed, "failed", paper) + _marks(axes, x, y, outside, "outside the domain", paper)
-        handles += [Patch(color="#dddddd", label="does not apply")] if shown.mask.any() else []
+        handles = _no_answer(axes, x, y, failed, outside, number, paper)
+        handles += [Patch(color="#dddddd", label="does not apply")] if (shown.mask & ~(failed | outside)).any() else []
     if boundaries and "curve_count" in ds:
         handles += _curves(axes, in_plane(ds, variable), x, y)
     if handles:
-        _legend(axes, handles, paper)
-    for axis, coord in ((axes.xaxis, x), (axes.yaxis, y)):
-        axis.set_label_text(label_of(coord))
-        if logarithmic(coord.values):
-            (axes.set_xscale if axis is axes.xaxis else axes.set_yscale)("log")
+        _legend(axes, handles)
+    axes.set(xlabel=label_of(x), ylabel=label_of(y))
+    for setting, scale in zip((axes.set_xscale, axes.set_yscale), scales, strict=True):
+        if scale == "log":
+            setting(scale)
+
+
+def _shown(axes, ds, variable, state, dpi):
+    """(variable, status, {}) in memory; of a large map for the cells of the picture, and {kind: number of points}."""
+    if max(variable.shape) <= WHOLE:
+        return variable.compute(), state.compute(), {}
+    box, points = axes.get_window_extent(), Points(variable, state, unanswered(ds))
+    pixels = np.array([box.width, box.height]) * dpi / axes.figure.dpi
+    whole = Overview(points, np.clip(FINE * pixels, 1, CELLS).astype(int)).complete
+    values, states = points.cells(whole)
+    for dim, starts in zip(variable.dims, whole.starts, strict=True):
+        ends = np.append(starts[1:], variable.sizes[dim]) - 1
+        middles = 0.5 * (variable[dim].values[starts] + variable[dim].values[ends])
+        variable, state = (
+            v.isel({dim: starts}).assign_coords({dim: (dim, middles, v[dim].attrs)}) for v in (variable, state)
+        )
+    return variable.copy(data=values), state.copy(data=states), whole.number
 
 
 def in_plane(ds, variable):
@@ -194,7 +230,7 @@ def _curves(axes, ds, x, y):
     return list(handles.values())
 
 
-def _cells(axes, ds, x, y, failed, paper):
+def _cells(axes, ds, x, y, failed, number, paper):
     """The map's cells instead of its points, with the area of each verdict. Returns the handles."""
     left, right, low, high = (ds[f"cell_{axis.name}_{end}"].values for axis in (x, y) for end in ("low", "high"))
     corners = np.stack([left, low, left, high, right, high, right, low], axis=1).reshape(-1, 4, 2)
@@ -215,28 +251,41 @@ def _cells(axes, ds, x, y, failed, paper):
         patch = Patch(facecolor=colour, edgecolor="black", lw=0.5, hatch=hatch, label=f"{name} ({part})")
         handles += [patch] if own.any() else []
     axes.set(xlim=(left.min(), right.max()), ylim=(low.min(), high.max()))
-    return handles + _marks(axes, x, y, failed, "failed", paper)
+    return handles + _marks(axes, x, y, failed, "failed", number, paper)
 
 
-def _verdicts(axes, x, y, variable, failed, outside, paper):
-    """A colour per flag; failed and outside points white and hatched; rare points ringed. Returns the handles."""
-    table = flag_codes(variable.attrs)
-    palette = colours_of(table)
+def _kinds(ds, variable, state):
+    """(codes, {kind: code}, {kind: colour}) of a flag variable; masked where the point failed or lies outside.
+
+    The kinds are its flags, and after them why points have no answer by nature, whose code is not that of undecided.
+    """
+    table, shown = flag_codes(variable.attrs), variable.values.copy()
+    colours = dict.fromkeys(table, "#444444") | colours_of(table) | greys_of(ds, table)
+    for name, code in ((name, unanswered(ds)[name]) for name in greys_of(ds, table)):
+        table[name] = max(table.values()) + 1
+        shown[(variable.values == table["undecided"]) & (state.values == code)] = table[name]
+    return np.ma.masked_array(shown, np.isin(state.values, list(status.UNANSWERED))), table, colours
+
+
+def _verdicts(axes, x, y, ds, variable, state, number, paper):
+    """A colour per kind; failed and outside points white and hatched; rare points ringed. Returns the handles."""
+    failed = np.isin(state.values, list(status.FAILURES))
+    outside = state.values == status.INVALID_PARAMETERS
+    shown, table, palette = _kinds(ds, variable, state)
+    flags = flag_codes(variable.attrs)
     codes = sorted(table.values())
     names = {code: name for name, code in table.items()}
-    cmap = ListedColormap([palette.get(names[code], "#444444") for code in codes])
+    cmap = ListedColormap([palette[names[code]] for code in codes])
     edges = np.append(np.array(codes) - 0.5, codes[-1] + 0.5)
-    shown = np.ma.masked_array(variable.values, failed | outside)
-    some = _thinned(variable)
     look = {"cmap": cmap, "norm": BoundaryNorm(edges, cmap.N), "shading": "nearest", "rasterized": True}
-    axes.pcolormesh(x[some[0]], y[some[1]], shown[some].T, **look)
-    number = {name: int((shown == code).sum()) for name, code in table.items()}
+    axes.pcolormesh(x, y, shown.T, **look)
+    number = number or {name: int((shown == code).sum()) for name, code in table.items()}
     handles = [
         Patch(
-            facecolor=palette.get(names[code], "#444444"),
+            facecolor=palette[names[code]],
             edgecolor="black",
             linewidth=0.5,
-            hatch=_hatch(table, names[code]) if paper else None,
+            hatch=_hatch(flags, names[code]) if paper else None,
             label=names[code].replace("_", " ") if paper else _counted(names[code], number),
         )
         for code in codes
@@ -244,16 +293,20 @@ def _verdicts(axes, x, y, variable, failed, outside, paper):
     ]
     if paper:
         for code in codes:
-            if number[names[code]] and _hatch(table, names[code]):
-                _hatched(axes, x, y, (shown == code).filled(False), _hatch(table, names[code]))
+            if number[names[code]] and _hatch(flags, names[code]):
+                _hatched(axes, x, y, (shown == code).filled(False), _hatch(flags, names[code]))
     undecided = (shown == table.get("undecided", -1)).filled(False)
-    handles += _marks(axes, x, y, undecided, "undecided", paper, UNDECIDED)
-    handles += _marks(axes, x, y, failed, "failed", paper) + _marks(axes, x, y, outside, "outside the domain", paper)
-    return handles
+    handles += _marks(axes, x, y, undecided, "undecided", number, paper, UNDECIDED)
+    return handles + _no_answer(axes, x, y, failed, outside, number, paper)
+
+
+def _no_answer(axes, x, y, failed, outside, number, paper):
+    handles = _marks(axes, x, y, failed, "failed", number, paper)
+    return handles + _marks(axes, x, y, outside, "outside the domain", number, paper)
 
 
 def _hatch(table, name):
-    """The hatching of a meaning in papers; none of undecided, which is black."""
+    """The hatching of a meaning in papers; none of undecided, which is black, and of no answer, which is grey."""
     meant = [other for other in table if other != "undecided"]
     return HATCHES[meant.index(name) % len(HATCHES)] if name in meant and "ok" not in table else ""
 
@@ -273,11 +326,6 @@ def _cornered(values):
     return np.concatenate([outer[:1], np.repeat(middles, 2), outer[1:]])
 
 
-def _thinned(variable):
-    """The places of a map that are drawn: all, or every so many where there are more than CELLS along an axis."""
-    return tuple(slice(None, None, -(-size // CELLS)) for size in variable.shape)
-
-
 def colours_of(table):
     """A colour per meaning; "ok" takes that of stable."""
     meant = [name for name in table if name not in ("undecided", "ok")]
@@ -285,10 +333,19 @@ def colours_of(table):
     return {"undecided": UNDECIDED, "ok": COLOURS[1]} | dict(zip(meant, first, strict=False))
 
 
-def _marks(axes, x, y, where, label, paper=False, colour="white"):
-    """Show the points `where`: hatched where they fill an area, ringed where they are rare; their legend handle."""
+def greys_of(ds, table):
+    """{status: grey} of the scene's own statuses, for a flag variable that may be undecided."""
+    names = [name for name in unanswered(ds) if "undecided" in table]
+    return {name: GREYS[i % len(GREYS)] for i, name in enumerate(names)}
+
+
+def _marks(axes, x, y, where, label, number, paper=False, colour="white"):
+    """Show the cells `where`: hatched where they fill an area, ringed where they are rare; their legend handle.
+
+    `number` holds how many points they stand for, where that is not one each.
+    """
     total = int(where.sum())
-    label = label if paper else f"{label} ({total:,})"
+    label = label if paper else f"{label} ({number.get(label, total):,})"
     if total == 0:
         return []
     if total <= MARK_BELOW * where.size:
@@ -297,11 +354,9 @@ def _marks(axes, x, y, where, label, paper=False, colour="white"):
         axes.plot(x.values[i], y.values[j], markersize=4, **ring)
         return [Line2D([], [], markersize=6, label=label, **ring)]
     if colour == "white":
-        some = _thinned(where)
         # one more cell all round, or the hatching would end at the centres of the outermost cells
-        wide = np.pad(where[some].T.astype(float), 1, mode="edge")
-        x, y = _widened(x.values[some[0]]), _widened(y.values[some[1]])
-        axes.contourf(x, y, wide, levels=[0.5, 1.5], colors="none", hatches=["xxx"])
+        wide = np.pad(where.T.astype(float), 1, mode="edge")
+        axes.contourf(_widened(x.values), _widened(y.values), wide, levels=[0.5, 1.5], colors="none", hatches=["xxx"])
         return [Patch(facecolor="white", edgecolor="grey", hatch="xxx", label=label)]
     return [Patch(facecolor=colour, label=label)]
 
@@ -315,13 +370,13 @@ def _widened(values):
 def _curve(axes, ds, variable, state, paper):
     x = variable[variable.dims[0]]
     if "flag_values" in variable.attrs:
-        palette = colours_of(flag_codes(variable.attrs))
-        for height, (name, code) in enumerate(flag_codes(variable.attrs).items()):
-            here = x.values[variable.values == code]
-            colour = palette.get(name, "#444444")
-            axes.plot(here, np.full(here.size, height), "s", markersize=4, color=colour)
-        names = [name.replace("_", " ") for name in flag_codes(variable.attrs)]
-        axes.set_yticks(range(len(names)), names, fontsize=8)
+        shown, table, palette = _kinds(ds, variable, state)
+        # all flags, of the other kinds those that occur
+        names = [name for name, code in table.items() if name in flag_codes(variable.attrs) or (shown == code).any()]
+        for height, name in enumerate(names):
+            here = x.values[(shown == table[name]).filled(False)]
+            axes.plot(here, np.full(here.size, height), "s", markersize=4, color=palette[name])
+        axes.set_yticks(range(len(names)), [name.replace("_", " ") for name in names], fontsize=8)
     else:
         label = textwrap.fill(variable.attrs.get("long_name", variable.name), 60)
         label = f"${variable.attrs.get('symbol') or variable.name}$" if paper else label
@@ -335,22 +390,54 @@ def _curve(axes, ds, variable, state, paper):
     axes.set(xlabel=label_of(x), ylabel=label_of(variable))
     handles = axes.get_legend_handles_labels()[0]
     if handles and paper:
-        _legend(axes, handles, paper)
+        _legend(axes, handles)
     elif handles:
         axes.legend(fontsize=8)
     if logarithmic(x.values):
         axes.set_xscale("log")
 
 
-def _legend(axes, handles, paper):
-    """Below: of the figure where the axes fill it, else of the axes."""
-    columns = 2 if paper and axes.figure.get_size_inches()[0] < 5 else 4
-    look = {"handles": handles, "frameon": False, "fontsize": 8, "ncols": min(columns, len(handles))}
-    alone = [other for other in axes.figure.axes if other.get_label() != "<colorbar>"] == [axes]
-    if alone and axes.figure.get_constrained_layout():
-        axes.figure.legend(loc="outside lower center", **look)
-    else:
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), **look)
+def _room(axes, most):
+    """Width and height for what stands in the middle of the axes' sides: in the figure, `most` times the axes' own."""
+    own, whole = axes.get_window_extent(), axes.figure.bbox
+    x, y = 0.5 * (own.x0 + own.x1), 0.5 * (own.y0 + own.y1)
+    width, height = 2 * min(x - whole.x0, whole.x1 - x), 2 * min(y - whole.y0, whole.y1 - y)
+    return min(width, most * own.width), min(height, most * own.height)
+
+
+def wrap(text, room):
+    """Break the lines of a matplotlib Text, laid out, that are longer than `room` pixels; formulas stay whole."""
+    said = text.get_text()
+    for number in range(max(map(len, said.split("\n"))), 9, -3):
+        box = text.get_window_extent()
+        if (box.height if text.get_rotation() else box.width) <= SPARE * room:
+            return
+        lines = [re.sub(r"\$[^$]*\$", lambda formula: formula[0].replace(" ", "\0"), line) for line in said.split("\n")]
+        wrapped = [textwrap.fill(line, number, break_long_words=False, break_on_hyphens=False) for line in lines]
+        text.set_text("\n".join(wrapped).replace("\0", " "))
+
+
+def _alone(axes):
+    """Has the figure no other axes, but for colour bars?"""
+    return [other for other in axes.figure.axes if other.get_label() != "<colorbar>"] == [axes]
+
+
+def _legend(axes, handles):
+    """Below: of the figure where the axes fill it, else of the axes; in as many columns as there is room for."""
+    own = _alone(axes) and axes.figure.get_constrained_layout()
+    # of its own, a legend's frame, which is not seen, may reach beyond the figure
+    room = 1.02 * axes.figure.bbox.width if own else BESIDE * axes.get_window_extent().width
+    look = {"handles": handles, "frameon": False, "fontsize": 8}
+    below = axes.transAxes + ScaledTranslation(0, -0.5, axes.figure.dpi_scale_trans)  # inches: ticks and label
+    for columns in range(min(4, len(handles)), 0, -1):
+        if own:
+            legend = axes.figure.legend(loc="outside lower center", ncols=columns, **look)
+        else:
+            place = {"loc": "upper center", "bbox_to_anchor": (0.5, 0), "bbox_transform": below}
+            legend = axes.legend(**place, ncols=columns, **look)
+        if columns == 1 or legend.get_window_extent().width <= room:
+            return
+        legend.remove()
 
 
 def limits(shown):

@@ -22,6 +22,7 @@ def load(package, name, what):
 
 def unknown(what, name, known):
     """One line for an unknown name: what it is, the nearest known one, and all that are allowed."""
-    near = get_close_matches(str(name), known, n=1, cutoff=0.5)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
+    same = {other.lower(): other for other in known}
+    near = get_close_matches(str(name).lower(), same, n=1, cutoff=0.5)
+    hint = f"; did you mean {same[near[0]]!r}?" if near else ""
     return f"unknown {what} {name!r}{hint} (allowed: {', '.join(known) or 'none'})"

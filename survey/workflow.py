@@ -135,6 +135,7 @@ def check(data, text="", output=None, default_path="survey.nc", near=None):
     try:
         file = File.model_validate(data)
     except ValidationError as error:
+        _check_names(data, given_scene, near)
         raise BadInput(_one_line(error)) from None
     name, scene = own.find(given_scene, near)
     numbers = {p.name for p in scene.PARAMETERS if p.number_option and _is_number(file.options.get(p.name))}
@@ -168,6 +169,22 @@ def check(data, text="", output=None, default_path="survey.nc", near=None):
     )
 
 
+def _check_names(data, scene, near):
+    """Raise BadInput for an unknown scene or parameter: what is missing below a wrong name is no help."""
+    axes = data.get("axes")
+    if not isinstance(data.get("scene"), str) or not isinstance(axes, Mapping) or set(data) - set(File.model_fields):
+        return
+    name, scene = own.find(scene, near)
+    known = [p.name for p in scene.PARAMETERS]
+    for key in axes:
+        if key not in known and key not in {option.name for option in scene.OPTIONS}:
+            raise BadInput(f"axes.{key}: {_unknown_parameter(name, key, known)}")
+
+
+def _unknown_parameter(scene, key, known):
+    return modules.unknown(f"parameter of scene {scene}", key, known)
+
+
 def _is_number(value):
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
@@ -199,7 +216,7 @@ def _check_closed(measure, name, asked, sizes):
     if refusal:
         raise BadInput(f"boundaries: of {name} {refusal}; change the axes, or leave the table out")
     if asked.axis is not None:
-        raise BadInput(f"boundaries.axis: the curves of {name} are closed forms, no axis is searched; leave it out")
+        raise BadInput(f"boundaries.axis: the curves of {name} are of the whole map: no axis is searched; leave it out")
     for key in axes[:2]:
         if sizes[key] < 2:
             raise BadInput(f"boundaries: the axis {key} has one value, and curves need a range; give two or more")
@@ -287,7 +304,7 @@ def check_parameters(scene, name, options, given, table=""):
                 raise BadInput(f"{table}{key} is an option of {name}, not a parameter; put it under [options]")
             if key in all_of:
                 raise BadInput(f"{table}{key} does not go with the rest{condition(scene, all_of[key].when, key)}")
-            raise BadInput(f"{table}{key}: {modules.unknown(f'parameter of {name}', key, list(known))}")
+            raise BadInput(f"{table}{key}: {_unknown_parameter(name, key, list(known))}")
         original = known[key].instead_of or key
         if original in replaced:
             raise BadInput(f"{table}{replaced[original]} and {table}{key} say the same thing; give only one of them")
@@ -423,7 +440,10 @@ def _apply(data, override):
 
 def _one_line(error):
     """The first complaint of pydantic (an unknown key before a missing one) as one line: key, value, allowed."""
-    first = min(error.errors(), key=lambda complaint: complaint["type"] != "extra_forbidden")
+    extra = "extra_forbidden"
+    first = min(
+        error.errors(), key=lambda one: (one["type"] != extra, one["type"] == extra and one["loc"][-1] == "values")
+    )
     tag = 2 if first["loc"][0] in ("axes", "refine") else None  # pydantic names the kind of axis after the axis
     key = ".".join(str(part) for i, part in enumerate(first["loc"]) if i != tag)
     more = "" if error.error_count() == 1 else f" (and {error.error_count() - 1} more)"
@@ -435,6 +455,9 @@ def _one_line(error):
         return f"{key} is missing; add it to the workflow{more}"
     if key.startswith("axes.") and isinstance(first["input"], list):
         return f"{key} is a list; write {key.removeprefix('axes.')} = {{ values = [...] }}{more}"
+    if first["type"] == "list_type":
+        such = "[0.1, 0.2]" if key.startswith("axes.") else '["NAME"]'
+        return f"{key} = {first['input']!r}: it must be a list, such as --set '{key}={such}' (quoted so){more}"
     said = first["msg"].partition(" or instance of")[0].replace("dictionary", "table")
     return f"{key} = {first['input']!r}: {said[0].lower()}{said[1:]}{more}"
 

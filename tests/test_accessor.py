@@ -1,17 +1,20 @@
 """`ds.survey`: each question asked of small surveys, and its answer compared with something it was not made from."""
 
+import json
 import math
 import os
 import subprocess
 import sys
+from importlib.resources import files
 from pathlib import Path
 
 import dask.array as da
 import matplotlib
+import mpmath
 import numpy as np
 import pytest
 import xarray as xr
-from scipy import integrate, linalg, special
+from scipy import special
 
 import survey
 from survey import status
@@ -19,7 +22,7 @@ from survey.errors import BadInput
 from survey.scenes import gyrostat
 
 matplotlib.use("Agg")
-GYROSTAT = {"b12": 0.7, "b31": -0.4, "d": 1.1, "c23": 0.3, "s2": 0.5, "s3": -0.2}
+GYROSTAT = "b12", "b31", "d", "c23", "s2", "s3", "phi0", "w0"
 FATES = Path(__file__).parent.parent / "results/gyrostat_fate_small.nc"
 STATE = {"A": 1.0, "C": 0.5, "epsilon": 3.0, "p_theta0": 0.3}
 
@@ -41,6 +44,11 @@ def toy():
         {"verdict": (("k", "rho"), verdict, flags), "status": (("k", "rho"), state)},
         {"k": x, "rho": y}, {"scene": "satellite", "options": "body=prolate", "title": "A toy map"},
     )  # fmt: skip
+
+
+def within(value, exact, bar):
+    """Is the true error within the bar, which is no wider than some thousand roundings of the motion's size?"""
+    return abs(mpmath.mpf(float(value)) - exact) <= float(bar) < 1e-9 * (1 + abs(exact))
 
 
 def close(one, other, bar):
@@ -129,6 +137,7 @@ def test_a_fate_says_why():
         ("mathieu", {"a": 3.0, "q": 0.7}),
         ("mathieu", {"a": 1.0, "q": 0.5}),
         ("satellite", {"k": 0.5, "rho": 1.2, "body": "oblate"}),
+        ("satellite", {"amplitude": 0.974, "inertia_ratio": 0.69}),  # 173 steps would do for half a period
         ("satellite", {"one_minus_k": -0.5, "inertia_ratio": 0.6, "direction": "-1"}),
     ],
 )
@@ -160,42 +169,58 @@ def test_ones_own_equation_has_points_trajectories_and_zooms():
 
 @pytest.mark.parametrize("mu", [0.01, 0.05])
 def test_the_orbit_beside_l4_is_the_exponential_of_the_matrix(mu):
-    motion = survey.evaluate("libration", mu=mu).survey.trajectory(figure=False).isel(f=-1)
-    s = math.sqrt(1 - 3 * mu * (1 - mu))
-    matrix = np.array([[0, 0, 1, 0], [0, 0, 0, 1], [1.5 * (1 + s), 0, 0, 2], [0, 1.5 * (1 - s), -2, 0]])
-    exact = linalg.expm(matrix * float(motion.f))
-    assert close(motion.xi, exact[0, 0], float(motion.xi_error))
-    assert close(motion.eta, exact[1, 0], float(motion.eta_error))
+    motion = survey.evaluate("libration", mu=mu).survey.trajectory(figure=False)
+    with mpmath.workdps(25):
+        s = mpmath.sqrt(1 - 3 * mpmath.mpf(mu) * (1 - mpmath.mpf(mu)))
+        matrix = mpmath.matrix([[0, 0, 1, 0], [0, 0, 0, 1], [1.5 * (1 + s), 0, 0, 2], [0, 1.5 * (1 - s), -2, 0]])
+        for i in (1, motion.sizes["f"] // 2, -1):
+            exact = mpmath.expm(matrix * mpmath.mpf(float(motion.f[i])))
+            for j, name in enumerate(("xi", "eta")):
+                assert within(motion[name][i], exact[j, 0], motion[f"{name}_error"][i])
+
+
+@pytest.mark.parametrize("k", [0.3, 0.999])
+def test_the_second_solution_of_lames_equation_is_sn_within_its_bars(k):
+    motion = survey.evaluate("satellite", k=k, rho=0.0).survey.trajectory(figure=False)
+    with mpmath.workdps(25):
+        for i in range(1, motion.sizes["u"], motion.sizes["u"] // 20):
+            exact = mpmath.ellipfun("sn", mpmath.mpf(float(motion.u[i])), k=mpmath.mpf(k))
+            assert within(motion.y2[i], exact, motion.y2_error[i])
+
+
+@pytest.mark.parametrize(("a", "q"), [(3.0, 0.7), (-2.0, 4.0)])
+def test_solutions_of_mathieus_equation_are_within_their_bars(a, q):
+    motion = survey.evaluate("mathieu", a=a, q=q).survey.trajectory(figure=False, time=2.0)
+    with mpmath.workdps(25):
+        exact = mpmath.odefun(lambda t, y: [y[1], -(a - 2 * q * mpmath.cos(2 * t)) * y[0]], 0, [1, 0])
+        for i in (1, motion.sizes["t"] // 2, -1):
+            assert within(motion.y1[i], exact(mpmath.mpf(float(motion.t[i])))[0], motion.y1_error[i])
 
 
 def test_multipliers_of_the_elliptic_problem_are_those_of_its_monodromy():
     from survey.measures import libration_motion, linear_motion
 
     ds = survey.evaluate("libration_elliptic", mu=[0.01, 0.05], e=0.3)
-    for mu in (0.01, 0.05):
+    for mu in ds.mu.values:
         motion = ds.survey.trajectory(mu=mu, figure=False)
         found = np.sort_complex(motion.multiplier_real.values + 1j * motion.multiplier_imag.values)
         matrices, lengths = libration_motion.coefficients(mu, 0.3)
-        monodromy = linear_motion.fundamental(matrices, lengths, 1)[0][-1]
-        off = abs(found - np.sort_complex(np.linalg.eigvals(monodromy)))
+        _, y, bars = linear_motion.fundamental(matrices, lengths, 1)
+        point = ds.sel(mu=mu)
+        assert close(np.trace(y[-1]), point.a, np.trace(bars[-1]) + float(point.a_error))
+        off = abs(found - np.sort_complex(np.linalg.eigvals(y[-1])))
         assert (off < 1e-7 * abs(found).max() + motion.multiplier_error.max().item()).all()
         assert motion.attrs["panels"] == "plane eta xi; multipliers"
 
 
-def test_the_orbit_of_a_gyrostat_is_its_trajectory():
-    ds = survey.open(FATES)
-    start = {"phi0": float(ds.phi0[25]), "w0": float(ds.w0[20])}
-    motion = ds.survey.trajectory(time=5.0, **start).isel(t=-1)
-
-    def rates(t, state, b12, b31, d, c23, s2, s3):
-        cos, sin = math.cos(state[0]), math.sin(state[0])
-        g = -d * cos * sin - c23 * (2 * cos * cos - 1) + s2 * cos - s3 * sin  # (57)
-        return state[1], (b12 * cos - b31 * sin) * state[1] + g
-
-    known = integrate.solve_ivp(rates, (0, 5), list(start.values()), "DOP853", args=GYROSTAT.values(), rtol=1e-12,
-                                atol=1e-12).y[:, -1]  # fmt: skip
-    for name, value in zip(("phi", "w"), known, strict=True):
-        assert close(motion[name], value, float(motion[f"{name}_error"]) + 1e-9)
+def test_the_orbit_of_a_gyrostat_ends_where_its_reference_does():
+    case = json.loads((files("survey.reference") / "gyrostat_trajectories.json").read_text())["trajectories"][0]
+    numbers = [float.fromhex(case[key]) for key in ("phi0_hex", "w0_hex")]
+    given = dict(zip(GYROSTAT, [*map(float.fromhex, case["p_hex"]), *numbers], strict=True))
+    ds = survey.evaluate("gyrostat", question="trajectory", t=1.0, **given)
+    motion = ds.survey.trajectory(time=float(case["t"]), figure=False).isel(t=-1)
+    for name in ("phi", "w"):
+        assert within(motion[name], mpmath.mpf(case[name]), motion[f"{name}_error"])
 
 
 @pytest.mark.parametrize(
@@ -260,6 +285,17 @@ def test_a_zoom_is_the_same_workflow_on_a_part(tongues, tmp_path):
     assert (finer.survey.compare(written).y1_excess <= 1).all()
     row = ds.survey.slice(q=0.8).survey.zoom(a=(3.0, 4.0))
     assert row.sizes["a"] == 6 and set(row.edge_position.dims) == {"edge"} and float(row.q) == float(ds.q[1])
+
+
+def test_a_zoom_beyond_the_map_is_solved_and_said(mathieu, recwarn):
+    inside = mathieu.survey.zoom(a=(-1.0, 5.0), num=3)
+    assert not recwarn.list
+    with pytest.warns(UserWarning, match=r"zoom: a = \(4, 7\) reaches beyond the map's -1 to 5; it is solved") as said:
+        beyond = mathieu.survey.zoom(a=(4.0, 7.0), num=4)
+    assert said[0].filename == __file__ and "\n" not in str(said[0].message)
+    assert float(beyond.a.max()) == 7.0 and int(beyond.status.sum()) == 0 and inside.sizes["a"] == 3
+    with pytest.raises(BadInput, match=r"axes\.a has an end 2e\+12, outside its domain"):
+        mathieu.survey.zoom(a=(0.0, 2e12))
 
 
 def test_areas_of_points_and_cells(toy, tongues):
@@ -338,6 +374,7 @@ def test_lazy_files_are_read_in_part(mathieu, tmp_path):
         (lambda s: s.zoom(a=(2.0, 1.0)), "the lower one first"),
         (lambda s: s.zoom(a=(0.0, 1.0), num=1), "num = 1"),
         (lambda s: s.trajectory(a=1.0, q=0.5, time=-1.0), "time = -1.0"),
+        (lambda s: s.trajectory(a=1.0, q=0.5, time="20"), "time = '20': give a positive number"),
         (lambda s: s.compare(3), "give the dataset"),
         (lambda s: s.compare(survey.evaluate("mathieu", a=7.5, q=1.0)), "no value of a is in both"),
         (lambda s: s.compare(survey.evaluate("libration", mu=0.01)), "one is of the scene"),

@@ -10,7 +10,9 @@ import time
 import netCDF4
 import pytest
 
+from survey import engine, workflow
 from survey.cli import main
+from survey.kernels import jit
 
 
 def test_run_ends_with_a_file_a_digest_and_a_picture(program, small):
@@ -49,9 +51,15 @@ def test_worker_processes_give_the_same_file(program, small):
         (["run", "small.toml", "--set", "scene=gyrostats"], "did you mean 'gyrostat'"),
         (["run", "small.toml", "-o", "nowhere/out.nc"], "there is no folder 'nowhere'"),
         (["run", "small.toml", "-o", "."], "is a folder"),
-        (["run", "small.toml", "--workers", "none"], "--workers"),
-        (["run"], "Missing argument"),
-        (["runn"], "runn"),
+        (["run", "small.toml", "--workers", "none"], "integer range; see survey run --help"),
+        (["run"], "Missing argument 'WORKFLOW'; see survey run --help"),
+        (["runn"], "No such command 'runn'"),
+        (["runn"], "; see survey --help"),
+        (["plot", "small.nc", "--stile", "paper"], "--stile"),
+        (
+            ["run", "small.toml", "--set", "axes.wo.num=3"],
+            "unknown parameter of scene gyrostat 'wo'; did you mean 'w0'",
+        ),
         (["info", "absent.nc"], "absent.nc: there is no such file"),
         (["verify", "absent.nc"], "absent.nc: there is no such file"),
         (["plot", "absent.nc"], "absent.nc: there is no such file"),
@@ -67,6 +75,21 @@ def test_bad_input_is_one_line_exit_2_and_no_file(small, words, message, monkeyp
     assert ended.value.code == 2, complaint
     assert message in complaint and complaint.count("\n") == 1 and said == ""
     assert [f.name for f in small.parent.iterdir()] == ["small.toml"]
+
+
+def test_no_words_show_the_help(capsys, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["survey"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 0 and "Commands:" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("new", [True, False])
+def test_the_plan_says_what_its_time_leaves_out(small, new, monkeypatch):
+    monkeypatch.setattr(jit, "is_new", lambda: new)
+    told = engine.plan(workflow.read(small))["not_estimated"]
+    assert "writing the file" in told and "compiling" in told
+    assert ("this machine has none of them yet" in told) == new
 
 
 def test_plan_counts_what_run_does_and_calls_no_kernel(program, small):

@@ -14,7 +14,7 @@ from snippets import ROOT, fenced
 
 import survey.methods
 import survey.scenes
-from survey import cli, modules, workflow
+from survey import cli, modules, status, workflow
 
 DOCS = ROOT / "workflows/docs"
 PAGES = sorted(DOCS.glob("*.md"))
@@ -171,3 +171,31 @@ def test_notebooks_are_kept_without_outputs(path):
 
 def test_every_scene_has_its_notebook():
     assert set(modules.names(survey.scenes)) | {"own_hill", "overnight"} <= {path.stem for path in NOTEBOOKS}
+
+
+def test_every_scene_has_its_mathematics_and_its_page_shows_it(tool):
+    pages = tool("scene_pages").pages()
+    for name in modules.names(survey.scenes):
+        title = (ROOT / f"survey/scenes/{name}.md").read_text().partition("\n")[0].removeprefix("# ")
+        assert tool("scene_pages").escaped(title) in pages[f"scenes/{name}.md"], name
+
+
+def test_an_item_of_a_list_keeps_its_lines(tool):
+    """And an indented formula that stands alone is shown as it is."""
+    notes = tool("scene_pages").notes
+    shown = notes("* one,\n  and on\n* two:\n  (1) x = y\n")
+    assert shown.strip() == "* one,\n  and on\n* two:\\\n  (1) x = y"
+    assert "```text\n  x_1 = y_1\n```" in notes("so\n\n  x_1 = y_1\n\nthen")
+
+
+@pytest.mark.parametrize("page", [ROOT / "README.md", DOCS / "overnight.md"], ids=lambda path: path.stem)
+def test_the_statuses_that_count_as_failed_are_told(page):
+    (told,) = re.findall(r"Failed.*? are points with the status\s([^.]*)\.", page.read_text())
+    failures = {name for name, code in status.CODES.items() if code in status.FAILURES and name != "pending"}
+    assert set(re.findall(r"`(\w+)`", told)) == failures
+
+
+@pytest.mark.parametrize("page", [ROOT / "README.md", ROOT / "results/README.md", *PAGES], ids=lambda p: p.stem)
+def test_what_the_shell_would_change_is_quoted(page):
+    for word in re.findall(r"--set (\S+)", page.read_text()):
+        assert word.startswith("'") or not set(word) & set("[]{}*"), word

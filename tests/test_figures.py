@@ -1,9 +1,12 @@
 """Pictures: titled, labelled, with a legend; undecided and failed points are visible as such."""
 
+from itertools import pairwise
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.colors import to_hex, to_rgb
 
 import survey
 from survey import figures, status
@@ -46,7 +49,54 @@ def test_undecided_is_not_counted_where_the_point_failed(toy):
     plt.close("all")
 
 
-def test_a_large_map_is_thinned_for_the_picture_and_counted_in_full(toy, monkeypatch):
+@pytest.fixture
+def bare(toy):
+    """The toy map where 50 points have no answer by nature, as the scene says."""
+    flags = {"flag_values": np.array([0, 1, 4, 16], np.int8),
+             "flag_meanings": "ok invalid_parameters step_limit no_motion"}  # fmt: skip
+    toy["status"] = (toy.status.dims, toy.status.values, flags)
+    toy.status[10, :], toy.verdict[10, :] = status.FIRST_OF_SCENE, -1
+    return toy
+
+
+@pytest.mark.parametrize("style", ["screen", "paper"])
+def test_no_answer_by_nature_is_grey_and_told_by_its_status(bare, style):
+    figure = figures.draw(bare, style=style)
+    legend = figure.legends[0]
+    labels = [text.get_text() for text in legend.get_texts()]
+    expected = ["unstable (499)", "stable (1,349)", "no motion (50)", "undecided (1)", "failed (100)",
+                "outside the domain (1)"]  # fmt: skip
+    assert labels == (expected if style == "screen" else [label.partition(" (")[0] for label in expected])
+    patch, mesh = legend.legend_handles[2], figure.axes[0].collections[0]
+    assert to_hex(patch.get_facecolor()).upper() == figures.GREYS[0] and not patch.get_hatch()
+    drawn = mesh.cmap(mesh.norm(mesh.get_array().reshape(50, 40)))[5, [10, 12]]
+    assert [to_hex(colour).upper() for colour in drawn] == [figures.GREYS[0], figures.COLOURS[1]]
+    plt.close(figure)
+
+
+def test_no_answer_by_nature_is_grey_in_a_large_map_too(bare, monkeypatch):
+    monkeypatch.setattr(figures, "WHOLE", 20)
+    monkeypatch.setattr(figures, "CELLS", 20)
+    figure = figures.draw(bare)
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "no motion (50)" in labels and "undecided (1)" in labels
+    mesh = figure.axes[0].collections[0]
+    drawn = mesh.cmap(mesh.norm(mesh.get_array()))[2]
+    assert to_hex(drawn[5]).upper() == figures.GREYS[0] and to_hex(drawn[12]).upper() == figures.COLOURS[1]
+    plt.close(figure)
+
+
+def test_a_row_tells_no_answer_by_nature_apart(bare):
+    figure = figures.draw(bare.isel(rho=0))
+    axes = figure.axes[0]
+    names = [label.get_text() for label in axes.get_yticklabels()]
+    assert names == ["undecided", "unstable", "stable", "marginal", "no motion"]
+    assert [line.get_xdata().size for line in axes.lines[:5]] == [0, 9, 29, 0, 1]  # one is outside the domain
+    plt.close(figure)
+
+
+def test_a_large_map_is_reduced_for_the_picture_and_counted_in_full(toy, monkeypatch):
+    monkeypatch.setattr(figures, "WHOLE", 20)
     monkeypatch.setattr(figures, "CELLS", 20)
     figure = figures.draw(toy)
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
@@ -56,10 +106,15 @@ def test_a_large_map_is_thinned_for_the_picture_and_counted_in_full(toy, monkeyp
 
 
 def test_the_colours_differ_for_the_colour_blind_and_in_grey():
-    from matplotlib.colors import to_rgb
+    def grey(*colours):
+        return [np.dot(to_rgb(colour), (0.299, 0.587, 0.114)) for colour in colours]
 
-    grey = [np.dot(to_rgb(colour), (0.299, 0.587, 0.114)) for colour in (*figures.COLOURS[:2], figures.UNDECIDED)]
-    assert min(abs(a - b) for i, a in enumerate(grey) for b in grey[:i]) > 0.25
+    def apart(values):
+        return min(abs(a - b) for i, a in enumerate(values) for b in values[:i])
+
+    assert apart(grey(*figures.COLOURS[:2], figures.UNDECIDED)) > 0.25
+    assert apart(grey(figures.COLOURS[1], figures.UNDECIDED, figures.GREYS[0], "white")) > 0.15  # not hatched in print
+    assert apart(grey(*figures.GREYS)) > 0.1 and not set(figures.GREYS) & set(figures.COLOURS)
 
 
 @pytest.mark.parametrize("name", ["w", "turnings", "status"])
@@ -121,6 +176,32 @@ def test_hatching_follows_the_edges_of_cells(toy):
     middles = [0.5 * (v[1:] + v[:-1]) for v in (one.k.values, one.rho.values)]
     for corner in np.unique(path.vertices.round(12), axis=0):
         assert all(np.isclose(value, edges).any() for value, edges in zip(corner, middles, strict=True))
+
+
+LONG = "Is this motion, whose name is long, in this system, whose name is longer still, a stable one?"
+
+
+@pytest.mark.parametrize(
+    ("columns", "size", "style"), [(1, (3, 4), None), (3, (11, 4), None), (1, (3.35, 2.9), "paper")]
+)
+def test_nothing_is_clipped_in_narrow_axes(bare, columns, size, style):
+    bare.attrs["title"] = LONG
+    bare.rho.attrs["long_name"] = LONG[:60]
+    figure, panels = plt.subplots(1, columns, figsize=size, layout="constrained", squeeze=False)
+    for axes in panels[0]:
+        figures.onto(axes, bare, style=style)
+    figure.draw_without_rendering()
+    whole = figure.bbox.padded(2)
+    for axes in panels[0]:
+        legends = [axes.get_legend(), *figure.legends]
+        for text in (axes.title, axes.xaxis.label, axes.yaxis.label, *(t for g in legends if g for t in g.get_texts())):
+            box = text.get_window_extent()
+            assert not text.get_text() or (whole.x0 <= box.x0 and box.x1 <= whole.x1), text
+            assert not text.get_text() or (whole.y0 <= box.y0 and box.y1 <= whole.y1), text
+    titles = [axes.title.get_window_extent() for axes in panels[0]]
+    assert all(a.x1 <= b.x0 for a, b in pairwise(titles))
+    assert style or panels[0, 0].get_title().replace("\n", " ").startswith(LONG)
+    plt.close(figure)
 
 
 def test_a_single_number_has_no_figure(surveyed):

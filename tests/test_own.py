@@ -197,5 +197,7 @@ def test_what_is_no_scene_is_refused(folder):
         survey.evaluate(mathieu, a=1.0, q=1.0)
     with pytest.raises(BadInput, match="scene = 5: input should be a valid string"):
         workflow.check({"scene": 5, "axes": {"a": 1.0}})
+    with pytest.raises(BadInput, match=r"axes\.aa: unknown parameter of scene hill\(mathieu\) 'aa'; did you mean 'a'"):
+        workflow.check({"scene": scene(), "axes": {"aa": {"num": 3}, "q": 1.0}})
     with pytest.raises(BadInput, match="a is missing"):
         survey.evaluate(scene(), q=1.0)

@@ -75,6 +75,8 @@ def test_a_scene_describes_itself(scene, options):
     )
     names = [p.name for p in scene.PARAMETERS]
     assert len(set(names)) == len(names) and all(p.long_name and p.symbol for p in scene.PARAMETERS)
+    flags = {name for o in scene.OUTPUTS if o.name == "verdict" and exists(o, options) for name in o.flags}
+    assert not flags & set(status.table(scene)), "counts and legends could not tell the two apart"
     for parameter in scene.PARAMETERS:
         assert parameter.name in scene.__doc__, f"the docstring does not tell of {parameter.name}"
         assert parameter.instead_of in (None, *names)

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 import survey
-from survey import engine, store, workflow
+from survey import dataset, engine, status, store, workflow
 from survey.errors import BadInput, Damaged, Stopped
 
 
@@ -50,6 +50,23 @@ def test_counts_that_do_not_match_the_data_are_found(copy):
     ds.attrs["status_counts"] = "ok: 23, overflow: 1"
     ds.to_netcdf(copy)
     assert any("status_counts" in complaint for complaint in store.check(copy))
+
+
+def test_a_point_without_an_answer_is_counted_by_its_status(copy):
+    """Older files tell it as undecided: they are sound as well."""
+    os.remove(f"{copy}.sha256")
+    ds = xr.load_dataset(copy)
+    flags = {"flag_values": np.array([-1, 1], np.int8), "flag_meanings": "undecided stable"}
+    ds["verdict"] = xr.ones_like(ds.status).assign_attrs(flags)
+    ds["verdict"][0], ds["status"][0, :2] = -1, status.STEP_LIMIT
+    bare = ds.sizes[ds.status.dims[1]]
+    ds = dataset.count(ds)
+    assert ds.attrs["verdict_counts"] == f"undecided: {bare - 2}, stable: {ds.status.size - bare}, step_limit: 2"
+    for told in (ds.attrs["verdict_counts"], f"undecided: {bare}, stable: {ds.status.size - bare}"):
+        ds.assign_attrs(verdict_counts=told).to_netcdf(copy)
+        assert not [complaint for complaint in store.check(copy) if "counts" in complaint]
+    ds.assign_attrs(verdict_counts=f"stable: {ds.status.size}").to_netcdf(copy)
+    assert any("verdict_counts" in complaint for complaint in store.check(copy))
 
 
 def test_an_incomplete_or_foreign_file_is_refused(copy, tmp_path):

@@ -17,6 +17,7 @@ import pytest
 import viewer as picture
 import xarray as xr
 
+import survey
 from survey import status
 from survey.analysis.point import reading
 from survey.errors import BadInput
@@ -45,6 +46,12 @@ def made(x, y, seed=0):
     return xr.Dataset(data, {"x": x, "y": y})
 
 
+def whole(layer):
+    """The layer, all of its map read."""
+    assert layer.overview.complete.share == 1
+    return layer
+
+
 def uneven(number):
     return np.cumsum(np.random.default_rng(1).uniform(0.1, 1.0, number))
 
@@ -66,7 +73,7 @@ def test_every_point_is_in_the_pixel_where_it_lies(axes, direct, sizes, monkeypa
     ds = made(*axes)
     layer = raster.Layer(ds, "verdict", ("x", "y"), {})
     xs, ys = (axis.pixels(*axis.ends, size) for axis, size in zip(map(raster.Axis, axes), sizes, strict=True))
-    mask, value = layer.pixels(xs, ys)
+    mask, value = whole(layer).pixels(xs, ys)
     assert mask.shape == sizes[::-1] and value is None
     factors = (1, 1) if direct else [-(-a.size // 90) for a in axes]
     for kind, where in (("undecided", (ds.verdict == -1) & (ds.status == 0)), ("failed", ds.status != 0)):
@@ -90,11 +97,10 @@ def test_a_pixel_of_numbers_shows_the_largest_magnitude_of_its_points():
     ds["value"][50:60, 50:60] = np.nan
     for overview in (False, True):
         layer = raster.Layer(ds, "value", ("x", "y"), {})
-        layer.__dict__.pop("_overview", None)
         xs, ys = (raster.Axis(ds[dim].values).pixels(-0.5, ds[dim].size - 0.5, ds[dim].size // 10) for dim in "xy")
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(raster, "DIRECT", 0 if overview else 10**9)
-            _, value = layer.pixels(xs, ys)
+            _, value = whole(layer).pixels(xs, ys)
         good = ds.value.where(ds.status == 0).values.astype(np.float32)
         blocks = good.reshape(12, 10, 9, 10).transpose(2, 0, 1, 3).reshape(9, 12, 100)
         largest = np.nan_to_num(np.abs(blocks), nan=-1.0).argmax(axis=-1)
@@ -109,14 +115,63 @@ def test_the_rarest_kind_is_seen_and_undecided_and_failed_before_all():
     layer = raster.Layer(ds, "verdict", ("x", "y"), {})
     xs, ys = (raster.Axis(ds[dim].values).pixels(-0.5, ds[dim].size - 0.5, 80) for dim in "xy")
     mask, _ = layer.pixels(xs, ys)
-    image = raster.paint(mask, None, layer).view(np.uint8).reshape(80, 80, 4)
+    image, kinds = raster.paint(mask, None, layer)
+    image = image.view(np.uint8).reshape(80, 80, 4)
     colours = {"undecided": (0, 0, 0), "failed": (255, 255, 255), "marginal": (0xE6, 0x9F, 0x00)}
     for kind, colour in colours.items():
         where = (mask & layer.bits[kind]) != 0
         seen = (image[..., :3] == colour).all(axis=-1)
         lines = (image[..., :3] == 0x77).all(axis=-1)  # the hatching of what failed
         assert where.any() and (seen | lines)[where].all() and not seen[~where].any()
-    assert list(raster.rarest(mask, layer))[-2:] == ["undecided", "failed"]
+    assert list(kinds)[-2:] == ["undecided", "failed"]
+
+
+@pytest.mark.parametrize("name", ["verdict", "value"])
+def test_what_is_not_read_yet_is_not_drawn_and_what_is_drawn_is_true(name, monkeypatch):
+    monkeypatch.setattr(raster, "DIRECT", 0)
+    monkeypatch.setattr(raster, "OVERVIEW", 100)
+    ds = made(np.arange(1000.0), np.arange(300.0))
+    ds[name].encoding["chunksizes"] = (47, 30)
+    layer, last = (raster.Layer(ds, name, ("x", "y"), {}) for _ in range(2))
+    xs, ys = (raster.Axis(ds[dim].values).pixels(-0.5, ds[dim].size - 0.5, 60) for dim in "xy")
+    true_mask, true_value = whole(last).pixels(xs, ys)
+    drawn = []
+    while layer.waits(xs, ys):
+        layer.overview.read()
+        mask, value = layer.pixels(xs, ys)
+        known = (mask & layer.bits["not read yet"]) == 0
+        np.testing.assert_array_equal(mask[known], true_mask[known])
+        if value is not None:
+            np.testing.assert_array_equal(value[known], true_value[known])
+        image, kinds = raster.paint(mask, value, layer)
+        background = np.array([0xF4, 0xF4, 0xF4, 0xFF], np.uint8).view(np.uint32)
+        assert (image[~known] == background).all() and (("not read yet" in kinds) == (not known.all()))
+        drawn.append(known.mean())
+    assert len(drawn) == 22 and drawn[1] < 0.15 and drawn[-1] == 1 and sorted(drawn) == drawn
+    assert layer.limits == last.limits if name == "value" else layer.overview.number == last.overview.number
+
+
+def test_no_answer_by_nature_is_grey_and_told_by_its_status(tmp_path):
+    """A map of Brun's problem: below the least effective potential there is no motion."""
+    ds = survey.evaluate("brun", l=np.linspace(-1, 1, 12), beta=np.linspace(-1, 1, 10), alpha=0.1, sign="1")
+    bare = ds.status.values == status.FIRST_OF_SCENE
+    layer = raster.Layer(ds, "verdict", ("l", "beta"), {})
+    xs, ys = (raster.Axis(ds[dim].values).pixels(-2, 2, 400) for dim in ("l", "beta"))
+    mask, _ = layer.pixels(xs, ys)
+    image, kinds = raster.paint(mask, None, layer)
+    seen = image.view(np.uint8).reshape(*mask.shape, 4)[..., :3]
+    grey = (seen == 0x80).all(axis=-1)
+    np.testing.assert_array_equal(grey, bare[np.ix_(xs.starts, ys.starts)].T)
+    assert 0 < grey.sum() < grey.size and set(kinds) == {"no_motion", "regular_nutation"}
+    told = ds.attrs["verdict_counts"]
+    assert told == f"regular_nutation: {(~bare).sum()}, no_motion: {bare.sum()}"
+    ds.attrs["complete"] = 1
+    ds.to_netcdf(tmp_path / "map.nc")
+    shown = Map(tmp_path / "map.nc")
+    assert shown.shares("verdict")["no_motion"] == f" ({bare.sum()} in all)"
+    lines = list(shown.under(shown.read(""), (0, 0)))
+    assert any("no_motion: " in line for line in lines) and not any("undecided" in line for line in lines)
+    assert "undecided" not in str(ds.survey.point(l=-1, beta=-1))
 
 
 def test_of_a_refined_map_each_cell_is_seen_where_it_lies():
@@ -158,7 +213,7 @@ def test_a_falling_axis_is_drawn_rising(tmp_path):
         view = shown.read("var=exponent")
         pixels = [axis.pixels(*axis.ends, 60) for axis in shown.axes]
         mask, value = shown.layer(view).pixels(*pixels)
-        images.append(raster.paint(mask, value, shown.layer(view)))
+        images.append(raster.paint(mask, value, shown.layer(view))[0])
     np.testing.assert_array_equal(*images)
 
 

@@ -90,7 +90,9 @@ def draw_verdict(ds, path):
         colour = "black" if definite else "grey"
         marks.vlines(float(value.mu), value.order, 9.4, color=colour, lw=0.6, alpha=0.5, ls="-" if definite else ":")
         marks.plot(float(value.mu), value.order, "o", ms=5, color=colour, mfc=colour if definite else "white")
-        place = {"xytext": (4, 4 if definite else -10)}
+        left = value.mu > 0.0375  # no room to the right; and in order 7 none above, where (3, 4, 0) stands
+        above = definite and not (left and value.order == 7)
+        place = {"xytext": (-4 if left else 4, 4 if above else -10), "ha": "right" if left else "left"}
         marks.annotate(value.symbol, (float(value.mu), value.order), textcoords="offset points", fontsize=7.5,
                        color=colour, **place)  # fmt: skip
     marks.set(ylabel="order", ylim=(9.4, 2.4), yticks=range(3, 9))

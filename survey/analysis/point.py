@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from survey import modules, own, status
-from survey.dataset import error_bars, fill_of, flag_codes, options_of
+from survey.dataset import UNDECIDED, error_bars, fill_of, flag_codes, options_of
 from survey.errors import BadInput
 
 # Attributes that tell of a whole file.
@@ -114,9 +114,9 @@ class Point:
         return "\n".join([self.dataset.attrs.get("title", self.dataset.attrs["scene"]), *lines])
 
     def _repr_html_(self):
-        cell = "<td style='text-align:left;vertical-align:top'>"
         rows = "".join(
-            "<tr>" + "".join(f"{cell}{html.escape(text)}</td>" for text in row) + "</tr>" for row in self._rows()
+            "<tr>" + _cell(name) + (_cell(value) + _cell(about) if about else _cell(value, 2)) + "</tr>"
+            for name, value, about in self._rows()
         )
         title = html.escape(self.dataset.attrs.get("title", self.dataset.attrs["scene"]))
         return f"<table><caption>{title}</caption>{rows}</table>"
@@ -124,7 +124,7 @@ class Point:
     def _rows(self):
         """(name, value, what it is) of everything; words have nothing in the third place."""
         ds = self.dataset
-        if self.verdict:
+        if self.verdict and has_verdict(ds):
             yield "verdict", self.verdict, ""
         yield "why", self.why, ""
         if int(ds.status) == status.OK:
@@ -138,6 +138,10 @@ class Point:
         for name, variable in ds.data_vars.items():
             if not name.endswith("_error") and name not in ("verdict", "status"):
                 yield from _outputs(ds, name, variable, name in bars)
+
+
+def _cell(text, columns=1):
+    return f"<td colspan='{columns}' style='text-align:left;vertical-align:top'>{html.escape(text)}</td>"
 
 
 def values(ds):
@@ -155,6 +159,11 @@ def _scene(ds):
         return own.find(own.of_dataset(ds))[1]
     except BadInput:
         return None
+
+
+def has_verdict(ds):
+    """Has the point a verdict, be it undecided? Else its status says why there is no answer."""
+    return int(ds.status) == status.OK or int(ds.verdict) != UNDECIDED
 
 
 def sentence(ds):

@@ -6,7 +6,7 @@ cylinder among its neighbours; `plane x y`, a path; `sphere x y z`, a path on th
 
 import numpy as np
 
-from survey.figures import COLOURS, label_of
+from survey.figures import COLOURS, label_of, wrap
 
 LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 GREY = "#999999"
@@ -18,7 +18,8 @@ def draw(ds, figure):
     for i, (kind, *names) in enumerate(panels):
         more = {"projection": "3d"} if kind == "sphere" else {}
         KINDS[kind](figure.add_subplot(1, len(panels), i + 1, **more), ds, *names)
-    figure.suptitle("\n".join(part for part in (ds.attrs["title"], ds.attrs["where"]) if part), fontsize=10)
+    title = figure.suptitle("\n".join(part for part in (ds.attrs["title"], ds.attrs["where"]) if part), fontsize=10)
+    wrap(title, figure.bbox.width)
 
 
 def _lines(axes, ds, x, *names):
@@ -46,7 +47,8 @@ def _multipliers(axes, ds):
         axes.plot(x[where], y[where], look, ms=6, mfc=COLOURS[1] if look == "o" else COLOURS[0], mec="black")
     axes.axhline(0.0, color=GREY, lw=0.6, zorder=0)
     axes.axvline(0.0, color=GREY, lw=0.6, zorder=0)
-    axes.set(xlabel=r"$\mathrm{Re}\,\lambda$", ylabel=r"$\mathrm{Im}\,\lambda$", aspect="equal")
+    axes.set(xlabel=r"$\mathrm{Re}\,\lambda$", ylabel=r"$\mathrm{Im}\,\lambda$")
+    axes.set_aspect("equal", adjustable="datalim")
     far = np.abs([x, y]).max()
     axes.set_title(f"multipliers, error bars to {off.max():.1g}", fontsize=9)
     if far > 30:  # one multiplier is far out: no circle would be seen
@@ -81,7 +83,8 @@ def _plane(axes, ds, x, y):
     axes.plot(ds[x], ds[y], lw=0.8, color=LINES[0])
     axes.plot(ds[x].values[0], ds[y].values[0], "o", color=LINES[1], mec="black", ms=6)
     axes.plot(0, 0, "+", color="black", ms=8)
-    axes.set(xlabel=f"${ds[x].attrs['symbol']}$", ylabel=f"${ds[y].attrs['symbol']}$", aspect="equal")
+    axes.set(xlabel=f"${ds[x].attrs['symbol']}$", ylabel=f"${ds[y].attrs['symbol']}$")
+    axes.set_aspect("equal", adjustable="datalim")
 
 
 def _sphere(axes, ds, x, y, z):

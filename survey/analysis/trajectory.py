@@ -12,7 +12,7 @@ from survey.scene import exists
 
 def solve(point, time=None):
     """The motion at `point` (a dataset of one point), a Dataset whose attribute `panels` says how it is drawn."""
-    if time is not None and not (np.isfinite(time) and time > 0):
+    if time is not None and not (np.asarray(time).dtype.kind in "iuf" and np.ndim(time) == 0 and 0 < time < np.inf):
         raise BadInput(f"time = {time!r}: give a positive number, how long the motion is followed")
     name, scene = own.find(own.of_dataset(point))
     make = getattr(scene, "trajectory", None)

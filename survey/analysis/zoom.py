@@ -1,6 +1,7 @@
 """A finer sweep of a part of a map, the same workflow otherwise."""
 
 import tomllib
+import warnings
 
 import numpy as np
 
@@ -12,10 +13,12 @@ from survey.grid import coordinates, logarithmic
 
 def sweep(ds, ranges, num=None, output=None):
     """The dataset of the finer map, in memory; or written by `survey.run` where there is an `output`."""
-    data = _workflow(ds, _ranges(ds, ranges), num)
+    ranges = _ranges(ds, ranges)
+    data = _workflow(ds, ranges, num)
+    checked = workflow.check(data, output=output, default_path="zoom.nc")
+    _warn(ds, ranges)
     if output is not None:
         return api.run(data, output=output)
-    checked = workflow.check(data, default_path="zoom.nc")
     found = engine.compute(checked.grid, checked.scene, checked.request)
     finer = count(describe(checked.grid, checked.scene, checked.name, checked.request, found))
     for beside in engine.extras(checked, lambda name, make: make()):
@@ -34,6 +37,17 @@ def _ranges(ds, ranges):
         if np.shape(ends) != (2,) or not np.isfinite(np.asarray(ends, float)).all() or not ends[0] < ends[1]:
             raise BadInput(f"{name} = {ends!r}: give two numbers, the lower one first, such as {name}=(0.1, 0.2)")
     return {name: (float(low), float(high)) for name, (low, high) in ranges.items()}
+
+
+def _warn(ds, ranges):
+    """One warning for ranges that reach beyond the map: where the parameters' domains allow it, they are solved."""
+    told = []
+    for name, (low, high) in ranges.items():
+        least, most = float(ds[name].min()), float(ds[name].max())
+        if low < least or high > most:
+            told.append(f"{name} = ({low:g}, {high:g}) reaches beyond the map's {least:g} to {most:g}")
+    if told:
+        warnings.warn(f"zoom: {'; '.join(told)}; it is solved there too", stacklevel=4)
 
 
 def _workflow(ds, ranges, num):

@@ -32,6 +32,7 @@ from survey.kernels.nutation import (
     barrier,
     find,
     looseness,
+    saddle,
 )
 from survey.kernels.quartic import UNIT, slope
 from survey.kernels.sines import sin_cos
@@ -162,6 +163,18 @@ def heights_of_states(points, heights):
         loose = looseness(a, b, abs(level[0]) + 2.0 * abs(k[0]) * u[0] * u[0])
         found = barrier(a, b, k, about_equator(a, b, level, k), loose, at_plus[0], at_minus[0])
         heights[i, 0], heights[i, 1], heights[i, 2] = found[0], found[1], abs(k[0])
+
+
+@kernel
+def saddles_of_states(points, u, bars):
+    """u of the saddle at the momenta of each state, in columns (7, n), and its bar; NaN where there is none."""
+    for i in range(len(u)):
+        b, a = points[5, i], points[6, i]
+        k = points[2, i] * points[0, i] * (points[0, i] - points[1, i])
+        u[i], rise = saddle(a, b, k)
+        rough = (abs(a) + abs(b * u[i])) * (abs(b) + abs(a * u[i])) + k * abs(u[i])
+        bars[i] = 8.0 * EPS * rough / rise if rise > 0.0 else np.nan
+        u[i] = u[i] if rise > 0.0 else np.nan
 
 
 @kernel

@@ -8,7 +8,7 @@ from survey.measures import linear_motion
 from survey.scene import Trajectory
 
 PERIODS, GROWTH = 6, 7.0  # so many periods, but not beyond e^7
-PHASE, LEAST, MOST = 0.05, 240, 20_000  # radians per step; steps per period
+PHASE, LEAST, MOST = 0.05, 240, 20_000  # radians per step; steps per period, and half of them, are even
 
 
 def solve(problem, answer, time, name="t"):
@@ -16,12 +16,13 @@ def solve(problem, answer, time, name="t"):
     period = float(answer["period"])
     periods = _number(float(answer["exponent"])) if time is None else max(1, ceil(time / period))
     fastest = np.sqrt(float(problem.bound[0] @ abs(problem.p[0, 0]) ** np.arange(3)))
-    steps = int(np.clip(fastest * period / PHASE, LEAST, MOST)) // 2 * 2
-    z, lengths = _sampled(problem, steps if problem.whole else steps // 2)
+    steps = int(np.clip(fastest * period / PHASE, LEAST, MOST)) // 4 * 4
+    z, size, lengths = _sampled(problem, steps if problem.whole else steps // 2)
     matrices = np.zeros((*z.shape, 2, 2))
     matrices[..., 0, 1], matrices[..., 1, 0] = 1.0, -z
-    y, bars = linear_motion.fundamental(matrices, lengths, periods)
-    t = np.concatenate([[0.0], np.cumsum(np.tile(lengths, periods))])
+    terms = abs(matrices[:, 0])
+    terms[:, 1, 0] = size
+    t, y, bars = linear_motion.fundamental(matrices, lengths, periods, np.array([1.0, max(fastest, 1.0)]), terms)
     if time is not None:
         kept = t <= time * (1 + 1e-12)
         t, y, bars = t[kept], y[kept], bars[kept]
@@ -43,10 +44,12 @@ def _number(exponent):
 
 
 def _sampled(problem, steps):
-    """z at the nodes of all steps of a period (steps, 9), and their lengths."""
+    """z at the nodes of all steps of a period (steps, 9), the size of the terms whose sum it is, and their lengths."""
     c0, c1 = problem.sample(np.array([0]), linear_motion.NODES, steps)[0].transpose(1, 0, 2)
     p, lengths = problem.p[0, 0], problem.lengths(np.array([0]), steps)[0]
     z = c0 + p * c1 + p * p * problem.c2
+    size = (abs(c0) + abs(p * c1) + p * p * problem.c2).max(axis=1)
     if problem.whole:
-        return z, lengths
-    return np.concatenate([z, linear_motion.mirrored(z)]), np.concatenate([lengths, lengths[::-1]])  # z(T - t) = z(t)
+        return z, size, lengths
+    z = np.concatenate([z, linear_motion.mirrored(z)])  # z(T - t) = z(t)
+    return z, np.concatenate([size, size[::-1]]), np.concatenate([lengths, lengths[::-1]])

@@ -17,8 +17,7 @@ def orbit(mu, e, time):
     """f, xi and eta, from rest in xi = 1, up to f = `time`, with their bars, as `Trajectory.data` holds them."""
     matrices, lengths = coefficients(mu, e)
     turns = int(np.clip(ceil(time / (2 * pi) - 1e-9), 1, MOST))
-    y, bars = linear_motion.fundamental(matrices, lengths, turns)
-    f = np.concatenate([[0.0], np.cumsum(np.tile(lengths, turns))])
+    f, y, bars = linear_motion.fundamental(matrices, lengths, turns)
     kept = f <= time * (1 + 1e-12)
     data = {"f": ("f", f[kept], {"long_name": "true anomaly", "symbol": "f", "units": "rad"})}
     for i, name in enumerate(("xi", "eta")):

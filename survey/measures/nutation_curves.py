@@ -1,5 +1,7 @@
 """The bifurcation set of nutations on a map of two of the scaled integrals l, alpha, beta, in closed form.
 
+On maps of initial states the same curves are level curves, see `nutation_levels`.
+
 Regular precessions are the surface (S18) of `nutation_sheets`, which a map cuts in curves. They are stable, and a well
 begins, where A^2 omega_n^2 / |k| = y^2 + z^2 - s (1 - 3 y^2 z^2) is positive; where it is negative they are saddles,
 the separatrices; where it is 0 the sheets meet in cusps (k > 0). The surface ends, and for k < 0 threads go on without
@@ -15,6 +17,7 @@ from itertools import pairwise, product
 import numpy as np
 
 from survey.kernels.nutation import EPS, TINY
+from survey.measures import nutation_levels as levels
 from survey.measures.nutation_sheets import parts, surface
 from survey.scene import Output
 
@@ -53,13 +56,18 @@ class Curves:
 
 def refusal(axes):
     """Why there are no curves on a map of these axes, in words; None if there are."""
-    if len(axes) in (2, 3) and set(axes) <= set(AXES):
+    if len(axes) in (2, 3) and (set(axes) <= set(AXES) or set(axes) <= set(levels.STATE)):
         return None
-    return f"curves are known on two axes of {', '.join(AXES)}, or all three, not on {', '.join(axes) or 'none'}"
+    return (
+        f"curves are known on two or three axes of {', '.join(AXES)} or of {', '.join(levels.STATE)}, "
+        f"not on {', '.join(axes) or 'none'}"
+    )
 
 
 def closed(square, axes, fixed, options):
-    """The Curves on the map of `axes` (two of AXES), the unit square `square`; `fixed` holds the third."""
+    """The Curves on the map of `axes`, the unit square `square`; `fixed` holds the other parameters."""
+    if not set(axes) <= set(AXES):
+        return _of_states(square, axes, fixed)
     s = float(options["sign"])
     third = next(name for name in AXES if name not in axes)
     value = float(fixed[third])
@@ -68,6 +76,32 @@ def closed(square, axes, fixed, options):
         found += _traced(part, square, axes, s)
     found += _uprights(third, value, s, square, axes) + _passages(third, value, s, square, axes)
     return _joined(found, square, axes)
+
+
+def _of_states(square, axes, fixed):
+    """The Curves on a map of initial states."""
+    count, kinds, places, errors, known = [], [], [], [], []
+    for function, x, error, columns in levels.traced(square, axes, fixed):
+        here = _nowhere(len(x)) | levels.along(function, columns)
+        kind = np.full(len(x), PASSAGE if function in (levels.upper_pole, levels.lower_pole) else SADDLE)
+        if function is levels.precession:
+            kind[here["nutation_square"][0] > 0.0] = STABLE
+        for part in np.split(np.arange(len(x)), 1 + np.flatnonzero(np.diff(kind))):
+            count.append(part.size)
+            kinds.append(kind[part[0]])
+        places.append(square.places(x))
+        errors.append(error)
+        known.append(here)
+    return Curves(
+        count=np.array(count, int),
+        kind=np.array(kinds, int),
+        places=np.concatenate([np.zeros((0, 2)), *places]),
+        error=np.concatenate([np.zeros(0), *errors]),
+        along={
+            output.name: tuple(np.concatenate([np.zeros(0), *(here[output.name][i] for here in known)]) for i in (0, 1))
+            for output in ALONG
+        },
+    )
 
 
 def _furthest(square, axes):

@@ -1,8 +1,9 @@
 """The scenes: one physical system per file. See `survey/scene.py` for the words they use.
 
 A scene module holds TITLE (one line), PARAMETERS, OPTIONS, OUTPUTS (tuples), STATUS (its own status names and
-sentences), FAMILY (the methods that serve it: those whose SERVES names that family), AUDIT (the
-methods by which `survey verify` solves points again), REFERENCES (tuple of strings), and two functions:
+sentences: why a point has no answer by nature; its verdict is -1, and maps and counts name the status), FAMILY (the
+methods that serve it: those whose SERVES names that family), AUDIT (the methods by which `survey verify` solves points
+again), REFERENCES (tuple of strings), and two functions:
 
     cost(options, sizes) -> seconds per point, a rough figure for cutting blocks and for the plan; `sizes` holds the
         number of values of each parameter

@@ -15,7 +15,7 @@ of A/sqrt|k|, action in units of sqrt|k|.
 Per period of the nutation psi advances by `precession` and phi by `spin`; these are not reduced modulo 2 pi, nor are
 the rotation numbers, which are 1/(2 pi) of them. They jump by 2 pi (by 1) where p_psi -+ p_phi changes its sign on
 motions that pass a pole, u = +-1; on such a motion they have the mean of both limits. [boundaries] gives these lines,
-the separatrices and the regular precessions on maps of two of l, alpha, beta.
+the separatrices and the regular precessions on maps of two of l, alpha, beta, or of two parameters of initial states.
 
 Known: T, precession and reduced spin are symmetric in p_psi <-> p_phi; both wells have the same T; without field
 (epsilon = 0, or A = C) the advances are multiples of pi; T = 2 pi / omega_n at regular precessions; near a separatrix T

@@ -4,10 +4,11 @@ Parameters, in order: a (characteristic value) and q (parametric excitation), up
 notation of DLMF 28.2.1.
 
 Known: the edges of the tongues are the characteristic values a_n(q), b_n(q) (DLMF 28.2(v)); D is even in q (DLMF
-28.2.13 with t -> pi/2 - t); at q = 0 every gap is closed and D = 2 cos(pi sqrt a), marginal at a = n^2; for q != 0 no
-gap is closed (DLMF 28.2(vi): a_n and b_n are distinct). Tongue n opens as q^n (DLMF 28.6.15).
+28.2.16); at q = 0 every gap is closed and D = 2 cos(pi sqrt a), marginal at a = n^2; for q != 0 no gap is closed (DLMF
+28.2(vi): a_n and b_n are distinct). Tongue n opens as q^n (DLMF 28.6.15).
 
-Source: DLMF chapter 28, https://dlmf.nist.gov/28; E. Mathieu, J. Math. Pures Appl. 13 (1868) 137.
+Source: DLMF chapter 28, https://dlmf.nist.gov/28; E. Mathieu, J. Math. Pures Appl. 13 (1868) 137. Conventions, and how
+it is decided: `mathieu.md` beside this file.
 """
 
 from math import cos, pi

@@ -1,8 +1,7 @@
 """The page in the browser: the map, what lies under the pointer, and the chosen point with its motion."""
 
 import html
-import io
-from base64 import b64encode
+import time
 
 import numpy as np
 from bokeh import events
@@ -15,15 +14,15 @@ from matplotlib.figure import Figure
 
 from survey import figures
 from survey.errors import BadInput, SurveyError
-from survey.viewer import raster
-from survey.viewer.shown import short
+from survey.viewer import looks, raster
 
 SIDE, WIDTH = 510, 470  # width in pixels of what stands beside the map, and of its parts
 SOON = 30  # ms: changes that follow each other faster are answered once
+MOMENT = 0.4  # seconds: the map is read for so long before it is drawn again, while it is read
+GROWTH = 1.5  # and by so much more of it: a picture costs time, too
 RINGS = 100  # pixels with undecided or failed points: if they are fewer, each is ringed
 RED = "#D40000"
 CURVE_POINTS = 300_000  # edges of more points are thinned
-MARKERS = {"D": "diamond", "o": "circle"}
 CLICK = "Click a point of the map to see its motion and everything known of it."
 # the model's name carries the link into the address bar
 KEEP_LINK = "window.history.replaceState(null, '', '?' + cb_obj.name)"
@@ -34,14 +33,14 @@ class Page:
 
     def __init__(self, shown, document):
         self.map, self.document, self.waiting, self.pointer = shown, document, set(), None
+        self.share = 0.0  # of the map, when it was drawn last
         self.caption = Div(width=WIDTH, styles={"color": "#555555"})
         self.view = self._from_link(document.session_context.request.arguments)
         self._plot()
         self._side()
         document.add_root(row(self.plot, self.side, sizing_mode="stretch_both"))
         document.title = shown.ds.attrs["title"]
-        if self.curves:
-            self._fill()
+        self._fill()
         self.changed()
         if self.view.point is not None:
             self.choose(self.view.point)
@@ -64,20 +63,22 @@ class Page:
         scales = ["log" if axis.log else "linear" for axis in axes]
         plot = self.plot = figure(
             x_range=ranges[0], y_range=ranges[1], x_axis_type=scales[0], y_axis_type=scales[1],
-            tools="pan,wheel_zoom,box_zoom,reset,save", active_scroll="wheel_zoom", background_fill_color="#f4f4f4",
-            sizing_mode="stretch_both", min_width=300, min_height=300, stylesheets=[":host(:focus) {outline: none}"],
+            tools="pan,wheel_zoom,box_zoom,reset,save", active_scroll="wheel_zoom",
+            background_fill_color=raster.BACKGROUND, sizing_mode="stretch_both", min_width=300, min_height=300,
+            stylesheets=[":host(:focus) {outline: none}"],
         )  # fmt: skip
-        plot.xaxis.axis_label, plot.yaxis.axis_label = (_label(self.map.ds[dim]) for dim in self.map.dims)
+        plot.xaxis.axis_label, plot.yaxis.axis_label = (looks.label(self.map.ds[dim]) for dim in self.map.dims)
         plot.grid.visible, plot.toolbar.logo = False, None
         place = {"x": [], "y": []}
-        self.image = plot.image_rgba(source=place | {"image": [], "dw": [], "dh": []}, **IMAGE).data_source
-        self.curves = dict(self._curves())
+        self.image = plot.image_rgba(source=place | {"image": [], "dw": [], "dh": []}, **looks.IMAGE).data_source
+        found = figures.curves_of(self.map.ds) if "curve_count" in self.map.ds else ()
+        self.curves = {name: looks.curve(plot, name) for name in found}
         look = {"size": 9, "line_color": RED, "line_width": 2, "fill_color": "colour"}
         self.rings = plot.scatter("x", "y", source=place | {"colour": []}, **look).data_source
-        look = {"size": 20, "marker": "circle_x", "line_color": "white", **HOLLOW}
+        look = {"size": 20, "marker": "circle_x", "line_color": "white", **looks.HOLLOW}
         self.chosen = plot.scatter("x", "y", source=dict(place), **look).data_source
         plot.scatter("x", "y", source=self.chosen, **look | {"line_color": "black", "line_width": 1})
-        self.near = Label(**LABEL)
+        self.near = Label(**looks.LABEL)
         self.bar = ColorBar(color_mapper=LinearColorMapper(Viridis256), visible=False)
         plot.add_layout(self.near)
         plot.add_layout(self.bar, "right")
@@ -93,20 +94,10 @@ class Page:
         plot.on_event(events.Tap, self._tapped)
         plot.js_on_change("name", CustomJS(code=KEEP_LINK))
 
-    def _curves(self):
-        """A renderer for each class of the boundaries, with the looks of `survey.figures`."""
-        for name in figures.curves_of(self.map.ds) if "curve_count" in self.map.ds else ():
-            _, look = figures.CURVES[name]
-            if "marker" in look:
-                style = {"marker": MARKERS[look["marker"]], "size": 1.6 * look["ms"], "line_color": look["mec"]}
-                yield name, self.plot.scatter("x", "y", source={"x": [], "y": []}, fill_color=look["mfc"], **style)
-                continue
-            dash = "solid" if look["ls"] == "-" else list(look["ls"][1])
-            style = {"line_dash": dash, "line_width": 1.5 * look["lw"]}
-            yield name, self.plot.multi_line("x", "y", source={"x": [], "y": []}, line_color=look["color"], **style)
-
     def _fill(self):
         """Show the boundaries of the plane that is seen."""
+        if not self.curves:
+            return
         others = {dim: at for dim, at in self.view.others.items() if dim in self.map.ds[self.view.name].dims}
         ds = figures.in_plane(self.map.ds, self.map.ds[self.view.name].isel(others))
         x, y = (ds[f"curve_{dim}"].values for dim in self.map.dims)
@@ -126,14 +117,15 @@ class Page:
         self.edges = Checkbox(label=told, active=view.boundaries, visible=bool(self.curves))
         _on(self.edges, ("active",), self.changed)
         self.sliders = {
-            dim: Slider(start=0, end=ds.sizes[dim] - 1, value=at, show_value=False, width=WIDTH)
+            dim: Slider(
+                title=dim, start=0, end=ds.sizes[dim] - 1, value=at, width=WIDTH, format=looks.labels(ds[dim].values)
+            )
             for dim, at in view.others.items()
             if ds.sizes[dim] > 1
         }
         for slider in self.sliders.values():
             _on(slider, ("value",), self.changed)
-            if self.curves:
-                _on(slider, ("value",), self._fill)
+            _on(slider, ("value",), self._fill)
             _on(slider, ("value_throttled",), lambda: self.choose(self.view.point))
         title = f"<b>{html.escape(ds.attrs['title'])}</b><br>{html.escape(ds.attrs['options'])}"
         self.legend, self.motion, self.known = (Div(width=WIDTH) for _ in range(3))
@@ -163,16 +155,14 @@ class Page:
         for dim, slider in self.sliders.items():
             view.others[dim] = int(slider.value)
             slider.visible = dim in (*ds.status.dims, *ds[view.name].dims)
-            slider.title = f"{dim} = {short(ds[dim].values[view.others[dim]])}"
         for curve in self.curves.values():
             curve.visible = view.boundaries
         plot.name = self.map.link(view)
-        if not self.map.layer(view).ready:
-            self._say(f"reading {ds.status.size:,} points, once ...")
         self.soon(self.draw)
+        self.soon(self.tell)
 
     def draw(self):
-        """Draw the window of the map that is seen, its legend, and what a pixel stands for."""
+        """Draw the window of the map that is seen, its legend, and what a pixel stands for; more of it is read then."""
         layer = self.map.layer(self.view)
         try:
             sizes = self.plot.inner_width, self.plot.inner_height
@@ -185,49 +175,49 @@ class Page:
         if xs is None or ys is None:
             return
         mask, value = layer.pixels(xs, ys)
-        corner = {
-            "x": [xs.ends[0]],
-            "y": [ys.ends[0]],
-            "dw": [xs.ends[1] - xs.ends[0]],
-            "dh": [ys.ends[1] - ys.ends[0]],
-        }
-        self.image.data = corner | {"image": [raster.paint(mask, value, layer)]}
-        kinds = raster.rarest(mask, layer)
+        image, kinds = raster.paint(mask, value, layer)
+        (left, right), (low, high) = xs.ends, ys.ends
+        self.image.data = {"x": [left], "y": [low], "dw": [right - left], "dh": [high - low], "image": [image]}
         self._ring(mask, layer, kinds, xs, ys)
-        self._legend(layer, kinds, value)
-        several = f"a pixel stands for up to {xs.points} × {ys.points} points" if max(xs.points, ys.points) > 1 else ""
-        shows = "its rarest kind" if layer.flagged else "the value largest in magnitude"
-        self._say(self.complaint + (f"{several} and shows {shows}" if several else ""))
-
-    def _say(self, words):
+        self._legend(layer, kinds, value is not None and (np.isnan(value) & (mask == 0)).any())
+        words = self.complaint
+        if max(xs.points, ys.points) > 1:
+            shows = "its rarest kind" if layer.flagged else "the value largest in magnitude"
+            words += f"a pixel stands for up to {xs.points} × {ys.points} points and shows {shows}"
+        if layer.waits(xs, ys):
+            self.share = layer.overview.share
+            words = f"an overview, {self.share:.0%} of {layer.variable.size:,} points read; {words} ..."
+            self.soon(self.refine)
         self.caption.update(text=html.escape(words), visible=bool(words))
+
+    def refine(self):
+        """Read some more of the map, and draw it again."""
+        overview, end = self.map.layer(self.view).overview, time.monotonic() + MOMENT
+        while overview.read() and time.monotonic() < end:
+            pass
+        self.soon(self.draw if overview.share >= min(1.0, GROWTH * self.share) else self.refine)
 
     def _ring(self, mask, layer, kinds, xs, ys):
         """Ring the pixels with undecided or failed points, where these are few."""
         few = [kind for kind in ("undecided", "failed") if 0 < kinds.get(kind, 0) <= RINGS]
-        places = [(*np.nonzero(mask & layer.bits[kind]), layer.kinds[kind]) for kind in few]
+        places = [(*np.nonzero(mask & layer.bits[kind]), layer.colours[kind]) for kind in few]
         self.rings.data = {
             "x": [x for _, j, _ in places for x in xs.middles[j]],
             "y": [y for i, _, _ in places for y in ys.middles[i]],
             "colour": [colour for i, _, colour in places for _ in i],
         }
 
-    def _legend(self, layer, kinds, value):
-        """The kinds that are seen, with their share of the whole map; or the colour bar."""
+    def _legend(self, layer, kinds, empty):
+        """The kinds that are seen, with their share of the whole map; or the colour bar. Are some pixels `empty`?"""
         ds, name = self.map.ds, self.view.name
         shares = self.map.shares(name)
-        entries = [(kind, layer.kinds[kind]) for kind in layer.kinds if kind in kinds]
-        if value is not None and np.isnan(value).any():
-            entries.append(("does not apply", raster.NOT_APPLY))
-        self.legend.text = "".join(
-            f"<span style='{ENTRY}'><span style='{SWATCH};background:{_swatch(kind, colour)}'></span>"
-            f"{html.escape(kind.replace('_', ' '))}{shares.get(kind, '')}</span> "
-            for kind, colour in entries
-        )
+        entries = [(kind, colour, shares.get(kind, "")) for kind, colour in layer.colours.items() if kind in kinds]
+        entries += [("does not apply", raster.NOT_APPLY, "")] if empty else []
+        self.legend.update(text=looks.legend(entries), visible=bool(entries))
         self.bar.visible = not layer.flagged
         if not layer.flagged:
             self.bar.color_mapper.update(low=layer.limits[0], high=layer.limits[1])
-            self.bar.title = _label(ds[name], tex=False)
+            self.bar.title = looks.label(ds[name], tex=False)
 
     def _moved(self, event):
         if event.x is not None:
@@ -262,10 +252,10 @@ class Page:
         self.choose(self._place(event.x, event.y))
 
     def choose(self, point):
-        """Choose a point, or none; its motion follows."""
-        self.view.point = point
+        """Choose a point, if it is one; its motion follows."""
         if point is None:
             return
+        self.view.point = point
         x, y = self.map.position(point)
         self.chosen.data = {"x": [x], "y": [y]}
         self.plot.name = self.map.link(self.view)
@@ -279,44 +269,13 @@ class Page:
         try:
             drawn = Figure(figsize=(6.8, 3.6), layout="constrained")
             answers.trajectory(figure=drawn, **coords)
-            self.motion.text = _picture(drawn)
+            self.motion.text = looks.picture(drawn)
         except SurveyError as error:
             self.motion.text = f"no motion: {html.escape(str(error))}"
         self.known.text = answers.point(**coords)._repr_html_()
-
-
-ENTRY = "white-space:nowrap;margin-right:14px"
-SWATCH = "display:inline-block;width:13px;height:13px;border:1px solid #555;vertical-align:-2px;margin-right:5px"
-HOLLOW = {"fill_alpha": 0, "line_width": 2.5}
-IMAGE = {key: key for key in ("image", "x", "y", "dw", "dh")} | {"level": "image"}
-LABEL = {
-    "x": 0, "y": 0, "text": "", "visible": False, "text_font_size": "12px", "text_line_height": 1.35, "padding": 6,
-    "background_fill_color": "white", "background_fill_alpha": 0.92, "border_line_color": "#888888",
-}  # fmt: skip
 
 
 def _on(model, properties, call):
     """Call when one of the model's properties has changed."""
     for name in properties:
         model.on_change(name, lambda attr, old, new: call())
-
-
-def _picture(drawn):
-    """A matplotlib figure as HTML."""
-    file = io.BytesIO()
-    drawn.savefig(file, format="png", dpi=150)
-    return f"<img class='motion' style='width:100%' src='data:image/png;base64,{b64encode(file.getvalue()).decode()}'>"
-
-
-def _swatch(kind, colour):
-    if kind not in raster.NO_ANSWER:
-        return colour
-    lines = [f"repeating-linear-gradient({angle}deg,#777 0 1px,transparent 1px 4px)" for angle in (45, 135)]
-    return ",".join(lines[: 2 if kind == "failed" else 1]) + ",white"
-
-
-def _label(variable, tex=True):
-    """`long name, symbol (unit)`."""
-    symbol, units = variable.attrs.get("symbol", ""), variable.attrs.get("units", "1")
-    text = variable.attrs.get("long_name", variable.name) + (f", $${symbol}$$" if symbol and tex else "")
-    return text + ("" if units in ("1", "") else f" ({units})")

@@ -1,28 +1,25 @@
 """A window of a map -> the pixels of a screen, reading no more than it must: maps of 10^8 points and more.
 
-A pixel that holds many points tells of all of them: of a flagged variable, the set of the flags that occur, so that
-one undecided point among thousands is seen; of numbers, the largest magnitude. A pixel that holds none shows the
-nearest point.
+A pixel that holds many points tells of all of them, as in `survey.reduced`; one that holds none shows the nearest.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from matplotlib import colormaps
 
-from survey import status
-from survey.dataset import fill_of, flag_codes
-from survey.figures import colours_of, limits
+from survey.dataset import flag_codes, unanswered
+from survey.figures import colours_of, greys_of, limits
 from survey.grid import logarithmic
+from survey.reduced import NO_ANSWER, UNIONS, UNREAD, Overview, Points, over, unranked
 
 DIRECT = 2**22  # points: a smaller window is read from the file, a larger one from the overview
 OVERVIEW = 4096  # cells along an axis of the overview, at most
 LIMITS = 512  # cells along an axis from which the colours' limits are taken
 WHITE, UNKNOWN, NOT_APPLY, LINE = "#FFFFFF", "#444444", "#DDDDDD", "#777777"
-NO_ANSWER = ("outside the domain", "failed")
+BACKGROUND = "#F4F4F4"
 HATCH = 6  # pixels from line to line
-UNIONS = np.bitwise_or, np.maximum  # of masks, of ranks
 viridis = colormaps["viridis"]
 
 
@@ -115,88 +112,65 @@ class Pixels:
         return int(np.diff(self.starts, append=self.stop).max())
 
 
-class Layer:
+class Layer(Points):
     """One variable of a survey over two of its axes, for drawing; `place` is {other dimension: place in it}.
 
-    `kinds` is {name: colour} of what a point may be: its flags, if it has any, and last why it has no answer. Bit i of
-    a mask says that the i-th of them occurs in a pixel.
+    `colours` is {kind: colour} of what a point may be.
     """
 
     def __init__(self, ds, name, dims, place):
         own, state = ({dim: at for dim, at in place.items() if dim in ds[key].dims} for key in (name, "status"))
-        self.variable = ds[name].isel(own).transpose(*dims)
-        self.status = ds.status.isel(state).transpose(*dims)
-        self.flagged = "flag_values" in self.variable.attrs
-        self.fill = np.nan if self.flagged or fill_of(self.variable) is None else fill_of(self.variable)
-        flags = flag_codes(self.variable.attrs) if self.flagged else {}
-        palette = colours_of(flags)
-        self.kinds = {flag: palette.get(flag, UNKNOWN) for flag in flags} | dict.fromkeys(NO_ANSWER, WHITE)
-        self.dtype = np.uint16 if len(self.kinds) <= 16 else np.uint32
-        self.bits = {kind: self.dtype(1 << i) for i, kind in enumerate(self.kinds)}
-        self._of_code, self._of_status = np.zeros(256, self.dtype), np.zeros(256, self.dtype)
-        for flag, code in flags.items():
-            self._of_code[np.int8(code).view(np.uint8)] = self.bits[flag]
-        for code in status.FAILURES:
-            self._of_status[code] = self.bits["failed"]
-        self._of_status[status.INVALID_PARAMETERS] = self.bits["outside the domain"]
+        values, states = ds[name].isel(own).transpose(*dims), ds.status.isel(state).transpose(*dims)
+        super().__init__(values, states, unanswered(ds))
+        palette = colours_of(self.flags) | greys_of(ds, self.flags)
+        self.colours = {kind: palette.get(kind, UNKNOWN) for kind in (*self.flags, *self.own)}
+        self.colours |= dict.fromkeys(NO_ANSWER, WHITE) | {UNREAD: BACKGROUND}
+        self._limits = lru_cache(maxsize=1)(self._limits)
+
+    @cached_property
+    def overview(self):
+        """The whole map, reduced: a large one as far as `read` was called of it."""
+        overview = Overview(self, (OVERVIEW, OVERVIEW))
+        return overview if self.variable.size > DIRECT else overview.complete
+
+    def waits(self, xs, ys):
+        """Does this window, or its colours, need more of the overview than is read?"""
+        return (_large(xs, ys) or not self.flagged) and self.overview.share < 1
 
     def pixels(self, xs, ys):
         """(mask, value), each (len(ys), len(xs)): kinds that occur in each pixel; value None for a flagged variable."""
-        x, y, fx, fy = xs.span, ys.span, 1, 1
-        if (x.stop - x.start) * (y.stop - y.start) <= DIRECT:
-            parts = self._read(x, y)
+        if _large(xs, ys):
+            fx, fy = self.overview.factors
+            own = slice(xs.span.start // fx, -(-xs.stop // fx)), slice(ys.span.start // fy, -(-ys.stop // fy))
+            parts = [part if part is None else part[own] for part in (self.overview.mask, self.overview.rank)]
         else:
-            parts, fx, fy = self._overview
-            own = slice(x.start // fx, -(-x.stop // fx)), slice(y.start // fy, -(-y.stop // fy))
-            parts = [part if part is None else part[own] for part in parts]
-        starts = (pixels.starts // f - pixels.span.start // f for pixels, f in ((xs, fx), (ys, fy)))
-        mask, rank = _reduced(parts, *starts)
-        return mask.T, rank if rank is None else _unranked(rank.T)
-
-    def _read(self, rows, columns):
-        """(mask, rank) of points; the rank, which stands for a value, is None for a flagged variable."""
-        state, array = self.status[rows, columns].values, self.variable[rows, columns].values
-        mask = self._of_status[state.view(np.uint8)]
-        if self.flagged:
-            flags = self._of_code[array.astype(np.int8, copy=False).view(np.uint8)]
-            return np.where(mask == 0, flags, mask), None
-        value = array.astype(np.float32)
-        value[(mask != 0) | (array == self.fill) | ~np.isfinite(value)] = np.nan
-        return mask, _ranked(value)
+            fx, fy, parts = 1, 1, self.read(xs.span, ys.span)
+        starts = [pixels.starts // f - pixels.span.start // f for pixels, f in ((xs, fx), (ys, fy))]
+        mask, rank = (
+            part if part is None else over(union, part, *starts).T for union, part in zip(UNIONS, parts, strict=True)
+        )
+        return mask, rank if rank is None else unranked(rank)
 
     @property
-    def ready(self):
-        """Is the whole map read, or small?"""
-        return self.variable.size <= DIRECT or "_overview" in self.__dict__
-
-    @cached_property
     def limits(self):
-        """The values between which the whole map is coloured."""
-        rank = self._overview[0][1]
-        starts = (np.arange(0, size, -(-size // LIMITS)) for size in rank.shape)
-        shown = np.ma.masked_invalid(_unranked(_blocks(np.maximum, rank, *starts)))
-        found = limits(shown) or {"vmin": shown.min(), "vmax": shown.max()}
-        return (0.0, 1.0) if shown.mask.all() else (float(found["vmin"]), float(found["vmax"]))
+        """The values between which the whole map, as far as it is read, is coloured."""
+        return self._limits(self.overview.share)
 
-    @cached_property
-    def _overview(self):
-        """((mask, rank), fx, fy): the whole map reduced by whole factors; read once, by rows of the file's tiles."""
-        shape = self.variable.shape
-        fx, fy = (-(-size // OVERVIEW) for size in shape)
-        small, columns = (-(-shape[0] // fx), -(-shape[1] // fy)), np.arange(0, shape[1], fy)
-        whole = np.zeros(small, self.dtype), None if self.flagged else np.zeros(small, np.uint32)
-        step = (self.variable.encoding.get("chunksizes") or (256,))[0]
-        for first in range(0, shape[0], step):
-            stop = min(first + step, shape[0])
-            groups = np.arange(first, stop) // fx  # the first of them may have begun in the rows before
-            parts = _reduced(
-                self._read(slice(first, stop), slice(None)), np.flatnonzero(np.diff(groups, prepend=-1)), columns
-            )
-            for union, into, part in zip(UNIONS, whole, parts, strict=True):
-                if part is not None:
-                    own = into[groups[0] : groups[-1] + 1]
-                    union(own, part, out=own)
-        return whole, fx, fy
+    def _limits(self, share):
+        rank = self.overview.rank
+        starts = (np.arange(0, size, -(-size // LIMITS)) for size in rank.shape)
+        shown = np.ma.masked_invalid(unranked(over(np.maximum, rank, *starts)))
+        if shown.mask.all():
+            return 0.0, 1.0
+        found = limits(shown) or {"vmin": shown.min(), "vmax": shown.max()}
+        low, high = (float(found[key]) for key in ("vmin", "vmax"))
+        spare = 0.0 if high > low else 0.5 * abs(low) or 0.5  # one value: in the middle
+        return low - spare, high + spare
+
+
+def _large(xs, ys):
+    """Is the window too large to be read from the file?"""
+    return (xs.stop - xs.span.start) * (ys.stop - ys.span.start) > DIRECT
 
 
 class CellLayer(Layer):
@@ -214,7 +188,7 @@ class CellLayer(Layer):
 
     def pixels(self, xs, ys):
         """(mask, None): the kinds of the cells that reach into each pixel; points count where they failed."""
-        mask = super().pixels(xs, ys)[0] & sum(self.bits[kind] for kind in NO_ANSWER)
+        mask = super().pixels(xs, ys)[0] & sum(self.bits[kind] for kind in (*NO_ANSWER, UNREAD))
         x, y = (_covered(*ends, pixels.edges) for ends, pixels in zip(self.ends, (xs, ys), strict=True))
         seen = (x[0] < x[1]) & (y[0] < y[1])
         for flag, code in self.flags.items():
@@ -234,55 +208,23 @@ def _covered(low, high, edges):
     return tuple(np.clip(end, 0, edges.size - 1).astype(int) for end in (first, stop))
 
 
-def rarest(mask, layer):
-    """{kind: number of pixels that hold it}, the rarest last, but undecided, outside and failed after all others."""
-    number = {kind: int(np.count_nonzero(mask & bit)) for kind, bit in layer.bits.items()}
-    late = ("undecided", *NO_ANSWER)
-    order = sorted(number, key=lambda kind: (late.index(kind) + 1 if kind in late else 0, -number[kind]))
-    return {kind: number[kind] for kind in order if number[kind]}
-
-
 def paint(mask, value, layer):
-    """The pixels' colours, (rows, columns) of uint32 RGBA: each pixel's rarest kind, or its value."""
+    """(colours, {kind: number of pixels that hold it}): (rows, columns) of uint32 RGBA, each pixel's kind or value."""
     image = np.zeros((*mask.shape, 4), np.uint8)  # where nothing is known, nothing is drawn
     if value is not None:
         low, high = layer.limits
-        image[...] = viridis((value - low) / ((high - low) or 1.0), bytes=True)
+        image[...] = viridis((value - low) / (high - low), bytes=True)
         image[np.isnan(value)] = _rgba(NOT_APPLY)
-    for kind in rarest(mask, layer):
-        where = (mask & layer.bits[kind]) != 0
-        image[where] = _rgba(layer.kinds[kind])
-        if kind in NO_ANSWER:
+    kind, number = layer.shown(mask)
+    for name in number:
+        where = kind == layer.kinds.index(name)
+        image[where] = _rgba(layer.colours[name])
+        if name in NO_ANSWER:
             y, x = np.nonzero(where)
-            lines = ((x + y) % HATCH == 0) | ((kind == "failed") & ((x - y) % HATCH == 0))
+            lines = ((x + y) % HATCH == 0) | ((name == "failed") & ((x - y) % HATCH == 0))
             image[y[lines], x[lines]] = _rgba(LINE)
-    return image.view(np.uint32)[..., 0]
+    return image.view(np.uint32)[..., 0], number
 
 
 def _rgba(colour):
     return [*bytes.fromhex(colour[1:]), 255]
-
-
-def _reduced(parts, x, y):
-    """The mask and the rank (or None) over the blocks of points that begin at rows x and columns y."""
-    return [part if part is None else _blocks(union, part, x, y) for union, part in zip(UNIONS, parts, strict=True)]
-
-
-def _blocks(union, part, x, y):
-    for axis, starts in enumerate((x, y)):
-        if not (starts.size == part.shape[axis] == starts[-1] + 1):  # else one point each
-            part = union.reduceat(part, starts, axis=axis)
-    return part
-
-
-def _ranked(value):
-    """float32 -> uint32 in the order of magnitude, one-to-one, NaN -> 0: the largest is found without its sign."""
-    bits = value.view(np.uint32)
-    return np.where(np.isnan(value), np.uint32(0), (bits << 1 | bits >> 31) + np.uint32(1))
-
-
-def _unranked(rank):
-    """The inverse of `_ranked`."""
-    bits = rank - np.uint32(1)
-    value = (bits >> 1 | bits << 31).view(np.float32)
-    return np.where(rank == 0, np.float32(np.nan), value)

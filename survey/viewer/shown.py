@@ -7,7 +7,7 @@ from math import isfinite
 from urllib.parse import parse_qsl, urlencode
 
 from survey import modules, status, store
-from survey.analysis.point import meaning, reading, sentence
+from survey.analysis.point import has_verdict, meaning, reading, sentence
 from survey.dataset import flag_codes, percent
 from survey.errors import BadInput
 from survey.viewer import raster
@@ -102,8 +102,8 @@ class Map:
                 flag_codes(ds.area_verdict.attrs), ds.area_fraction.values, ds.area_fraction_error.values, strict=True
             )
             return {flag: f" ({percent(share, bar)})".replace("+-", "±") for flag, share, bar in shares}
-        told = ds.attrs.get(f"{name}_counts", "")
-        counts = (part.split(": ") for part in told.split(", ") if part)
+        told = [ds.attrs.get(f"{counted}_counts", "") for counted in ("status", name)]
+        counts = (part.split(": ") for part in ", ".join(told).split(", ") if part)
         return {flag: f" ({int(number):,} in all)" for flag, number in counts}
 
     def position(self, point):
@@ -128,6 +128,8 @@ class Map:
         if here.status != status.OK:
             yield from textwrap.wrap(sentence(here), 60)
         for name in names:
+            if name == "verdict" and not has_verdict(here):
+                continue
             value = reading(here, name, f"{name}_error" in bars).replace("+-", "±")
             yield f"{name}: {value.replace('_', ' ')}" if "flag_values" in here[name].attrs else f"{name} = {value}"
 

@@ -242,9 +242,9 @@ def test_a_logarithmic_axis():
     [
         ({"axes": {"l": 0.1, "alpha": 0.1, "beta": {"values": [1.0, 2.0]}}}, "not on beta"),
         ({"axes": {"l": {"values": [0.1, 0.2]}, "beta": {"values": [0.1]}, "alpha": 0.1}}, "beta has one value"),
-        ({"boundaries": {"axis": "beta"}}, "closed forms, no axis is searched"),
-        ({"axes": {n: {"values": [0.1, 0.2]} for n in ("theta0", "p_psi")} | {"A": 2.0, "C": 1.0, "epsilon": 0.6,
-          "p_theta0": 0.0, "p_phi": 1.0}}, "not on theta0, p_psi"),
+        ({"boundaries": {"axis": "beta"}}, "no axis is searched"),
+        ({"axes": {n: {"values": [0.1, 0.2]} for n in ("t", "p_psi")} | {"A": 2.0, "C": 1.0, "epsilon": 0.6,
+          "theta0": 0.4, "p_theta0": 0.0, "p_phi": 1.0}}, "not on t, p_psi"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused(changes, words):

@@ -60,8 +60,10 @@ def main():
     source = OUT / "source"
     assemble(source)
     if not given.no_notebooks:
+        print("running the notebooks, a dot for each", flush=True)
         run("pytest", *NBMAKE, "-n", "2", str(source / "notebooks"))
         check(source / "notebooks")
+    print("making the pages", flush=True)
     run("sphinx", "-q", "-W", "--keep-going", "-E", "-d", str(OUT / "doctrees"), str(source), str(OUT / "html"))
     print(OUT / "html/index.html")
 

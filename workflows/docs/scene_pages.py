@@ -79,10 +79,15 @@ def escaped(text):
 
 
 def notes(text):
-    """The mathematics as Markdown: headings one lower, indented lines as they stand, numbered equations apart."""
+    """The mathematics as Markdown: headings one lower, indented lines as they stand, numbered equations apart.
+
+    Indented lines that go on with an item of a list stay in it; a formula there begins a line.
+    """
     out, before = [], "blank"
     for line in text.splitlines():
         kind = _kind(line)
+        if kind == "indented" and before == "item":
+            kind, out[-1] = "item", out[-1] + "\\" * line.lstrip().startswith("(")
         if before == "indented" and kind == "blank":
             continue
         if kind != before and "indented" in (kind, before):
@@ -100,7 +105,7 @@ def _shown(kind, line):
     if kind == "indented":
         return line.replace("**", "")
     if kind == "item":
-        return "* " + escaped(line[2:])
+        return re.sub("^[*-] ", "* ", line[:2]) + escaped(line[2:])
     return re.sub(r"^([>+])", r"\\\1", escaped(line))
 
 

@@ -1,0 +1,70 @@
+"""How things look in the page: pieces of HTML, and bokeh's models."""
+
+import html
+import io
+import re
+from base64 import b64encode
+
+from bokeh.models import CustomJSTickFormatter
+
+from survey import figures
+from survey.viewer import raster
+from survey.viewer.shown import short
+
+ENTRY = "white-space:nowrap;margin-right:14px"
+SWATCH = "display:inline-block;width:13px;height:13px;border:1px solid #555;vertical-align:-2px;margin-right:5px"
+HOLLOW = {"fill_alpha": 0, "line_width": 2.5}
+IMAGE = {key: key for key in ("image", "x", "y", "dw", "dh")} | {"level": "image"}
+LABEL = {
+    "x": 0, "y": 0, "text": "", "visible": False, "text_font_size": "12px", "text_line_height": 1.35, "padding": 6,
+    "background_fill_color": "white", "background_fill_alpha": 0.92, "border_line_color": "#888888",
+}  # fmt: skip
+MARKERS = {"D": "diamond", "o": "circle"}
+
+
+def curve(plot, name):
+    """A renderer of the boundaries of a class, with the looks of `survey.figures`."""
+    _, look = figures.CURVES[name]
+    if "marker" in look:
+        style = {"marker": MARKERS[look["marker"]], "size": 1.6 * look["ms"], "line_color": look["mec"]}
+        return plot.scatter("x", "y", source={"x": [], "y": []}, fill_color=look["mfc"], **style)
+    dash = "solid" if look["ls"] == "-" else list(look["ls"][1])
+    style = {"line_dash": dash, "line_width": 1.5 * look["lw"], "line_color": look["color"]}
+    return plot.multi_line("x", "y", source={"x": [], "y": []}, **style)
+
+
+def legend(entries):
+    """HTML of (kind, colour, words after it)."""
+    return "".join(
+        f"<span style='{ENTRY}'><span style='{SWATCH};background:{_swatch(kind, colour)}'></span>"
+        f"{html.escape(kind.replace('_', ' '))}{words}</span> "
+        for kind, colour, words in entries
+    )
+
+
+def _swatch(kind, colour):
+    if kind not in raster.NO_ANSWER:
+        return colour
+    lines = [f"repeating-linear-gradient({angle}deg,#777 0 1px,transparent 1px 4px)" for angle in (45, 135)]
+    return ",".join(lines[: 2 if kind == "failed" else 1]) + ",white"
+
+
+def picture(drawn):
+    """A matplotlib figure as HTML."""
+    file = io.BytesIO()
+    drawn.savefig(file, format="png", dpi=150)
+    return f"<img class='motion' style='width:100%' src='data:image/png;base64,{b64encode(file.getvalue()).decode()}'>"
+
+
+def labels(values):
+    """A slider's formatter, from places to the values there."""
+    return CustomJSTickFormatter(args={"values": [short(value) for value in values]}, code="return values[tick]")
+
+
+def label(variable, tex=True):
+    """`long name, symbol (unit)`."""
+    symbol, units = variable.attrs.get("symbol", ""), variable.attrs.get("units", "1")
+    text = variable.attrs.get("long_name", variable.name)
+    if symbol and tex:
+        text = re.sub(r"([_%&#])", r"\\\1", text) + f", $${symbol}$$"  # TeX reads the words, too
+    return text + ("" if units in ("1", "") else f" ({units})")
