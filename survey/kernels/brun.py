@@ -15,26 +15,32 @@ from survey.kernels.nutation import (
     LOW,
     LOW_MINUS,
     LOW_PLUS,
+    NOISE_HIGH,
+    NOISE_LOW,
+    NOISE_WIDTH,
     NONE,
     NUTATION,
     Q_HIGH,
     Q_LOW,
     SEPARATRIX,
     SIZE,
+    SUM,
     TINY,
     WIDTH,
     K,
     about_equator,
     barrier,
     find,
+    looseness,
     saddle,
 )
+from survey.kernels.quartic import UNIT, slope
 from survey.kernels.sines import sin_cos
 
 
 @inline
 def of_state(size_a, size_c, epsilon, theta, p_theta, b, a):
-    """k, L, L + k - a b and L + k + a b as pairs, and u (S1); the last is False outside the domain."""
+    """k, L, L + k - a b, L + k + a b and u as pairs (S1); the last is False outside the domain."""
     sine, cosine = sin_cos(0.5 * theta)
     k = dd.mul(dd.two_prod(epsilon, size_a), dd.two_sum(size_a, -size_c))
     inside = sine[0] != 0.0 or a == b
@@ -47,9 +53,9 @@ def of_state(size_a, size_c, epsilon, theta, p_theta, b, a):
     common = dd.loose(kinetic, dd.mul(k, dd.square(double)))
     at_plus = dd.loose(common, dd.times(minus, -a))
     at_minus = dd.loose(common, dd.times(plus, a))
-    u = dd.loose(high, dd.neg(low))
+    u = dd.mul(dd.sub(cosine, sine), dd.loose(cosine, sine))
     level = dd.loose(dd.loose(kinetic, dd.neg(dd.mul(k, dd.square(u)))), dd.two_prod(a, a))
-    return k, level, at_plus, at_minus, u[0], inside
+    return k, level, at_plus, at_minus, u, inside
 
 
 @kernel
@@ -86,6 +92,24 @@ def phase(row, theta, p_theta, start):
 
 
 @kernel
+def measure(row, start, c, u, theta, p_theta):
+    """WIDTH of a narrow well, where its turning points leave few digits of it, from P and P' at the start.
+
+    There P = (sin theta p_theta)^2 = (u - ul)(uh - u) Q, and P' gives ul + uh - 2 u: (uh - ul)^2 by positive terms.
+    """
+    k, width, done, left = row[K], row[WIDTH], start[0], start[1]
+    q = row[Q_LOW] * left + row[Q_HIGH] * done - k * width * width * left * done
+    height = (2.0 * sin(0.5 * theta) * cos(0.5 * theta) * p_theta) ** 2
+    offset = (slope(c, u)[0] - height * k * (2.0 * u[0] + row[SUM]) / q) / q
+    square = offset * offset + 4.0 * height / q
+    terms = abs(c[1][0]) + abs(u[0]) * (4.0 * abs(c[2][0]) + 8.0 * abs(k))
+    bar = UNIT * terms / q + 8.0 * EPS * abs(offset)
+    noise = 16.0 * EPS + row[NOISE_LOW] + row[NOISE_HIGH] + bar * (abs(offset) + bar) / square if square > 0.0 else 1.0
+    if noise < row[NOISE_WIDTH]:
+        row[WIDTH], row[NOISE_WIDTH] = sqrt(square), noise
+
+
+@kernel
 def of_states(points, rows, kinds, count, heights, starts):
     """The well of each initial state (A, C, epsilon, theta0, p_theta0, p_psi, p_phi).
 
@@ -99,15 +123,18 @@ def of_states(points, rows, kinds, count, heights, starts):
         if not inside:
             kinds[i] = LOST
             continue
-        heights[i, 0], heights[i, 1] = find(a, b, k, level, at_plus, at_minus, both, two)
+        rough = abs(level[0]) + 2.0 * abs(k[0]) * u[0] * u[0]
+        heights[i, 0], heights[i, 1] = find(a, b, k, level, at_plus, at_minus, rough, both, two)
         heights[i, 2] = abs(k[0])
-        place = 1 if two[1] != NONE and u > 0.5 * (both[0, HIGH] + both[1, LOW]) else 0
+        place = 1 if two[1] != NONE and u[0] > 0.5 * (both[0, HIGH] + both[1, LOW]) else 0
         count[i] = (two[0] != NONE) + (two[1] != NONE) if two[0] != SEPARATRIX else -1
         kinds[i] = two[place] if two[place] != NONE else LOST
         for j in range(SIZE):
             rows[i, j] = both[place, j]
         if kinds[i] >= NUTATION:
             phase(rows[i], theta, p_theta, starts[i])
+            if kinds[i] == NUTATION and rows[i, NOISE_WIDTH] > EPS:
+                measure(rows[i], starts[i], about_equator(a, b, level, k), u, theta, p_theta)
 
 
 @kernel
@@ -120,7 +147,7 @@ def of_integrals(points, sign, rows, kinds, heights):
         high = dd.two_sum(level, sign)
         pair = level, 0.0
         heights[i, 0], heights[i, 1] = find(
-            a, b, k, pair, dd.sub(high, product), dd.add(high, product), rows[i], kinds[i]
+            a, b, k, pair, dd.sub(high, product), dd.add(high, product), 0.0, rows[i], kinds[i]
         )
         heights[i, 2] = 1.0
 
@@ -130,10 +157,11 @@ def heights_of_states(points, heights):
     """Fill `heights` (n, 3) as `of_states`, for points in columns (7, n)."""
     for i in range(len(heights)):
         b, a = points[5, i], points[6, i]
-        k, level, at_plus, at_minus, _u, _inside = of_state(
+        k, level, at_plus, at_minus, u, _inside = of_state(
             points[0, i], points[1, i], points[2, i], points[3, i], points[4, i], b, a
         )
-        found = barrier(a, b, k, about_equator(a, b, level, k), at_plus[0], at_minus[0])
+        loose = looseness(a, b, abs(level[0]) + 2.0 * abs(k[0]) * u[0] * u[0])
+        found = barrier(a, b, k, about_equator(a, b, level, k), loose, at_plus[0], at_minus[0])
         heights[i, 0], heights[i, 1], heights[i, 2] = found[0], found[1], abs(k[0])
 
 
@@ -156,5 +184,5 @@ def heights_of_integrals(points, heights):
         level, sign, b, a = points[0, i], points[1, i], points[5, i], points[6, i]
         pair, k, high, product = (level, 0.0), (sign, 0.0), dd.two_sum(level, sign), dd.two_prod(a, b)
         at_plus, at_minus = dd.sub(high, product)[0], dd.add(high, product)[0]
-        found = barrier(a, b, k, about_equator(a, b, pair, k), at_plus, at_minus)
+        found = barrier(a, b, k, about_equator(a, b, pair, k), looseness(a, b, 0.0), at_plus, at_minus)
         heights[i, 0], heights[i, 1], heights[i, 2] = found[0], found[1], 1.0

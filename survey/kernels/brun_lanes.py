@@ -7,7 +7,7 @@ wells and 1 for the upper one, C/A, nothing, b, a.
 import numpy as np
 
 from survey.kernels import double as dd
-from survey.kernels import nutation_fine
+from survey.kernels import nutation_action, nutation_fine
 from survey.kernels import nutation_lanes as nl
 from survey.kernels.brun import of_state
 from survey.kernels.jit import inline, kernel, splice
@@ -37,8 +37,8 @@ def states(work):
             work[i], work[TILE + i], work[2 * TILE + i], work[3 * TILE + i], work[4 * TILE + i], b, a
         )
         polynomial(work, (k[0] if inside else np.nan, k[1]), level, at_plus, at_minus, i)
-        work[nl.U + i] = u
-        work[nl.HERE + i] = work[4 * TILE + i] ** 2 * (1.0 - u) * (1.0 + u)
+        work[nl.U + i] = u[0]
+        work[nl.HERE + i] = work[4 * TILE + i] ** 2 * (1.0 - u[0]) * (1.0 + u[0])
 
 
 @kernel
@@ -149,6 +149,8 @@ def answer(polynomials, tell, told_u, points, actions, out, wells, done):
             polynomials(work)
             solve(work, steps, told_u and n < 2, exactly, actions)
             tell(work, told)
+            if actions:
+                nutation_action.mend(work, told)
             leave(work, told, which, first, out, wells, done)
         left = in_state(done, LEFT, CANCELLED, left) if exactly else left
         which = left if exactly else in_state(done, CANCELLED, CANCELLED, left)

@@ -15,9 +15,9 @@ from survey.kernels.quartic import ROUGH, UNIT, root, roughly, slope, slopes, va
 LOW, HIGH, LOW_PLUS, LOW_MINUS, HIGH_PLUS, HIGH_MINUS, WIDTH, SUM = range(8)
 Q_LOW, Q_HIGH, Q_PLUS, Q_MINUS, BEND, MIDDLE = range(8, 14)  # BEND: 4 q0 - k S^2; MIDDLE: s of (S5)
 K, L, MINUS, PLUS, LEVEL = range(14, 19)  # k, L, b - a, b + a, L - (k ul uh + q0)/2
-# of the turning points and, relative, of Q, BEND and WIDTH
-BAR_LOW, BAR_HIGH, NOISE_LOW, NOISE_HIGH, NOISE_BEND, NOISE_WIDTH = range(19, 25)
-REST = 25  # from here on what float64 leaves of each number
+# of the turning points and, relative, of Q, s + g of (S5), WIDTH and the distances from the poles
+BAR_LOW, BAR_HIGH, NOISE_LOW, NOISE_HIGH, NOISE_ABOVE, NOISE_WIDTH, NOISE_ENDS = range(19, 26)
+REST = 26  # from here on what float64 leaves of each number
 SIZE = 2 * REST
 # kinds of wells
 NONE, LOST, SEPARATRIX, NUTATION, PRECESSION, PASSAGE = -2, -1, 0, 1, 2, 3
@@ -138,6 +138,20 @@ def beyond(gap, at, inside, inside_far, near, far, equator):
 
 
 @inline
+def inner(equatorial, loose, inside, outside):
+    """As `beyond`, the turning point beside a saddle: its distances from the poles +1 and -1, and its bar."""
+    u, bar = root(equatorial, inside, outside)
+    first, _second = slopes(equatorial, u[0])
+    return dd.sub((1.0, 0.0), u), dd.add((1.0, 0.0), u), bar + loose / max(abs(first), TINY)
+
+
+@inline
+def looseness(a, b, rough):
+    """The rounding of P(0) = L - a^2 - b^2, which may nearly cancel; that of L's terms is `rough` UNIT/4."""
+    return 0.25 * UNIT * (a * a + b * b + rough)
+
+
+@inline
 def hill_at_pole(gap, product, k, at):
     """L above W at a pole that the motion may reach (b -+ a = 0) and where W is greatest, and its bar; or NaN."""
     if gap == 0.0 and product + 4.0 * k < 0.0:
@@ -157,7 +171,7 @@ def pair(row, place):
 
 
 @kernel
-def fill(gaps, k, level, ats, equatorial, right, left, row):
+def fill(gaps, k, level, ats, equatorial, loose, right, left, row):
     """A row from the turning points, each (distance from its pole, from the other pole, bar)."""
     minus, plus = gaps
     v, wh, bar_v = right
@@ -212,7 +226,9 @@ def fill(gaps, k, level, ats, equatorial, right, left, row):
     direct(k, dd.sub(level, k), square, ul, bar, row, Q_LOW, NOISE_LOW)
     beside_saddle(equatorial, uh, bar_v, -1.0, row, Q_HIGH, NOISE_HIGH)
     beside_saddle(equatorial, ul, bar_w, 1.0, row, Q_LOW, NOISE_LOW)
-    row[NOISE_BEND] = 8.0 * (moved + UNIT * (abs(level[0]) + abs(k[0]))) / max(abs(row[BEND]), TINY)
+    row[NOISE_ENDS] = max(bar_v / max(v[0], TINY), bar_w / max(w[0], TINY), bar_v / wh[0], bar_w / vl[0])
+    rough = 8.0 * (moved + UNIT * (abs(level[0]) + abs(k[0])))
+    row[NOISE_ABOVE] = noise_above(row, rough, at_lowest(equatorial, loose, k, total, ul, uh, bar_w, bar_v, rough, row))
 
 
 @inline
@@ -245,14 +261,14 @@ def beside_saddle(equatorial, u, bar, side, row, place, error):
 
 
 @kernel
-def still(gaps, k, level, ats, equatorial, y, plus, row):
+def still(gaps, k, level, ats, equatorial, loose, y, plus, row):
     """A row of a regular precession at the distance y from the pole +1 (`plus`) or -1."""
     bar = EPS * y
     near, far = ((y, 0.0), dd.two_sum(2.0, -y), bar), (dd.two_sum(2.0, -y), (y, 0.0), bar)
     if plus:
-        fill(gaps, k, level, ats, equatorial, near, far, row)
+        fill(gaps, k, level, ats, equatorial, loose, near, far, row)
     else:
-        fill(gaps, k, level, ats, equatorial, far, near, row)
+        fill(gaps, k, level, ats, equatorial, loose, far, near, row)
     row[WIDTH] = 0.0
 
 
@@ -264,14 +280,40 @@ def above(row, g):
 
 
 @kernel
-def barrier(a, b, k, equatorial, at_plus, at_minus):
+def at_lowest(equatorial, loose, k, total, ul, uh, bar_w, bar_v, bar, row):
+    """The error of BEND, `bar` or, where Q is least, better: there Q = P/((u - ul)(uh - u)) is next to BEND/4."""
+    u = -0.5 * total[0]
+    left, right = dd.add((u, 0.0), dd.neg(ul)), dd.add(uh, (-u, 0.0))
+    if k[0] <= 0.0 or bar < LOST_DIGITS * abs(row[BEND]) or min(left[0], right[0]) <= 0.0:
+        return bar
+    height, size = value(equatorial, (u, 0.0))
+    product, off = dd.mul(left, right), dd.add((u, 0.0), dd.times(total, 0.5))
+    q = dd.div(height, product)
+    better = dd.times(dd.sub(q, dd.mul(k, dd.mul(off, off))), 4.0)
+    noise = bar_w / left[0] + bar_v / right[0] + 2.0 * EPS
+    error = 4.0 * ((UNIT * size + loose) / product[0] + abs(q[0]) * noise + k[0] * abs(off[0]) * (bar_w + bar_v))
+    if error < bar:
+        put(row, BEND, better)
+    return min(error, bar)
+
+
+@inline
+def noise_above(row, bar, bar_bend):
+    """The relative error of `above`, `bar` that of s, `bar_bend` of BEND, besides 8 roundings."""
+    s, g = row[MIDDLE], sqrt(row[Q_LOW]) * sqrt(row[Q_HIGH])
+    noise = (bar + 0.5 * (row[NOISE_LOW] + row[NOISE_HIGH]) * g) / max(abs(s) + g, TINY)
+    return noise if s >= 0.0 else noise + bar_bend / max(abs(row[BEND]), TINY) + 2.0 * row[NOISE_WIDTH]
+
+
+@kernel
+def barrier(a, b, k, equatorial, loose, at_plus, at_minus):
     """(L above the separatrix, its bar; u of the saddle and F' there); NaN where there is none at these a and b."""
     size_k = k[0]
     between, rise = saddle(a, b, size_k)
     if rise > 0.0:
         height, size = value(equatorial, (between, 0.0))
         rough = (abs(a) + abs(b * between)) * (abs(b) + abs(a * between)) + size_k * abs(between)
-        bar = 4.0 * UNIT * size + (8.0 * EPS * rough) ** 2 / rise  # the saddle's place is as good as F there
+        bar = 4.0 * (UNIT * size + loose) + (8.0 * EPS * rough) ** 2 / rise  # the saddle's place is as good as F there
         return height[0] / ((1.0 - between) * (1.0 + between)), bar, between, rise
     distance, bar = nan, 0.0
     if size_k < 0.0:
@@ -282,19 +324,19 @@ def barrier(a, b, k, equatorial, at_plus, at_minus):
 
 
 @kernel
-def find(a, b, k, level, at_plus, at_minus, rows, kinds):
+def find(a, b, k, level, at_plus, at_minus, rough, rows, kinds):
     """Fill `rows` (2, SIZE) and `kinds` (2) with the wells, lower u first; returns (L above the separatrix, its bar).
 
     NaN where there is no separatrix at these a and b. Kinds: NUTATION, PRECESSION (the turning points coincide),
-    PASSAGE (through a pole), SEPARATRIX (within the error), NONE.
+    PASSAGE (through a pole), SEPARATRIX (within the error), NONE. rough: see `looseness`.
     """
     kinds[0] = kinds[1] = NONE
     gaps, ats = (dd.two_sum(b, -a), dd.two_sum(b, a)), (at_plus, at_minus)
     minus, plus, product, size_k = gaps[0][0], gaps[1][0], a * b, k[0]
     polar = about_pole(dd.mul(gaps[0], gaps[0]), at_plus, level, k)
     antipolar = about_pole(dd.mul(gaps[1], gaps[1]), at_minus, level, k)
-    equatorial = about_equator(a, b, level, k)
-    distance, bar, between, rise = barrier(a, b, k, equatorial, at_plus[0], at_minus[0])
+    equatorial, loose = about_equator(a, b, level, k), looseness(a, b, rough)
+    distance, bar, between, rise = barrier(a, b, k, equatorial, loose, at_plus[0], at_minus[0])
     if abs(distance) <= bar:
         kinds[0] = SEPARATRIX
         return distance, bar
@@ -310,41 +352,33 @@ def find(a, b, k, level, at_plus, at_minus, rows, kinds):
         place = 0
         if bottom > murmur:
             left = beyond(plus, at_minus[0], w, 2.0 - w, antipolar, polar, -1.0)
-            u, bar_u = root(equatorial, w - 1.0, between)
-            fill(gaps, k, level, ats, equatorial, (dd.sub((1.0, 0.0), u), dd.add((1.0, 0.0), u), bar_u), left, rows[0])
+            right = inner(equatorial, loose, w - 1.0, between)
+            fill(gaps, k, level, ats, equatorial, loose, right, left, rows[0])
             kinds[0] = PASSAGE if left[0][0] == 0.0 else NUTATION
             place = 1
         elif bottom >= -murmur:
-            still(gaps, k, level, ats, equatorial, w, False, rows[0])
+            still(gaps, k, level, ats, equatorial, loose, w, False, rows[0])
             kinds[0], place = PRECESSION, 1
         if top > hum:
             right = beyond(minus, at_plus[0], v, 2.0 - v, polar, antipolar, -1.0)
-            u, bar_u = root(equatorial, 1.0 - v, between)
-            fill(
-                gaps,
-                k,
-                level,
-                ats,
-                equatorial,
-                right,
-                (dd.add((1.0, 0.0), u), dd.sub((1.0, 0.0), u), bar_u),
-                rows[place],
-            )
+            from_plus, from_minus, bar_u = inner(equatorial, loose, 1.0 - v, between)
+            left = from_minus, from_plus, bar_u
+            fill(gaps, k, level, ats, equatorial, loose, right, left, rows[place])
             kinds[place] = PASSAGE if right[0][0] == 0.0 else NUTATION
         elif top >= -hum:
-            still(gaps, k, level, ats, equatorial, v, True, rows[place])
+            still(gaps, k, level, ats, equatorial, loose, v, True, rows[place])
             kinds[place] = PRECESSION
     elif max(top - hum, bottom - murmur) > 0.0:
         equator = equatorial[0][0]
         v, w = (v if v >= 0.0 else 2.0 - w), (w if w >= 0.0 else 2.0 - v)
         right = beyond(minus, at_plus[0], v, w, polar, antipolar, equator)
         left = beyond(plus, at_minus[0], w, v, antipolar, polar, equator)
-        fill(gaps, k, level, ats, equatorial, right, left, rows[0])
+        fill(gaps, k, level, ats, equatorial, loose, right, left, rows[0])
         kinds[0] = PASSAGE if right[0][0] == 0.0 or left[0][0] == 0.0 else NUTATION
     elif v >= 0.0 and top >= -hum:
-        still(gaps, k, level, ats, equatorial, v, True, rows[0])
+        still(gaps, k, level, ats, equatorial, loose, v, True, rows[0])
         kinds[0] = PRECESSION
     elif w >= 0.0 and bottom >= -murmur:
-        still(gaps, k, level, ats, equatorial, w, False, rows[0])
+        still(gaps, k, level, ats, equatorial, loose, w, False, rows[0])
         kinds[0] = PRECESSION
     return distance, bar

@@ -3,6 +3,8 @@
 from survey.kernels import double as dd
 from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.nutation_lanes import (
+    BAR_V,
+    BAR_W,
     BEND,
     FINE,
     FINE_DIFFERENCE,
@@ -19,13 +21,17 @@ from survey.kernels.nutation_lanes import (
     V_LOW,
     W_HIGH,
     W_LOW,
+    WIDTH,
     K,
+    L,
     pair,
     put,
 )
+from survey.kernels.quartic import UNIT
 
 MEANS = 8
-LAST = 1e-20
+LAST = 1e-30
+FINEST = 2.0**-96
 # rows of the tile that follow those of `nutation_lanes`: pairs x, y; 1 - e, weight, total of both poles; complementary?
 X, Y, UP, DOWN, LOW_UP, LOW_DOWN = (TILE * (ROWS + n) for n in (0, 2, 4, 10, 16, 17))
 REST, WEIGHT, TOTAL = 0, 2 * TILE, 4 * TILE
@@ -49,7 +55,11 @@ def prepare(work, i):
     k, near, far = pair(work, K, i), pair(work, Q_HIGH, i), pair(work, Q_LOW, i)
     high, low = dd.positive_root(near), dd.positive_root(far)
     g = dd.mul(high, low)
-    above = dd.loose(pair(work, MIDDLE, i), g)
+    above, middle, bend = dd.loose(pair(work, MIDDLE, i), g), pair(work, MIDDLE, i), pair(work, BEND, i)
+    if middle[0] < 0.0:  # (S10)
+        width = dd.sub(pair(work, V_LOW, i), pair(work, V_HIGH, i))
+        below = dd.scaled(dd.loose(g, dd.neg(middle)), 4.0)
+        above = dd.ratio(dd.mul(dd.mul(k, bend), dd.square(width)), below)
     incline = dd.scaled(dd.ratio(dd.mul(k, pair(work, SUM, i)), dd.loose(high, low)), 2.0)
     x, y = dd.positive_root(dd.scaled(above, 0.5)), dd.positive_root(g)
     xy = dd.mul(x, y)
@@ -68,7 +78,7 @@ def prepare(work, i):
     put(work, HIGH, i, high)
     put(work, LOW, i, low)
     put(work, INCLINE, i, incline)
-    put(work, BOW, i, dd.scaled(dd.ratio(dd.mul(k, pair(work, BEND, i)), above), 0.5))
+    put(work, BOW, i, dd.scaled(dd.ratio(dd.mul(k, bend), above), 0.5))
 
 
 @inline
@@ -103,6 +113,16 @@ def part(gap, near, far, root_near, root_far, incline, bow, line, ratio):
 
 
 @inline
+def noise(work, i):
+    """What the bars of the set-up leave of the parts, relative to their terms, as in methods/agm.py."""
+    bar_v, bar_w, size_k = work[BAR_V + i], work[BAR_W + i], abs(work[K + i])
+    error = 8.0 * (size_k * (bar_v + bar_w) + UNIT * (abs(work[L + i]) + 8.0 * size_k))
+    total = error / work[Q_LOW + i] + error / work[Q_HIGH + i] + FINEST
+    total += error / abs(work[BEND + i]) + 2.0 * (bar_v + bar_w) / work[WIDTH + i] if work[MIDDLE + i] < 0.0 else 0.0
+    return 4.0 * total + bar_v / work[V_HIGH + i] + bar_w / work[W_LOW + i]
+
+
+@inline
 def finish(work, i):
     high, low, incline, bow = (pair(work, HIGH, i), pair(work, LOW, i), pair(work, INCLINE, i), pair(work, BOW, i))
     up = part(pair(work, MINUS, i), pair(work, V_HIGH, i), pair(work, V_LOW, i), high, low, incline, bow,
@@ -114,7 +134,7 @@ def finish(work, i):
     known = (abs(work[UP + WEIGHT + i]) <= LAST * work[UP + TOTAL + i]) & (
         abs(work[DOWN + WEIGHT + i]) <= LAST * work[DOWN + TOTAL + i]
     )
-    work[FINE + i] = 1.0 if known else 0.0
+    work[FINE + i] = noise(work, i) if known else 0.0
 
 
 @kernel

@@ -17,10 +17,10 @@ from survey.kernels.quartic import UNIT
 TILE = 64
 GIVEN, OUTPUTS = 7, 12  # rows of numbers given; u_min, u_max, period, precession, spin, action, then their bars
 RIGHT = 0.125 * EPS  # errors of the set-up, relative
-BLUR = 0.01  # the error of a well's width, relative
+BLUR = 8.0 * EPS  # the error of a well's width, relative: `brun.measure` does better
 WIDE = 0.1  # wells that are wider are no parabolas
 NEAR, LAST = 3e-5, 1e-17  # the last two means, and the last weight of R
-SLANT, CANCELLED = 0.25, 0.01  # as in methods/agm.py
+SLANT, CANCELLED = 0.25, 0.05  # as in methods/agm.py
 NODES = 16
 COSINES = np.cos((np.arange(NODES) + 0.5) * pi / NODES)
 # places of the rows of a tile: of what is given the last two, b and a
@@ -38,7 +38,7 @@ X, Y, WEIGHT, SERIES = range(45 * TILE, 49 * TILE, TILE)  # the mean
 # Both poles: the charts, see `chart`; then the sums R: 1 - e, weight, total, 1 if complementary
 UP, DOWN = 49 * TILE, 54 * TILE
 LINE_UP, LINE_DOWN, INCLINE = range(59 * TILE, 62 * TILE, TILE)  # l of (S11) at the poles, and its slope
-# the sum and the difference of the parts of both poles, with all their digits, and 1 if these are known
+# the sum and the difference of the parts of both poles, with all their digits, and their relative error (0: unknown)
 FINE_TOTAL, FINE_DIFFERENCE, FINE = range(62 * TILE, 65 * TILE, TILE)
 BAR_V, BAR_W, ACTION = range(65 * TILE, 68 * TILE, TILE)  # of the first two pairs; (S15), where it is known
 # the roots of Q at the turning points, P at U
@@ -346,13 +346,14 @@ def finish(work, size, drift, i, told):
     total, difference, rough = down + up, down - up, size_up + size_down
     sure = (work[GOOD + i] == 1.0) & (abs(apart) <= 0.5 * NEAR * middle)
     sure &= (last_up <= LAST * ratio_up) & (last_down <= LAST * ratio_down)
-    bare = abs(total) if turns_up + turns_down == 0.0 else abs(difference)  # without multiples of pi
-    cancelled = (bare < CANCELLED * rough) & (turns_up * turns_down != 0.0) & (work[MIDDLE + i] > 0.0)
-    fine = work[FINE + i] == 1.0
+    # without multiples of pi
+    bare = abs(total) if turns_up + turns_down == 0.0 else abs(difference + drift * size * period)
+    cancelled = (bare < CANCELLED * rough) & (turns_up * turns_down != 0.0)
+    fine = work[FINE + i] > 0.0
     exactly = fine & cancelled
     total = work[FINE_TOTAL + i] * period if exactly else total
     difference = work[FINE_DIFFERENCE + i] * period if exactly else difference
-    error, rounding = (EPS / 32.0 * rough, 12.0 * EPS) if exactly else (25.0 * EPS * rough, 2.0 * EPS)
+    error, rounding = (work[FINE + i] * rough, 12.0 * EPS) if exactly else (25.0 * EPS * rough, 2.0 * EPS)
     turned = 2.0 * EPS * pi
     precession, spin = pi * (turns_down + turns_up) + total, pi * (turns_down - turns_up) + difference
     error_precession = error + rounding * abs(total) + turned * abs(turns_down + turns_up)
@@ -401,7 +402,7 @@ def judge(work, i):
 
 @kernel
 def small_actions(work):
-    """Fill the row ACTION by Gauss-Chebyshev quadrature, see methods/agm.py."""
+    """Fill the row ACTION by Gauss-Chebyshev quadrature, see `nutation_action.small`."""
     for j in range(NODES):
         for i in range(TILE):
             add_node(work, COSINES[j], i)

@@ -2,27 +2,25 @@
 
 Domain: every motion between turning points; near separatrices and poles too. Bars are a few roundings.
 
-Source: DLMF 19.8(i), 19.22(ii); formulas (S5), (S10)-(S14) of `scenes/brun.md`.
+Source: DLMF 19.8(i), 19.22(ii); formulas (S5), (S10)-(S14), (S22) of `scenes/brun.md`.
 """
 
-from math import copysign, pi, sqrt
-
-import numpy as np
+from math import copysign, log, pi, sqrt
 
 from survey.kernels import double as dd
 from survey.kernels import nutation as nu
 from survey.kernels.elliptic import jacobi
 from survey.kernels.jit import inline, kernel
+from survey.kernels.nutation_action import ROUGH, action
 from survey.kernels.nutation_time import motion
 from survey.kernels.third_kind import mean, third, third_double
 
 ORDER = 0  # no steps
 SERVES = ("nutation",)
 EPS = nu.EPS
-NODES = 16
-_COSINES = np.cos((np.arange(NODES) + 0.5) * pi / NODES)
-CANCELLED = 0.01  # advances that are a smaller part of their terms are computed in double-double
+CANCELLED = 0.05  # advances that are a smaller part of their terms are computed in double-double
 FINE = 2.0**-94
+CLOSE = 0.1  # poles that are nearer, in units of a well's width, bound rates by nothing
 SLANT = 0.25  # where the line through the roots of Q is lower at the pole, relative, pi is not split off
 
 
@@ -66,9 +64,13 @@ def fine_parts(row):
     k, total, near, far = nu.pair(row, nu.K), nu.pair(row, nu.SUM), nu.pair(row, nu.Q_HIGH), nu.pair(row, nu.Q_LOW)
     high, low = dd.sqrt(near), dd.sqrt(far)
     g = dd.mul(high, low)
-    above = dd.add(nu.pair(row, nu.MIDDLE), g)
+    above, n = dd.add(nu.pair(row, nu.MIDDLE), g), nu.pair(row, nu.BEND)
+    if row[nu.MIDDLE] < 0.0:  # (S10)
+        width = dd.sub(nu.pair(row, nu.LOW_PLUS), nu.pair(row, nu.HIGH_PLUS))
+        rest = dd.times(dd.sub(g, nu.pair(row, nu.MIDDLE)), 4.0)
+        above = dd.div(dd.mul(dd.mul(k, n), dd.mul(width, width)), rest)
     incline = dd.times(dd.div(dd.mul(k, total), dd.add(high, low)), 2.0)
-    bend = dd.times(dd.div(dd.mul(k, nu.pair(row, nu.BEND)), above), 0.5)
+    bend = dd.times(dd.div(dd.mul(k, n), above), 0.5)
     x, y = dd.sqrt(dd.times(above, 0.5)), dd.sqrt(g)
     plus = nu.pair(row, nu.MINUS), nu.pair(row, nu.HIGH_PLUS), nu.pair(row, nu.LOW_PLUS)
     minus = nu.pair(row, nu.PLUS), nu.pair(row, nu.LOW_MINUS), nu.pair(row, nu.HIGH_MINUS)
@@ -77,27 +79,39 @@ def fine_parts(row):
     return dd.add(down, up)[0] * (pi / middle[0]), dd.sub(down, up)[0] * (pi / middle[0])
 
 
-@kernel
-def smooth_action(row, root_low, root_high):
-    """The action by Gauss-Chebyshev quadrature, or -1 where singularities are too near for its few nodes."""
-    k, width, total, bend = row[nu.K], row[nu.WIDTH], row[nu.SUM], row[nu.BEND]
-    if width == 0.0:
-        return 0.0
-    if min(row[nu.HIGH_PLUS], row[nu.LOW_MINUS]) < 0.5 * width:
-        return -1.0
-    if k * bend < 0.0:
-        far = abs(sqrt(-0.25 * bend / k) - abs(total))
-    else:
-        far = sqrt(total * total + 0.25 * bend / k) if k != 0.0 else 2.0
-    if far < 1.1 * width:
-        return -1.0
-    low, high, result = root_low * root_low, root_high * root_high, 0.0
-    for i in range(NODES):
-        up, down = 0.5 * (1.0 + _COSINES[i]), 0.5 * (1.0 - _COSINES[i])
-        q = low * down + high * up - k * width * width * up * down
-        rest = (row[nu.LOW_PLUS] * down + row[nu.HIGH_PLUS] * up) * (row[nu.LOW_MINUS] * down + row[nu.HIGH_MINUS] * up)
-        result += up * down * sqrt(q) / rest
-    return width * width * result / NODES
+@inline
+def shares(x, y):
+    """What part of relative changes of x and of y, at most, their mean changes by (S23)."""
+    least = 1.0 / log(4.0 * max(x, y) / min(x, y))
+    return (least, 1.0) if x < y else (1.0, least)
+
+
+@inline
+def rates(row, to_plus, to_minus):
+    """2 psi' and 2 phi' (S4), less the drift, in size, where 1 - u and 1 + u are these."""
+    up = row[nu.MINUS] / to_plus if row[nu.MINUS] != 0.0 else 0.0
+    down = row[nu.PLUS] / to_minus if row[nu.PLUS] != 0.0 else 0.0
+    return abs(down + up), abs(down - up)
+
+
+@inline
+def blurred(row, roots, up, down, period, x, y):
+    """What errors of Q at the turning points and of s + g make of precession and spin (S23); of advances up, down."""
+    share, low, high, above = shares(x, y), row[nu.NOISE_LOW], row[nu.NOISE_HIGH], row[nu.NOISE_ABOVE]
+    full, rest, time = abs(up) + abs(down), min(x, y) / max(x, y), 0.5 * period
+    if x < y:  # the motion is slow where Q is least
+        to_plus = (row[nu.LOW_PLUS] * roots[1] + row[nu.HIGH_PLUS] * roots[0]) / (roots[0] + roots[1])
+        to_minus = (row[nu.LOW_MINUS] * roots[1] + row[nu.HIGH_MINUS] * roots[0]) / (roots[0] + roots[1])
+        psi, phi = rates(row, to_plus, to_minus)
+        generic, part = (low + high + rest * above) * full, share[0] * above * time
+        return generic + part * psi, generic + part * phi
+    if min(row[nu.HIGH_PLUS], row[nu.LOW_MINUS]) < CLOSE * row[nu.WIDTH]:
+        generic = (low + high + above) * full
+        return generic, generic
+    generic, part = (above + rest * (low + high)) * full, share[1] * time
+    psi, phi = rates(row, row[nu.LOW_PLUS], row[nu.LOW_MINUS])
+    other_psi, other_phi = rates(row, row[nu.HIGH_PLUS], row[nu.HIGH_MINUS])
+    return generic + part * (low * psi + high * other_psi), generic + part * (low * phi + high * other_phi)
 
 
 @inline
@@ -117,28 +131,33 @@ def periods_of(row, out):
     turns_down, down, size_down = advance(
         *minus, width, root_low, root_high, -incline, row[nu.Q_MINUS], bend, period, x, y
     )
-    noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + (row[nu.NOISE_BEND] if row[nu.MIDDLE] < 0.0 else 0.0)
-    out[0], out[4] = period, (12.0 * EPS + noise) * period
+    low, high = row[nu.NOISE_LOW], row[nu.NOISE_HIGH]
+    noise, share = low + high + (row[nu.NOISE_ABOVE] if row[nu.MIDDLE] < 0.0 else 0.0), shares(x, y)
+    out[0] = period
+    out[4] = (12.0 * EPS + 0.5 * share[0] * row[nu.NOISE_ABOVE] + 0.25 * share[1] * (low + high)) * period
     total, difference, size = down + up, down - up, size_up + size_down
-    error, rounding = (24.0 * EPS + 4.0 * noise) * size, 2.0 * EPS
+    roots = root_low, root_high
+    blur_psi, blur_phi = blurred(row, roots, pi * turns_up + up, pi * turns_down + down, period, x, y)
+    ends = 4.0 * row[nu.WIDTH] * (row[nu.NOISE_ENDS] + row[nu.NOISE_WIDTH])
+    error, rounding = (24.0 * EPS + ends) * size, 2.0 * EPS
     bare = abs(total) if turns_up + turns_down == 0.0 else abs(difference)  # without multiples of pi
-    if bare < CANCELLED * size and turns_up * turns_down != 0.0 and row[nu.MIDDLE] > 0.0:
+    if bare < CANCELLED * size and turns_up * turns_down != 0.0:
         total, difference = fine_parts(row)
-        error, rounding = (FINE + 4.0 * noise) * size, 12.0 * EPS
+        error, rounding = (FINE + ends) * size, 12.0 * EPS
     out[1], out[2] = pi * (turns_down + turns_up) + total, pi * (turns_down - turns_up) + difference
     turned = 2.0 * EPS * pi
-    out[5] = error + rounding * abs(total) + turned * abs(turns_down + turns_up)
-    out[6] = error + rounding * abs(difference) + turned * abs(turns_down - turns_up)
+    out[5] = error + min(4.0 * noise * size, blur_psi) + rounding * abs(total) + turned * abs(turns_down + turns_up)
+    out[6] = (
+        error + min(4.0 * noise * size, blur_phi) + rounding * abs(difference) + turned * abs(turns_down - turns_up)
+    )
     up, down = row[nu.MINUS] * (pi * turns_up + up), row[nu.PLUS] * (pi * turns_down + down)
     rest = 0.5 * (0.5 * above - series)
     out[3] = (period * (row[nu.LEVEL] + rest) - up - down) / (2.0 * pi)
     size = period * (abs(row[nu.LEVEL]) + abs(rest))
     size += abs(row[nu.MINUS]) * (pi + size_up) + abs(row[nu.PLUS]) * (pi + size_down)
     out[7] = (24.0 * EPS + 4.0 * noise) * size / (2.0 * pi)
-    if out[7] > 1e-14 * abs(out[3]):
-        action = smooth_action(row, root_low, root_high)
-        if action >= 0.0:
-            out[3], out[7] = action, (64.0 * EPS + noise + 2.5 * row[nu.NOISE_WIDTH]) * action
+    if out[7] > ROUGH * abs(out[3]):
+        out[3], out[7] = action(row)
 
 
 @kernel

@@ -2,7 +2,7 @@
 
 Domain: every motion between turning points. Precessions that nearly cancel keep an absolute accuracy only.
 
-Source: B. C. Carlson, Numer. Algorithms 10 (1995) 13-26; formulas (S5), (S6), (S15) of `scenes/brun.md`.
+Source: B. C. Carlson, Numer. Algorithms 10 (1995) 13-26; formulas (S5), (S6), (S14), (S22) of `scenes/brun.md`.
 """
 
 from math import cos, hypot, pi, sin, sqrt
@@ -10,6 +10,7 @@ from math import cos, hypot, pi, sin, sqrt
 from survey.kernels import nutation as nu
 from survey.kernels.carlson import rf, rj
 from survey.kernels.jit import inline, kernel
+from survey.kernels.nutation_action import ROUGH, action
 from survey.kernels.nutation_time import first_kind, motion
 
 ORDER = 0  # no steps
@@ -46,11 +47,15 @@ def periods_of(row, out):
     noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + 8.0 * EPS * g / nu.above(row, g)
     out[0], out[1], out[2] = 4.0 * time, up + down, down - up
     out[4] = (32.0 * EPS + noise) * out[0]
+    # here, other than in agm, advances know the distances from poles by these alone
+    noise += 0.5 * row[nu.NOISE_ENDS]
     out[5] = out[6] = (48.0 * EPS + 4.0 * noise) * (abs(up) + abs(down))
     square = second_kind(time, 0.5 * nu.above(row, g), g, g)
     parts = out[0] * row[nu.LEVEL], 4.0 * square, row[nu.MINUS] * up, row[nu.PLUS] * down
     out[3] = (parts[0] + parts[1] - parts[2] - parts[3]) / (2.0 * pi)
     out[7] = (48.0 * EPS + 4.0 * noise) * (abs(parts[0]) + parts[1] + abs(parts[2]) + abs(parts[3])) / (2.0 * pi)
+    if out[7] > ROUGH * abs(out[3]):
+        out[3], out[7] = action(row)
 
 
 @kernel

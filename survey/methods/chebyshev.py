@@ -12,6 +12,7 @@ from math import atan2, cos, exp, inf, log1p, pi, sin, sqrt
 import numpy as np
 
 from survey.kernels import nutation as nu
+from survey.kernels.double import two_sum
 from survey.kernels.jit import inline, kernel
 
 ORDER = 0  # no steps: convergence is exponential
@@ -47,27 +48,38 @@ def rate(row):
 
 
 @inline
+def gathered(total, term):
+    high, low = two_sum(total[0], term)
+    return high, total[1] + low
+
+
+@inline
 def sums(row, n, out):
     """T/A, the halves of the advances, the action, and the rounding of Q relative to it, by n nodes in x = 0..pi."""
     low, high, bow = row[nu.Q_LOW], row[nu.Q_HIGH], row[nu.K] * row[nu.WIDTH] ** 2
     minus, plus = row[nu.MINUS], row[nu.PLUS]
-    time = up = down = action = rough = 0.0
+    time = up = down = action = (0.0, 0.0)  # sums and their roundings: of thousands of nodes near poles
+    rough = 0.0
     for i in range(n):
-        c = cos((i + 0.5) * (0.5 * pi / n))  # of x/2: both weights without cancellation
-        s = cos((n - i - 0.5) * (0.5 * pi / n))
+        c = sin((n - i - 0.5) * (0.5 * pi / n))  # cos x/2, with all its digits where it is small
+        s = sin((i + 0.5) * (0.5 * pi / n))
         c, s = c * c, s * s
         square = low * s + high * c - bow * s * c
         root = sqrt(square)
         to_plus = row[nu.LOW_PLUS] * s + row[nu.HIGH_PLUS] * c
         to_minus = row[nu.LOW_MINUS] * s + row[nu.HIGH_MINUS] * c
-        time += 1.0 / root
-        up += 1.0 / (to_plus * root) if minus != 0.0 else 0.0
-        down += 1.0 / (to_minus * root) if plus != 0.0 else 0.0
-        action += s * c * root / (to_plus * to_minus)
+        time = gathered(time, 1.0 / root)
+        up = gathered(up, 1.0 / (to_plus * root) if minus != 0.0 else 0.0)
+        down = gathered(down, 1.0 / (to_minus * root) if plus != 0.0 else 0.0)
+        action = gathered(action, s * c * root / (to_plus * to_minus))
         rough = max(rough, (low * s + high * c + abs(bow) * s * c) / square)
     step = pi / n
-    out[0], out[1], out[2] = 2.0 * step * time, step * up * minus, step * down * plus
-    out[3], out[4] = row[nu.WIDTH] ** 2 * step * action / pi, rough
+    out[0], out[1], out[2] = (
+        2.0 * step * (time[0] + time[1]),
+        step * (up[0] + up[1]) * minus,
+        step * (down[0] + down[1]) * plus,
+    )
+    out[3], out[4] = row[nu.WIDTH] ** 2 * step * (action[0] + action[1]) / pi, rough
 
 
 @inline
@@ -75,10 +87,12 @@ def periods_of(row, n, speed, half, whole, out):
     """See `agm.periods_of`; the error of n nodes follows from the difference to half of them."""
     sums(row, n // 2, half)
     sums(row, n, whole)
-    noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + (16.0 + 2.0 * sqrt(float(n))) * EPS * whole[4]
+    noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + 16.0 * EPS * whole[4]
     seen, missed = exp(-speed * n), exp(-2.0 * speed * n)
     for i in range(4):
         half[i] = 10.0 * (abs(whole[i] - half[i]) * seen + abs(whole[i]) * missed) + noise * abs(whole[i])
+    half[1] += row[nu.NOISE_ENDS] * abs(whole[1])
+    half[2] += row[nu.NOISE_ENDS] * abs(whole[2])
     half[3] += 2.5 * row[nu.NOISE_WIDTH] * whole[3]
     out[0], out[1], out[2], out[3] = whole[0], whole[1] + whole[2], whole[2] - whole[1], whole[3]
     out[4], out[5], out[6], out[7] = half[0], half[1] + half[2], half[1] + half[2], half[3]
