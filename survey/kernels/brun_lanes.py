@@ -105,7 +105,7 @@ def solve(work, steps, within, exactly, actions):
     nl.wells(work, steps[1])
     nl.means(work, steps[2])
     if exactly:
-        nutation_fine.fine(work)
+        nutation_fine.fine(work, steps[2])
     if actions:
         nl.small_actions(work)
 

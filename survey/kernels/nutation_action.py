@@ -106,11 +106,11 @@ def action(row):
 def mend(work, told):
     """In a tile of `nutation_lanes`: (S22) for the actions `told` whose terms cancel, small wells' apart."""
     for i in range(nl.TILE):
-        value, bar = told[5 * nl.TILE + i], told[11 * nl.TILE + i]
+        value, bar, width = told[5 * nl.TILE + i], told[11 * nl.TILE + i], work[nl.WIDTH + i]
         if work[nl.GOOD + i] != 2.0 or work[nl.ACTION + i] > 0.0 or bar <= ROUGH * abs(value):
             continue
-        width, roots = work[nl.WIDTH + i], (sqrt(work[nl.Q_LOW + i]), sqrt(work[nl.Q_HIGH + i]))
+        blur = (work[nl.BAR_V + i] + work[nl.BAR_W + i]) / width
+        roots = (sqrt(work[nl.Q_LOW + i]), sqrt(work[nl.Q_HIGH + i]))
         at_plus, at_minus = (work[nl.V_LOW + i], work[nl.V_HIGH + i]), (work[nl.W_LOW + i], work[nl.W_HIGH + i])
         value, _moved = positive(width, roots, 0.5 * work[nl.ABOVE + i], at_plus, at_minus, (0.0, 0.0, 0.0))
-        blur = (work[nl.BAR_V + i] + work[nl.BAR_W + i]) / width
         told[5 * nl.TILE + i], told[11 * nl.TILE + i] = value, (66.0 * EPS + 4.0 * blur) * value

@@ -29,7 +29,7 @@ from survey.kernels.nutation_lanes import (
 )
 from survey.kernels.quartic import UNIT
 
-MEANS = 8
+FURTHER = 2  # means that double-double takes more than float64
 LAST = 1e-30
 FINEST = 2.0**-96
 # rows of the tile that follow those of `nutation_lanes`: pairs x, y; 1 - e, weight, total of both poles; complementary?
@@ -144,8 +144,8 @@ def begin(work):
 
 
 @kernel
-def go(work):
-    for _ in range(MEANS):
+def go(work, means):
+    for _ in range(means):
         for i in range(TILE):
             take_mean(work, i)
 
@@ -157,8 +157,8 @@ def end(work):
 
 
 @splice
-def fine(work):
-    """Fill the rows FINE of `work` (ALL)."""
+def fine(work, means):
+    """Fill the rows FINE of `work` (ALL), where so many means suffice float64."""
     begin(work)
-    go(work)
+    go(work, means + FURTHER)
     end(work)

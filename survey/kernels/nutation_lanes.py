@@ -17,7 +17,7 @@ from survey.kernels.quartic import UNIT
 TILE = 64
 GIVEN, OUTPUTS = 7, 12  # rows of numbers given; u_min, u_max, period, precession, spin, action, then their bars
 RIGHT = 0.125 * EPS  # errors of the set-up, relative
-BLUR = 8.0 * EPS  # the error of a well's width, relative: `brun.measure` does better
+BLUR = 0.01  # the error of a well's width, relative
 WIDE = 0.1  # wells that are wider are no parabolas
 NEAR, LAST = 3e-5, 1e-17  # the last two means, and the last weight of R
 SLANT, CANCELLED = 0.25, 0.05  # as in methods/agm.py

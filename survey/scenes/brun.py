@@ -51,6 +51,7 @@ STATUS = {
 _NO_MOTION = 16
 _STATE, _SCALED, _MOTION = {"sign": ("",)}, {"sign": ("1", "-1")}, {"motion": ("at_t",)}
 _HARMLESS = (1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0)
+_BLURRED = 4e-13  # relative bars of actions of wells so narrow that turning points lose digits: see `brun.measure`
 _LARGE = {"minimum": -1e25, "maximum": 1e25}  # products of four such numbers, and of their inverses, are floats
 MOTION_PERIODS, MOTION_POINTS = 6, 3001  # of a trajectory
 DIMENSIONS = {"well": np.array([1, 2])}
@@ -163,7 +164,13 @@ def _state_in_lanes(given, columns, valid, slowly, wanted):
     out = nutation.named(values) | {"wells": wells.astype(np.int64)}
     if "separatrix_distance" in wanted:
         out |= nutation.distance(nutation.heights(brun.heights_of_states, columns))
-    return _completed(out, given, valid, done, slowly)
+    out = _completed(out, given, valid, done, slowly)
+    blurred = np.flatnonzero(out["action_error"] > _BLURRED * np.abs(out["action"])) if "action" in wanted else []
+    if len(blurred):
+        part = slowly({name: values[blurred] for name, values in given.items()}, valid[blurred])
+        for name in ("action", "action_error"):
+            out[name][blurred] = part[name]
+    return out
 
 
 def _scaled_in_lanes(given, valid, sign, slowly, wanted):
