@@ -66,7 +66,13 @@ def coordinates(grid, scene, request):
     used = {p.name: p for p in scene.PARAMETERS}
     coords = {key: (dims, values, _meaning(used[key])) for key, (dims, values) in grid.parameters.items()}
     extra = dict.fromkeys(dim for output in outputs_of(scene, request) for dim in output.dims)
-    return coords | {dim: ((dim,), np.asarray(scene.DIMENSIONS[dim]), {"long_name": dim}) for dim in extra}
+    return coords | {dim: _index(dim, np.asarray(scene.DIMENSIONS[dim])) for dim in extra}
+
+
+def _index(dim, values):
+    """An extra dimension's coordinate: names, or numbers, which have a unit."""
+    unit = {"units": "1"} if values.dtype.kind in "if" else {}
+    return (dim,), values, {"long_name": dim, "symbol": rf"\mathrm{{{dim}}}"} | unit
 
 
 def variables(grid, scene, request):
