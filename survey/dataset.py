@@ -292,6 +292,8 @@ def meaning(output):
         attributes["ancillary_variables"] = f"{output.name}_error"
     comment = [output.applies] if output.applies else []
     comment += [f"{output.fill} where it does not apply"] if output.integer else []
+    if output.flags is not None and output.fill not in output.flags.values():
+        comment.append(f"{output.fill} where there is no answer")
     if comment:
         attributes["comment"] = "; ".join(comment)
     return attributes
