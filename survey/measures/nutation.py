@@ -144,8 +144,9 @@ def heights(kernel, points):
 
 def distance(heights):
     """The output of that name: (L - L of the separatrix)/|k|, and its bar; NaN where there is none, or FAR away."""
-    value = heights[:, 0] / heights[:, 2]
-    bar = heights[:, 1] / heights[:, 2] + 4.0 * nu.EPS * np.abs(value)
+    with np.errstate(divide="ignore", invalid="ignore"):  # k = 0 has no separatrix
+        value = heights[:, 0] / heights[:, 2]
+        bar = heights[:, 1] / heights[:, 2] + 4.0 * nu.EPS * np.abs(value)
     near = np.abs(value) < FAR
     return {
         "separatrix_distance": np.where(near, value, np.nan),
