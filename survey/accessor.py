@@ -22,6 +22,10 @@ class Survey:
             )
         self._ds = ds
 
+    def __repr__(self):
+        names = [name for name in vars(type(self)) if not name.startswith("_")]
+        return f"a survey of {self._ds.attrs['scene']}: ds.survey has {', '.join(names)}; help(ds.survey) tells each"
+
     def map(self, var=None, ax=None, boundaries=True, style=None, width="single"):
         """Draw the stability map, or the variable `var`; along one axis, its curve and error band.
 

@@ -54,7 +54,7 @@ def audit(ds, points, seed=0):
 
 
 def _place(given, i):
-    return ", ".join(f"{key} = {values[i]!r}" for key, values in given.items())
+    return ", ".join(f"{key} = {values[i].item()!r}" for key, values in given.items())
 
 
 def _solve(name, method, options, rtol, ds, module, variables, places):

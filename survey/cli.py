@@ -160,6 +160,8 @@ def plot(path, output, var, style, width):
 
     from survey import api, figures
 
+    if width != "single" and style != "paper":
+        raise BadInput(f"--width {width} is one of --style paper, where columns have widths; give both, or neither")
     ds = api.open(path)
     suffix = ".pdf" if style == "paper" else ".png"
     target = Path(output or f"{path.removesuffix('.nc')}{f'_{var}' if var else ''}{suffix}")
@@ -168,7 +170,8 @@ def plot(path, output, var, style, width):
     except BadInput:
         raise
     except (OSError, ValueError) as error:
-        raise BadInput(f"{target}: cannot draw to it ({error}); name a .png, .pdf or .svg file with -o") from None
+        reason = getattr(error, "strerror", None) or error
+        raise BadInput(f"{target}: cannot draw to it ({reason}); name a .png, .pdf or .svg file with -o") from None
     out.print(str(target), markup=False)
 
 

@@ -26,7 +26,6 @@ from survey.dataset import flag_codes, percent, unanswered
 from survey.errors import BadInput
 from survey.grid import logarithmic
 from survey.reduced import Overview, Points
-from survey.wording import counted
 
 # after Okabe and Ito, safe for the colour-blind, the first two far apart in grey print too;
 # black is kept for undecided, white with hatching for failed
@@ -237,6 +236,7 @@ def _cells(axes, ds, x, y, failed, number, paper):
     corners = np.stack([left, low, left, high, right, high, right, low], axis=1).reshape(-1, 4, 2)
     table = flag_codes(ds.cell_verdict.attrs)
     shares = dict(zip(flag_codes(ds.area_verdict.attrs), ds.area_fraction.values, strict=True))
+    left_open = max(1.0 - float((ds.area_fraction - ds.area_fraction_error).sum()), 0.0)
     handles = []
     for name, code in reversed(table.items()):
         own, colour = ds.cell_verdict.values == code, colours_of(table)[name]
@@ -247,7 +247,8 @@ def _cells(axes, ds, x, y, failed, number, paper):
         axes.add_collection(PolyCollection(corners[own], facecolors=colour, rasterized=True, **line))
         if hatch:
             axes.add_collection(PolyCollection(corners[own], facecolors="none", lw=0, hatch=hatch, rasterized=True))
-        part = percent(shares[name], float(ds.area_fraction_error[0])) if name in shares else counted(own.sum(), "cell")
+        bar = float(ds.area_fraction_error[0])
+        part = percent(shares[name], bar) if name in shares else f"{100 * left_open:.2g} %"
         part = part.replace("+-", "±")
         patch = Patch(facecolor=colour, edgecolor="black", lw=0.5, hatch=hatch, label=f"{name} ({part})")
         handles += [patch] if own.any() else []
@@ -280,7 +281,7 @@ def _verdicts(axes, x, y, ds, variable, state, number, paper):
     edges = np.append(np.array(codes) - 0.5, codes[-1] + 0.5)
     look = {"cmap": cmap, "norm": BoundaryNorm(edges, cmap.N), "shading": "nearest", "rasterized": True}
     axes.pcolormesh(x, y, shown.T, **look)
-    number = number or {name: int((shown == code).sum()) for name, code in table.items()}
+    number = number or {name: int((shown == code).filled(False).sum()) for name, code in table.items()}
     handles = [
         Patch(
             facecolor=palette[names[code]],

@@ -165,6 +165,8 @@ class HillScene:
             failed = error
         if isinstance(failed, IndexError):
             n = len(self.PARAMETERS)
+            if "only integers" in str(failed):
+                self._refuse("z(u, p) asks for a parameter by its name, and p is an array", "write p[0], p[1], ...")
             self._refuse(f"z(u, p) reaches beyond an array ({failed})", f"PARAMETERS names {n}: p[0] to p[{n - 1}]")
         try:
             hill_own.at(self.z, np.empty((0, len(self.PARAMETERS))), np.empty((0, 1)))

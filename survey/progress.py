@@ -77,7 +77,7 @@ class Progress:
             eta = f"{_clock(left)} or more"
             self.bar.update(self.task, description=f"{self.workflow.name}: {text}", what="cells", eta=eta)
         elif settled == 1:
-            self._line(text)
+            self._line(f"cells: all decided or as narrow as asked, {counted(points, 'point')} solved")
         elif time.monotonic() - self.logged > LOG_SECONDS:
             self.logged = time.monotonic()
             self._line(f"{text}, ETA {left:.0f} s or more")

@@ -387,8 +387,8 @@ def undigested(path):
     if beside.exists():
         return []
     return [
-        f"{path}: there is no digest {beside.name} beside it, so changes of its labels, coordinates and attributes go "
-        "unseen (what is checked: the checksums of its data, counts, status, points); copy the digest here too, or "
+        f"{path}: there is no digest {beside.name} beside it, so what another program has changed goes unseen (what is "
+        "checked: the checksums of its data, counts, status, and some points anew); copy the digest here too, or "
         f"take the file as it is: sha256sum {shlex.quote(str(path))} > {shlex.quote(str(beside))}"
     ]
 

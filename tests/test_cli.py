@@ -113,6 +113,7 @@ def test_info_verify_and_plot(program, ran):
     assert plotted.returncode == 0 and (program.folder / "t.pdf").read_bytes()[:4] == b"%PDF"
     assert "did you mean 'turnings'" in program("plot", "small.nc", "--var", "turning").stderr
     assert program("plot", "small.nc", "-o", "t.docx").returncode == 2
+    assert "give both, or neither" in program("plot", "small.nc", "--width", "double").stderr
 
 
 def test_verify_finds_a_flipped_bit(program, ran):

@@ -49,6 +49,14 @@ def test_undecided_is_not_counted_where_the_point_failed(toy):
     plt.close("all")
 
 
+@pytest.mark.parametrize("style", ["screen", "paper"])
+def test_a_map_wholly_outside_the_domain(toy, style):
+    toy.status[...] = status.INVALID_PARAMETERS
+    labels = [text.get_text() for text in figures.draw(toy, style=style).legends[0].get_texts()]
+    assert labels == ["outside the domain (2,000)" if style == "screen" else "outside the domain"]
+    plt.close("all")
+
+
 @pytest.fixture
 def bare(toy):
     """The toy map where 50 points have no answer by nature, as the scene says."""

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from survey import status
+from survey.analysis.point import scene_of
 from survey.dataset import flag_codes, percent
 from survey.errors import BadInput
 
@@ -31,7 +32,9 @@ def of_map(ds):
     bar = np.where(most > 0, np.maximum(most - area, area - least) + 1e-13 * total, 0.0)
     units = " ".join(u for u in (ds[dim].attrs.get("units", "1") for dim in ds.status.dims) if u != "1") or "1"
     found = _described([list(codes)[i] for i in kept], area[kept], bar[kept], total, units, COMMENT)
-    found.attrs["areas"] += "; from points: what is narrower than their spacing is not seen ([refine] bounds it)"
+    found.attrs["areas"] += "; from points: what is narrower than their spacing is not seen"
+    if len(ds.status.dims) == 2 and getattr(scene_of(ds), "FAMILY", "") == "hill":
+        found.attrs["areas"] += " ([refine] bounds it)"
     return found
 
 

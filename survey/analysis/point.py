@@ -98,7 +98,7 @@ class Point:
         ds = self.dataset
         if int(ds.status) != status.OK:
             return sentence(ds)
-        judge = getattr(_scene(ds), "why", None)
+        judge = getattr(scene_of(ds), "why", None)
         if judge is None or "verdict" not in ds:
             return sentence(ds)
         try:
@@ -153,7 +153,7 @@ def values(ds):
     }
 
 
-def _scene(ds):
+def scene_of(ds):
     """The scene's module, or None where it is a user's that is gone."""
     try:
         return own.find(own.of_dataset(ds))[1]

@@ -9,6 +9,8 @@ from survey.dataset import options_of
 from survey.errors import BadInput
 from survey.scene import exists
 
+SHOWN = 4  # parameters: of more, those that are 0 are left out of the title
+
 
 def solve(point, time=None):
     """The motion at `point` (a dataset of one point), a Dataset whose attribute `panels` says how it is drawn."""
@@ -24,7 +26,11 @@ def solve(point, time=None):
     found = make(given, values(known), chosen, time)
     about = {"title": point.attrs.get("title", ""), "scene": name, "options": point.attrs["options"]}
     about |= {"parameters": ", ".join(f"{key}={value!r}" for key, value in given.items())}
-    shown = [f"${point[key].attrs.get('symbol', key)} = {value:.6g}$" for key, value in given.items() if value]
+    shown = [
+        f"${point[key].attrs.get('symbol', key)} = {value:.6g}$"
+        for key, value in given.items()
+        if value or len(given) <= SHOWN
+    ]
     about |= {"where": ", ".join(shown)}
     about |= {"panels": "; ".join(" ".join(panel) for panel in found.panels)}
     return xr.Dataset(dict(found.data), attrs=about)

@@ -7,10 +7,10 @@ conserved, k = epsilon A (A - C) and L = 2 A h - (A/C) p_phi^2 - epsilon A^2 + p
     psi' = [(p_psi - p_phi)/(1 - u) + (p_psi + p_phi)/(1 + u)] / (2 A)                                 (S4)
 
 Parameters, in order: A > 0 and C (0 < C <= 2 A), moments of inertia; epsilon = 3 mu / R^3, any sign; an initial state:
-theta0 in [0, pi], p_theta0, p_psi, p_phi; and, if wanted, t (psi = phi = 0 at t = 0). Or, instead of all these, the
-scaled integrals l = L/|k|, alpha = p_phi/sqrt|k|, beta = p_psi/sqrt|k| with the option `sign` (of k) and ratio = C/A,
-which only the spin needs; then every well of the effective potential has its place, lower u first, and time is in units
-of A/sqrt|k|, action in units of sqrt|k|.
+theta0 in [0, pi] (0 only if p_psi = p_phi), p_theta0, p_psi, p_phi; and, if wanted, t (psi = phi = 0 at t = 0). Or,
+instead of all these, the scaled integrals l = L/|k|, alpha = p_phi/sqrt|k|, beta = p_psi/sqrt|k| with the option `sign`
+(of k) and ratio = C/A, which only the spin needs; then every well of the effective potential has its place, lower u
+first, and time is in units of A/sqrt|k|, action in units of sqrt|k|.
 
 Per period of the nutation psi advances by `precession` and phi by `spin`; these are not reduced modulo 2 pi, nor are
 the rotation numbers, which are 1/(2 pi) of them. They jump by 2 pi (by 1) where p_psi -+ p_phi changes its sign on
@@ -46,6 +46,8 @@ REFERENCES = (
     "Bekov, Shinibaev et al.: quadratures of Kobb's type, a body in a Newtonian field (errata: survey/scenes/brun.md)",
 )
 STATUS = {
+    "invalid_parameters": "the parameters lie outside the domain: C is at most 2 A, at theta0 = 0 p_psi is p_phi, and "
+    "more in `survey scenes brun`",
     "no_motion": "no motion has these integrals: l lies below the least effective potential",
 }
 _NO_MOTION = 16
@@ -65,8 +67,8 @@ PARAMETERS = (
     Parameter("theta0", "initial angle between the axis and the vertical", r"\theta_0", units="rad", minimum=0.0,
               maximum=pi, when=_STATE),
     Parameter("p_theta0", "initial momentum conjugate to theta", r"p_{\theta 0}", when=_STATE, **_LARGE),
-    Parameter("p_psi", "momentum of the precession angle, b", r"p_\psi", when=_STATE, **_LARGE),
-    Parameter("p_phi", "momentum of the spin angle, a", r"p_\varphi", when=_STATE, **_LARGE),
+    Parameter("p_psi", "momentum of the precession angle", r"p_\psi", when=_STATE, **_LARGE),
+    Parameter("p_phi", "momentum of the spin angle", r"p_\varphi", when=_STATE, **_LARGE),
     Parameter("t", "time since the initial state", "t", when=_MOTION | _STATE, whole=True, **_LARGE),
     Parameter("l", "scaled energy L / |k|", "l", when=_SCALED, **_LARGE),
     Parameter("alpha", "scaled momentum p_phi / sqrt|k|", r"\alpha", when=_SCALED, **_LARGE),
