@@ -67,10 +67,11 @@ def test_every_command_takes_it(program, folder):
 
 def test_finished_blocks_are_not_used_again_after_the_file_has_changed(folder):
     first = workflow.read("below/mine.toml", output="o.nc")
-    with store.Blocks(first.path, engine.fingerprint(first)):
-        pass
+    block = engine.regions_of(first)[1][0][1][0]
+    with store.Blocks(first.path, engine.fingerprint(first)) as kept:
+        kept.save(0, engine.solve_block(first.scene, first.request, first.grid, block))
     (folder / "below/mine.py").write_text(SCENE.replace("- 2 *", "- 2.000001 *"))
-    with pytest.raises(BadInput, match=r"scene_hash changed.*--fresh"):
+    with pytest.raises(BadInput, match=r"another z\(u, p\).*--fresh"):
         engine.run(workflow.read("below/mine.toml", output="o.nc"))
     (folder / "below/mine.py").write_text(SCENE)
     engine.run(workflow.read("below/mine.toml", output="o.nc"))
