@@ -322,7 +322,7 @@ def test_what_cannot_be_viewed_is_one_line(tmp_path):
     xr.open_dataset(MAP).isel(k=0).to_netcdf(tmp_path / "line.nc")
     for name, message in (
         ("absent.nc", "there is no such file"),
-        ("other.nc", "this netCDF file was not written by survey run"),
+        ("other.nc", "this netCDF file was not written by survey"),
         ("line.nc", "this survey has no two axes"),
     ):
         with pytest.raises(BadInput, match=message) as told:
