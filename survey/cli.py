@@ -154,15 +154,17 @@ def info(path, as_json):
 @click.option("--var", metavar="NAME", help="The variable; by default the verdict.")
 @click.option("--style", type=click.Choice(["screen", "paper"]), default="screen", help="For papers: PDF, hatched.")
 @click.option("--width", type=click.Choice(["single", "double"]), default="single", help="Columns, of style paper.")
-def plot(path, output, var, style, width):
+@click.option("--at", metavar="NAME=VALUE", multiple=True, help="Draw the plane, row or well there, not the first.")
+def plot(path, output, var, style, width, at):
     """Draw the stability map, or the named variable."""
     from pathlib import Path
 
     from survey import api, figures
+    from survey.analysis.point import plane
 
     if width != "single" and style != "paper":
         raise BadInput(f"--width {width} is one of --style paper, where columns have widths; give both, or neither")
-    ds = api.open(path)
+    ds = plane(api.open(path), dict(part.partition("=")[::2] for part in at))
     suffix = ".pdf" if style == "paper" else ".png"
     target = Path(output or f"{path.removesuffix('.nc')}{f'_{var}' if var else ''}{suffix}")
     try:

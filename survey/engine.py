@@ -233,8 +233,10 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, agai
             if _process() in compiled:
                 compiled[_process()] -= before
             compiling = max(compiled.values(), default=0.0)  # processes compile side by side
+            before = compile_seconds()
             further = extras(workflow, kept.once, progress)
-            beside = time.perf_counter() - computed
+            more = compile_seconds() - before
+            compiling, beside = compiling + more, time.perf_counter() - computed - more
             told = {
                 "wall_time_s": round(time.perf_counter() - started, 3),
                 "compile_time_s": round(compiling, 3),
@@ -242,8 +244,8 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, agai
             }
             written = assembly.finish(further, told)
         kept.remove()
-    writing = time.perf_counter() - computed - beside
-    computing = max(0.0, computed - began - compiling)
+    writing = time.perf_counter() - computed - beside - more
+    computing = max(0.0, computed - began - (compiling - more))
     return Finished(written, assembly.tally.counts, compiling, computing, beside if further else 0.0, writing)
 
 

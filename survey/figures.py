@@ -160,7 +160,8 @@ def _map(axes, ds, variable, state, boundaries, paper):
     else:
         shown = np.ma.masked_invalid(np.where(failed | outside, np.nan, variable.values.astype(float)))
         drawn = axes.pcolormesh(x, y, shown.T, cmap="viridis", shading="nearest", rasterized=True, **limits(shown))
-        axes.figure.colorbar(drawn, ax=axes, label=label_of(variable), ticks=whole)
+        if not shown.mask.all():
+            axes.figure.colorbar(drawn, ax=axes, label=label_of(variable), ticks=whole)
         axes.set_facecolor("#dddddd")
         handles = _no_answer(axes, x, y, failed, outside, number, paper)
         handles += [Patch(color="#dddddd", label="does not apply")] if (shown.mask & ~(failed | outside)).any() else []
@@ -458,7 +459,7 @@ def label_of(variable):
     symbol, units = variable.attrs.get("symbol", ""), variable.attrs.get("units", "1")
     text = variable.attrs.get("long_name", variable.name)
     shown = symbol and "flag_values" not in variable.attrs
-    text += ", $$" if shown else ""  # TeX is wider than what it shows: wrapped without it
+    text = "$$" if text == symbol else f"{text}, $$" if shown else text  # TeX is wider than what it shows: put in last
     text += "" if units in ("1", "") else f" ({units})"
     wrapped = textwrap.fill(text, 40, break_long_words=False)
     return wrapped.replace("$$", f"${symbol}$") if shown else wrapped
@@ -469,7 +470,7 @@ def _title(ds, variable):
     lines = [ds.attrs.get("title", ""), variable.attrs.get("long_name", variable.name)]
     fixed = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "fi"]
     fixed = [c for c in fixed if c.name in ds.dims or float(c) != 0]
-    of = {name: f" (1 of {ds.sizes[name]})" for name in variable.coords if name in ds.dims}
+    of = {name: f" (1 of {ds.sizes[name]})" for name in variable.coords if ds.sizes.get(name, 1) > 1}
     numbers = [f"${c.attrs.get('symbol') or c.name} = {float(c):.6g}${of.get(c.name, '')}" for c in fixed]
     labels = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "UO"]
     numbers = ", ".join(numbers + [f"{c.name} {c.item()}{of.get(c.name, '')}" for c in labels])

@@ -113,6 +113,10 @@ def test_info_verify_and_plot(program, ran):
     assert plotted.returncode == 0 and (program.folder / "t.pdf").read_bytes()[:4] == b"%PDF"
     assert "did you mean 'turnings'" in program("plot", "small.nc", "--var", "turning").stderr
     assert program("plot", "small.nc", "-o", "t.docx").returncode == 2
+    for at, words in (("w0=x", "give one number"), ("w=1", "unknown axis"), ("w0=99", "lies outside the map")):
+        refused = program("plot", "small.nc", "--at", at)
+        assert refused.returncode == 2 and words in refused.stderr and refused.stderr.count("\n") == 1, refused.stderr
+    assert program("plot", "small.nc", "--at", "w0=1.1", "--var", "turnings", "-o", "row.png").returncode == 0
     assert "give both, or neither" in program("plot", "small.nc", "--width", "double").stderr
 
 

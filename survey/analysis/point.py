@@ -57,6 +57,33 @@ def place(ds, coords):
     return places
 
 
+def plane(ds, at):
+    """The survey where axes have the values next to `at`, and other dimensions the places of these names.
+
+    `at` holds texts. A dimension beyond the two that are drawn is kept, of one place.
+    """
+    for name, text in at.items():
+        if name in ds.status.dims:
+            i, drawn = place(ds, {name: _number(name, text)})[name], name in ds.status.dims[:2]
+            ds = of_points(ds).isel({name: i}) if drawn else ds.isel({name: [i]})
+            continue
+        others = [dim for dim in ds.dims if dim in ds.coords and dim not in ds.status.dims]
+        if name not in others:
+            raise BadInput(modules.unknown("axis", name, [*ds.status.dims, *others]))
+        known = [str(value) for value in ds[name].values]
+        if text not in known:
+            raise BadInput(modules.unknown(name, text, known))
+        ds = ds.isel({name: [known.index(text)]})
+    return ds
+
+
+def _number(name, text):
+    try:
+        return float(text)
+    except ValueError:
+        raise BadInput(f"{name} = {text!r}: give one number, as in --at {name}=0.5") from None
+
+
 def meaning(variable):
     """The word of a flag's code, of a single value."""
     words = {code: word for word, code in flag_codes(variable.attrs).items()}

@@ -112,6 +112,7 @@ def _outputs(when, dims):
     )  # fmt: skip
 
 
+_VERDICTS = {"undecided": -1, "separatrix": 0, "regular_nutation": 1, "regular_precession": 2, "pole_passage": 3}
 _ANGLE = {"units": "rad", "when": _MOTION, "applies": f"{_TURNS}; without the jumps of pi in passing a pole"}
 OUTPUTS = (
     Output("u", "u = cos theta at t", "u", when=_MOTION, applies=_TURNS),
@@ -122,8 +123,8 @@ OUTPUTS = (
     Output("separatrix_distance", "L less its value on the separatrix at the same p_psi, p_phi, over |k|", r"\Delta l",
            applies="where these momenta have a separatrix (nearer than 1e38): negative in a well, positive outside"),
     Output("wells", "number of wells of motion at these integrals", integer=True, applies="off separatrices"),
-    Output("verdict", "what the motion is (scaled integrals: the last of these that a well holds)",
-           flags={"undecided": -1, "separatrix": 0, "regular_nutation": 1, "regular_precession": 2, "pole_passage": 3}),
+    Output("verdict", "what the motion is", flags=_VERDICTS, when=_STATE),
+    Output("verdict", "what the motion is, the last of these that a well holds", flags=_VERDICTS, when=_SCALED),
 )  # fmt: skip
 
 
