@@ -66,12 +66,12 @@ def scaled_misses(seed, number):
 
 def test_hard_cases():
     with mp.workdps(60):
-        assert misses(1, 200) == []
+        assert misses(1, 120) == []
 
 
 def test_hard_cases_of_scaled_integrals():
     with mp.workdps(60):
-        assert scaled_misses(1, 150) == []
+        assert scaled_misses(1, 90) == []
 
 
 def test_motions_of_hard_cases():
