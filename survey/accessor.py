@@ -78,7 +78,8 @@ class Survey:
 
         Where the file holds it ([boundaries] in the workflow): a coordinate per axis, `position_error`, `kind` (what
         kind of boundary), `index` (of the tongue) and, if joined, `curve`; of one `kind` or `index` if asked for. Else
-        midpoints between neighbouring points of different verdict, with X_error = half their distance.
+        the middles of the cells that [refine] left undecided, or midpoints between neighbouring points of different
+        verdict, with X_error = half the cell's width or half their distance.
         """
         from survey.analysis import boundary
 

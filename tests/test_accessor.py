@@ -298,6 +298,17 @@ def test_a_zoom_beyond_the_map_is_solved_and_said(mathieu, recwarn):
         mathieu.survey.zoom(a=(0.0, 2e12))
 
 
+def test_every_curve_lies_in_a_cell_that_is_left_undecided(tongues):
+    ds = survey.open(tongues)
+    curves = ds.survey.boundary()
+    cells = ds.drop_vars([name for name in ds if name.startswith(("edge_", "curve_", "fold_"))]).survey.boundary()
+    inside = np.ones((curves.sizes["place"], cells.sizes["place"]), bool)
+    for axis in ds.status.dims:
+        off = abs(curves[axis].values[:, None] - cells[axis].values)
+        inside &= off <= cells[f"{axis}_error"].values + 1e-12
+    assert inside.any(axis=1).all() and float(cells[f"{axis}_error"].max()) > 0
+
+
 def test_areas_of_points_and_cells(toy, tongues):
     found = toy.survey.areas()
     disc = found.sel(area_verdict="unstable")

@@ -1,4 +1,4 @@
-"""Where the verdict changes: the edges and curves that the file holds, or what the map's points say, as one table."""
+"""Where the verdict changes: edges, curves or cells that the file holds, or what the map's points say, as one table."""
 
 import numpy as np
 import xarray as xr
@@ -14,6 +14,8 @@ def find(ds, kind=None, index=None):
         found = _curves(ds)
     elif "edge_count" in ds:
         found = _edges(ds)
+    elif "cell_verdict" in ds:
+        found = _undecided_cells(ds)
     else:
         found = _between_points(ds)
     for name, asked in (("kind", kind), ("index", index)):
@@ -51,6 +53,17 @@ def _edges(ds):
     for name, source in (("kind", ds.edge_class), ("index", ds.edge_index)):
         found[name] = ("place", source.values, source.attrs)
     return _table(ds, found, f"edges of tongues along {axis}, as the file holds them")
+
+
+def _undecided_cells(ds):
+    """The middles of the cells that [refine] left undecided: every boundary lies in one of them."""
+    left, found = np.flatnonzero(ds.cell_verdict.values == flag_codes(ds.cell_verdict.attrs)["undecided"]), {}
+    for dim in ds.attrs["refine"].split(", "):
+        low, high = (ds[f"cell_{dim}_{end}"].values[left] for end in ("low", "high"))
+        words = {"long_name": f"error bound of {dim}: half the width of the cell"}
+        found[dim] = ("place", 0.5 * (low + high), ds[dim].attrs)
+        found[f"{dim}_error"] = ("place", 0.5 * (high - low), ds[dim].attrs | words)
+    return _table(ds, found, "middles of the undecided cells, in which every boundary lies; not each of them holds one")
 
 
 def _between_points(ds):

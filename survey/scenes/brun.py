@@ -279,7 +279,8 @@ def trajectory(point, answer, options, time=None):
     t = np.linspace(0.0, MOTION_PERIODS * period if time is None else time, MOTION_POINTS)
     asked = {name: np.full((1, 1), value) for name, value in state.items()} | {"t": t[None]}
     out = {name: values[0] for name, values in solve(asked, Request({"motion": "at_t"}, rtol=1e-9)).items()}
-    data = {"t": ("t", t, {"long_name": "time", "symbol": "t", "units": "1"})}
+    words = "time, over A / sqrt|k|" if "l" in point else "time"
+    data = {"t": ("t", t, {"long_name": words, "symbol": "t", "units": "1"})}
     for o in OUTPUTS[:3]:
         meaning = {"long_name": o.long_name, "symbol": o.symbol, "units": o.units}
         data[o.name] = ("t", out[o.name], meaning)
