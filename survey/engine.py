@@ -165,19 +165,19 @@ class Job:
     kept: store.Blocks
     code: dict[str, str]
 
-    def __call__(self, numbered):
+    def __call__(self, block):
         _refuse_other_code(self.code)
-        number, ends = numbered
-        block = tuple(slice(*pair) for pair in ends)
+        number, ends = block
+        cuts = tuple(slice(*pair) for pair in ends)
         began, before = time.perf_counter(), compile_seconds()
-        content = self.kept.keep(number, solve_block(self.scene, self.request, self.grid, block))
+        content = self.kept.keep(number, solve_block(self.scene, self.request, self.grid, cuts))
         compiled = compile_seconds()
         seconds = time.perf_counter() - began - (compiled - before)
         return Solved(number, _process(), compiled, max(seconds, 0.0), content)
 
-    def died(self, numbered):
+    def died(self, block):
         """Keep a block with the status of points whose worker died again and again."""
-        number, ends = numbered
+        number, ends = block
         shape = tuple(stop - start for start, stop in ends)
         table = layout(self.scene, self.request)
         arrays = {name: np.full(shape + extra, fill, kind) for name, (kind, fill, extra) in table.items()}

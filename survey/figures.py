@@ -22,6 +22,7 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import ScaledTranslation
 
 from survey import modules, status
+from survey.analysis import areas
 from survey.dataset import flag_codes, percent, unanswered
 from survey.errors import BadInput
 from survey.grid import logarithmic
@@ -157,6 +158,7 @@ def _map(axes, ds, variable, state, boundaries, paper):
         handles = _cells(axes, ds, x, y, failed, number, paper)
     elif "flag_values" in variable.attrs:
         handles = _verdicts(axes, x, y, ds, variable, state, number, paper)
+        handles += _no_answer(axes, x, y, failed, outside, number, paper)
     else:
         shown = np.ma.masked_invalid(np.where(failed | outside, np.nan, variable.values.astype(float)))
         drawn = axes.pcolormesh(x, y, shown.T, cmap="viridis", shading="nearest", rasterized=True, **limits(shown))
@@ -237,7 +239,6 @@ def _cells(axes, ds, x, y, failed, number, paper):
     corners = np.stack([left, low, left, high, right, high, right, low], axis=1).reshape(-1, 4, 2)
     table = flag_codes(ds.cell_verdict.attrs)
     shares = dict(zip(flag_codes(ds.area_verdict.attrs), ds.area_fraction.values, strict=True))
-    left_open = max(1.0 - float((ds.area_fraction - ds.area_fraction_error).sum()), 0.0)
     handles = []
     for name, code in reversed(table.items()):
         own, colour = ds.cell_verdict.values == code, colours_of(table)[name]
@@ -249,7 +250,7 @@ def _cells(axes, ds, x, y, failed, number, paper):
         if hatch:
             axes.add_collection(PolyCollection(corners[own], facecolors="none", lw=0, hatch=hatch, rasterized=True))
         bar = float(ds.area_fraction_error[0])
-        part = percent(shares[name], bar) if name in shares else f"{100 * left_open:.2g} %"
+        part = percent(shares[name], bar) if name in shares else f"{100 * areas.undecided(ds):.2g} %"
         part = part.replace("+-", "±")
         patch = Patch(facecolor=colour, edgecolor="black", lw=0.5, hatch=hatch, label=f"{name} ({part})")
         handles += [patch] if own.any() else []
@@ -271,9 +272,7 @@ def _kinds(ds, variable, state):
 
 
 def _verdicts(axes, x, y, ds, variable, state, number, paper):
-    """A colour per kind; failed and outside points white and hatched; rare points ringed. Returns the handles."""
-    failed = np.isin(state.values, list(status.FAILURES))
-    outside = state.values == status.INVALID_PARAMETERS
+    """A colour per kind, rare points ringed; what failed or lies outside stays white. Returns the handles."""
     shown, table, palette = _kinds(ds, variable, state)
     flags = flag_codes(variable.attrs)
     codes = sorted(table.values())
@@ -299,8 +298,7 @@ def _verdicts(axes, x, y, ds, variable, state, number, paper):
             if number[names[code]] and _hatch(flags, names[code]):
                 _hatched(axes, x, y, (shown == code).filled(False), _hatch(flags, names[code]))
     undecided = (shown == table.get("undecided", -1)).filled(False)
-    handles += _marks(axes, x, y, undecided, "undecided", number, paper, UNDECIDED)
-    return handles + _no_answer(axes, x, y, failed, outside, number, paper)
+    return handles + _marks(axes, x, y, undecided, "undecided", number, paper, UNDECIDED)
 
 
 def _no_answer(axes, x, y, failed, outside, number, paper):

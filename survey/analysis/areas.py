@@ -44,10 +44,14 @@ def _of_cells(ds):
     share = ds.area_fraction.values
     total = float(ds.area.values[share.argmax()] / share.max())
     bar = ds.area_error.values.astype(float)
-    left = total - (ds.area.values - bar).sum()
-    values, bars = [*ds.area.values, left], [*bar, 1e-13 * total]
+    values, bars = [*ds.area.values, total * undecided(ds)], [*bar, 1e-13 * total]
     words = "from cells that are decided as wholes; the area of the undecided cells is the others' error bar"
     return _described([*names, "undecided"], np.array(values), np.array(bars), total, ds.area.attrs["units"], words)
+
+
+def undecided(ds):
+    """The share of a refined map that its undecided cells take."""
+    return max(1.0 - float((ds.area_fraction - ds.area_fraction_error).sum()), 0.0)
 
 
 def _counted(ds, codes):

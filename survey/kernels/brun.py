@@ -32,6 +32,7 @@ from survey.kernels.nutation import (
     barrier,
     find,
     looseness,
+    roughness,
     saddle,
 )
 from survey.kernels.quartic import UNIT, slope
@@ -172,8 +173,7 @@ def saddles_of_states(points, u, bars):
         b, a = points[5, i], points[6, i]
         k = points[2, i] * points[0, i] * (points[0, i] - points[1, i])
         u[i], rise = saddle(a, b, k)
-        rough = (abs(a) + abs(b * u[i])) * (abs(b) + abs(a * u[i])) + k * abs(u[i])
-        bars[i] = 8.0 * EPS * rough / rise if rise > 0.0 else np.nan
+        bars[i] = roughness(u[i], a, b, k) / rise if rise > 0.0 else np.nan
         u[i] = u[i] if rise > 0.0 else np.nan
 
 

@@ -72,6 +72,12 @@ def saddle(a, b, k):
     return (u, rise) if rise > 1e-12 * k and abs(u) < 0.4 else (0.0, 0.0)
 
 
+@inline
+def roughness(u, a, b, k):
+    """The rounding of F at a saddle."""
+    return 8.0 * EPS * ((abs(a) + abs(b * u)) * (abs(b) + abs(a * u)) + k * abs(u))
+
+
 @kernel
 def lowest(square, product, k, most):
     """The distance from the pole of the least W, between the pole and `most`: v^2 B(v) = (b - a)^2 (1 - v).
@@ -312,8 +318,8 @@ def barrier(a, b, k, equatorial, loose, at_plus, at_minus):
     between, rise = saddle(a, b, size_k)
     if rise > 0.0:
         height, size = value(equatorial, (between, 0.0))
-        rough = (abs(a) + abs(b * between)) * (abs(b) + abs(a * between)) + size_k * abs(between)
-        bar = 4.0 * (UNIT * size + loose) + (8.0 * EPS * rough) ** 2 / rise  # the saddle's place is as good as F there
+        rough = roughness(between, a, b, size_k)
+        bar = 4.0 * (UNIT * size + loose) + rough**2 / rise  # the saddle's place is as good as F there
         return height[0] / ((1.0 - between) * (1.0 + between)), bar, between, rise
     distance, bar = nan, 0.0
     if size_k < 0.0:
