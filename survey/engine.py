@@ -27,7 +27,7 @@ from survey.dispatch import cpus
 from survey.errors import BadInput, Stopped
 from survey.kernels import jit
 from survey.kernels.jit import compile_seconds
-from survey.wording import counted
+from survey.wording import counted, sized
 
 BLOCK_SECONDS = 0.5
 BLOCK_POINTS = 2**17
@@ -407,10 +407,9 @@ class Assembly:
         written["history"] = f"{now()}: {command()}"
         with store.refused(workflow.path):
             for ds in further:
-                self.output.add(ds)
                 written |= ds.attrs
             written |= told
-            self.output.publish(written)
+            self.output.publish(written, further)
         return written | {"complete": 1}
 
     def _write(self, region, first, blocks):
@@ -465,8 +464,8 @@ def _refuse_too_large(workflow):
     room = shutil.disk_usage(workflow.path.parent).free
     if needed > room and needed > room + unfinished.size(workflow.path):
         raise BadInput(
-            f"{counted(grid.points, 'point')} need {needed / 2**30:,.0f} GiB, and the disk of {workflow.path} has "
-            f"{room / 2**30:,.0f} GiB free; take fewer points, or name fewer outputs in output.variables"
+            f"{counted(grid.points, 'point')} need {sized(needed)}, and the disk of {workflow.path} has "
+            f"{sized(room)} free; take fewer points, or name fewer outputs in output.variables"
         )
 
 

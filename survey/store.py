@@ -9,27 +9,25 @@ import shlex
 import shutil
 import socket
 import uuid
-import zlib
 from math import prod
 from pathlib import Path
 
 import filelock
 import netCDF4
 import numpy as np
+from isal import isal_zlib
 
-from survey import status, unfinished
+from survey import status, tiles, unfinished
 from survey.dataset import tally
 from survey.errors import BadInput, Damaged, Stopped, SurveyError
 from survey.grid import halved
 
 FORMAT = 2
 TILE_POINTS = 2**16
-CACHE = 2**20  # bytes: a tile and more
 LOCK_SECONDS = 0.2  # a look at the lock takes less
 NETCDF = (b"\x89HDF", b"CDF")  # how a netCDF file begins
 IN_MEMORY = 2**28  # bytes: a larger file is opened lazily
-# checksummed compression: readable everywhere, and every flipped bit is found; measured: level 4 takes half as long
-# again and saves one part in a hundred
+# checksummed compression: readable everywhere, and every flipped bit is found
 PACKED = {"compression": "zlib", "complevel": 1, "shuffle": True, "fletcher32": True}
 
 
@@ -178,14 +176,14 @@ def pack(arrays, file):
     for part in parts:
         for piece in (part, bytes(-memoryview(part).nbytes % 8)):
             file.write(piece)
-            check = zlib.crc32(piece, check)
+            check = isal_zlib.crc32(piece, check)
     file.write(check.to_bytes(8, "little"))
 
 
 def unpack(content):
     """The arrays that `pack` wrote; raises ValueError if a bit is not as it was."""
     body, check = memoryview(content)[:-8], content[-8:]
-    if len(content) < 16 or zlib.crc32(body).to_bytes(8, "little") != check:
+    if len(content) < 16 or isal_zlib.crc32(body).to_bytes(8, "little") != check:
         raise ValueError("its checksum fails")
     place = content.index(b"\n") + 1
     names = json.loads(content[:place])
@@ -205,7 +203,8 @@ def refused(path):
     except SurveyError:
         raise
     except (OSError, RuntimeError) as error:  # netCDF4 raises RuntimeError on a full disk
-        told = getattr(error, "strerror", None) or error
+        number = getattr(error, "errno", None)  # HDF5's own words are long
+        told = os.strerror(number) if number else error
         with contextlib.suppress(OSError):
             told = f"{told}; {shutil.disk_usage(Path(path).parent).free:,} bytes are free"
         raise Stopped(f"{path}: writing failed ({told}); mend it and run the command again") from None
@@ -244,70 +243,39 @@ class Output:
     """
 
     def __init__(self, path, folder, coordinates, variables, layout, shape, tile):
-        self.path, self.part, self.beside = Path(path), folder / "output.nc", {}
+        self.path, self.part, self.beside, self.pieces = Path(path), folder / "output.nc", {}, None
         with refused(self.path):
-            self.file = netCDF4.Dataset(self.part, "w")
             try:
-                self._define_map(coordinates, variables, layout, shape, tile)
+                with netCDF4.Dataset(self.part, "w") as file:
+                    self._define_map(file, coordinates, variables, layout, shape, tile)
             except BaseException:
                 self.discard()
                 raise
 
     def discard(self):
         """Close and remove what is not published."""
-        if self.file.isopen():
+        if self.pieces:
             with contextlib.suppress(OSError, RuntimeError):
-                self.file.close()
+                self.pieces.close()
         self.part.unlink(missing_ok=True)
 
-    def define(self, name, dims, shape, dtype, attributes, tile=None):
-        """Make a variable, compressed in tiles of these lengths, and the dimensions it lacks."""
-        for dim, size in zip(dims, shape, strict=True):
-            if dim not in self.file.dimensions:
-                self.file.createDimension(dim, size)
-        dtype = np.dtype(dtype)
-        packed = PACKED | {"chunksizes": tile} if tile and prod(shape) else {}
-        fill = np.nan if dtype.kind == "f" and tile is not None else None
-        made = self.file.createVariable(name, str if dtype.kind in "UO" else dtype, dims, fill_value=fill, **packed)
-        made.set_auto_maskandscale(False)
-        if packed:
-            made.set_var_chunk_cache(CACHE, 1, 1.0)  # tiles are written once: pack them now, keep none
-        made.setncatts(attributes)
+    def put(self, name, values, where=()):
+        """Write values of a variable of the map, all or those at `where` (slices at the edges of tiles)."""
+        if self.pieces is None:
+            import h5py
 
-    def put(self, name, values, where=...):
-        """Write values of a variable, all or those at `where` (slices at the edges of tiles: each is packed once)."""
-        values = np.asarray(values)
-        self.file[name][where if where != () else ...] = values.astype(object) if values.dtype.kind == "U" else values
+            self.pieces = h5py.File(self.part, "r+", locking=False)  # the run's own lock holds it
+        tiles.write(self.pieces[name], values, where)
 
-    def _define_map(self, coordinates, variables, layout, shape, tile):
-        for name, (dims, values, meaning) in coordinates.items():
-            if np.asarray(values).dtype.kind == "U":  # CF knows labels of a dimension as arrays of characters only
-                dims, meaning = (*dims, f"{name}_length"), meaning | {"_Encoding": "utf-8"}
-                values = netCDF4.stringtochar(np.char.encode(values, "utf-8"))
-            self.define(name, dims, np.shape(values), np.asarray(values).dtype, meaning)
-            self.put(name, values)
-        self.beside = {name: set(dims) for name, (dims, _, _) in coordinates.items() if name not in dims}
-        for name, (dims, meaning) in variables.items():
-            dtype, _, extra = layout[name]
-            self.define(name, dims, shape + extra, dtype, meaning | self._beside(dims), tile + extra)
-
-    def add(self, ds):
-        """Write the variables of a further dataset, but those that are there."""
-        for name, variable in ds.variables.items():
-            if name not in self.file.variables:
-                tile, meaning = halved(variable.shape, TILE_POINTS), variable.attrs | self._beside(variable.dims)
-                self.define(name, variable.dims, variable.shape, variable.dtype, meaning, tile)
-                self.put(name, variable.values)
-
-    def _beside(self, dims):
-        """The attribute that names the coordinates that are no dimensions of their own."""
-        names = sorted(name for name, needed in self.beside.items() if needed <= set(dims))
-        return {"coordinates": " ".join(names)} if names else {}
-
-    def publish(self, attributes):
-        """Finish the file, `complete` last, and put it in its place, its digest beside it (`OUT.nc.sha256`)."""
-        self.file.setncatts(attributes | {"complete": np.int8(1)})
-        self.file.close()
+    def publish(self, attributes, further=()):
+        """Add the `further` datasets' variables but those that are there and the attributes, `complete` last; put the
+        file in its place, its digest beside it (`OUT.nc.sha256`)."""
+        if self.pieces:
+            self.pieces.close()
+        with netCDF4.Dataset(self.part, "a") as file:
+            for ds in further:
+                self._add(file, ds)
+            file.setncatts(attributes | {"complete": np.int8(1)})
         with open(self.part, "rb+") as file:
             os.fsync(file.fileno())
             digest = hashlib.file_digest(file, "sha256").hexdigest()
@@ -318,6 +286,45 @@ class Output:
         write_atomically(beside, old + line, self.part.parent)
         publish(self.part, self.path)
         write_atomically(beside, line, self.part.parent)
+
+    def _define_map(self, file, coordinates, variables, layout, shape, tile):
+        for name, (dims, values, meaning) in coordinates.items():
+            values = np.asarray(values)
+            if values.dtype.kind == "U":  # CF knows labels of a dimension as arrays of characters only
+                dims, meaning = (*dims, f"{name}_length"), meaning | {"_Encoding": "utf-8"}
+                values = netCDF4.stringtochar(np.char.encode(values, "utf-8"))
+            define(file, name, dims, values.shape, values.dtype, meaning)[...] = values
+        self.beside = {name: set(dims) for name, (dims, _, _) in coordinates.items() if name not in dims}
+        for name, (dims, meaning) in variables.items():
+            dtype, _, extra = layout[name]
+            define(file, name, dims, shape + extra, dtype, meaning | self._beside(dims), tile + extra)
+
+    def _add(self, file, ds):
+        for name, variable in ds.variables.items():
+            if name not in file.variables:
+                tile, meaning = halved(variable.shape, TILE_POINTS), variable.attrs | self._beside(variable.dims)
+                made = define(file, name, variable.dims, variable.shape, variable.dtype, meaning, tile)
+                values = variable.values
+                made[...] = values.astype(object) if values.dtype.kind == "U" else values
+
+    def _beside(self, dims):
+        """The attribute that names the coordinates that are no dimensions of their own."""
+        names = sorted(name for name, needed in self.beside.items() if needed <= set(dims))
+        return {"coordinates": " ".join(names)} if names else {}
+
+
+def define(file, name, dims, shape, dtype, attributes, tile=None):
+    """The new variable of a netCDF4 file, compressed in tiles of these lengths; the dimensions it lacks are made."""
+    for dim, size in zip(dims, shape, strict=True):
+        if dim not in file.dimensions:
+            file.createDimension(dim, size)
+    dtype = np.dtype(dtype)
+    packed = PACKED | {"chunksizes": tile} if tile and prod(shape) else {}
+    fill = np.nan if dtype.kind == "f" and tile is not None else None
+    made = file.createVariable(name, str if dtype.kind in "UO" else dtype, dims, fill_value=fill, **packed)
+    made.set_auto_maskandscale(False)
+    made.setncatts(attributes)
+    return made
 
 
 def load(path, chunks="auto"):

@@ -38,7 +38,7 @@ def failing(real, writes=lambda *given: True):
             raise OSError(28, "No space left on device")
         return real(*given, **named)
     return call
-for where, name in ((os, "fsync"), (os, "replace"), (store, "pack"), (store.Output, "put"), (store.Output, "define")):
+for where, name in ((os, "fsync"), (os, "replace"), (store, "pack"), (store.Output, "put"), (store, "define")):
     setattr(where, name, failing(getattr(where, name)))
 store.open = failing(builtins.open, lambda path, how="r": "b" in how and how != "rb")
 from survey.cli import main

@@ -192,7 +192,7 @@ def test_every_flipped_bit_and_every_cut_of_a_block_is_found():
     [
         (os, "fsync", OSError(28, "No space left on device")),
         (store.Output, "put", RuntimeError("NetCDF: HDF error")),
-        (store.Output, "define", OSError(5, "Input/output error")),
+        (store, "define", OSError(5, "Input/output error")),
     ],
 )
 def test_a_disk_that_refuses_leaves_the_old_file(copy, small, monkeypatch, where, name, error):
@@ -210,7 +210,7 @@ def test_a_disk_that_refuses_leaves_the_old_file(copy, small, monkeypatch, where
     assert survey.run(small, output=copy).status.size == 24  # the lock is free, and what is there is of use
 
 
-CALLS = [(os, "fsync"), (os, "replace"), (store, "pack"), (store.Output, "put"), (store.Output, "define")]
+CALLS = [(os, "fsync"), (os, "replace"), (store, "pack"), (store.Output, "put"), (store, "define")]
 
 
 @pytest.mark.parametrize(("where", "name"), CALLS, ids=lambda value: getattr(value, "__name__", value))
