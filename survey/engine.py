@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import tomli_w
+from rich import filesize
 
 from survey import dispatch, methods, modules, status, store, unfinished
 from survey.dataset import Tally, attributes, command, coordinates, layout, now, round_up, variables
@@ -27,7 +28,7 @@ from survey.dispatch import cpus
 from survey.errors import BadInput, Stopped
 from survey.kernels import jit
 from survey.kernels.jit import compile_seconds
-from survey.wording import counted, sized
+from survey.wording import counted
 
 BLOCK_SECONDS = 0.5
 BLOCK_POINTS = 2**17
@@ -206,7 +207,10 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, agai
         left = Remaining(workflow.grid.shape, blocks, reused)
         compiled = {}
 
-        with _compiling_ahead(workflow.scene), Assembly(workflow, kept, tile, regions) as assembly:
+        with (
+            _compiling_ahead(workflow.scene, workflow.request.variables),
+            Assembly(workflow, kept, tile, regions) as assembly,
+        ):
 
             def finished(done, solved=None):
                 if solved:
@@ -321,13 +325,13 @@ def _refuse_other_code(code):
 
 
 @contextlib.contextmanager
-def _compiling_ahead(scene):
+def _compiling_ahead(scene, variables):
     """On a new machine, a process compiles the kernels needed last while this one compiles those needed first."""
     ahead = getattr(scene, "AHEAD", None)
     if not (ahead and jit.is_new() and cpus() > 1):
         yield
         return
-    words = f"import gc; gc.disable(); from survey.measures import {ahead}; {ahead}.compile_ahead()"
+    words = f"import gc; gc.disable(); from survey.measures import {ahead}; {ahead}.compile_ahead({list(variables)})"
     jit.ahead = subprocess.Popen([sys.executable, "-c", words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         yield
@@ -464,8 +468,8 @@ def _refuse_too_large(workflow):
     room = shutil.disk_usage(workflow.path.parent).free
     if needed > room and needed > room + unfinished.size(workflow.path):
         raise BadInput(
-            f"{counted(grid.points, 'point')} need {sized(needed)}, and the disk of {workflow.path} has "
-            f"{sized(room)} free; take fewer points, or name fewer outputs in output.variables"
+            f"{counted(grid.points, 'point')} need {filesize.decimal(needed)}, and the disk of {workflow.path} has "
+            f"{filesize.decimal(room)} free; take fewer points, or name fewer outputs in output.variables"
         )
 
 

@@ -109,7 +109,7 @@ def test_what_is_there_already_needs_no_more_room(left, small, monkeypatch):
     assert written > needed // 4
     usage = engine.shutil.disk_usage(left)
     monkeypatch.setattr(engine.shutil, "disk_usage", lambda _: usage._replace(free=needed - 1))
-    with pytest.raises(BadInput, match=r"24 points need [\d.]+ KiB, and the disk"):
+    with pytest.raises(BadInput, match=r"24 points need [\d.]+ kB, and the disk"):
         engine.run(workflow.read(small, output="other.nc"))
     engine.run(workflow.read(small))
     assert survey.open("small.nc").attrs["blocks_reused"] == 3

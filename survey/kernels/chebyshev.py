@@ -5,52 +5,39 @@ Source: J. C. Mason, D. C. Handscomb, Chebyshev Polynomials (2003), 2.4.1 (Clens
 
 import numpy as np
 
-from survey.kernels.hill import EPS, EXPONENT, NO_RULE, STABLE, UNDECIDED, UNSTABLE, exponent
+from survey.kernels.hill import EPS, STABLE, UNDECIDED, UNSTABLE
 from survey.kernels.jit import kernel, splice
 
 TILE = 64
+TERMS = 8
 ROWS = 8
 
 
-@kernel
-def expand(values, matrix, place, series, doubts):
-    """The series of each row of `values` (R, n) at nodes, by `matrix` (columns: [from, to]), and its `_doubt`."""
-    for r in range(len(values)):
-        out = series[r]
-        for j in range(len(matrix)):  # by hand: array assignments take longer to compile
-            out[j] = 0.0
-        for i in range(len(matrix)):
-            for j in range(len(matrix)):
-                out[j] += values[r, i] * matrix[i, j]
-        doubts[r] = _doubt(out, place)
+def expand(values, matrix, place):
+    """The series of each row of `values` (R, n) at nodes, by `matrix` (columns: [from, to]), and its `_doubt` (R)."""
+    series = np.zeros_like(values)
+    for at, weights in enumerate(matrix):  # in this order, so that a row's bits do not depend on the others
+        series += values[:, at, None] * weights
+    return series, _doubt(np.abs(series), place)
 
 
-@kernel
-def transform(rows, matrix, place, out):
+def transform(rows, matrix, place):
     """Coefficients along the first axis of `rows` (n, m), values at nodes by `matrix` (by columns: [from, to]).
 
-    Returns the `_doubt` over all columns.
+    Also the `_doubt` over all columns.
     """
-    n, m = rows.shape
-    sizes = np.empty(n)
-    for k in range(n):
-        for i in range(m):
-            out[k, i] = 0.0
-        for j in range(n):
-            for i in range(m):
-                out[k, i] += matrix[j, k] * rows[j, i]
-        sizes[k] = 0.0
-        for i in range(m):
-            sizes[k] += abs(out[k, i])
-    return _doubt(sizes, place)
+    series = np.zeros_like(rows)
+    for row, weights in zip(rows, matrix, strict=True):
+        series += weights[:, None] * row
+    return series, float(_doubt(np.abs(series).sum(axis=1)[None], place)[0])
 
 
 @kernel
-def restrict(series, x, out):
-    """out[r] = sum_k series[k] T_k(x[r]): the rows' own coefficients, by Clenshaw's recurrence."""
+def restrict(series, x, work, out):
+    """out[r] = sum_k series[k] T_k(x[r]): the rows' own coefficients, by Clenshaw's recurrence; `work` is (2, m)."""
     n, m = series.shape
-    last, before = np.empty(m), np.empty(m)
     for r in range(len(x)):
+        last, before = work[0], work[1]
         for i in range(m):
             last[i], before[i] = 0.0, 0.0
         for k in range(n - 1, 0, -1):
@@ -61,21 +48,17 @@ def restrict(series, x, out):
             out[r, i] = series[0, i] + x[r] * last[i] - before[i]
 
 
-@splice
-def _doubt(series, place):
-    """What a series leaves out and folds back, and rounding; a place on [-1, 1] is known to `place` ulp.
+def _doubt(sizes, place):
+    """What series of such coefficients (R, n) leave out and fold back, and rounding; a place on [-1, 1] is known to
+    `place` ulp.
 
     The first from its last coefficients at the rate at which they fall; the second of the transform, of Clenshaw's
     recurrence, and of the rounded place in the axis, where T_k' <= k^2.
     """
-    n = len(series)
-    last = before = rounding = 0.0
-    for k in range(n):
-        size = abs(series[k])
-        last = max(last, size) if k >= n - 4 else last
-        before = max(before, size) if n - 8 <= k < n - 4 else before
-        rounding += size * (4.0 + k + (0.5 + place) * k * k)
-    rate = min(max(last / (before + 1e-300), 0.1), 0.9)
+    k = np.arange(sizes.shape[1])
+    last, before = sizes[:, -4:].max(axis=1), sizes[:, -8:-4].max(axis=1, initial=0.0)
+    rounding = (sizes * (4.0 + k + (0.5 + place) * k * k)).sum(axis=1)
+    rate = np.clip(last / (before + 1e-300), 0.1, 0.9)
     return 4.0 * last / (1.0 - rate) + EPS * rounding
 
 
@@ -91,7 +74,7 @@ def _polynomials(x, tile):
 
 @splice
 def _sum(c, tile, sums, count):
-    """sum_k c_k T_k in `count` lanes, eight terms a turn; there are a multiple of eight."""
+    """sum_k c_k T_k in `count` lanes, TERMS terms a turn."""
     for i in range(count):
         sums[i] = 0.0
     for k in range(len(c) - 8, -1, -8):
@@ -104,36 +87,25 @@ def _sum(c, tile, sums, count):
 
 
 @kernel
-def discriminants(rows, coefficients, bars, x, rule, rtol, wanted, floats, verdict, late):
-    """D of the `rows` from its series at x (L): D, its bar, the verdict, the exponent; `late` where not enough.
+def discriminants(rows, coefficients, bars, x, rtol, floats, verdict, late):
+    """D of the `rows` from its series at x (L): D, its bar and the verdict; `late` where not enough.
 
-    Row rows[j]: D = sum_k coefficients[j, k] T_k(x) within bars[j]. Columns and `wanted` as in `kernels.hill.measure`.
+    Row rows[j]: D = sum_k coefficients[j, k] T_k(x) within bars[j], coefficients in a multiple of TERMS. Columns as in
+    `kernels.hill.measure`.
     """
-    terms, tiles = (coefficients.shape[1] + 7) // 8 * 8, (len(x) + TILE - 1) // TILE
-    table, sums, own = np.empty((tiles, terms, TILE)), np.empty(TILE), np.zeros((len(rows), terms))
-    for j in range(len(rows)):
-        for k in range(coefficients.shape[1]):
-            own[j, k] = coefficients[j, k]
+    terms, tiles = coefficients.shape[1], (len(x) + TILE - 1) // TILE
+    table, sums = np.empty((tiles, terms, TILE)), np.empty(TILE)
     for t in range(tiles):
         _polynomials(x[t * TILE : (t + 1) * TILE], table[t])
     # A tile of the table stays in the first cache for some rows, and what is written within some pages.
     for turn in range((len(rows) + ROWS - 1) // ROWS * tiles):
         start, t = turn // tiles * ROWS, turn % tiles
-        for j in range(start, min(start + ROWS, len(rows))):
-            count = min(TILE, len(x) - t * TILE)
-            _sum(own[j], table[t], sums, count)
+        count = len(x) - t * TILE if t == tiles - 1 else TILE
+        for j in range(start, len(rows) if start + ROWS > len(rows) else start + ROWS):
+            _sum(coefficients[j], table[t], sums, count)
             first = rows[j] * len(x) + t * TILE
             said, missed = verdict[first : first + count], late[first : first + count]
             _judge(sums, bars[j], floats[:, first : first + count], rtol, said, missed)
-            if len(rule) > 0:
-                for i in range(count):
-                    missed[i] |= rule[rows[j], t * TILE + i] != NO_RULE
-            if wanted[5]:
-                for i in range(count):
-                    # |D| - 2 = 4 sinh^2(exponent / 2)
-                    growth, bar = exponent(0.25 * (abs(sums[i]) - 2.0), 0.25 * bars[j], said[i])
-                    floats[EXPONENT, first + i], floats[EXPONENT + 1, first + i] = growth, bar
-                    missed[i] |= not bar <= rtol * (1.0 + growth)
 
 
 @splice

@@ -8,7 +8,7 @@ from math import asinh, atan2, isfinite, pi, sqrt
 
 import numpy as np
 
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.unroll import unroll
 
 RESULTS = 10
@@ -20,6 +20,7 @@ NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE = 0, 1, 2
 # Columns of `measure`, each followed by that of its error bound.
 FLOATS = ("discriminant", "y1", "y2", "dy1", "dy2", "exponent", "rotation_number")
 DISCRIMINANT, Y1, Y2, DY1, DY2, EXPONENT, ROTATION = range(0, 14, 2)
+FACTORS = np.array([Y1, DY1, Y2, DY2])  # in the order of the results
 UNTRIED = -1
 
 
@@ -84,12 +85,11 @@ def segments(level, top, order, rows, of_level, starts):
 
 @kernel
 def measure(results, rule, wanted, rtol, whole, overflow, floats, verdict, late, status):
-    """All that follows from `results` (N, 10): `floats` (14, N) with the bars, `verdict`, and who misses `rtol`.
+    """What follows from `results` (N, 10) by arithmetic: `floats` (14, N) with the bars, `verdict`, who misses `rtol`.
 
     Points whose `status` is not 0 are passed over; those that leave the range of floats get the status `overflow`.
-    `rule` (N, or empty) holds what exact rules say, `wanted` (7) which columns count for `late`. With `whole` the
-    results are those at T: sin^2 and cos^2 of half the angle are then (2 - D) / 4 and (2 + D) / 4, D = y1 + y2', and
-    the zeros of y2 in (0, T) give the band (that solution's angle advances from 0 to between d pi and (d + 1) pi).
+    `rule` (N, or empty) holds what exact rules say, `wanted` (7) which columns count for `late`; `whole` as in
+    `_squares`.
     """
     for i in range(len(results)):
         late[i] = False
@@ -98,21 +98,16 @@ def measure(results, rule, wanted, rtol, whole, overflow, floats, verdict, late,
             for c in range(len(floats)):
                 floats[c, i] = np.nan
             continue
-        y1, dy1, y2, dy2 = results[i, 0], results[i, 1], results[i, 2], results[i, 3]
-        e1, de1, e2, de2 = results[i, 4], results[i, 5], results[i, 6], results[i, 7]
-        sine, sine_bar = _product(-dy1, y2, de1, e2)
-        cosine, cosine_bar = _product(y1, dy2, e1, de2)
-        zeros, doubt = results[i, 8] + results[i, 9], 0.0
-        if whole:
-            trace, bar = y1 + dy2, 0.25 * (e1 + de2 + 2.0 * EPS * (abs(y1) + abs(dy2) + 2.0))
-            sine, cosine, sine_bar, cosine_bar = 0.25 * (2.0 - trace), 0.25 * (2.0 + trace), bar, bar
-            # where y2's last zero may lie on either side of T: sin^2 of the angle is at most -y1' y2
-            zeros, doubt = results[i, 9], e2 * (abs(dy1) + de1) if abs(y2) <= e2 else 0.0
+        sine, sine_bar, cosine, cosine_bar = _squares(results[i], whole)
         said = decide(sine, sine_bar, cosine, cosine_bar, rule[i] if len(rule) > 0 else NO_RULE)
         # D from 2 - 4 sin^2 or 4 cos^2 - 2, whichever has the smaller bar.
-        d = 2.0 - 4.0 * sine if sine_bar <= cosine_bar else 4.0 * cosine - 2.0
-        d_bar = 4.0 * min(sine_bar, cosine_bar) + 2.0 * EPS * (2.0 + abs(d))
-        if not (isfinite(d) and max(max(max(e1, e2), max(de1, de2)), d_bar) < LARGEST):
+        by_sine = sine_bar <= cosine_bar
+        d = 2.0 - 4.0 * sine if by_sine else 4.0 * cosine - 2.0
+        bar = 4.0 * (sine_bar if by_sine else cosine_bar) + 2.0 * EPS * (2.0 + abs(d))
+        within = isfinite(d) and bar < LARGEST
+        for c in range(4):
+            within &= results[i, 4 + c] < LARGEST
+        if not within:
             status[i] = overflow
             for c in range(len(floats)):
                 floats[c, i] = np.nan
@@ -120,31 +115,71 @@ def measure(results, rule, wanted, rtol, whole, overflow, floats, verdict, late,
         verdict[i] = said
         missed = said == UNDECIDED
         if wanted[0]:
-            floats[DISCRIMINANT, i], floats[DISCRIMINANT + 1, i] = d, d_bar
-            missed |= not d_bar <= rtol * (1.0 + abs(d))
-        if wanted[1]:
-            floats[Y1, i], floats[Y1 + 1, i] = y1, e1
-            missed |= not e1 <= rtol * (1.0 + abs(y1))
-        if wanted[2]:
-            floats[Y2, i], floats[Y2 + 1, i] = y2, e2
-            missed |= not e2 <= rtol * (1.0 + abs(y2))
-        if wanted[3]:
-            floats[DY1, i], floats[DY1 + 1, i] = dy1, de1
-            missed |= not de1 <= rtol * (1.0 + abs(dy1))
-        if wanted[4]:
-            floats[DY2, i], floats[DY2 + 1, i] = dy2, de2
-            missed |= not de2 <= rtol * (1.0 + abs(dy2))
-        if wanted[5]:
-            by_sine = sine < cosine
-            x, bar = exponent(-sine if by_sine else -cosine, sine_bar if by_sine else cosine_bar, said)
-            floats[EXPONENT, i], floats[EXPONENT + 1, i] = x, bar
-            missed |= not bar <= rtol * (1.0 + x)
-        if wanted[6]:
-            x, bar = _rotation(sine, sine_bar, cosine, cosine_bar, said, zeros)
-            bar += sqrt(min(doubt, 1.0)) if said != UNSTABLE else 0.0
-            floats[ROTATION, i], floats[ROTATION + 1, i] = x, bar
-            missed |= not bar <= rtol * (1.0 + x)
+            floats[DISCRIMINANT, i], floats[DISCRIMINANT + 1, i] = d, bar
+            missed |= not bar <= rtol * (1.0 + abs(d))
+        for c in range(4):
+            at, bar = FACTORS[c], results[i, 4 + c]
+            if wanted[at // 2]:
+                floats[at, i], floats[at + 1, i] = results[i, c], bar
+                missed |= not bar <= rtol * (1.0 + abs(results[i, c]))
         late[i] = missed
+
+
+@kernel
+def transcendental(results, wanted, rtol, whole, floats, verdict, late, status):
+    """The columns of `measure` that are no arithmetic: exponent and rotation number, if wanted, and who misses."""
+    for i in range(len(results)):
+        if status[i] != 0:
+            continue
+        sine, sine_bar, cosine, cosine_bar = _squares(results[i], whole)
+        if wanted[EXPONENT // 2]:
+            by_sine = sine < cosine
+            growth, bar = -sine if by_sine else -cosine, sine_bar if by_sine else cosine_bar
+            late[i] |= _grows(growth, bar, rtol, floats[:, i], verdict[i])
+        if wanted[ROTATION // 2]:
+            zeros, doubt = results[i, 8] + results[i, 9], 0.0
+            if whole:  # where y2's last zero may lie on either side of T: sin^2 of the angle is at most -y1' y2
+                zeros = results[i, 9]
+                if abs(results[i, 2]) <= results[i, 6]:
+                    doubt = min(results[i, 6] * (abs(results[i, 1]) + results[i, 5]), 1.0)
+            x, bar = _rotation(sine, sine_bar, cosine, cosine_bar, verdict[i], zeros)
+            bar += sqrt(doubt) if verdict[i] != UNSTABLE else 0.0
+            floats[ROTATION, i], floats[ROTATION + 1, i] = x, bar
+            late[i] |= not bar <= rtol * (1.0 + x)
+
+
+@kernel
+def exponents(first, count, rtol, floats, verdict, late):
+    """The exponents of `count` points from each of `first` on, whose D and bar are known, and who misses `rtol`."""
+    for start in first:
+        for i in range(start, start + count):
+            # |D| - 2 = 4 sinh^2(exponent / 2)
+            growth = 0.25 * (abs(floats[DISCRIMINANT, i]) - 2.0)
+            late[i] |= _grows(growth, 0.25 * floats[DISCRIMINANT + 1, i], rtol, floats[:, i], verdict[i])
+
+
+@splice
+def _squares(result, whole):
+    """sin^2 and cos^2 of half the angle, each with its bar: -y1' y2 and y1 y2'.
+
+    With `whole` the results are those at T: then (2 - D) / 4 and (2 + D) / 4, D = y1 + y2', and the zeros of y2 in
+    (0, T) give the band (that solution's angle advances from 0 to between d pi and (d + 1) pi).
+    """
+    sine, sine_bar = _product(-result[1], result[2], result[5], result[6])
+    cosine, cosine_bar = _product(result[0], result[3], result[4], result[7])
+    if whole:
+        trace, size = result[0] + result[3], abs(result[0]) + abs(result[3]) + 2.0
+        bar = 0.25 * (result[4] + result[7] + 2.0 * EPS * size)
+        sine, cosine, sine_bar, cosine_bar = 0.25 * (2.0 - trace), 0.25 * (2.0 + trace), bar, bar
+    return sine, sine_bar, cosine, cosine_bar
+
+
+@inline
+def _grows(growth, bar, rtol, floats, verdict):
+    """Keep a point's exponent and its bar; does it miss `rtol`?"""
+    x, bar = exponent(growth, bar, verdict)
+    floats[EXPONENT], floats[EXPONENT + 1] = x, bar
+    return not bar <= rtol * (1.0 + x)
 
 
 @unroll

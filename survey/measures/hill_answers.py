@@ -36,10 +36,11 @@ class Answers:
 
     def judge(self, results, rule):
         """Answer every point whose status is ok from its results (N, 10)."""
-        kernels.measure(
-            results, NONE if rule is None else rule, self.asked.wanted, self.asked.rtol, self.asked.whole,
-            status.OVERFLOW, self.floats, self.verdict, self.late, self.status,
-        )  # fmt: skip
+        asked, own = self.asked, (self.floats, self.verdict, self.late, self.status)
+        rule = NONE if rule is None else rule
+        kernels.measure(results, rule, asked.wanted, asked.rtol, asked.whole, status.OVERFLOW, *own)
+        if asked.wanted[kernels.EXPONENT // 2 :].any():
+            kernels.transcendental(results, asked.wanted, asked.rtol, asked.whole, *own)
 
     def put(self, places, other, at=slice(None)):
         """The answers of the points `places` are those of `other` at `at` (all of them by default, in that order)."""

@@ -19,12 +19,11 @@ from functools import cache, lru_cache
 import numpy as np
 
 from survey.kernels import hill as kernels
-from survey.kernels.chebyshev import discriminants, expand, restrict, transform
+from survey.kernels.chebyshev import TERMS, discriminants, expand, restrict, transform
 from survey.kernels.jit import wait_for_ahead
 from survey.measures import hill_effort
 from survey.measures.hill_answers import Answers, Asked
 
-NO_RULES = np.zeros((0, 0), np.int8)
 DEGREES = np.array([16, 20, 24, 28, 32, 40, 48, 56, 64, 80, 96, 112, 128, 160, 192, 224, 256, 320, 384])
 # A proxy pays if there are this many points, and rows, for each that it solves.
 POINTS_PER_NODE = 3
@@ -46,18 +45,18 @@ def serves(problem, asked):
     return problem.line is not None and named <= ANSWERS and problem.line[2] > problem.line[1]
 
 
-def compile_ahead():
-    """Compile, by calls on next to nothing, what a dense map needs once its nodes are solved."""
-    asked, one = Asked(1.0, DISCRIMINANT), np.ones((1, 1))
-    answers = Answers(1, asked)
+def compile_ahead(variables):
+    """Compile, by calls on next to nothing, what a map of these needs once the first points, or nodes, are solved."""
+    dense = set(variables) <= ANSWERS | {"verdict"}
+    answers = Answers(1, Asked(1.0, np.full(len(kernels.FLOATS), not dense)))
     answers.judge(np.ones((1, kernels.RESULTS)), None)
-    expand(one, one, 1.0, one.copy(), np.ones(1))
-    transform(one, one, 1.0, one.copy())
-    restrict(one, np.ones(1), one.copy())
-    discriminants(
-        np.zeros(1, int), one, np.ones(1), np.ones(1), NO_RULES, 1.0, asked.wanted,
-        answers.floats, answers.verdict, answers.late,
-    )  # fmt: skip
+    if dense:
+        series = np.ones((1, TERMS))
+        restrict(series, np.ones(1), np.empty((2, TERMS)), series.copy())
+        _discriminants(answers, np.zeros(1, int), series, np.ones(1), np.ones(1))
+        level, one = np.arange(2)[None], np.ones(1)  # what the series leave open
+        kernels.levels(np.ones((1, 2)), np.ones((1, 3)), one, one, 1.0, 1.0, hill_effort.LADDER, level)
+        hill_effort.segments_of(np.arange(2)[None])
 
 
 def solve(problem, method, asked, answers):
@@ -113,11 +112,22 @@ def _rows(problem, method, asked, answers, chosen, axis, open_points):
 
 
 def _answer(problem, asked, answers, rows, series, bars, axis, open_points):
-    rule = NO_RULES if problem.rule is None else problem.rule
+    wait_for_ahead()
     x = (problem.p[rows[0]] - axis.middle) / axis.radius  # all rows have the same points
-    x = 2 * x * x - 1 if axis.even else x
-    discriminants(rows, series, bars, x, rule, asked.rtol, asked.wanted, answers.floats, answers.verdict, answers.late)
-    open_points[rows] = answers.late.reshape(problem.p.shape)[rows]
+    _discriminants(answers, rows, series, bars, 2 * x * x - 1 if axis.even else x)
+    late = answers.late.reshape(problem.p.shape)
+    if problem.rule is not None:
+        late[rows] |= problem.rule[rows] != kernels.NO_RULE
+    if asked.wanted[kernels.EXPONENT // 2]:
+        kernels.exponents(rows * x.size, x.size, asked.rtol, answers.floats, answers.verdict, answers.late)
+    open_points[rows] = late[rows]
+
+
+def _discriminants(answers, rows, series, bars, x):
+    """D of the rows from their series at x, in place."""
+    whole = np.zeros((len(series), -(-series.shape[1] // TERMS) * TERMS))
+    whole[:, : series.shape[1]] = series
+    discriminants(rows, whole, bars, x, answers.asked.rtol, answers.floats, answers.verdict, answers.late)
 
 
 def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
@@ -129,7 +139,10 @@ def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
         inside = left & (place >= low) & (place <= high)
         rows, own = chosen[inside], np.empty((np.count_nonzero(inside), series.shape[1]))
         if rows.size:
-            restrict(series, (place[inside] - 0.5 * (low + high)) / (0.5 * (high - low)), own)
+            wait_for_ahead()
+            restrict(
+                series, (place[inside] - 0.5 * (low + high)) / (0.5 * (high - low)), np.empty((2, own.shape[1])), own
+            )
             _answer(problem, asked, answers, rows, own, np.full(rows.size, bar), axis, open_points)
         left &= ~inside
     return chosen[left]
@@ -167,8 +180,7 @@ def _surface(across, method, rtol, middle, radius, axis, budget):
         spent += n
         nodes = across.at(middle + radius * _nodes(n))
         values, series, bars = _series(nodes, method, 0.0, np.arange(n), int(DEGREES[place]), axis)
-        surface = np.empty_like(series)
-        tail = transform(series, _transform(n), (4 + abs(middle) + radius) / radius, surface)
+        surface, tail = transform(series, _transform(n), (4 + abs(middle) + radius) / radius)
         doubt = tail + _lebesgue(n) * bars.max()
         if _served(values, doubt, rtol).mean() >= MOST:
             return (surface, doubt), spent
@@ -208,10 +220,8 @@ def _series(problem, method, rtol, rows, n, axis):
     own = Answers(nodes.p.size, finer)
     hill_effort.solve(nodes, method, finer, own)
     values, bars = (own.floats[c].reshape(nodes.p.shape) for c in (kernels.DISCRIMINANT, kernels.DISCRIMINANT + 1))
-    series, totals = np.empty(values.shape), np.empty(rows.size)
-    wait_for_ahead()
-    expand(values, _transform(x.size), (abs(axis.middle) + axis.radius) / axis.radius, series, totals)
-    return values, series, totals + _lebesgue(x.size) * bars.max(axis=1)
+    series, doubts = expand(values, _transform(x.size), (abs(axis.middle) + axis.radius) / axis.radius)
+    return values, series, doubts + _lebesgue(x.size) * bars.max(axis=1)
 
 
 def _served(values, bar, rtol):

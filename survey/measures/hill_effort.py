@@ -39,9 +39,7 @@ def solve(problem, method, asked, answers, where=None):
         )
     adaptive = getattr(method, "ADAPTIVE", False)
     run, top = (_walk, len(TOLERANCES) - 1) if adaptive else (_chain, len(LADDER) - 1)
-    level = _first_tolerance(problem, asked.rtol) if adaptive else _first_steps(problem, method, asked.rtol)
-    if asked.together:
-        level = np.where(level == UNTRIED, UNTRIED, level.max(axis=1, keepdims=True))
+    level = _first_tolerance(problem, asked.rtol) if adaptive else _first_steps(problem, method, asked)
     flat = level.reshape(-1)
     chosen = slice(None) if where is None else np.flatnonzero(where)
     if where is not None:
@@ -92,19 +90,28 @@ def _bar(results):
     return np.where(np.isfinite(bar), bar, np.inf)
 
 
-def _first_steps(problem, method, rtol):
+def _first_steps(problem, method, asked):
     """The ladder's first step number that the method asks for; beyond the ladder where it has none; UNTRIED at NaN."""
-    phase, distance = method.hill_density(rtol)
-    level = np.empty(problem.p.shape, np.int64)
-    levels(problem.p, problem.bound, problem.span, problem.rate, max(phase, 1 / LONGEST), distance, LADDER, level)
-    return level
+    phase, distance = method.hill_density(asked.rtol)
+    phase = max(phase, 1 / LONGEST)
+    if not asked.together:
+        return _levels(problem, phase, distance)
+    known = np.isfinite(problem.p)
+    size = abs(np.where(known, problem.p, 0.0)).max(axis=1)
+    frequency = np.sqrt(problem.bound[:, 0] + size * (problem.bound[:, 1] + size * problem.bound[:, 2]))
+    steps = np.maximum(phase * frequency * problem.span, distance * problem.rate * problem.span)
+    return np.where(known & np.isfinite(steps)[:, None], np.searchsorted(LADDER, steps)[:, None], UNTRIED)
 
 
 def _first_tolerance(problem, rtol):
-    level = np.empty(problem.p.shape, np.int64)
-    levels(problem.p, problem.bound, problem.span, problem.rate, 0.0, 0.0, LADDER, level)
     first = int(np.searchsorted(-TOLERANCES, -max(0.01 * rtol, TOLERANCES[-1])))
-    return np.where(level == UNTRIED, UNTRIED, first)
+    return np.where(_levels(problem, 0.0, 0.0) == UNTRIED, UNTRIED, first)
+
+
+def _levels(problem, phase, distance):
+    level = np.empty(problem.p.shape, np.int64)
+    levels(problem.p, problem.bound, problem.span, problem.rate, phase, distance, LADDER, level)
+    return level
 
 
 def _walk(problem, method, level, out):
@@ -117,11 +124,7 @@ def _walk(problem, method, level, out):
 
 def _chain(problem, method, level, out):
     """Points solved by fixed steps: those with the same number of steps together, in calls of bounded work."""
-    most = level.shape[0] * min(level.shape[1], len(LADDER)) + 1
-    order = np.empty(level.size, np.int64)
-    rows, of_level, starts = (np.empty(most, np.int64) for _ in range(3))
-    count = segments(level, len(LADDER) - 1, order, rows, of_level, starts)
-    rows, of_level, starts, ends = rows[:count], of_level[:count], starts[:count], starts[1 : count + 1]
+    order, rows, of_level, starts, ends = segments_of(level)
     nodes, p = np.array(method.NODES), problem.p.reshape(-1)
     for at in np.flatnonzero(np.bincount(of_level)):
         steps, own = int(LADDER[at]), of_level == at
@@ -133,6 +136,19 @@ def _chain(problem, method, level, out):
                 method.hill_scatter(samples, problem.c2, h, p, order, first, out)
             else:
                 method.hill_chain(samples, problem.c2, h, p, order, first, last, out)
+
+
+def segments_of(level):
+    """(points by row and level; row, level, first and last place of each segment), as `kernels.hill.segments`."""
+    size = level.shape[1]
+    if (level == level[:, :1]).all():  # whole rows: nothing to sort
+        rows = np.flatnonzero((level[:, 0] >= 0) & (level[:, 0] < len(LADDER)))
+        return np.arange(level.size), rows, level[rows, 0], rows * size, (rows + 1) * size
+    most = level.shape[0] * min(size, len(LADDER)) + 1
+    order = np.empty(level.size, np.int64)
+    rows, of_level, starts = (np.empty(most, np.int64) for _ in range(3))
+    count = segments(level, len(LADDER) - 1, order, rows, of_level, starts)
+    return order, rows[:count], of_level[:count], starts[:count], starts[1 : count + 1]
 
 
 def _points_alone(rows, starts, ends):
