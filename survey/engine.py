@@ -12,7 +12,7 @@ import time
 import tomllib
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from importlib.metadata import version
 from math import prod
@@ -208,7 +208,7 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, agai
         compiled = {}
 
         with (
-            _compiling_ahead(workflow.scene, workflow.request.variables),
+            _compiling_ahead(workflow.scene, workflow.request),
             Assembly(workflow, kept, tile, regions) as assembly,
         ):
 
@@ -324,15 +324,23 @@ def _refuse_other_code(code):
             )
 
 
+def beside(scene, variables):
+    """The program that compiles some of the kernels of a map of these variables."""
+    return (
+        f"import gc; gc.disable(); from {scene.__name__} import sample, NO_ROWS; from survey.measures.{scene.AHEAD} "
+        f"import compile_ahead; compile_ahead(sample, NO_ROWS, {list(variables)})"
+    )
+
+
 @contextlib.contextmanager
-def _compiling_ahead(scene, variables):
-    """On a new machine, a process compiles the kernels needed last while this one compiles those needed first."""
-    ahead = getattr(scene, "AHEAD", None)
-    if not (ahead and jit.is_new() and cpus() > 1):
+def _compiling_ahead(scene, request):
+    """On a new machine, a process compiles some of the kernels while this one compiles the longest."""
+    if not (hasattr(scene, "AHEAD") and request.method == "auto" and jit.is_new() and cpus() > 1):
         yield
         return
-    words = f"import gc; gc.disable(); from survey.measures import {ahead}; {ahead}.compile_ahead({list(variables)})"
-    jit.ahead = subprocess.Popen([sys.executable, "-c", words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    jit.ahead = subprocess.Popen(
+        [sys.executable, "-c", beside(scene, request.variables)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
     try:
         yield
     finally:
@@ -380,17 +388,19 @@ class Assembly:
         meanings = variables(grid, scene, request)
         flags = {name: meanings[name][1] for name in ("status", "verdict") if name in meanings}
         self.tally = Tally(flags, request.rtol)
-        self.output = store.Output(
-            workflow.path, kept.folder, coordinates(grid, scene, request), meanings, self.layout, grid.shape, tile
-        )
-        self.writer, self.writes, self.room = ThreadPoolExecutor(1), [], {}
+        self.open = partial(  # once there is something to write: the first block is solved sooner
+            store.Output, workflow.path, kept.folder, coordinates(grid, scene, request), meanings, self.layout,
+            grid.shape, tile,
+        )  # fmt: skip
+        self.output, self.writer, self.writes, self.room = None, ThreadPoolExecutor(1), [], {}
 
     def __enter__(self):
         return self
 
     def __exit__(self, *_):
         self.writer.shutdown(cancel_futures=True)
-        self.output.discard()
+        if self.output:
+            self.output.discard()
 
     def has(self, number):
         """Block `number` is finished. Raises what writing another part has raised."""
@@ -418,6 +428,7 @@ class Assembly:
 
     def _write(self, region, first, blocks):
         """Write the region whose blocks are numbered from `first`."""
+        self.output = self.output or self.open()
         shape = tuple(cut.stop - cut.start for cut in region)
         if self.room.get("status", np.empty(0)).shape != shape:
             self.room = {name: np.empty(shape + extra, kind) for name, (kind, _, extra) in self.layout.items()}

@@ -13,7 +13,6 @@ from math import prod
 from pathlib import Path
 
 import filelock
-import netCDF4
 import numpy as np
 from isal import isal_zlib
 
@@ -243,6 +242,8 @@ class Output:
     """
 
     def __init__(self, path, folder, coordinates, variables, layout, shape, tile):
+        import netCDF4
+
         self.path, self.part, self.beside, self.pieces = Path(path), folder / "output.nc", {}, None
         with refused(self.path):
             try:
@@ -270,6 +271,8 @@ class Output:
     def publish(self, attributes, further=()):
         """Add the `further` datasets' variables but those that are there and the attributes, `complete` last; put the
         file in its place, its digest beside it (`OUT.nc.sha256`)."""
+        import netCDF4
+
         if self.pieces:
             self.pieces.close()
         with netCDF4.Dataset(self.part, "a") as file:
@@ -288,11 +291,13 @@ class Output:
         write_atomically(beside, line, self.part.parent)
 
     def _define_map(self, file, coordinates, variables, layout, shape, tile):
+        from netCDF4 import stringtochar
+
         for name, (dims, values, meaning) in coordinates.items():
             values = np.asarray(values)
             if values.dtype.kind == "U":  # CF knows labels of a dimension as arrays of characters only
                 dims, meaning = (*dims, f"{name}_length"), meaning | {"_Encoding": "utf-8"}
-                values = netCDF4.stringtochar(np.char.encode(values, "utf-8"))
+                values = stringtochar(np.char.encode(values, "utf-8"))
             define(file, name, dims, values.shape, values.dtype, meaning)[...] = values
         self.beside = {name: set(dims) for name, (dims, _, _) in coordinates.items() if name not in dims}
         for name, (dims, meaning) in variables.items():
@@ -333,6 +338,7 @@ def load(path, chunks="auto"):
     Lazy means dask arrays; with `chunks` None, arrays that read from the file what is indexed, at once.
     Raises BadInput (no file of survey) or Damaged (one that is incomplete, or whose bits have changed).
     """
+    import netCDF4
     import xarray as xr
 
     path = Path(path)

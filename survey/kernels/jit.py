@@ -11,6 +11,7 @@ every source that can reach a kernel, of the versions and of the CPU, so that an
 import hashlib
 import os
 import subprocess
+import time
 from pathlib import Path
 
 import llvmlite
@@ -67,17 +68,21 @@ def is_new():
 
 
 ahead: subprocess.Popen | None = None  # a process that compiles for this one, on a new machine
+waited = 0.0
 
 
 def wait_for_ahead():
     """Wait until the process that compiles ahead has ended: it has begun sooner than this one would."""
-    if ahead is not None:
+    global waited
+    if ahead is not None and ahead.poll() is None:
+        began = time.perf_counter()
         ahead.wait()
+        waited = max(waited, time.perf_counter() - began)  # threads wait side by side
 
 
 def compile_seconds():
-    """Seconds in which this process has compiled kernels so far."""
-    return _COMPILING.duration if _COMPILING.done else 0.0
+    """Seconds in which this process has compiled kernels so far, or waited for another that does."""
+    return waited + (_COMPILING.duration if _COMPILING.done else 0.0)
 
 
 _FLAGS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}

@@ -6,6 +6,7 @@ import numpy as np
 
 from survey import status
 from survey.kernels import hill as kernels
+from survey.kernels.jit import wait_for_ahead
 
 NONE = np.zeros(0, np.int8)
 
@@ -40,6 +41,7 @@ class Answers:
         rule = NONE if rule is None else rule
         kernels.measure(results, rule, asked.wanted, asked.rtol, asked.whole, status.OVERFLOW, *own)
         if asked.wanted[kernels.EXPONENT // 2 :].any():
+            wait_for_ahead()
             kernels.transcendental(results, asked.wanted, asked.rtol, asked.whole, *own)
 
     def put(self, places, other, at=slice(None)):

@@ -45,18 +45,14 @@ def serves(problem, asked):
     return problem.line is not None and named <= ANSWERS and problem.line[2] > problem.line[1]
 
 
-def compile_ahead(variables):
-    """Compile, by calls on next to nothing, what a map of these needs once the first points, or nodes, are solved."""
+def compile_ahead(sample, no_rows, variables):
+    """Compile, by calls on next to nothing, what a map of these needs beside the kernel of the method."""
+    sample(no_rows, np.ones(1), np.empty((0, 1, 2, 1)))
     dense = set(variables) <= ANSWERS | {"verdict"}
     answers = Answers(1, Asked(1.0, np.full(len(kernels.FLOATS), not dense)))
     answers.judge(np.ones((1, kernels.RESULTS)), None)
     if dense:
-        series = np.ones((1, TERMS))
-        restrict(series, np.ones(1), np.empty((2, TERMS)), series.copy())
-        _discriminants(answers, np.zeros(1, int), series, np.ones(1), np.ones(1))
-        level, one = np.arange(2)[None], np.ones(1)  # what the series leave open
-        kernels.levels(np.ones((1, 2)), np.ones((1, 3)), one, one, 1.0, 1.0, hill_effort.LADDER, level)
-        hill_effort.segments_of(np.arange(2)[None])
+        _discriminants(answers, np.zeros(1, int), np.ones((1, TERMS)), np.ones(1), np.ones(1))
 
 
 def solve(problem, method, asked, answers):

@@ -8,6 +8,7 @@ go through one kernel call of at most about a second.
 import numpy as np
 
 from survey import status
+from survey.kernels import jit
 from survey.kernels.hill import RESULTS, UNTRIED, levels, segments
 from survey.measures.hill_answers import Answers
 
@@ -124,21 +125,29 @@ def _walk(problem, method, level, out):
 
 def _chain(problem, method, level, out):
     """Points solved by fixed steps: those with the same number of steps together, in calls of bounded work."""
-    order, rows, of_level, starts, ends = segments_of(level)
+    order, rows, of_level, starts, ends = _segments(level)
     nodes, p = np.array(method.NODES), problem.p.reshape(-1)
+    lone = level.shape[1] < LANES_PER_ROW
+
+    def compose(samples, h, first, last):
+        if lone:
+            method.hill_scatter(samples, problem.c2, h, p, order, first, out)
+        else:
+            method.hill_chain(samples, problem.c2, h, p, order, first, last, out)
+
+    if jit.ahead:  # by calls on nothing, compile this while another process compiles the rest
+        compose(np.empty((0, 0, 2, nodes.size)), np.empty((0, 0)), starts[:0], ends[:0])
+        row, none = np.empty(0), np.empty((0, 2), np.int64)
+        levels(np.empty((0, 2)), np.empty((0, 3)), row, row, 1.0, 1.0, LADDER, none)
+        segments(none, 0, *np.empty((4, 1), np.int64))
     for at in np.flatnonzero(np.bincount(of_level)):
         steps, own = int(LADDER[at]), of_level == at
-        lone = level.shape[1] < LANES_PER_ROW
         segment = _points_alone(rows[own], starts[own], ends[own]) if lone else (rows[own], starts[own], ends[own])
         for used, first, last in _calls(*segment, steps, nodes.size):
-            samples, h = problem.sample(used, nodes, steps), problem.lengths(used, steps)
-            if lone:
-                method.hill_scatter(samples, problem.c2, h, p, order, first, out)
-            else:
-                method.hill_chain(samples, problem.c2, h, p, order, first, last, out)
+            compose(problem.sample(used, nodes, steps), problem.lengths(used, steps), first, last)
 
 
-def segments_of(level):
+def _segments(level):
     """(points by row and level; row, level, first and last place of each segment), as `kernels.hill.segments`."""
     size = level.shape[1]
     if (level == level[:, :1]).all():  # whole rows: nothing to sort

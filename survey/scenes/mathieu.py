@@ -26,7 +26,7 @@ from survey.scene import Parameter
 
 TITLE = "Stability of Mathieu's equation"
 FAMILY = "hill"
-AHEAD = "hill_dense"
+AHEAD, NO_ROWS = "hill_dense", np.empty(0)  # what a process compiles beside, with `sample`
 STATUS = {}
 AUDIT = ("dop853",)
 REFERENCES = (

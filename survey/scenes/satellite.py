@@ -36,7 +36,7 @@ from survey.scene import Option, Output, Parameter
 
 TITLE = "Out-of-plane stability of a satellite's planar librations and rotations"
 FAMILY = "hill"
-AHEAD = "hill_dense"
+AHEAD, NO_ROWS = "hill_dense", np.empty((0, 6))  # what a process compiles beside, with `sample`
 STATUS = {}
 AUDIT = ("dop853",)
 REFERENCES = (
