@@ -12,7 +12,7 @@ import time
 import tomllib
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache
 from importlib import import_module
 from importlib.metadata import version
 from math import prod
@@ -207,10 +207,9 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, agai
         left = Remaining(workflow.grid.shape, blocks, reused)
         compiled = {}
 
-        with (
-            _compiling_ahead(workflow.scene, workflow.request),
-            Assembly(workflow, kept, tile, regions) as assembly,
-        ):
+        here = len(reused) < len(blocks) and not (workers or scheduler)
+        ahead = _compiling_ahead(workflow.scene, workflow.request) if here else contextlib.nullcontext()
+        with ahead, Assembly(workflow, kept, tile, regions) as assembly:
 
             def finished(done, solved=None):
                 if solved:
@@ -324,28 +323,25 @@ def _refuse_other_code(code):
             )
 
 
-def beside(scene, variables):
-    """The program that compiles some of the kernels of a map of these variables."""
-    return (
-        f"import gc; gc.disable(); from {scene.__name__} import sample, NO_ROWS; from survey.measures.{scene.AHEAD} "
-        f"import compile_ahead; compile_ahead(sample, NO_ROWS, {list(variables)})"
-    )
+def program_ahead(scene, variables):
+    """The program that compiles what the scene names for a map of these variables."""
+    return f"import gc; gc.disable(); from {scene.__name__} import compile_ahead; compile_ahead({list(variables)})"
 
 
 @contextlib.contextmanager
 def _compiling_ahead(scene, request):
     """On a new machine, a process compiles some of the kernels while this one compiles the longest."""
-    if not (hasattr(scene, "AHEAD") and request.method == "auto" and jit.is_new() and cpus() > 1):
+    if not (hasattr(scene, "compile_ahead") and request.method == "auto" and jit.is_new() and cpus() > 1):
         yield
         return
-    jit.ahead = subprocess.Popen(
-        [sys.executable, "-c", beside(scene, request.variables)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
+    words = [sys.executable, "-c", program_ahead(scene, request.variables)]
+    process = jit.ahead = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         yield
     finally:
-        jit.ahead.kill()
-        jit.ahead.wait()
+        jit.ahead = None
+        process.kill()
+        process.wait()
 
 
 def extras(workflow, once, progress=None):
@@ -388,10 +384,7 @@ class Assembly:
         meanings = variables(grid, scene, request)
         flags = {name: meanings[name][1] for name in ("status", "verdict") if name in meanings}
         self.tally = Tally(flags, request.rtol)
-        self.open = partial(  # once there is something to write: the first block is solved sooner
-            store.Output, workflow.path, kept.folder, coordinates(grid, scene, request), meanings, self.layout,
-            grid.shape, tile,
-        )  # fmt: skip
+        self.map = coordinates(grid, scene, request), meanings, self.layout, grid.shape, tile
         self.output, self.writer, self.writes, self.room = None, ThreadPoolExecutor(1), [], {}
 
     def __enter__(self):
@@ -399,11 +392,14 @@ class Assembly:
 
     def __exit__(self, *_):
         self.writer.shutdown(cancel_futures=True)
-        if self.output:
-            self.output.discard()
+        if self.output and not (self.output.cancelled() or self.output.exception()):
+            self.output.result().discard()
 
     def has(self, number):
         """Block `number` is finished. Raises what writing another part has raised."""
+        if not self.output:  # not sooner: it takes a while, in which the first block may be solved
+            self.output = self.writer.submit(store.Output, self.workflow.path, self.kept.folder, *self.map)
+            self.writes.append(self.output)
         place = self.place[number]
         self.waiting[place] -= 1
         if not self.waiting[place]:
@@ -423,12 +419,11 @@ class Assembly:
             for ds in further:
                 written |= ds.attrs
             written |= told
-            self.output.publish(written, further)
+            self.output.result().publish(written, further)
         return written | {"complete": 1}
 
     def _write(self, region, first, blocks):
         """Write the region whose blocks are numbered from `first`."""
-        self.output = self.output or self.open()
         shape = tuple(cut.stop - cut.start for cut in region)
         if self.room.get("status", np.empty(0)).shape != shape:
             self.room = {name: np.empty(shape + extra, kind) for name, (kind, _, extra) in self.layout.items()}
@@ -440,7 +435,7 @@ class Assembly:
                 self.room[name][inside] = values
         with store.refused(self.workflow.path):
             for name, values in self.room.items():
-                self.output.put(name, values, region)
+                self.output.result().put(name, values, region)
 
 
 def plan(workflow):

@@ -15,6 +15,7 @@ from pathlib import Path
 import filelock
 import numpy as np
 from isal import isal_zlib
+from rich import filesize
 
 from survey import status, tiles, unfinished
 from survey.dataset import tally
@@ -202,10 +203,10 @@ def refused(path):
     except SurveyError:
         raise
     except (OSError, RuntimeError) as error:  # netCDF4 raises RuntimeError on a full disk
-        number = getattr(error, "errno", None)  # HDF5's own words are long
-        told = os.strerror(number) if number else error
+        number = getattr(error, "errno", None) or 0  # h5py's own words are long; netCDF4's numbers are below zero
+        told = os.strerror(number) if number > 0 else getattr(error, "strerror", None) or error
         with contextlib.suppress(OSError):
-            told = f"{told}; {shutil.disk_usage(Path(path).parent).free:,} bytes are free"
+            told = f"{told}; {filesize.decimal(shutil.disk_usage(Path(path).parent).free)} are free"
         raise Stopped(f"{path}: writing failed ({told}); mend it and run the command again") from None
 
 
@@ -266,7 +267,11 @@ class Output:
             import h5py
 
             self.pieces = h5py.File(self.part, "r+", locking=False)  # the run's own lock holds it
-        tiles.write(self.pieces[name], values, where)
+        try:
+            variable = self.pieces[name]
+        except KeyError as error:  # so h5py says what it cannot read
+            raise OSError(str(error)) from None
+        tiles.write(variable, values, where)
 
     def publish(self, attributes, further=()):
         """Add the `further` datasets' variables but those that are there and the attributes, `complete` last; put the

@@ -8,21 +8,29 @@ import itertools
 import numpy as np
 from isal import isal_zlib
 
-COLUMNS = 512
+COLUMNS = 512  # of the table whose sums a checksum takes; they stay far below 2^64
 
 
 def write(variable, values, where):
-    """Write values at `where` (slices at the edges of tiles; those left out take all) of an h5py dataset."""
+    """Write values at `where` (slices at the edges of tiles; those left out take all) of an h5py dataset.
+
+    Raises ValueError where the values do not fill whole tiles.
+    """
     values = np.asarray(values, variable.dtype)
     if not variable.chunks:
         variable[(*where, ...)] = values
         return
+    where = (*where, *map(slice, variable.shape[len(where) :]))
+    cuts = [range(*cut.indices(size)) for cut, size in zip(where, variable.shape, strict=True)]
+    ends = zip(cuts, variable.chunks, variable.shape, strict=True)
+    whole = all(cut.start % tile == 0 and (cut.stop % tile == 0 or cut.stop == size) for cut, tile, size in ends)
+    if not whole or values.shape != tuple(map(len, cuts)):
+        raise ValueError(f"{variable.name}: values of shape {values.shape} do not fill whole tiles at {where}")
     plist = variable.id.get_create_plist()
     filters = [(code, parameters) for code, _, parameters, _ in map(plist.get_filter, range(plist.get_nfilters()))]
-    starts = [cut.start for cut in where] + [0] * (values.ndim - len(where))
     for corner in itertools.product(*map(range, [0] * values.ndim, values.shape, variable.chunks)):
         tile = values[tuple(slice(at, at + size) for at, size in zip(corner, variable.chunks, strict=True))]
-        place = tuple(start + at for start, at in zip(starts, corner, strict=True))
+        place = tuple(cut.start + at for cut, at in zip(cuts, corner, strict=True))
         variable.id.write_direct_chunk(place, packed(_whole(tile, variable), filters))
 
 

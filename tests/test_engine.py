@@ -54,6 +54,8 @@ def test_labels_of_an_extra_dimension_are_kept(tmp_path):
     for part in (slice(0, 2), slice(2, 3)):
         output.put("c", values[part], (part,))
     output.put("status", np.zeros(3, np.int8))
+    with pytest.raises(OSError, match="absent"):  # as where HDF5 cannot read what it wrote
+        output.put("absent", values)
     output.publish({})
     ds = xr.load_dataset(tmp_path / "o.nc")
     assert ds.order.values.tolist() == ["200", "110"] and ds.c.dims == ("x", "order")

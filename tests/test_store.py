@@ -192,6 +192,7 @@ def test_every_flipped_bit_and_every_cut_of_a_block_is_found():
     [
         (os, "fsync", OSError(28, "No space left on device")),
         (store.Output, "put", RuntimeError("NetCDF: HDF error")),
+        (store.Output, "publish", OSError(-101, "NetCDF: HDF error")),
         (store, "define", OSError(5, "Input/output error")),
     ],
 )

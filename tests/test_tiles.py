@@ -24,8 +24,8 @@ def written(path, values, tile, by_us, **packing):
     with netCDF4.Dataset(path, "w") as file:
         for number, size in enumerate(values.shape):
             file.createDimension(f"x{number}", size)
-        kind, how = values.dtype.newbyteorder("="), PACKED | {"chunksizes": tile} | packing
-        made = file.createVariable("x", kind, tuple(file.dimensions), **how)
+        how = PACKED | {"chunksizes": tile, "endian": "big" if values.dtype.byteorder == ">" else "little"} | packing
+        made = file.createVariable("x", values.dtype, tuple(file.dimensions), **how)
         if not by_us:
             made[:] = values
     if by_us:
@@ -76,3 +76,28 @@ def test_pieces_come_to_their_places_in_any_order(tmp_path):
         for where in [(slice(16, 40), slice(18, 31)), (slice(0, 16),), (slice(16, 40), slice(0, 18))]:
             tiles.write(file["x"], values[where], where)
     np.testing.assert_array_equal(read(path), values)
+
+
+def test_values_that_do_not_fill_whole_tiles_are_refused(tmp_path):
+    values = RNG.normal(size=(10, 3))
+    path = written(tmp_path / "x.nc", values, (4, 3), True)
+    with h5py.File(path, "r+") as file:
+        for where in [(slice(0, 6),), (slice(2, 8),), (slice(0, 4), slice(0, 2))]:
+            with pytest.raises(ValueError, match=r"x: values .* do not fill whole tiles"):
+                tiles.write(file["x"], values[where], where)
+        for given in (values[:6], np.zeros((12, 3)), values[0]):
+            with pytest.raises(ValueError, match=r"x: values .* do not fill whole tiles"):
+                tiles.write(file["x"], given, ())
+    np.testing.assert_array_equal(read(path), values)
+
+
+def test_variables_without_tiles_are_written_as_they_are(tmp_path):
+    with netCDF4.Dataset(tmp_path / "x.nc", "w") as file:
+        file.createDimension("pair", 2)
+        file.createVariable("x", float, ())
+        file.createVariable("y", float, ("pair",))
+    with h5py.File(tmp_path / "x.nc", "r+") as file:
+        tiles.write(file["x"], 3.5, ())
+        tiles.write(file["y"], np.array([1.5, 2.5]), ())
+    with netCDF4.Dataset(tmp_path / "x.nc") as file:
+        assert file["x"][()] == 3.5 and file["y"][:].tolist() == [1.5, 2.5]

@@ -9,12 +9,12 @@ from survey.kernels.hill import EPS, STABLE, UNDECIDED, UNSTABLE
 from survey.kernels.jit import kernel, splice
 
 TILE = 64
-TERMS = 8
+TERMS = 8  # as many as `_sum` spells out
 ROWS = 8
 
 
 def expand(values, matrix, place):
-    """The series of each row of `values` (R, n) at nodes, by `matrix` (columns: [from, to]), and its `_doubt` (R)."""
+    """The series of each row of `values` (R, n) at nodes, by `matrix` (n, n; [from, to]), and its `_doubt` (R)."""
     series = np.zeros_like(values)
     for at, weights in enumerate(matrix):  # in this order, so that a row's bits do not depend on the others
         series += values[:, at, None] * weights
@@ -22,9 +22,8 @@ def expand(values, matrix, place):
 
 
 def transform(rows, matrix, place):
-    """Coefficients along the first axis of `rows` (n, m), values at nodes by `matrix` (by columns: [from, to]).
-
-    Also the `_doubt` over all columns.
+    """Coefficients (n, m) along the first axis of `rows`, values at nodes, by `matrix` (n, n; [from, to]), and the
+    `_doubt` (a number) of their sums over the columns.
     """
     series = np.zeros_like(rows)
     for row, weights in zip(rows, matrix, strict=True):
@@ -77,9 +76,9 @@ def _sum(c, tile, sums, count):
     """sum_k c_k T_k in `count` lanes, TERMS terms a turn."""
     for i in range(count):
         sums[i] = 0.0
-    for k in range(len(c) - 8, -1, -8):
+    for k in range(len(c) - TERMS, -1, -TERMS):
         c0, c1, c2, c3, c4, c5, c6, c7 = c[k], c[k + 1], c[k + 2], c[k + 3], c[k + 4], c[k + 5], c[k + 6], c[k + 7]
-        t = tile[k : k + 8]
+        t = tile[k : k + TERMS]
         for i in range(count):
             low = (c0 * t[0, i] + c1 * t[1, i]) + (c2 * t[2, i] + c3 * t[3, i])
             high = (c4 * t[4, i] + c5 * t[5, i]) + (c6 * t[6, i] + c7 * t[7, i])

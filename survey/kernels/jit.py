@@ -72,11 +72,12 @@ waited = 0.0
 
 
 def wait_for_ahead():
-    """Wait until the process that compiles ahead has ended: it has begun sooner than this one would."""
+    """Wait for the process that compiles ahead: it will be done sooner than if this one began now."""
     global waited
-    if ahead is not None and ahead.poll() is None:
+    process = ahead
+    if process is not None and process.poll() is None:
         began = time.perf_counter()
-        ahead.wait()
+        process.wait()
         waited = max(waited, time.perf_counter() - began)  # threads wait side by side
 
 

@@ -46,13 +46,21 @@ def serves(problem, asked):
 
 
 def compile_ahead(sample, no_rows, variables):
-    """Compile, by calls on next to nothing, what a map of these needs beside the kernel of the method."""
+    """Compile, by calls on next to nothing, what a map of these variables needs beside the kernel of the method.
+
+    `sample` and its empty `no_rows` are the scene's. While this is done, the map's own process compiles the method's
+    kernel: what it needs at once comes first, and what it waits for last.
+    """
     sample(no_rows, np.ones(1), np.empty((0, 1, 2, 1)))
-    dense = set(variables) <= ANSWERS | {"verdict"}
-    answers = Answers(1, Asked(1.0, np.full(len(kernels.FLOATS), not dense)))
-    answers.judge(np.ones((1, kernels.RESULTS)), None)
-    if dense:
+    grows = not {"exponent", "exponent_per_orbit"}.isdisjoint(variables)
+    named = {name for name in kernels.FLOATS if name in variables} | ({"exponent"} if grows else set())
+    answers = Answers(1, Asked(1.0, np.array([name in named for name in kernels.FLOATS])))
+    if named <= ANSWERS:
+        Answers(1, Asked(1.0, DISCRIMINANT)).judge(np.ones((1, kernels.RESULTS)), None)
         _discriminants(answers, np.zeros(1, int), np.ones((1, TERMS)), np.ones(1), np.ones(1))
+        if grows:
+            kernels.exponents(np.zeros(1, int), 1, 1.0, answers.floats, answers.verdict, answers.late)
+    answers.judge(np.ones((1, kernels.RESULTS)), None)
 
 
 def solve(problem, method, asked, answers):
@@ -111,19 +119,16 @@ def _answer(problem, asked, answers, rows, series, bars, axis, open_points):
     wait_for_ahead()
     x = (problem.p[rows[0]] - axis.middle) / axis.radius  # all rows have the same points
     _discriminants(answers, rows, series, bars, 2 * x * x - 1 if axis.even else x)
-    late = answers.late.reshape(problem.p.shape)
-    if problem.rule is not None:
-        late[rows] |= problem.rule[rows] != kernels.NO_RULE
     if asked.wanted[kernels.EXPONENT // 2]:
         kernels.exponents(rows * x.size, x.size, asked.rtol, answers.floats, answers.verdict, answers.late)
-    open_points[rows] = late[rows]
+    open_points[rows] = answers.late.reshape(problem.p.shape)[rows]
 
 
 def _discriminants(answers, rows, series, bars, x):
-    """D of the rows from their series at x, in place."""
-    whole = np.zeros((len(series), -(-series.shape[1] // TERMS) * TERMS))
-    whole[:, : series.shape[1]] = series
-    discriminants(rows, whole, bars, x, answers.asked.rtol, answers.floats, answers.verdict, answers.late)
+    """D of the rows from their series, padded to TERMS, at x, in place."""
+    padded = np.zeros((len(series), -(-series.shape[1] // TERMS) * TERMS))
+    padded[:, : series.shape[1]] = series
+    discriminants(rows, padded, bars, x, answers.asked.rtol, answers.floats, answers.verdict, answers.late)
 
 
 def _surfaces(problem, method, asked, answers, chosen, axis, open_points):

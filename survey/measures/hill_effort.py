@@ -150,7 +150,7 @@ def _chain(problem, method, level, out):
 def _segments(level):
     """(points by row and level; row, level, first and last place of each segment), as `kernels.hill.segments`."""
     size = level.shape[1]
-    if (level == level[:, :1]).all():  # whole rows: nothing to sort
+    if size and (level == level[:, :1]).all():  # whole rows: nothing to sort
         rows = np.flatnonzero((level[:, 0] >= 0) & (level[:, 0] < len(LADDER)))
         return np.arange(level.size), rows, level[rows, 0], rows * size, (rows + 1) * size
     most = level.shape[0] * min(size, len(LADDER)) + 1

@@ -15,6 +15,11 @@ and, for `ds.survey.point` and `ds.survey.trajectory`, if it likes, two more:
     trajectory(point, answer, options, time) -> survey.scene.Trajectory: the motion at one point, up to `time` (None:
         what suits); `point` maps each parameter to a number
 
+and, if its maps compile for long on a new machine:
+
+    compile_ahead(variables) -> None: compiles some kernels of a map of these variables, in a process of its own beside
+        that of the map, which waits for it (`kernels.jit.wait_for_ahead`) where it comes to need them
+
 where `answer` holds everything that is known of one point, {name: array}, flags as words.
 
 `point` of `solve` maps each parameter that exists to a float64 array; all have the same number of dimensions and

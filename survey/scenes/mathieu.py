@@ -19,14 +19,13 @@ from survey import status
 from survey.kernels import double as dd
 from survey.kernels.hill import NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE
 from survey.kernels.jit import inline, kernel
-from survey.measures import hill, hill_motion, hill_why
+from survey.measures import hill, hill_dense, hill_motion, hill_why
 from survey.measures.rows import Rows
 from survey.methods import dop853, taylor_double
 from survey.scene import Parameter
 
 TITLE = "Stability of Mathieu's equation"
 FAMILY = "hill"
-AHEAD, NO_ROWS = "hill_dense", np.empty(0)  # what a process compiles beside, with `sample`
 STATUS = {}
 AUDIT = ("dop853",)
 REFERENCES = (
@@ -56,6 +55,11 @@ def solve(point, request):
     out["period"] = np.where(out["status"] == status.OK, pi, np.nan)
     out["period_error"] = 1.3e-16 + 0.0 * out["period"]  # pi is rounded
     return {name: block.back(values) for name, values in out.items()}
+
+
+def compile_ahead(variables):
+    """Compile some of the kernels of a map of these variables (see `survey.scenes`)."""
+    hill_dense.compile_ahead(sample, np.empty(0), variables)
 
 
 def trajectory(point, answer, options, time=None):

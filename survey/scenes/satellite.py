@@ -29,14 +29,13 @@ from survey.kernels.elliptic import MEANS
 from survey.kernels.hill import LARGEST, NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE
 from survey.kernels.jit import kernel
 from survey.kernels.satellite import complete_integrals, half_periods, potential, sample, tabulate
-from survey.measures import hill, hill_motion, hill_why
+from survey.measures import hill, hill_dense, hill_motion, hill_why
 from survey.measures.rows import Rows
 from survey.methods import dop853, taylor_double
 from survey.scene import Option, Output, Parameter
 
 TITLE = "Out-of-plane stability of a satellite's planar librations and rotations"
 FAMILY = "hill"
-AHEAD, NO_ROWS = "hill_dense", np.empty((0, 6))  # what a process compiles beside, with `sample`
 STATUS = {}
 AUDIT = ("dop853",)
 REFERENCES = (
@@ -91,6 +90,11 @@ def solve(point, request):
         _solve(shared, np.where((alpha > 1) == oblate, rho, np.nan), oblate, request) for oblate in np.unique(alpha > 1)
     ]
     return {name: np.where(alpha > 1, bodies[-1][name], bodies[0][name]) for name in bodies[0]}
+
+
+def compile_ahead(variables):
+    """Compile some of the kernels of a map of these variables (see `survey.scenes`)."""
+    hill_dense.compile_ahead(sample, np.empty((0, 6)), variables)
 
 
 def trajectory(point, answer, options, time=None):
