@@ -8,10 +8,11 @@ import pytest
 
 from survey import engine
 
+# between tongues: nothing stays undecided, for which more would be compiled
 WORKFLOW = """
 scene = "{scene}"
-axes.{row} = {{ start = 0.1, stop = 0.9, num = 9 }}
-axes.{lane} = {{ start = 0.6, stop = 4.0, num = 200 }}
+axes.{row} = {{ start = 0.1, stop = 0.2, num = 9 }}
+axes.{lane} = {{ start = 1.9, stop = 2.1, num = 200 }}
 output.variables = {variables}
 """
 # the program, telling which of these kernels it has compiled and which it has read
@@ -34,7 +35,7 @@ READ, COMPILED, UNUSED = "1 0", "0 1", "0 0"
     ("scene", "row", "lane", "variables", "kernels"),
     [
         ("satellite", "k", "rho", ["exponent", "rotation_number", "verdict"], (UNUSED, UNUSED, READ)),
-        ("satellite", "k", "rho", ["exponent_per_orbit", "period", "verdict"], (READ, READ, READ)),
+        ("satellite", "k", "rho", ["exponent_per_orbit", "period", "verdict"], (READ, READ, UNUSED)),
         ("mathieu", "q", "a", ["discriminant", "verdict"], (READ, UNUSED, UNUSED)),
     ],
 )
