@@ -47,7 +47,7 @@ def find(workflow, each=None, once=lambda name, make: make()):
     found = _rows(workflow, axis, other, edges)
     if other:
         found |= _curves(workflow, other[0], axis, edges, each)
-    return xr.Dataset(found, attrs={"boundaries": axis})
+    return xr.Dataset(found, attrs={"boundaries": axis, "edge_incomplete_rows": int((edges.complete == 0).sum())})
 
 
 def plan(workflow, cost):

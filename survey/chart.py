@@ -27,7 +27,13 @@ def draw(records, machine, scene, name, path):
         axes.grid(alpha=0.3)
     panels[0, 0].set_ylabel(f"largest error of the {name}, relative to 1 + |value|")
     named = {label: line for axes in panels[0] for line, label in zip(*axes.get_legend_handles_labels(), strict=True)}
-    figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=5, fontsize=8)
+    absent = machine.get("missing_peers", [])
+    title = "in brackets: compilation, which no time counts" + (
+        f"; not installed: {', '.join(absent)}" if absent else ""
+    )
+    figure.legend(
+        named.values(), named.keys(), loc="outside lower center", ncols=5, fontsize=8, title=title, title_fontsize=8
+    )
     figure.suptitle(
         f"{scene}: error against time, lower left is better (beside points: wrong verdicts on the references)"
     )
@@ -39,8 +45,9 @@ def _line(axes, own, look):
     """One method or peer (hollow, dashed), with the number of wrong verdicts beside each point that has any."""
     method, peer = own[0].method, own[0].peer
     seconds, errors = [r.seconds_per_point for r in own], [max(r.error, LEAST_ERROR) for r in own]
+    name = f"peer {peer}" if peer else method
     style = {"ls": "--", "mfc": "white"} if peer else {"lw": 2.5 if method == "auto" else 1.2}
-    axes.plot(seconds, errors, ms=5, label=f"{peer} (peer)" if peer else method, **{"lw": 1.2} | style | look)
+    axes.plot(seconds, errors, ms=5, label=f"{name} ({own[0].compile_seconds:.1f} s)", **{"lw": 1.2} | style | look)
     for number, record in enumerate(r for r in own if r.wrong_verdicts):
         # to the right and to the left in turn, else the figures of neighbours read as one number
         place = {"xytext": (5, 3), "ha": "left"} if number % 2 == 0 else {"xytext": (-5, -9), "ha": "right"}

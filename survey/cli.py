@@ -269,6 +269,9 @@ def _closing(finished, paths):
         missed = attributes["accuracy_missed"]
         verb = "has" if missed == 1 else "have"
         err.print(f"accuracy_missed: {counted(missed, 'point')} {verb} an error bar above rtol")
+    if attributes.get("edge_incomplete_rows"):
+        rows = counted(attributes["edge_incomplete_rows"], "row")
+        err.print(f"edges: {rows} may have more than were found (edge_complete = 0)")
     took = {"compiled": finished.compiling, "kernels": finished.computing, "file": finished.writing}
     took |= {"edges and cells": finished.beside} if finished.beside else {}
     err.print(", ".join(f"{name} {seconds:.1f} s" for name, seconds in took.items()))

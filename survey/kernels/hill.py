@@ -104,6 +104,8 @@ def measure(results, rule, wanted, rtol, whole, overflow, floats, verdict, late,
         by_sine = sine_bar <= cosine_bar
         d = 2.0 - 4.0 * sine if by_sine else 4.0 * cosine - 2.0
         bar = 4.0 * (sine_bar if by_sine else cosine_bar) + 2.0 * EPS * (2.0 + abs(d))
+        if said == MARGINAL and abs(d) > bar:  # on an edge |D| = 2
+            d, bar = 2.0 if d > 0.0 else -2.0, 0.0
         within = isfinite(d) and bar < LARGEST
         for c in range(4):
             within &= results[i, 4 + c] < LARGEST

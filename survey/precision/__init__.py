@@ -84,6 +84,7 @@ def write(scene, directory, peers=False, say=lambda line: None):
     records = measure(scene, case, peers, say)
     paths = [directory / f"precision_{scene}.{kind}" for kind in ("json", "csv", "png")]
     machine = provenance() | {"system": platform.platform(), "threads": 1} | limit(scene, case)
+    machine["missing_peers"] = missing(peers)
     paths[0].write_text(json.dumps({"records": [asdict(r) for r in records], "machine": machine}, indent=1) + "\n")
     with open(paths[1], "w", newline="") as file:
         table = csv.DictWriter(file, list(asdict(records[0])))
@@ -104,12 +105,11 @@ def measure(scene, case, peers=False, say=lambda line: None):
     methods = ["auto", *workflow.methods_of(module, next(iter(case.works().values()))[1])]
     fewer = getattr(case, "MOST", {})
     runs = {(method, ""): (_solver(module, method, case.ERROR), fewer.get(method)) for method in methods}
-    for name in modules.names(programs) if peers else ():
-        if importlib.util.find_spec(name):
-            peer = modules.load(programs, name, "peer")
-            runs["", name] = _peer(case, peer), peer.POINTS
-        else:
-            say(f"{name} is not installed and is missing in the chart: pip install 'survey[bench]'")
+    for name in missing(peers):
+        say(f"{name} is not installed and is missing in the chart: pip install 'survey[bench]'")
+    for name in sorted(set(modules.names(programs)) - set(missing(peers))) if peers else ():
+        peer = modules.load(programs, name, "peer")
+        runs["", name] = _peer(case, peer), peer.POINTS
     whole = case.works()
     thinned = {work: (_thinned(point), options) for work, (point, options) in whole.items()}
     records = []
@@ -133,6 +133,11 @@ def measure(scene, case, peers=False, say=lambda line: None):
                 records.append(Record(work, method, peer, setting, error, seconds, wrong, compile_seconds))
         say(f"{scene}: {method or peer} measured")
     return records
+
+
+def missing(peers):
+    """Names of the peers that are asked for and not installed."""
+    return [name for name in modules.names(programs) if peers and not importlib.util.find_spec(name)]
 
 
 def limit(scene, case):

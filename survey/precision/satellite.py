@@ -78,13 +78,17 @@ def outcome(ends):
 def operations_of(run):
     """Operations of midpoint Taylor's steps, counted from their formulas, while `run()` solves a work."""
     steps = []
-    chain = taylor16.hill_chain
+    chain, scatter = taylor16.hill_chain, taylor16.hill_scatter
 
     def counting(samples, c2, h, p, order, starts, ends, out):
         steps.append(samples.shape[1] * int((ends - starts).sum()))
         chain(samples, c2, h, p, order, starts, ends, out)
 
-    with patch.object(taylor16, "hill_chain", counting):
+    def counting_alone(samples, c2, h, p, order, starts, out):
+        steps.append(samples.shape[1] * starts.size)
+        scatter(samples, c2, h, p, order, starts, out)
+
+    with patch.multiple(taylor16, hill_chain=counting, hill_scatter=counting_alone):
         run()
     return sum(steps) * operations(_one_step)
 

@@ -128,6 +128,14 @@ def test_lame_at_rho_0(body, k, turns):
 
 
 @pytest.mark.parametrize("body", ["prolate", "oblate"])
+@pytest.mark.parametrize("short", [0.3, 1e-9, -1e-9, -0.3])
+def test_on_an_edge_the_discriminant_is_exact(body, short):
+    """At rho = 0 w or its derivative solves the equation (Lame's): |D| = 2, whatever a factor's bar near k = 1."""
+    out = solve(body, one_minus_k=short, rho=0.0)
+    assert abs(out["discriminant"][0]) == 2 and out["discriminant_error"][0] == 0 and out["verdict"][0] == 2
+
+
+@pytest.mark.parametrize("body", ["prolate", "oblate"])
 def test_parity_of_librations(body):
     rho = np.linspace(0.1, 5, 40)
     plus, minus = (solve(body, k=0.83, rho=sign * rho) for sign in (1, -1))
