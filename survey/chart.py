@@ -27,10 +27,9 @@ def draw(records, machine, scene, name, path):
         axes.grid(alpha=0.3)
     panels[0, 0].set_ylabel(f"largest error of the {name}, relative to 1 + |value|")
     named = {label: line for axes in panels[0] for line, label in zip(*axes.get_legend_handles_labels(), strict=True)}
-    absent = machine.get("missing_peers", [])
-    title = "in brackets: compilation, which no time counts" + (
-        f"; not installed: {', '.join(absent)}" if absent else ""
-    )
+    title = "in brackets: compilation, which no time counts"
+    if machine["missing_peers"]:
+        title += f"; not installed: {', '.join(machine['missing_peers'])}"
     figure.legend(
         named.values(), named.keys(), loc="outside lower center", ncols=5, fontsize=8, title=title, title_fontsize=8
     )

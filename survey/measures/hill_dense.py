@@ -140,10 +140,8 @@ def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
         inside = left & (place >= low) & (place <= high)
         rows, own = chosen[inside], np.empty((np.count_nonzero(inside), series.shape[1]))
         if rows.size:
-            wait_for_ahead()
-            restrict(
-                series, (place[inside] - 0.5 * (low + high)) / (0.5 * (high - low)), np.empty((2, own.shape[1])), own
-            )
+            x = (place[inside] - 0.5 * (low + high)) / (0.5 * (high - low))
+            restrict(series, x, np.empty((2, own.shape[1])), own)
             _answer(problem, asked, answers, rows, own, np.full(rows.size, bar), axis, open_points)
         left &= ~inside
     return chosen[left]

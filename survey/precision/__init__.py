@@ -105,9 +105,10 @@ def measure(scene, case, peers=False, say=lambda line: None):
     methods = ["auto", *workflow.methods_of(module, next(iter(case.works().values()))[1])]
     fewer = getattr(case, "MOST", {})
     runs = {(method, ""): (_solver(module, method, case.ERROR), fewer.get(method)) for method in methods}
-    for name in missing(peers):
+    absent = missing(peers)
+    for name in absent:
         say(f"{name} is not installed and is missing in the chart: pip install 'survey[bench]'")
-    for name in sorted(set(modules.names(programs)) - set(missing(peers))) if peers else ():
+    for name in sorted(set(modules.names(programs)) - set(absent)) if peers else ():
         peer = modules.load(programs, name, "peer")
         runs["", name] = _peer(case, peer), peer.POINTS
     whole = case.works()
