@@ -26,14 +26,14 @@ def solve(body="prolate", method="auto", rtol=1e-10, **point):
     return satellite.solve(point, Request({"body": body}, method, rtol, names))
 
 
-def factors(body, rho, **modulus):
+def factors(body, rho, low=0.0, **modulus):
     """The ten results of one point of the satellite, by the double-double kernel itself (held against mpmath)."""
     shared = satellite.moduli({name: np.array([[value]]) for name, value in modulus.items()})
     row = satellite.Motion(*(np.ravel(values) for values in shared), body == "oblate")
-    problem = satellite._problem(row, np.array([[rho]]), None, True)
+    problem = satellite._problem(row, np.array([[rho]]))
     phase, distance = taylor_double.hill_density()
     steps = 2 * np.ceil(0.5 * row.period / 2 * np.maximum(phase * (abs(rho) + row.k + 1), distance * row.rate))
-    return problem.exact(np.zeros(1, int), np.array([rho]), steps.astype(np.int64))[0]
+    return problem.exact(np.zeros(1, int), np.array([rho]), np.array([low]), steps.astype(np.int64))[0]
 
 
 def truth(case):

@@ -1,7 +1,7 @@
 """Planar motions of a satellite along one row of the map: w = dx/du and z = c0 + rho c1 + rho^2 at given u.
 
-A row is `rows[r]` = (k, k', half period, oblate, high, low): for rotations k > 1 and k' is the complement of 1/k;
-high + low is k exactly, also where 1 - k was given.
+A row is `rows[r]` = (k, k', half period, oblate, given, which): for rotations k > 1 and k' is the complement of 1/k;
+`given` is the parameter of this row that is known exactly, and `which` says which one it is.
 Notes (scenes/satellite.md), section 1: z = (rho + w)^2 + g with g = dn^2 (PL), -k^2 sn^2 (OL), cn^2 (PR),
 -sn^2 (OR): no cancelling constant.
 """
@@ -11,6 +11,7 @@ import numpy as np
 from survey.kernels import double as dd
 from survey.kernels.elliptic import GAP, LANES, MEANS, jacobi, jacobi_lanes, means
 from survey.kernels.jit import inline, kernel
+from survey.kernels.sines import sin_cos
 
 # A relative gap of the means whose square is below the rounding of extended floats.
 CLOSE = 1e-10
@@ -32,7 +33,7 @@ def complete_integrals(k, kc):
 
 
 def half_periods(k, kc):
-    """2 K(k), or K(1/k) / k for rotations; correctly rounded, nearly: phases are rho times as long (DLMF 19.8.5).
+    """2 K(k), or K(1/k) / k for rotations, and what rounding left: phases are rho times as long (DLMF 19.8.5).
 
     In the machine's extended floats (on some machines float64) and numpy, which has nothing to compile.
     """
@@ -43,7 +44,8 @@ def half_periods(k, kc):
         a[wide], b[wide] = (one + other) / 2, np.sqrt(one * other)
         wide = wide[one - other > CLOSE * one]
     two = (np.longdouble(dd.PI[0]) + np.longdouble(dd.PI[1])) / a
-    return np.where(k > 1, two / (2 * np.maximum(k, 1)), two).astype(float)
+    half = np.where(k > 1, two / (2 * np.maximum(k, 1)), two)
+    return half.astype(float), (half - half.astype(float)).astype(float)
 
 
 @inline
@@ -116,44 +118,57 @@ def tabulate(row, table):
 # dn = cos x and k sn = sin x for librations; cn and sn for rotations.
 SIN, COS, W, SQUARE = range(4)
 CLOCK = 4
+# What a row is given by: k, 1 - k or asin k.
+K, ONE_MINUS_K, AMPLITUDE = 0.0, 1.0, 2.0
+# A row in double-double: k and sqrt(|1 - k^2|), each as two numbers, rotates, oblate.
+EXACTLY = 6
 
 
 @inline
-def exactly(row):
-    """k, |1 - k|, sqrt(|1 - k^2|) as double-doubles, and whether k > 1."""
-    k = row[4], row[5]
-    short = dd.sub((1.0, 0.0), k)
-    rotates = short[0] < 0.0
-    if rotates:
-        short = dd.neg(short)
-    return k, dd.sqrt(dd.mul(short, dd.add((1.0, 0.0), k))), rotates
+def exactly(row, exact):
+    """Fill `exact` (EXACTLY) from what the row is given by."""
+    given, which = (row[4], 0.0), row[5]
+    rotates = False
+    if which == AMPLITUDE:
+        rest = dd.add(dd.two_sum(dd.HALF_PI[0], -row[4]), (dd.HALF_PI[1], dd.HALF_PI_REST))
+        k, _ = sin_cos(row[4])
+        sine, cosine = sin_cos(rest[0])
+        complement = dd.shifted(sine, rest[1] * cosine[0])
+    else:
+        other = dd.two_sum(1.0, -row[4])
+        k, short = (given, other) if which == K else (other, given)
+        rotates = short[0] < 0.0
+        short = dd.neg(short) if rotates else short
+        complement = dd.sqrt(dd.mul(short, dd.add((1.0, 0.0), k)))
+    exact[0], exact[1] = k
+    exact[2], exact[3] = complement
+    exact[4], exact[5] = 1.0 if rotates else 0.0, row[3]
 
 
 @inline
-def half_period(row):
+def half_period(exact):
     """2 K(k), or K(1/k) / k for rotations, as a double-double."""
-    k, complement, rotates = exactly(row)
-    if rotates:
+    k, complement = (exact[0], exact[1]), (exact[2], exact[3])
+    if exact[4] > 0.0:
         return dd.div(dd.HALF_PI, dd.mean(k, complement))
     return dd.div(dd.PI, dd.mean((1.0, 0.0), complement))
 
 
 @inline
-def slowest(row, clock):
+def slowest(exact, clock):
     """The clock where w is least, from where errors do not grow: u = K for librations, K(1/k) / k for rotations."""
-    k, complement, rotates = exactly(row)
     for n in range(CLOCK):
         clock[n, 0, 0], clock[n, 1, 0] = 0.0, 0.0
-    if rotates:
+    if exact[4] > 0.0:
         clock[SIN, 0, 0] = 1.0
-        clock[W, 0, 0], clock[W, 1, 0] = complement
+        clock[W, 0, 0], clock[W, 1, 0] = exact[2], exact[3]
     else:
-        clock[SIN, 0, 0], clock[SIN, 1, 0] = k
-        clock[COS, 0, 0], clock[COS, 1, 0] = complement
+        clock[SIN, 0, 0], clock[SIN, 1, 0] = exact[0], exact[1]
+        clock[COS, 0, 0], clock[COS, 1, 0] = exact[2], exact[3]
 
 
 @inline
-def pendulum(row, h, clock):
+def pendulum(exact, h, clock):
     """Series of the clock in x = u / h: (sin x)' = w cos x, (cos x)' = -w sin x, w' = -sin x cos x."""
     sine, cosine, w = clock[SIN], clock[COS], clock[W]
     for n in range(clock.shape[2] - 1):
@@ -166,26 +181,26 @@ def pendulum(row, h, clock):
 
 
 @inline
-def coefficient(side, row, rho, clock, z):
+def coefficient(side, exact, rho, clock, z):
     """Series of z = (rho + w)^2 + g; w is odd about u = K for librations, even about K(1/k) / k for rotations."""
-    k, _, rotates = exactly(row)
-    sign = 1.0 if rotates else side
+    sign, oblate = 1.0 if exact[4] > 0.0 else side, exact[5] > 0.0
+    twice = dd.scaled(rho, 2.0 * sign)
     for n in range(1, clock.shape[2]):
-        shift = dd.times((clock[W, 0, n], clock[W, 1, n]), 2.0 * sign * rho)
+        shift = dd.mul((clock[W, 0, n], clock[W, 1, n]), twice)
         # w^2 + sin^2 x is constant, so g' = (w^2)'
         z[0, n], z[1, n] = dd.add(shift, (2.0 * clock[SQUARE, 0, n], 2.0 * clock[SQUARE, 1, n]))
-    shifted = dd.add((rho, 0.0), (sign * clock[W, 0, 0], sign * clock[W, 1, 0]))
-    place = SIN if row[3] > 0.0 else COS
+    shifted = dd.add(rho, (sign * clock[W, 0, 0], sign * clock[W, 1, 0]))
+    place = SIN if oblate else COS
     g = (clock[place, 0, 0], clock[place, 1, 0])
     g = dd.mul(g, g)
-    z[0, 0], z[1, 0] = dd.add(dd.mul(shifted, shifted), dd.neg(g) if row[3] > 0.0 else g)
-    return 2.0 * (abs(rho) + k[0]) * k[0] + 2.0
+    z[0, 0], z[1, 0] = dd.add(dd.mul(shifted, shifted), dd.neg(g) if oblate else g)
+    return 2.0 * (abs(rho[0]) + exact[0]) * exact[0] + 2.0
 
 
 @inline
-def missed(row, clock):
+def missed(exact, clock):
     """Where w is largest sin x = 0, |cos x| = 1, |w| = k: how far off, sin x and w relative to their amplitudes."""
-    k, _, _ = exactly(row)
+    k = exact[0], exact[1]
     sine = abs(clock[SIN, 0, 0]) / min(1.0, k[0])
     cosine, w = (clock[COS, 0, 0], clock[COS, 1, 0]), (clock[W, 0, 0], clock[W, 1, 0])
     cosine = dd.sub(dd.neg(cosine) if cosine[0] < 0.0 else cosine, (1.0, 0.0))

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from survey import methods, modules, status
+from survey.kernels.double import split_error
 from survey.kernels.hill import FLOATS, MARGINAL, RESULTS, STABLE, UNDECIDED, UNSTABLE
 from survey.measures import hill_auto, hill_effort
 from survey.measures.hill_answers import Answers, Asked
@@ -57,15 +58,16 @@ class Problem:
 
     `sample(rows, nodes, steps)` gives c0, c1 of the rows at `nodes` (fractions) of each step as an array
     (rows, steps, 2, nodes); `walk(rows, p, tolerance)`, for adaptive methods, gives the results of a chain for
-    points p of those rows, and which of them reached the end; `exact(rows, p, steps)` gives them in double-double, each
-    in its even number of steps, for p and rows that are exact. |z| <= bound[r, 0] + |p| bound[r, 1] + p^2 bound[r, 2];
+    points p of those rows, and which of them reached the end; `exact(rows, p, low, steps)` gives them in double-double,
+    for p + low, each in its even number of steps. |z| <= bound[r, 0] + |p| bound[r, 1] + p^2 bound[r, 2];
     `rate` is 1 / distance to z's nearest singularity. `rule` (R, L) holds what exact rules say (`kernels.hill`), and
     `constant` the rows where z does not depend on t, with z there (rows, L); None where nothing is to be said.
     `line` is the whole axis of p, when every row has the same points: (number, least, greatest). `even` (R) says
     where p -> -p exchanges y1 and y2' at T/2, and leaves y2 and y1'. `across` is the axis of the rows, if there
     is one, and `places` (R) where they lie on it, known to 4 + |place| ulp.
     `cut(rows, steps)` gives the lengths of the steps (rows, steps) where they differ. With `whole`, where z is not
-    even, the whole period stands for the half.
+    even, the whole period stands for the half. `span_low` and `p_low` are what float64 took from the half period and
+    from p: None where nothing is known of it, or where it is 0.
     """
 
     p: np.ndarray
@@ -84,17 +86,28 @@ class Problem:
     places: np.ndarray | None = None
     cut: Callable | None = None
     whole: bool = False
+    span_low: np.ndarray | None = None
+    p_low: np.ndarray | None = None
 
     def lengths(self, rows, steps):
-        """Lengths of the steps (rows, steps)."""
-        return self.cut(rows, steps) if self.cut else np.repeat(self.span[rows, None] / steps, steps, axis=1)
+        """Lengths of the steps (rows, steps); the first takes what rounding would leave out of the half period."""
+        if self.cut:
+            return self.cut(rows, steps)
+        span = self.span[rows]
+        h = span / steps
+        left = (span - steps * h) - split_error(float(steps), h, steps * h)
+        lengths = np.repeat(h[:, None], steps, axis=1)
+        lengths[:, 0] += left if self.span_low is None else left + self.span_low[rows]
+        return lengths
 
     def at(self, rows, p, rule=None):
         """Points `p` (one row for each of `rows`) on their own, no axis, with what exact rules say of them."""
+        span_low = None if self.span_low is None else self.span_low[rows]
         return replace(
             self, p=p, span=self.span[rows], bound=self.bound[rows], rate=self.rate[rows], rule=rule, constant=None,
-            line=None, across=None, sample=lambda used, nodes, steps: self.sample(rows[used], nodes, steps),
-            walk=self.walk and (lambda used, p, tolerance: self.walk(rows[used], p, tolerance)), exact=None,
+            span_low=span_low, p_low=None, line=None, across=None, exact=None,
+            sample=lambda used, nodes, steps: self.sample(rows[used], nodes, steps),
+            walk=self.walk and (lambda used, p, tolerance: self.walk(rows[used], p, tolerance)),
             cut=self.cut and (lambda used, steps: self.cut(rows[used], steps)),
         )  # fmt: skip
 
@@ -102,7 +115,7 @@ class Problem:
 def of_rows(rows, sample, walk, exact=None):
     """The functions of a Problem from a scene's kernels, which take some of its `rows` (R, ...) and fill `out`.
 
-    `sample(rows, nodes, out)`; `walk(rows, p, tolerance, out, reached)`; `exact(rows, p, steps, out)` or None.
+    `sample(rows, nodes, out)`; `walk(rows, p, tolerance, out, reached)`; `exact(rows, p, low, steps, out)` or None.
     """
 
     def samples(used, nodes, steps):
@@ -115,9 +128,9 @@ def of_rows(rows, sample, walk, exact=None):
         walk(rows[used], p, tolerance, out, reached)
         return out, reached
 
-    def solved(used, p, steps):
+    def solved(used, p, low, steps):
         out = np.empty((used.size, RESULTS))
-        exact(rows[used], p, steps, out)
+        exact(rows[used], p, low, steps, out)
         return out
 
     return {"sample": samples, "walk": walked, "exact": solved if exact else None}

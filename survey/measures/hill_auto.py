@@ -51,16 +51,18 @@ def _exactly(problem, answers, places, asked):
     """Solve the points at `places` in double-double, where the number of steps allows it."""
     phase, distance = taylor_double.hill_density()
     rows, p = places // problem.p.shape[1], problem.p.reshape(-1)[places]
+    low = np.zeros(p.size) if problem.p_low is None else problem.p_low.reshape(-1)[places]
     frequency = np.sqrt((problem.bound[rows] * np.stack([p**0, abs(p), p**2], axis=1)).sum(axis=1))
     steps = 2 * np.ceil(0.5 * problem.span[rows] * np.maximum(phase * frequency, distance * problem.rate[rows]))
     within = steps <= taylor_double.STEP_LIMIT
-    places, rows, p, steps = places[within], rows[within], p[within], steps[within].astype(np.int64)
+    places, rows, p, low = places[within], rows[within], p[within], low[within]
+    steps = steps[within].astype(np.int64)
     calls = np.cumsum(steps) // CALL_STEPS
     for call in np.unique(calls):
         these = calls == call
         own = Answers(int(these.sum()), asked)
         rule = None if problem.rule is None else problem.rule.reshape(-1)[places[these]]
-        own.judge(problem.exact(rows[these], p[these], steps[these]), rule)
+        own.judge(problem.exact(rows[these], p[these], low[these], steps[these]), rule)
         answers.put(places[these], own)
 
 

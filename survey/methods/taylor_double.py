@@ -18,7 +18,7 @@ from survey.kernels.lanes import bars, column, relative
 ORDER = 34
 SERVES = ()  # a last resort, never a user's choice
 PHASE, DISTANCE = 1.4, 0.1
-STEP_LIMIT = 20_000
+STEP_LIMIT = 100_000
 # A step: its propagator as four double-doubles, local bounds of truncation and rounding (3), dz of the clock.
 STEP = 12
 SOLUTIONS = 3
@@ -87,8 +87,8 @@ def hill_walk(start, expand, potential, miss, row, p, span, before, after, work,
 
     The clock's origin lies `before` steps after the start. `start(row, clock)` sets its values, coefficients 0;
     `expand(row, h, clock)` the others, in x = t / h; `potential(side, row, p, clock, z)` fills the series of z at the
-    distance of the clock from the origin, after it (side 1) or before it (-1), and returns the most by which |z| can
-    move per unit of the clock's error; `miss(row, clock)` is that error at the clock's end.
+    distance of the clock from the origin, after it (side 1) or before it (-1), `p` a double-double, and returns the
+    most by which |z| can move per unit of the clock's error; `miss(row, clock)` is that error at the clock's end.
 
     Fills `out` as `survey.kernels.lanes.chain` does; `work` from `workspace`, `chain` (steps, STEP) is scratch.
     """

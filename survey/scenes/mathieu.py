@@ -79,6 +79,7 @@ def _problem(q, a, line=None, ends=None):
         rule=rule,
         constant=constant,
         line=line,
+        span_low=np.full(q.size, dd.HALF_PI[1]),
         across=hill.Across("mathieu", *ends, at=lambda q: _problem(q, np.zeros((q.size, 0)))) if ends else None,
         places=q,
     )
@@ -149,7 +150,7 @@ def coefficient(side, row, a, clock, z):
     """Series of z = a - 2 q cos 2t."""
     for n in range(clock.shape[2]):
         z[0, n], z[1, n] = dd.times((clock[0, 0, n], clock[0, 1, n]), -2.0 * row)
-    z[0, 0], z[1, 0] = dd.add((z[0, 0], z[1, 0]), (a, 0.0))
+    z[0, 0], z[1, 0] = dd.add((z[0, 0], z[1, 0]), a)
     return 2.0 * abs(row)
 
 
@@ -160,10 +161,10 @@ def missed(row, clock):
 
 
 @kernel
-def solve_points(q, a, steps, out):
+def solve_points(q, a, low, steps, out):
     """Points of their own, in double-double, in `steps` steps each."""
     work, chain = taylor_double.workspace(2), np.empty((steps.max(), taylor_double.STEP))
     for i in range(len(a)):
         taylor_double.hill_walk(
-            start, circular, coefficient, missed, q[i], a[i], dd.HALF_PI, 0, steps[i], work, chain, out[i]
+            start, circular, coefficient, missed, q[i], (a[i], low[i]), dd.HALF_PI, 0, steps[i], work, chain, out[i]
         )

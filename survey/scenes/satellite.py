@@ -25,6 +25,7 @@ import numpy as np
 
 from survey import status
 from survey.kernels import satellite as motion
+from survey.kernels.double import split_error
 from survey.kernels.elliptic import MEANS
 from survey.kernels.hill import LARGEST, NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE
 from survey.kernels.jit import kernel
@@ -82,12 +83,13 @@ def solve(point, request):
     """All outputs of a block that the request wants (see `survey.scenes`)."""
     shared = moduli(point)
     if "rho" in point:
-        oblate, exactly = request.options["body"] == "oblate", "amplitude" not in point
-        return _solve(shared, point["rho"], oblate, request, request.line("rho"), exactly, _ends(request))
+        oblate = request.options["body"] == "oblate"
+        return _solve(shared, point["rho"], oblate, request, line=request.line("rho"), ends=_ends(request))
     alpha = np.asarray(point["inertia_ratio"], dtype=float)
-    rho = float(request.options["direction"]) / np.sqrt(3 * abs(1 - alpha))
+    rho, low = rates(alpha, request.options["direction"])
     bodies = [
-        _solve(shared, np.where((alpha > 1) == oblate, rho, np.nan), oblate, request) for oblate in np.unique(alpha > 1)
+        _solve(shared, np.where((alpha > 1) == oblate, rho, np.nan), oblate, request, low)
+        for oblate in np.unique(alpha > 1)
     ]
     return {name: np.where(alpha > 1, bodies[-1][name], bodies[0][name]) for name in bodies[0]}
 
@@ -101,20 +103,17 @@ def trajectory(point, answer, options, time=None):
     """Solutions and multipliers of a point (see `survey.scenes`)."""
     rho, oblate = point.get("rho"), options.get("body") == "oblate"
     if rho is None:
-        rho = float(options["direction"]) / np.sqrt(3 * abs(1 - point["inertia_ratio"]))
+        rho, _ = rates(point["inertia_ratio"], options["direction"])
         oblate = point["inertia_ratio"] > 1
     shared = moduli({name: np.array([value]) for name, value in point.items()})
     return hill_motion.solve(_problem(Motion(*shared, bool(oblate)), np.array([[rho]])), answer, time, "u")
 
 
-def _solve(shared, rho, oblate, request, line=None, exactly_given=False, across=None):
-    """The outputs for one kind of body; points that are not of it have rho = NaN.
-
-    What k and rho are exactly is known only where they are `exactly_given`, not computed from other words.
-    """
+def _solve(shared, rho, oblate, request, low=None, line=None, ends=None):
+    """The outputs for one kind of body; points not of it have rho = NaN. `low` is what float64 took from rho."""
     block = Rows(shared, rho)
     row = Motion(*(block.per_row(values) for values in shared), bool(oblate))
-    problem = _problem(row, block.per_point(rho), line, exactly_given, across)
+    problem = _problem(row, block.per_point(rho), None if low is None else block.per_point(low), line, ends)
     wanted = set(request.variables) | ({"exponent"} if "exponent_per_orbit" in request.variables else set())
     out = hill.solve(problem, request.method, request.rtol, wanted)
     ok = out["status"] == status.OK
@@ -139,35 +138,50 @@ def _per_orbit(out, orbits):
 
 
 def moduli(point):
-    """k, the complement (of 1/k for rotations), and two numbers whose sum is k exactly: no digit is lost near k = 1.
+    """k, the complement (of 1/k for rotations), what was given, and which it is: no digit is lost near k = 1.
 
-    From k, from 1 - k, or from the amplitude asin k, where the sum is as good as float64 makes it.
+    From k, from 1 - k, or from the amplitude asin k.
     """
     if "amplitude" in point:
         amplitude = np.asarray(point["amplitude"], dtype=float)
-        return np.sin(amplitude), np.cos(amplitude), np.sin(amplitude), 0 * amplitude
+        return np.sin(amplitude), np.cos(amplitude), amplitude, np.full_like(amplitude, motion.AMPLITUDE)
     with np.errstate(all="ignore"):
         if "one_minus_k" in point:
-            short = np.asarray(point["one_minus_k"], dtype=float)
-            high = 1 - short
-            low = (1 - (high - (high - 1))) - (short + (high - 1))  # the rounding of 1 - k, exactly (Knuth)
+            given = short = np.asarray(point["one_minus_k"], dtype=float)
+            which, high = motion.ONE_MINUS_K, 1 - short
             k = np.where(short < 0, np.maximum(high, np.nextafter(1, 2)), high)  # a rotation remains one
         else:
-            k = high = np.asarray(point["k"], dtype=float)
-            short, low = 1 - k, 0 * k
+            given = k = np.asarray(point["k"], dtype=float)
+            which, short = motion.K, 1 - k
         scale = np.maximum(k, 1)
         complement = np.sqrt((abs(short) / scale) * ((1 + k) / scale))
-    return k, np.where(k == np.inf, np.nan, complement), high, low
+    return k, np.where(k == np.inf, np.nan, complement), given, np.full_like(given, which)
+
+
+def rates(inertia_ratio, direction):
+    """rho = +-1 / sqrt(3 |1 - alpha|) rounded, and what float64 took from it."""
+    with np.errstate(all="ignore"):
+        short = 1 - inertia_ratio
+        rest = (1 - (short - (short - 1))) - (inertia_ratio + (short - 1))  # the rounding of 1 - alpha, exactly (Knuth)
+        short, rest = abs(short), np.sign(short) * rest
+        rho = 1 / np.sqrt(3 * short)
+        # one step of Newton's: 1 - 3 rho^2 (short + rest), each product with its own rounding
+        square = rho * rho
+        triple = 3 * square
+        triple_rest = split_error(3.0, square, triple) + 3 * split_error(rho, rho, square)
+        total = triple * short
+        missing = (1 - total) - (split_error(triple, short, total) + (triple * rest + triple_rest * short))
+        return float(direction) * rho, float(direction) * (0.5 * rho * missing)
 
 
 @dataclass(frozen=True)
 class Motion:
-    """The planar motions of the rows: k, the complement, k exactly as a sum, and what follows from them."""
+    """The planar motions of the rows: k, the complement, what was given and which, and what follows from them."""
 
     k: np.ndarray
     kc: np.ndarray
-    high: np.ndarray
-    low: np.ndarray
+    given: np.ndarray
+    which: np.ndarray
     oblate: bool
 
     @cached_property
@@ -180,8 +194,13 @@ class Motion:
         return self.k > 1
 
     @cached_property
+    def half(self):
+        """The half period, rounded, and what float64 took from it."""
+        return half_periods(self.k, self.kc)
+
+    @property
     def period(self):
-        return 2 * half_periods(self.k, self.kc)
+        return 2 * self.half[0]
 
     @cached_property
     def rate(self):
@@ -223,7 +242,7 @@ def _at(s, oblate, rotates):
     """The rows at places s of the axis."""
     k, kc = np.sqrt(-np.expm1(-s)), np.exp(-s / 2)
     k = 1 / k if rotates else k
-    return _problem(Motion(k, kc, k, 0 * k, oblate), np.zeros((s.size, 0)))
+    return _problem(Motion(k, kc, k, np.full_like(k, motion.K), oblate), np.zeros((s.size, 0)))
 
 
 def _across(row, ends):
@@ -232,18 +251,19 @@ def _across(row, ends):
     return hill.Across(key, *ends, at=lambda places: _at(places, row.oblate, rotates))
 
 
-def _problem(row, rho, line=None, exactly_given=False, ends=None):
-    oblate = np.full(row.k.size, float(row.oblate))
-    rows = np.column_stack([row.k, row.kc, row.period / 2, oblate, row.high, row.low])
-
+def _problem(row, rho, low=None, line=None, ends=None):
+    half, half_low = row.half
+    rows = np.column_stack([row.k, row.kc, half, np.full(row.k.size, float(row.oblate)), row.given, row.which])
     rule, constant = _rules(row, rho)
     return hill.Problem(
         p=rho,
-        span=row.period / 2,
+        p_low=low,
+        span=half,
+        span_low=half_low,
         bound=np.column_stack([row.k**2 + 1, 2 * row.k, np.ones(row.k.size)]),  # (|rho| + k)^2 + 1
         rate=row.rate,
         c2=1.0,
-        **hill.of_rows(rows, sample, walk_points, solve_points if exactly_given else None),
+        **hill.of_rows(rows, sample, walk_points, solve_points),
         rule=rule,
         constant=constant,
         line=line,
@@ -282,12 +302,14 @@ def walk_points(rows, rho, tolerance, out, reached):
 
 
 @kernel
-def solve_points(rows, rho, steps, out):
+def solve_points(rows, rho, low, steps, out):
     """Points of their own, in double-double, in `steps` (even) steps each."""
     work, chain = taylor_double.workspace(motion.CLOCK), np.empty((steps.max(), taylor_double.STEP))
+    row = np.empty(motion.EXACTLY)
     for i in range(len(rho)):
+        motion.exactly(rows[i], row)
         before = steps[i] if rows[i, 0] > 1.0 else steps[i] // 2
         taylor_double.hill_walk(
-            motion.slowest, motion.pendulum, motion.coefficient, motion.missed, rows[i], rho[i],
-            motion.half_period(rows[i]), before, steps[i] - before, work, chain, out[i],
+            motion.slowest, motion.pendulum, motion.coefficient, motion.missed, row, (rho[i], low[i]),
+            motion.half_period(row), before, steps[i] - before, work, chain, out[i],
         )  # fmt: skip

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from mpmath import mp, mpf
 
 from survey.kernels import double as dd
+from survey.kernels import satellite
 from survey.kernels.jit import inline, kernel
-from survey.kernels.satellite import half_period
 
 
 @kernel
@@ -120,19 +120,28 @@ def test_series():
 
 
 @kernel
-def half_of(row):
-    return half_period(row)
+def half_of(row, exact):
+    satellite.exactly(row, exact)
+    return satellite.half_period(exact)
 
 
 @pytest.mark.parametrize("short", [1.0 - 1e-9, 0.5, 1e-3, 1e-8, 1e-14, 1e-20, -1e-20, -1e-8, -0.3, -7.0, -1e9])
 def test_half_period_from_one_minus_k(short):
     """2 K(k), K(1/k) / k to 30 digits: 1 - k is an exact number, however small."""
-    high = 1.0 - short
-    row = np.array([high, 0.0, 0.0, 0.0, *dd.two_sum(1.0, -short)])
+    row = np.array([0.0, 0.0, 0.0, 0.0, short, satellite.ONE_MINUS_K])
     with mp.workdps(60):
         k = 1 - mpf(short)
         wanted = 2 * mp.ellipk(k**2) if k < 1 else mp.ellipk(1 / k**2) / k
-        assert abs(value(half_of(row)) / wanted - 1) < 16 * dd.UNIT
+        assert abs(value(half_of(row, np.empty(satellite.EXACTLY))) / wanted - 1) < 16 * dd.UNIT
+
+
+@pytest.mark.parametrize("amplitude", [0.0, 1e-9, 0.03, 0.8, 1.5, 1.5707963, np.nextafter(np.pi / 2, 0)])
+def test_half_period_from_the_amplitude(amplitude):
+    """2 K(sin amplitude) to 30 digits, also where cos amplitude is 6e-17."""
+    row = np.array([0.0, 0.0, 0.0, 0.0, amplitude, satellite.AMPLITUDE])
+    with mp.workdps(60):
+        wanted = mp.pi / mp.agm(1, mp.cos(mpf(amplitude)))
+        assert abs(value(half_of(row, np.empty(satellite.EXACTLY))) / wanted - 1) < 16 * dd.UNIT
 
 
 def test_both_ways_to_the_error_of_a_product_give_the_same_bits():

@@ -55,6 +55,6 @@ def test_mathieus_narrow_tongue():
     ds = survey.evaluate("mathieu", a=a, q=q)
     assert ds.verdict.values.tolist() == [STABLE, STABLE]
     problem = mathieu._problem(np.array([q]), a[None, :])
-    out = problem.exact(np.zeros(2, int), a, np.array([8, 8]))
+    out = problem.exact(np.zeros(2, int), a, np.zeros(2), np.array([8, 8]))
     assert (abs(out[:, 0]) > out[:, 4]).all() and (abs(out[:, 3]) > out[:, 7]).all()
     assert np.sign(out[0, 0]) == -np.sign(out[1, 0]) and np.sign(out[0, 3]) == -np.sign(out[1, 3])
