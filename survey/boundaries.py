@@ -8,6 +8,7 @@ closed form has `closed`, which gives them, with `refusal`, CLASSES, TITLE and A
 The edges of all others are sought as the zeros of Hill's factors.
 """
 
+from itertools import pairwise
 from math import prod
 
 import numpy as np
@@ -47,7 +48,9 @@ def find(workflow, each=None, once=lambda name, make: make()):
     found = _rows(workflow, axis, other, edges)
     if other:
         found |= _curves(workflow, other[0], axis, edges, each)
-    return xr.Dataset(found, attrs={"boundaries": axis, "edge_incomplete_rows": int((edges.complete == 0).sum())})
+    about = {"boundaries": axis, "edge_incomplete_rows": int((edges.complete == 0).sum())}
+    left_out = ", ".join(f"{a:.12g} to {b:.12g}" for (_, a), (b, _) in pairwise(_parts(workflow, axis)))
+    return xr.Dataset(found, attrs=about | ({"edge_left_out": f"{axis} from {left_out}"} if left_out else {}))
 
 
 def plan(workflow, cost):
@@ -111,11 +114,11 @@ def _of_curves(workflow, names, count, kind, places, error, where):
 
 def _edges(workflow, axis, rows, each, once):
     """All Edges of all rows, a few rows at a time."""
-    ends = np.asarray(workflow.grid.parameters[axis][1])[[0, -1]]
-    parts = [None] * -(-rows // ROWS)
+    parts, between = [None] * -(-rows // ROWS), _parts(workflow, axis)
 
     def make(some):
-        own = hill_edges.find(_row_solver(workflow, axis, some), some.size, *sorted(ends))
+        solve = _row_solver(workflow, axis, some)
+        own = hill_edges.joined([hill_edges.find(solve, some.size, *ends) for ends in between])
         own.row += some[0]
         return vars(own)
 
@@ -172,7 +175,7 @@ def _curves(workflow, across, axis, edges, each):
     def solve(q, p, wanted):
         return _solve(workflow, fixed | {across: q, axis: p}, wanted)
 
-    pieces = [_pieces(workflow, name, square, i) for i, name in enumerate((across, axis))]
+    pieces = [_pieces(workflow, name) for name in (across, axis)]
     rows = np.asarray(workflow.grid.parameters[across][1])[edges.row]
     of_rows = square.inside(np.stack([rows, edges.position], axis=1)), edges.kind, edges.index
     found = [of_rows, *(_of_columns(solve, square, *piece) for piece in pieces[0])]
@@ -209,17 +212,24 @@ def _square(workflow, across, axis):
     return hill_look.Square(low, high, np.array([logarithmic(v) for v in values]))
 
 
-def _pieces(workflow, name, square, place):
-    """Parts (low, high) of an axis of the square between the values that the parameter leaves out.
+def _pieces(workflow, name):
+    """Parts (low, high) of an axis, in units of its range, between the values that the parameter leaves out.
 
     Singular there, tongues accumulate: the parts end half a step before the map's nearest values, or MARGIN before.
     """
+    square = _square(workflow, name, name)
     excluded = np.array(next(p for p in workflow.scene.PARAMETERS if p.name == name).excluded)
-    inner = excluded[(excluded > square.low[place]) & (excluded < square.high[place])]
     known = np.asarray(workflow.grid.parameters[name][1])
-    units = [square.inside(np.stack([v, v], axis=1))[:, place] for v in (inner, known[~np.isin(known, excluded)])]
+    inner = excluded[(excluded > square.low[0]) & (excluded < square.high[0])]
+    units = [square.inside(np.stack([v, v], axis=1))[:, 0] for v in (inner, known[~np.isin(known, excluded)])]
     apart = np.array([min(MARGIN, 0.5 * abs(units[1] - cut).min()) for cut in units[0]])
     return list(zip([0.0, *(units[0] + apart)], [*(units[0] - apart), 1.0], strict=True))
+
+
+def _parts(workflow, name):
+    """The same parts, by the parameter's values."""
+    ends = np.array(_pieces(workflow, name))
+    return _square(workflow, name, name).places(np.stack([ends, ends], axis=-1))[..., 0].tolist()
 
 
 def _of_columns(solve, square, low, high):

@@ -272,6 +272,8 @@ def _closing(finished, paths):
     if attributes.get("edge_incomplete_rows"):
         rows = counted(attributes["edge_incomplete_rows"], "row")
         err.print(f"edges: {rows} may have more than were found (edge_complete = 0)")
+    if "edge_left_out" in attributes:
+        err.print(f"edges: not sought for {attributes['edge_left_out']}, where they accumulate", markup=False)
     took = {"compiled": finished.compiling, "kernels": finished.computing, "file": finished.writing}
     took |= {"edges and cells": finished.beside} if finished.beside else {}
     err.print(", ".join(f"{name} {seconds:.1f} s" for name, seconds in took.items()))

@@ -6,9 +6,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
+from hill_qep import edges as eigenproblem
 
 import survey
 from survey import boundaries, engine, figures, store
+from survey.cli import main
 from survey.errors import Stopped
 from survey.workflow import check
 
@@ -111,6 +113,30 @@ def test_a_map_without_tongues_has_empty_curves(tmp_path):
     assert ds.sizes["edge"] == ds.sizes["curve"] == ds.sizes["fold"] == 0 and (ds.edge_complete == 1).all()
     figures.draw(survey.open(tmp_path / "none.nc"))
     plt.close("all")
+
+
+def test_rows_through_a_value_where_tongues_accumulate(tmp_path, capsys):
+    """Inertia ratio 1 is left out, and told; all other edges are those of the eigenproblem in rho, both bodies'."""
+    (tmp_path / "through.toml").write_text(
+        'scene = "satellite"\naxes.amplitude.values = [0.3, 1.1]\n'
+        "axes.inertia_ratio = {start = 0.0, stop = 2.0, num = 20}\n"
+        'boundaries.axis = "inertia_ratio"\noutput.variables = ["verdict"]\n'
+    )
+    with pytest.raises(SystemExit, match="0"):
+        main(["run", str(tmp_path / "through.toml"), "-o", str(tmp_path / "through.nc")])
+    assert "edges: not sought for inertia_ratio from 0.998 to 1.002, where they accumulate" in capsys.readouterr().err
+    ds = xr.load_dataset(tmp_path / "through.nc")
+    assert ds.attrs["edge_left_out"] == "inertia_ratio from 0.998 to 1.002" and ds.edge_complete.values.all()
+    row = np.repeat([0, 1], ds.edge_count.values)
+    alpha, kind, error = ds.edge_position.values, ds.edge_class.values, ds.edge_position_error.values
+    for number, amplitude in enumerate(ds.amplitude.values):
+        for body, side in (("prolate", alpha < 1), ("oblate", alpha > 1)):
+            own = (row == number) & side
+            rho = 1 / np.sqrt(3 * abs(1 - alpha[own]))
+            true = np.array(eigenproblem(body, np.sin(amplitude), 3**-0.5, 0.006**-0.5, 64))
+            order, other = np.lexsort((rho, kind[own])), np.lexsort(true.T)
+            np.testing.assert_array_equal(kind[own][order], true[other, 1])
+            assert (abs(rho[order] - true[other, 0]) <= 1e-12 + 1.5 * rho[order] ** 3 * error[own][order]).all()
 
 
 def test_a_row_of_its_own(tmp_path):

@@ -65,9 +65,16 @@ def find(solve, rows, low, high, panels=4):
         left = left[~sound]
         if not left.size:
             break
-    row, position, error, kind, index = (np.concatenate(values) for values in zip(*found, strict=True))
+    return joined([Edges(*values, complete) for values in found])
+
+
+def joined(parts):
+    """The Edges of all parts of the same rows, which are complete where each part is."""
+    names = ("row", "position", "error", "kind", "index")
+    row, position, *others = (np.concatenate([getattr(part, name) for part in parts]) for name in names)
     order = np.lexsort((position, row))
-    return Edges(row[order], position[order], error[order], kind[order], index[order], complete)
+    complete = np.logical_and.reduce([part.complete for part in parts])
+    return Edges(row[order], position[order], *(values[order] for values in others), complete)
 
 
 def _candidates(solve, rows, low, high, panels):
