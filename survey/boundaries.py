@@ -44,11 +44,14 @@ def find(workflow, each=None, once=lambda name, make: make()):
     each = each or hill_curves.in_turn
     grid, axis = workflow.grid, workflow.boundaries
     other = [dim for dim in grid.sizes if dim != axis]
+    ranges = [dim for dim in other if grid.sizes[dim] > 1]  # curves need one across the rows
     edges = _edges(workflow, axis, grid.sizes[other[0]] if other else 1, each, once)
     found = _rows(workflow, axis, other, edges)
-    if other:
-        found |= _curves(workflow, other[0], axis, edges, each)
+    if ranges:
+        found |= _curves(workflow, ranges[0], axis, edges, each)
     about = {"boundaries": axis, "edge_incomplete_rows": int((edges.complete == 0).sum())}
+    if ranges:
+        about["curves_lost"] = int((found["curve_complete"][1] == 0).sum())
     left_out = ", ".join(f"{a:.12g} to {b:.12g}" for (_, a), (b, _) in pairwise(_parts(workflow, axis)))
     return xr.Dataset(found, attrs=about | ({"edge_left_out": f"{axis} from {left_out}"} if left_out else {}))
 
@@ -178,7 +181,7 @@ def _curves(workflow, across, axis, edges, each):
     pieces = [_pieces(workflow, name) for name in (across, axis)]
     rows = np.asarray(workflow.grid.parameters[across][1])[edges.row]
     of_rows = square.inside(np.stack([rows, edges.position], axis=1)), edges.kind, edges.index
-    found = [of_rows, *(_of_columns(solve, square, *piece) for piece in pieces[0])]
+    found = [of_rows, *(_of_columns(solve, square, _columns(pieces[1]), *piece) for piece in pieces[0])]
     seeds = _seeds(*(np.concatenate(values) for values in zip(*found, strict=True)), pieces)
     curves = hill_curves.trace(solve, square, seeds, each)
     folds = hill_folds.find(solve, square, curves)
@@ -215,7 +218,7 @@ def _square(workflow, across, axis):
 def _pieces(workflow, name):
     """Parts (low, high) of an axis, in units of its range, between the values that the parameter leaves out.
 
-    Singular there, tongues accumulate: the parts end half a step before the map's nearest values, or MARGIN before.
+    Singular there, tongues accumulate: the parts end half way to the map's nearest value, or MARGIN before.
     """
     square = _square(workflow, name, name)
     excluded = np.array(next(p for p in workflow.scene.PARAMETERS if p.name == name).excluded)
@@ -232,16 +235,22 @@ def _parts(workflow, name):
     return _square(workflow, name, name).places(np.stack([ends, ends], axis=-1))[..., 0].tolist()
 
 
-def _of_columns(solve, square, low, high):
-    """(places, kind, index) of the edges along some columns, from low to high in the square."""
-    columns = np.linspace(0, 1, COLUMNS)
+def _columns(pieces):
+    """Where columns are searched: evenly over the axis, but not between its pieces."""
+    ends, columns = np.ravel(pieces), np.linspace(0, 1, COLUMNS)
+    inside = np.any([(columns >= low) & (columns <= high) for low, high in pieces], axis=0)
+    return np.where(inside, columns, ends[abs(columns[:, None] - ends).argmin(axis=1)])
+
+
+def _of_columns(solve, square, columns, low, high):
+    """(places, kind, index) of the edges along the columns, from low to high in the square."""
 
     def along(column, x, wanted):
         places = square.places(np.stack(np.broadcast_arrays(x, columns[column][:, None]), axis=-1))
         out = solve(places[..., 0].reshape(-1, 1), places[..., 1].reshape(-1, 1), wanted)
         return {name: values.reshape(x.shape) for name, values in out.items()}
 
-    edges = hill_edges.find(along, COLUMNS, low, high)
+    edges = hill_edges.find(along, columns.size, low, high)
     return np.stack([edges.position, columns[edges.row]], axis=1), edges.kind, edges.index
 
 

@@ -272,6 +272,9 @@ def _closing(finished, paths):
     if attributes.get("edge_incomplete_rows"):
         rows = counted(attributes["edge_incomplete_rows"], "row")
         err.print(f"edges: {rows} may have more than were found (edge_complete = 0)")
+    if attributes.get("curves_lost"):
+        curves = counted(attributes["curves_lost"], "curve")
+        err.print(f"edges: {curves} could not be followed to the map's border (curve_complete = 0)")
     if "edge_left_out" in attributes:
         err.print(f"edges: not sought for {attributes['edge_left_out']}, where they accumulate", markup=False)
     took = {"compiled": finished.compiling, "kernels": finished.computing, "file": finished.writing}

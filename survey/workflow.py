@@ -207,7 +207,10 @@ def _check_boundaries(scene, name, asked, given):
         raise BadInput(f"boundaries: they are drawn on one axis or two, and there are {len(axes)}; fix the others")
     if asked.axis is not None and asked.axis not in axes:
         raise BadInput(f"boundaries.axis: {modules.unknown('axis', asked.axis, axes)}")
-    return asked.axis or axes[-1]
+    axis = asked.axis or axes[-1]
+    if given[axis].size < 2:
+        raise BadInput(f"boundaries: the axis {axis} has one value, and edges need a range; give two or more")
+    return axis
 
 
 def _check_closed(measure, name, asked, sizes):

@@ -139,6 +139,44 @@ def test_rows_through_a_value_where_tongues_accumulate(tmp_path, capsys):
             assert (abs(rho[order] - true[other, 0]) <= 1e-12 + 1.5 * rho[order] ** 3 * error[own][order]).all()
 
 
+@pytest.mark.parametrize(
+    ("name", "axis"),
+    # k = 1 would be the middle one of the columns that are searched
+    [("k", {"start": 0.0, "stop": 2.0, "num": 41}), ("one_minus_k", {"start": 0.5, "stop": -0.5, "num": 40})],
+)
+def test_rows_through_the_separatrix(tmp_path, name, axis):
+    """Both sides of k = 1 in one map have the edges of maps of one side, and each row its change of the verdict."""
+    axes = {"rho": {"values": [-1.2, 0.6, 1.5]}, name: axis}
+    ds = survey.run({"scene": "satellite", "axes": axes, "boundaries": {"axis": name}}, output=tmp_path / "both.nc")
+    low, high = map(float, ds.attrs["edge_left_out"].removeprefix(f"{name} from ").split(" to "))
+    assert ds.edge_complete.values.all()
+    ends = np.cumsum(ds.edge_count.values)
+    places = np.sort(ds[name].values)
+    own = [ds.edge_position.values[last - count : last] for last, count in zip(ends, ds.edge_count.values, strict=True)]
+    for side in (places[places < low], places[places > high]):
+        for row, rho in enumerate(ds.rho.values):
+            inside = np.histogram(own[row], side)[0]
+            verdicts = survey.evaluate("satellite", **{name: side}, rho=rho, variables=["verdict"]).verdict.values
+            np.testing.assert_array_equal(inside % 2 == 1, np.diff(verdicts) != 0)
+
+
+def test_no_edge_is_missed_at_the_end_of_an_axis(tmp_path):
+    """Edges accumulate towards 1 - k = 1e-12, on an axis 5e11 times as long: two for each tongue passed in all."""
+    for low, rho in ((1e-9, 1.5), (1e-12, 1.5), (1e-12, 0.7)):
+        axes = {"one_minus_k": {"start": low, "stop": 0.5, "num": 4}, "rho": rho}
+        ds = survey.run({"scene": "satellite", "axes": axes, "boundaries": {}}, output=tmp_path / f"{low}-{rho}.nc")
+        assert int(ds.edge_complete) == 1
+        tongues = np.floor(2 * ds.rotation_number.values)
+        assert (ds.verdict.values[[0, -1]] == 1).all() and int(ds.edge_count) == 2 * (tongues[0] - tongues[-1])
+
+
+def test_a_map_of_one_row_has_edges_and_no_curves(tmp_path, recwarn):
+    axes = {"q": {"values": [1.0]}, "a": {"start": -1.0, "stop": 10.0, "num": 4}}
+    ds = survey.run({"scene": "mathieu", "axes": axes, "boundaries": {"axis": "a"}}, output=tmp_path / "one.nc")
+    assert ds.edge_count.values.tolist() == [7] and "curve_count" not in ds and not recwarn.list
+    plt.close(figures.draw(ds))
+
+
 def test_a_row_of_its_own(tmp_path):
     axes = {"a": {"start": -1.0, "stop": 10.0, "num": 4}, "q": 1.0}
     ds = survey.run({"scene": "mathieu", "axes": axes, "boundaries": {"axis": "a"}}, output=tmp_path / "row.nc")
@@ -148,6 +186,10 @@ def test_a_row_of_its_own(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
+        (
+            {"axes": WORKFLOW["axes"] | {"rho": {"values": [0.5]}}},
+            "boundaries: the axis rho has one value, and edges need a range",
+        ),
         ({"boundaries": {"axis": "rhoo"}}, r"boundaries.axis: unknown axis 'rhoo'; did you mean 'rho'"),
         ({"boundaries": {"axes": "rho"}}, r"unknown key boundaries.axes; did you mean 'axis'"),
         ({"axes": {"k": 0.5, "rho": 1.0}}, r"boundaries: they are drawn on one axis or two"),

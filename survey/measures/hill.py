@@ -90,15 +90,17 @@ class Problem:
     p_low: np.ndarray | None = None
 
     def lengths(self, rows, steps):
-        """Lengths of the steps (rows, steps); the first takes what rounding would leave out of the half period."""
+        """Lengths of the steps (rows, steps): some, evenly spread, an ulp longer, so that they fill the half period."""
         if self.cut:
             return self.cut(rows, steps)
         span = self.span[rows]
         h = span / steps
         left = (span - steps * h) - split_error(float(steps), h, steps * h)
-        lengths = np.repeat(h[:, None], steps, axis=1)
-        lengths[:, 0] += left if self.span_low is None else left + self.span_low[rows]
-        return lengths
+        if self.span_low is not None:
+            left += self.span_low[rows]
+        ulp = np.spacing(h)
+        ulps = np.floor((np.rint(left / ulp) / steps)[:, None] * np.arange(steps + 1) + 0.5)
+        return h[:, None] + ulp[:, None] * np.diff(ulps, axis=1)
 
     def at(self, rows, p, rule=None):
         """Points `p` (one row for each of `rows`) on their own, no axis, with what exact rules say of them."""

@@ -28,7 +28,7 @@ OUTPUTS = (
 NODES = 24
 # The last coefficients of a converged series, relative to its largest.
 CONVERGED = 1e-9
-DEEPEST = 14
+DEEP, DEEPEST, FEW = 13, 45, 4
 HALVINGS = 3
 ROUNDS = 12
 # So many half widths beside an edge the verdict is certain without double-double arithmetic.
@@ -78,14 +78,14 @@ def joined(parts):
 
 
 def _candidates(solve, rows, low, high, panels):
-    """(row, kind, position) of the zeros of the factors' series."""
+    """(row, kind, position) of the zeros of the factors' series, and the radius of their panels."""
     ends = np.linspace(low, high, panels + 1)
     row = np.repeat(rows, panels)
     left, right = np.tile(ends[:-1], rows.size), np.tile(ends[1:], rows.size)
     nodes = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
     matrix = 2 / NODES * np.cos(np.pi * np.outer(np.arange(NODES), np.arange(NODES) + 0.5) / NODES)
     matrix[0] /= 2
-    found = [(np.zeros(0, int), np.zeros(0, int), np.zeros(0))]
+    found = [(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))]
     for depth in range(DEEPEST):
         middle, radius = 0.5 * (left + right), 0.5 * (right - left)
         out = solve(row, middle[:, None] + radius[:, None] * nodes, FACTORS)
@@ -93,11 +93,14 @@ def _candidates(solve, rows, low, high, panels):
         noise = np.stack([out[f"{name}_error"] for name in FACTORS]).max(axis=2)
         size, tail = abs(series).max(axis=2), abs(series[:, :, -3:]).max(axis=2)
         rough = ~(tail <= CONVERGED * size + noise).all(axis=0) & (depth < DEEPEST - 1)
+        if depth >= DEEP:  # only towards single places, where edges accumulate: else noise would be halved without end
+            rough &= np.bincount(row[rough], minlength=row.max() + 1)[row] <= FEW
         told = np.isfinite(size).all(axis=0) & ~rough
         for kind, panel in zip(*np.nonzero((size > noise) & told), strict=True):
             zeros = _zeros(series[kind, panel])
             number = np.full(zeros.size, 1)
-            found.append((number * row[panel], number * kind, middle[panel] + radius[panel] * zeros))
+            at = middle[panel] + radius[panel] * zeros
+            found.append((number * row[panel], number * kind, at, number * radius[panel]))
         row = np.repeat(row[rough], 2)
         left, right = _halves(left[rough], middle[rough]), _halves(middle[rough], right[rough])
         if not row.size:
@@ -118,14 +121,14 @@ def _zeros(series):
     return zeros.real[(abs(zeros.imag) < 1e-6) & (abs(zeros.real) <= 1 + 1e-9)]
 
 
-def _close_in(solve, row, kind, x, low, high):
+def _close_in(solve, row, kind, x, radius, low, high):
     """(row, position, error, kind, index) of the zeros that change sign and lie on the axis, each once."""
 
     def look(who, x):
         return of_kind(solve(row[who], x, FACTORS), kind[who])
 
     scale = max(abs(low), abs(high))
-    x, width, sure = close_in(look, x, np.full(x.size, 1e-9 * scale), 4 * np.spacing(abs(x)))
+    x, width, sure = close_in(look, x, np.minimum(1e-9 * scale, 1e-4 * radius), 4 * np.spacing(abs(x)))
     inside = sure & (x >= low) & (x <= high)
     row, kind, x, width = (values[inside] for values in (row, kind, x, width))
     order = np.lexsort((x, kind, row))
@@ -182,28 +185,30 @@ def _complete(solve, rows, edges, low, high):
     order = np.lexsort((edges[1], edges[0]))
     row, x, width, kind, index = (values[order] for values in edges)
     own = [np.flatnonzero(row == r) for r in rows]
-    most = max((mine.size for mine in own), default=0) + 1
-    places = np.empty((rows.size, most))
+    most = max((mine.size for mine in own), default=0) + 3
+    places = np.full((rows.size, most), float(high))
     for i, mine in enumerate(own):
-        between = 0.5 * (np.concatenate([[low], x[mine]]) + np.concatenate([x[mine], [high]]))
-        places[i] = np.concatenate([between, np.full(most - between.size, between[-1])])
+        places[i, 0] = low
+        places[i, 1 : mine.size + 2] = 0.5 * (np.concatenate([[low], x[mine]]) + np.concatenate([x[mine], [high]]))
     out = solve(rows, places, (*FACTORS, *COUNTS))
     signs = np.stack([np.where(abs(out[n]) > out[f"{n}_error"], np.sign(out[n]), 0) for n in FACTORS])
     band = _band(out)
     sound = np.isfinite([out[name] for name in FACTORS]).all(axis=(0, 2))
     for i, mine in enumerate(own):
-        # between edges closer than their errors nothing is told
-        told = np.concatenate([[True], np.diff(x[mine]) > width[mine][1:] + width[mine][:-1], [True]])[: mine.size + 1]
-        seen = np.where(told, signs[:, i, : mine.size + 1], 0)
-        sound[i] = _signs_agree(seen, kind[mine])
-        sound[i] &= _rotation_agrees(np.where(told, band[i, : mine.size + 1], np.nan), index[mine])
+        # at both ends and between edges, but nothing is told between edges closer than their errors
+        told = np.ones(mine.size + 3, np.bool_)
+        told[2:-2] = np.diff(x[mine]) > width[mine][1:] + width[mine][:-1]
+        told[[0, -1]] = [(abs(x[mine] - end) > width[mine]).all() for end in (low, high)]
+        seen = np.where(told, signs[:, i, : mine.size + 3], 0)
+        sound[i] &= _signs_agree(seen, kind[mine])
+        sound[i] &= _rotation_agrees(np.where(told, band[i, : mine.size + 3], np.nan), index[mine])
     return sound
 
 
 def _signs_agree(seen, kind):
-    """Do the signs (4, m + 1; 0 unknown) of the factors between m edges change at the edges of their kind alone?"""
-    turns = np.cumsum(kind == np.arange(len(FACTORS))[:, None], axis=1)
-    straight = seen * np.where(np.pad(turns, ((0, 0), (1, 0))) % 2, -1, 1)
+    """Do the signs (4, m + 3; 0 unknown) of the factors at the ends and between m edges change at those alone?"""
+    turns = np.pad(np.cumsum(kind == np.arange(len(FACTORS))[:, None], axis=1), ((0, 0), (2, 0)))
+    straight = seen * np.where(np.pad(turns, ((0, 0), (0, 1)), mode="edge") % 2, -1, 1)
     return bool(((straight >= 0).all(axis=1) | (straight <= 0).all(axis=1)).all())
 
 
@@ -216,7 +221,7 @@ def _band(out):
 
 
 def _rotation_agrees(band, index):
-    """Does every edge lie between its tongue n and a band beside it, as `band` (m + 1) between the m edges tells?"""
-    before, after = abs(band[:-1] - index), abs(band[1:] - index)
+    """Does every edge lie between its tongue n and a band beside it, as `band` (m + 3), at the ends too, tells?"""
+    before, after = abs(band[1:-2] - index), abs(band[2:-1] - index)
     wrong = (before > 0.5) | (after > 0.5) | (before == after)
-    return not wrong.any()
+    return not wrong.any() and not (abs(band[[0, -2]] - band[[1, -1]]) > 0).any()

@@ -155,7 +155,8 @@ def moduli(point):
             which, short = motion.K, 1 - k
         scale = np.maximum(k, 1)
         complement = np.sqrt((abs(short) / scale) * ((1 + k) / scale))
-    return k, np.where(k == np.inf, np.nan, complement), given, np.full_like(given, which)
+        complement = np.where((k < np.inf) & (complement > 0), complement, np.nan)  # no period where k = 1
+    return k, complement, given, np.full_like(given, which)
 
 
 def rates(inertia_ratio, direction):
