@@ -1,5 +1,6 @@
 """Which method where: a constant coefficient by its closed form, everything else by midpoint Taylor, and points
-that it leaves undecided in double-double arithmetic, or by the adaptive DOP853 where a problem has no such kernel.
+that it leaves undecided in double-double arithmetic, or by the adaptive DOP853 where a problem has no such kernel. So
+are the few whose D hangs on an ulp of the parameters, where more is asked than float64 can tell.
 
 Measured (`survey precision satellite`): midpoint Taylor is the fastest at every accuracy and has the sharpest bars.
 """
@@ -7,12 +8,14 @@ Measured (`survey precision satellite`): midpoint Taylor is the fastest at every
 import numpy as np
 
 from survey import status
-from survey.kernels.hill import UNDECIDED
+from survey.kernels.hill import DISCRIMINANT, UNDECIDED
 from survey.measures import hill_dense, hill_effort
 from survey.measures.hill_answers import Answers
 from survey.methods import dop853, taylor16, taylor_double
 
 EPS = 2.3e-16
+# A discriminant whose bar is wider than this, relative to 1 + |D|, is ill conditioned, where so few steps suffice.
+ILL, FEW_STEPS = 1e-11, 500
 # Keep a call of the double-double kernel below about a second.
 CALL_STEPS = 20_000
 
@@ -38,8 +41,12 @@ def solve(problem, asked, answers, decide=True):
         answers.put(places, own)
     left = (answers.status == status.OK) & (answers.verdict == UNDECIDED)
     left = left & decide if free is None else left & ~free & decide
-    if left.any() and problem.exact is not None:
-        _exactly(problem, answers, np.flatnonzero(left), asked)
+    if problem.exact is not None:
+        _exactly(problem, answers, np.flatnonzero(left), asked, taylor_double.STEP_LIMIT)
+        if asked.rtol < ILL and asked.wanted[DISCRIMINANT // 2]:
+            d, bar = abs(answers.floats[DISCRIMINANT]), answers.floats[DISCRIMINANT + 1]
+            ill = (answers.status == status.OK) & (bar > ILL * (1 + d))
+            _exactly(problem, answers, np.flatnonzero(ill if free is None else ill & ~free), asked, FEW_STEPS)
     elif left.any() and problem.walk is not None:
         again = Answers(left.size, asked)
         hill_effort.solve(problem, dop853, asked, again, left)
@@ -47,14 +54,16 @@ def solve(problem, asked, answers, decide=True):
         answers.put(decided, again, decided)
 
 
-def _exactly(problem, answers, places, asked):
-    """Solve the points at `places` in double-double, where the number of steps allows it."""
+def _exactly(problem, answers, places, asked, most):
+    """Solve the points at `places` in double-double, where at most so many steps suffice."""
+    if not places.size:
+        return
     phase, distance = taylor_double.hill_density()
     rows, p = places // problem.p.shape[1], problem.p.reshape(-1)[places]
     low = np.zeros(p.size) if problem.p_low is None else problem.p_low.reshape(-1)[places]
     frequency = np.sqrt((problem.bound[rows] * np.stack([p**0, abs(p), p**2], axis=1)).sum(axis=1))
     steps = 2 * np.ceil(0.5 * problem.span[rows] * np.maximum(phase * frequency, distance * problem.rate[rows]))
-    within = steps <= taylor_double.STEP_LIMIT
+    within = steps <= most
     places, rows, p, low = places[within], rows[within], p[within], low[within]
     steps = steps[within].astype(np.int64)
     calls = np.cumsum(steps) // CALL_STEPS

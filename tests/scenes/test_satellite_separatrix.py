@@ -46,6 +46,26 @@ def test_relative_error_down_to_1e_12(body, side):
         assert miss(body, rho, one_minus_k=short) < 1e-12, (rho, short)
 
 
+@pytest.mark.parametrize(
+    ("short", "rho"),
+    [
+        ("0x1.e5b73e07bce59p-25", "0x1.f92bccbd2e08ap-1"),
+        ("0x1.07187afae09a5p-22", "0x1.f95d27096cca3p-1"),
+        ("0x1.1feb9aee30cc3p-34", "0x1.f904cdaf59ba2p-1"),
+        ("0x1.4720c897d62dfp-21", "0x1.f97f1af054814p-1"),
+    ],
+)
+def test_a_discriminant_that_an_ulp_of_rho_moves_by_more(short, rho):
+    """The worst of 4,500 beside the thin bands of oblate bodies: an ulp of rho moves D by up to 3e-11."""
+    short, rho = float.fromhex(short), float.fromhex(rho)
+    with mp.workdps(40):
+        d, verdict = told(*mp_factors("OL", 1 - mpf(short), mpf(rho), 40)[:4])
+        for rtol, most in ((1e-10, 1e-11), (1e-12, 1e-12), (1e-13, 1e-12)):
+            out = solve("oblate", rtol=rtol, rho=rho, one_minus_k=short)
+            assert abs(out["discriminant"][0] - d) < min(most * max(1, abs(d)), mpf(out["discriminant_error"][0]))
+            assert out["verdict"][0] == verdict
+
+
 @pytest.mark.parametrize("body", BODIES)
 def test_rho_up_to_1000(body):
     random = np.random.default_rng(12)
