@@ -44,16 +44,21 @@ def find(workflow, each=None, once=lambda name, make: make()):
     each = each or hill_curves.in_turn
     grid, axis = workflow.grid, workflow.boundaries
     other = [dim for dim in grid.sizes if dim != axis]
-    ranges = [dim for dim in other if grid.sizes[dim] > 1]  # curves need one across the rows
+    across = next((dim for dim in other if grid.sizes[dim] > 1), None)  # curves need a range
     edges = _edges(workflow, axis, grid.sizes[other[0]] if other else 1, each, once)
     found = _rows(workflow, axis, other, edges)
-    if ranges:
-        found |= _curves(workflow, ranges[0], axis, edges, each)
     about = {"boundaries": axis, "edge_incomplete_rows": int((edges.complete == 0).sum())}
-    if ranges:
+    if across:
+        found |= _curves(workflow, across, axis, edges, each)
         about["curves_lost"] = int((found["curve_complete"][1] == 0).sum())
-    left_out = ", ".join(f"{a:.12g} to {b:.12g}" for (_, a), (b, _) in pairwise(_parts(workflow, axis)))
-    return xr.Dataset(found, attrs=about | ({"edge_left_out": f"{axis} from {left_out}"} if left_out else {}))
+    left_out = [
+        f"{name} from {a:.12g} to {b:.12g}"
+        for name in filter(None, (axis, across))
+        for (_, a), (b, _) in pairwise(_parts(workflow, name))
+    ]
+    if left_out:
+        about["edge_left_out"] = ", ".join(left_out)
+    return xr.Dataset(found, attrs=about)
 
 
 def plan(workflow, cost):
@@ -65,7 +70,7 @@ def plan(workflow, cost):
     if hasattr(measure, "closed"):  # measured: about a tenth of a second each
         size = 8 * (1 + len(workflow.grid.sizes) + 2 * len(measure.ALONG))
         return {"bytes_per_curve_point": size}, 0.1 * prod(list(workflow.grid.sizes.values())[2:])
-    sizes = [size for dim, size in workflow.grid.sizes.items() if dim != workflow.boundaries]
+    sizes = [size for dim, size in workflow.grid.sizes.items() if dim != workflow.boundaries and size > 1]
     # measured: ten to twenty edges a row; half a thousand points of curves
     seconds = prod(sizes) * (2e-3 + 250 * cost) + (0.2 + 1e4 * cost if sizes else 0.0)
     return {"rows": prod(sizes), "bytes_per_edge": 25, "bytes_per_curve_point": 24 * len(sizes)}, seconds
@@ -193,7 +198,7 @@ def _curves(workflow, across, axis, edges, each):
             "long_name": "curve through the edge, counted from 0", "units": "1"}),
         "curve_index": ("curve", *_index(curves.index)),
         "curve_complete": ("curve", curves.complete.astype(np.int8),
-                           _yes_or_no("is the curve closed, or does it end at the map's border", "lost complete")),
+                           _yes_or_no("is the curve closed, or ended by the map or edge_left_out", "lost complete")),
         "fold_curve": ("fold", folds.curve.astype(np.int32), {
             "long_name": f"curve that turns back in {across}, counted from 0", "units": "1",
             "instance_dimension": "curve"}),
@@ -209,8 +214,8 @@ def _curves(workflow, across, axis, edges, each):
     return variables
 
 
-def _square(workflow, across, axis):
-    values = [np.asarray(workflow.grid.parameters[name][1]) for name in (across, axis)]
+def _square(workflow, *names):
+    values = [np.asarray(workflow.grid.parameters[name][1]) for name in names]
     low, high = (np.array([end(v) for v in values]) for end in (np.min, np.max))
     return hill_look.Square(low, high, np.array([logarithmic(v) for v in values]))
 
@@ -220,26 +225,26 @@ def _pieces(workflow, name):
 
     Singular there, tongues accumulate: the parts end half way to the map's nearest value, or MARGIN before.
     """
-    square = _square(workflow, name, name)
+    line = _square(workflow, name)
     excluded = np.array(next(p for p in workflow.scene.PARAMETERS if p.name == name).excluded)
     known = np.asarray(workflow.grid.parameters[name][1])
-    inner = excluded[(excluded > square.low[0]) & (excluded < square.high[0])]
-    units = [square.inside(np.stack([v, v], axis=1))[:, 0] for v in (inner, known[~np.isin(known, excluded)])]
-    apart = np.array([min(MARGIN, 0.5 * abs(units[1] - cut).min()) for cut in units[0]])
+    inner = excluded[(excluded > line.low) & (excluded < line.high)]
+    units = [line.inside(v[:, None])[:, 0] for v in (inner, known[~np.isin(known, excluded)])]
+    apart = np.array([max(4 * line.grain, min(MARGIN, 0.5 * abs(units[1] - cut).min())) for cut in units[0]])
     return list(zip([0.0, *(units[0] + apart)], [*(units[0] - apart), 1.0], strict=True))
 
 
 def _parts(workflow, name):
     """The same parts, by the parameter's values."""
-    ends = np.array(_pieces(workflow, name))
-    return _square(workflow, name, name).places(np.stack([ends, ends], axis=-1))[..., 0].tolist()
+    return _square(workflow, name).places(np.array(_pieces(workflow, name))[..., None])[..., 0].tolist()
 
 
 def _columns(pieces):
     """Where columns are searched: evenly over the axis, but not between its pieces."""
-    ends, columns = np.ravel(pieces), np.linspace(0, 1, COLUMNS)
-    inside = np.any([(columns >= low) & (columns <= high) for low, high in pieces], axis=0)
-    return np.where(inside, columns, ends[abs(columns[:, None] - ends).argmin(axis=1)])
+    columns = np.linspace(0, 1, COLUMNS)
+    for (_, a), (b, _) in pairwise(pieces):
+        columns[(columns > a) & (columns < b)] = a
+    return columns
 
 
 def _of_columns(solve, square, columns, low, high):

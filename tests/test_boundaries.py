@@ -145,11 +145,14 @@ def test_rows_through_a_value_where_tongues_accumulate(tmp_path, capsys):
     [("k", {"start": 0.0, "stop": 2.0, "num": 41}), ("one_minus_k", {"start": 0.5, "stop": -0.5, "num": 40})],
 )
 def test_rows_through_the_separatrix(tmp_path, name, axis):
-    """Both sides of k = 1 in one map have the edges of maps of one side, and each row its change of the verdict."""
+    """On both sides of k = 1 the edges lie where the verdict changes, and no column is sought on it."""
     axes = {"rho": {"values": [-1.2, 0.6, 1.5]}, name: axis}
     ds = survey.run({"scene": "satellite", "axes": axes, "boundaries": {"axis": name}}, output=tmp_path / "both.nc")
     low, high = map(float, ds.attrs["edge_left_out"].removeprefix(f"{name} from ").split(" to "))
     assert ds.edge_complete.values.all()
+    middle = (1.0 - axis["start"]) / (axis["stop"] - axis["start"]) if name == "k" else 0.5
+    pieces = boundaries._pieces(check({"scene": "satellite", "axes": axes, "boundaries": {"axis": name}}), name)
+    assert (abs(boundaries._columns(pieces) - middle) > 1e-4).all() and boundaries._columns(pieces).size == 9
     ends = np.cumsum(ds.edge_count.values)
     places = np.sort(ds[name].values)
     own = [ds.edge_position.values[last - count : last] for last, count in zip(ends, ds.edge_count.values, strict=True)]
@@ -158,6 +161,35 @@ def test_rows_through_the_separatrix(tmp_path, name, axis):
             inside = np.histogram(own[row], side)[0]
             verdicts = survey.evaluate("satellite", **{name: side}, rho=rho, variables=["verdict"]).verdict.values
             np.testing.assert_array_equal(inside % 2 == 1, np.diff(verdicts) != 0)
+
+
+def test_what_is_left_out_across_the_rows_is_told(tmp_path):
+    axes = {"k": {"start": 0.8, "stop": 1.2, "num": 6}, "rho": {"start": 1.0, "stop": 1.2, "num": 9}}
+    ds = survey.run({"scene": "satellite", "axes": axes, "boundaries": {"axis": "rho"}}, output=tmp_path / "across.nc")
+    low, high = map(float, ds.attrs["edge_left_out"].removeprefix("k from ").split(" to "))
+    assert (low, high) == (0.9996, 1.0004)
+    inside = (ds.curve_k.values > low + 1e-9) & (ds.curve_k.values < high - 1e-9)
+    assert ds.sizes["curve"] > 0 and not inside.any() and ds.attrs["curves_lost"] == (ds.curve_complete == 0).sum()
+
+
+def test_a_value_that_rounds_to_the_one_left_out(tmp_path):
+    axes = {"one_minus_k": {"values": [-0.5, 1e-17, 0.5]}, "rho": 1.2}
+    asked = {"scene": "satellite", "axes": axes, "boundaries": {}}
+    ((_, low), (high, _)) = boundaries._parts(check(asked), "one_minus_k")
+    assert low < 0 < high < 1e-14
+    assert int(survey.run(asked, output=tmp_path / "near.nc").edge_complete) == 1
+
+
+def test_lost_curves_are_told(tmp_path, capsys):
+    """Edges of an oblate body near the separatrix lie closer together than float64 can follow."""
+    (tmp_path / "lost.toml").write_text(
+        'scene = "satellite"\noptions.body = "oblate"\naxes.rho = {start = 0.1, stop = 3.0, num = 5}\n'
+        'axes.k = {start = 0.1, stop = 0.9999999, num = 4}\nboundaries.axis = "rho"\noutput.variables = ["verdict"]\n'
+    )
+    with pytest.raises(SystemExit, match="0"):
+        main(["run", str(tmp_path / "lost.toml"), "-o", str(tmp_path / "lost.nc")])
+    lost = int((xr.load_dataset(tmp_path / "lost.nc").curve_complete == 0).sum())
+    assert lost > 1 and f"edges: {lost} curves could not be followed" in capsys.readouterr().err
 
 
 def test_no_edge_is_missed_at_the_end_of_an_axis(tmp_path):

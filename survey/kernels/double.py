@@ -20,7 +20,8 @@ from survey.kernels.jit import inline
 SPLITTER = 134217729.0  # 2^27 + 1
 UNIT = 2.0**-104
 PI = (3.141592653589793, 1.2246467991473532e-16)
-HALF_PI, HALF_PI_REST = (1.5707963267948966, 6.123233995736766e-17), -1.4973849048591698e-33
+HALF_PI = (1.5707963267948966, 6.123233995736766e-17)
+HALF_PI_REST = -1.4973849048591698e-33  # for what is left of pi / 2 beside it
 MEANS = 20
 GAP = 1e-16  # convergence is quadratic: the next mean has every digit
 

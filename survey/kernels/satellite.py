@@ -33,7 +33,7 @@ def complete_integrals(k, kc):
 
 
 def half_periods(k, kc):
-    """2 K(k), or K(1/k) / k for rotations, and what rounding left: phases are rho times as long (DLMF 19.8.5).
+    """2 K(k), or K(1/k) / k for rotations, rounded, and the rest, as phases are rho times as long (DLMF 19.8.5).
 
     In the machine's extended floats (on some machines float64) and numpy, which has nothing to compile.
     """

@@ -90,7 +90,7 @@ class Problem:
     p_low: np.ndarray | None = None
 
     def lengths(self, rows, steps):
-        """Lengths of the steps (rows, steps): some, evenly spread, an ulp longer, so that they fill the half period."""
+        """Lengths of the steps (rows, steps), some an ulp longer or shorter, evenly spread, to fill the half period."""
         if self.cut:
             return self.cut(rows, steps)
         span = self.span[rows]

@@ -1,6 +1,6 @@
 """Which method where: a constant coefficient by its closed form, everything else by midpoint Taylor, and points
 that it leaves undecided in double-double arithmetic, or by the adaptive DOP853 where a problem has no such kernel. So
-are the few whose D hangs on an ulp of the parameters, where more is asked than float64 can tell.
+are the few whose D, if asked for, hangs on an ulp of the parameters, where more is asked than float64 can tell.
 
 Measured (`survey precision satellite`): midpoint Taylor is the fastest at every accuracy and has the sharpest bars.
 """
@@ -14,7 +14,7 @@ from survey.measures.hill_answers import Answers
 from survey.methods import dop853, taylor16, taylor_double
 
 EPS = 2.3e-16
-# A discriminant whose bar is wider than this, relative to 1 + |D|, is ill conditioned, where so few steps suffice.
+# A discriminant with a wider bar, relative to 1 + |D|, is ill conditioned, if so few steps (0.2 s a hundred points) do.
 ILL, FEW_STEPS = 1e-11, 500
 # Keep a call of the double-double kernel below about a second.
 CALL_STEPS = 20_000
@@ -39,14 +39,13 @@ def solve(problem, asked, answers, decide=True):
         results = closed_form(z[np.isfinite(z)], problem.span[places // problem.p.shape[1]])
         own.judge(results, None if problem.rule is None else problem.rule.reshape(-1)[places])
         answers.put(places, own)
-    left = (answers.status == status.OK) & (answers.verdict == UNDECIDED)
-    left = left & decide if free is None else left & ~free & decide
+    ours = (answers.status == status.OK) & (True if free is None else ~free)
+    left = ours & (answers.verdict == UNDECIDED) & decide
     if problem.exact is not None:
         _exactly(problem, answers, np.flatnonzero(left), asked, taylor_double.STEP_LIMIT)
         if asked.rtol < ILL and asked.wanted[DISCRIMINANT // 2]:
             d, bar = abs(answers.floats[DISCRIMINANT]), answers.floats[DISCRIMINANT + 1]
-            ill = (answers.status == status.OK) & (bar > ILL * (1 + d))
-            _exactly(problem, answers, np.flatnonzero(ill if free is None else ill & ~free), asked, FEW_STEPS)
+            _exactly(problem, answers, np.flatnonzero(ours & (bar > ILL * (1 + d))), asked, FEW_STEPS)
     elif left.any() and problem.walk is not None:
         again = Answers(left.size, asked)
         hill_effort.solve(problem, dop853, asked, again, left)

@@ -4,8 +4,8 @@
 
 The factors are analytic in every parameter, so on panels short enough each is its Chebyshev series to rounding, and
 the eigenvalues of the series' colleague matrix are all its zeros, double ones too. Each is then closed in by signs of
-the factor itself, certain against its bar. A row is complete when, between its edges, every factor has the sign that
-the list says, and the rotation number counts the same tongues; else its panels are halved.
+the factor itself, certain against its bar. A row is complete when, between its edges and at its ends, every factor has
+the sign that the list says, and the rotation number counts the same tongues; else its panels are halved.
 
 Sources: W. Magnus, S. Winkler, Hill's Equation (1966), theorem 1.1; J. P. Boyd, SIAM J. Numer. Anal. 40 (2002) 1666.
 """
@@ -28,6 +28,7 @@ OUTPUTS = (
 NODES = 24
 # The last coefficients of a converged series, relative to its largest.
 CONVERGED = 1e-9
+# Panels are halved so often; on to the second towards so FEW places of a row, where edges accumulate: not over noise.
 DEEP, DEEPEST, FEW = 13, 45, 4
 HALVINGS = 3
 ROUNDS = 12
@@ -93,7 +94,7 @@ def _candidates(solve, rows, low, high, panels):
         noise = np.stack([out[f"{name}_error"] for name in FACTORS]).max(axis=2)
         size, tail = abs(series).max(axis=2), abs(series[:, :, -3:]).max(axis=2)
         rough = ~(tail <= CONVERGED * size + noise).all(axis=0) & (depth < DEEPEST - 1)
-        if depth >= DEEP:  # only towards single places, where edges accumulate: else noise would be halved without end
+        if depth >= DEEP:
             rough &= np.bincount(row[rough], minlength=row.max() + 1)[row] <= FEW
         told = np.isfinite(size).all(axis=0) & ~rough
         for kind, panel in zip(*np.nonzero((size > noise) & told), strict=True):
@@ -181,7 +182,7 @@ def close_in(look, x, width, grain):
 
 
 def _complete(solve, rows, edges, low, high):
-    """Which rows are complete: between neighbouring edges the factors' signs and the rotation number are as listed."""
+    """Which rows are complete: the factors' signs and the rotation number are as listed, at the ends and between."""
     order = np.lexsort((edges[1], edges[0]))
     row, x, width, kind, index = (values[order] for values in edges)
     own = [np.flatnonzero(row == r) for r in rows]
@@ -207,8 +208,8 @@ def _complete(solve, rows, edges, low, high):
 
 def _signs_agree(seen, kind):
     """Do the signs (4, m + 3; 0 unknown) of the factors at the ends and between m edges change at those alone?"""
-    turns = np.pad(np.cumsum(kind == np.arange(len(FACTORS))[:, None], axis=1), ((0, 0), (2, 0)))
-    straight = seen * np.where(np.pad(turns, ((0, 0), (0, 1)), mode="edge") % 2, -1, 1)
+    turns = np.cumsum(np.pad(kind == np.arange(len(FACTORS))[:, None], ((0, 0), (2, 1))), axis=1)
+    straight = seen * np.where(turns % 2, -1, 1)
     return bool(((straight >= 0).all(axis=1) | (straight <= 0).all(axis=1)).all())
 
 

@@ -155,7 +155,8 @@ def moduli(point):
             which, short = motion.K, 1 - k
         scale = np.maximum(k, 1)
         complement = np.sqrt((abs(short) / scale) * ((1 + k) / scale))
-        complement = np.where((k < np.inf) & (complement > 0), complement, np.nan)  # no period where k = 1
+        period = (k < np.inf) & (complement > 0)  # there is none where k = 1
+        k, complement = np.where(period, k, np.nan), np.where(period, complement, np.nan)
     return k, complement, given, np.full_like(given, which)
 
 
@@ -172,7 +173,9 @@ def rates(inertia_ratio, direction):
         triple_rest = split_error(3.0, square, triple) + 3 * split_error(rho, rho, square)
         total = triple * short
         missing = (1 - total) - (split_error(triple, short, total) + (triple * rest + triple_rest * short))
-        return float(direction) * rho, float(direction) * (0.5 * rho * missing)
+        low = 0.5 * rho * missing
+        high = rho + low
+        return float(direction) * high, float(direction) * (low - (high - rho))
 
 
 @dataclass(frozen=True)
@@ -240,7 +243,7 @@ def _ends(request):
 
 
 def _at(s, oblate, rotates):
-    """The rows at places s of the axis."""
+    """The rows at places s of the axis: nodes of series, never solved in double-double, as k is not exact."""
     k, kc = np.sqrt(-np.expm1(-s)), np.exp(-s / 2)
     k = 1 / k if rotates else k
     return _problem(Motion(k, kc, k, np.full_like(k, motion.K), oblate), np.zeros((s.size, 0)))

@@ -4,12 +4,14 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hill_problems import factors, mp_factors
+from hill_problems import factors, mp_factors, solve
 from mpmath import mp, mpf
 
 import survey
+from survey import status
+from survey.kernels.double import HALF_PI
 from survey.kernels.hill import STABLE, UNSTABLE
-from survey.scenes import satellite
+from survey.scenes import mathieu, satellite
 
 WAYS = [
     # first and second parameter, range of the second that holds an edge
@@ -93,6 +95,13 @@ def test_the_last_amplitude_below_a_right_angle():
         np.testing.assert_allclose(one[:4], other[:4], rtol=1e-14)
 
 
+def test_at_the_separatrix_there_is_no_period(recwarn):
+    for point in ({"k": 1.0}, {"one_minus_k": 0.0}, {"k": np.inf}):
+        out = solve(rho=1.5, **point)
+        assert out["status"][0] == status.INVALID_PARAMETERS and np.isnan(out["period"][0])
+    assert not recwarn.list
+
+
 def test_rho_of_an_inertia_ratio_to_thirty_digits():
     alpha = np.concatenate([[0.0, 1e-300, 1e-17, np.nextafter(1, 0), np.nextafter(1, 2), 2.0], np.linspace(0, 2, 40)])
     for direction in ("1", "-1"):
@@ -101,6 +110,17 @@ def test_rho_of_an_inertia_ratio_to_thirty_digits():
             with mp.workdps(50):
                 true = int(direction) / mp.sqrt(3 * abs(1 - mpf(alpha[i])))
                 assert abs(mpf(rho[i]) + mpf(low[i]) - true) < mpf("1e-31") * abs(true), alpha[i]
+            assert abs(low[i]) <= 0.5 * np.spacing(abs(rho[i])), alpha[i]
+
+
+def test_steps_fill_the_half_period_on_any_machine():
+    """Mathieu's is pi / 2, known to 32 digits: steps an ulp longer or shorter add up to it to half an ulp of one."""
+    problem = mathieu._problem(np.array([1.0, 5.0]), np.zeros((2, 1)))
+    for steps in (6, 10, 28, 448, 28672):
+        lengths = problem.lengths(np.array([1]), steps)[0]
+        total = sum(map(Fraction, lengths.tolist()))
+        assert abs(total - (Fraction(HALF_PI[0]) + Fraction(HALF_PI[1]))) <= Fraction(np.spacing(lengths.min())) / 2
+        assert np.ptp(lengths) <= np.spacing(lengths.max())
 
 
 @pytest.mark.skipif(np.finfo(np.longdouble).eps > 1e-18, reason="this machine has no longer floats than float64")
