@@ -259,6 +259,8 @@ def _draw(workflow):
 
 def _closing(finished, paths):
     """What was found, where it lies, and what it took."""
+    if finished.before:
+        err.print(f"{paths.pop(0)}: already complete; removed what the run that wrote it had left", markup=False)
     for path in paths:
         err.print(f"wrote {path}", markup=False)
     attributes = finished.attributes

@@ -164,6 +164,13 @@ def _counts(table):
     return {f"{name}_counts": ", ".join(f"{k}: {n}" for k, n in number.items() if n) for name, number in table.items()}
 
 
+def counts_in(attributes):
+    """{"status" and "verdict": {kind: points}} of a file's attributes: what `Tally.attributes` wrote."""
+    told = {name: attributes[f"{name}_counts"] for name in ("status", "verdict") if f"{name}_counts" in attributes}
+    pairs = {name: [part.rpartition(": ") for part in text.split(", ")] for name, text in told.items()}
+    return {name: {kind: int(number) for kind, _, number in some} for name, some in pairs.items()}
+
+
 def _above(value, bar, rtol):
     """Where the bar exceeds rtol (1 + |value|)."""
     asked = np.abs(value)

@@ -23,7 +23,7 @@ import tomli_w
 from rich import filesize
 
 from survey import dispatch, methods, modules, status, store, unfinished
-from survey.dataset import Tally, attributes, command, coordinates, layout, now, round_up, variables
+from survey.dataset import Tally, attributes, command, coordinates, counts_in, layout, now, round_up, variables
 from survey.dispatch import cpus
 from survey.errors import BadInput, Stopped
 from survey.kernels import jit
@@ -135,6 +135,7 @@ class Finished:
     computing: float
     beside: float  # edges, cells
     writing: float
+    before: bool = False  # was the file complete already?
 
 
 class Solved(NamedTuple):
@@ -201,7 +202,11 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, agai
     tile, regions = regions_of(workflow)
     blocks = [block for _, blocks in regions for block in blocks]
     about = {"points": workflow.grid.points, "code": _code() | _compilers()}
-    with client, store.Blocks(workflow.path, fingerprint(workflow), fresh, about, _findable(workflow), again) as kept:
+    kept = store.Blocks(workflow.path, fingerprint(workflow), fresh, about, _findable(workflow), again, workflow.text)
+    with store.refused(workflow.path), client, kept:
+        if kept.published:
+            kept.remove()
+            return Finished(kept.published, counts_in(kept.published), 0.0, 0.0, 0.0, 0.0, True)
         reused = kept.sound()
         job = Job(workflow.scene, workflow.request, workflow.grid, kept, _code())
         left = Remaining(workflow.grid.shape, blocks, reused)
@@ -415,10 +420,11 @@ class Assembly:
         written = attributes(workflow.scene, workflow.name, workflow.request) | self.tally.attributes
         written |= {"title": workflow.title, "workflow": workflow.text, "date_created": now()}
         written["history"] = f"{now()}: {command()}"
+        for ds in further:
+            written |= ds.attrs
+        written |= told | {"fingerprint": self.kept.identity}
+        self.kept.refuse_lost_lock()
         with store.refused(workflow.path):
-            for ds in further:
-                written |= ds.attrs
-            written |= told
             self.output.result().publish(written, further)
         return written | {"complete": 1}
 

@@ -12,63 +12,65 @@ import uuid
 from math import prod
 from pathlib import Path
 
-import filelock
 import numpy as np
 from isal import isal_zlib
 from rich import filesize
 
-from survey import status, tiles, unfinished
+from survey import lock, status, unfinished
 from survey.dataset import tally
 from survey.errors import BadInput, Damaged, Stopped, SurveyError
 from survey.grid import halved
 
-FORMAT = 2
+FORMAT = 3
 TILE_POINTS = 2**16
-LOCK_SECONDS = 0.2  # a look at the lock takes less
 NETCDF = (b"\x89HDF", b"CDF")  # how a netCDF file begins
 IN_MEMORY = 2**28  # bytes: a larger file is opened lazily
-# checksummed compression: readable everywhere, and every flipped bit is found
-PACKED = {"compression": "zlib", "complevel": 1, "shuffle": True, "fletcher32": True}
 
 
 class Blocks:
     """The finished blocks of a run in `OUT.nc.blocks/`: one writer, each block durable as it finishes.
 
+    Each block says of which survey it is; the manifest beside them, which is made first and removed last, tells users.
     Use as a context manager; raises BadInput if another run holds the output, or if the blocks that are there
     belong to another survey (unless `fresh`), Damaged if it cannot be told to which. For users the folder keeps
     what `about` tells, the text of the `workflow`, and `again`, the command that goes on.
+    If a run that did not end has left something beside a complete output of the same workflow, `published` is that
+    output's attributes: all that is to be done is to `remove` what was left.
     """
 
-    def __init__(self, path, fingerprint, fresh=False, about=None, workflow="", again=None):
+    def __init__(self, path, fingerprint, fresh=False, about=None, workflow="", again=None, text=None):
         self.folder = unfinished.folder_of(path)
         self.path = Path(path)
         self.fingerprint = {"format": FORMAT, **fingerprint}
+        self.identity = hashlib.sha256(json.dumps(self.fingerprint, sort_keys=True).encode()).hexdigest()[:16]
         self.fresh = fresh
-        self.about, self.workflow = about or {}, workflow
-        self.lock = filelock.FileLock(f"{path}.lock", timeout=LOCK_SECONDS)
-        self.holder = {"host": socket.gethostname(), "pid": os.getpid(), "run": uuid.uuid4().hex}
-        self.holder |= {"folder": os.getcwd(), "again": again}
+        self.about, self.workflow, self.text = about or {}, workflow, text
+        name = {"host": socket.gethostname(), "pid": os.getpid(), "run": uuid.uuid4().hex}
+        self.lock = lock.Lock(f"{path}.lock", name)
+        self.holder = name | {"folder": os.getcwd(), "again": again}
+        self.published = None
 
     def __enter__(self):
         with refused(self.path):
-            self._hold()
+            left = self._hold()
             try:
-                self._prepare()
+                self._prepare(bool(left) or self.folder.exists())
             except BaseException:
-                self.lock.release()
+                self.__exit__()
                 raise
         return self
 
     def __exit__(self, *_):
-        self.lock.release()
+        with contextlib.suppress(OSError):  # what ended the run is told, and the next one takes the lock
+            self.lock.release()
 
     def __getstate__(self):
         # a worker saves blocks, wherever it runs; only the parent holds the lock
-        return self.__dict__ | {"lock": None, "workflow": "", "folder": self.folder.absolute()}
+        return self.__dict__ | {"lock": None, "workflow": "", "text": None, "folder": self.folder.absolute()}
 
     def done(self):
         """Numbers of the blocks that are finished."""
-        return {int(file.stem) for file in self.folder.glob("*.block")}
+        return {int(file.stem) for file in self.folder.glob("*.block") if file.stem.isdecimal()}
 
     def sound(self):
         """Numbers of the blocks that are finished and whose checksums hold; the others are removed."""
@@ -77,7 +79,7 @@ class Blocks:
     def save(self, number, arrays):
         """Keep the arrays of block `number`; once this returns, a power cut does not lose them."""
         with refused(self.path):
-            write_atomically(self._file(number), lambda file: pack(arrays, file))
+            write_atomically(self._file(number), lambda file: pack(arrays, file, self._label(number)))
 
     def keep(self, number, arrays):
         """Save the block where this process reaches the run's folder; else return the bytes that `put` saves there."""
@@ -85,7 +87,7 @@ class Blocks:
             self.save(number, arrays)
             return None
         file = io.BytesIO()
-        pack(arrays, file)
+        pack(arrays, file, self._label(number))
         return file.getvalue()
 
     def put(self, number, content):
@@ -95,83 +97,151 @@ class Blocks:
 
     def once(self, name, make):
         """The arrays that an earlier run kept under this name, else those of `make()`, kept from now on."""
-        file = self.folder / f"{name}.extra"
+        file, label = self.folder / f"{name}.extra", self._label(name)
         with contextlib.suppress(OSError, ValueError):
-            return unpack(file.read_bytes())
+            return unpack(file.read_bytes(), label)
         arrays = make()
         with refused(self.path):
-            write_atomically(file, lambda opened: pack(arrays, opened))
+            write_atomically(file, lambda opened: pack(arrays, opened, label))
         return arrays
-
-    def _reached(self):
-        """Does this process see the very folder that the run's parent holds?"""
-        with contextlib.suppress(OSError, ValueError):
-            return json.loads((self.folder / "holder.json").read_text()) == self.holder
-        return False
 
     def load(self, number):
         """The arrays of block `number`; raises Damaged (and removes the block) if its checksum fails."""
-        try:
-            return unpack(self._file(number).read_bytes())
-        except (OSError, ValueError) as error:
-            self._file(number).unlink(missing_ok=True)
-            raise Damaged(f"{self._file(number)}: this block is damaged ({error}); run the command again") from None
+        with refused(self.path, "reading a block"):
+            try:
+                return self._read(number)
+            except (FileNotFoundError, ValueError) as error:
+                self._file(number).unlink(missing_ok=True)
+                told = f"{self._file(number)}: this block is damaged ({error}); run the command again"
+                raise Damaged(told) from None
 
-    def _sound(self, number):
-        with contextlib.suppress(Damaged):
-            self.load(number)
-            return True
-        return False
+    def refuse_lost_lock(self):
+        """Raise Stopped if the lock names another run: where file systems share no locks, a halted run may lose it."""
+        if not self.lock.owned():
+            raise Stopped(f"{self.path}: another run has taken its lock, since this one had halted; wait, or use -o")
 
     def remove(self):
-        """Drop the blocks once the output is complete."""
-        shutil.rmtree(self.folder, ignore_errors=True)
-        Path(f"{self.path}.lock").unlink(missing_ok=True)  # while it is held: nobody else holds a lock of that name
-        self.lock.release()
+        """Drop the blocks once the output is complete, and the lock."""
+        try:
+            clear(self.folder)
+            self.lock.release()
+        except OSError as error:
+            told = f"what the run kept beside it could not be removed ({error.strerror}: {error.filename})"
+            raise Stopped(f"{self.path} is complete, but {told}; mend it and run the command again") from None
+
+    def _reached(self):
+        """Does this process see the very folder that the run's parent holds?"""
+        return unfinished.table(self.folder / "holder.json") == self.holder
 
     def _file(self, number):
         return self.folder / f"{number:08d}.block"
 
-    def _prepare(self):
-        if self.fresh or not any(file.suffix in (".block", ".extra") for file in self.folder.glob("*")):
-            shutil.rmtree(self.folder, ignore_errors=True)  # nothing is finished there: nothing is lost
-        self.folder.mkdir(exist_ok=True)
-        self._same_survey()
-        write_atomically(self.folder / "holder.json", json.dumps(self.holder).encode())
+    def _label(self, name):
+        """What a file in the folder says of itself: of which survey, which part."""
+        return f"{self.identity} {name}"
+
+    def _read(self, number):
+        return unpack(self._file(number).read_bytes(), self._label(number))
+
+    def _sound(self, number):
+        try:
+            self._read(number)
+        except (OSError, ValueError):
+            self._file(number).unlink(missing_ok=True)
+            return False
+        return True
 
     def _hold(self):
+        """Hold the lock; what it says of a run that has ended without removing it."""
         try:
-            self.lock.acquire()
-        except filelock.Timeout:
-            holder = {"host": "another host", "pid": "unknown"}
-            with contextlib.suppress(OSError, ValueError):
-                holder |= json.loads((self.folder / "holder.json").read_bytes())
-            raise BadInput(
-                f"{self.path}: another run is writing it (host {holder['host']}, pid {holder['pid']}); wait, or use -o"
-            ) from None
+            return self.lock.acquire()
+        except lock.Held as held:
+            raise BadInput(f"{self.path}: another run is writing it ({held}); wait, or use -o") from None
 
-    def _same_survey(self):
-        manifest, known = self.folder / "manifest.json", self.fingerprint | self.about
-        if not any(self.folder.iterdir()):
-            write_atomically(self.folder / "workflow.toml", self.workflow.encode())
-            write_atomically(manifest, json.dumps(known, indent=1).encode())
+    def _prepare(self, left):
+        if self.fresh:
+            clear(self.folder)
+        finished = [file for file in self.folder.glob("*") if file.suffix in (".block", ".extra")]
+        self._refuse_other_survey(finished)
+        if left and not self.fresh and self._complete():
             return
-        try:
-            old = json.loads(manifest.read_bytes())
-        except (OSError, ValueError):
-            raise Damaged(
-                f"{manifest} is missing or damaged: nobody knows of which survey these blocks are; "
-                "--fresh deletes them and starts anew, -o writes another file"
-            ) from None
+        if not finished:  # nothing is lost
+            clear(self.folder)
+        self.folder.mkdir(exist_ok=True)
+        sync(self.path.parent)
+        known = self.fingerprint | self.about
+        if not self._is_own(unfinished.table(self.folder / "manifest.json")):
+            write_atomically(self.folder / "workflow.toml", self.workflow.encode())
+            write_atomically(self.folder / "manifest.json", json.dumps(known, indent=1).encode())
+        write_atomically(self.folder / "holder.json", json.dumps(self.holder).encode())
+
+    def _is_own(self, manifest):
+        return all(manifest.get(key) == value for key, value in self.fingerprint.items())
+
+    def _refuse_other_survey(self, finished):
+        manifest = self.folder / "manifest.json"
+        old = unfinished.table(manifest)
+        if self._is_own(old) or not any(map(self._is_foreign, finished)):
+            return
         changed = [key for key in self.fingerprint if old.get(key) != self.fingerprint[key]]
-        if changed:
+        if old:
+            known = self.fingerprint | self.about
             raise BadInput(unfinished.drift(self.path, old, known, changed, self.workflow))
+        raise Damaged(
+            f"{manifest} is missing or damaged, and blocks beside it are of another survey; "
+            "--fresh deletes them and starts anew, -o writes another file"
+        )
+
+    def _is_foreign(self, file):
+        """Is the file sound and of another survey? (One that is not sound is of no use to any.)"""
+        try:
+            if label_of(file).startswith(f"{self.identity} "):
+                return False
+            unpack(file.read_bytes())
+        except (OSError, ValueError):
+            return False
+        return True
+
+    def _complete(self):
+        """Is the output complete and of this very workflow? Then `published` is known, and one digest beside it."""
+        try:
+            with open(self.path, "rb") as file:
+                line = f"{hashlib.file_digest(file, 'sha256').hexdigest()}  {self.path.name}\n".encode()
+            digests = digest_of(self.path).read_bytes()
+            if line not in digests:
+                return False
+            attributes = attributes_of(self.path)
+        except (OSError, RuntimeError):
+            return False
+        wanted = {"complete": 1, "fingerprint": self.identity, "workflow": self.text}
+        if any(attributes.get(key) != value for key, value in wanted.items()):
+            return False
+        if digests != line:  # the run ended between the file and its digest
+            self.folder.mkdir(exist_ok=True)
+            write_atomically(digest_of(self.path), line, self.folder)
+        self.published = attributes
+        return True
 
 
-def pack(arrays, file):
-    """Write the arrays to a binary file: a line that names them, their bytes in multiples of 8, a checksum."""
+def clear(folder):
+    """Remove a run's folder, its manifest last: whatever ends this half-way, what is left can be told."""
+    if not folder.exists():
+        return
+    manifest = folder / "manifest.json"
+    for file in sorted(folder.iterdir()):
+        if file.is_dir() and not file.is_symlink():
+            shutil.rmtree(file)
+        elif file != manifest:
+            file.unlink(missing_ok=True)
+    manifest.unlink(missing_ok=True)
+    folder.rmdir()
+
+
+def pack(arrays, file, label=""):
+    """Write the arrays to a binary file: a line with the label and their names, their bytes in multiples of 8, a
+    checksum."""
     names = {name: (array.dtype.str, array.shape) for name, array in arrays.items()}
-    parts = [json.dumps(names).encode() + b"\n"] + [np.ascontiguousarray(array) for array in arrays.values()]
+    parts = [json.dumps([label, names]).encode() + b"\n"] + [np.ascontiguousarray(array) for array in arrays.values()]
     check = 0
     for part in parts:
         for piece in (part, bytes(-memoryview(part).nbytes % 8)):
@@ -180,13 +250,15 @@ def pack(arrays, file):
     file.write(check.to_bytes(8, "little"))
 
 
-def unpack(content):
-    """The arrays that `pack` wrote; raises ValueError if a bit is not as it was."""
+def unpack(content, label=None):
+    """The arrays that `pack` wrote; raises ValueError if a bit is not as it was, or if its label is another one."""
     body, check = memoryview(content)[:-8], content[-8:]
     if len(content) < 16 or isal_zlib.crc32(body).to_bytes(8, "little") != check:
         raise ValueError("its checksum fails")
     place = content.index(b"\n") + 1
-    names = json.loads(content[:place])
+    own, names = json.loads(content[:place])
+    if label not in (None, own):
+        raise ValueError("it is of another survey")
     arrays = {}
     for name, (kind, shape) in names.items():
         place += -place % 8
@@ -195,19 +267,25 @@ def unpack(content):
     return arrays
 
 
+def label_of(file):
+    """The label that `pack` gave the file, not checked; empty for one that has none."""
+    with open(file, "rb") as opened:
+        head = json.loads(opened.readline())
+    return head[0] if isinstance(head, list) and head and isinstance(head[0], str) else ""
+
+
 @contextlib.contextmanager
-def refused(path):
+def refused(path, what="writing"):
     """Turn a disk that refuses into one line."""
     try:
         yield
     except SurveyError:
         raise
-    except (OSError, RuntimeError) as error:  # netCDF4 raises RuntimeError on a full disk
-        number = getattr(error, "errno", None) or 0  # h5py's own words are long; netCDF4's numbers are below zero
-        told = os.strerror(number) if number > 0 else getattr(error, "strerror", None) or error
+    except OSError as error:
+        told = error.strerror or error
         with contextlib.suppress(OSError):
             told = f"{told}; {filesize.decimal(shutil.disk_usage(Path(path).parent).free)} are free"
-        raise Stopped(f"{path}: writing failed ({told}); mend it and run the command again") from None
+        raise Stopped(f"{path}: {what} failed ({told}); mend it and run the command again") from None
 
 
 def write_atomically(path, content, folder=None):
@@ -222,18 +300,25 @@ def write_atomically(path, content, folder=None):
             file.flush()
             os.fsync(file.fileno())
         publish(part, path)
-    finally:
-        part.unlink(missing_ok=True)
+    except BaseException:
+        with contextlib.suppress(OSError):  # what made it fail is told
+            part.unlink(missing_ok=True)
+        raise
 
 
 def publish(part, path):
     """Rename a complete file into place and make the rename durable."""
     os.replace(part, path)
-    folder = os.open(path.parent, os.O_RDONLY)
+    sync(path.parent)
+
+
+def sync(folder):
+    """Make durable what was made, renamed or removed in the folder."""
+    descriptor = os.open(folder, os.O_RDONLY)
     try:
-        os.fsync(folder)
+        os.fsync(descriptor)
     finally:
-        os.close(folder)
+        os.close(descriptor)
 
 
 class Output:
@@ -243,49 +328,40 @@ class Output:
     """
 
     def __init__(self, path, folder, coordinates, variables, layout, shape, tile):
-        import netCDF4
+        from survey import netcdf
 
-        self.path, self.part, self.beside, self.pieces = Path(path), folder / "output.nc", {}, None
+        self.path, self.part, self.beside = Path(path), folder / "output.nc", {}
+        self.file, self.published = None, False
         with refused(self.path):
             try:
-                with netCDF4.Dataset(self.part, "w") as file:
-                    self._define_map(file, coordinates, variables, layout, shape, tile)
+                self.file = netcdf.File(self.part)
+                self._define_map(coordinates, variables, layout, shape, tile)
             except BaseException:
                 self.discard()
                 raise
 
     def discard(self):
         """Close and remove what is not published."""
-        if self.pieces:
-            with contextlib.suppress(OSError, RuntimeError):
-                self.pieces.close()
-        self.part.unlink(missing_ok=True)
+        if self.file:
+            self.file.discard()
+        if not self.published:
+            with contextlib.suppress(OSError):  # the folder goes with what is left in it
+                self.part.unlink(missing_ok=True)
 
     def put(self, name, values, where=()):
         """Write values of a variable of the map, all or those at `where` (slices at the edges of tiles)."""
-        if self.pieces is None:
-            import h5py
+        from survey import tiles
 
-            self.pieces = h5py.File(self.part, "r+", locking=False)  # the run's own lock holds it
-        try:
-            variable = self.pieces[name]
-        except KeyError as error:  # so h5py says what it cannot read
-            raise OSError(str(error)) from None
-        tiles.write(variable, values, where)
+        self.file.write(tiles.write, name, values, where)
 
     def publish(self, attributes, further=()):
         """Add the `further` datasets' variables but those that are there and the attributes, `complete` last; put the
         file in its place, its digest beside it (`OUT.nc.sha256`)."""
-        import netCDF4
-
-        if self.pieces:
-            self.pieces.close()
-        with netCDF4.Dataset(self.part, "a") as file:
-            for ds in further:
-                self._add(file, ds)
-            file.setncatts(attributes | {"complete": np.int8(1)})
-        with open(self.part, "rb+") as file:
-            os.fsync(file.fileno())
+        for ds in further:
+            self._add(ds)
+        self.file.describe(attributes | {"complete": np.int8(1)})
+        self.file.close()
+        with open(self.part, "rb") as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
         beside = digest_of(self.path)
         # both digests stand until the rename is done, so that no instant shows a sound file as damaged
@@ -293,29 +369,29 @@ class Output:
         line = f"{digest}  {self.path.name}\n".encode()
         write_atomically(beside, old + line, self.part.parent)
         publish(self.part, self.path)
+        self.published = True
         write_atomically(beside, line, self.part.parent)
 
-    def _define_map(self, file, coordinates, variables, layout, shape, tile):
-        from netCDF4 import stringtochar
-
+    def _define_map(self, coordinates, variables, layout, shape, tile):
         for name, (dims, values, meaning) in coordinates.items():
             values = np.asarray(values)
             if values.dtype.kind == "U":  # CF knows labels of a dimension as arrays of characters only
+                values = np.char.encode(values, "utf-8")
+                values = values.view("S1").reshape(*values.shape, -1)
                 dims, meaning = (*dims, f"{name}_length"), meaning | {"_Encoding": "utf-8"}
-                values = stringtochar(np.char.encode(values, "utf-8"))
-            define(file, name, dims, values.shape, values.dtype, meaning)[...] = values
+            self.file.define(name, dims, values.shape, values.dtype, meaning, values=values)
         self.beside = {name: set(dims) for name, (dims, _, _) in coordinates.items() if name not in dims}
         for name, (dims, meaning) in variables.items():
             dtype, _, extra = layout[name]
-            define(file, name, dims, shape + extra, dtype, meaning | self._beside(dims), tile + extra)
+            self.file.define(name, dims, shape + extra, dtype, meaning | self._beside(dims), tile + extra)
 
-    def _add(self, file, ds):
+    def _add(self, ds):
         for name, variable in ds.variables.items():
-            if name not in file.variables:
+            if name not in self.file:
                 tile, meaning = halved(variable.shape, TILE_POINTS), variable.attrs | self._beside(variable.dims)
-                made = define(file, name, variable.dims, variable.shape, variable.dtype, meaning, tile)
-                values = variable.values
-                made[...] = values.astype(object) if values.dtype.kind == "U" else values
+                self.file.define(
+                    name, variable.dims, variable.shape, variable.dtype, meaning, tile, values=variable.values
+                )
 
     def _beside(self, dims):
         """The attribute that names the coordinates that are no dimensions of their own."""
@@ -323,18 +399,12 @@ class Output:
         return {"coordinates": " ".join(names)} if names else {}
 
 
-def define(file, name, dims, shape, dtype, attributes, tile=None):
-    """The new variable of a netCDF4 file, compressed in tiles of these lengths; the dimensions it lacks are made."""
-    for dim, size in zip(dims, shape, strict=True):
-        if dim not in file.dimensions:
-            file.createDimension(dim, size)
-    dtype = np.dtype(dtype)
-    packed = PACKED | {"chunksizes": tile} if tile and prod(shape) else {}
-    fill = np.nan if dtype.kind == "f" and tile is not None else None
-    made = file.createVariable(name, str if dtype.kind in "UO" else dtype, dims, fill_value=fill, **packed)
-    made.set_auto_maskandscale(False)
-    made.setncatts(attributes)
-    return made
+def attributes_of(path):
+    """The global attributes of a netCDF file."""
+    import netCDF4
+
+    with netCDF4.Dataset(path) as file:
+        return {name: file.getncattr(name) for name in file.ncattrs()}
 
 
 def load(path, chunks="auto"):

@@ -1,7 +1,6 @@
 """What an unfinished run has left in `OUT.nc.blocks/`, told to users: how much is done, and what has changed since."""
 
 import datetime
-import fcntl
 import json
 import os
 import shlex
@@ -9,6 +8,7 @@ import tomllib
 from math import prod
 from pathlib import Path
 
+from survey import lock
 from survey.wording import counted
 
 SHOWN = 3  # changes that are told one by one
@@ -25,7 +25,7 @@ def folder_of(path):
 def finished(path):
     """(blocks that are finished, all blocks) of the run that was to write `path`; (0, 0) if there is none."""
     folder = folder_of(path)
-    known = _table(folder / "manifest.json")
+    known = table(folder / "manifest.json")
     return (len(_blocks(folder)), known["blocks"]) if "blocks" in known else (0, 0)
 
 
@@ -35,10 +35,10 @@ def told(path):
     {} if there is none.
     """
     folder = folder_of(path)
-    known, holder, files = _table(folder / "manifest.json"), _table(folder / "holder.json"), _blocks(folder)
+    known, holder, files = table(folder / "manifest.json"), table(folder / "holder.json"), _blocks(folder)
     if "blocks" not in known:
         return {}
-    at_work = _is_locked(Path(f"{path}.lock"))
+    at_work = lock.holder(f"{path}.lock")
     last = max(_stat(file, "st_mtime") for file in [*files, *folder.glob("*.extra"), folder / "manifest.json"])
     return {
         "folder": str(folder),
@@ -47,8 +47,8 @@ def told(path):
         "points_done": sum(map(_points, files)),
         "points": known.get("points"),
         "last_written": datetime.datetime.fromtimestamp(last, datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
-        "at_work": f"host {holder.get('host')}, pid {holder.get('pid')}" if at_work else "nobody: it was interrupted",
-        **({} if at_work else {"resume": _resume(path, holder)}),
+        "at_work": _who(at_work or holder) if at_work is not None else f"nobody: it was interrupted ({_who(holder)})",
+        **({"resume": _resume(path, holder)} if at_work is None else {}),
     }
 
 
@@ -133,6 +133,10 @@ def _resume(path, holder):
     return (f"cd {shlex.quote(holder['folder'])} && " if away else "") + holder["again"]
 
 
+def _who(holder):
+    return f"host {holder.get('host', 'unknown')}, pid {holder.get('pid', 'unknown')}"
+
+
 def _blocks(folder):
     return list(folder.glob("*.block"))
 
@@ -141,7 +145,7 @@ def _points(file):
     """The points of a block, from the line that names its arrays; 0 if it has none."""
     try:
         with open(file, "rb") as opened:
-            return prod(json.loads(opened.readline())["status"][1])
+            return prod(json.loads(opened.readline())[1]["status"][1])
     except (OSError, ValueError, LookupError, TypeError):
         return 0
 
@@ -154,7 +158,7 @@ def _stat(file, what):
         return 0
 
 
-def _table(file):
+def table(file):
     """The JSON object in a file; {} if there is none."""
     try:
         table = json.loads(file.read_bytes())
@@ -162,14 +166,3 @@ def _table(file):
         return {}
     return table if isinstance(table, dict) else {}
 
-
-def _is_locked(file):
-    """Does a run hold this lock? Seen without keeping it: a run that starts tries more than once."""
-    try:
-        with open(file, "rb") as opened:
-            fcntl.flock(opened, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    except OSError:
-        return False
-    return False

@@ -1,7 +1,18 @@
-"""The real program meets an error, or a kill, at each call that writes, in turn; and a read-only disk."""
+"""The real program is killed, or meets an error, at each call that reaches its output's folder; and a read-only disk.
 
+A small library (faults.c) preloaded into it counts its calls of write, fsync, rename, unlink, open and their like,
+those of its worker processes too, and makes the n-th of them the last one or fail.
+"""
+
+import ctypes
+import json
+import mmap
+import os
+import re
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 import xarray as xr
@@ -9,84 +20,174 @@ import xarray as xr
 from survey import store
 
 SWEEP = """
-scene = "gyrostat"
-[options]
-question = "trajectory"
+scene = "mathieu"
 [axes]
-w0   = { start = 0.5, stop = 2.0, num = 20 }
-phi0 = { start = 0.5, stop = 2.0, num = 20 }
-t    = 2
-b12  = 0.7
-d    = 1.1
+a = { start = 0.5, stop = 3.0, num = 4 }
+q = { start = 0.1, stop = 2.0, num = 4 }
 [output]
-path = "sweep.nc"
+variables = ["verdict"]
 """
-# the program with several blocks; its AT-th call that writes fails, or is its last; it tells the number of calls
-PROGRAM = """
-import builtins, os, signal, sys
-at, what = int(sys.argv.pop(1)), sys.argv.pop(1)
-from survey import engine, store
-engine.BLOCK_POINTS = 100
-calls = 0
-def failing(real, writes=lambda *given: True):
-    def call(*given, **named):
-        global calls
-        calls += writes(*given)
-        if calls == at and writes(*given):
-            if what == "kill":
-                os.kill(os.getpid(), signal.SIGKILL)
-            raise OSError(28, "No space left on device")
-        return real(*given, **named)
-    return call
-for where, name in ((os, "fsync"), (os, "replace"), (store, "pack"), (store.Output, "put"), (store, "define")):
-    setattr(where, name, failing(getattr(where, name)))
-store.open = failing(builtins.open, lambda path, how="r": "b" in how and how != "rb")
-from survey.cli import main
-try:
-    main()
-finally:
-    print(calls)
+BESIDE = """
+[boundaries]
+axis = "a"
+[refine]
+width = 0.2
 """
+# The program with two blocks, again and again, each time in a process of its own: a copy of this one, which has
+# imported and compiled what it needs, but opened no file and started no thread.
+SERVER = """
+import json, os, sys
+import dask.multiprocessing, dask.threaded, psutil
+from survey import boundaries, cli, dispatch, engine, lock, netcdf, progress, refine, tiles, workflow
+engine.BLOCK_POINTS = 8
+on_threads = dispatch.on_threads
+dispatch.on_threads = lambda task, numbers, finished=lambda *_: None, threads=None: list(map(task, numbers))
+for path in sys.argv[2:]:
+    read = workflow.read(path)
+    engine.compute(read.grid, read.scene, read.request)
+    engine.extras(read, lambda name, make: make())
+dispatch.on_threads = on_threads
+for line in sys.stdin:
+    given = json.loads(line)
+    process = os.fork()
+    if not process:
+        break
+    print(os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]), flush=True)
+else:
+    sys.exit()
+for number, name in enumerate((os.devnull, "stdout", "stderr")):
+    os.dup2(os.open(name, os.O_RDWR | os.O_CREAT | os.O_TRUNC), number)
+sys.argv[1:] = given["words"]
+with open(os.environ["FAULTS_TABLE"], "r+b") as table:
+    table.seek(given["place"])
+    table.write(os.getpid().to_bytes(4, sys.byteorder))
+cli.main()
+"""
+ERRORS = {"kill": 0, "EIO": 5, "ENOSPC": 28}
 
 
-def run(folder, at=0, what="none", *words):
-    command = [sys.executable, "-c", PROGRAM, str(at), what, "run", "sweep.toml", "--quiet", *words]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120)
+class Table(ctypes.Structure):
+    """As in faults.c."""
+
+    _fields_ = [(name, ctypes.c_int) for name in ("calls", "at", "met", "error", "ever", "killed")]
+
+
+class Faults:
+    """Runs of the program in an empty folder; the library counts what reaches the folder `out`."""
+
+    def __init__(self, folder, library):
+        self.folder, self.out, self.log = folder, folder / "out", folder / "log"
+        (folder / "plain.toml").write_text(SWEEP)
+        (folder / "beside.toml").write_text(SWEEP + BESIDE)
+        (folder / "table").write_bytes(bytes(ctypes.sizeof(Table)))
+        with open(folder / "table", "r+b") as file:
+            self.table = Table.from_buffer(mmap.mmap(file.fileno(), 0))
+        told = {"TABLE": folder / "table", "FOLDER": self.out, "LOG": self.log}
+        environment = {key: value for key, value in os.environ.items() if not key.startswith("COV")}
+        environment |= {f"FAULTS_{key}": str(value) for key, value in told.items()} | {"LD_PRELOAD": str(library)}
+        words = [sys.executable, "-c", SERVER, "", "plain.toml", "beside.toml"]
+        self.server = subprocess.Popen(
+            words, cwd=folder, env=environment, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        )
+        self.known = {}
+
+    def run(self, words, at=0, error=0, ever=False):
+        """(exit code, stderr, what the at-th call was) of the command."""
+        for name, value in (("calls", 0), ("at", at), ("met", 0), ("error", error), ("ever", ever)):
+            setattr(self.table, name, value)
+        self.log.write_bytes(b"")
+        given = {"words": ["run", *words, "-o", "out/sweep.nc", "--quiet"], "place": Table.killed.offset}
+        print(json.dumps(given), file=self.server.stdin, flush=True)
+        code = int(self.server.stdout.readline())
+        calls = self.log.read_text().splitlines()
+        call = next((line for line in calls if line.startswith(f"{at} ")), "")
+        return code, (self.folder / "stderr").read_text(), call
+
+    def whole(self, words):
+        """(dataset, calls) of a run that nothing disturbs."""
+        if words not in self.known:
+            self.empty()
+            code, told, _ = self.run(words)
+            assert code == 0, told
+            self.known[words] = self.sound(), self.log.read_text().splitlines()
+        return self.known[words]
+
+    def empty(self):
+        shutil.rmtree(self.out, ignore_errors=True)
+        self.out.mkdir()
+
+    def sound(self):
+        """The dataset of the output, which has no complaints and nothing beside it but its digest."""
+        assert {file.name for file in self.out.iterdir()} == {"sweep.nc", "sweep.nc.sha256"}
+        assert store.check(self.out / "sweep.nc") == []
+        lines = (self.out / "sweep.nc.sha256").read_text().splitlines()
+        assert len(lines) == 1 and lines[0].endswith("  sweep.nc")
+        return xr.load_dataset(self.out / "sweep.nc").drop_attrs()
+
+    def meet(self, words, at, what, ever=False):
+        """A fault at the at-th call, and one resume."""
+        unbroken, _ = self.whole(words)
+        self.empty()
+        code, told, call = self.run(words, at, ERRORS[what], ever)
+        where = f"{what} at {call or at}: {told}"
+        path = self.out / "sweep.nc"
+        assert self.table.met or self.table.calls < at, where
+        if not self.table.met:  # threads take turns: this time there were fewer calls
+            assert code == 0, where
+        elif what == "kill":
+            assert code == -9, where
+        elif code == 0:  # what cannot be read is read or worked out again
+            assert " read " in call and not told, where
+        else:
+            assert code == 4 and re.fullmatch(r"survey: .*out/sweep\.nc.*\n", told), where
+            assert os.strerror(ERRORS[what]) in told, where
+        if code == 0:
+            xr.testing.assert_equal(self.sound(), unbroken)
+        elif path.exists():
+            assert store.check(path) == [], where
+        code, told, _ = self.run(words)
+        assert code == 0, f"{where}; then {told}"
+        xr.testing.assert_equal(self.sound(), unbroken)
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    """(the dataset of a run that nothing disturbed, its number of calls that write)."""
-    folder = tmp_path_factory.mktemp("whole")
-    (folder / "sweep.toml").write_text(SWEEP)
-    for _ in range(2):  # the first may compile, and writes the kernels too
-        done = run(folder)
-        assert done.returncode == 0, done.stderr
-    return xr.load_dataset(folder / "sweep.nc").drop_attrs(), int(done.stdout)
+def faults(tmp_path_factory):
+    compiler, folder = shutil.which("cc"), tmp_path_factory.mktemp("faults")
+    if compiler is None or sys.platform != "linux":
+        pytest.skip("needs a C compiler and Linux")
+    library, source = folder / "faults.so", Path(__file__).with_name("faults.c")
+    subprocess.run([compiler, "-O1", "-shared", "-fPIC", "-o", library, source, "-ldl"], check=True)
+    faults = Faults(folder, library)
+    yield faults
+    faults.server.stdin.close()
+    assert faults.server.wait(20) == 0
 
 
-@pytest.mark.parametrize("what", ["error", "kill"])
-@pytest.mark.parametrize("every", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_a_fault_at_a_call_that_writes_loses_nothing(whole, tmp_path, what, every):
-    """Short: in the middle, and at the last ones, which publish; long: at each."""
-    unbroken, calls = whole
-    assert calls > 40
-    some = {"error": [calls // 2, calls], "kill": [calls - 4, calls - 1]}[what]
-    for at in range(1, calls + 1) if every else some:
-        folder = tmp_path / str(at)
-        folder.mkdir()
-        (folder / "sweep.toml").write_text(SWEEP)
-        path = folder / "sweep.nc"
-        broken = run(folder, at, what)
-        assert broken.returncode == {"error": 4, "kill": -9}[what], (at, broken.stderr)
-        assert what == "kill" or (broken.stderr.count("\n") == 1 and "No space left" in broken.stderr), broken.stderr
-        assert not path.exists() or store.check(path) == []
-        left = set(folder.rglob("*"))
-        assert what == "kill" or not [file for file in left if file.name.endswith((".part", "output.nc"))], left
-        done = run(folder)
-        assert done.returncode == 0 and store.check(path) == [], (at, done.stderr)
-        xr.testing.assert_equal(xr.load_dataset(path).drop_attrs(), unbroken)
-        assert {file.name for file in folder.iterdir()} == {"sweep.toml", "sweep.nc", "sweep.nc.sha256"}, at
+def _some(calls):
+    """Numbers of calls: one of each kind (of two, the one in the middle), and all from the publication on."""
+    kinds = {}
+    for number, line in enumerate(calls, 1):
+        kinds.setdefault(re.sub(r"\d+", "", line), []).append(number)
+    last = next(number for number, line in enumerate(calls, 1) if "rename" in line and "output.nc" in line)
+    return sorted({some[len(some) // 2] for some in kinds.values()} | set(range(last, len(calls) + 1)))
+
+
+@pytest.mark.parametrize("what", ["kill", "EIO"])
+def test_a_fault_at_some_calls_loses_nothing(faults, what):
+    words = ("plain.toml",)
+    for at in _some(faults.whole(words)[1]):
+        faults.meet(words, at, what)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("what", ERRORS)
+@pytest.mark.parametrize("workers", [(), ("--workers", "2")], ids=["threads", "processes"])
+@pytest.mark.parametrize("name", ["plain.toml", "beside.toml"])
+def test_a_fault_at_any_call_loses_nothing(faults, name, workers, what):
+    """ENOSPC: at all later calls too."""
+    words = (name, *workers)
+    for at in range(1, len(faults.whole(words)[1]) + 3):
+        faults.meet(words, at, what, ever=what == "ENOSPC")
 
 
 def test_a_disk_that_is_read_only_stops_the_run_before_any_work(tmp_path):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from survey import tiles
-from survey.store import PACKED
 
+PACKED = {"compression": "zlib", "complevel": 1, "shuffle": True, "fletcher32": True}
 RNG = np.random.default_rng(5)
 CONTENTS = {
     "zeros": np.zeros((40, 31)),
