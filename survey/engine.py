@@ -422,7 +422,7 @@ class Assembly:
         written["history"] = f"{now()}: {command()}"
         for ds in further:
             written |= ds.attrs
-        written |= told | {"fingerprint": self.kept.identity}
+        written |= told | {"fingerprint": self.kept.of_output}
         self.kept.refuse_lost_lock()
         with store.refused(workflow.path):
             self.output.result().publish(written, further)

@@ -18,7 +18,7 @@ BARE = "This is a netCDF dimension but not a netCDF variable.{:10d}"
 
 
 class Sink:
-    """A new file for HDF5 to write, which never refuses: `error` is the first OSError, the disk gets nothing after it."""
+    """A new file for HDF5 that never refuses: `error` is the first OSError, and what comes after it stays in memory."""
 
     def __init__(self, path):
         self.descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o666)

@@ -42,7 +42,9 @@ class Blocks:
         self.folder = unfinished.folder_of(path)
         self.path = Path(path)
         self.fingerprint = {"format": FORMAT, **fingerprint}
-        self.identity = hashlib.sha256(json.dumps(self.fingerprint, sort_keys=True).encode()).hexdigest()[:16]
+        self.identity = _hash(self.fingerprint)
+        # of the output, which is the same however it was cut into blocks
+        self.of_output = _hash({key: self.fingerprint[key] for key in self.fingerprint.keys() - {"format", "blocks"}})
         self.fresh = fresh
         self.about, self.workflow, self.text = about or {}, workflow, text
         name = {"host": socket.gethostname(), "pid": os.getpid(), "run": uuid.uuid4().hex}
@@ -213,7 +215,7 @@ class Blocks:
             attributes = attributes_of(self.path)
         except (OSError, RuntimeError):
             return False
-        wanted = {"complete": 1, "fingerprint": self.identity, "workflow": self.text}
+        wanted = {"complete": 1, "fingerprint": self.of_output, "workflow": self.text}
         if any(attributes.get(key) != value for key, value in wanted.items()):
             return False
         if digests != line:  # the run ended between the file and its digest
@@ -221,6 +223,11 @@ class Blocks:
             write_atomically(digest_of(self.path), line, self.folder)
         self.published = attributes
         return True
+
+
+def _hash(table):
+    """16 hex digits of a table's values."""
+    return hashlib.sha256(json.dumps(table, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def clear(folder):

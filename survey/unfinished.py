@@ -165,4 +165,3 @@ def table(file):
     except (OSError, ValueError):
         return {}
     return table if isinstance(table, dict) else {}
-

@@ -38,8 +38,9 @@ width = 0.2
 SERVER = """
 import json, os, sys
 import dask.multiprocessing, dask.threaded, psutil
-from survey import boundaries, cli, dispatch, engine, lock, netcdf, progress, refine, tiles, workflow
+from survey import boundaries, cli, dataset, dispatch, engine, lock, netcdf, progress, refine, tiles, workflow
 engine.BLOCK_POINTS = 8
+dataset.provenance()
 on_threads = dispatch.on_threads
 dispatch.on_threads = lambda task, numbers, finished=lambda *_: None, threads=None: list(map(task, numbers))
 for path in sys.argv[2:]:
@@ -163,20 +164,26 @@ def faults(tmp_path_factory):
     assert faults.server.wait(20) == 0
 
 
-def _some(calls):
-    """Numbers of calls: one of each kind (of two, the one in the middle), and all from the publication on."""
-    kinds = {}
-    for number, line in enumerate(calls, 1):
-        kinds.setdefault(re.sub(r"\d+", "", line), []).append(number)
-    last = next(number for number, line in enumerate(calls, 1) if "rename" in line and "output.nc" in line)
-    return sorted({some[len(some) // 2] for some in kinds.values()} | set(range(last, len(calls) + 1)))
+def _published(calls):
+    """The number of the call that publishes the output."""
+    return next(number for number, line in enumerate(calls, 1) if "rename" in line and "output.nc" in line)
 
 
-@pytest.mark.parametrize("what", ["kill", "EIO"])
-def test_a_fault_at_some_calls_loses_nothing(faults, what):
+def test_a_kill_at_any_call_from_the_publication_on_leaves_what_the_next_run_removes(faults):
     words = ("plain.toml",)
-    for at in _some(faults.whole(words)[1]):
-        faults.meet(words, at, what)
+    calls = faults.whole(words)[1]
+    for at in range(_published(calls), len(calls) + 1):
+        faults.meet(words, at, "kill")
+
+
+def test_an_error_at_a_call_of_each_kind_is_one_line(faults):
+    """Of several calls that do the same with files of the same use, one from the middle."""
+    words, kinds = ("plain.toml",), {}
+    for number, line in enumerate(faults.whole(words)[1], 1):
+        _, call, path = line.split(" ")
+        kinds.setdefault((call, re.sub(r"\d+|\.[a-z0-9.]+(?=\.part)", "", path)), []).append(number)
+    for some in kinds.values():
+        faults.meet(words, some[len(some) // 2], "EIO")
 
 
 @pytest.mark.slow
@@ -196,12 +203,13 @@ def test_a_disk_that_is_read_only_stops_the_run_before_any_work(tmp_path):
     if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=20m", "none", disk], capture_output=True).returncode:
         pytest.skip("needs the right to mount a small tmpfs")
     try:
-        (disk / "sweep.toml").write_text(SWEEP)
+        (disk / "plain.toml").write_text(SWEEP)
         subprocess.run(["mount", "-o", "remount,ro", disk], check=True)
-        refused = run(disk)
+        command = [sys.executable, "-m", "survey", "run", "plain.toml", "--quiet"]
+        refused = subprocess.run(command, cwd=disk, capture_output=True, text=True, timeout=120)
         assert refused.returncode == 4 and refused.stderr.count("\n") == 1, refused.stderr
-        assert "is read-only" in refused.stderr and list(disk.iterdir()) == [disk / "sweep.toml"]
+        assert "is read-only" in refused.stderr and list(disk.iterdir()) == [disk / "plain.toml"]
         subprocess.run(["mount", "-o", "remount,rw", disk], check=True)
-        assert run(disk).returncode == 0
+        subprocess.run(command, cwd=disk, check=True, timeout=120)
     finally:
         subprocess.run(["umount", disk], check=True)

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 import survey
-from survey import dataset, engine, status, store, workflow
+from survey import dataset, engine, netcdf, status, store, workflow
 from survey.errors import BadInput, Damaged, Stopped
 
 
@@ -157,6 +157,63 @@ def test_a_second_writer_is_told_who_holds_the_output_and_a_killed_holder_frees_
         pass
 
 
+def test_a_complete_output_wins_over_what_its_run_has_left(small, tmp_path):
+    """The manifest is gone, blocks and lock are not; both digests stand."""
+    path = tmp_path / "o.nc"
+    first = survey.run(small, output=path).attrs["date_created"]
+    checked = workflow.read(small, output=path)
+    with store.Blocks(path, engine.fingerprint(checked)) as kept:
+        kept.save(0, {"status": np.zeros(2, np.int8)})
+    (kept.folder / "manifest.json").unlink()
+    (tmp_path / "o.nc.lock").write_text('{"host": "gone", "pid"')
+    beside = tmp_path / "o.nc.sha256"
+    beside.write_text("0" * 64 + "  o.nc\n" + beside.read_text())
+    assert survey.run(small, output=path).attrs["date_created"] == first
+    assert {file.name for file in tmp_path.glob("o.nc*")} == {"o.nc", "o.nc.sha256"}
+    assert beside.read_text().count("\n") == 1 and store.check(path) == []
+    with store.Blocks(path, engine.fingerprint(checked)) as kept:
+        kept.save(0, {"status": np.zeros(2, np.int8)})
+    survey.run(small, output=path, fresh=True)
+    assert survey.open(path).attrs["date_created"] >= first and not kept.folder.exists()
+
+
+def test_a_complete_output_of_another_workflow_does_not(small, tmp_path, monkeypatch):
+    monkeypatch.setattr(engine, "BLOCK_POINTS", 4)
+    path = tmp_path / "o.nc"
+    survey.run(small, output=path)
+    checked = workflow.read(small, ["title='other'"], path)
+    with store.Blocks(path, engine.fingerprint(checked)) as kept:
+        kept.save(0, engine.solve_block(checked.scene, checked.request, checked.grid, engine.blocks_of(checked)[0]))
+    engine.run(checked)
+    assert survey.open(path).attrs["title"] == "other" and survey.open(path).attrs["blocks_reused"] == 1
+
+
+def test_a_block_under_another_number_or_of_another_survey_is_not_taken(tmp_path):
+    with store.Blocks(tmp_path / "o.nc", {"rtol": 1}) as kept:
+        kept.save(0, {"w": np.arange(3.0)})
+        (kept.folder / "00000001.block").write_bytes(kept._file(0).read_bytes())
+        with store.Blocks(tmp_path / "other.nc", {"rtol": 2}) as other:
+            other.save(2, {"w": np.arange(3.0)})
+        (kept.folder / "00000002.block").write_bytes(other._file(2).read_bytes())
+        (kept.folder / "notes.block").write_text("of the user")
+        assert kept.sound() == {0}
+
+
+def test_a_clean_up_that_fails_is_told_and_done_by_the_next_run(small, tmp_path, monkeypatch):
+    path, rmdir = tmp_path / "o.nc", os.rmdir
+
+    def refuse(folder, **_):
+        raise OSError(5, "Input/output error", str(folder))
+
+    monkeypatch.setattr(os, "rmdir", refuse)
+    with pytest.raises(Stopped, match=r"o\.nc is complete, but .* \(Input/output error: .*o\.nc\.blocks\); mend it"):
+        survey.run(small, output=path)
+    monkeypatch.setattr(os, "rmdir", rmdir)
+    assert not (tmp_path / "o.nc.lock").exists()
+    survey.run(small, output=path)
+    assert {file.name for file in tmp_path.glob("o.nc*")} == {"o.nc", "o.nc.sha256"}
+
+
 ARRAYS = {
     "w": np.linspace(0, 1, 12).reshape(3, 4),
     "w_error": np.full((3, 4), 1e-9, np.float32),
@@ -191,9 +248,8 @@ def test_every_flipped_bit_and_every_cut_of_a_block_is_found():
     ("where", "name", "error"),
     [
         (os, "fsync", OSError(28, "No space left on device")),
-        (store.Output, "put", RuntimeError("NetCDF: HDF error")),
-        (store.Output, "publish", OSError(-101, "NetCDF: HDF error")),
-        (store, "define", OSError(5, "Input/output error")),
+        (netcdf.File, "write", OSError("HDF5: an error of its own")),
+        (os, "pwrite", OSError(5, "Input/output error")),
     ],
 )
 def test_a_disk_that_refuses_leaves_the_old_file(copy, small, monkeypatch, where, name, error):
@@ -204,14 +260,14 @@ def test_a_disk_that_refuses_leaves_the_old_file(copy, small, monkeypatch, where
 
     with monkeypatch.context() as patch:
         patch.setattr(where, name, refuse)
-        with pytest.raises(Stopped, match=r"copy\.nc.*(No space left|HDF error|Input/output)"):
+        with pytest.raises(Stopped, match=r"copy\.nc.*(No space left|HDF5: an|Input/output)"):
             survey.run(small, output=copy)
     assert copy.read_bytes() == before and store.check(copy) == []
     assert [file.name for file in copy.parent.rglob("*") if file.name.endswith((".part", "output.nc"))] == []
     assert survey.run(small, output=copy).status.size == 24  # the lock is free, and what is there is of use
 
 
-CALLS = [(os, "fsync"), (os, "replace"), (store, "pack"), (store.Output, "put"), (store, "define")]
+CALLS = [(os, "fsync"), (os, "replace"), (store, "pack"), (store.Output, "put"), (netcdf.File, "define")]
 
 
 @pytest.mark.parametrize(("where", "name"), CALLS, ids=lambda value: getattr(value, "__name__", value))

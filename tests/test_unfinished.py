@@ -85,22 +85,32 @@ def test_other_code_is_told_plainly(left, small):
     manifest = json.loads((left / "manifest.json").read_text())
     manifest["code"]["survey"], manifest["kernels"] = "0.0.9", "old"
     (left / "manifest.json").write_text(json.dumps(manifest))
+    for file in left.glob("*.block"):
+        arrays = store.unpack(file.read_bytes())
+        with open(file, "wb") as opened:
+            store.pack(arrays, opened, "of that version")
     now = manifest["code"] | {"survey": engine.version("survey")}
     assert f"blocks of another version of the code (survey 0.0.9 -> {now['survey']}); go back to that" in refusal(small)
     told = refusal(small, "solver.rtol=1e-6")
     assert "-> 1e-06)" in told and "go back to that version and that workflow" in told
 
 
-def test_without_a_sound_manifest_no_block_is_taken(left, small):
-    bits = bytearray((left / "manifest.json").read_bytes())
+@pytest.mark.parametrize("damage", ["flipped", "gone", "another"])
+def test_a_damaged_manifest_costs_nothing_as_blocks_say_of_which_survey_they_are(left, small, damage):
+    manifest = left / "manifest.json"
+    bits = bytearray(manifest.read_bytes())
     bits[3] ^= 128
-    (left / "manifest.json").write_bytes(bits)
-    with pytest.raises(Damaged, match=r"manifest\.json is missing or damaged"):
-        engine.run(workflow.read(small))
+    manifest.write_bytes({"flipped": bits, "gone": b"", "another": b'{"format": 1}'}[damage])
+    engine.run(workflow.read(small))
+    assert survey.open("small.nc").attrs["blocks_reused"] == 3 and not left.exists()
+
+
+def test_without_a_manifest_blocks_of_another_survey_are_not_taken(left, small):
     (left / "manifest.json").unlink()
-    with pytest.raises(Damaged, match="--fresh deletes them"):
-        engine.run(workflow.read(small))
+    with pytest.raises(Damaged, match=r"manifest\.json is missing or damaged, .* --fresh deletes them"):
+        engine.run(workflow.read(small, ["solver.rtol=1e-6"]))
     assert len(list(left.glob("*.block"))) == 3
+    assert not (left.parent / "small.nc.lock").exists()
 
 
 def test_what_is_there_already_needs_no_more_room(left, small, monkeypatch):
