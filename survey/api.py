@@ -299,7 +299,7 @@ def summary(ds: xr.Dataset) -> dict[str, Any]:
     return {
         "title": ds.attrs.get("title", ""),
         "scene": ds.attrs["scene"],
-        "options": ds.attrs["options"],
+        "options": ds.attrs.get("options", ""),
         "axes": axes,
         "fixed": {name: float(c) for name, c in ds.coords.items() if c.ndim == 0 and c.dtype.kind == "f"},
         "variables": {

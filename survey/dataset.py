@@ -191,7 +191,7 @@ def count(ds):
 def counts(ds):
     """{"verdict" (where there is one) and "status": {kind: number of points}}, as `Tally.kinds`."""
     whole = tally(ds)
-    whole.add({name: ds[name].values for name in whole.codes})
+    whole.add({name: ds[name].transpose(*ds.status.dims).values for name in whole.codes})
     return {name: whole.kinds[name] for name in ("verdict", "status") if name in whole.codes}
 
 

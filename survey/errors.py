@@ -25,8 +25,8 @@ class Untrusted(BadInput):
 
     def __init__(self, path: str, digest: str, text: str) -> None:
         super().__init__(
-            f"scene = {path!r} is a Python file that you have not run here before, and points are solved only by running "
-            f"it; read it ({self.reading(path)}), and if you trust it, give --trust-scene, or in Python "
+            f"scene = {path!r} is a Python file that you have not run here before, and points are solved only by "
+            f"running it; read it ({self.reading(path)}), and if you trust it, give --trust-scene, or in Python "
             "survey.open(path, trust_scene=True)"
         )
         self.path, self.digest, self.text = path, digest, text

@@ -8,8 +8,8 @@ The file holds
     EVEN         True where z(T - u) = z(u), which halves the work and makes edges certain; False by default
     BREAKS       where z or a derivative jumps, in [0, T]: number(s), or a function of p; none by default
 
-and, as it likes, a docstring, TITLE and REFERENCES. It is run, as any Python file is: use files that you trust. One that
-only a survey's file names is not run unless this user has run it here before, or allows it (`survey.trust`). What it
+and, as it likes, a docstring, TITLE and REFERENCES. It is run, as any Python file is: use files that you trust. One
+that only a survey's file names is run if this user has run it here before, or allows it (`survey/trust.py`). What it
 imports is not watched when a run is resumed. z goes on with period T; what is narrower than a hundredth of T may be
 missed unless BREAKS stand beside it. [boundaries] and [refine] take z to be analytic in the parameters.
 """

@@ -66,6 +66,8 @@ def _check_packing(name, variable):
     for key in PACKING:
         if key in attributes:
             raise Damaged(f"the variable {name} has the attribute {key}, and values of surveys are stored as they are")
+    if np.size(variable.getncattr("_FillValue") if "_FillValue" in attributes else 0) != 1:
+        raise Damaged(f"the variable {name} has more than one _FillValue, or none that is one")
     encoding = variable.getncattr("_Encoding") if "_Encoding" in attributes else "utf-8"
     if str(encoding).lower().replace("utf8", "utf-8") not in ENCODINGS:
         raise Damaged(f"{name}._Encoding = {str(encoding)[:60]!r} (allowed: {', '.join(ENCODINGS)})")
