@@ -4,6 +4,7 @@ python tests/hostile.py 1000 3      # mutations 1000, 1001, 1002: what each is, 
 """
 
 import hashlib
+import html
 import io
 import shutil
 import sys
@@ -341,7 +342,7 @@ def page(path):
     shown.choose((0, 0))
     shown.solve()
     shown.show_source()
-    return "".join(part.text for part in document.select({"type": Div})).replace("\n", " ") + document.title
+    return "".join(part.text for part in document.select({"type": Div})).replace("\n", " ") + html.escape(document.title)
 
 
 def main():

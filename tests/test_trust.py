@@ -224,3 +224,11 @@ def test_a_scene_made_of_a_function_needs_no_trust(strange):
     scene = survey.hill(lambda u, p: p[0] - 2 * p[1] * np.cos(2 * u), period=np.pi, parameters=("a", "q"), even=True)
     ds = survey.evaluate(scene, a=[0.5, 1.0], q=0.3)
     assert "T/2" in ds.survey.point(a=1.0).why and not strange.state.exists()
+
+
+def test_modules_in_the_folder_of_a_strange_survey_are_not_imported(strange):
+    for name in ("numpy", "bokeh", "yaml", "sitecustomize"):
+        (strange.path.parent / f"{name}.py").write_text(strange.file.read_text())
+    words = [sys.executable, "-m", "survey", "info", "base.nc"]
+    done = subprocess.run(words, capture_output=True, text=True, cwd=strange.path.parent)
+    assert done.returncode == 0 and not strange.ran, done.stderr
