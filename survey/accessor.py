@@ -2,7 +2,9 @@
 
 import xarray as xr
 
+from survey import schema
 from survey.errors import BadInput
+from survey.wording import plain
 
 
 @xr.register_dataset_accessor("survey")
@@ -11,7 +13,7 @@ class Survey:
 
     Works on the datasets of `survey.run`, `survey.open`, `survey.evaluate` and of `xarray.open_dataset`, lazy ones
     (`chunks={}`) too, of which only what is asked for is loaded. Coordinates are numbers, the nearest point is taken.
-    Raises survey.BadInput in one line.
+    Raises survey.BadInput, or survey.Damaged where the dataset is none that survey writes, in one line.
     """
 
     def __init__(self, ds):
@@ -20,11 +22,13 @@ class Survey:
                 "this dataset was not written by survey: it has no status, or no attribute scene "
                 "(arithmetic drops attributes: xr.set_options(keep_attrs=True) keeps them)"
             )
+        schema.check(ds, whole=False)
         self._ds = ds
 
     def __repr__(self):
         names = [name for name in vars(type(self)) if not name.startswith("_")]
-        return f"a survey of {self._ds.attrs['scene']}: ds.survey has {', '.join(names)}; help(ds.survey) tells each"
+        scene = plain(self._ds.attrs["scene"])
+        return f"a survey of {scene}: ds.survey has {', '.join(names)}; help(ds.survey) tells each"
 
     def map(self, var=None, ax=None, boundaries=True, style=None, width="single"):
         """Draw the stability map, or the variable `var`; along one axis, its curve and error band.
@@ -58,11 +62,17 @@ class Survey:
         `time` is how long, in the scene's independent variable; the scene knows what suits. Draws into the matplotlib
         Figure or SubFigure `figure`, by default a new one; not at all if it is False.
         """
-        from survey.analysis import point, portrait, trajectory
+        from survey.analysis import point, trajectory
 
         found = trajectory.solve(point.nearest(self._ds, coords).load(), time)
         if figure is not False:
-            portrait.draw(found, _new_figure() if figure is None else figure)
+            import matplotlib
+
+            from survey import figures
+            from survey.analysis import portrait
+
+            with matplotlib.rc_context(figures.look(None).rc):
+                portrait.draw(found, _new_figure() if figure is None else figure)
         return found
 
     def slice(self, **coords):

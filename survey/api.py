@@ -13,9 +13,9 @@ import xarray as xr
 
 import survey.methods as method_folder
 import survey.scenes as scene_folder
-from survey import engine, modules, own, status, store
+from survey import engine, modules, own, schema, status, store, trust
 from survey import workflow as workflows
-from survey.dataset import count, counts, describe, layout, percent
+from survey.dataset import count, counts, describe, flag_codes, layout, percent
 from survey.errors import BadInput
 from survey.grid import Grid, line
 from survey.hill_scene import HillScene
@@ -136,12 +136,20 @@ def evaluate(
     return count(ds.assign_coords(_own_coordinates(given)))
 
 
-def open(path: str | os.PathLike[str]) -> xr.Dataset:
+def open(path: str | os.PathLike[str], *, trust_scene: bool = False) -> xr.Dataset:
     """The dataset in the netCDF file `path`: in memory and the file closed; or lazy, if it takes more than 256 MiB.
 
-    Raises survey.BadInput if there is no such file or survey did not write it, survey.Damaged if it is incomplete.
+    Opening a file runs nothing of it. A survey of your own Hill equation names a Python file, which has to run where
+    points are solved (`ds.survey.trajectory`, `zoom`, the reason of a verdict): it does if you have run that very text
+    here before; `trust_scene=True` lets it run in this process.
+
+    Raises survey.BadInput if there is no such file or survey did not write it, survey.Damaged if it is incomplete, or
+    holds what no survey does.
     """
-    return store.load(path)
+    ds = store.load(path)
+    if trust_scene:
+        trust.allow(ds.attrs.get("scene_hash", ""))
+    return ds
 
 
 def scenes() -> dict[str, str]:
@@ -289,9 +297,9 @@ def summary(ds: xr.Dataset) -> dict[str, Any]:
         if dim in ds.coords
     }
     return {
-        "title": ds.attrs["title"],
+        "title": ds.attrs.get("title", ""),
         "scene": ds.attrs["scene"],
-        "options": ds.attrs["options"],
+        "options": ds.attrs.get("options", ""),
         "axes": axes,
         "fixed": {name: float(c) for name, c in ds.coords.items() if c.ndim == 0 and c.dtype.kind == "f"},
         "variables": {
@@ -310,7 +318,8 @@ def summary(ds: xr.Dataset) -> dict[str, Any]:
 def areas(ds: xr.Dataset) -> dict[str, str]:
     """{verdict: its area with its error bound, and its share of the map} of a refined map."""
     names = ("area", "area_error", "area_fraction", "area_fraction_error")
-    rows = zip(ds.area_verdict.attrs["flag_meanings"].split(), *(ds[name].values for name in names), strict=True)
+    schema.areas(ds)
+    rows = zip(flag_codes(ds.area_verdict.attrs), *(ds[name].values for name in names), strict=True)
     return {name: f"{area:.12g} +- {bar:.2g} ({percent(part, off)})" for name, area, bar, part, off in rows}
 
 

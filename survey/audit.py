@@ -9,10 +9,12 @@ from functools import partial
 import numpy as np
 import xarray as xr
 
-from survey import own, status
+from survey import own, schema, status
 from survey import workflow as workflows
+from survey.analysis.point import asked
 from survey.api import evaluate
-from survey.dataset import options_of, outputs_of
+from survey.dataset import outputs_of
+from survey.errors import Damaged
 from survey.measures.hill_edges import FACTORS
 from survey.scene import Request, exists
 
@@ -23,18 +25,20 @@ def audit(ds, points, seed=0):
     So must edges and cells, each at random places. Returns {"points" that some method answered, "silent": those that
     none did, "edges", "cells": how many there were, "method", "complaints"}.
     """
-    name = own.of_dataset(ds)
-    _, module = own.find(name)
-    options = options_of(ds)
-    others = [m for m in workflows.methods_of(module, options) if m != ds.attrs["method"]]
-    used = [m for m in module.AUDIT if m in others] or others[:1]
-    report = {"points": 0, "silent": 0, "edges": 0, "cells": 0, "method": " and ".join(used), "complaints": []}
+    report = {"points": 0, "silent": 0, "edges": 0, "cells": 0, "method": "", "complaints": []}
     if not points:
         return report
+    name = own.of_dataset(ds)
+    _, module = own.find(name)
+    options = asked(ds, module)
+    others = [m for m in workflows.methods_of(module, options) if m != ds.attrs["method"]]
+    used = [m for m in module.AUDIT if m in others] or others[:1]
+    report["method"] = " and ".join(used)
     random = np.random.default_rng(seed)
     flat, given = _chosen(ds, module, points, random)
     arrays = {key: xr.DataArray(values, dims="_point") for key, values in given.items()}
     outputs = outputs_of(module, Request(options, variables=frozenset(flat.data_vars)))
+    outputs, report["complaints"] = _alike_stored(flat, outputs, module)
     answered = np.zeros(flat.status.size, bool)
     decided = any(o.name == "verdict" and exists(o, options) for o in module.OUTPUTS)
     rtol, wanted = max(ds.attrs["rtol"] / 100, 1e-13), [o.name for o in outputs]
@@ -53,6 +57,21 @@ def audit(ds, points, seed=0):
     return report | {"points": int(answered.sum()), "silent": int((~answered).sum())}
 
 
+def _alike_stored(flat, outputs, module):
+    """(outputs that the points hold as the scene gives them, complaints of the others)."""
+    sizes = {o.name: tuple(len(module.DIMENSIONS[dim]) for dim in o.dims) for o in outputs}
+    good = [
+        o
+        for o in outputs
+        if flat[o.name].dtype.kind == o.dtype.kind
+        and flat[o.name].dims == ("_point", *o.dims)
+        and flat[o.name].shape[1:] == sizes[o.name]
+        and (o.dtype.kind != "f" or f"{o.name}_error" in flat)
+    ]
+    return good, [f"{o.name}: it is not stored as this output of {flat.attrs['scene']} is" for o in outputs
+                  if o not in good]  # fmt: skip
+
+
 def _place(given, i):
     return ", ".join(f"{key} = {values[i].item()!r}" for key, values in given.items())
 
@@ -66,6 +85,9 @@ def _solve(name, method, options, rtol, ds, module, variables, places):
 
 def _edges(ds, chosen, solve, _):
     """Edges at which the factor of their class has one certain sign on both sides."""
+    schema.edges(ds)
+    if not np.isin(ds.edge_class.values, range(len(FACTORS))).all():
+        raise Damaged("edge_class holds codes of no factor at T/2")
     axis, count = ds.attrs["boundaries"], np.atleast_1d(ds.edge_count.values)
     place = {dim: ds[dim].values[np.repeat(np.arange(count.size), count)[chosen]] for dim in ds.edge_count.dims}
     x, width = ds.edge_position.values[chosen], ds.edge_position_error.values[chosen]
@@ -81,6 +103,7 @@ def _edges(ds, chosen, solve, _):
 
 def _cells(ds, chosen, solve, random):
     """Decided cells with a place that has another verdict."""
+    schema.cells(ds)
     names, part = ds.attrs["refine"].split(", "), random.uniform(0.0, 1.0, (2, chosen.size))
     ends = [[ds[f"cell_{name}_{end}"].values[chosen] for end in ("low", "high")] for name in names]
     place = {name: low + (high - low) * p for name, (low, high), p in zip(names, ends, part, strict=True)}

@@ -11,12 +11,15 @@ import traceback
 import click
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
-from survey.errors import BadInput, SurveyError
-from survey.wording import counted
+from survey.errors import BadInput, SurveyError, Untrusted
+from survey.wording import counted, plain
 
-out = Console(highlight=False, soft_wrap=True)
-err = Console(stderr=True, highlight=False, soft_wrap=True)
+out = Console(highlight=False, soft_wrap=True, emoji=False)
+err = Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
+CELL = 10_000  # characters of an attribute that are shown
+TRUST = "Let the survey's own scene, a Python file, run: only if you have read it, or trust who wrote it."
 
 
 def main(arguments=None):
@@ -46,7 +49,7 @@ def _usage(error):
 
 def complain(message, code):
     """One line on stderr; returns the exit code."""
-    err.print(f"survey: {message}", markup=False)
+    err.print(plain(f"survey: {message}"), markup=False)
     return code
 
 
@@ -101,11 +104,11 @@ def plan(workflow, overrides, output, as_json):
 @program.command()
 @click.argument("path", metavar="OUT.nc")
 @click.option("--points", type=click.IntRange(0), default=20, show_default=True, help="Points to solve again.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Which random points.")
-def verify(path, points, seed):
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Which random points.")
+@click.option("--trust-scene", is_flag=True, help=TRUST)
+def verify(path, points, seed, trust_scene):
     """Check digest, completeness and counts; solve N random points again by another method."""
-    from survey import store
-    from survey.audit import audit
+    from survey import store, trust
 
     ds = store.load(path)
     complaints = store.check(path, ds)
@@ -113,12 +116,43 @@ def verify(path, points, seed):
         complain(complaint, 3)
     if complaints != store.undigested(path):
         return 3
-    again = audit(ds, points, seed)
+    if trust_scene:
+        trust.allow(ds.attrs.get("scene_hash", ""))
+    sound = f"{path}: {'sound but for the digest' if complaints else 'sound'}; "
+    try:
+        again = _audit(ds, points, seed)
+    except BadInput:
+        out.print(plain(f"{sound}no points were solved again"), markup=False)
+        raise
     for complaint in again["complaints"]:
         complain(f"{path}: {complaint}", 3)
     if not again["complaints"]:
-        out.print(f"{path}: {'sound but for the digest' if complaints else 'sound'}; {_audited(again)}", markup=False)
+        out.print(plain(sound + _audited(again)), markup=False)
     return 3 if complaints or again["complaints"] else 0
+
+
+def _audit(ds, points, seed):
+    """`audit`; of a survey with a stranger's scene after the user has said in the terminal that it may run."""
+    from survey import trust
+    from survey.audit import audit
+
+    try:
+        return audit(ds, points, seed)
+    except Untrusted as untrusted:
+        if not _may_run(untrusted):
+            raise
+        trust.allow(untrusted.digest)
+        return audit(ds, points, seed)
+
+
+def _may_run(untrusted):
+    """Ask in the terminal, where there is one, whether a stranger's scene may run."""
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        return False
+    told = f"The scene of this survey is a Python file that you have not run here before: {untrusted.path}"
+    for line in (told, f"sha256 {untrusted.digest}", f"Read it first: {untrusted.reading(untrusted.path)}"):
+        err.print(plain(line), markup=False)
+    return click.confirm("It may do all that you may do. Run it?", default=False, err=True)
 
 
 def _audited(again):
@@ -143,7 +177,7 @@ def info(path, as_json):
     if as_json:
         return _show(table | ({"unfinished": left} if left else {}), True)
     if left:
-        out.print(unfinished.sentence(left), markup=False)
+        out.print(plain(unfinished.sentence(left)), markup=False)
     if table:
         _show(table, False)
 
@@ -174,7 +208,7 @@ def plot(path, output, var, style, width, at):
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise BadInput(f"{target}: cannot draw to it ({reason}); name a .png, .pdf or .svg file with -o") from None
-    out.print(str(target), markup=False)
+    out.print(plain(str(target)), markup=False)
 
 
 @program.command()
@@ -182,11 +216,12 @@ def plot(path, output, var, style, width, at):
 @click.option("--port", type=click.IntRange(0, 65535), default=5006, show_default=True, help="0 for any that is free.")
 @click.option("--link", default="", help="The address of an earlier view, to see it again.")
 @click.option("--no-browser", is_flag=True, help="Only print the address.")
-def view(path, port, link, no_browser):
+@click.option("--trust-scene", is_flag=True, help=TRUST)
+def view(path, port, link, no_browser, trust_scene):
     """Show the map in the browser, to this machine alone: zoom, values with error bars, the motion of a point."""
     from survey.viewer.server import serve
 
-    serve(path, port, link, lambda line: err.print(line, markup=False), not no_browser)
+    serve(path, port, link, lambda line: err.print(plain(line), markup=False), not no_browser, trust_scene)
 
 
 @program.command()
@@ -219,10 +254,10 @@ def precision(scene, peers, output):
 def _show(table, as_json):
     """A mapping as JSON or as two columns."""
     if as_json:
-        return click.echo(json.dumps(table, indent=1, default=str))
+        return click.echo(json.dumps(table, indent=1, default=str).replace("\x7f", "\\u007f"))
     grid = Table.grid(padding=(0, 2))
     for key, value in _rows(table):
-        grid.add_row(key, value)
+        grid.add_row(Text(plain(key)), Text(plain(value, CELL, lines=True)))
     out.print(grid, markup=False)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from survey import status
+from survey import schema, status
 from survey.scene import exists
 
 CONVENTIONS = "CF-1.11, ACDD-1.3"
@@ -198,7 +198,7 @@ def count(ds):
 def counts(ds):
     """{"verdict" (where there is one) and "status": {kind: number of points}}, as `Tally.kinds`."""
     whole = tally(ds)
-    whole.add({name: ds[name].values for name in whole.codes})
+    whole.add({name: ds[name].transpose(*ds.status.dims).values for name in whole.codes})
     return {name: whole.kinds[name] for name in ("verdict", "status") if name in whole.codes}
 
 
@@ -209,13 +209,13 @@ def unanswered(ds):
 
 
 def flag_codes(meaning):
-    """{flag meaning: code} from the attributes of a CF flag variable."""
-    return dict(zip(meaning["flag_meanings"].split(), np.atleast_1d(meaning["flag_values"]).tolist(), strict=True))
+    """{flag meaning: code} from the attributes of a CF flag variable; raises Damaged where they are none."""
+    return schema.flags(meaning)
 
 
 def options_of(ds):
-    """{name: value} of the scene's options."""
-    return dict(pair.split("=") for pair in ds.attrs["options"].split(", ") if pair)
+    """{name: value} of the scene's options; raises Damaged where they are not told."""
+    return schema.options(ds.attrs)
 
 
 def error_bars(ds):

@@ -1,16 +1,43 @@
 """What can go wrong, and the exit code that says so."""
 
+import shlex
+
+from survey.wording import plain
+
 
 class SurveyError(Exception):
     """A failure that is told in one line; `exit_code` is what the command returns."""
 
     exit_code = 4
 
+    def __init__(self, message: object = "") -> None:
+        super().__init__(plain(str(message)))  # it may name what a stranger wrote
+
 
 class BadInput(SurveyError, ValueError):
     """The input is refused before any work: the line names the key, the value, what is allowed, what to do."""
 
     exit_code = 2
+
+
+class Untrusted(BadInput):
+    """A survey's scene is a Python file that this user has not run here before; `text` is what would run."""
+
+    def __init__(self, path: str, digest: str, text: str) -> None:
+        super().__init__(
+            f"scene = {path!r} is a Python file that you have not run here before, and points are solved only by "
+            f"running it; read it ({self.reading(path)}), and if you trust it, give --trust-scene, or in Python "
+            "survey.open(path, trust_scene=True)"
+        )
+        self.path, self.digest, self.text = path, digest, text
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return Untrusted, (self.path, self.digest, self.text)
+
+    @staticmethod
+    def reading(path: str) -> str:
+        """The command that shows the file, its control characters as text."""
+        return f"cat -v -- {shlex.quote(path)}"
 
 
 class Damaged(SurveyError):

@@ -8,6 +8,7 @@ import re
 import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from math import inf
 
 import matplotlib
@@ -16,17 +17,20 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.mathtext import MathTextParser
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
+from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import ScaledTranslation
 
-from survey import modules, status
+from survey import modules, schema, status
 from survey.analysis import areas
 from survey.dataset import flag_codes, percent, unanswered
 from survey.errors import BadInput
 from survey.grid import logarithmic
 from survey.reduced import Overview, Points
+from survey.wording import plain
 
 # after Okabe and Ito, safe for the colour-blind, the first two far apart in grey print too;
 # black is kept for undecided, white with hatching for failed
@@ -42,6 +46,9 @@ FINE = 0.8  # cells for each pixel of the axes, before legend and labels take th
 SPARE = 0.95  # of the room for a text: fonts are a little wider at other resolutions
 BESIDE = 1.2  # of the width of axes that have neighbours: texts may reach into the gap
 MARK_BELOW = 0.002  # a share of the map: rarer points are also marked with a ring, or nobody would see them
+SAID, SYMBOL = 300, 120  # characters of a text, and of a formula, of a file
+DEPTH = 6  # of nested braces in a formula
+SIZED = ("\\hspace", "\\genfrac")  # TeX that takes lengths, which may be of miles
 _EDGES = "edges: even dark, odd grey;\nperiodic solid, antiperiodic dashed"
 _RIM = withStroke(linewidth=2.0, foreground="#444444")
 _POINT = {"ls": "none", "mec": "#000000", "mew": 0.8}
@@ -71,10 +78,11 @@ class Look:
 
 
 _WIDE = (7.2, 5.2)
+_RC = {"text.usetex": False}  # a stranger's file must not reach LaTeX, which reads and writes files
 STYLES = {
-    "screen": Look({"single": _WIDE, "double": _WIDE}, 150),
+    "screen": Look({"single": _WIDE, "double": _WIDE}, 150, rc=_RC),
     # columns of 85 and 175 mm; fonts are embedded as TrueType (42), as journals ask
-    "paper": Look({"single": (3.35, 2.9), "double": (6.89, 4.4)}, 600, True, {
+    "paper": Look({"single": (3.35, 2.9), "double": (6.89, 4.4)}, 600, True, _RC | {
         "font.family": "STIXGeneral", "mathtext.fontset": "stix", "font.size": 9, "axes.labelsize": 9,
         "xtick.labelsize": 8, "ytick.labelsize": 8, "axes.linewidth": 0.6, "xtick.major.width": 0.6,
         "ytick.major.width": 0.6, "hatch.linewidth": 0.35, "pdf.fonttype": 42, "ps.fonttype": 42,
@@ -115,11 +123,14 @@ def draw(ds, name=None, style=None, width="single"):
 def onto(axes, ds, name=None, boundaries=True, style=None):
     """Draw one variable (the verdict, or the first output) onto matplotlib axes; BadInput for an unknown one."""
     paper = look(style).paper
-    drawable = [key for key in ds.data_vars if not key.endswith("_error") and set(ds[key].dims) >= set(ds.status.dims)]
+    drawable = [key for key in ds.data_vars if not key.endswith("_error") and set(ds[key].dims) >= set(ds.status.dims)
+                and ds[key].dtype.kind in "iuf"]  # fmt: skip
     name = name or ("verdict" if "verdict" in ds else drawable[0])
     if name not in drawable:
         raise BadInput(modules.unknown("variable", name, drawable))
     variable, state = _flat(ds, name)
+    for text in axes.findobj(Text):  # made, perhaps, while the user had LaTeX on
+        text.set_usetex(False)
     if variable.ndim == 2:
         _map(axes, ds, variable, state, boundaries, paper)
     elif variable.ndim == 1:
@@ -140,11 +151,48 @@ def _fit(axes):
             wrap(text, room)
 
 
+def words(text, most=SAID):
+    """A file's text for matplotlib: nothing in it is a formula, nothing invisible, and no end of it."""
+    return plain(str(text), most).replace("$", r"\$")
+
+
+def formula(symbol, name):
+    """`symbol` as a formula, if it is TeX that matplotlib can draw; else the name as text."""
+    return f"${symbol}$" if _is_formula(symbol) else words(name)
+
+
+@lru_cache(maxsize=512)
+def _is_formula(symbol):
+    if not 0 < len(symbol) <= SYMBOL or "$" in symbol or not symbol.isprintable() or _depth(symbol) > DEPTH:
+        return False
+    if any(command in symbol for command in SIZED):
+        return False
+    try:
+        MathTextParser("path").parse(f"${symbol}$")
+    except (ValueError, RecursionError):
+        return False
+    return True
+
+
+def _depth(symbol):
+    """How deep braces are nested."""
+    level = np.cumsum([(c == "{") - (c == "}") for c in symbol])
+    return int(level.max(initial=0))
+
+
 def _flat(ds, name):
     """The variable and the status on at most two of the survey's dimensions (the first place of any other)."""
     keep = list(ds.status.dims)[:2]
     first = {dim: 0 for dim in ds[name].dims if dim not in keep}
-    return ds[name].isel(first), ds.status.isel({dim: 0 for dim in ds.status.dims if dim not in keep})
+    state = ds.status.isel({dim: 0 for dim in ds.status.dims if dim not in keep})
+    variable = ds[name].isel(first).transpose(*state.dims)
+    unsorted = [dim for dim in keep if not _goes_one_way(variable[dim].values)]
+    return (variable.sortby(unsorted), state.sortby(unsorted)) if unsorted else (variable, state)
+
+
+def _goes_one_way(values):
+    steps = np.diff(values.astype(float))
+    return bool((steps >= 0).all() or (steps <= 0).all())
 
 
 def _map(axes, ds, variable, state, boundaries, paper):
@@ -207,7 +255,8 @@ def in_plane(ds, variable):
 
 
 def curves_of(ds):
-    """{class: slices of its curves in `curve_point`}, in the order in which they are drawn."""
+    """{class: slices of its curves in `curve_point`}, in the order in which they are drawn; raises Damaged."""
+    schema.curves(ds)
     names = {code: name for name, code in flag_codes(ds.curve_class.attrs).items()}
     kinds, ends = ds.curve_class.values, np.cumsum(ds.curve_count.values)
     found = {}
@@ -235,6 +284,7 @@ def _curves(axes, ds, x, y):
 
 def _cells(axes, ds, x, y, failed, number, paper):
     """The map's cells instead of its points, with the area of each verdict. Returns the handles."""
+    schema.cells(ds)
     left, right, low, high = (ds[f"cell_{axis.name}_{end}"].values for axis in (x, y) for end in ("low", "high"))
     corners = np.stack([left, low, left, high, right, high, right, low], axis=1).reshape(-1, 4, 2)
     table = flag_codes(ds.cell_verdict.attrs)
@@ -252,7 +302,7 @@ def _cells(axes, ds, x, y, failed, number, paper):
         bar = float(ds.area_fraction_error[0])
         part = percent(shares[name], bar) if name in shares else f"{100 * areas.undecided(ds):.2g} %"
         part = part.replace("+-", "±")
-        patch = Patch(facecolor=colour, edgecolor="black", lw=0.5, hatch=hatch, label=f"{name} ({part})")
+        patch = Patch(facecolor=colour, edgecolor="black", lw=0.5, hatch=hatch, label=f"{words(name)} ({part})")
         handles += [patch] if own.any() else []
     axes.set(xlim=(left.min(), right.max()), ylim=(low.min(), high.max()))
     return handles + _marks(axes, x, y, failed, "failed", number, paper)
@@ -263,7 +313,7 @@ def _kinds(ds, variable, state):
 
     The kinds are its flags, and after them why points have no answer by nature, whose code is not that of undecided.
     """
-    table, shown = flag_codes(variable.attrs), variable.values.copy()
+    table, shown = flag_codes(variable.attrs), variable.values.astype(np.int32)
     colours = dict.fromkeys(table, "#444444") | colours_of(table) | greys_of(ds, table)
     for name, code in ((name, unanswered(ds)[name]) for name in greys_of(ds, table)):
         table[name] = max(table.values()) + 1
@@ -288,7 +338,7 @@ def _verdicts(axes, x, y, ds, variable, state, number, paper):
             edgecolor="black",
             linewidth=0.5,
             hatch=_hatch(flags, names[code]) if paper else None,
-            label=names[code].replace("_", " ") if paper else _counted(names[code], number),
+            label=_spaced(names[code]) if paper else _counted(names[code], number),
         )
         for code in codes
         if number[names[code]] and names[code] != "undecided"
@@ -377,10 +427,10 @@ def _curve(axes, ds, variable, state, paper):
         for height, name in enumerate(names):
             here = x.values[(shown == table[name]).filled(False)]
             axes.plot(here, np.full(here.size, height), "s", markersize=4, color=palette[name])
-        axes.set_yticks(range(len(names)), [name.replace("_", " ") for name in names], fontsize=8)
+        axes.set_yticks(range(len(names)), [_spaced(name) for name in names], fontsize=8)
     else:
-        label = textwrap.fill(variable.attrs.get("long_name", variable.name), 60)
-        label = f"${variable.attrs.get('symbol') or variable.name}$" if paper else label
+        label = textwrap.fill(words(variable.attrs.get("long_name", variable.name)), 60)
+        label = formula(variable.attrs.get("symbol") or variable.name, variable.name) if paper else label
         axes.plot(x, variable, lw=1.2, color="#0072B2", label=label)
     if f"{variable.name}_error" in ds:
         bar = ds[f"{variable.name}_error"].isel({d: 0 for d in ds[variable.name].dims if d not in variable.dims})
@@ -455,26 +505,36 @@ def limits(shown):
 def label_of(variable):
     """`long name, symbol (unit)`."""
     symbol, units = variable.attrs.get("symbol", ""), variable.attrs.get("units", "1")
-    text = variable.attrs.get("long_name", variable.name)
-    shown = symbol and "flag_values" not in variable.attrs
+    text = words(variable.attrs.get("long_name", variable.name))
+    shown = _is_formula(symbol) and "flag_values" not in variable.attrs
     text = "$$" if text == symbol else f"{text}, $$" if shown else text  # TeX is wider than what it shows: put in last
-    text += "" if units in ("1", "") else f" ({units})"
+    text += "" if units in ("1", "") else f" ({words(units)})"
     wrapped = textwrap.fill(text, 40, break_long_words=False)
     return wrapped.replace("$$", f"${symbol}$") if shown else wrapped
 
 
 def _title(ds, variable):
     """The survey's title, what is drawn, and the numbers that are fixed and not zero."""
-    lines = [ds.attrs.get("title", ""), variable.attrs.get("long_name", variable.name)]
+    lines = [words(ds.attrs.get("title", "")), words(variable.attrs.get("long_name", variable.name))]
     fixed = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "fi"]
     fixed = [c for c in fixed if c.name in ds.dims or float(c) != 0]
     of = {name: f" (1 of {ds.sizes[name]})" for name in variable.coords if ds.sizes.get(name, 1) > 1}
-    numbers = [f"${c.attrs.get('symbol') or c.name} = {float(c):.6g}${of.get(c.name, '')}" for c in fixed]
+    numbers = [f"{_equal(c)}{of.get(c.name, '')}" for c in fixed]
     labels = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "UO"]
-    numbers = ", ".join(numbers + [f"{c.name} {c.item()}{of.get(c.name, '')}" for c in labels])
-    lines[1] += f" ({ds.attrs['options']})" if ds.attrs.get("options") else ""
+    numbers = ", ".join(numbers + [f"{words(c.name)} {words(c.item())}{of.get(c.name, '')}" for c in labels])
+    lines[1] += f" ({words(ds.attrs['options'])})" if ds.attrs.get("options") else ""
     return "\n".join([*lines, numbers] if numbers else lines)
 
 
+def _equal(coordinate):
+    """`symbol = number` of a fixed parameter."""
+    symbol, number = coordinate.attrs.get("symbol") or coordinate.name, f"{float(coordinate):.6g}"
+    return f"${symbol} = {number}$" if _is_formula(symbol) else f"{words(coordinate.name)} = {number}"
+
+
+def _spaced(name):
+    return words(name.replace("_", " ").strip())
+
+
 def _counted(name, number):
-    return f"{name.replace('_', ' ')} ({number[name]:,})"
+    return f"{_spaced(name)} ({number[name]:,})"

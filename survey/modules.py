@@ -7,6 +7,8 @@ from pkgutil import iter_modules
 
 from survey.errors import BadInput
 
+LONGEST = 80  # characters of a name that are told
+
 
 def names(package):
     """Sorted names of the modules in `package` (an imported package)."""
@@ -16,7 +18,7 @@ def names(package):
 def load(package, name, what):
     """The module `name` of `package`; raises BadInput, naming the nearest, if there is none."""
     whole = f"{package.__name__}.{name}"
-    if whole in sys.modules:  # the folder is not read anew for every block
+    if str(name).isidentifier() and whole in sys.modules:  # the folder is not read anew for every block
         return sys.modules[whole]
     known = names(package)
     if name not in known:
@@ -26,6 +28,7 @@ def load(package, name, what):
 
 def unknown(what, name, known):
     """One line for an unknown name: what it is, the nearest known one, and all that are allowed."""
+    name = name if len(str(name)) <= LONGEST else f"{str(name)[: LONGEST - 4]} ..."
     same = {other.lower(): other for other in known}
     near = get_close_matches(str(name).lower(), same, n=1, cutoff=0.5)
     hint = f"; did you mean {same[near[0]]!r}?" if near else ""

@@ -8,13 +8,16 @@ The file holds
     EVEN         True where z(T - u) = z(u), which halves the work and makes edges certain; False by default
     BREAKS       where z or a derivative jumps, in [0, T]: number(s), or a function of p; none by default
 
-and, as it likes, a docstring, TITLE and REFERENCES. It is run, as any Python file is: use files that you trust. What
-it imports is not watched when a run is resumed. z goes on with period T; what is narrower than a hundredth of T may be
+and, as it likes, a docstring, TITLE and REFERENCES. It is run, as any Python file is: use files that you trust. One
+that only a survey's file names is run if this user has run it here before, or allows it (`survey/trust.py`). What it
+imports is not watched when a run is resumed. z goes on with period T; what is narrower than a hundredth of T may be
 missed unless BREAKS stand beside it. [boundaries] and [refine] take z to be analytic in the parameters.
 """
 
 import hashlib
 import inspect
+import os
+import stat
 from collections.abc import Callable, Iterable
 from functools import lru_cache
 from itertools import product
@@ -26,8 +29,8 @@ import numpy as np
 import numpy.typing as npt
 
 import survey.scenes
-from survey import modules
-from survey.errors import BadInput
+from survey import modules, trust
+from survey.errors import BadInput, Untrusted
 from survey.hill_scene import SAME, HillScene, is_number, reason
 from survey.measures import hill as measure
 from survey.scene import Parameter
@@ -38,6 +41,7 @@ EXAMPLES = {
     "PARAMETERS": 'PARAMETERS = ("a", "b"), the names of p[0], p[1]',
 }
 _made: Any = {}  # by hash: what `hill` has made in this process
+MOST = 2**20  # bytes of a scene's file
 REFERENCES = ("W. Magnus, S. Winkler, Hill's Equation, Interscience 1966",)
 
 
@@ -91,16 +95,10 @@ def find(scene: Any, near: str | Path | None = None) -> tuple[str, Any]:
         )
     if not str(scene).endswith(".py"):
         return scene, modules.load(survey.scenes, scene, "scene")
-    paths = [Path(scene), *([Path(near) / scene] if near is not None else [])]
-    path = next((path for path in paths if path.is_file()), None)
-    if path is None:
-        looked = " or ".join(dict.fromkeys(str(path) for path in paths))
-        raise BadInput(f"scene = {str(scene)!r}: there is no file {looked}; name the file of your own Hill equation")
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadInput(f"{path}: cannot read this scene ({getattr(error, 'strerror', None) or error})") from None
-    return str(path), _from_text(str(path), text)
+    path, text = _read(scene, near)
+    found = _from_text(str(path), text)
+    trust.keep(found.HASH)  # whoever names the file wants it run
+    return str(path), found
 
 
 def check(scene: Any, grid: Any = None) -> None:
@@ -117,24 +115,62 @@ def check(scene: Any, grid: Any = None) -> None:
 
 
 def of_dataset(ds: Any) -> Any:
-    """The scene of a survey's dataset, as `find` takes it; BadInput if it was a user's and is not as it was."""
-    name = ds.attrs["scene"]
-    if "scene_hash" not in ds.attrs:
+    """The scene of a survey's dataset, as `find` takes it.
+
+    Raises BadInput if it was a user's and is not as it was, Untrusted if its file has yet to be allowed to run.
+    """
+    name, digest = ds.attrs["scene"], ds.attrs.get("scene_hash")
+    if not isinstance(name, str):
+        raise BadInput(f"the attribute scene is {str(name)[:60]!r}, which names no scene")
+    if name.endswith(".py"):
+        return _from_file(name, digest, Path(ds.encoding.get("source") or "").parent)
+    if digest is None:
         return name
-    if not name.endswith(".py") and ds.attrs["scene_hash"] in _made:
-        return _made[ds.attrs["scene_hash"]]
-    if not name.endswith(".py"):
-        raise BadInput(
-            f"scene = {name!r} was a function given from Python: points cannot be solved again without it; "
-            "give it to survey.hill again first"
-        )
+    if isinstance(digest, str) and digest in _made:
+        return _made[digest]
+    raise BadInput(
+        f"scene = {name!r} was a function given from Python: points cannot be solved again without it; "
+        "give it to survey.hill again first"
+    )
+
+
+def _from_file(name: str, digest: Any, near: Path) -> HillScene:
+    """The scene in the file that a dataset names; nothing of it runs before its hash is compared and known."""
     try:
-        name, scene = find(name, Path(ds.encoding.get("source", "")).parent)
+        path, text = _read(name, near)
     except BadInput:
         raise BadInput(f"scene = {name!r}: its file has gone; the attribute scene_text holds what it said") from None
-    if scene.HASH != ds.attrs["scene_hash"]:
+    found = hashlib.sha256(text.encode()).hexdigest()
+    if found != digest:
         raise BadInput(f"scene = {name!r}: its file has changed since; the attribute scene_text holds what it said")
-    return name
+    if not trust.known(found):
+        raise Untrusted(str(path), found, text)
+    return _from_text(str(path), text)
+
+
+def _read(name: str | Path, near: str | Path | None) -> tuple[Path, str]:
+    """(path, text) of a scene's file, read once: what is hashed is what runs. Raises BadInput."""
+    paths = [Path(name), *([Path(near) / name] if near is not None else [])]
+    path = next((path for path in paths if _is_file(path)), None)
+    if path is None:
+        looked = " or ".join(dict.fromkeys(str(path) for path in paths))
+        raise BadInput(f"scene = {str(name)!r}: there is no file {looked}; name the file of your own Hill equation")
+    try:
+        with open(path, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK)) as file:
+            regular = stat.S_ISREG(os.fstat(file.fileno()).st_mode)
+            content = file.read(MOST + 1) if regular else b""
+        if not regular or len(content) > MOST:
+            raise BadInput(f"{path}: this is no scene: it is no file, or takes more than {MOST:,} bytes")
+        return path, content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
+    except (OSError, UnicodeDecodeError) as error:
+        raise BadInput(f"{path}: cannot read this scene ({getattr(error, 'strerror', None) or error})") from None
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # a name that the system does not take
+        return False
 
 
 @lru_cache(maxsize=32)

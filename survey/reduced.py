@@ -10,6 +10,7 @@ import numpy as np
 
 from survey import status
 from survey.dataset import fill_of, flag_codes
+from survey.errors import Damaged
 
 NO_ANSWER = ("outside the domain", "failed")
 UNREAD = "not read yet"
@@ -34,7 +35,9 @@ class Points:
         self.fill = np.nan if self.flagged or fill_of(variable) is None else fill_of(variable)
         self.own = own if "undecided" in self.flags else {}
         self.kinds = [*self.flags, *self.own, *NO_ANSWER, UNREAD]
-        self.dtype = next(dtype for dtype in MASKS if len(self.kinds) <= np.iinfo(dtype).bits)
+        self.dtype = next((dtype for dtype in MASKS if len(self.kinds) <= np.iinfo(dtype).bits), None)
+        if self.dtype is None:
+            raise Damaged(f"{variable.name}: a point may be of {len(self.kinds)} kinds, more than a map can show")
         self.bits = {kind: self.dtype(1 << i) for i, kind in enumerate(self.kinds)}
         self._of_code, self._of_status, self._of_open = np.zeros((3, 256), self.dtype)
         for flag, code in self.flags.items():

@@ -16,14 +16,16 @@ import numpy as np
 from isal import isal_zlib
 from rich import filesize
 
-from survey import lock, status, unfinished
+from survey import lock, schema, status, unfinished
 from survey.dataset import tally
 from survey.errors import BadInput, Damaged, Stopped, SurveyError
 from survey.grid import halved
 
 FORMAT = 3
 TILE_POINTS = 2**16
+PIECE = 2**20  # points that are read at once where a file has no tiles
 NETCDF = (b"\x89HDF", b"CDF")  # how a netCDF file begins
+DIGEST = 2**12  # bytes: a line or two
 IN_MEMORY = 2**28  # bytes: a larger file is opened lazily
 
 
@@ -421,7 +423,6 @@ def load(path, chunks="auto"):
     Raises BadInput (no file of survey) or Damaged (one that is incomplete, or whose bits have changed).
     """
     import netCDF4
-    import xarray as xr
 
     path = Path(path)
     _refuse_absent(path)
@@ -429,16 +430,32 @@ def load(path, chunks="auto"):
         _refuse_changed(path)
         with netCDF4.Dataset(path) as file:
             _refuse_foreign(path, file)
-        with xr.open_dataset(path, engine="netcdf4") as ds:
+            schema.check_declared(file, path.stat().st_size)
+        with _opened(path) as ds:
             if ds.nbytes <= IN_MEMORY:
                 return ds.load()
-        return xr.open_dataset(path, engine="netcdf4", chunks=chunks)
-    except SurveyError:
+        return _opened(path, chunks)
+    except (BadInput, Stopped):
         raise
+    except Damaged as error:
+        raise Damaged(error if str(error).startswith(str(path)) else f"{path}: {error}; ask who wrote it") from None
     except PermissionError:
         raise BadInput(f"{path}: this file must not be read; allow it, such as with chmod u+r") from None
-    except (OSError, RuntimeError, ValueError) as error:
+    except Exception as error:  # a stranger's file may make the libraries that decode it raise anything
         raise Damaged(f"{path}: cannot be read ({error}); run the workflow again") from None
+
+
+def _opened(path, chunks=None):
+    """The checked dataset, lazy."""
+    import xarray as xr
+
+    ds = xr.open_dataset(path, engine="netcdf4", chunks=chunks, decode_times=False, decode_timedelta=False)
+    try:
+        schema.check(ds)
+    except BaseException:
+        ds.close()
+        raise
+    return ds
 
 
 def _refuse_absent(path):
@@ -455,7 +472,7 @@ def _refuse_changed(path):
     beside = digest_of(path)
     with open(path, "rb") as file:
         if beside.exists():
-            if hashlib.file_digest(file, "sha256").hexdigest().encode() not in beside.read_bytes():
+            if hashlib.file_digest(file, "sha256").hexdigest().encode() not in _head(beside):
                 raise Damaged(
                     f"{path}: the file's bits differ from the digest in {beside.name}; run the workflow again"
                 )
@@ -463,11 +480,20 @@ def _refuse_changed(path):
             raise BadInput(f"{path}: this is not a netCDF file of survey; name one that survey run wrote")
 
 
+def _head(path):
+    """What a digest's file says; no more is read, and nothing of what is no file."""
+    if not path.is_file():
+        return b""
+    with open(path, "rb") as file:
+        return file.read(DIGEST)
+
+
 def _refuse_foreign(path, file):
     """Raise BadInput if the open netCDF file is not of survey, Damaged if it is not complete."""
-    if "status" not in file.variables or "scene" not in file.ncattrs():
+    names = file.ncattrs()
+    if "status" not in file.variables or "scene" not in names:
         raise BadInput(f"{path}: this netCDF file was not written by survey; name one that survey run wrote")
-    if getattr(file, "complete", 0) != 1:
+    if "complete" not in names or not np.array_equal(np.ravel(file.getncattr("complete")), [1]):
         raise Damaged(f"{path}: the file is incomplete; run the workflow again")
 
 
@@ -500,9 +526,13 @@ def check(path, ds=None):
         again.add(arrays)
         wrong |= dict.fromkeys(_unsound(path, arrays))
     for key, told in again.attributes.items():
-        if ds.attrs.get(key) not in (told, again.before.get(key, told)):
-            complaints.append(f"{path}: {key} says {ds.attrs.get(key)!r}, the data say {told!r}")
-    if again.counts["status"]["pending"]:
+        said = ds.attrs.get(key)
+        if not any(np.array_equal(said, right) for right in (told, again.before.get(key, told))):
+            complaints.append(f"{path}: {key} says {said!r}, the data say {told!r}")
+    for name, number in again.counts.items():
+        if sum(number.values()) != again.points:
+            complaints.append(f"{path}: {name} holds codes that its flag_values do not name")
+    if again.counts["status"].get("pending"):
         complaints.append(f"{path}: some points are still pending")
     return complaints + list(wrong)
 
@@ -512,7 +542,8 @@ def pieces(ds):
     point = ds.status.dims
     names = [name for name in ds.data_vars if set(point) <= set(ds[name].dims)]
     cut = point[:1]
-    step = ds.status.encoding.get("chunksizes", ds.status.shape)[0] if cut else 1
+    rows = max(1, PIECE // max(1, prod(ds.status.shape[1:])))
+    step = (ds.status.encoding.get("chunksizes") or (rows,))[0] if cut else 1
     for first in range(0, ds.sizes[cut[0]] if cut else 1, step):
         some = ds[names].isel({dim: slice(first, first + step) for dim in cut})
         yield {name: some[name].transpose(*point, ...).values for name in names}

@@ -49,6 +49,15 @@ def _compile_untraced(self, sig):
 Dispatcher.compile = _compile_untraced
 
 
+@pytest.fixture(autouse=True, scope="session")
+def state(tmp_path_factory):
+    """A state folder of the tests' own, in processes that they start too: no test learns what the user has run."""
+    folder = tmp_path_factory.mktemp("state")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_STATE_HOME", str(folder))
+        yield folder
+
+
 @pytest.fixture
 def program(tmp_path):
     """Run `survey` in an empty folder; returns the finished process with its output as text."""

@@ -5,8 +5,7 @@ from itertools import product
 import numpy as np
 import xarray as xr
 
-from survey import status
-from survey.analysis.point import scene_of
+from survey import own, schema, status
 from survey.dataset import flag_codes, percent
 from survey.errors import BadInput
 
@@ -33,13 +32,22 @@ def of_map(ds):
     units = " ".join(u for u in (ds[dim].attrs.get("units", "1") for dim in ds.status.dims) if u != "1") or "1"
     found = _described([list(codes)[i] for i in kept], area[kept], bar[kept], total, units, COMMENT)
     found.attrs["areas"] += "; from points: what is narrower than their spacing is not seen"
-    if len(ds.status.dims) == 2 and getattr(scene_of(ds), "FAMILY", "") == "hill":
+    if len(ds.status.dims) == 2 and _is_hill(ds):
         found.attrs["areas"] += " ([refine] bounds it)"
     return found
 
 
+def _is_hill(ds):
+    """Is the scene of the family that [refine] serves? A user's own is; it need not run to be known as one."""
+    try:
+        return "scene_hash" in ds.attrs or getattr(own.find(own.of_dataset(ds))[1], "FAMILY", "") == "hill"
+    except BadInput:
+        return False
+
+
 def _of_cells(ds):
     """The areas of decided cells; what is left is undecided, all or none of it an area of either verdict."""
+    schema.areas(ds)
     names = list(flag_codes(ds.area_verdict.attrs))
     share = ds.area_fraction.values
     total = float(ds.area.values[share.argmax()] / share.max())

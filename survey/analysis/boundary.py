@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from survey import modules
+from survey import modules, schema
 from survey.dataset import flag_codes
 from survey.errors import BadInput
 
@@ -31,6 +31,7 @@ def find(ds, kind=None, index=None):
 
 def _curves(ds):
     """Every point of every curve."""
+    schema.curves(ds)
     number = ds.curve_count.values
     which = np.repeat(np.arange(number.size), number)
     along = [name for name, v in ds.data_vars.items() if v.dims == ("curve_point",)]
@@ -44,6 +45,7 @@ def _curves(ds):
 
 def _edges(ds):
     """Every edge of every row."""
+    schema.edges(ds)
     count, axis = ds.edge_count, ds.attrs.get("boundaries", ds.status.dims[-1])
     found = {}
     for dim in count.dims:
@@ -57,6 +59,7 @@ def _edges(ds):
 
 def _undecided_cells(ds):
     """The middles of the cells that [refine] left undecided: every boundary lies in one of them."""
+    schema.cells(ds)
     left, found = np.flatnonzero(ds.cell_verdict.values == flag_codes(ds.cell_verdict.attrs)["undecided"]), {}
     for dim in ds.attrs["refine"].split(", "):
         low, high = (ds[f"cell_{dim}_{end}"].values[left] for end in ("low", "high"))

@@ -87,9 +87,10 @@ def _unlike(one, other):
     """What else the two differ in: options, method, accuracy, code, fixed parameters."""
     keys = ("options", "method", "rtol", "version_survey", "kernel_hash", "scene_hash")
     told = [f"{key}: {one.attrs.get(key)} and {other.attrs.get(key)}" for key in keys
-            if one.attrs.get(key) != other.attrs.get(key)]  # fmt: skip
+            if not np.array_equal(one.attrs.get(key), other.attrs.get(key))]  # fmt: skip
     for name, value in one.coords.items():
-        if name in other.coords and value.ndim == other[name].ndim == 0 and value.item() != other[name].item():
+        numbers = name in other.coords and all(c.ndim == 0 and c.dtype.kind in "iuf" for c in (value, other[name]))
+        if numbers and value.item() != other[name].item():
             told.append(f"{name}: {value.item():g} and {other[name].item():g}")
     return "; ".join(told)
 

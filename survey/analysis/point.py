@@ -2,14 +2,19 @@
 
 import html
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 import xarray as xr
 
-from survey import modules, own, status
+from survey import modules, own, status, workflow
 from survey.dataset import UNDECIDED, error_bars, fill_of, flag_codes, options_of
-from survey.errors import BadInput
+from survey.errors import BadInput, Damaged, Untrusted
+from survey.wording import plain
 
+MOST = 1000  # places of an output that are told
+# What Jupyter and Sphinx leave as it is: dollars in a stranger's text are no TeX.
+NO_FORMULAS = "tex2jax_ignore mathjax_ignore"
 # Attributes that tell of a whole file.
 WHOLE = (
     "points", "accuracy_missed", "status_counts", "verdict_counts", "areas", "boundaries", "refine", "refine_points",
@@ -40,12 +45,14 @@ def place(ds, coords):
 
     A number may lie beyond an end by half a step, not more.
     """
-    axes = [dim for dim in ds.status.dims if dim in ds.coords]
+    axes = [dim for dim in ds.status.dims if dim in ds.coords and ds[dim].dtype.kind in "iuf"]
     places = {}
     for name, value in coords.items():
         if name not in axes:
             raise BadInput(modules.unknown("axis", name, axes))
         values = ds[name].values
+        if not np.isfinite(values).all():
+            raise Damaged(f"the axis {name} holds what is no finite number")
         if np.ndim(value) or np.asarray(value).dtype.kind not in "iuf" or not np.isfinite(value):
             raise BadInput(f"{name} = {value!r}: give one number, from {values.min():g} to {values.max():g}")
         i = int(np.abs(values - float(value)).argmin())
@@ -90,6 +97,11 @@ def meaning(variable):
     return words.get(int(variable), str(int(variable)))
 
 
+def asked(ds, scene):
+    """{name: value} of the options in the file, all that the scene has then; raises BadInput for others."""
+    return workflow.check_options(scene, options_of(ds), [p.name for p in scene.PARAMETERS if p.name in ds.coords])
+
+
 def parameters(ds):
     """{name: value} of a point's parameters."""
     return {name: float(c) for name, c in ds.coords.items() if c.ndim == 0 and c.dtype.kind in "fi"}
@@ -125,28 +137,35 @@ class Point:
         ds = self.dataset
         if int(ds.status) != status.OK:
             return sentence(ds)
-        judge = getattr(scene_of(ds), "why", None)
-        if judge is None or "verdict" not in ds:
+        if "verdict" not in ds:
             return sentence(ds)
         try:
-            return judge(values(ds))
+            judge = getattr(own.find(own.of_dataset(ds))[1], "why", None)
+        except Untrusted as untrusted:
+            return str(untrusted)
+        except BadInput:
+            judge = None
+        try:
+            return judge(values(ds)) if judge else sentence(ds)
         except KeyError as missing:
             return f"the file does not hold {missing.args[0]}, which decides; let the survey write it"
+        except (ArithmeticError, LookupError, TypeError, ValueError):
+            return "the file's values are not those of this scene"
 
     def __repr__(self):
-        rows = list(self._rows())
-        wide = max(len(f"{name} = {value}") for name, value, about in rows if about)
+        rows = [tuple(map(plain, row)) for row in self._rows()]
+        wide = max((len(f"{name} = {value}") for name, value, about in rows if about), default=0)
         lines = (f"{name} = {value}".ljust(wide) + f"  {about}" if about else f"{name}: {value}"
                  for name, value, about in rows)  # fmt: skip
-        return "\n".join([self.dataset.attrs.get("title", self.dataset.attrs["scene"]), *lines])
+        return "\n".join([plain(self.dataset.attrs.get("title", self.dataset.attrs["scene"])), *lines])
 
     def _repr_html_(self):
         rows = "".join(
             "<tr>" + _cell(name) + (_cell(value) + _cell(about) if about else _cell(value, 2)) + "</tr>"
             for name, value, about in self._rows()
         )
-        title = html.escape(self.dataset.attrs.get("title", self.dataset.attrs["scene"]))
-        return f"<table><caption>{title}</caption>{rows}</table>"
+        title = html.escape(plain(self.dataset.attrs.get("title", self.dataset.attrs["scene"])))
+        return f"<table class='{NO_FORMULAS}'><caption>{title}</caption>{rows}</table>"
 
     def _rows(self):
         """(name, value, what it is) of everything; words have nothing in the third place."""
@@ -168,7 +187,7 @@ class Point:
 
 
 def _cell(text, columns=1):
-    return f"<td colspan='{columns}' style='text-align:left;vertical-align:top'>{html.escape(text)}</td>"
+    return f"<td colspan='{columns}' style='text-align:left;vertical-align:top'>{html.escape(plain(text))}</td>"
 
 
 def values(ds):
@@ -178,14 +197,6 @@ def values(ds):
         for name, v in ds.variables.items()
         if set(v.dims) <= set(ds.dims)
     }
-
-
-def scene_of(ds):
-    """The scene's module, or None where it is a user's that is gone."""
-    try:
-        return own.find(own.of_dataset(ds))[1]
-    except BadInput:
-        return None
 
 
 def has_verdict(ds):
@@ -206,11 +217,11 @@ def _outputs(ds, name, variable, has_bar):
     if not variable.ndim:
         yield name, reading(ds, name, has_bar), about
         return
-    label = variable.dims[0]
-    for i in range(ds.sizes[label]):
-        value = reading(ds.isel({label: i}), name, has_bar)
+    for place in islice(np.ndindex(variable.shape), MOST):
+        where = dict(zip(variable.dims, place, strict=True))
+        value = reading(ds.isel(where), name, has_bar)
         if value not in ("does not apply", "none"):
-            yield f"{name}[{ds[label].values[i]}]", value, about
+            yield f"{name}[{', '.join(str(ds[dim].values[i]) for dim, i in where.items())}]", value, about
 
 
 def reading(ds, name, has_bar):
@@ -224,6 +235,8 @@ def reading(ds, name, has_bar):
     if not has_bar:
         return "does not apply" if value == fill_of(variable) else str(variable.values)
     bar = float(ds[f"{name}_error"])
+    if not 0 <= bar < np.inf:
+        return f"{value!r}, its error bar is {bar}"
     known = 2 if bar == 0 or value == 0 else np.floor(np.log10(abs(value))) - np.floor(np.log10(bar)) + 2
     return f"{value:#.{int(np.clip(known, 2, 17))}g} +- {bar:.2g}" if bar else f"{value!r} +- 0"
 

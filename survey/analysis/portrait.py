@@ -6,7 +6,7 @@ cylinder among its neighbours; `plane x y`, a path; `sphere x y z`, a path on th
 
 import numpy as np
 
-from survey.figures import COLOURS, label_of, wrap
+from survey.figures import COLOURS, label_of, words, wrap
 
 LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 GREY = "#999999"
@@ -18,7 +18,9 @@ def draw(ds, figure):
     for i, (kind, *names) in enumerate(panels):
         more = {"projection": "3d"} if kind == "sphere" else {}
         KINDS[kind](figure.add_subplot(1, len(panels), i + 1, **more), ds, *names)
-    title = figure.suptitle("\n".join(part for part in (ds.attrs["title"], ds.attrs["where"]) if part), fontsize=10)
+    title = figure.suptitle(
+        "\n".join(part for part in (words(ds.attrs["title"]), ds.attrs["where"]) if part), fontsize=10
+    )
     wrap(title, figure.bbox.width)
 
 

@@ -4,10 +4,8 @@ import numpy as np
 import xarray as xr
 
 from survey import api, own
-from survey.analysis.point import parameters, values
-from survey.dataset import options_of
+from survey.analysis.point import asked, parameters, values
 from survey.errors import BadInput
-from survey.scene import exists
 
 SHOWN = 4  # parameters: of more, those that are 0 are left out of the title
 
@@ -20,17 +18,14 @@ def solve(point, time=None):
     make = getattr(scene, "trajectory", None)
     if make is None:
         raise BadInput(f"the scene {name} has no trajectory; it would be a function of that name in its file")
-    given, chosen = parameters(point), options_of(point)
-    needed = {o.name for o in scene.OUTPUTS if exists(o, chosen)}
-    known = point if needed <= set(point) else api.evaluate(own.of_dataset(point), **given, **chosen)
+    chosen, symbols = asked(point, scene), {p.name: p.symbol for p in scene.PARAMETERS}
+    given = {key: value for key, value in parameters(point).items() if key in symbols}
+    # solved anew: a motion follows from parameters, never from what a file says of it
+    known = api.evaluate(own.of_dataset(point), **given, **chosen)
     found = make(given, values(known), chosen, time)
-    about = {"title": point.attrs.get("title", ""), "scene": name, "options": point.attrs["options"]}
+    about = {"title": point.attrs.get("title", ""), "scene": name, "options": point.attrs.get("options", "")}
     about |= {"parameters": ", ".join(f"{key}={value!r}" for key, value in given.items())}
-    shown = [
-        f"${point[key].attrs.get('symbol', key)} = {value:.6g}$"
-        for key, value in given.items()
-        if value or len(given) <= SHOWN
-    ]
+    shown = [f"${symbols[key]} = {value:.6g}$" for key, value in given.items() if value or len(given) <= SHOWN]
     about |= {"where": ", ".join(shown)}
     about |= {"panels": "; ".join(" ".join(panel) for panel in found.panels)}
     return xr.Dataset(dict(found.data), attrs=about)

@@ -6,8 +6,9 @@ import warnings
 import numpy as np
 
 from survey import api, engine, modules, own, workflow
-from survey.dataset import count, describe, options_of
-from survey.errors import BadInput
+from survey.analysis.point import asked
+from survey.dataset import count, describe
+from survey.errors import BadInput, Damaged
 from survey.grid import coordinates, logarithmic
 
 
@@ -52,11 +53,13 @@ def _warn(ds, ranges):
 
 def _workflow(ds, ranges, num):
     """The workflow as a mapping: that in the file, or what the attributes say, with other axes."""
-    data = tomllib.loads(ds.attrs["workflow"]) if "workflow" in ds.attrs else {}
+    data = _further(ds)
     data |= {"title": f"{ds.attrs.get('title', '')}, a part".lstrip(", "), "scene": own.of_dataset(ds)}
-    data |= {"options": options_of(ds), "axes": _axes(ds, ranges, num)}
-    data |= {"solver": {"method": ds.attrs["method"], "rtol": float(ds.attrs["rtol"])}}
-    known = {o.name for o in own.find(data["scene"])[1].OUTPUTS}
+    scene = own.find(data["scene"])[1]
+    data |= {"options": asked(ds, scene), "axes": _axes(ds, ranges, num)}
+    solver = {"method": ds.attrs.get("method"), "rtol": ds.attrs.get("rtol")}
+    data["solver"] = {key: str(v) if key == "method" else float(v) for key, v in solver.items() if v is not None}
+    known = {o.name for o in scene.OUTPUTS}
     data["output"] = {"variables": [name for name in ds.data_vars if name in known]}
     axes = [dim for dim in ds.status.dims if dim in ds.coords]
     if data.get("boundaries", {}).get("axis") not in (None, *axes):
@@ -64,6 +67,15 @@ def _workflow(ds, ranges, num):
     if len(axes) != 2:
         data.pop("refine", None)
     return data
+
+
+def _further(ds):
+    """What else the workflow in the file asks for: [boundaries] and [refine], and nothing that names a file."""
+    try:
+        told = tomllib.loads(ds.attrs.get("workflow", ""))
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise Damaged(f"the attribute workflow is no TOML ({error})") from None
+    return {key: told[key] for key in ("boundaries", "refine") if isinstance(told.get(key), dict)}
 
 
 def _axes(ds, ranges, num):

@@ -10,6 +10,7 @@ from bokeh.models import CustomJSTickFormatter
 from survey import figures
 from survey.viewer import raster
 from survey.viewer.shown import short
+from survey.wording import plain
 
 ENTRY = "white-space:nowrap;margin-right:14px"
 SWATCH = "display:inline-block;width:13px;height:13px;border:1px solid #555;vertical-align:-2px;margin-right:5px"
@@ -37,8 +38,8 @@ def legend(entries):
     """HTML of (kind, colour, words after it)."""
     return "".join(
         f"<span style='{ENTRY}'><span style='{SWATCH};background:{_swatch(kind, colour)}'></span>"
-        f"{html.escape(kind.replace('_', ' '))}{words}</span> "
-        for kind, colour, words in entries
+        f"{html.escape(words(kind.replace('_', ' ')))}{after}</span> "
+        for kind, colour, after in entries
     )
 
 
@@ -61,10 +62,22 @@ def labels(values):
     return CustomJSTickFormatter(args={"values": [short(value) for value in values]}, code="return values[tick]")
 
 
+def words(text):
+    """A file's text for bokeh: nothing in it is TeX, which bokeh finds between $$, \\( and \\[."""
+    return re.sub(r"([$\\])(?=[$(\[])", r"\1 ", plain(str(text), figures.SAID))
+
+
+def text_of(path, digest, text):
+    """HTML of a scene's file for a reader who is to decide whether it may run: nothing of it is hidden."""
+    look = "max-height:360px;overflow:auto;background:#f4f4f4;border:1px solid #888;padding:6px;white-space:pre-wrap"
+    told = html.escape(plain(text, len(text), lines=True))
+    return f"<b>{html.escape(plain(path))}</b><br>sha256 {digest}<pre style='{look}'>{told}</pre>"
+
+
 def label(variable, tex=True):
     """`long name, symbol (unit)`."""
-    symbol, units = variable.attrs.get("symbol", ""), variable.attrs.get("units", "1")
-    text = variable.attrs.get("long_name", variable.name)
-    if symbol and tex:
+    symbol, units = variable.attrs.get("symbol", ""), words(variable.attrs.get("units", "1"))
+    text = words(variable.attrs.get("long_name", variable.name))
+    if symbol and tex and not re.search(r"[\\${}^~]", text + units) and figures.formula(symbol, "") == f"${symbol}$":
         text = re.sub(r"([_%&#])", r"\\\1", text) + f", $${symbol}$$"  # TeX reads the words, too
     return text + ("" if units in ("1", "") else f" ({units})")

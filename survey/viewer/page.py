@@ -7,13 +7,13 @@ import numpy as np
 from bokeh import events
 from bokeh.core.property.descriptors import UnsetValueError
 from bokeh.layouts import column, row
-from bokeh.models import Checkbox, ColorBar, CustomJS, Div, Label, LinearColorMapper, Range1d, Select, Slider
+from bokeh.models import Button, Checkbox, ColorBar, CustomJS, Div, Label, LinearColorMapper, Range1d, Select, Slider
 from bokeh.palettes import Viridis256
 from bokeh.plotting import figure
 from matplotlib.figure import Figure
 
-from survey import figures
-from survey.errors import BadInput, SurveyError
+from survey import figures, trust
+from survey.errors import BadInput, SurveyError, Untrusted
 from survey.viewer import looks, raster
 
 SIDE, WIDTH = 510, 470  # width in pixels of what stands beside the map, and of its parts
@@ -23,6 +23,7 @@ GROWTH = 1.5  # and by so much more of it: a picture costs time, too
 RINGS = 100  # pixels with undecided or failed points: if they are fewer, each is ringed
 RED = "#D40000"
 CURVE_POINTS = 300_000  # edges of more points are thinned
+STRANGE = "no motion: the scene of this survey is a Python file that you have not run here before. Read it first."
 CLICK = "Click a point of the map to see its motion and everything known of it."
 # the model's name carries the link into the address bar
 KEEP_LINK = "window.history.replaceState(null, '', '?' + cb_obj.name)"
@@ -34,12 +35,12 @@ class Page:
     def __init__(self, shown, document):
         self.map, self.document, self.waiting, self.pointer = shown, document, set(), None
         self.share = 0.0  # of the map, when it was drawn last
-        self.caption = Div(width=WIDTH, styles={"color": "#555555"})
+        self.caption = _text(styles={"color": "#555555"})
         self.view = self._from_link(document.session_context.request.arguments)
         self._plot()
         self._side()
         document.add_root(row(self.plot, self.side, sizing_mode="stretch_both"))
-        document.title = shown.ds.attrs["title"]
+        document.title = shown.title
         self._fill()
         self.changed()
         if self.view.point is not None:
@@ -118,7 +119,12 @@ class Page:
         _on(self.edges, ("active",), self.changed)
         self.sliders = {
             dim: Slider(
-                title=dim, start=0, end=ds.sizes[dim] - 1, value=at, width=WIDTH, format=looks.labels(ds[dim].values)
+                title=looks.words(dim),
+                start=0,
+                end=ds.sizes[dim] - 1,
+                value=at,
+                width=WIDTH,
+                format=looks.labels(ds[dim].values),
             )
             for dim, at in view.others.items()
             if ds.sizes[dim] > 1
@@ -127,11 +133,15 @@ class Page:
             _on(slider, ("value",), self.changed)
             _on(slider, ("value",), self._fill)
             _on(slider, ("value_throttled",), lambda: self.choose(self.view.point))
-        title = f"<b>{html.escape(ds.attrs['title'])}</b><br>{html.escape(ds.attrs['options'])}"
-        self.legend, self.motion, self.known = (Div(width=WIDTH) for _ in range(3))
-        self.motion.text = CLICK
-        told = [self.legend, self.caption, self.motion, self.known]
-        parts = [Div(text=title, width=WIDTH), self.variable, *self.sliders.values(), self.edges, *told]
+        title = f"<b>{html.escape(self.map.title)}</b><br>{html.escape(self.map.options)}"
+        self.legend, self.motion, self.known, self.source = (_text() for _ in range(4))
+        self.motion.text, self.strange = CLICK, None
+        self.read = Button(label="Show the text of its file", visible=False)
+        self.run = Button(label="I have read it: run it, until survey view ends", button_type="warning", visible=False)
+        self.read.on_event(events.ButtonClick, lambda _: self.show_source())
+        self.run.on_event(events.ButtonClick, lambda _: self.trust())
+        told = [self.legend, self.caption, self.motion, self.read, self.source, self.run, self.known]
+        parts = [_text(text=title), self.variable, *self.sliders.values(), self.edges, *told]
         look = {"overflow-x": "hidden", "overflow-y": "auto", "padding-left": "10px"}
         self.side = column(*parts, width=SIDE, sizing_mode="stretch_height", styles=look)
 
@@ -233,7 +243,7 @@ class Page:
         if point is None:
             self.near.visible = False
             return
-        (x, y), words = self.pointer, "\n".join(self.map.under(self.view, point))
+        (x, y), words = self.pointer, "\n".join(map(looks.words, self.map.under(self.view, point)))
         left, low = (
             np.mean(axis.scaled(np.array(window))) < axis.scaled(at)
             for axis, window, at in zip(self.map.axes, self.view.window, (x, y), strict=True)
@@ -260,6 +270,7 @@ class Page:
         self.chosen.data = {"x": [x], "y": [y]}
         self.plot.name = self.map.link(self.view)
         self.motion.text, self.known.text = "solving this point in time ...", ""
+        self._ask(None)
         self.soon(self.solve)
 
     def solve(self):
@@ -270,9 +281,34 @@ class Page:
             drawn = Figure(figsize=(6.8, 3.6), layout="constrained")
             answers.trajectory(figure=drawn, **coords)
             self.motion.text = looks.picture(drawn)
+        except Untrusted as untrusted:
+            self._ask(untrusted)
+            self.motion.text = STRANGE
         except SurveyError as error:
             self.motion.text = f"no motion: {html.escape(str(error))}"
         self.known.text = answers.point(**coords)._repr_html_()
+
+    def _ask(self, strange):
+        """Offer to read the file of a stranger's scene (an Untrusted), or nothing (None)."""
+        self.strange, self.source.text = strange, ""
+        self.read.visible, self.run.visible = strange is not None, False
+
+    def show_source(self):
+        """Show the file of a stranger's scene, and offer to run it."""
+        if self.strange:
+            self.source.text = looks.text_of(self.strange.path, self.strange.digest, self.strange.text)
+            self.read.visible, self.run.visible = False, True
+
+    def trust(self):
+        """Let the very text that is shown run, and solve the point."""
+        if self.strange and self.run.visible:
+            trust.allow(self.strange.digest)
+            self.choose(self.view.point)
+
+
+def _text(**look):
+    """A piece of HTML beside the map, in which dollars are no TeX."""
+    return Div(width=WIDTH, disable_math=True, **look)
 
 
 def _on(model, properties, call):

@@ -1,17 +1,22 @@
 """A survey's file and a view of it: the link that tells the view, and what is known of a point in a few lines."""
 
+import re
 import textwrap
 from dataclasses import dataclass, field
 from functools import lru_cache
 from math import isfinite
 from urllib.parse import parse_qsl, urlencode
 
-from survey import modules, status, store
+import numpy as np
+
+from survey import modules, schema, status, store
 from survey.analysis.point import has_verdict, meaning, reading, sentence
 from survey.dataset import flag_codes, percent
-from survey.errors import BadInput
+from survey.errors import BadInput, Damaged
 from survey.viewer import raster
+from survey.wording import plain
 
+FAR = 1e300  # no sum or difference of coordinates overflows
 LINES = 6  # outputs told of the point under the pointer
 
 
@@ -31,6 +36,7 @@ class Map:
 
     def __init__(self, path):
         ds = store.load(path, chunks=None)
+        _check(path, ds)
         if len(ds.status.dims) < 2:
             raise BadInput(f"{path}: this survey has no two axes, so there is no map to view; draw it with survey plot")
         self.dims = ds.status.dims[:2]
@@ -39,6 +45,7 @@ class Map:
         self.axes = [raster.Axis(self.ds[dim].values) for dim in self.dims]
         own = set(ds.status.dims)
         self.names = [name for name, v in ds.data_vars.items() if own <= set(v.dims) and not name.endswith("_error")]
+        self.title, self.options = plain(ds.attrs.get("title", "")), plain(ds.attrs["options"])
         # dimensions beside the two: of the survey, and of some outputs
         self.others = list(dict.fromkeys(dim for name in self.names for dim in ds[name].dims if dim not in self.dims))
         self._layers = lru_cache(maxsize=8)(self._layer)
@@ -98,13 +105,14 @@ class Map:
         """{flag: how much of the whole map bears it, in words}."""
         ds = self.ds
         if name == "verdict" and "area_fraction" in ds:
+            schema.areas(ds)
             shares = zip(
                 flag_codes(ds.area_verdict.attrs), ds.area_fraction.values, ds.area_fraction_error.values, strict=True
             )
             return {flag: f" ({percent(share, bar)})".replace("+-", "±") for flag, share, bar in shares}
-        told = [ds.attrs.get(f"{counted}_counts", "") for counted in ("status", name)]
-        counts = (part.split(": ") for part in ", ".join(told).split(", ") if part)
-        return {flag: f" ({int(number):,} in all)" for flag, number in counts}
+        told = [str(ds.attrs.get(f"{counted}_counts", "")) for counted in ("status", name)]
+        counts = (part.rpartition(": ") for part in ", ".join(told).split(", "))
+        return {flag: f" ({int(number):,} in all)" for flag, _, number in counts if re.fullmatch("[0-9]{1,18}", number)}
 
     def position(self, point):
         """The coordinates (x, y) of a point's places."""
@@ -141,9 +149,22 @@ class Map:
         yield from (f"cell: {meaning(found)}" for found in ds.cell_verdict[inside][:1])
 
 
+def _check(path, ds):
+    """Raise Damaged unless the cells are whole and the first two axes go up or down: else no point is found on them."""
+    if "cell_verdict" in ds:
+        schema.cells(ds)
+    for dim in ds.status.dims[:2]:
+        values = ds[dim].values.astype(float)
+        if abs(values).max() > FAR:
+            raise Damaged(f"{path}: the axis {dim} reaches beyond {FAR:g}, so there is no map to view")
+        steps = np.diff(values)
+        if not ((steps > 0).all() or (steps < 0).all()):
+            raise Damaged(f"{path}: the values of the axis {dim} go up and down, so there is no map to view")
+
+
 def short(value):
     """A coordinate, number or label, for a reader."""
-    return f"{value:.8g}" if value.dtype.kind == "f" else str(value)
+    return f"{value:.8g}" if value.dtype.kind == "f" else plain(str(value), 80)
 
 
 def _numbers(key, words, number):
