@@ -1,10 +1,16 @@
 """What can go wrong, and the exit code that says so."""
 
 
+from survey.wording import LINE, short
+
+
 class SurveyError(Exception):
     """A failure that is told in one line; `exit_code` is what the command returns."""
 
     exit_code = 4
+
+    def __init__(self, *said: object) -> None:
+        super().__init__(*(short(part, LINE) for part in said))  # whatever a file or a name brings into it
 
 
 class BadInput(SurveyError, ValueError):

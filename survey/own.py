@@ -31,6 +31,7 @@ from survey.errors import BadInput
 from survey.hill_scene import SAME, HillScene, is_number, reason
 from survey.measures import hill as measure
 from survey.scene import Parameter
+from survey.wording import short, shown
 
 EXAMPLES = {
     "z": "def z(u, p): return p[0] + p[1] * cos(2 * u)",
@@ -87,15 +88,18 @@ def find(scene: Any, near: str | Path | None = None) -> tuple[str, Any]:
         return scene.NAME, scene
     if callable(scene):
         raise BadInput(
-            f"scene = {scene!r} is a function; give survey.hill({getattr(scene, '__name__', 'z')}, period=...)"
+            f"scene = {shown(scene)} is a function; give survey.hill({getattr(scene, '__name__', 'z')}, period=...)"
         )
     if not str(scene).endswith(".py"):
         return scene, modules.load(survey.scenes, scene, "scene")
     paths = [Path(scene), *([Path(near) / scene] if near is not None else [])]
-    path = next((path for path in paths if path.is_file()), None)
+    try:
+        path = next((path for path in paths if path.is_file()), None)
+    except OSError as error:
+        raise BadInput(f"scene = {shown(str(scene), 120)}: no file can be called so ({error.strerror})") from None
     if path is None:
-        looked = " or ".join(dict.fromkeys(str(path) for path in paths))
-        raise BadInput(f"scene = {str(scene)!r}: there is no file {looked}; name the file of your own Hill equation")
+        looked = " or ".join(dict.fromkeys(short(path, 120) for path in paths))
+        raise BadInput(f"scene = {shown(str(scene), 120)}: there is no file {looked}; name the file of your own Hill equation")
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
