@@ -18,9 +18,9 @@ from survey import workflow as workflows
 from survey.dataset import count, counts, describe, flag_codes, layout, percent
 from survey.errors import BadInput
 from survey.grid import Grid, line
-from survey.hill_scene import HillScene
+from survey.hill_scene import HillScene, is_number
 from survey.scene import Option, Output, Parameter, Request, condition, exists
-from survey.wording import counted
+from survey.wording import counted, shown
 
 
 def run(
@@ -29,6 +29,7 @@ def run(
     workers: int | None = None,
     scheduler: str | None = None,
     fresh: bool = False,
+    block_timeout: float | None = None,
 ) -> xr.Dataset:
     """Run, or resume, the survey in the TOML file `workflow`: the same as the command `survey run`.
 
@@ -39,6 +40,8 @@ def run(
     workers : number of worker processes; by default threads of this process.
     scheduler : address or scheduler file of a dask.distributed cluster.
     fresh : drop the finished blocks of an earlier, interrupted run.
+    block_timeout : seconds after which a worker process that has not finished its block is replaced (five minutes more
+        for its first, to compile); by default 20 times the longest block so far, and at least five minutes.
 
     Returns
     -------
@@ -52,8 +55,10 @@ def run(
     read = workflows.read if isinstance(workflow, (str, os.PathLike)) else workflows.check
     checked = read(workflow, output=output)
     if workers is not None and (not isinstance(workers, int) or workers < 1):
-        raise BadInput(f"workers = {workers!r}: it must be a whole number from 1 on, or None for threads")
-    engine.run(checked, workers, scheduler, fresh)
+        raise BadInput(f"workers = {shown(workers)}: it must be a whole number from 1 on, or None for threads")
+    if block_timeout is not None and not (is_number(block_timeout) and 0 < block_timeout < np.inf):
+        raise BadInput(f"block_timeout = {shown(block_timeout)}: it must be a positive number of seconds, or None")
+    engine.run(checked, workers, scheduler, fresh, block_timeout=block_timeout)
     ds = store.load(checked.path)
     draw(ds, checked)
     return ds
@@ -179,14 +184,12 @@ def _array(key: str, value: Any) -> npt.NDArray[Any]:
         if np.ma.isMaskedArray(value):
             return np.ma.filled(value.astype(float), np.nan)
         return np.asarray(value)
-    except ValueError:  # a list of lists of unequal lengths
+    except Exception:  # a list of lists of unequal lengths; an object of any kind
         raise _not_real(key, value) from None
 
 
 def _not_real(key: str, value: Any) -> BadInput:
-    told = " ".join(repr(value).split())
-    told = told if len(told) <= 120 else f"{told[:116]} ..."
-    return BadInput(f"{key} = {told}: it must be a real number or an array of real numbers")
+    return BadInput(f"{key} = {shown(value)}: it must be a real number or an array of real numbers")
 
 
 def _check_dimensions(module: Any, given: dict[str, xr.DataArray]) -> None:

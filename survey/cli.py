@@ -65,9 +65,15 @@ def program():
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Replace a key, such as axes.k.num=40.")
 @click.option("--workers", type=click.IntRange(1), help="Worker processes; by default threads of this process.")
 @click.option("--scheduler", metavar="ADDRESS", help="A dask.distributed scheduler, or its scheduler file.")
+@click.option(
+    "--block-timeout",
+    type=click.FloatRange(0, min_open=True),
+    metavar="SECONDS",
+    help="Replace a worker that needs longer for a block; by default 20 times the longest so far, 5 minutes at least.",
+)
 @click.option("--fresh", is_flag=True, help="Drop the finished blocks of an earlier, interrupted run.")
 @click.option("--quiet", is_flag=True, help="No progress and no closing lines.")
-def run(workflow, output, overrides, workers, scheduler, fresh, quiet):
+def run(workflow, output, overrides, workers, scheduler, block_timeout, fresh, quiet):
     """Run, or resume, a sweep; write OUT.nc and the pictures that the workflow asks for."""
     from survey import engine
     from survey import workflow as workflows
@@ -78,7 +84,7 @@ def run(workflow, output, overrides, workers, scheduler, fresh, quiet):
     _stop_on_sigterm()
     try:
         with Progress(err, checked, silent=quiet) as progress:
-            finished = engine.run(checked, workers, scheduler, fresh, progress, again)
+            finished = engine.run(checked, workers, scheduler, fresh, progress, again, block_timeout)
             pictures = _draw(checked)
     except KeyboardInterrupt as stop:
         traceback.clear_frames(stop.__traceback__)  # the semaphores they hold would be reported as leaked

@@ -1,4 +1,4 @@
-"""Tasks through dask: on threads of this machine, on processes of it, or on a cluster. The only place that knows dask.
+"""Tasks through dask: on threads of this machine or on processes of it (on a cluster: `cluster`).
 
 A task is called once for each number (or what else can be hashed and sorted); `finished(done, result)` hears of each as
 it ends, and of (0, None) before. `died(number)` is called instead where it kills its worker, and DEATHS times again.
@@ -6,11 +6,11 @@ it ends, and of (0, None) before. `died(number)` is called instead where it kill
 
 import contextlib
 import itertools
-import logging
 import multiprocessing.context
 import os
 import signal
 import threading
+import time
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import resource_tracker
@@ -20,16 +20,38 @@ import dask.multiprocessing
 import dask.threaded
 from dask.callbacks import Callback
 
-from survey.errors import BadInput, Stopped, SurveyError
+from survey.errors import Stopped, SurveyError
 
 DEATHS = 3
-SCHEDULER_SECONDS = 10
-WORKERLESS_SECONDS = 60
+# A worker is stuck, and replaced, once a block takes so many times the longest one so far, and at least so many seconds;
+# in its first block it may compile, which takes up to a minute where nothing else is at work.
+PATIENCE, PATIENCE_SECONDS, COMPILE_SECONDS = 20, 300.0, 300.0
+LEAVE_SECONDS = 10.0  # in which worker processes end that have nothing left to do
 
 
 def cpus():
     """Processors this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class Patience:
+    """How long a worker may take for a block: `seconds`, or by how long others took, whose times `took` tells."""
+
+    def __init__(self, seconds=None):
+        self.seconds, self.longest = seconds, 0.0
+
+    def took(self, seconds):
+        """A block has taken so many seconds; None: it tells nothing."""
+        self.longest = max(self.longest, seconds or 0.0)
+
+    @property
+    def limit(self):
+        return self.seconds or max(PATIENCE_SECONDS, PATIENCE * self.longest)
+
+    @property
+    def first(self):
+        """The same for a worker's first block, before which it compiles."""
+        return self.limit + COMPILE_SECONDS
 
 
 def on_threads(task, numbers, finished=lambda done, result=None: None, threads=None):
@@ -40,108 +62,116 @@ def on_threads(task, numbers, finished=lambda done, result=None: None, threads=N
     _compute(task, numbers, lambda number, result: finished(next(done), result), dask.threaded.get, threads or cpus())
 
 
-def on_processes(task, numbers, finished, died, workers):
-    """Call the task for every number on worker processes, which may die: what they were at is done again.
+def on_processes(task, numbers, finished, died, workers, patience=None):
+    """Call the task for every number on worker processes, which may die or freeze: what they were at is done again.
 
-    Which task killed its worker is told apart by calling those that were under way again, one by one.
+    Which task killed its worker is told apart by calling those that were under way again, one by one. Raises Stopped
+    for a task that takes longer than the patience then, too.
     """
-    done, ended = itertools.count(1), set()
+    done, ended, patience = itertools.count(1), set(), patience or Patience()
     finished(0)
 
     def end(number, result):
         ended.add(number)
         finished(next(done), result)
 
-    def attempt(some, workers):
+    def attempt(some, workers, alone=False):
         """The numbers that were under way when a worker died."""
-        begun = set()
+        watch = _Watch(patience, workers)
         try:
-            with _pool(workers) as pool:
-                _compute(task, some, end, dask.multiprocessing.get, workers, begun.add, pool=pool)
+            with _pool(workers) as pool, watch:
+                _compute(
+                    _Signed(task), some, watch.ended(end), dask.multiprocessing.get, workers, watch.began, pool=pool
+                )
         except BrokenProcessPool:
-            return sorted(begun - ended)
+            if watch.stuck and alone:
+                raise Stopped(
+                    f"a block took more than {patience.limit:.0f} s, twice; run the command again to go on, with a "
+                    "longer --block-timeout if blocks take long"
+                ) from None
+            return sorted(set(watch.begun) - ended)
         return []
 
     suspects = attempt(numbers, workers)
     while suspects:
         for number in suspects:
-            if all(attempt([number], 1) for _ in range(DEATHS)):
+            if all(attempt([number], 1, alone=True) for _ in range(DEATHS)):
                 end(number, died(number))
         suspects = attempt([number for number in numbers if number not in ended], workers)
 
 
-def on_cluster(task, numbers, finished, died, client):
-    """Call the task for every number on the workers of a dask cluster."""
-    from dask.distributed import KilledWorker, as_completed
+class _Signed:
+    """The task; its result comes with the process that did it."""
 
-    address = client.scheduler.address
-    done = itertools.count(1)
-    finished(0)
-    futures = dict(zip(client.map(task, numbers, pure=False, allow_other_workers=False), numbers, strict=True))
-    with _watched(client):
-        for future in as_completed(list(futures), loop=client.loop):
-            try:
-                result = future.result()
-            except KilledWorker:
-                result = died(futures[future])
-            except SurveyError:
-                raise
-            except Exception as error:
-                told = f"the dask cluster at {address} failed ({_brief(error)})"
-                raise Stopped(f"{told}; start one and run the command again to go on") from None
-            del futures[future]
-            future.release()
-            finished(next(done), result)
+    def __init__(self, task):
+        self.task = task
+
+    def __call__(self, number):
+        return os.getpid(), self.task(number)
 
 
-@contextlib.contextmanager
-def _watched(client):
-    """Say so now and then where the cluster has no workers: dask waits, as a batch queue may yet start some."""
-    ended = threading.Event()
+class _Watch:
+    """Kills the worker processes of this thread once one of them is stuck with a task, so that they count as dead."""
 
-    def watch():
-        while not ended.wait(WORKERLESS_SECONDS):
-            with contextlib.suppress(OSError, TimeoutError, ValueError):
-                if not client.nthreads():
-                    where = client.scheduler.address
-                    words = "the dask cluster at %s has no workers; waiting for some (dask worker %s starts one)"
-                    logging.getLogger("survey").warning(words, where, where)
+    def __init__(self, patience, workers):
+        self.patience, self.workers = patience, workers
+        self.begun, self.proven, self.stuck = {}, set(), False
+        self.starter, self.over = threading.get_ident(), threading.Event()
 
-    threading.Thread(target=watch, daemon=True).start()
-    try:
-        yield
-    finally:
-        ended.set()
+    def __enter__(self):
+        threading.Thread(target=self._look, daemon=True).start()
+        return self
+
+    def __exit__(self, *_):
+        self.over.set()
+
+    def began(self, number):
+        self.begun[number] = time.monotonic()
+
+    def ended(self, end):
+        """What is called as a task ends."""
+
+        def call(number, signed):
+            process, result = signed
+            self.begun.pop(number, None)
+            self.proven.add(process)
+            end(number, result)
+
+        return call
+
+    def _look(self):
+        while not self.over.wait(min(max(self.patience.limit / 10, 0.1), 5.0)):
+            # each has compiled what it needs, or else one of them may be at that
+            limit = self.patience.limit if len(self.proven) >= self.workers else self.patience.first
+            if time.monotonic() - min(self.begun.copy().values(), default=time.monotonic()) > limit:
+                self.stuck = True
+                _kill(self.starter)
+                return
 
 
-def client_of(address):
-    """A client of the dask cluster at `address` (or in a scheduler file). Raises BadInput or Stopped."""
-    try:
-        from dask.distributed import Client
-    except ImportError:
-        raise BadInput("--scheduler needs dask.distributed: pip install distributed") from None
-    try:
-        where = {"scheduler_file": address} if os.path.exists(address) else {"address": address}
-        client = Client(**where, timeout=SCHEDULER_SECONDS, set_as_default=False)
-        for name in [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]:
-            logging.getLogger(name).setLevel(logging.CRITICAL)  # what they would log is told in one line
-        return client
-    except (OSError, ValueError) as error:
-        raise Stopped(f"no dask scheduler answers at {address!r} ({error}); start one with dask scheduler") from None
+def _kill(starter):
+    """Kill the worker processes that the thread `starter` has started."""
+    for worker in multiprocessing.active_children():
+        if isinstance(worker, _Worker) and worker.starter == starter:
+            worker.kill()
 
 
 @contextlib.contextmanager
 def _pool(workers):
     """Worker processes; an error or an interruption kills them: nobody waits for what they are at."""
     resource_tracker.ensure_running()  # else the first worker's start would, and unblock the signal
-    with ProcessPoolExecutor(workers, _Spawning(), _serve) as pool:
-        try:
-            yield pool
-        except BaseException:
-            for worker in multiprocessing.active_children():
-                if isinstance(worker, _Worker) and worker.starter == threading.get_ident():
-                    worker.kill()
-            raise
+    leave = threading.Timer(LEAVE_SECONDS, _kill, [threading.get_ident()])  # one that is frozen does not go by itself
+    leave.daemon = True
+    try:
+        with ProcessPoolExecutor(workers, _Spawning(), _serve) as pool:
+            try:
+                yield pool
+            except BaseException:
+                _kill(threading.get_ident())
+                raise
+            leave.start()
+    finally:
+        leave.cancel()
 
 
 class _Worker(multiprocessing.context.SpawnProcess):
@@ -205,9 +235,3 @@ def _compute(task, numbers, ended, get, workers, begun=lambda number: None, **mo
         if isinstance(error, SurveyError):
             raise getattr(error, "exception", error) from None  # dask adds a worker's traceback to the message
         raise
-
-
-def _brief(error):
-    """The first line of an error; of a lost connection not where it was lost."""
-    name = type(error).__name__
-    return name if name in ("CommClosedError", "CancelledError", "FutureCancelledError") else str(error).split("\n")[0]

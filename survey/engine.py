@@ -22,7 +22,7 @@ import numpy as np
 import tomli_w
 from rich import filesize
 
-from survey import dispatch, methods, modules, status, store, unfinished
+from survey import cluster, dispatch, methods, modules, status, store, unfinished
 from survey.dataset import Tally, attributes, command, coordinates, counts_in, layout, now, round_up, variables
 from survey.dispatch import cpus
 from survey.errors import BadInput, Stopped
@@ -32,6 +32,7 @@ from survey.wording import counted
 
 BLOCK_SECONDS = 0.5
 BLOCK_POINTS = 2**17
+MOST_BLOCKS = 4 * 10**6  # each is a file
 SAMPLES = 16  # blocks from all over the map that are solved first
 NEAR = 0.02  # of the map: what a block so near has cost tells this one's cost well enough
 # what the writer holds at a time: enough for the tiles to be square, little beside what else a process takes
@@ -62,6 +63,12 @@ def points_per_block(scene, request, grid):
 def regions_of(workflow):
     """(lengths of a tile, [(region, its blocks)]) of a workflow's grid: a region holds whole tiles and whole blocks."""
     scene, request, grid = workflow.scene, workflow.request, workflow.grid
+    number = grid.points / points_per_block(scene, request, grid)
+    if number > MOST_BLOCKS:
+        raise BadInput(
+            f"{counted(grid.points, 'point')} of {workflow.name} need {number:.1g} blocks of about {BLOCK_SECONDS} s; "
+            f"at most {MOST_BLOCKS:.0e} can be kept: take fewer points, or several surveys"
+        )
     region = max(1, min(REGION_POINTS, REGION_BYTES // bytes_per_point(scene, request)))
     return grid.tiled(points_per_block(scene, request, grid), region, store.TILE_POINTS)
 
@@ -188,17 +195,18 @@ class Job:
         return Solved(number, "", 0.0, None)
 
 
-def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, again=None):
+def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, again=None, block_timeout=None):
     """Run or resume the survey and write its netCDF file; returns what was Finished.
 
     A part of the file is written as soon as the blocks of its region are there, while others are computed.
     `progress(done, total, reused, what, left)` is called as blocks finish, and as parts of the boundaries do;
     `left()` estimates the seconds that are left. `again` is the command that goes on after an interruption.
+    `block_timeout`: seconds after which a worker process that has finished no block is replaced.
     Raises BadInput, Damaged or Stopped.
     """
     started = time.perf_counter()
     _refuse_too_large(workflow)
-    client = dispatch.client_of(scheduler) if scheduler else contextlib.nullcontext()
+    client = cluster.client_of(scheduler) if scheduler else contextlib.nullcontext()
     tile, regions = regions_of(workflow)
     blocks = [block for _, blocks in regions for block in blocks]
     about = {"points": workflow.grid.points, "code": _code() | _compilers()}
@@ -210,7 +218,7 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, agai
         reused = kept.sound()
         job = Job(workflow.scene, workflow.request, workflow.grid, kept, _code())
         left = Remaining(workflow.grid.shape, blocks, reused)
-        compiled = {}
+        compiled, patience = {}, dispatch.Patience(block_timeout)
 
         here = len(reused) < len(blocks) and not (workers or scheduler)
         ahead = _compiling_ahead(workflow.scene, workflow.request) if here else contextlib.nullcontext()
@@ -222,6 +230,7 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, agai
                     if solved.content is not None:
                         kept.put(solved.number, solved.content)
                     left.took(solved.number, solved.seconds)
+                    patience.took(solved.seconds)
                     assembly.has(solved.number)
                 if progress:
                     progress(len(reused) + done, len(blocks), len(reused), left=left)
@@ -232,9 +241,9 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, agai
             todo = _spread([number for number in range(len(blocks)) if number not in reused])
             todo = [numbered(number, blocks[number]) for number in todo]
             if scheduler:
-                dispatch.on_cluster(job, todo, finished, job.died, client)
+                cluster.on_cluster(job, todo, finished, job.died, client, patience)
             elif workers:
-                dispatch.on_processes(job, todo, finished, job.died, workers)
+                dispatch.on_processes(job, todo, finished, job.died, workers, patience)
             else:
                 dispatch.on_threads(job, todo, finished)
             computed = time.perf_counter()

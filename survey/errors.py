@@ -10,8 +10,8 @@ class SurveyError(Exception):
 
     exit_code = 4
 
-    def __init__(self, message: object = "") -> None:
-        super().__init__(plain(str(message)))  # it may name what a stranger wrote
+    def __init__(self, *said: object) -> None:
+        super().__init__(*(plain(str(part)) for part in said))  # it may name what a stranger wrote
 
 
 class BadInput(SurveyError, ValueError):

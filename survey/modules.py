@@ -6,8 +6,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 
 from survey.errors import BadInput
-
-LONGEST = 80  # characters of a name that are told
+from survey.wording import listed, short, shown
 
 
 def names(package):
@@ -28,8 +27,7 @@ def load(package, name, what):
 
 def unknown(what, name, known):
     """One line for an unknown name: what it is, the nearest known one, and all that are allowed."""
-    name = name if len(str(name)) <= LONGEST else f"{str(name)[: LONGEST - 4]} ..."
     same = {other.lower(): other for other in known}
-    near = get_close_matches(str(name).lower(), same, n=1, cutoff=0.5)
+    near = get_close_matches(short(name if isinstance(name, str) else shown(name)).lower(), same, n=1, cutoff=0.5)
     hint = f"; did you mean {same[near[0]]!r}?" if near else ""
-    return f"unknown {what} {name!r}{hint} (allowed: {', '.join(known) or 'none'})"
+    return f"unknown {what} {shown(name)}{hint} (allowed: {listed(known) or 'none'})"

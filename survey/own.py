@@ -34,6 +34,7 @@ from survey.errors import BadInput, Untrusted
 from survey.hill_scene import SAME, HillScene, is_number, reason
 from survey.measures import hill as measure
 from survey.scene import Parameter
+from survey.wording import short, shown
 
 EXAMPLES = {
     "z": "def z(u, p): return p[0] + p[1] * cos(2 * u)",
@@ -91,7 +92,7 @@ def find(scene: Any, near: str | Path | None = None) -> tuple[str, Any]:
         return scene.NAME, scene
     if callable(scene):
         raise BadInput(
-            f"scene = {scene!r} is a function; give survey.hill({getattr(scene, '__name__', 'z')}, period=...)"
+            f"scene = {shown(scene)} is a function; give survey.hill({getattr(scene, '__name__', 'z')}, period=...)"
         )
     if not str(scene).endswith(".py"):
         return scene, modules.load(survey.scenes, scene, "scene")
@@ -153,8 +154,10 @@ def _read(name: str | Path, near: str | Path | None) -> tuple[Path, str]:
     paths = [Path(name), *([Path(near) / name] if near is not None else [])]
     path = next((path for path in paths if _is_file(path)), None)
     if path is None:
-        looked = " or ".join(dict.fromkeys(str(path) for path in paths))
-        raise BadInput(f"scene = {str(name)!r}: there is no file {looked}; name the file of your own Hill equation")
+        looked = " or ".join(dict.fromkeys(short(path, 120) for path in paths))
+        raise BadInput(
+            f"scene = {shown(str(name), 120)}: there is no file {looked}; name the file of your own Hill equation"
+        )
     try:
         with open(path, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK)) as file:
             regular = stat.S_ISREG(os.fstat(file.fileno()).st_mode)

@@ -4,6 +4,7 @@ import os
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import prod
 from numbers import Real
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -17,8 +18,11 @@ from survey import modules, own
 from survey.errors import BadInput, Stopped
 from survey.grid import Grid, check_axis, coordinates
 from survey.scene import Request, condition, exists
+from survey.wording import plain, short, shown
 
 MOST = 10**8  # coordinates on one axis
+MOST_POINTS = 10**11  # of a map
+SUFFIXES = 40  # bytes that the names of files beside the output are longer by
 FINEST = 1e-6  # width of a cell as a fraction of its axis
 Number = Annotated[float, Field(allow_inf_nan=False)]
 
@@ -109,27 +113,43 @@ def read(path, overrides=(), output=None):
     path = Path(path)
     try:
         text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadInput(f"{path}: cannot read this workflow file ({_reason(error)})") from None
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise BadInput(f"{path}: this is not TOML ({error})") from None
+    except (OSError, ValueError) as error:
+        raise BadInput(f"{short(path, 120)}: cannot read this workflow file ({_reason(error)})") from None
+    data = _parsed(text, f"{short(path, 120)}: this is not TOML")
     for override in overrides:
         _apply(data, override)
     if overrides:
         changes = "".join(f" --set {override}" for override in overrides)
-        text = f"# {path.name}{changes}\n\n{tomli_w.dumps(data)}"
+        text = f"# {plain(f'{path.name}{changes}')}\n\n{_as_toml(data)}"
     return check(data, text, output, default_path=path.with_suffix(".nc").name, near=path.parent)
 
 
+def _parsed(text, complaint):
+    """The table that a TOML text holds; raises BadInput."""
+    try:
+        return tomllib.loads(text)
+    except ValueError as error:  # TOMLDecodeError, or an integer of more than 4300 digits
+        raise BadInput(f"{complaint} ({short(error, 150)})") from None
+    except RecursionError:
+        raise BadInput(f"{complaint} that can be read (it is nested too deeply)") from None
+
+
+def _as_toml(data):
+    """The text of a mapping; raises BadInput."""
+    try:
+        return tomli_w.dumps(data)
+    except (TypeError, ValueError, RecursionError) as error:
+        raise BadInput(f"this workflow cannot be written as TOML ({short(error, 150)}); use plain values") from None
+
+
+@np.errstate(all="ignore")  # axes beyond floats are found by their values
 def check(data, text="", output=None, default_path="survey.nc", near=None):
     """The checked Workflow of the mapping `data` (a parsed workflow file); `text` is what it was parsed from.
 
     A scene that is a file lies relative to the current folder, or else to the folder `near`.
     """
     if not isinstance(data, Mapping):
-        raise BadInput(f"{data!r} is neither the path of a workflow file nor a mapping with its tables")
+        raise BadInput(f"{shown(data)} is neither the path of a workflow file nor a mapping with its tables")
     given_scene = data.get("scene")
     if isinstance(given_scene, own.HillScene):
         data = {**data, "scene": given_scene.NAME}
@@ -138,10 +158,14 @@ def check(data, text="", output=None, default_path="survey.nc", near=None):
     except ValidationError as error:
         _check_names(data, given_scene, near)
         raise BadInput(_one_line(error)) from None
+    except RecursionError:
+        raise BadInput("this workflow is nested too deeply, or holds itself; write it as plain tables") from None
+    _check_text(file, output)
     name, scene = own.find(given_scene, near)
     numbers = {p.name for p in scene.PARAMETERS if p.number_option and _is_number(file.options.get(p.name))}
-    file.axes |= {key: float(file.options.pop(key)) for key in numbers - set(file.axes)}
+    file.axes |= {key: _float(f"options.{key}", file.options.pop(key)) for key in sorted(numbers - set(file.axes))}
     options = check_options(scene, file.options, file.axes, "options.")
+    _check_size(file.axes)
     given = {key: _values(f"axes.{key}", axis) for key, axis in file.axes.items()}
     parameters = check_parameters(scene, name, options, given, "axes.")
     for key, values in given.items():
@@ -163,7 +187,7 @@ def check(data, text="", output=None, default_path="survey.nc", near=None):
         request=request,
         path=check_path(next(path for path in (output, file.output.path, default_path) if path is not None)),
         figures=tuple(file.output.figures),
-        text=text or tomli_w.dumps(data),
+        text=text or _as_toml(data),
         boundaries=_check_boundaries(scene, name, file.boundaries, given),
         refine=_check_refine(scene, name, file, given),
         style=file.output.style,
@@ -179,11 +203,34 @@ def _check_names(data, scene, near):
     known = [p.name for p in scene.PARAMETERS]
     for key in axes:
         if key not in known and key not in {option.name for option in scene.OPTIONS}:
-            raise BadInput(f"axes.{key}: {_unknown_parameter(name, key, known)}")
+            raise BadInput(f"axes.{short(key, 40)}: {_unknown_parameter(name, key, known)}")
 
 
 def _unknown_parameter(scene, key, known):
     return modules.unknown(f"parameter of scene {scene}", key, known)
+
+
+def _check_text(file, output):
+    """Raise BadInput for characters that a terminal would obey, in what is shown there."""
+    for key, value in (("title", file.title), ("scene", file.scene), ("output.path", output or file.output.path or "")):
+        text = str(value).replace("\n", "").replace("\t", "") if key == "title" else str(value)
+        if not text.isprintable():
+            raise BadInput(f"{key} = {shown(str(value))}: it holds characters that cannot be printed; leave them out")
+
+
+def _check_size(axes):
+    """Raise BadInput for a map of too many points, before any is made."""
+    points = prod(axis.num if isinstance(axis, Spread) else 1 for axis in axes.values())
+    if points > MOST_POINTS:
+        raise BadInput(f"the axes make {points:.3g} points; a map holds at most {MOST_POINTS:.0e}; take fewer")
+
+
+def _float(key, number):
+    """The number as a float; raises BadInput for an integer beyond all floats."""
+    try:
+        return float(number)
+    except OverflowError:
+        raise BadInput(f"{key} = {shown(number)}: it is beyond the largest number, 1.8e308") from None
 
 
 def _is_number(value):
@@ -255,7 +302,7 @@ def _check_width_table(widths, axes):
     if isinstance(widths, dict):
         for key in widths:
             if key not in axes:
-                raise BadInput(f"refine.width.{key}: {modules.unknown('axis', key, list(axes))}")
+                raise BadInput(f"refine.width.{short(key, 40)}: {modules.unknown('axis', key, list(axes))}")
         for key in axes:
             if key not in widths:
                 raise BadInput(f"refine.width.{key} is missing; give a width for each axis, or one number for both")
@@ -284,9 +331,10 @@ def check_options(scene, given, parameters=(), table=""):
         if key not in known:
             if key in {p.name for p in scene.PARAMETERS}:
                 raise BadInput(f"{table}{key} is a parameter, not an option; put it under [axes]")
-            raise BadInput(f"{table}{key}: {modules.unknown('option', key, sorted(known))}")
-        if str(value) not in known[key].choices:
-            raise BadInput(f"{table}{key}: {modules.unknown('value', str(value), list(known[key].choices))}")
+            raise BadInput(f"{table}{short(key, 40)}: {modules.unknown('option', key, sorted(known))}")
+        told = value if isinstance(value, str) else shown(value)
+        if told not in known[key].choices:
+            raise BadInput(f"{table}{key}: {modules.unknown('value', told, list(known[key].choices))}")
         if known[key].said_by in parameters:
             raise BadInput(f"{table}{key} and {known[key].said_by} say the same thing; give only one of them")
         if known[key].only_with and known[key].only_with not in parameters:
@@ -308,7 +356,7 @@ def check_parameters(scene, name, options, given, table=""):
                 raise BadInput(f"{table}{key} is an option of {name}, not a parameter; put it under [options]")
             if key in all_of:
                 raise BadInput(f"{table}{key} does not go with the rest{condition(scene, all_of[key].when, key)}")
-            raise BadInput(f"{table}{key}: {_unknown_parameter(name, key, list(known))}")
+            raise BadInput(f"{table}{short(key, 40)}: {_unknown_parameter(name, key, list(known))}")
         original = known[key].instead_of or key
         if original in replaced:
             raise BadInput(f"{table}{replaced[original]} and {table}{key} say the same thing; give only one of them")
@@ -331,7 +379,7 @@ def check_request(scene, options, method, rtol, variables, tables=("", "")):
     """The Request; raises BadInput for an unknown method or variable, or an rtol outside (0, 1)."""
     _check_method(scene, options, method, tables[0])
     if isinstance(rtol, bool) or not isinstance(rtol, Real) or not 0 < rtol < 1:
-        raise BadInput(f"{tables[0]}rtol = {rtol!r}: it must lie between 0 and 1, such as 1e-10")
+        raise BadInput(f"{tables[0]}rtol = {shown(rtol)}: it must lie between 0 and 1, such as 1e-10")
     outputs = [output.name for output in scene.OUTPUTS if exists(output, options)]
     for variable in variables or ():
         if variable not in outputs:
@@ -366,25 +414,50 @@ def check_path(path):
     """The output path; raises BadInput unless a file can be made there, Stopped where the disk is read-only."""
     if not str(path):
         raise BadInput("output.path is empty; name a file, such as 'map.nc'")
-    path = Path(path)
+    try:
+        return _checked_path(Path(path))
+    except (OSError, ValueError) as error:
+        if isinstance(error, BadInput):
+            raise
+        raise BadInput(f"output.path = {shown(str(path), 120)}: no file can be made there ({_reason(error)})") from None
+
+
+def _is_netcdf(path):
+    with path.open("rb") as file:
+        return file.read(4) == b"\x89HDF"
+
+
+def _checked_path(path):
     folder = path.parent
     if path.suffix.lower() in (".png", ".pdf", ".svg", ".toml"):
-        raise BadInput(f"output.path = {str(path)!r} is to be a netCDF file; name one, such as {path.stem + '.nc'!r}")
-    if path.is_file() and path.open("rb").read(4) != b"\x89HDF":
-        raise BadInput(f"output.path = {str(path)!r} is there and is no netCDF file; move it away, or use -o OUT.nc")
+        raise BadInput(
+            f"output.path = {shown(str(path), 120)} is to be a netCDF file; name one, such as {shown(path.stem + '.nc')}"
+        )
+    if path.is_file() and not _is_netcdf(path):
+        raise BadInput(
+            f"output.path = {shown(str(path), 120)} is there and is no netCDF file; move it away, or use -o OUT.nc"
+        )
     if path.is_dir():
-        raise BadInput(f"output.path = {str(path)!r} is a folder; name a file, such as {str(path / 'map.nc')!r}")
+        raise BadInput(
+            f"output.path = {shown(str(path), 120)} is a folder; name a file, such as {shown(str(path / 'map.nc'), 120)}"
+        )
     if not folder.is_dir():
         raise BadInput(
-            f"output.path = {str(path)!r}: there is no folder {str(folder)!r}; make it first, or use -o OUT.nc"
+            f"output.path = {shown(str(path), 120)}: there is no folder {shown(str(folder), 120)}; make it first, or use -o OUT.nc"
         )
     if os.statvfs(folder).f_flag & os.ST_RDONLY:
         raise Stopped(
-            f"output.path = {str(path)!r}: the disk of the folder {str(folder)!r} is read-only; make it writable and "
+            f"output.path = {shown(str(path), 120)}: the disk of the folder {shown(str(folder), 120)} is read-only; make it writable and "
             "run the command again, or use -o OUT.nc"
         )
+    if len(os.fsencode(path.name)) > os.pathconf(folder, "PC_NAME_MAX") - SUFFIXES:
+        raise BadInput(
+            f"output.path = {shown(str(path), 120)}: this name is too long for the files beside it; shorten it"
+        )
     if not os.access(folder, os.W_OK | os.X_OK) or str(folder.resolve()).startswith(("/proc", "/sys")):
-        raise BadInput(f"output.path = {str(path)!r}: the folder {str(folder)!r} cannot be written to; use -o OUT.nc")
+        raise BadInput(
+            f"output.path = {shown(str(path), 120)}: the folder {shown(str(folder), 120)} cannot be written to; use -o OUT.nc"
+        )
     return path
 
 
@@ -427,18 +500,20 @@ def _apply(data, override):
     """Set `KEY=VALUE` in the parsed workflow; VALUE is TOML, or else a string."""
     key, equals, value = override.partition("=")
     if not equals or not key.strip():
-        raise BadInput(f"--set {override!r}: write it as KEY=VALUE, such as --set axes.k.num=40")
+        raise BadInput(f"--set {shown(override)}: write it as KEY=VALUE, such as --set axes.k.num=40")
     try:
         value = tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         value = value.strip()
     *tables, last = (part.strip() for part in key.split("."))
     if not all([*tables, last]):
-        raise BadInput(f"--set {override!r}: the key has an empty part; write it as axes.k.num=40")
+        raise BadInput(f"--set {shown(override)}: the key has an empty part; write it as axes.k.num=40")
     for table in tables:
         data = data.setdefault(table, {})
         if not isinstance(data, dict):
-            raise BadInput(f"--set {override!r}: {table} is a value, not a table, so it has no key below it")
+            raise BadInput(
+                f"--set {shown(override)}: {short(table)} is a value, not a table, so it has no key below it"
+            )
     data[last] = value
 
 
@@ -449,7 +524,7 @@ def _one_line(error):
         error.errors(), key=lambda one: (one["type"] != extra, one["type"] == extra and one["loc"][-1] == "values")
     )
     tag = 2 if first["loc"][0] in ("axes", "refine") else None  # pydantic names the kind of axis after the axis
-    key = ".".join(str(part) for i, part in enumerate(first["loc"]) if i != tag)
+    key = ".".join(short(part, 40) for i, part in enumerate(first["loc"]) if i != tag)
     more = "" if error.error_count() == 1 else f" (and {error.error_count() - 1} more)"
     if first["type"] == "extra_forbidden" and first["loc"][-1] == "values":
         return f"{key} stands beside other keys; give values alone, or start, stop and num"
@@ -461,9 +536,9 @@ def _one_line(error):
         return f"{key} is a list; write {key.removeprefix('axes.')} = {{ values = [...] }}{more}"
     if first["type"] == "list_type":
         such = "[0.1, 0.2]" if key.startswith("axes.") else '["NAME"]'
-        return f"{key} = {first['input']!r}: it must be a list, such as --set '{key}={such}' (quoted so){more}"
+        return f"{key} = {shown(first['input'])}: it must be a list, such as --set '{key}={such}' (quoted so){more}"
     said = first["msg"].partition(" or instance of")[0].replace("dictionary", "table")
-    return f"{key} = {first['input']!r}: {said[0].lower()}{said[1:]}{more}"
+    return f"{key} = {shown(first['input'])}: {said[0].lower()}{said[1:]}{more}"
 
 
 def _nearest(loc):
@@ -476,8 +551,10 @@ def _nearest(loc):
         else File
     )
     known = list(table.model_fields) + (["values"] if table is Spread else [])
-    return modules.unknown("", str(loc[-1]), known).removeprefix(f"unknown  {str(loc[-1])!r}")
+    return modules.unknown("", str(loc[-1]), known).removeprefix(f"unknown  {shown(str(loc[-1]))}")
 
 
 def _reason(error):
-    return getattr(error, "strerror", None) or "it is not UTF-8 text"
+    if isinstance(error, UnicodeDecodeError):
+        return "it is not UTF-8 text"
+    return getattr(error, "strerror", None) or short(error, 150)

@@ -342,7 +342,9 @@ def page(path):
     shown.choose((0, 0))
     shown.solve()
     shown.show_source()
-    return "".join(part.text for part in document.select({"type": Div})).replace("\n", " ") + html.escape(document.title)
+    return "".join(part.text for part in document.select({"type": Div})).replace("\n", " ") + html.escape(
+        document.title
+    )
 
 
 def main():

@@ -8,6 +8,7 @@ import time
 
 import pytest
 
+from survey import cluster as clusters
 from survey import dispatch
 from survey.errors import BadInput, Stopped
 
@@ -93,6 +94,45 @@ def test_an_interruption_waits_for_no_worker(tmp_path, in_time):
     assert heard.results == [] and not multiprocessing.active_children()
 
 
+def test_a_worker_that_freezes_is_replaced(tmp_path, in_time, monkeypatch):
+    monkeypatch.setattr(dispatch, "COMPILE_SECONDS", 20.0)
+
+    def freezes(number):
+        once = tmp_path / "frozen"
+        if number == 5 and not once.exists():
+            once.touch()
+            os.kill(os.getpid(), signal.SIGSTOP)
+        return number * number
+
+    heard = Heard()
+    dispatch.on_processes(freezes, NUMBERS, heard.finished, heard.died, 2, dispatch.Patience(1.0))
+    assert heard.dead == [] and sorted(heard.results) == [n * n for n in NUMBERS]
+
+
+def test_a_task_without_end_stops_the_run_in_one_line(in_time, monkeypatch):
+    monkeypatch.setattr(dispatch, "COMPILE_SECONDS", 3.0)
+
+    def endless(number):
+        time.sleep(10_000 if number == 5 else 0)
+        return number
+
+    heard = Heard()
+    with pytest.raises(Stopped, match=r"^a block took more than 1 s, twice; run .* --block-timeout"):
+        dispatch.on_processes(endless, NUMBERS, heard.finished, heard.died, 2, dispatch.Patience(1.0))
+    assert heard.dead == [] and len(heard.results) >= 5 and not multiprocessing.active_children()
+
+
+def test_patience_is_measured_from_other_tasks_and_has_a_floor():
+    patience = dispatch.Patience()
+    assert patience.limit == dispatch.PATIENCE_SECONDS
+    patience.took(100.0)
+    patience.took(None)
+    patience.took(1.0)
+    assert patience.limit == 100.0 * dispatch.PATIENCE
+    assert patience.first == patience.limit + dispatch.COMPILE_SECONDS
+    assert dispatch.Patience(7.0).limit == 7.0
+
+
 @pytest.fixture(scope="module")
 def cluster():
     distributed = pytest.importorskip("distributed")
@@ -123,21 +163,61 @@ def test_a_cluster_ends_every_number_and_survives_deaths(cluster, in_time, tmp_p
         return number * number
 
     heard = Heard()
-    with dispatch.client_of(cluster.scheduler_address) as client:
-        dispatch.on_cluster(deadly, NUMBERS, heard.finished, heard.died, client)
-    assert 4 in heard.dead and sorted(heard.counts) == list(range(13))
-    innocent = {n * n for n in NUMBERS if n not in heard.dead}
-    assert innocent <= set(heard.results)
+    with clusters.client_of(cluster.scheduler_address) as client:
+        clusters.on_cluster(deadly, NUMBERS, heard.finished, heard.died, client)
+    assert heard.dead == [4] and sorted(heard.counts) == list(range(13))
+    assert sorted(heard.results) == sorted(n * n if n != 4 else -4 for n in NUMBERS)
+
+
+@pytest.mark.parametrize("what", ["frozen", "endless"])
+def test_a_cluster_replaces_a_worker_that_is_stuck(cluster, in_time, monkeypatch, tmp_path, what):
+    monkeypatch.setattr(dispatch, "COMPILE_SECONDS", 20.0)
+
+    def stuck(number):
+        once = tmp_path / "stuck"
+        if number == 9 and not once.exists():
+            once.touch()
+            os.kill(os.getpid(), signal.SIGSTOP) if what == "frozen" else time.sleep(10_000)
+        return number * number
+
+    heard = Heard()
+    with clusters.client_of(cluster.scheduler_address) as client:
+        clusters.on_cluster(stuck, NUMBERS, heard.finished, heard.died, client, dispatch.Patience(2.0))
+    assert heard.dead == [] and sorted(heard.results) == [n * n for n in NUMBERS]
+
+
+def test_a_cluster_stops_for_a_task_without_end(cluster, in_time, monkeypatch):
+    monkeypatch.setattr(dispatch, "COMPILE_SECONDS", 3.0)
+
+    def endless(number):
+        time.sleep(10_000 if number == 9 else 0)
+        return number
+
+    heard = Heard()
+    with clusters.client_of(cluster.scheduler_address) as client:
+        with pytest.raises(
+            Stopped, match=r"^3 workers .* had a block for more than 1 s and finished none; run .* again"
+        ):
+            clusters.on_cluster(endless, NUMBERS, heard.finished, heard.died, client, dispatch.Patience(1.0))
+    assert heard.dead == [] and len(heard.results) >= 9
+
+
+def test_a_cluster_whose_workers_all_die_stops_and_blames_no_task(cluster, in_time):
+    heard = Heard()
+    with clusters.client_of(cluster.scheduler_address) as client:
+        with pytest.raises(Stopped, match="die again and again and finish no block; give them more memory"):
+            clusters.on_cluster(lambda number: os.kill(os.getpid(), 9), NUMBERS, heard.finished, heard.died, client)
+    assert heard.dead == [] and heard.results == []
 
 
 def test_a_cluster_without_workers_is_told_and_waited_for(in_time, monkeypatch, caplog):
     distributed = pytest.importorskip("distributed")
-    monkeypatch.setattr(dispatch, "WORKERLESS_SECONDS", 0.2)
+    monkeypatch.setattr(clusters, "WORKERLESS_SECONDS", 0.2)
     heard = Heard()
     with distributed.LocalCluster(n_workers=0, processes=False, dashboard_address=None) as empty:
-        with dispatch.client_of(empty.scheduler_address) as client:
+        with clusters.client_of(empty.scheduler_address) as client:
             run = threading.Thread(
-                target=dispatch.on_cluster, args=(abs, range(3), heard.finished, heard.died, client), daemon=True
+                target=clusters.on_cluster, args=(abs, range(3), heard.finished, heard.died, client), daemon=True
             )
             run.start()
             while "has no workers; waiting for some" not in caplog.text:
@@ -150,8 +230,18 @@ def test_a_cluster_without_workers_is_told_and_waited_for(in_time, monkeypatch, 
 
 def test_no_scheduler_is_told_in_one_line(monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr(dispatch, "SCHEDULER_SECONDS", 1)
+    monkeypatch.setattr(clusters, "SCHEDULER_SECONDS", 1)
     with pytest.raises(Stopped, match=r"no dask scheduler answers at 'tcp://127\.0\.0\.1:9'"):
-        dispatch.client_of("tcp://127.0.0.1:9")
+        clusters.client_of("tcp://127.0.0.1:9")
     with pytest.raises((BadInput, Stopped), match="nonsense"):
-        dispatch.client_of("nonsense://x")
+        clusters.client_of("nonsense://x")
+
+
+def test_a_scheduler_file_that_is_none_is_told_in_one_line(tmp_path):
+    pytest.importorskip("distributed")
+    with pytest.raises(BadInput, match=r"absent\.json: there is no such scheduler file"):
+        clusters.client_of(str(tmp_path / "absent.json"))
+    for text in ("", "[]", "{}", "nonsense"):
+        (tmp_path / "file").write_text(text)
+        with pytest.raises(BadInput, match="file: this is not a scheduler file"):
+            clusters.client_of(str(tmp_path / "file"))
