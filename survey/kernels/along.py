@@ -15,7 +15,9 @@ from survey.kernels.flow import (
     BOUND_DG,
     BOUND_F,
     BOUND_G,
+    C23,
     LAST,
+    S2,
     TRUNC_PHI,
     TRUNC_W,
     TWO_PI,
@@ -95,8 +97,9 @@ def trajectory(setting, begin, at, p, phi0, w0, times, tolerance, limit, floats,
             bar_phi, bar_w = bar(n, a), bar(n, c)
             floats[j, 0], floats[j, 1] = x + turns * TWO_PI, v
             floats[j, 2], floats[j, 3] = bar_phi + 3e-16 * abs(turns) * TWO_PI, bar_w
-            passed = sign != 0 and v * sign < 0.0
-            turnings[j] = count + passed if unsure < 3 and count >= 0 else UNTOLD
+            from_rest = n == 1 and w0 == 0.0  # then w is 0 at the start and nowhere else
+            told = unsure < 3 and count >= 0 and (abs(v) > bar_w or from_rest)
+            turnings[j] = count + (v * sign < 0.0 and not from_rest) if told else UNTOLD
             if not (bar_phi < TRUST and bar_w < TRUST * (1.0 + abs(v))):
                 floats[j, 0] = floats[j, 1] = floats[j, 2] = floats[j, 3] = math.nan
                 turnings[j] = UNTOLD
@@ -119,7 +122,7 @@ def trajectory(setting, begin, at, p, phi0, w0, times, tolerance, limit, floats,
         if abs(w) <= bar(n, sbb):
             unsure += 1
         else:
-            if unsure > 2 and sign != 0:
+            if unsure > 2:
                 count = UNTOLD - limit  # below zero for good
             if w * sign < 0.0:
                 count += 1
@@ -163,6 +166,12 @@ def start_sign(p, phi, w):
     if abs(g) <= 8.0 * UNIT * p[BOUND_G]:
         return 0
     return 1 if g > 0.0 else -1
+
+
+@inline
+def rests(p, phi, w):
+    """Is the state exactly an equilibrium? Of binary64 angles only 0 can be one (see `equilibria.resting`)."""
+    return w == 0.0 and (p[BOUND_G] == 0.0 or (phi == 0.0 and p[S2] == p[C23]))
 
 
 @inline
@@ -249,7 +258,8 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
     j, size, doubt = 0, len(targets), -1  # doubt: the first target in doubt
     ending = OK
     if w0 == 0.0 and start_sign(p, phi, w0) <= 0:
-        ending = TURNING if start_sign(p, phi, w0) < 0 else EQUILIBRIUM
+        # within rounding of an equilibrium it is not told to which side the solution leaves it
+        ending = TURNING if start_sign(p, phi, w0) < 0 else (EQUILIBRIUM if rests(p, phi0, w0) else SEPARATRIX)
         while j < size and targets[j] == phi0:
             floats[j, 0] = floats[j, 1] = floats[j, 2] = floats[j, 3] = 0.0
             status[j] = OK
@@ -286,7 +296,7 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
             usable = bar(n, a) < TRUST and floats[j, 2] < TRUST * (1.0 + abs(v))
             usable = usable and floats[j, 3] < TRUST * (1.0 + floats[j, 1])
             status[j] = OK if usable else NO_CONVERGENCE
-            if doubt < 0 and not told(floats[j]):
+            if doubt < 0 and not certain(floats[j]):
                 doubt = j
             j += 1
         saa, sab, sbb = carried(p, T, reach, v1, saa, sab, sbb)
@@ -301,7 +311,7 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
             ending = TURNING if clean_turning(p, x1, bar_phi, bar_w) else SEPARATRIX
             bar_t = bar_w / abs(values(p, x1)[1]) + 3e-16 * t if ending == TURNING else 0.0
             for i in range(doubt if doubt >= 0 else j, size):
-                if i >= j or not told(floats[i]):
+                if i >= j or not certain(floats[i]):
                     status[i] = ending
                     floats[i, 0], floats[i, 1] = x1 + turns * TWO_PI, t + (reach + t_low)
                     floats[i, 2], floats[i, 3] = edge + 4e-16 * abs(floats[i, 0]), bar_t * 1.2
@@ -326,12 +336,12 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
                 ending = EQUILIBRIUM
                 break
     for i in range(doubt if doubt >= 0 else j, size):
-        if i >= j or not told(floats[i]):
+        if i >= j or not certain(floats[i]):
             status[i] = ending
 
 
 @inline
-def told(row):
+def certain(row):
     """Is w so certain, at a target, that a turning point is further away than the bar of phi?"""
     return row[2] < 0.1 * row[0]
 

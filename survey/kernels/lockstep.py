@@ -228,7 +228,7 @@ def _turnings(state):
     for i in range(LANES):
         v, sign, unsure, count = state[_V, i], state[_SIGN, i], state[_UNSURE, i], state[_COUNT, i]
         near = not v * v > 2.0402 * state[_STEPS, i] * state[_SBB, i]
-        lost = unsure > 2.0 and sign != 0.0
+        lost = unsure > 2.0
         passed = count + (1.0 if v * sign < 0.0 else 0.0)
         state[_COUNT, i] = count if near else (_MANY if lost else passed)
         state[_SIGN, i] = sign if near else (1.0 if v > 0.0 else -1.0)
@@ -265,8 +265,9 @@ def _tell(state, before, fixed, i, floats, turnings):
         return False
     floats[0], floats[1] = (state[_PSI, i] + angle) + turns * TWO_PI, v
     floats[2], floats[3] = wide + 3e-16 * (abs(turns) * TWO_PI + abs(angle)), high
-    told = before[_UNSURE, i] < 3.0 and before[_COUNT, i] >= 0.0
-    passed = before[_SIGN, i] * v < 0.0
+    from_rest = before[_STEPS, i] == 0.0 and before[_V, i] == 0.0  # then w is 0 at the start and nowhere else
+    told = before[_UNSURE, i] < 3.0 and before[_COUNT, i] >= 0.0 and (abs(v) > high or from_rest)
+    passed = before[_SIGN, i] * v < 0.0 and not from_rest
     turnings[0] = int(before[_COUNT, i]) + passed if told else UNTOLD
     for k in range(_STATE):
         state[k, i] = before[k, i]

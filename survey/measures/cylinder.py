@@ -87,21 +87,37 @@ def _in_time(method, rows, places, rtol):
         np.copyto(status, ends[:, None], where=~np.isfinite(floats[..., 0]))  # else OK
         return floats, turnings, status
 
-    return back(_repeated(run, np.isfinite(places), attempts(method, rtol), rtol))
+    asked = np.isfinite(places)
+    results = _repeated(run, asked, attempts(method, rtol), rtol)
+    if hasattr(method, "flow_turnings"):
+        _count(method, rows, places, attempts(method, rtol)[-1], asked, results)
+    return back(results)
 
 
-def abel(method, rows, targets, rtol):
+def _count(method, rows, places, tolerance, asked, results):
+    """Tell the turnings that the steps have not told, as those beside a focus, where w is less than its bar."""
+    _floats, turnings, status = results
+    pick = (asked & (turnings == UNTOLD) & (status == OK)).any(axis=1)
+    if pick.any():
+        P, starts = split(rows[pick])
+        told = turnings[pick]
+        method.flow_turnings(P, starts, np.ascontiguousarray(places[pick]), tolerance, STEPS, told)
+        turnings[pick] = np.where(status[pick] == OK, told, turnings[pick])
+
+
+def abel(method, rows, targets, rtol, before=False):
     """w, t and their bars, or those of the turning point (status TURNING), at phi = `targets` (rows, columns).
 
-    Where w0 = 0 and g != 0 the solution starts at its turning point; it is followed forward in time, to the side of
-    g, and at targets on the other side it has turned at t = 0.
+    Where w0 = 0 and g != 0 the solution starts at its turning point; it is followed forward in time, or backward if
+    `before`; both branches lie to the side of g, and at targets on the other side it has turned at t = 0.
     """
+    back = rows[:, 7] == 0.0 if before else np.zeros(len(rows), bool)
     floats = np.full((*targets.shape, 4), np.nan)
     status = np.zeros(targets.shape, dtype=np.int64)
     for side in (1.0, -1.0):
         ahead = targets >= rows[:, 6:7] if side > 0 else targets < rows[:, 6:7]
         for past in (False, True):
-            picked = ahead.any(axis=1) & ((rows[:, 7] * side < 0) == past)
+            picked = ahead.any(axis=1) & (((rows[:, 7] * side < 0) | back) == past)
             if not picked.any():
                 continue
             part = reverse(rows[picked]) if past else rows[picked]

@@ -14,9 +14,11 @@ import numpy as np
 from survey.kernels import equilibria as eq
 from survey.kernels import fate as kf
 from survey.kernels import returns as rt
-from survey.kernels.along import SEPARATRIX, STEP_LIMIT
+from survey.kernels.along import OK, SEPARATRIX, STEP_LIMIT
 from survey.kernels.flow import BOUND_DG, BOUND_F, coefficients
-from survey.measures.cylinder import tolerances
+from survey.kernels.flow_double import energy as energy_beside
+from survey.measures.cylinder import tolerances, trajectories
+from survey.methods import taylor_double_flow
 
 NO_TURNS = kf.NO_TURNS
 I0, I1, I2, G = 0, 1, 2, 3  # strata
@@ -25,6 +27,7 @@ STEPS = 20_000  # budget of one fate: about 15 ms
 MORE = 10  # times the budget for those that use it up
 MOST = 2_000_000  # steps in all
 BATCH = 50  # fates per kernel call, so that a call stays below a second
+HANDED_OVER = np.geomspace(0.5, 2000.0, 28)  # times, in those of the system, at which float64 takes over again
 LEAST = 1e-6  # slowest rotation of the lattice, in velocities of the system
 FINE = 1e-16  # truncation per step for cycles, or the finest of the method
 
@@ -60,7 +63,26 @@ def followed(method, s, starts, rtol):
         again = out[:, 4] == code
         if again.any():
             out[again] = fates(method, s, starts[again], tolerance, MORE)
+    if s.stratum not in (I0, I1) and starts.shape[1] == 2:  # no better than the bars of a start can its fate be
+        for i in np.flatnonzero(out[:, 4] == SEPARATRIX):
+            _handed_over(method, s, starts[i], first, out[i])
     return out
+
+
+def _handed_over(method, s, start, tolerance, out):
+    """Follow one start in double-double past what float64 cannot tell, until its fate from there on is decided."""
+    times = HANDED_OVER / (s.p[BOUND_F] + math.sqrt(s.p[BOUND_DG]) + abs(start[1]))
+    row = np.concatenate([s.p[:6], start])[None]
+    floats, turnings, status = trajectories(taylor_double_flow, row, times[None], 0.0)
+    for state, turned, code in zip(floats[0], turnings[0], status[0], strict=True):
+        if code != OK:
+            return
+        later = fates(method, s, state[None], tolerance)[0]
+        if later[0] != kf.UNDECIDED:
+            out[:] = later
+            if later[2] >= 0:
+                out[2] = later[2] + turned if turned >= 0 else kf.UNTOLD
+            return
 
 
 def _middles(s, out):
@@ -294,6 +316,13 @@ def _free(s, starts):
     return out
 
 
+def _above(p, phi, w, row):
+    """Sign of the energy less that of the equilibrium `row`, in double-double; 0 where its bar reaches 0."""
+    gap, bar = energy_beside(p, phi, w, row[eq.ANGLE])
+    bar += 0.5 * p[BOUND_DG] * row[eq.BAR] ** 2  # V' = 0 at the equilibrium
+    return 0 if abs(gap) <= bar else math.copysign(1.0, gap)
+
+
 def _conservative(s, starts):
     """b = 0: H = w^2/2 + V is conserved; rotation above the highest V, libration below, but for separatrices."""
     _b12, _b31, d, c23, s2, s3 = s.p[:6]
@@ -309,6 +338,9 @@ def _conservative(s, starts):
     noise = 4e-16 * (np.abs(energy) + w * w + (abs(d) + abs(c23) + abs(s2) + abs(s3)) * (1.0 + np.abs(phi)))
     near = (np.abs(energy[:, None] - levels) <= noise[:, None] + 1e-15).any(axis=1)
     rotates = energy > levels.max()
+    for i in np.flatnonzero(near):
+        above = [_above(s.p, phi[i], w[i], row) for row in rest]
+        near[i], rotates[i] = 0 in above, min(above) > 0
     out = np.zeros((len(starts), 5))
     out[:, 0] = np.where(rotates, kf.PERIODIC_ROTATION, kf.PERIODIC_LIBRATION)
     out[:, 1] = -1

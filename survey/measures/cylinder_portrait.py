@@ -20,7 +20,7 @@ from survey.status import NO_CONVERGENCE, OK
 
 CYCLES, EQUILIBRIA = 8, 4  # places; surveys of random points found no more than 4 cycles, and g has 4 roots at most
 NONE, ROTATION_PLUS, ROTATION_MINUS, LIBRATION = range(4)
-TOO_MANY = 20  # as in the STATUS of scenes/gyrostat.py
+TOO_MANY, UNTOLD_RESTS = 20, 21  # as in the STATUS of scenes/gyrostat.py
 UNDECIDED, DEGENERATE, STABLE = -1, 0, 1
 COUNTS = ("equilibria", "saddles", "rotations_plus", "rotations_minus", "librations")
 ROUNDING = 4e-16  # of K and L, relative to the sizes of their terms
@@ -44,8 +44,12 @@ def solve(method, systems, rtol):
     result, listed = empty(len(systems), OK), []
     for i, six in enumerate(systems):
         s = remembered(method, six)
-        result["verdict"][i] = _verdict(method, s, rtol)
         _ends(s, six, result, i)
+        if any(_is_degenerate(s, row) for row in s.equilibria):
+            # how many equilibria and cycles there are then, the error bars do not tell
+            result["verdict"][i], result["status"][i] = DEGENERATE, UNTOLD_RESTS
+            continue
+        result["verdict"][i] = _verdict(method, s, rtol)
         _rests(s, result, i)
         cycles = [(kind, row) for kind, table in enumerate((s.plus, s.minus, s.librations), 1) for row in table]
         if len(cycles) > CYCLES:
@@ -91,8 +95,7 @@ def _type(row):
 def _verdict(method, s, rtol):
     """Is the point structurally stable, by the error bars?"""
     scale = s.p[BOUND_F] + math.sqrt(s.p[BOUND_DG])
-    degenerate = s.stratum != G or any(_is_degenerate(s.p, row) for row in s.equilibria)
-    degenerate = degenerate or any(not _hyperbolic(row) for row in s.librations)
+    degenerate = s.stratum != G or any(not _hyperbolic(row) for row in s.librations)
     for cycles in (s.plus, s.minus):
         degenerate = degenerate or any(not (_hyperbolic(row) or _far(row, s.K, scale)) for row in cycles)
     if degenerate:
@@ -104,11 +107,12 @@ def _verdict(method, s, rtol):
     return STABLE if (followed(method, s, starts, rtol)[:, 0] >= 0).all() else UNDECIDED
 
 
-def _is_degenerate(p, row):
-    """Does the bar of an equilibrium reach g' = 0, or f = 0 where it is no saddle (a Hopf point)?"""
+def _is_degenerate(s, row):
+    """Does the bar of an equilibrium reach g' = 0, or f = 0 where it is no saddle (in stratum G a Hopf point)?"""
+    p = s.p
     if row[eq.KIND] == eq.DEGENERATE or abs(row[eq.DG]) <= p[BOUND_DDG] * row[eq.BAR] + 8.0 * UNIT * p[BOUND_DG]:
         return True
-    return row[eq.KIND] != eq.SADDLE and row[eq.STABLE] == 0.0
+    return s.stratum == G and row[eq.KIND] != eq.SADDLE and row[eq.STABLE] == 0.0
 
 
 def _hyperbolic(row):

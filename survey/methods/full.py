@@ -77,7 +77,9 @@ def trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
                 return NO_CONVERGENCE
             floats[j, 0], floats[j, 1] = (here[0] + before * TWO_PI_LOW) + before * TWO_PI, here[1]
             floats[j, 2], floats[j, 3] = here[2] + 3e-16 * abs(before) * TWO_PI, here[3]
-            turnings[j] = count + (here[1] * sign < 0.0) if unsure < 3 and count >= 0 else UNTOLD
+            from_rest = n == 1 and w0 == 0.0
+            told = unsure < 3 and count >= 0 and (abs(here[1]) > here[3] or from_rest)
+            turnings[j] = count + (here[1] * sign < 0.0 and not from_rest) if told else UNTOLD
             j += 1
         gyrostat.at(T, h, new)
         gyrostat.carry(G, T, V, h, squares, J, work)
@@ -92,7 +94,7 @@ def trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
         if abs(w) <= here[3]:
             unsure += 1
             continue
-        if unsure > 2 and sign != 0:
+        if unsure > 2:
             count = UNTOLD - limit  # below zero for good
         count += w * sign < 0.0
         sign, unsure = (1 if w > 0.0 else -1), 0

@@ -7,7 +7,7 @@ Mathematics 14 (2005) 99-117. Domain: every parameter value; explicit, so steps 
 
 import math
 
-from survey.kernels import along, fate, lockstep, returns
+from survey.kernels import along, fate, lockstep, returns, winding
 from survey.kernels.flow import LAST, PHI, TRUNC_PHI, TRUNC_W, E, W, Y, longest_step, series
 from survey.kernels.flow import ORDER as _ORDER
 from survey.kernels.jit import inline, kernel
@@ -56,6 +56,12 @@ def flow_at(p, T, dt):
 def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
     """See `lockstep.trajectories`."""
     return lockstep.trajectories(P, starts, times, tolerance, limit, floats, turnings, status)
+
+
+@kernel
+def flow_turnings(P, starts, times, tolerance, limit, turnings):
+    """See `winding.turnings`."""
+    winding.turnings(flow_setting, flow_begin, flow_at, P, starts, times, tolerance, limit, turnings)
 
 
 @kernel

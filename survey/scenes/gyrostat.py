@@ -22,11 +22,20 @@ show their change beside rounding, verdicts are -1. `multiplier` and cycles carr
 separatrix are -1 (status `separatrix`), also those of starts at rest beside a saddle: `equilibrium_start` is given to
 exact equilibria only, and of binary64 angles none but phi0 = 0, where s2 = c23, is one (if g is not 0 throughout).
 
+A motion is one curve through (phi0, w0), in time. As a solution w(phi) of (57) it has, where w0 = 0 and g(phi0) != 0,
+two branches, w ~ +-sqrt(2 g (phi - phi0)), both on the side of phi0 to which g points. An Abel solution is the branch
+that the motion takes at t > 0, on which w has the sign of g(phi0); `branch = "before"` takes the other, by which the
+motion came: there w has the other sign and t < 0. Where w0 != 0 there is one branch, and the option changes nothing.
+
 An Abel solution has status `ok` where it certainly reaches phi, `turning` where it turns before phi or so near to it
 that phi lies within `phi_turning_error` of `phi_turning`.
 
 `auto` takes trajectories and Abel solutions in closed form where one applies and keeps its digits (method `closed`),
-else by Taylor series; `workflows/gyrostat_methods.py` maps where each method fails.
+else by Taylor series, and in double-double arithmetic (some 1e-3 s each) where these miss `rtol`; fates next to
+separatrices are followed in it, too. `workflows/gyrostat_methods.py` maps where each method fails.
+
+`turnings` counts the zeros of w between 0 and t, its ends not among them; it is not told where a zero lies so near to
+t that the error bar of w cannot tell it from t.
 
 The method `full` solves the six equations (1)-(6) of a gyrostat whose invariant set is this motion; `survey verify`
 holds trajectories against it, and `workflows/gyrostat_deviation.py` measures how deviations from the set grow.
@@ -35,6 +44,7 @@ A portrait is what the fates of a system share: ends, equilibria, cycles, and wh
 keep them all. It is structurally stable where, by the error bars, K is off zero (L, where K = 0 exactly), no
 equilibrium is degenerate or a Hopf point, no multiplier is 1, the signs of the return maps fit together (so the parity
 law holds), and every unstable branch of a saddle ends elsewhere than in a saddle; near saddle connections it is -1.
+Where an equilibrium is degenerate or a Hopf point within the error bar the status is `degenerate`, the verdict 0.
 
 Questions: `trajectory` (phi and w at t), `abel` (w and t at phi), `fate` (where the solution ends) and `portrait` (of
 the system, without an initial state).
@@ -79,7 +89,11 @@ PARAMETERS = (
     Parameter("phi", "angle of rotation at which w and t are asked, unwrapped", r"\varphi", units="rad", when=_ABEL,
               whole=True, **_FAR),
 )  # fmt: skip
-OPTIONS = (Option("question", _QUESTIONS, "what is asked of the solution, or of the system"),)
+OPTIONS = (
+    Option("question", _QUESTIONS, "what is asked of the solution, or of the system"),
+    Option("branch", ("after", "before"), "where w0 = 0, the branch w(phi) that the motion takes at t > 0 or at t < 0",
+           only_with="phi"),
+)  # fmt: skip
 STATUS = {
     "turning": "the solution turns back before it reaches phi, or within phi_turning_error of it: phi_turning and "
     "t_turning say where and when",
@@ -87,6 +101,8 @@ STATUS = {
     "separatrix": "the error bar cannot tell on which side of a separatrix the solution passes",
     "no_closed_form": "no closed form applies (they need b = 0, g = 0 or (61)): try another method",
     "too_many_cycles": "there are more cycles than places for them: the first are given",
+    "degenerate": "within the error bar an equilibrium is degenerate (g = g' = 0, or f = g = 0 where it is no saddle): "
+    "the numbers of equilibria and of cycles are not told; K, L, the stratum and the ends are",
 }
 _TURNING = 16
 MOST_TURNINGS = 2**31 - 1  # are kept as int32
@@ -173,7 +189,9 @@ def solve(point, request):
     if question in ("fate", "portrait"):
         return {"fate": _fate, "portrait": _portrait}[question](point, method, request.rtol)
     measure = cylinder_auto if request.method == "auto" else cylinder
-    return {"trajectory": _trajectory, "abel": _abel}[question](point, measure, method, request.rtol)
+    if question == "trajectory":
+        return _trajectory(point, measure, method, request.rtol)
+    return _abel(point, measure, method, request.rtol, request.options.get("branch") == "before")
 
 
 def why(answer):
@@ -276,10 +294,10 @@ def _trajectory(point, measure, method, rtol):
     return results | {"turnings": back(turnings), "status": back(status)}
 
 
-def _abel(point, measure, method, rtol):
+def _abel(point, measure, method, rtol, before):
     rows, places, back = _dense(point, "phi")
     rows, places, good = _valid(rows, places)
-    floats, status = measure.abel(method, rows, places, rtol)
+    floats, status = measure.abel(method, rows, places, rtol, before)
     status = np.where(good, status, INVALID_PARAMETERS)
     results = {"status": back(status)}
     for names, code in ((("w", "t"), OK), (("phi_turning", "t_turning"), _TURNING)):
