@@ -172,7 +172,7 @@ def saddles_of_states(points, u, bars):
     for i in range(len(u)):
         b, a = points[5, i], points[6, i]
         k = points[2, i] * points[0, i] * (points[0, i] - points[1, i])
-        u[i], rise = saddle(a, b, k)
+        u[i], rise, _doubtful = saddle(a, b, k)
         bars[i] = roughness(u[i], a, b, k) / rise if rise > 0.0 else np.nan
         u[i] = u[i] if rise > 0.0 else np.nan
 

@@ -31,6 +31,21 @@ def rf(x, m, g):
 
 
 @inline
+def rf_whole(above, g):
+    """R_F(0, y, z), from above = m + g, which may be all that is left of them: the first duplication."""
+    return 2.0 * rf(g, above, sqrt(2.0 * g) * sqrt(above))
+
+
+@inline
+def rj_whole(above, g, p):
+    """R_J(0, y, z, p), from above = m + g."""
+    fourth, root = sqrt(p), sqrt(2.0 * g) * sqrt(above)
+    product = fourth * (p + fourth * sqrt(2.0 * above) + g)
+    rest = rj(g, above, root, p + g)  # a quarter of each argument makes 8 times as much, which counts a quarter
+    return 6.0 / product * rc_of_one(2.0 * fourth * (p + g) / product) + 2.0 * rest
+
+
+@inline
 def rc_of_one(s):
     """R_C(1, s), s > 0 (DLMF 19.2.18, 19.2.19)."""
     e = s - 1.0

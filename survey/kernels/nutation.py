@@ -5,7 +5,7 @@ w = 1 + u, its roots, and its factor Q where P = (u - ul)(uh - u) Q, Q = k u^2 +
 then holds float64 numbers that are right to the last digits. Equation numbers: `scenes/brun.md`.
 """
 
-from math import nan, sqrt
+from math import copysign, inf, nan, sqrt
 
 from survey.kernels import double as dd
 from survey.kernels.jit import inline, kernel
@@ -51,9 +51,12 @@ def torque(u, a, b, k):
 
 @kernel
 def saddle(a, b, k):
-    """(u, F' there) of the greatest W between two least ones; F' = 0 where there is none. k > 0, |u| < 1/3."""
+    """(u, F' there, in doubt?) of the greatest W between two least ones; F' = 0 where there is none. k > 0, |u| < 1/3.
+
+    In doubt: so near a cusp that the rounding of F may hide a saddle, or make one.
+    """
     if k <= 0.0:
-        return 0.0, 0.0
+        return 0.0, 0.0, False
     u, bend = 0.0, a * b / k
     for _ in range(NEWTON):  # the greatest F', where 10 u^3 - 6 u + a b / k = 0
         move = (u * (10.0 * u * u - 6.0) + bend) / (30.0 * u * u - 6.0)
@@ -61,15 +64,23 @@ def saddle(a, b, k):
         if abs(move) < 1e-12:
             break
     level, rise = torque(u, a, b, k)
+    if not rise > 0.0:
+        return 0.0, 0.0, abs(u) < 0.4 and rise > -32.0 * EPS * (a * a + b * b + k)
+    before, least = u, abs(level)
     for _ in range(NEWTON):  # from there F is convex towards its zero, if it has one
-        if not rise > 0.0:
-            return 0.0, 0.0
-        move = level / rise
+        if not rise > 0.0:  # beyond the least |F|, which is more than half of that at the step before
+            return 0.0, 0.0, abs(before) < 0.4 and least <= 4.0 * roughness(before, a, b, k)
+        move, before, least = level / rise, u, abs(level)
         u -= move
         level, rise = torque(u, a, b, k)
         if abs(move) <= 4.0 * EPS * abs(u):
             break
-    return (u, rise) if rise > 1e-12 * k and abs(u) < 0.4 else (0.0, 0.0)
+    if abs(u) >= 0.4:
+        return 0.0, 0.0, False
+    # F is a parabola about its extremum, rise / F'' away, where it is rise^2 / 2 F''
+    bend = 2.0 * abs(a * b) + 12.0 * k * abs(u)
+    doubtful = rise * rise <= 16.0 * roughness(u, a, b, k) * bend
+    return (0.0, 0.0, True) if doubtful else (u, rise, False)
 
 
 @inline
@@ -267,15 +278,23 @@ def beside_saddle(equatorial, u, bar, side, row, place, error):
 
 
 @kernel
-def still(gaps, k, level, ats, equatorial, loose, y, plus, row):
-    """A row of a regular precession at the distance y from the pole +1 (`plus`) or -1."""
-    bar = EPS * y
+def still(gaps, k, level, ats, equatorial, loose, y, hum, chart, plus, row):
+    """A row of a regular precession at the distance y from the pole +1 (`plus`) or -1.
+
+    hum: the bar of P there, and chart: P about that pole. The well may be as high, and so wide, which changes all else
+    by its square.
+    """
+    _first, second = slopes(chart, y)
+    square = max(-second, TINY)
+    bar, wide = EPS * y, 2.0 * sqrt(hum / square) if y > 0.0 else 8.0 * hum / square
     near, far = ((y, 0.0), dd.two_sum(2.0, -y), bar), (dd.two_sum(2.0, -y), (y, 0.0), bar)
     if plus:
         fill(gaps, k, level, ats, equatorial, loose, near, far, row)
     else:
         fill(gaps, k, level, ats, equatorial, loose, far, near, row)
     row[WIDTH] = 0.0
+    row[BAR_LOW] += wide
+    row[BAR_HIGH] += wide
 
 
 @inline
@@ -313,9 +332,14 @@ def noise_above(row, bar, bar_bend):
 
 @kernel
 def barrier(a, b, k, equatorial, loose, at_plus, at_minus):
-    """(L above the separatrix, its bar; u of the saddle and F' there); NaN where there is none at these a and b."""
+    """(L above the separatrix, its bar; u of the saddle and F' there); NaN where there is none at these a and b.
+
+    The bar is infinite where that is in doubt.
+    """
     size_k = k[0]
-    between, rise = saddle(a, b, size_k)
+    between, rise, doubtful = saddle(a, b, size_k)
+    if doubtful:
+        return nan, inf, 0.0, 0.0
     if rise > 0.0:
         height, size = value(equatorial, (between, 0.0))
         rough = roughness(between, a, b, size_k)
@@ -327,6 +351,20 @@ def barrier(a, b, k, equatorial, loose, at_plus, at_minus):
         if bar == 0.0:
             distance, bar = hill_at_pole(b + a, -a * b, size_k, at_minus)
     return distance, bar, between, rise
+
+
+@kernel
+def in_small_well(equatorial, a, b, k):
+    """Next to a cusp: is L so near to W there that a motion may be in the small well beside the saddle?"""
+    u = cusp(a, b, k)
+    height, _size = value(equatorial, (u, 0.0))
+    return abs(height[0]) <= roughness(u, a, b, k)
+
+
+@inline
+def cusp(a, b, k):
+    """u of a cusp at these momenta, where a b = -4 k u^3."""
+    return -copysign((abs(a * b) / (4.0 * k)) ** (1.0 / 3.0), a * b)
 
 
 @kernel
@@ -346,6 +384,9 @@ def find(a, b, k, level, at_plus, at_minus, rough, rows, kinds):
     if abs(distance) <= bar:
         kinds[0] = SEPARATRIX
         return distance, bar
+    if bar == inf and in_small_well(equatorial, a, b, size_k):
+        kinds[0] = LOST
+        return distance, bar
     v = w = top = bottom = -1.0
     hum = murmur = 0.0
     if rise > 0.0 or product >= 0.0:
@@ -363,7 +404,7 @@ def find(a, b, k, level, at_plus, at_minus, rough, rows, kinds):
             kinds[0] = PASSAGE if left[0][0] == 0.0 else NUTATION
             place = 1
         elif bottom >= -murmur:
-            still(gaps, k, level, ats, equatorial, loose, w, False, rows[0])
+            still(gaps, k, level, ats, equatorial, loose, w, murmur, antipolar, False, rows[0])
             kinds[0], place = PRECESSION, 1
         if top > hum:
             right = beyond(minus, at_plus[0], v, 2.0 - v, polar, antipolar, -1.0)
@@ -372,7 +413,7 @@ def find(a, b, k, level, at_plus, at_minus, rough, rows, kinds):
             fill(gaps, k, level, ats, equatorial, loose, right, left, rows[place])
             kinds[place] = PASSAGE if right[0][0] == 0.0 else NUTATION
         elif top >= -hum:
-            still(gaps, k, level, ats, equatorial, loose, v, True, rows[place])
+            still(gaps, k, level, ats, equatorial, loose, v, hum, polar, True, rows[place])
             kinds[place] = PRECESSION
     elif max(top - hum, bottom - murmur) > 0.0:
         equator = equatorial[0][0]
@@ -382,9 +423,9 @@ def find(a, b, k, level, at_plus, at_minus, rough, rows, kinds):
         fill(gaps, k, level, ats, equatorial, loose, right, left, rows[0])
         kinds[0] = PASSAGE if right[0][0] == 0.0 or left[0][0] == 0.0 else NUTATION
     elif v >= 0.0 and top >= -hum:
-        still(gaps, k, level, ats, equatorial, loose, v, True, rows[0])
+        still(gaps, k, level, ats, equatorial, loose, v, hum, polar, True, rows[0])
         kinds[0] = PRECESSION
     elif w >= 0.0 and bottom >= -murmur:
-        still(gaps, k, level, ats, equatorial, loose, w, False, rows[0])
+        still(gaps, k, level, ats, equatorial, loose, w, murmur, antipolar, False, rows[0])
         kinds[0] = PRECESSION
     return distance, bar

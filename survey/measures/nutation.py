@@ -14,6 +14,7 @@ TURN = 2.0 * np.pi
 NAMES = ("u_min", "u_max", "period", "precession", "spin", "action")
 TRUST = 0.03  # relative errors beyond are no errors of first order
 UNDECIDED = -1
+NO_MOTION = 16  # the status of integrals without a motion
 FAR = 1e38  # distances in units of |k| beyond this say no more than that there is next to no field
 
 
@@ -78,9 +79,17 @@ def outputs(rows, out, inertia, drift):
         "period": (period, bar),
         "precession": (values[:, PRECESSION], bars[:, PRECESSION]),
         "spin": (spin, spin_bar),
-        "action": (values[:, ACTION], bars[:, ACTION]),
+        "action": (values[:, ACTION], bars[:, ACTION] + _smallest(rows)),
     }
     return _named(found, good)
+
+
+def _smallest(rows):
+    """What the action of a regular precession may be, by the bars of its turning points; 0 of other wells."""
+    wide = np.where(rows[:, nu.WIDTH] == 0.0, rows[:, nu.BAR_LOW] + rows[:, nu.BAR_HIGH], 0.0)
+    near = np.minimum(rows[:, nu.HIGH_PLUS], rows[:, nu.LOW_MINUS])
+    steep = np.sqrt(np.maximum(np.maximum(rows[:, nu.Q_LOW], rows[:, nu.Q_HIGH]), 0.0))
+    return steep * wide * np.minimum(1.0, wide / np.maximum(near, nu.TINY))
 
 
 def _named(found, good):
@@ -130,8 +139,8 @@ def motions(method, rows, kinds, starts, out, times, inertia, drift):
 
 
 def verdicts(rows, kinds):
-    """The verdict of each well: its kind, and a regular precession also where the turning points' bars overlap."""
-    one = (kinds == nu.NUTATION) & (rows[..., nu.WIDTH] <= rows[..., nu.BAR_LOW] + rows[..., nu.BAR_HIGH])
+    """The verdict of each well: its kind, and a regular precession also where the well's width is within its bar."""
+    one = (kinds == nu.NUTATION) & (rows[..., nu.NOISE_WIDTH] >= 1.0)
     return np.where(one, nu.PRECESSION, np.maximum(kinds, UNDECIDED))
 
 
@@ -143,12 +152,15 @@ def heights(kernel, points):
 
 
 def distance(heights):
-    """The output of that name: (L - L of the separatrix)/|k|, and its bar; NaN where there is none, or FAR away."""
+    """The output of that name: (L - L of the separatrix)/|k|, and its bar; NaN where there is none, or FAR away.
+
+    An infinite bar is left beside NaN where it is in doubt whether there is one.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):  # k = 0 has no separatrix
         value = heights[:, 0] / heights[:, 2]
         bar = heights[:, 1] / heights[:, 2] + 4.0 * nu.EPS * np.abs(value)
     near = np.abs(value) < FAR
     return {
         "separatrix_distance": np.where(near, value, np.nan),
-        "separatrix_distance_error": np.where(near, bar, np.nan),
+        "separatrix_distance_error": np.where(near, bar, np.where(np.isinf(heights[:, 1]), np.inf, np.nan)),
     }

@@ -132,7 +132,7 @@ def periods_of(row, out):
         *minus, width, root_low, root_high, -incline, row[nu.Q_MINUS], bend, period, x, y
     )
     low, high = row[nu.NOISE_LOW], row[nu.NOISE_HIGH]
-    noise, share = low + high + (row[nu.NOISE_ABOVE] if row[nu.MIDDLE] < 0.0 else 0.0), shares(x, y)
+    noise, share = low + high + row[nu.NOISE_ABOVE], shares(x, y)
     out[0] = period
     out[4] = (12.0 * EPS + 0.5 * share[0] * row[nu.NOISE_ABOVE] + 0.25 * share[1] * (low + high)) * period
     total, difference, size = down + up, down - up, size_up + size_down

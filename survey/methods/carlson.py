@@ -8,7 +8,7 @@ Source: B. C. Carlson, Numer. Algorithms 10 (1995) 13-26; formulas (S5), (S6), (
 from math import cos, hypot, pi, sin, sqrt
 
 from survey.kernels import nutation as nu
-from survey.kernels.carlson import rf, rj
+from survey.kernels.carlson import rf_whole, rj, rj_whole
 from survey.kernels.jit import inline, kernel
 from survey.kernels.nutation_action import ROUGH, action
 from survey.kernels.nutation_time import first_kind, motion
@@ -20,11 +20,11 @@ STEPS = 60
 
 
 @inline
-def advance(gap, near, far, width, q, time, s, g):
+def advance(gap, near, far, width, q, time, above, g):
     """(b -+ a) J/A (S6): J has its turning point far from the pole as origin; `time` is R_F."""
     if gap == 0.0:
         return 0.0
-    third = rj(0.0, s, g, q * near / far)
+    third = rj_whole(above, g, q * near / far)
     return gap * (2.0 * time / far + 2.0 * width * q / (3.0 * far * far) * third)
 
 
@@ -38,19 +38,20 @@ def second_kind(first, y, z, g):
 @inline
 def periods_of(row, out):
     """See `agm.periods_of`."""
-    width, s = row[nu.WIDTH], row[nu.MIDDLE]
+    width = row[nu.WIDTH]
     low, high = row[nu.Q_LOW], row[nu.Q_HIGH]
     g = sqrt(low) * sqrt(high)
-    time = rf(0.0, s, g)
-    up = advance(row[nu.MINUS], row[nu.HIGH_PLUS], row[nu.LOW_PLUS], width, low, time, s, g)
-    down = advance(row[nu.PLUS], row[nu.LOW_MINUS], row[nu.HIGH_MINUS], width, high, time, s, g)
-    noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + 8.0 * EPS * g / nu.above(row, g)
+    above = nu.above(row, g)
+    time = rf_whole(above, g)
+    up = advance(row[nu.MINUS], row[nu.HIGH_PLUS], row[nu.LOW_PLUS], width, low, time, above, g)
+    down = advance(row[nu.PLUS], row[nu.LOW_MINUS], row[nu.HIGH_MINUS], width, high, time, above, g)
+    noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + row[nu.NOISE_ABOVE]
     out[0], out[1], out[2] = 4.0 * time, up + down, down - up
     out[4] = (32.0 * EPS + noise) * out[0]
     # here, other than in agm, advances know the distances from poles by these alone
     noise += 0.5 * row[nu.NOISE_ENDS]
     out[5] = out[6] = (48.0 * EPS + 4.0 * noise) * (abs(up) + abs(down))
-    square = second_kind(time, 0.5 * nu.above(row, g), g, g)
+    square = second_kind(time, 0.5 * above, g, g)
     parts = out[0] * row[nu.LEVEL], 4.0 * square, row[nu.MINUS] * up, row[nu.PLUS] * down
     out[3] = (parts[0] + parts[1] - parts[2] - parts[3]) / (2.0 * pi)
     out[7] = (48.0 * EPS + 4.0 * noise) * (abs(parts[0]) + parts[1] + abs(parts[2]) + abs(parts[3])) / (2.0 * pi)

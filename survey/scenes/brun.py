@@ -33,11 +33,11 @@ from survey import methods
 from survey.errors import BadInput
 from survey.kernels import brun, brun_lanes
 from survey.kernels import nutation as nu
-from survey.measures import nutation
+from survey.measures import nutation, nutation_again, nutation_digits
 from survey.measures.rows import Rows
 from survey.modules import load
 from survey.scene import Option, Output, Parameter, Request, Trajectory, named, told
-from survey.status import INVALID_PARAMETERS, NO_CONVERGENCE, OK
+from survey.status import INVALID_PARAMETERS, NO_CONVERGENCE, OK, OVERFLOW
 
 TITLE = "Rotation of an axisymmetric body in a Newtonian field (Brun's problem)"
 FAMILY = "nutation"
@@ -49,10 +49,11 @@ STATUS = {
     "invalid_parameters": "the parameters lie outside the domain: C is at most 2 A, at theta0 = 0 p_psi is p_phi, and "
     "more in `survey scenes brun`",
     "no_motion": "no motion has these integrals: l lies below the least effective potential",
+    "overflow": "a value leaves the range of binary64: theta0 is too near to 0 or pi for these momenta",
 }
-_NO_MOTION = 16
 _STATE, _SCALED, _MOTION = {"sign": ("",)}, {"sign": ("1", "-1")}, {"motion": ("at_t",)}
 _HARMLESS = (1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0)
+_LARGEST = 1e290
 _BLURRED = 4e-13  # relative bars of actions of wells so narrow that turning points lose digits: see `brun.measure`
 _LARGE = {"minimum": -1e25, "maximum": 1e25}  # products of four such numbers, and of their inverses, are floats
 MOTION_PERIODS, MOTION_POINTS = 6, 3001  # of a trajectory
@@ -144,15 +145,24 @@ def solve(point, request):
     wanted = request.variables or {"action", "separatrix_distance"}
     if "l" in given:
         sign = int(request.options["sign"])
+        solver = partial(nutation_digits.of_integrals, sign=sign)
         slowly = partial(_scaled, sign=sign, method=method, rtol=request.rtol)
         out = _scaled_in_lanes(given, valid, sign, slowly, wanted) if auto else slowly(given, valid)
     else:
         times = block.per_point(point["t"]) if "t" in point else None
-        valid &= given["C"] <= 2.0 * given["A"]
-        slowly = partial(_state, method=method, rtol=request.rtol, times=times)
+        valid &= (given["C"] <= 2.0 * given["A"]) & ((given["theta0"] > 0.0) | (given["p_psi"] == given["p_phi"]))
+        solver = nutation_digits.of_state
+        slowly = partial(_state, method=method, request=request, times=times)
         out = _state_in_lanes(given, columns, valid, slowly, wanted) if auto else slowly(given, valid)
+    if "t" not in point:
+        nutation_again.settle(out, _ordered(given), solver, valid, request)
     out |= nutation.rates(out, request.variables)
     return {name: _back(block, values) for name, values in out.items()}
+
+
+def _ordered(given):
+    """The parameters (m, n) of a state or of scaled integrals, in the order of PARAMETERS."""
+    return np.array([given[p.name] for p in PARAMETERS if p.name in given])
 
 
 def _back(block, values):
@@ -205,20 +215,28 @@ def _completed(out, given, valid, done, slowly):
     return out
 
 
-def _state(given, valid, method, rtol, times):
-    points = np.column_stack([given[p.name] for p in PARAMETERS[:7]])
+def _state(given, valid, method, request, times):
+    points = _ordered(given).T.copy()
     points[~valid] = _HARMLESS
     rows, kinds, count, heights, starts = nutation.of_states(points)
-    valid &= kinds != nu.LOST
     a, c = points[:, 0], points[:, 1]
     drift = points[:, 6] * ((a - c) / (a * c))
-    periods, kinds = nutation.periods(method, rows, kinds, rtol)
+    periods, kinds = nutation.periods(method, rows, kinds, request.rtol)
     out = nutation.outputs(rows, periods, a, drift)
     out["verdict"] = nutation.verdicts(rows, kinds)
-    status = np.where(kinds == nu.LOST, NO_CONVERGENCE, OK)
+    status = np.where(kinds == nu.LOST, np.where(_too_large(points), OVERFLOW, NO_CONVERGENCE), OK)
     out = _finished(out, status, valid, count, heights)
+    if times is not None:
+        nutation_again.settle(out, points.T, nutation_digits.of_state, valid, request, known=True)
     return _with_motion(out, valid, kinds, times, lambda at: nutation.motions(
         method, rows, kinds, starts, periods, at, a, drift)) if times is not None else out  # fmt: skip
+
+
+def _too_large(points):
+    """Where the kinetic energy of the precession, next to a pole, leaves the range of double-double."""
+    theta, b, a = points[:, 3], points[:, 5], points[:, 6]
+    with np.errstate(all="ignore"):
+        return ~((b - a * np.cos(theta)) ** 2 < _LARGEST * np.sin(theta) ** 2) & (theta > 0.0)
 
 
 def _with_motion(out, valid, kinds, times, motions):
@@ -243,7 +261,7 @@ def _scaled(given, valid, sign, method, rtol):
     out, known = {name: values.reshape(-1, 1, 2) for name, values in out.items()}, known.reshape(-1, 2)
     lost = (known == nu.LOST).any(axis=1)
     out["verdict"] = nutation.verdicts(rows, known).max(axis=1)
-    status = np.where(lost, NO_CONVERGENCE, np.where((known == nu.NONE).all(axis=1), _NO_MOTION, OK))
+    status = np.where(lost, NO_CONVERGENCE, np.where((known == nu.NONE).all(axis=1), nutation.NO_MOTION, OK))
     return _finished(out, status, valid, count, heights)
 
 
