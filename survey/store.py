@@ -283,13 +283,15 @@ def label_of(file):
 
 @contextlib.contextmanager
 def refused(path, what="writing"):
-    """Turn a disk that refuses into one line."""
+    """Turn a disk that refuses into one line; a file elsewhere is named in it."""
     try:
         yield
     except SurveyError:
         raise
     except OSError as error:
         told = error.strerror or error
+        if isinstance(error.filename, (str, os.PathLike)) and not str(error.filename).startswith(str(path)):
+            told = f"{told}: {error.filename}"
         with contextlib.suppress(OSError):
             told = f"{told}; {filesize.decimal(shutil.disk_usage(Path(path).parent).free)} are free"
         raise Stopped(f"{path}: {what} failed ({told}); mend it and run the command again") from None
