@@ -199,7 +199,7 @@ class Blocks:
         try:
             if label_of(file).startswith(f"{self.identity} "):
                 return False
-            unpack(file.read_bytes())
+            checked(file.read_bytes())
         except (OSError, ValueError):
             return False
         return True
@@ -259,9 +259,7 @@ def pack(arrays, file, label=""):
 
 def unpack(content, label=None):
     """The arrays that `pack` wrote; raises ValueError if a bit is not as it was, or if its label is another one."""
-    body, check = memoryview(content)[:-8], content[-8:]
-    if len(content) < 16 or isal_zlib.crc32(body).to_bytes(8, "little") != check:
-        raise ValueError("its checksum fails")
+    body = checked(content)
     place = content.index(b"\n") + 1
     own, names = json.loads(content[:place])
     if label not in (None, own):
@@ -272,6 +270,14 @@ def unpack(content, label=None):
         arrays[name] = np.frombuffer(body, kind, prod(shape), place).reshape(shape)
         place += arrays[name].nbytes
     return arrays
+
+
+def checked(content):
+    """What a block of any format holds before its checksum; ValueError if a bit is not as it was."""
+    body, check = memoryview(content)[:-8], content[-8:]
+    if len(content) < 16 or isal_zlib.crc32(body).to_bytes(8, "little") != check:
+        raise ValueError("its checksum fails")
+    return body
 
 
 def label_of(file):
