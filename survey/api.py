@@ -79,7 +79,8 @@ def draw(ds: xr.Dataset, workflow: Any) -> list[Path]:
         for name in workflow.figures
     }
     for name, path in paths.items():
-        figures.save(ds, path, name, workflow.style)
+        with store.refused(path):
+            figures.save(ds, path, name, workflow.style)
     return list(paths.values())
 
 

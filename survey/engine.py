@@ -211,7 +211,7 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, agai
     blocks = [block for _, blocks in regions for block in blocks]
     about = {"points": workflow.grid.points, "code": _code() | _compilers()}
     kept = store.Blocks(workflow.path, fingerprint(workflow), fresh, about, _findable(workflow), again, workflow.text)
-    with store.refused(workflow.path), client, kept:
+    with store.refused(workflow.path, "the run"), client, kept:
         if kept.published:
             kept.remove()
             return Finished(kept.published, counts_in(kept.published), 0.0, 0.0, 0.0, 0.0, True)

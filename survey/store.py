@@ -201,7 +201,7 @@ class Blocks:
         try:
             if label_of(file).startswith(f"{self.identity} "):
                 return False
-            unpack(file.read_bytes())
+            checked(file.read_bytes())
         except (OSError, ValueError):
             return False
         return True
@@ -261,9 +261,7 @@ def pack(arrays, file, label=""):
 
 def unpack(content, label=None):
     """The arrays that `pack` wrote; raises ValueError if a bit is not as it was, or if its label is another one."""
-    body, check = memoryview(content)[:-8], content[-8:]
-    if len(content) < 16 or isal_zlib.crc32(body).to_bytes(8, "little") != check:
-        raise ValueError("its checksum fails")
+    body = checked(content)
     place = content.index(b"\n") + 1
     own, names = json.loads(content[:place])
     if label not in (None, own):
@@ -276,6 +274,14 @@ def unpack(content, label=None):
     return arrays
 
 
+def checked(content):
+    """What a block of any format holds before its checksum; ValueError if a bit is not as it was."""
+    body, check = memoryview(content)[:-8], content[-8:]
+    if len(content) < 16 or isal_zlib.crc32(body).to_bytes(8, "little") != check:
+        raise ValueError("its checksum fails")
+    return body
+
+
 def label_of(file):
     """The label that `pack` gave the file, not checked; empty for one that has none."""
     with open(file, "rb") as opened:
@@ -285,13 +291,15 @@ def label_of(file):
 
 @contextlib.contextmanager
 def refused(path, what="writing"):
-    """Turn a disk that refuses into one line."""
+    """Turn a disk that refuses into one line; a file elsewhere is named in it."""
     try:
         yield
     except SurveyError:
         raise
     except OSError as error:
         told = error.strerror or error
+        if isinstance(error.filename, (str, os.PathLike)) and not str(error.filename).startswith(str(path)):
+            told = f"{told}: {error.filename}"
         with contextlib.suppress(OSError):
             told = f"{told}; {filesize.decimal(shutil.disk_usage(Path(path).parent).free)} are free"
         raise Stopped(f"{path}: {what} failed ({told}); mend it and run the command again") from None

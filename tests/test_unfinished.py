@@ -2,6 +2,7 @@
 
 import json
 import re
+import zlib
 
 import numpy as np
 import pytest
@@ -111,6 +112,18 @@ def test_without_a_manifest_blocks_of_another_survey_are_not_taken(left, small):
         engine.run(workflow.read(small, ["solver.rtol=1e-6"]))
     assert len(list(left.glob("*.block"))) == 3
     assert not (left.parent / "small.nc.lock").exists()
+
+
+def test_blocks_of_an_older_format_are_kept_and_told(left, small):
+    """Format 2: the first line is a table of the arrays alone."""
+    manifest = json.loads((left / "manifest.json").read_text())
+    (left / "manifest.json").write_text(json.dumps(manifest | {"format": 2}))
+    for file in left.glob("*.block"):
+        body = file.read_bytes()[:-8].split(b"\n", 1)[1]
+        head = b'{"w": ["<f8", [4]], "status": ["|i1", [4]], "w_error": ["<f4", [4]]}\n'
+        file.write_bytes(head + body + zlib.crc32(head + body).to_bytes(8, "little"))
+    assert "small.nc.blocks holds 3 finished blocks of another version of the code (format)" in refusal(small)
+    assert len(list(left.glob("*.block"))) == 3
 
 
 def test_what_is_there_already_needs_no_more_room(left, small, monkeypatch):
