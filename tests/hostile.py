@@ -342,7 +342,8 @@ def page(path):
     shown.choose((0, 0))
     shown.solve()
     shown.show_source()
-    return "".join(part.text for part in document.select({"type": Div})).replace("\n", " ") + html.escape(document.title)
+    told = "".join(part.text for part in document.select({"type": Div})).replace("\n", " ")
+    return told + html.escape(document.title)  # as bokeh's page escapes it
 
 
 def main():
