@@ -360,6 +360,7 @@ def main():
             found = ask(folder / "file.nc", sentinel, points, solve, draw)
             for what, wrong in found:
                 print(f"{seed} [{told}] {what}: {wrong}"[:1500], flush=True)
+            print(f"{seed + 1 - first} of {number}", end="\r", file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":
