@@ -25,20 +25,18 @@ PACKING = ("scale_factor", "add_offset", "missing_value", "_Unsigned")
 ENCODINGS = ("utf-8", "ascii")
 
 
-def check(ds, where="", whole=True):
-    """Raise Damaged, naming the part, where the dataset is none that survey writes; `where` names the file.
+def check(ds, whole=True):
+    """Raise Damaged, naming the part, where the dataset is none that survey writes.
 
-    `whole`: all attributes must be there, and each axis have finite numbers.
+    `whole`, as files are: all attributes are there, the flags of the status too, and each axis has finite numbers.
     """
-    try:
-        _check_attributes(ds.attrs, REQUIRED if whole else ("scene",))
-        _check_points(ds)
-        for name, variable in ds.variables.items():
-            _check_variable(ds, name, variable)
-        if whole:
-            _check_axes(ds)
-    except Damaged as error:
-        raise Damaged(f"{where}{': ' if where else ''}{error}") from None
+    _check_attributes(ds.attrs, REQUIRED if whole else ("scene",))
+    _check_points(ds)
+    for name, variable in ds.variables.items():
+        _check_variable(ds, name, variable)
+    if whole:
+        _flags_of("status", ds.status.attrs)
+        _check_axes(ds)
 
 
 def check_declared(file, size):
@@ -129,11 +127,8 @@ def _check_variable(ds, name, variable):
     for key in ("long_name", "units", "symbol", "comment"):
         if not isinstance(given.get(key, ""), str):
             raise Damaged(f"{name}.{key} is {_told(given[key])}, and should be a text")
-    if "flag_values" in given or "flag_meanings" in given or name == "status":
-        try:
-            flags(given)
-        except Damaged as error:
-            raise Damaged(f"{name}: {error}") from None
+    if "flag_values" in given or "flag_meanings" in given:
+        _flags_of(name, given)
     if "flag_values" in given and variable.dtype.kind not in "iu":
         raise Damaged(f"{name} has flags, and holds no integers")
     of_points = name in ds.data_vars and set(ds.status.dims) <= set(variable.dims)
@@ -142,6 +137,13 @@ def _check_variable(ds, name, variable):
     bar = ds.variables.get(f"{name}_error")
     if bar is not None and (bar.dims != variable.dims or bar.dtype.kind != "f"):
         raise Damaged(f"{name}_error is no error bar for each value of {name}")
+
+
+def _flags_of(name, meaning):
+    try:
+        flags(meaning)
+    except Damaged as error:
+        raise Damaged(f"{name}: {error}") from None
 
 
 def _check_axes(ds):

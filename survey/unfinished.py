@@ -59,8 +59,8 @@ def size(path):
 
 def sentence(left):
     """What `told` has found, in words."""
-    points = counted(left["points"], "point") if left["points"] else "them"
-    done = f"{left['blocks_done']:,} of {counted(left['blocks'], 'block')} ({left['points_done']:,} of {points})"
+    points = _counted(left["points"], "point") if left["points"] else "them"
+    done = f"{left['blocks_done']:,} of {_counted(left['blocks'], 'block')} ({left['points_done']:,} of {points})"
     who = f"go on with: {left['resume']}" if "resume" in left else f"{left['at_work']} is at work on it"
     return f"{left['folder']} holds an unfinished run: {done}, last written {left['last_written']}; {who}"
 
@@ -127,10 +127,23 @@ def _short(value):
 
 def _resume(path, holder):
     """The command that goes on: the one that began, or else with the workflow as it was kept."""
-    if not holder.get("again"):
+    words, folder = _words(holder.get("again")), holder.get("folder")
+    if words[:2] != ["survey", "run"]:  # of another program: the folder may be a stranger's
         return f"survey run {shlex.quote(str(folder_of(path) / 'workflow.toml'))} -o {shlex.quote(str(path))}"
-    away = holder.get("folder") not in (None, os.getcwd())
-    return (f"cd {shlex.quote(holder['folder'])} && " if away else "") + holder["again"]
+    away = isinstance(folder, str) and folder != os.getcwd()
+    return (f"cd {shlex.quote(folder)} && " if away else "") + shlex.join(words)
+
+
+def _words(command):
+    """The words of a command as a shell takes them, each of them harmless when it is quoted; [] if there are none."""
+    try:
+        return shlex.split(command) if isinstance(command, str) else []
+    except ValueError:
+        return []
+
+
+def _counted(number, noun):
+    return counted(number, noun) if isinstance(number, int) else f"{number} {noun}s"
 
 
 def _who(holder):

@@ -116,7 +116,7 @@ def attribute(path, rng):
     with h5py.File(path, "r+", locking=False) as file:
         place = _places(file, rng)
         names = [name for name in place.attrs if name not in OF_HDF5]
-        name = _pick(rng, names + MORE * (not rng.integers(4)))
+        name = _pick(rng, names + MORE * (not names or not rng.integers(4)))
         value = _pick(rng, TEXTS if rng.integers(3) else VALUES)
         value = np.array([value] * 2, h5py.string_dtype()) if isinstance(value, str) and not rng.integers(8) else value
         try:
@@ -233,7 +233,7 @@ def ask(path, sentinel, points=0, solve=False, draw=True):
         found += [(" ".join(words), wrong) for wrong in command(words)]
     for ds in opened:
         for what, call in questions(ds, path, solve, draw).items():
-            found += [(what, wrong) for wrong in answered(call)]
+            found += [(what, wrong) for wrong in answered(call, what in ("point's HTML", "page"))]
     picture.unlink(missing_ok=True)
     left = {file.name for file in set(path.parent.iterdir()) ^ before}
     found += [("all", f"wrote {left}")] * bool(left) + [("all", "ran the scene")] * sentinel.exists()
@@ -269,7 +269,7 @@ def unseen(text):
     return [f"raw {sorted(bad)!r}"] if bad else []
 
 
-def answered(call):
+def answered(call, markup=False):
     """What is wrong with an answer from Python: a refusal in one line is none, nor is text that is seen."""
     try:
         with warnings.catch_warnings():
@@ -280,7 +280,8 @@ def answered(call):
         return unseen(str(refusal)) + ["two lines"] * ("\n" in str(refusal))
     except Exception as error:
         return [f"{type(error).__name__}: {error}"]
-    return unseen(text or "") + ["raw <"] * ("<script" in (text or "") or "<img src=x" in (text or ""))
+    raw = markup and any(tag in text for tag in ("<script", "<img src=x"))
+    return unseen(text or "") + ["raw <"] * raw
 
 
 def questions(ds, path, solve, draw):
@@ -342,9 +343,8 @@ def page(path):
     shown.choose((0, 0))
     shown.solve()
     shown.show_source()
-    return "".join(part.text for part in document.select({"type": Div})).replace("\n", " ") + html.escape(
-        document.title
-    )
+    told = "".join(part.text for part in document.select({"type": Div})).replace("\n", " ")
+    return told + html.escape(document.title)  # as bokeh's page escapes it
 
 
 def main():
@@ -360,6 +360,7 @@ def main():
             found = ask(folder / "file.nc", sentinel, points, solve, draw)
             for what, wrong in found:
                 print(f"{seed} [{told}] {what}: {wrong}"[:1500], flush=True)
+            print(f"{seed + 1 - first} of {number}", end="\r", file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

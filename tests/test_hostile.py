@@ -2,9 +2,11 @@
 
 import hashlib
 import html
+import json
 import os
 import re
 import resource
+import shlex
 import subprocess
 import sys
 import time
@@ -17,7 +19,7 @@ import pytest
 import xarray as xr
 
 import survey
-from survey import errors, figures, modules, scenes
+from survey import errors, figures, modules, scenes, unfinished
 from survey.errors import BadInput, Damaged
 from survey.viewer import looks
 from survey.wording import plain
@@ -251,3 +253,19 @@ def test_the_hash_of_the_evil_scene_is_that_of_its_text(folder):
     hostile.base(folder)
     text = (folder / "evil.py").read_bytes()
     assert survey.open(folder / "base.nc").attrs["scene_hash"] == hashlib.sha256(text).hexdigest()
+
+
+@pytest.mark.parametrize("blocks", [3, "\x1b[2Jmany", [1], None, 1e400])
+def test_what_an_unfinished_run_says_is_text_and_its_command_is_no_other_program(tmp_path, blocks):
+    folder = tmp_path / "map.nc.blocks"
+    folder.mkdir()
+    (folder / "manifest.json").write_text(json.dumps({"blocks": blocks, "points": "\x1b[31m"}))
+    for again in ("rm -rf ~", "survey run x.toml; rm -rf ~", "survey run $(reboot)", 5, "'", ["survey"]):
+        (folder / "holder.json").write_text(
+            json.dumps({"again": again, "folder": "/tmp/$(reboot)\x1b", "host": "\x1b"})
+        )
+        assert list(hostile.command(["info", str(tmp_path / "map.nc")])) == []
+        told = unfinished.told(tmp_path / "map.nc")["resume"]
+        command = told.rpartition(" && ")[2]
+        words = shlex.split(command)
+        assert words[:2] == ["survey", "run"] and command == shlex.join(words) and "rm" not in shlex.split(told)[:1]

@@ -165,7 +165,7 @@ class Point:
             for name, value, about in self._rows()
         )
         title = html.escape(plain(self.dataset.attrs.get("title", self.dataset.attrs["scene"])))
-        return f"<table class='{NO_FORMULAS}'><caption>{title}</caption>{rows}</table>"
+        return f"<div class='{NO_FORMULAS}'><table><caption>{title}</caption>{rows}</table></div>"
 
     def _rows(self):
         """(name, value, what it is) of everything; words have nothing in the third place."""

@@ -9,7 +9,6 @@ from functools import cached_property, lru_cache
 import numpy as np
 from matplotlib import colormaps
 
-from survey import schema
 from survey.dataset import flag_codes, unanswered
 from survey.figures import colours_of, greys_of, limits
 from survey.grid import logarithmic
@@ -179,7 +178,6 @@ class CellLayer(Layer):
 
     def __init__(self, ds, name, dims, place):
         super().__init__(ds, name, dims, place)
-        schema.cells(ds)
         axes = [Axis(ds[dim].values) for dim in dims]
         self.ends = [
             [axis.scaled(ds[f"cell_{dim}_{end}"].values) for end in ("low", "high")]
