@@ -20,7 +20,7 @@ from survey.errors import BadInput
 from survey.grid import Grid, line
 from survey.hill_scene import HillScene, is_number
 from survey.scene import Option, Output, Parameter, Request, condition, exists
-from survey.wording import counted, shown
+from survey.wording import counted, short, shown
 
 
 def run(
@@ -126,8 +126,11 @@ def evaluate(
     given = {key: _labelled(key, value) for key, value in parameters.items() if key not in names}
     options = workflows.check_options(module, {key: parameters[key] for key in parameters if key in names}, given)
     used = workflows.check_parameters(module, scene, options, given)
-    if variables is not None and (isinstance(variables, str) or not isinstance(variables, Iterable)):
-        variables = [variables]
+    if variables is not None:
+        try:
+            variables = [variables] if isinstance(variables, str) else list(variables)
+        except TypeError:
+            variables = [variables]
     request = workflows.check_request(module, options, method, rtol, variables)
     given |= {key: xr.DataArray(float(p.default)) for key, p in used.items() if key not in given}
     _check_lone_values(used, given)
@@ -161,12 +164,12 @@ def _labelled(key: str, value: Any) -> xr.DataArray:
     if not isinstance(value, xr.DataArray):
         array = value if hasattr(value, "dask") else _array(key, value)
         if array.ndim > 1:
-            raise BadInput(f"{key}: an array of {array.ndim} dimensions has no names for them; give a DataArray")
+            raise BadInput(f"{short(key, 40)}: an array of {array.ndim} dimensions has no names for them; give a DataArray")
         value = xr.DataArray(array, dims=(key,) if array.ndim else ())
     if value.dtype.kind not in "iuf":
         raise _not_real(key, value.values)
     if value.size == 0:
-        raise BadInput(f"{key}: an empty array has no points; give at least one value")
+        raise BadInput(f"{short(key, 40)}: an empty array has no points; give at least one value")
     return value.astype(float)
 
 
@@ -181,7 +184,7 @@ def _array(key: str, value: Any) -> npt.NDArray[Any]:
 
 
 def _not_real(key: str, value: Any) -> BadInput:
-    return BadInput(f"{key} = {shown(value)}: it must be a real number or an array of real numbers")
+    return BadInput(f"{short(key, 40)} = {shown(value)}: it must be a real number or an array of real numbers")
 
 
 def _check_dimensions(module: Any, given: dict[str, xr.DataArray]) -> None:

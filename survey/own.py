@@ -15,6 +15,7 @@ missed unless BREAKS stand beside it. [boundaries] and [refine] take z to be ana
 
 import hashlib
 import inspect
+import os
 from collections.abc import Callable, Iterable
 from functools import lru_cache
 from itertools import product
@@ -90,7 +91,7 @@ def find(scene: Any, near: str | Path | None = None) -> tuple[str, Any]:
         raise BadInput(
             f"scene = {shown(scene)} is a function; give survey.hill({getattr(scene, '__name__', 'z')}, period=...)"
         )
-    if not str(scene).endswith(".py"):
+    if not isinstance(scene, (str, os.PathLike)) or not str(scene).endswith(".py"):
         return scene, modules.load(survey.scenes, scene, "scene")
     paths = [Path(scene), *([Path(near) / scene] if near is not None else [])]
     try:

@@ -20,7 +20,7 @@ from survey.grid import Grid, check_axis, coordinates
 from survey.scene import Request, condition, exists
 from survey.wording import printable, short, shown
 
-MOST = 10**8  # coordinates on one axis
+MOST = 10**7  # coordinates on one axis
 MOST_POINTS = 10**11  # of a map
 SUFFIXES = 40  # bytes that the names of files beside the output are longer by
 FINEST = 1e-6  # width of a cell as a fraction of its axis
@@ -382,13 +382,15 @@ def check_request(scene, options, method, rtol, variables, tables=("", "")):
         raise BadInput(f"{tables[0]}rtol = {shown(rtol)}: it must lie between 0 and 1, such as 1e-10")
     outputs = [output.name for output in scene.OUTPUTS if exists(output, options)]
     for variable in variables or ():
-        if variable not in outputs:
+        if not isinstance(variable, str) or variable not in outputs:
             raise BadInput(f"{tables[1]}variables: {modules.unknown('variable', variable, outputs)}")
     return Request(options, method, float(rtol), frozenset(outputs if variables is None else variables))
 
 
 def _check_method(scene, options, method, table):
     """Raises BadInput for a method that is unknown or does not serve these options."""
+    if not isinstance(method, str):
+        raise BadInput(f"{table}method: {modules.unknown('method', method, ['auto', *methods_of(scene, options)])}")
     if method == "auto":
         return  # the methods' modules need not be imported
     serving = methods_of(scene, options)
