@@ -164,7 +164,9 @@ def _labelled(key: str, value: Any) -> xr.DataArray:
     if not isinstance(value, xr.DataArray):
         array = value if hasattr(value, "dask") else _array(key, value)
         if array.ndim > 1:
-            raise BadInput(f"{short(key, 40)}: an array of {array.ndim} dimensions has no names for them; give a DataArray")
+            raise BadInput(
+                f"{short(key, 40)}: an array of {array.ndim} dimensions has no names for them; give a DataArray"
+            )
         value = xr.DataArray(array, dims=(key,) if array.ndim else ())
     if value.dtype.kind not in "iuf":
         raise _not_real(key, value.values)

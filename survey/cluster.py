@@ -151,7 +151,7 @@ class _Watch:
         now = time.monotonic()
         self.looked, self.busy, self.staffed, self.warned = now, now, now, now
         self.held, self.proven, self.late = {}, set(), Counter()
-        self.struck_by, self.replaced = set(), False
+        self.struck_by, self.had_some = set(), False
 
     @property
     def pause(self):
@@ -209,22 +209,22 @@ class _Watch:
     def _check_staff(self, held, now):
         """Raise Stopped where nobody takes a block; say so where there are no workers, as a queue may yet start some."""
         patience = max(self.patience.limit, WORKERLESS_SECONDS)
-        if any(held.values()):
+        if any(held.values()) or not held:
             self.busy = now
         if held:
             self.staffed = self.warned = now
+            self.had_some = True
             if now - self.busy > patience:
                 raise Stopped(
                     f"the workers of the dask cluster at {self.address} have taken no block for {now - self.busy:.0f} "
                     "s; see their logs (a worker short of memory pauses) and run the command again to go on"
                 )
             return
-        if self.replaced and now - self.staffed > patience:
+        if self.had_some and now - self.staffed > patience:  # a nanny does not always start another one
             raise Stopped(
-                f"no worker of the dask cluster at {self.address} answers any more; start some (dask worker "
-                f"{self.address}) and run the command again to go on"
+                f"the dask cluster at {self.address} has lost its last worker {now - self.staffed:.0f} s ago; start some "
+                f"(dask worker {self.address}; the logs tell why they ended) and run the command again to go on"
             )
-        self.busy = max(self.busy, self.staffed)
         if now - self.warned > WORKERLESS_SECONDS:
             self.warned = now
             words = "the dask cluster at %s has no workers; waiting for some (dask worker %s starts one)"
@@ -243,7 +243,6 @@ class _Watch:
                 )
         words = "%d of the workers of %s finished no block for more than %.0f s; their blocks go to others"
         logging.getLogger("survey").warning(words, len(late), self.address, limit)
-        self.replaced = True
         with contextlib.suppress(OSError, TimeoutError, ValueError):
             self.client.sync(
                 self.client.scheduler.restart_workers,

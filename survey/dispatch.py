@@ -81,7 +81,9 @@ def on_processes(task, numbers, finished, died, workers, patience=None):
         watch = _Watch(patience, workers)
         try:
             with _pool(workers) as pool, watch:
-                _compute(_Signed(task), some, watch.ended(end), dask.multiprocessing.get, workers, watch.began, pool=pool)
+                _compute(
+                    _Signed(task), some, watch.ended(end), dask.multiprocessing.get, workers, watch.began, pool=pool
+                )
         except BrokenProcessPool:
             if watch.stuck and alone:
                 raise Stopped(

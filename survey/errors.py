@@ -1,6 +1,5 @@
 """What can go wrong, and the exit code that says so."""
 
-
 from survey.wording import LINE, short
 
 

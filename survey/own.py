@@ -100,7 +100,9 @@ def find(scene: Any, near: str | Path | None = None) -> tuple[str, Any]:
         raise BadInput(f"scene = {shown(str(scene), 120)}: no file can be called so ({error.strerror})") from None
     if path is None:
         looked = " or ".join(dict.fromkeys(short(path, 120) for path in paths))
-        raise BadInput(f"scene = {shown(str(scene), 120)}: there is no file {looked}; name the file of your own Hill equation")
+        raise BadInput(
+            f"scene = {shown(str(scene), 120)}: there is no file {looked}; name the file of your own Hill equation"
+        )
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:

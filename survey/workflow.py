@@ -432,11 +432,17 @@ def _is_netcdf(path):
 def _checked_path(path):
     folder = path.parent
     if path.suffix.lower() in (".png", ".pdf", ".svg", ".toml"):
-        raise BadInput(f"output.path = {shown(str(path), 120)} is to be a netCDF file; name one, such as {shown(path.stem + '.nc')}")
+        raise BadInput(
+            f"output.path = {shown(str(path), 120)} is to be a netCDF file; name one, such as {shown(path.stem + '.nc')}"
+        )
     if path.is_file() and not _is_netcdf(path):
-        raise BadInput(f"output.path = {shown(str(path), 120)} is there and is no netCDF file; move it away, or use -o OUT.nc")
+        raise BadInput(
+            f"output.path = {shown(str(path), 120)} is there and is no netCDF file; move it away, or use -o OUT.nc"
+        )
     if path.is_dir():
-        raise BadInput(f"output.path = {shown(str(path), 120)} is a folder; name a file, such as {shown(str(path / 'map.nc'), 120)}")
+        raise BadInput(
+            f"output.path = {shown(str(path), 120)} is a folder; name a file, such as {shown(str(path / 'map.nc'), 120)}"
+        )
     if not folder.is_dir():
         raise BadInput(
             f"output.path = {shown(str(path), 120)}: there is no folder {shown(str(folder), 120)}; make it first, or use -o OUT.nc"
@@ -447,9 +453,13 @@ def _checked_path(path):
             "run the command again, or use -o OUT.nc"
         )
     if len(os.fsencode(path.name)) > os.pathconf(folder, "PC_NAME_MAX") - SUFFIXES:
-        raise BadInput(f"output.path = {shown(str(path), 120)}: this name is too long for the files beside it; shorten it")
+        raise BadInput(
+            f"output.path = {shown(str(path), 120)}: this name is too long for the files beside it; shorten it"
+        )
     if not os.access(folder, os.W_OK | os.X_OK) or str(folder.resolve()).startswith(("/proc", "/sys")):
-        raise BadInput(f"output.path = {shown(str(path), 120)}: the folder {shown(str(folder), 120)} cannot be written to; use -o OUT.nc")
+        raise BadInput(
+            f"output.path = {shown(str(path), 120)}: the folder {shown(str(folder), 120)} cannot be written to; use -o OUT.nc"
+        )
     return path
 
 
@@ -503,7 +513,9 @@ def _apply(data, override):
     for table in tables:
         data = data.setdefault(table, {})
         if not isinstance(data, dict):
-            raise BadInput(f"--set {shown(override)}: {short(table)} is a value, not a table, so it has no key below it")
+            raise BadInput(
+                f"--set {shown(override)}: {short(table)} is a value, not a table, so it has no key below it"
+            )
     data[last] = value
 
 

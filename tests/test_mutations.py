@@ -28,19 +28,122 @@ for _ in range(200):
 NUMBERS = [0, -1, 1, 2, 3, 1000, 10**12, 10**30, 10**400, -(10**400), 2**63, 1e308, -1e308, 5e-324, -0.0, 1e-300, 0.5]
 NUMBERS += [math.nan, math.inf, -math.inf, True, False]
 TEXTS = ["", " ", "x", "auto", "log", "linear", "verdict", "results", ".", "..", "/", "~", "a/b/c.nc", "/proc/map.nc"]
-TEXTS += ["n" * 300 + ".nc", "n" * 240 + ".nc", "n" * 5000, "d/" * 3000 + "map.nc", "a\0.nc", "a\0.py", "n" * 5000 + ".py"]
-TEXTS += ["\x1b[31mred\x1b[0m", "\x1b]0;title\x07", "\x07\x08\x7f", "\u202egnp.exe", "\u0085\u2028", "é\u0301", "🛰" * 400, "\ud7ff"]
-TEXTS += ["k", "rho", "mu", "results/x.png", "results/map.nc/", "x.py", "meissner.py", "../meissner.py", "{0.__class__}%s%n"]
+TEXTS += [
+    "n" * 300 + ".nc",
+    "n" * 240 + ".nc",
+    "n" * 5000,
+    "d/" * 3000 + "map.nc",
+    "a\0.nc",
+    "a\0.py",
+    "n" * 5000 + ".py",
+]
+TEXTS += [
+    "\x1b[31mred\x1b[0m",
+    "\x1b]0;title\x07",
+    "\x07\x08\x7f",
+    "\u202egnp.exe",
+    "\u0085\u2028",
+    "é\u0301",
+    "🛰" * 400,
+    "\ud7ff",
+]
+TEXTS += [
+    "k",
+    "rho",
+    "mu",
+    "results/x.png",
+    "results/map.nc/",
+    "x.py",
+    "meissner.py",
+    "../meissner.py",
+    "{0.__class__}%s%n",
+]
 DATES = [datetime.date(2026, 1, 1), datetime.datetime(1, 1, 1), datetime.time(1, 2, 3)]
-TABLES = [[], [1], [1, "a"], [[1.0]], [2.0, 1.0], [0.1, 0.2], ["verdict"], [math.nan], DEEP, {}, {"start": 0}, {"values": []}]
-TABLES += [{"values": [1, 10**400]}, {"start": 0.1, "stop": 0.2, "num": 3}, {"start": 1e-320, "stop": 1e308, "num": 3, "spacing": "log"}]
-TABLES += [{"start": -1.7e308, "stop": 1.7e308, "num": 5}, {"start": 0.1, "stop": 0.2, "num": 10**12}, {"x" * 5000: 1}, {"\x1b[1m": {"\n": 1}}]
+TABLES = [
+    [],
+    [1],
+    [1, "a"],
+    [[1.0]],
+    [2.0, 1.0],
+    [0.1, 0.2],
+    ["verdict"],
+    [math.nan],
+    DEEP,
+    {},
+    {"start": 0},
+    {"values": []},
+]
+TABLES += [
+    {"values": [1, 10**400]},
+    {"start": 0.1, "stop": 0.2, "num": 3},
+    {"start": 1e-320, "stop": 1e308, "num": 3, "spacing": "log"},
+]
+TABLES += [
+    {"start": -1.7e308, "stop": 1.7e308, "num": 5},
+    {"start": 0.1, "stop": 0.2, "num": 10**12},
+    {"x" * 5000: 1},
+    {"\x1b[1m": {"\n": 1}},
+]
 JUNK = [*NUMBERS, *TEXTS, *DATES, *TABLES]
-KEYS = ["k", "rho", "axes", "scene", "options", "solver", "output", "path", "refine", "boundaries", "width", "axis", "num"]
-KEYS += ["start", "stop", "values", "spacing", "rtol", "method", "figures", "variables", "title", "style", "body", "t", "mu"]
+KEYS = [
+    "k",
+    "rho",
+    "axes",
+    "scene",
+    "options",
+    "solver",
+    "output",
+    "path",
+    "refine",
+    "boundaries",
+    "width",
+    "axis",
+    "num",
+]
+KEYS += [
+    "start",
+    "stop",
+    "values",
+    "spacing",
+    "rtol",
+    "method",
+    "figures",
+    "variables",
+    "title",
+    "style",
+    "body",
+    "t",
+    "mu",
+]
 KEYS += ["x", "", "\x1b[31m", "n" * 5000, "é", "a.b", "\n"]
-BYTES = [b"", b"\xff\xfe", b"\x00", b"\xef\xbb\xbf", b"\r", b"\x1b[2J", b"[", b"]" * 3, b"{" * 300, b"[" * 100_000, b"=", b'"', b"'''", b"#"]
-BYTES += [b"1" * 5000, b"1e400", b"1" * 400, b"\xc3", "é".encode(), b"\n", b"\nscene = 'x'\n", b"nan", b"0x" + b"f" * 600, b"1979-05-27"]
+BYTES = [
+    b"",
+    b"\xff\xfe",
+    b"\x00",
+    b"\xef\xbb\xbf",
+    b"\r",
+    b"\x1b[2J",
+    b"[",
+    b"]" * 3,
+    b"{" * 300,
+    b"[" * 100_000,
+    b"=",
+    b'"',
+    b"'''",
+    b"#",
+]
+BYTES += [
+    b"1" * 5000,
+    b"1e400",
+    b"1" * 400,
+    b"\xc3",
+    "é".encode(),
+    b"\n",
+    b"\nscene = 'x'\n",
+    b"nan",
+    b"0x" + b"f" * 600,
+    b"1979-05-27",
+]
 
 
 def places(table, at=()):
@@ -102,7 +205,9 @@ def override(draw, table):
     """KEY=VALUE as `--set` takes it."""
     key = ".".join(str(part) for part in draw.choice(list(places(table))))
     key = draw.choice([key, key, key, draw.choice(KEYS), f"{key}.{draw.choice(KEYS)}", f"axes.{draw.choice(KEYS)}"])
-    value = draw.choice([str(draw.choice(NUMBERS[:8])), draw.choice(TEXTS), repr(draw.choice(TEXTS)), "[" * 2000, "[1,", "1" * 5000])
+    value = draw.choice(
+        [str(draw.choice(NUMBERS[:8])), draw.choice(TEXTS), repr(draw.choice(TEXTS)), "[" * 2000, "[1,", "1" * 5000]
+    )
     return draw.choice([f"{key}={value}", f"{key}={value}", f"{key}={value}", key, f"={value}", ""])
 
 
@@ -114,7 +219,7 @@ def mutated(draw, path):
     if what < 0.6:
         try:
             return tomli_w.dumps(mutate_table(draw, table)).encode(), []
-        except (ValueError, TypeError, AttributeError):  # what cannot be written
+        except (ValueError, TypeError, AttributeError, OverflowError):  # what cannot be written
             return mutate_text(draw, text), []
     if what < 0.85:
         return mutate_text(draw, text), []
@@ -185,8 +290,28 @@ class Hostile:
 
 LOOP = {}
 LOOP["axes"] = LOOP
-OBJECTS = [*JUNK, None, b"bytes", 1j, {1, 2}, object(), Hostile(), len, 10**5000, np.nan, np.array([[1.0]]), np.array(["a"])]
-OBJECTS += [np.array([1j]), np.array([None]), xr.DataArray([1.0], dims="verdict"), np.datetime64("2026"), [Hostile()], LOOP]
+OBJECTS = [
+    *JUNK,
+    None,
+    b"bytes",
+    1j,
+    {1, 2},
+    object(),
+    Hostile(),
+    len,
+    10**5000,
+    np.nan,
+    np.array([[1.0]]),
+    np.array(["a"]),
+]
+OBJECTS += [
+    np.array([1j]),
+    np.array([None]),
+    xr.DataArray([1.0], dims="verdict"),
+    np.datetime64("2026"),
+    [Hostile()],
+    LOOP,
+]
 OBJECTS += [np.float32(0.5), np.int8(1), (0.1, 0.2), range(3), "\ud800", np.empty(0), np.ma.masked, float]
 
 
@@ -209,7 +334,15 @@ def test_objects_of_any_kind_are_refused_by_evaluate_in_one_line(folder, monkeyp
         raise Reached("this is where points are solved")
 
     monkeypatch.setattr(engine, "compute", compute)
-    good = {"scene": "satellite", "k": 0.5, "rho": 1.0, "body": "prolate", "method": "auto", "rtol": 1e-10, "variables": None}
+    good = {
+        "scene": "satellite",
+        "k": 0.5,
+        "rho": 1.0,
+        "body": "prolate",
+        "method": "auto",
+        "rtol": 1e-10,
+        "variables": None,
+    }
     assert refused(lambda: survey.evaluate(**good)).startswith("this is where")
     for thing in OBJECTS:
         signal.setitimer(signal.ITIMER_REAL, SECONDS)
