@@ -207,7 +207,7 @@ class _Watch:
         return bool(keys) and now - since > limit
 
     def _check_staff(self, held, now):
-        """Raise Stopped where nobody takes a block; say so where there are no workers, as a queue may yet start some."""
+        """Raise Stopped where nobody takes a block; where no worker has come yet, say so: a queue may start some."""
         patience = max(self.patience.limit, WORKERLESS_SECONDS)
         if any(held.values()) or not held:
             self.busy = now
@@ -222,8 +222,8 @@ class _Watch:
             return
         if self.had_some and now - self.staffed > patience:  # a nanny does not always start another one
             raise Stopped(
-                f"the dask cluster at {self.address} has lost its last worker {now - self.staffed:.0f} s ago; start some "
-                f"(dask worker {self.address}; the logs tell why they ended) and run the command again to go on"
+                f"the dask cluster at {self.address} lost its last worker {now - self.staffed:.0f} s ago; "
+                f"start some (dask worker {self.address}; the logs tell why they ended) and run the command again to go on"
             )
         if now - self.warned > WORKERLESS_SECONDS:
             self.warned = now
@@ -238,8 +238,8 @@ class _Watch:
             self.late[number] += 1
             if self.late[number] >= TRIES:
                 raise Stopped(
-                    f"{TRIES} workers of the dask cluster at {self.address} had a block for more than {limit:.0f} s and "
-                    "finished none; run the command again to go on, with a longer --block-timeout if blocks take long"
+                    f"{TRIES} workers of the dask cluster at {self.address} had a block for over {limit:.0f} s "
+                    "and finished none; run the command again to go on, with a longer --block-timeout if blocks take long"
                 )
         words = "%d of the workers of %s finished no block for more than %.0f s; their blocks go to others"
         logging.getLogger("survey").warning(words, len(late), self.address, limit)

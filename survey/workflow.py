@@ -431,35 +431,24 @@ def _is_netcdf(path):
 
 def _checked_path(path):
     folder = path.parent
+    told, where = f"output.path = {shown(str(path), 120)}", shown(str(folder), 120)
     if path.suffix.lower() in (".png", ".pdf", ".svg", ".toml"):
-        raise BadInput(
-            f"output.path = {shown(str(path), 120)} is to be a netCDF file; name one, such as {shown(path.stem + '.nc')}"
-        )
+        raise BadInput(f"{told} is to be a netCDF file; name one, such as {shown(path.stem + '.nc')}")
     if path.is_file() and not _is_netcdf(path):
-        raise BadInput(
-            f"output.path = {shown(str(path), 120)} is there and is no netCDF file; move it away, or use -o OUT.nc"
-        )
+        raise BadInput(f"{told} is there and is no netCDF file; move it away, or use -o OUT.nc")
     if path.is_dir():
-        raise BadInput(
-            f"output.path = {shown(str(path), 120)} is a folder; name a file, such as {shown(str(path / 'map.nc'), 120)}"
-        )
+        raise BadInput(f"{told} is a folder; name a file, such as {shown(str(path / 'map.nc'), 120)}")
     if not folder.is_dir():
-        raise BadInput(
-            f"output.path = {shown(str(path), 120)}: there is no folder {shown(str(folder), 120)}; make it first, or use -o OUT.nc"
-        )
+        raise BadInput(f"{told}: there is no folder {where}; make it first, or use -o OUT.nc")
     if os.statvfs(folder).f_flag & os.ST_RDONLY:
         raise Stopped(
-            f"output.path = {shown(str(path), 120)}: the disk of the folder {shown(str(folder), 120)} is read-only; make it writable and "
+            f"{told}: the disk of the folder {where} is read-only; make it writable and "
             "run the command again, or use -o OUT.nc"
         )
     if len(os.fsencode(path.name)) > os.pathconf(folder, "PC_NAME_MAX") - SUFFIXES:
-        raise BadInput(
-            f"output.path = {shown(str(path), 120)}: this name is too long for the files beside it; shorten it"
-        )
+        raise BadInput(f"{told}: this name is too long for the files beside it; shorten it")
     if not os.access(folder, os.W_OK | os.X_OK) or str(folder.resolve()).startswith(("/proc", "/sys")):
-        raise BadInput(
-            f"output.path = {shown(str(path), 120)}: the folder {shown(str(folder), 120)} cannot be written to; use -o OUT.nc"
-        )
+        raise BadInput(f"{told}: the folder {where} cannot be written to; use -o OUT.nc")
     return path
 
 

@@ -158,7 +158,7 @@ def in_time():
 
 
 def die():
-    time.sleep(1)  # a nanny starts no other worker for one that dies at once
+    time.sleep(2)  # a nanny starts no other worker for one that dies at once
     os.kill(os.getpid(), signal.SIGKILL)
 
 
@@ -202,18 +202,18 @@ def test_a_cluster_stops_for_a_task_without_end(cluster, in_time, monkeypatch):
 
     heard = Heard()
     with clusters.client_of(cluster.scheduler_address) as client:
-        with pytest.raises(
-            Stopped, match=r"^3 workers .* had a block for more than 1 s and finished none; run .* again"
-        ):
+        with pytest.raises(Stopped, match=r"^3 workers .* had a block for over 1 s and finished none; run .* again"):
             clusters.on_cluster(endless, NUMBERS, heard.finished, heard.died, client, dispatch.Patience(1.0))
     assert heard.dead == [] and len(heard.results) >= 9
 
 
-def test_a_cluster_whose_workers_all_die_stops_and_blames_no_task(cluster, in_time):
+def test_a_cluster_whose_workers_all_die_stops_and_blames_no_task(cluster, in_time, monkeypatch):
+    """Either they die again and again, or, on a busy machine, a nanny gives up."""
+    monkeypatch.setattr(clusters, "WORKERLESS_SECONDS", 5)
     heard = Heard()
     with clusters.client_of(cluster.scheduler_address) as client:
-        with pytest.raises(Stopped, match="die again and again and finish no block; give them more memory"):
-            clusters.on_cluster(lambda number: die(), NUMBERS, heard.finished, heard.died, client)
+        with pytest.raises(Stopped, match=r"die again and again and finish no block; give|lost its last worker"):
+            clusters.on_cluster(lambda _: die(), NUMBERS, heard.finished, heard.died, client, dispatch.Patience(20.0))
     assert heard.dead == [] and heard.results == []
 
 
@@ -242,9 +242,7 @@ def test_a_cluster_that_has_lost_its_workers_stops_the_run(in_time, monkeypatch)
     with distributed.LocalCluster(1, processes=False, dashboard_address=None) as small:
         with clusters.client_of(small.scheduler_address) as client:
             threading.Timer(1.5, small.scale, [0]).start()
-            with pytest.raises(
-                Stopped, match=r"has lost its last worker \d+ s ago; start some .* run the command again"
-            ):
+            with pytest.raises(Stopped, match=r"lost its last worker \d+ s ago; start some .* run the command again"):
                 clusters.on_cluster(slow, range(100), heard.finished, heard.died, client, dispatch.Patience(1.0))
     assert 0 < len(heard.results) < 100
 
