@@ -223,7 +223,7 @@ class _Watch:
         if self.had_some and now - self.staffed > patience:  # a nanny does not always start another one
             raise Stopped(
                 f"the dask cluster at {self.address} lost its last worker {now - self.staffed:.0f} s ago; "
-                f"start some (dask worker {self.address}; the logs tell why they ended) and run the command again to go on"
+                f"start some (dask worker {self.address}; their logs tell more) and run the command again to go on"
             )
         if now - self.warned > WORKERLESS_SECONDS:
             self.warned = now
@@ -239,7 +239,7 @@ class _Watch:
             if self.late[number] >= TRIES:
                 raise Stopped(
                     f"{TRIES} workers of the dask cluster at {self.address} had a block for over {limit:.0f} s "
-                    "and finished none; run the command again to go on, with a longer --block-timeout if blocks take long"
+                    "and finished none; run the command again to go on, with a longer --block-timeout if they need it"
                 )
         words = "%d of the workers of %s finished no block for more than %.0f s; their blocks go to others"
         logging.getLogger("survey").warning(words, len(late), self.address, limit)
