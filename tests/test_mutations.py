@@ -219,7 +219,7 @@ def mutated(draw, path):
     if what < 0.6:
         try:
             return tomli_w.dumps(mutate_table(draw, table)).encode(), []
-        except (ValueError, TypeError, AttributeError, OverflowError):  # what cannot be written
+        except (ValueError, TypeError, AttributeError, OverflowError, RecursionError):  # what cannot be written
             return mutate_text(draw, text), []
     if what < 0.85:
         return mutate_text(draw, text), []
