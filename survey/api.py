@@ -127,10 +127,7 @@ def evaluate(
     options = workflows.check_options(module, {key: parameters[key] for key in parameters if key in names}, given)
     used = workflows.check_parameters(module, scene, options, given)
     if variables is not None:
-        try:
-            variables = [variables] if isinstance(variables, str) else list(variables)
-        except TypeError:
-            variables = [variables]
+        variables = _several(variables)
     request = workflows.check_request(module, options, method, rtol, variables)
     given |= {key: xr.DataArray(float(p.default)) for key, p in used.items() if key not in given}
     _check_lone_values(used, given)
@@ -155,6 +152,14 @@ def open(path: str | os.PathLike[str]) -> xr.Dataset:
 def scenes() -> dict[str, str]:
     """{name: title} of the scenes."""
     return scene_folder()  # type: ignore[operator]  # a folder that can be called
+
+
+def _several(variables: Any) -> list[Any]:
+    """The names of outputs as a list, also where one is given alone."""
+    try:
+        return [variables] if isinstance(variables, str) else list(variables)
+    except TypeError:
+        return [variables]
 
 
 def _labelled(key: str, value: Any) -> xr.DataArray:

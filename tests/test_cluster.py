@@ -84,6 +84,7 @@ def test_a_lost_scheduler_is_told_and_the_run_can_go_on(cluster, small):
     assert len(list(blocks.glob("*.block"))) > 5
 
 
+@pytest.mark.slow
 def test_a_worker_that_freezes_does_not_hold_up_the_run(cluster, small, surveyed):
     """Its nanny goes on, and starts another."""
     many = ("--set", "axes.w0.num=100", "--set", "solver.method='dop853'")
@@ -151,6 +152,7 @@ def test_a_cluster_with_tls(small, tmp_path, surveyed):
     xr.testing.assert_equal(*(xr.load_dataset(path).drop_attrs() for path in (surveyed, small.with_suffix(".nc"))))
 
 
+@pytest.mark.slow
 def test_an_expired_certificate_is_told_in_one_line(small, tmp_path):
     if not shutil.which("openssl"):
         pytest.skip("needs openssl")
@@ -243,6 +245,7 @@ def test_the_batch_script_runs_a_sweep(small, surveyed):
     assert not list(small.parent.glob("scheduler-*")) and not (small.parent / "requeued").exists()
 
 
+@pytest.mark.slow
 def test_the_batch_script_takes_the_settings_of_tls(small, tmp_path, surveyed):
     if not shutil.which("openssl"):
         pytest.skip("needs openssl")

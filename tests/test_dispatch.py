@@ -207,6 +207,7 @@ def test_a_cluster_stops_for_a_task_without_end(cluster, in_time, monkeypatch):
     assert heard.dead == [] and len(heard.results) >= 9
 
 
+@pytest.mark.slow
 def test_a_cluster_whose_workers_all_die_stops_and_blames_no_task(cluster, in_time, monkeypatch):
     """Either they die again and again, or, on a busy machine, a nanny gives up."""
     monkeypatch.setattr(clusters, "WORKERLESS_SECONDS", 5)
