@@ -20,7 +20,7 @@ from survey.errors import BadInput
 from survey.grid import Grid, line
 from survey.hill_scene import HillScene, is_number
 from survey.scene import Option, Output, Parameter, Request, condition, exists
-from survey.wording import counted, shown
+from survey.wording import counted, short, shown
 
 
 def run(
@@ -127,8 +127,8 @@ def evaluate(
     given = {key: _labelled(key, value) for key, value in parameters.items() if key not in names}
     options = workflows.check_options(module, {key: parameters[key] for key in parameters if key in names}, given)
     used = workflows.check_parameters(module, scene, options, given)
-    if variables is not None and (isinstance(variables, str) or not isinstance(variables, Iterable)):
-        variables = [variables]
+    if variables is not None:
+        variables = _several(variables)
     request = workflows.check_request(module, options, method, rtol, variables)
     given |= {key: xr.DataArray(float(p.default)) for key, p in used.items() if key not in given}
     _check_lone_values(used, given)
@@ -163,6 +163,14 @@ def scenes() -> dict[str, str]:
     return scene_folder()  # type: ignore[operator]  # a folder that can be called
 
 
+def _several(variables: Any) -> list[Any]:
+    """The names of outputs as a list, also where one is given alone."""
+    try:
+        return [variables] if isinstance(variables, str) else list(variables)
+    except TypeError:
+        return [variables]
+
+
 def _labelled(key: str, value: Any) -> xr.DataArray:
     """The parameter as a float64 DataArray."""
     if isinstance(value, xr.Variable):
@@ -170,12 +178,14 @@ def _labelled(key: str, value: Any) -> xr.DataArray:
     if not isinstance(value, xr.DataArray):
         array = value if hasattr(value, "dask") else _array(key, value)
         if array.ndim > 1:
-            raise BadInput(f"{key}: an array of {array.ndim} dimensions has no names for them; give a DataArray")
+            raise BadInput(
+                f"{short(key, 40)}: an array of {array.ndim} dimensions has no names for them; give a DataArray"
+            )
         value = xr.DataArray(array, dims=(key,) if array.ndim else ())
     if value.dtype.kind not in "iuf":
         raise _not_real(key, value.values)
     if value.size == 0:
-        raise BadInput(f"{key}: an empty array has no points; give at least one value")
+        raise BadInput(f"{short(key, 40)}: an empty array has no points; give at least one value")
     return value.astype(float)
 
 
@@ -190,7 +200,7 @@ def _array(key: str, value: Any) -> npt.NDArray[Any]:
 
 
 def _not_real(key: str, value: Any) -> BadInput:
-    return BadInput(f"{key} = {shown(value)}: it must be a real number or an array of real numbers")
+    return BadInput(f"{short(key, 40)} = {shown(value)}: it must be a real number or an array of real numbers")
 
 
 def _check_dimensions(module: Any, given: dict[str, xr.DataArray]) -> None:

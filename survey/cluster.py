@@ -151,7 +151,7 @@ class _Watch:
         now = time.monotonic()
         self.looked, self.busy, self.staffed, self.warned = now, now, now, now
         self.held, self.proven, self.late = {}, set(), Counter()
-        self.struck_by, self.replaced = set(), False
+        self.struck_by, self.had_some = set(), False
 
     @property
     def pause(self):
@@ -207,24 +207,24 @@ class _Watch:
         return bool(keys) and now - since > limit
 
     def _check_staff(self, held, now):
-        """Raise Stopped where nobody takes a block; say so where there are no workers, as a queue may yet start some."""
+        """Raise Stopped where nobody takes a block; where no worker has come yet, say so: a queue may start some."""
         patience = max(self.patience.limit, WORKERLESS_SECONDS)
-        if any(held.values()):
+        if any(held.values()) or not held:
             self.busy = now
         if held:
             self.staffed = self.warned = now
+            self.had_some = True
             if now - self.busy > patience:
                 raise Stopped(
                     f"the workers of the dask cluster at {self.address} have taken no block for {now - self.busy:.0f} "
                     "s; see their logs (a worker short of memory pauses) and run the command again to go on"
                 )
             return
-        if self.replaced and now - self.staffed > patience:
+        if self.had_some and now - self.staffed > patience:  # a nanny does not always start another one
             raise Stopped(
-                f"no worker of the dask cluster at {self.address} answers any more; start some (dask worker "
-                f"{self.address}) and run the command again to go on"
+                f"the dask cluster at {self.address} lost its last worker {now - self.staffed:.0f} s ago; "
+                f"start some (dask worker {self.address}; their logs tell more) and run the command again to go on"
             )
-        self.busy = max(self.busy, self.staffed)
         if now - self.warned > WORKERLESS_SECONDS:
             self.warned = now
             words = "the dask cluster at %s has no workers; waiting for some (dask worker %s starts one)"
@@ -238,12 +238,11 @@ class _Watch:
             self.late[number] += 1
             if self.late[number] >= TRIES:
                 raise Stopped(
-                    f"{TRIES} workers of the dask cluster at {self.address} had a block for more than {limit:.0f} s and "
-                    "finished none; run the command again to go on, with a longer --block-timeout if blocks take long"
+                    f"{TRIES} workers of the dask cluster at {self.address} had a block for over {limit:.0f} s "
+                    "and finished none; run the command again to go on, with a longer --block-timeout if they need it"
                 )
         words = "%d of the workers of %s finished no block for more than %.0f s; their blocks go to others"
         logging.getLogger("survey").warning(words, len(late), self.address, limit)
-        self.replaced = True
         with contextlib.suppress(OSError, TimeoutError, ValueError):
             self.client.sync(
                 self.client.scheduler.restart_workers,

@@ -23,8 +23,8 @@ from dask.callbacks import Callback
 from survey.errors import Stopped, SurveyError
 
 DEATHS = 3
-# A worker is stuck, and replaced, once a block takes so many times the longest one so far, and at least so many seconds;
-# in its first block it may compile, which takes up to a minute where nothing else is at work.
+# A worker is stuck, and replaced, once a block takes so many times the longest one so far, and so many seconds at
+# least; in its first block it may compile, which takes up to a minute where nothing else is at work.
 PATIENCE, PATIENCE_SECONDS, COMPILE_SECONDS = 20, 300.0, 300.0
 LEAVE_SECONDS = 10.0  # in which worker processes end that have nothing left to do
 

@@ -16,6 +16,8 @@ def names(package):
 
 def load(package, name, what):
     """The module `name` of `package`; raises BadInput, naming the nearest, if there is none."""
+    if not isinstance(name, str):
+        raise BadInput(unknown(what, name, names(package)))
     whole = f"{package.__name__}.{name}"
     if str(name).isidentifier() and whole in sys.modules:  # the folder is not read anew for every block
         return sys.modules[whole]

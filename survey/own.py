@@ -94,7 +94,7 @@ def find(scene: Any, near: str | Path | None = None) -> tuple[str, Any]:
         raise BadInput(
             f"scene = {shown(scene)} is a function; give survey.hill({getattr(scene, '__name__', 'z')}, period=...)"
         )
-    if not str(scene).endswith(".py"):
+    if not isinstance(scene, (str, os.PathLike)) or not str(scene).endswith(".py"):
         return scene, modules.load(survey.scenes, scene, "scene")
     path, text = _read(scene, near)
     found = _from_text(str(path), text)

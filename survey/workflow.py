@@ -20,7 +20,7 @@ from survey.grid import Grid, check_axis, coordinates
 from survey.scene import Request, condition, exists
 from survey.wording import plain, short, shown
 
-MOST = 10**8  # coordinates on one axis
+MOST = 10**7  # coordinates on one axis
 MOST_POINTS = 10**11  # of a map
 SUFFIXES = 40  # bytes that the names of files beside the output are longer by
 FINEST = 1e-6  # width of a cell as a fraction of its axis
@@ -382,13 +382,15 @@ def check_request(scene, options, method, rtol, variables, tables=("", "")):
         raise BadInput(f"{tables[0]}rtol = {shown(rtol)}: it must lie between 0 and 1, such as 1e-10")
     outputs = [output.name for output in scene.OUTPUTS if exists(output, options)]
     for variable in variables or ():
-        if variable not in outputs:
+        if not isinstance(variable, str) or variable not in outputs:
             raise BadInput(f"{tables[1]}variables: {modules.unknown('variable', variable, outputs)}")
     return Request(options, method, float(rtol), frozenset(outputs if variables is None else variables))
 
 
 def _check_method(scene, options, method, table):
     """Raises BadInput for a method that is unknown or does not serve these options."""
+    if not isinstance(method, str):
+        raise BadInput(f"{table}method: {modules.unknown('method', method, ['auto', *methods_of(scene, options)])}")
     if method == "auto":
         return  # the methods' modules need not be imported
     serving = methods_of(scene, options)
@@ -429,35 +431,24 @@ def _is_netcdf(path):
 
 def _checked_path(path):
     folder = path.parent
+    told, where = f"output.path = {shown(str(path), 120)}", shown(str(folder), 120)
     if path.suffix.lower() in (".png", ".pdf", ".svg", ".toml"):
-        raise BadInput(
-            f"output.path = {shown(str(path), 120)} is to be a netCDF file; name one, such as {shown(path.stem + '.nc')}"
-        )
+        raise BadInput(f"{told} is to be a netCDF file; name one, such as {shown(path.stem + '.nc')}")
     if path.is_file() and not _is_netcdf(path):
-        raise BadInput(
-            f"output.path = {shown(str(path), 120)} is there and is no netCDF file; move it away, or use -o OUT.nc"
-        )
+        raise BadInput(f"{told} is there and is no netCDF file; move it away, or use -o OUT.nc")
     if path.is_dir():
-        raise BadInput(
-            f"output.path = {shown(str(path), 120)} is a folder; name a file, such as {shown(str(path / 'map.nc'), 120)}"
-        )
+        raise BadInput(f"{told} is a folder; name a file, such as {shown(str(path / 'map.nc'), 120)}")
     if not folder.is_dir():
-        raise BadInput(
-            f"output.path = {shown(str(path), 120)}: there is no folder {shown(str(folder), 120)}; make it first, or use -o OUT.nc"
-        )
+        raise BadInput(f"{told}: there is no folder {where}; make it first, or use -o OUT.nc")
     if os.statvfs(folder).f_flag & os.ST_RDONLY:
         raise Stopped(
-            f"output.path = {shown(str(path), 120)}: the disk of the folder {shown(str(folder), 120)} is read-only; make it writable and "
+            f"{told}: the disk of the folder {where} is read-only; make it writable and "
             "run the command again, or use -o OUT.nc"
         )
     if len(os.fsencode(path.name)) > os.pathconf(folder, "PC_NAME_MAX") - SUFFIXES:
-        raise BadInput(
-            f"output.path = {shown(str(path), 120)}: this name is too long for the files beside it; shorten it"
-        )
+        raise BadInput(f"{told}: this name is too long for the files beside it; shorten it")
     if not os.access(folder, os.W_OK | os.X_OK) or str(folder.resolve()).startswith(("/proc", "/sys")):
-        raise BadInput(
-            f"output.path = {shown(str(path), 120)}: the folder {shown(str(folder), 120)} cannot be written to; use -o OUT.nc"
-        )
+        raise BadInput(f"{told}: the folder {where} cannot be written to; use -o OUT.nc")
     return path
 
 

@@ -9,6 +9,7 @@ import sys
 import time
 from pathlib import Path
 
+import psutil
 import pytest
 import xarray as xr
 
@@ -25,11 +26,11 @@ def dask(*words, cwd, before=(), **more):
     return subprocess.Popen(command, cwd=cwd, env=os.environ | more, **quiet)
 
 
-def worker(file, **more):
+def worker(file, *words, **more):
     """A worker that lives in another folder."""
     away = file.parent / "away"
     away.mkdir(exist_ok=True)
-    return dask("worker", "--scheduler-file", file, "--nthreads", 1, "--no-dashboard", cwd=away, **more)
+    return dask("worker", "--scheduler-file", file, "--nthreads", 1, "--no-dashboard", *words, cwd=away, **more)
 
 
 @pytest.fixture
@@ -59,9 +60,9 @@ def wait_for(what, seconds=60.0):
         time.sleep(0.01)
 
 
-def start(folder, file, *words):
+def start(folder, file, *words, **more):
     command = [sys.executable, "-c", PROGRAM, "run", "small.toml", "--scheduler", str(file), *words]
-    return subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True)
+    return subprocess.Popen(command, cwd=folder, env=os.environ | more, stderr=subprocess.PIPE, text=True)
 
 
 def test_a_cluster_gives_the_same_file(cluster, small, surveyed):
@@ -81,6 +82,93 @@ def test_a_lost_scheduler_is_told_and_the_run_can_go_on(cluster, small):
     told = running.communicate(timeout=120)[1]
     assert running.returncode == 4 and told.splitlines()[-1].startswith("survey: the dask cluster at tcp://"), told
     assert len(list(blocks.glob("*.block"))) > 5
+
+
+@pytest.mark.slow
+def test_a_worker_that_freezes_does_not_hold_up_the_run(cluster, small, surveyed):
+    """Its nanny goes on, and starts another."""
+    many = ("--set", "axes.w0.num=100", "--set", "solver.method='dop853'")
+    whole = start(small.parent, cluster[0], *many, "-o", "whole.nc")
+    assert whole.wait(180) == 0
+    running = start(small.parent, cluster[0], *many, "--block-timeout", "3")
+    blocks = small.parent / "small.nc.blocks"
+    wait_for(lambda: len(list(blocks.glob("*.block"))) > 5)
+    frozen = psutil.Process(cluster[1][1].pid).children()
+    for process in frozen:
+        process.suspend()
+    told = running.communicate(timeout=180)[1]
+    assert running.returncode == 0 and "finished no block for more than 3 s; their blocks go to others" in told, told
+    assert not any(process.is_running() and process.status() == "stopped" for process in frozen)
+    xr.testing.assert_equal(*(xr.load_dataset(small.parent / name).drop_attrs() for name in ("whole.nc", "small.nc")))
+
+
+def certificate(folder, name, days=2):
+    """Settings of dask for all roles: a certificate that is its own authority, by openssl."""
+    key, asked, cert = (folder / f"{name}.{suffix}" for suffix in ("key", "csr", "pem"))
+    new = ["req", "-new", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-subj", f"/CN={name}"]
+    signed = ["x509", "-req", "-in", asked, "-signkey", key, "-days", str(days), "-out", cert]
+    for words in ([*new, "-keyout", key, "-out", asked], signed):
+        subprocess.run(["openssl", *words], check=True, capture_output=True)
+    files = {
+        f"{role}__{what}": file
+        for role in ("SCHEDULER", "WORKER", "CLIENT")
+        for what, file in (("CERT", cert), ("KEY", key))
+    }
+    return {f"DASK_DISTRIBUTED__COMM__TLS__{what}": str(file) for what, file in {"CA_FILE": cert, **files}.items()}
+
+
+def test_a_cluster_with_tls(small, tmp_path, surveyed):
+    if not shutil.which("openssl"):
+        pytest.skip("needs openssl")
+    file, tls, other = tmp_path / "scheduler.json", certificate(tmp_path, "survey"), certificate(tmp_path, "other")
+    scheduler = ("scheduler", "--protocol", "tls", "--scheduler-file", file, "--port", 0, "--no-dashboard")
+    processes = [dask(*scheduler, cwd=tmp_path, **tls)]
+    try:
+        wait_for(file.exists)
+        processes.append(worker(file, **tls))
+        ca = "DASK_DISTRIBUTED__COMM__TLS__CA_FILE"
+        for more, code, words in (
+            (
+                {},
+                2,
+                "asks for TLS; set distributed.comm.tls: ca-file, client.cert and client.key in dask's configuration",
+            ),
+            ({ca: tls[ca]}, 2, "asks for TLS; set"),
+            (tls | {ca: str(tmp_path / "absent.pem")}, 2, "cannot be used (No such file or directory)"),
+            (tls | {ca: str(small)}, 2, "cannot be used ("),
+            (tls | {ca: other[ca]}, 4, "do not accept each other's TLS certificates (certificate verify failed"),
+            (other | {ca: tls[ca]}, 4, "do not accept each other's TLS certificates ("),
+        ):
+            running = start(small.parent, file, "--quiet", **more)
+            told = running.communicate(timeout=60)[1]
+            assert running.returncode == code and told.count("\n") == 1 and words in told, told
+        running = start(small.parent, file, **tls)
+        told = running.communicate(timeout=180)[1]
+        assert running.returncode == 0 and "computed 6, reused 0 of 6 blocks" in told, told
+    finally:
+        for process in reversed(processes):
+            process.kill()
+            process.wait()
+    xr.testing.assert_equal(*(xr.load_dataset(path).drop_attrs() for path in (surveyed, small.with_suffix(".nc"))))
+
+
+@pytest.mark.slow
+def test_an_expired_certificate_is_told_in_one_line(small, tmp_path):
+    if not shutil.which("openssl"):
+        pytest.skip("needs openssl")
+    expired = certificate(tmp_path, "old", days=-1)
+    file = tmp_path / "scheduler.json"
+    scheduler = ("scheduler", "--protocol", "tls", "--scheduler-file", file, "--port", 0, "--no-dashboard")
+    process = dask(*scheduler, cwd=tmp_path, **expired)
+    try:
+        wait_for(file.exists)
+        running = start(small.parent, file, "--quiet", **expired)
+        told = running.communicate(timeout=60)[1]
+    finally:
+        process.kill()
+        process.wait()
+    assert running.returncode == 4 and told.count("\n") == 1, told
+    assert "renew the one that has expired" in told, told
 
 
 def test_blocks_travel_where_no_folder_is_shared(small, tmp_path):
@@ -135,7 +223,7 @@ def test_a_worker_with_other_code_is_refused(small, tmp_path):
         job(engine.numbered(0, engine.blocks_of(checked)[0]))
 
 
-def queue(folder, *words):
+def queue(folder, *words, **more):
     """The batch script as a queue would start it on one machine, with stand-ins for the queue's own commands."""
     commands = folder / "bin"
     commands.mkdir(exist_ok=True)
@@ -144,7 +232,7 @@ def queue(folder, *words):
         (commands / name).chmod(0o755)
     path = os.pathsep.join([str(commands), os.path.dirname(sys.executable), os.environ["PATH"]])
     script = Path(__file__).parent.parent / "workflows" / "slurm.sh"
-    environment = os.environ | {"PATH": path, "SLURM_JOB_ID": "17"}
+    environment = os.environ | {"PATH": path, "SLURM_JOB_ID": "17"} | more
     command = ["bash", str(script), "small.toml", *words]
     return subprocess.Popen(command, cwd=folder, env=environment, stderr=subprocess.PIPE, text=True)
 
@@ -157,8 +245,20 @@ def test_the_batch_script_runs_a_sweep(small, surveyed):
     assert not list(small.parent.glob("scheduler-*")) and not (small.parent / "requeued").exists()
 
 
+@pytest.mark.slow
+def test_the_batch_script_takes_the_settings_of_tls(small, tmp_path, surveyed):
+    if not shutil.which("openssl"):
+        pytest.skip("needs openssl")
+    running = queue(small.parent, **certificate(tmp_path, "survey"), DASK_DISTRIBUTED__COMM__DEFAULT_SCHEME="tls")
+    file = small.parent / "scheduler-17.json"
+    wait_for(lambda: file.exists() and "tls://" in file.read_text())
+    told = running.communicate(timeout=180)[1]
+    assert running.returncode == 0, told
+    xr.testing.assert_equal(*(xr.load_dataset(path).drop_attrs() for path in (surveyed, small.with_suffix(".nc"))))
+
+
 def test_the_batch_script_stops_before_the_walltime_and_is_queued_again(small):
-    many = ("--set", "axes.w0.num=40000", "--set", "solver.method='dop853'")
+    many = ("--set", "axes.w0.num=10000", "--set", "solver.method='dop853'")
     running = queue(small.parent, *many)
     blocks = small.parent / "small.nc.blocks"
     wait_for(lambda: list(blocks.glob("*.block")))

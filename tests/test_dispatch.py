@@ -6,6 +6,7 @@ import signal
 import threading
 import time
 
+import dask
 import pytest
 
 from survey import cluster as clusters
@@ -135,9 +136,11 @@ def test_patience_is_measured_from_other_tasks_and_has_a_floor():
 
 @pytest.fixture(scope="module")
 def cluster():
+    """Two workers; a task is set aside after two deaths, not four: each costs seconds."""
     distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-        yield cluster
+    with dask.config.set({"distributed.scheduler.allowed-failures": 1}):
+        with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+            yield cluster
 
 
 @pytest.fixture
@@ -154,12 +157,17 @@ def in_time():
     signal.signal(signal.SIGALRM, before)
 
 
+def die():
+    time.sleep(2)  # a nanny starts no other worker for one that dies at once
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
 def test_a_cluster_ends_every_number_and_survives_deaths(cluster, in_time, tmp_path):
     def deadly(number):
         once = tmp_path / f"killed-{number}"
         if number == 4 or (number == 7 and not once.exists()):
             once.touch()
-            os.kill(os.getpid(), signal.SIGKILL)
+            die()
         return number * number
 
     heard = Heard()
@@ -169,15 +177,14 @@ def test_a_cluster_ends_every_number_and_survives_deaths(cluster, in_time, tmp_p
     assert sorted(heard.results) == sorted(n * n if n != 4 else -4 for n in NUMBERS)
 
 
-@pytest.mark.parametrize("what", ["frozen", "endless"])
-def test_a_cluster_replaces_a_worker_that_is_stuck(cluster, in_time, monkeypatch, tmp_path, what):
-    monkeypatch.setattr(dispatch, "COMPILE_SECONDS", 20.0)
+def test_a_cluster_replaces_a_worker_that_is_frozen(cluster, in_time, monkeypatch, tmp_path):
+    monkeypatch.setattr(dispatch, "COMPILE_SECONDS", 5.0)
 
     def stuck(number):
         once = tmp_path / "stuck"
         if number == 9 and not once.exists():
             once.touch()
-            os.kill(os.getpid(), signal.SIGSTOP) if what == "frozen" else time.sleep(10_000)
+            os.kill(os.getpid(), signal.SIGSTOP)
         return number * number
 
     heard = Heard()
@@ -195,18 +202,19 @@ def test_a_cluster_stops_for_a_task_without_end(cluster, in_time, monkeypatch):
 
     heard = Heard()
     with clusters.client_of(cluster.scheduler_address) as client:
-        with pytest.raises(
-            Stopped, match=r"^3 workers .* had a block for more than 1 s and finished none; run .* again"
-        ):
+        with pytest.raises(Stopped, match=r"^3 workers .* had a block for over 1 s and finished none; run .* again"):
             clusters.on_cluster(endless, NUMBERS, heard.finished, heard.died, client, dispatch.Patience(1.0))
     assert heard.dead == [] and len(heard.results) >= 9
 
 
-def test_a_cluster_whose_workers_all_die_stops_and_blames_no_task(cluster, in_time):
+@pytest.mark.slow
+def test_a_cluster_whose_workers_all_die_stops_and_blames_no_task(cluster, in_time, monkeypatch):
+    """Either they die again and again, or, on a busy machine, a nanny gives up."""
+    monkeypatch.setattr(clusters, "WORKERLESS_SECONDS", 5)
     heard = Heard()
     with clusters.client_of(cluster.scheduler_address) as client:
-        with pytest.raises(Stopped, match="die again and again and finish no block; give them more memory"):
-            clusters.on_cluster(lambda number: os.kill(os.getpid(), 9), NUMBERS, heard.finished, heard.died, client)
+        with pytest.raises(Stopped, match=r"die again and again and finish no block; give|lost its last worker"):
+            clusters.on_cluster(lambda _: die(), NUMBERS, heard.finished, heard.died, client, dispatch.Patience(20.0))
     assert heard.dead == [] and heard.results == []
 
 
@@ -226,6 +234,23 @@ def test_a_cluster_without_workers_is_told_and_waited_for(in_time, monkeypatch, 
             empty.scale(1)
             run.join()
     assert sorted(heard.results) == [0, 1, 2]
+
+
+def test_a_cluster_that_has_lost_its_workers_stops_the_run(in_time, monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(clusters, "WORKERLESS_SECONDS", 1)
+    heard = Heard()
+    with distributed.LocalCluster(1, processes=False, dashboard_address=None) as small:
+        with clusters.client_of(small.scheduler_address) as client:
+            threading.Timer(1.5, small.scale, [0]).start()
+            with pytest.raises(Stopped, match=r"lost its last worker \d+ s ago; start some .* run the command again"):
+                clusters.on_cluster(slow, range(100), heard.finished, heard.died, client, dispatch.Patience(1.0))
+    assert 0 < len(heard.results) < 100
+
+
+def slow(number):
+    time.sleep(0.2)
+    return number
 
 
 def test_no_scheduler_is_told_in_one_line(monkeypatch):

@@ -1,4 +1,4 @@
-"""Workflow files that are wrong in every way: each ends, soon, in a plan or in one short line that a terminal can show."""
+"""Workflow files that are wrong in every way: each ends soon, in a plan or in one short line without control codes."""
 
 import copy
 import datetime
@@ -219,7 +219,7 @@ def mutated(draw, path):
     if what < 0.6:
         try:
             return tomli_w.dumps(mutate_table(draw, table)).encode(), []
-        except (ValueError, TypeError, AttributeError):  # what cannot be written
+        except (ValueError, TypeError, AttributeError, OverflowError, RecursionError):  # what cannot be written
             return mutate_text(draw, text), []
     if what < 0.85:
         return mutate_text(draw, text), []
@@ -265,7 +265,7 @@ def attack(folder, number, seed):
         file.write_bytes(content)
         signal.setitimer(signal.ITIMER_REAL, SECONDS)
         try:
-            refusals += refused(lambda: engine.plan(workflow.read(file, overrides))) is not None
+            refusals += refused(lambda sets=overrides: engine.plan(workflow.read(file, sets))) is not None
         except BaseException as error:
             raise AssertionError(f"mutation {count} of seed {seed}: {content[:2000]!r} {overrides!r}"[:3000]) from error
     return refusals

@@ -89,11 +89,27 @@ def test_defaults_are_filled_in():
         (["axes.rho.num=3"], ["axes.rho.values stands beside", "values alone"]),
         (["axes.k.stop=0.1"], ["axes.k", "both 0.1"]),
         (["axes.k.num=1"], ["axes.k", "num = 1", "bare number"]),
-        (["axes.k.num=1000000000"], ["axes.k.num = 1000000000", "100000000"]),
+        (["axes.k.num=1000000000"], ["axes.k.num = 1000000000", "10000000"]),
         (["axes.body=1.0"], ["axes.body is an option", "[options]"]),
         (["options.k=0.5"], ["options.k is a parameter", "[axes]"]),
         (["solver=3"], ["solver = 3", "valid table"]),
         (["solver.rtol=nan"], ["solver.rtol = nan", "finite"]),
+        (["axes.k=1" + "0" * 400], ["axes.k = 1000", " ... ", "number"]),
+        (["axes.k=1" + "0" * 5000], ["axes.k = '1000", " ... ", "number"]),
+        (
+            ["axes.k.num=9000000", "axes.rho={start = 0.6, stop = 4.0, num = 9000000}"],
+            ["8.1e+13 points", "at most 1e+11"],
+        ),
+        (["options.body=" + "x" * 5000], ["options.body", "xxx ... xxx", "prolate, oblate"]),
+        (["x" * 5000 + "=1"], ["unknown key xxx", "xxx ... xxx"]),
+        (
+            ["output.path=" + "n" * 5000 + ".nc"],
+            ["output.path", "nnn ... nnn", "no file can be made there (File name too long)"],
+        ),
+        (["output.path=" + "n" * 240 + ".nc"], ["output.path", "too long for the files beside it"]),
+        (["output.path=a\u0000.nc"], ["output.path = 'a\\x00.nc'", "cannot be printed"]),
+        (["title=\u001b[31mred"], ["title = '\\x1b[31mred'", "cannot be printed"]),
+        (["scene=" + "n" * 5000 + ".py"], ["scene = 'nnn", "nnn ... nnn", "no file can be called so"]),
     ],
 )
 def test_bad_input_is_refused_in_one_line(overrides, words):
