@@ -6,6 +6,8 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
+from flow_truth import exact
+from mpmath import mp
 from scipy.integrate import solve_ivp
 
 from survey.kernels import equilibria as eq
@@ -263,13 +265,26 @@ def test_parity_law():
     assert checked > 40
 
 
-def test_beside_a_separatrix_nothing_is_claimed():
-    """N1: the threshold to 16 digits is undecided; 1e-9 beside it both sides are told apart."""
-    phi, w = 3.5, 1.85414457907569906
-    at, above, below = (fates(SIX, [phi, w + gap]) for gap in (0.0, 1e-9, -1e-9))
-    assert at["verdict"][0] == UNDECIDED and at["status"][0] == 18
-    assert above["verdict"][0] >= 0 and below["verdict"][0] >= 0
-    assert (above["verdict"][0], above["turnings"][0]) != (below["verdict"][0], below["turnings"][0])
+def test_beside_a_separatrix_fates_are_those_of_its_sides():
+    """N1: double-double tells on which side of the stable branch of a saddle the doubles next to it start."""
+    phi, nearest, saddle = 3.5, 1.85414457907569906, 4.65094863594827606
+    starts = [nearest - 1e-9, *(nearest + i * np.spacing(nearest) for i in (-1, 0, 1)), nearest + 1e-9]
+    found = fates(SIX, [[phi, w] for w in starts])
+    assert (found["verdict"] >= 0).all() and (found["status"] == 0).all()
+    told = list(zip(*(found[name].tolist() for name in ("verdict", "turnings", "net_turns")), strict=True))
+    passed = [exact(SIX, phi, w, 25.0, 40)[0] > saddle for w in starts]
+    assert told[0] != told[-1] and passed[-1] and not passed[0]
+    assert told == [told[-1] if beyond else told[0] for beyond in passed]
+
+
+def test_beside_separatrices_without_barnett_london_effect():
+    """H = w^2/2 - cos phi: 1 on the separatrix of the pendulum; a double next to it is told from it, if it is not on."""
+    phi = np.array([0.1, 1.0, -2.0, 3.0])
+    starts = [[x, w] for x in phi for w in 2 * math.cos(x / 2) * (1 + np.arange(-2, 3) * 2e-16)]
+    found = fates((0, 0, 0, 0, 0, 1.0), starts)
+    with mp.workdps(50):
+        above = [mp.mpf(w) ** 2 / 2 - mp.cos(mp.mpf(x)) > 1 for x, w in starts]
+    assert found["verdict"].tolist() == [TURNS if side else SWINGS for side in above]
 
 
 def test_sides_of_cycles_are_consistent():
