@@ -1,6 +1,7 @@
 """The flow on the cylinder by other means: Taylor series with mpmath; polar coordinates about a focus, by SciPy."""
 
 import math
+from itertools import pairwise
 
 import mpmath as mp
 import numpy as np
@@ -70,7 +71,8 @@ def zeros_beside_a_focus(six, phi, w, times):
     counts = [int(np.count_nonzero(np.diff(sign[: 1 + int(2000 * t)]))) for t in times if t <= first]
     x, v = early.y[:, -1]
     lattice = np.linspace(x - 1.5, x + 1.5, 301)
-    roots = [brentq(force, a, b, xtol=1e-16) for a, b in zip(lattice, lattice[1:], strict=False) if force(a) > 0 > force(b)]
+    falls = [(a, b) for a, b in pairwise(lattice) if force(a) > 0 > force(b)]
+    roots = [brentq(force, a, b, xtol=1e-16) for a, b in falls]
     e = min(roots, key=lambda root: abs(root - x))
     angle = math.atan2(v, x - e)
     late = [t for t in times if t > first]

@@ -247,7 +247,8 @@ def test_degenerate_points():
 )
 def test_at_degenerate_equilibria_nothing_is_counted(six, off):
     """g = -c23 + s2, g' = -d - s3 and f = b12 at phi = 0; `off` splits or lifts the roots, by 1e-16 to 1e-5 rad."""
-    six = np.array(six) + [off * (six[5] > 0), 0, 0, 0, 0, off * (six[5] < 0)]
+    six = np.array(six)
+    six[5 if six[5] < 0 else 0] += off
     found = portraits(six)
     assert found["status"][0] == cp.UNTOLD_RESTS and found["verdict"][0] == 0
     assert all(found[name][0] == -1 for name in cp.COUNTS)
