@@ -59,6 +59,8 @@ def _completed(results, missed, solve, rows, places):
     others = solve(rows[some], np.where(missed[some], places[some], np.inf))
     old = [result[some] for result in results]
     take = missed[some] & (cylinder.badness(others) <= cylinder.badness(old))
+    if len(others) == 3:  # turnings that either tells are certain
+        np.copyto(others[1], old[1], where=others[1] == UNTOLD)
     for result, held, new in zip(results, old, others, strict=True):
         held[take] = new[take]
         result[some] = held
