@@ -235,6 +235,13 @@ def test_degenerate_points():
     assert found["equilibria"].tolist()[:2] == [-1, 2] and (found["end_plus"] == 1).all()
 
 
+def test_where_K_is_zero_within_its_rounding_only_the_verdict_is_degenerate():
+    """s3 = b31 s2 / b12, rounded: K is taken as 0, but the ends hang on the sign that it has."""
+    b12, b31, s2 = 0.6668855208492106, -1.2732093048880717, -0.0540824846984024
+    found = portraits((b12, b31, 0.9552966902164288, 0.36904143486989205, s2, 0.10325358790484557))
+    assert found["K"][0] == 0.0 < found["K_error"][0] and found["verdict"][0] == 0
+
+
 @pytest.mark.parametrize("off", [0.0, 1e-16, -1e-16, 1e-15, -1e-15])
 @pytest.mark.parametrize(
     "six",

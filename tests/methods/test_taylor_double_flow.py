@@ -8,7 +8,7 @@ from mpmath import mp, mpf
 from survey.kernels import flow_double
 from survey.kernels.along import NO_CONVERGENCE, OK, SEPARATRIX, STEP_LIMIT, TURNING
 from survey.measures import cylinder, cylinder_auto
-from survey.methods import taylor, taylor_double_flow
+from survey.methods import dop853, taylor, taylor_double_flow
 
 SIX = (0.7, -0.4, 1.1, 0.3, 0.5, -0.2)
 NEAR = [3.5, 1.85414457907569906]  # next to the stable branch of a saddle at 4.65095
@@ -64,6 +64,21 @@ def test_too_many_steps_are_given_up_at_once():
         taylor_double_flow, np.array([[*SIX, *NEAR]]), np.array([[1e9]]), 0.0
     )
     assert status[0, 0] == STEP_LIMIT and np.isnan(floats).all() and turnings[0, 0] == -2
+
+
+@pytest.mark.parametrize("method", [taylor, dop853])
+@pytest.mark.parametrize("fast", [0.0, 4.0])
+def test_one_short_step_keeps_within_its_rounding(method, fast):
+    """A bar of one step is little more than an ulp: sums of stages must not be rounded at the size of phi and w."""
+    random = np.random.default_rng(4)
+    rows = random.normal(size=(1500, 8)) * [1, 1, 1, 1, 1, 1, 2, 10.0**fast]
+    rows[::2, :2] = 0.0
+    times = random.uniform(0.0, 0.02, (1500, 1)) / 10.0**fast
+    truth, _turnings, _status = cylinder.trajectories(taylor_double_flow, rows, times, 0.0)
+    found, _turnings, status = cylinder.trajectories(method, rows, times, 1e-11)
+    assert (status == OK).all()
+    error, bars = np.abs(found - truth)[..., :2], found[..., 2:] + 1.2e-16 * np.abs(truth[..., :2])
+    assert (error <= bars).all()
 
 
 @pytest.mark.slow
