@@ -20,9 +20,20 @@ def questions():
         choices = [
             [(option.name, choice) for choice in option.choices] for option in scene.OPTIONS if not option.only_with
         ]
-        also = [[(o.name, choice)] for o in scene.OPTIONS if _is_primary(scene, o.only_with) for choice in o.choices]
+        also = [
+            [*_needed(scene, o), (o.name, choice)]
+            for o in scene.OPTIONS
+            if _is_primary(scene, o.only_with)
+            for choice in o.choices
+        ]
         for combination in [*itertools.product(*choices), *also]:
             yield pytest.param(scene, dict(combination), id="-".join([name, *(value for _, value in combination)]))
+
+
+def _needed(scene, option):
+    """Values of other options with which the parameter of the option exists."""
+    when = next(p.when for p in scene.PARAMETERS if p.name == option.only_with)
+    return [(name, allowed[0]) for name, allowed in when.items() if name != option.name and allowed[0]]
 
 
 def _is_primary(scene, name):

@@ -25,6 +25,8 @@ def trajectories(method, rows, times, rtol):
         missed |= untold
         results[0][untold] = np.nan
         results[2][untold & (results[2] == OK)] = closed.NO_CONVERGENCE
+    if not missed.any():
+        return results
     results = _completed(results, missed, lambda some, at: cylinder.trajectories(method, some, at, rtol), rows, times)
     left = _left_open(results, rtol) | ((results[1] == UNTOLD) & (results[2] == OK))
     exact = taylor_double_flow
@@ -35,6 +37,8 @@ def abel(method, rows, targets, rtol, before=False):
     """As `cylinder.abel`, likewise."""
     results = cylinder.abel(closed, rows, targets, rtol, before)
     missed = cylinder.missed(results, rtol) & (results[-1] != EQUILIBRIUM)
+    if not missed.any():
+        return results
     results = _completed(results, missed, lambda some, at: cylinder.abel(method, some, at, rtol, before), rows, targets)
     left, exact = _left_open(results, rtol), taylor_double_flow
     return _completed(results, left, lambda some, at: cylinder.abel(exact, some, at, rtol, before), rows, targets)
@@ -55,6 +59,8 @@ def _completed(results, missed, solve, rows, places):
     others = solve(rows[some], np.where(missed[some], places[some], np.inf))
     old = [result[some] for result in results]
     take = missed[some] & (cylinder.badness(others) <= cylinder.badness(old))
+    if len(others) == 3:  # turnings that either tells are certain
+        np.copyto(others[1], old[1], where=others[1] == UNTOLD)
     for result, held, new in zip(results, old, others, strict=True):
         held[take] = new[take]
         result[some] = held

@@ -72,17 +72,17 @@ def followed(method, s, starts, rtol):
 def _handed_over(method, s, start, tolerance, out):
     """Follow one start in double-double past what float64 cannot tell, until its fate from there on is decided."""
     times = HANDED_OVER / (s.p[BOUND_F] + math.sqrt(s.p[BOUND_DG]) + abs(start[1]))
-    row = np.concatenate([s.p[:6], start])[None]
-    floats, turnings, status = trajectories(taylor_double_flow, row, times[None], 0.0)
-    for state, turned, code in zip(floats[0], turnings[0], status[0], strict=True):
-        if code != OK:
-            return
-        later = fates(method, s, state[None], tolerance)[0]
-        if later[0] != kf.UNDECIDED:
-            out[:] = later
-            if later[2] >= 0:
-                out[2] = later[2] + turned if turned >= 0 else kf.UNTOLD
-            return
+    row, done = np.concatenate([s.p[:6], start])[None], 0
+    for last in (10, 19, len(times)):  # most are decided early, and what comes later costs most
+        floats, turnings, status = trajectories(taylor_double_flow, row, times[None, :last], 0.0)
+        for state, turned, code in list(zip(floats[0], turnings[0], status[0], strict=True))[done:]:
+            later = fates(method, s, state[None], tolerance)[0] if code == OK else [kf.UNDECIDED]
+            if later[0] != kf.UNDECIDED:
+                out[:] = later
+                if later[2] >= 0:
+                    out[2] = later[2] + turned if turned >= 0 else kf.UNTOLD
+                return
+        done = last
 
 
 def _middles(s, out):

@@ -6,6 +6,7 @@ of them end elsewhere than in a saddle there is no saddle connection.
 """
 
 import math
+from fractions import Fraction
 
 import numpy as np
 
@@ -95,7 +96,8 @@ def _type(row):
 def _verdict(method, s, rtol):
     """Is the point structurally stable, by the error bars?"""
     scale = s.p[BOUND_F] + math.sqrt(s.p[BOUND_DG])
-    degenerate = s.stratum != G or any(not _hyperbolic(row) for row in s.librations)
+    degenerate = s.stratum != G or (s.K == 0.0 and not _is_exact(s.p))
+    degenerate = degenerate or any(not _hyperbolic(row) for row in s.librations)
     for cycles in (s.plus, s.minus):
         degenerate = degenerate or any(not (_hyperbolic(row) or _far(row, s.K, scale)) for row in cycles)
     if degenerate:
@@ -105,6 +107,12 @@ def _verdict(method, s, rtol):
     starts = np.zeros((2 * eq.MOST, 4))
     starts = starts[: unstable(s.p, s.equilibria, len(s.equilibria), starts)]
     return STABLE if (followed(method, s, starts, rtol)[:, 0] >= 0).all() else UNDECIDED
+
+
+def _is_exact(p):
+    """Is K = b12 s3 - b31 s2 zero, and not only within its rounding?"""
+    b12, b31, _d, _c23, s2, s3 = map(Fraction, p[:6])
+    return b12 * s3 == b31 * s2
 
 
 def _is_degenerate(s, row):

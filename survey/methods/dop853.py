@@ -143,7 +143,7 @@ def flow_setting(p, w, tolerance):
 def flow_at(p, T, dt):
     """(phi, w, integral of f, integral of g) at dt after the start of the step: one step of size dt."""
     phi, w = T[0, PHI], T[0, W]
-    x, v, e, y = phi, w, 0.0, 0.0
+    x = v = e = y = 0.0  # changes: each sum is added to phi or w once, whose rounding is the one that bars count
     for i in range(STAGES):
         dx = dv = 0.0
         for k in range(i):
@@ -157,7 +157,7 @@ def flow_at(p, T, dt):
         v += dt * B[i] * ai
         e += dt * B[i] * f
         y += dt * B[i] * g
-    return x, v, e, y
+    return phi + x, w + v, e, y
 
 
 @inline

@@ -44,7 +44,8 @@ A portrait is what the fates of a system share: ends, equilibria, cycles, and wh
 keep them all. It is structurally stable where, by the error bars, K is off zero (L, where K = 0 exactly), no
 equilibrium is degenerate or a Hopf point, no multiplier is 1, the signs of the return maps fit together (so the parity
 law holds), and every unstable branch of a saddle ends elsewhere than in a saddle; near saddle connections it is -1.
-Where an equilibrium is degenerate or a Hopf point within the error bar the status is `degenerate`, the verdict 0.
+Where an equilibrium is degenerate or a Hopf point within the error bar, the verdict is 0 and the status is
+`degenerate_equilibrium`: the ends are told, numbers of equilibria and cycles are not.
 
 Questions: `trajectory` (phi and w at t), `abel` (w and t at phi), `fate` (where the solution ends) and `portrait` (of
 the system, without an initial state).
@@ -101,8 +102,8 @@ STATUS = {
     "separatrix": "the error bar cannot tell on which side of a separatrix the solution passes",
     "no_closed_form": "no closed form applies (they need b = 0, g = 0 or (61)): try another method",
     "too_many_cycles": "there are more cycles than places for them: the first are given",
-    "degenerate": "within the error bar an equilibrium is degenerate (g = g' = 0, or f = g = 0 where it is no saddle): "
-    "the numbers of equilibria and of cycles are not told; K, L, the stratum and the ends are",
+    "degenerate_equilibrium": "within the error bar g = g' = 0 at an equilibrium, or f = g = 0 at one that is no "
+    "saddle: the numbers of equilibria and of cycles are not told; K, L, the stratum and the ends are",
 }
 _TURNING = 16
 MOST_TURNINGS = 2**31 - 1  # are kept as int32

@@ -7,9 +7,10 @@ from importlib.resources import files
 import mpmath as mp
 import numpy as np
 import pytest
+from flow_truth import exact, zeros_beside_a_focus
 
-from survey.kernels.along import EQUILIBRIUM, NO_CONVERGENCE, OK, SEPARATRIX, TURNING
-from survey.measures import cylinder
+from survey.kernels.along import EQUILIBRIUM, NO_CONVERGENCE, OK, SEPARATRIX, TURNING, UNTOLD
+from survey.measures import cylinder, cylinder_auto
 from survey.methods import closed, dop853, rk4, taylor
 
 REFERENCE = json.loads((files("survey.reference") / "gyrostat.json").read_text())
@@ -119,33 +120,6 @@ def test_beside_a_turning_point_ok_is_certain_and_turning_holds_within_its_bar()
         assert all(np.array_equal(a[0, 0], b[0, j]) for a, b in zip(alone, together, strict=True))
 
 
-def series(six, phi, w, order):
-    """Taylor coefficients of phi and w in time."""
-    b12, b31, d, c23, s2, s3 = six
-    sine, cosine, phi, w = [mp.sin(phi)], [mp.cos(phi)], [phi], [w]
-    for n in range(order):
-        cw, sw, cs, cc, ss = (
-            mp.fdot(x, y[::-1]) for x, y in ((cosine, w), (sine, w), (cosine, sine), (cosine, cosine), (sine, sine))
-        )
-        rate = b12 * cw - b31 * sw - d * cs - c23 * (cc - ss) + s2 * cosine[n] - s3 * sine[n]
-        for row, value in zip((sine, cosine, phi, w), (cw, -sw, w[n], rate), strict=True):
-            row.append(value / (n + 1))
-    return phi, w
-
-
-def exact(six, phi, w, t, digits=30):
-    """phi and w at t by Taylor series with mpmath, of an order of one for each digit."""
-    with mp.workdps(digits):
-        six, phi, w, left = list(map(mp.mpf, six)), mp.mpf(phi), mp.mpf(w), mp.mpf(t)
-        while left:
-            rows = series(six, phi, w, digits)
-            largest = max(abs(c) ** (mp.mpf(1) / n) for row in rows for n, c in list(enumerate(row))[-2:])
-            step = mp.sign(left) * min(abs(left), 1 / (10 * largest))
-            phi, w = (mp.fdot(row, [step**n for n in range(digits + 1)]) for row in rows)
-            left -= step
-        return [float(phi), float(w)]
-
-
 RANDOM = np.random.default_rng(11).normal(size=(5, 9)) * [1, 1, 2, 2, 2, 2, 2, 3, 3]
 HARD = [
     [25.0, -10.0, 0.5, 0.7, 1.2, -0.4, 0.2, -0.5, 1.5],  # stiff
@@ -214,6 +188,37 @@ def test_equilibrium_start():
     assert in_phi((0, 0, 0, 0, 0, 1.0), 0.0, 0.0, [0.0, 1.0])[1].tolist() == [OK, EQUILIBRIUM]
 
 
+def test_a_start_at_rest_beside_an_equilibrium_leaves_it():
+    """The double next to pi is no equilibrium of a pendulum: it falls, slowly, to the side of g."""
+    row = np.array([[0, 0, 0, 0, 0, 1.0, math.pi, 0.0]])
+    places = np.array([[1.0, math.pi, 4.0]])
+    assert cylinder.abel(taylor, row, places, 1e-10)[1][0].tolist() == [SEPARATRIX, OK, SEPARATRIX]
+    floats, status = cylinder_auto.abel(taylor, row, places, 1e-10)
+    assert status[0].tolist() == [OK, OK, TURNING]
+    with mp.workdps(90):  # a quarter of the libration, less what is left of it at phi = 1; 1 - k^2 is 4e-33
+        start = mp.mpf(math.pi)
+        k = mp.sin(start / 2)
+        time = mp.ellipk(k**2) - mp.ellipf(mp.asin(mp.sin(mp.mpf(1) / 2) / k), k**2)
+        w = -mp.sqrt(2 * (mp.cos(1) - mp.cos(start)))
+    assert abs(floats[0, 0, 0] - w) <= floats[0, 0, 2] and abs(floats[0, 0, 1] - time) <= floats[0, 0, 3] < 1e-10
+
+
+@pytest.mark.parametrize("method", [taylor, dop853])
+@pytest.mark.parametrize("six", [SIX, (0, 0, 1.1, 0.3, 0.5, -0.2)])
+def test_the_branch_before_is_where_the_motion_came_from(six, method):
+    row = np.array([[*six, 0.5, 0.0]])
+    places = np.array([[0.3, 0.5, 0.7, 0.45]])
+    floats, status = cylinder.abel(method, row, places, 1e-10, before=True)
+    assert status[0].tolist() == [OK, OK, TURNING, OK] and floats[0, 2, :2].tolist() == [0.5, 0.0]
+    for place, (w, t, bar_w, bar_t) in zip(places[0, [0, 3]], floats[0, [0, 3]], strict=True):
+        assert w > 0 > t
+        phi, speed = exact(six, 0.5, 0.0, t)
+        assert abs(phi - place) <= speed * bar_t + 1e-15 and abs(speed - w) <= bar_w + 3 * bar_t
+    plain = np.array([[*six, 0.5, 0.1]])
+    one, other = (cylinder.abel(method, plain, places, 1e-10, before=choice) for choice in (False, True))
+    assert all(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
+
+
 def test_closed_form_50():
     """Case A is the reduced flow with F alone: phi' = (P sin + Q cos + n)/A11, so g = (n/A11) f with w = F + n/A11."""
     for case in REFERENCE["closed50"]:
@@ -269,10 +274,22 @@ def test_turnings_of_a_pendulum():
     assert turnings[0].tolist() == list(range(8))
 
 
-def test_turnings_far_into_a_focus_are_not_invented():
-    """Once the oscillation is below rounding the count cannot be told, and is not."""
-    _f, turnings, _s = in_time(SIX, 2.5, 0.1, [10.0, 1000.0])
-    assert turnings[0, 0] > 0 and turnings[0, 1] == -2
+@pytest.mark.parametrize("six", [SIX, (0.4, 0.3, -0.9, 0.7, 1.1, 0.6)])
+def test_turnings_far_into_a_focus_are_told(six):
+    """Where w is far below rounding, down to e^-400, they are counted about the focus in polar coordinates."""
+    times = np.array([10.0, 100.0, 333.0, 1000.0])
+    _f, turnings, _s = in_time(six, 2.5, 0.1, times)
+    assert turnings[0].tolist() == zeros_beside_a_focus(six, 2.5, 0.1, times)
+
+
+def test_a_turning_within_the_bar_of_w_is_not_counted_but_by_double_double():
+    """A start beside a double root: w does not reach 0, by 3e-17."""
+    row = np.array([[0, 0, -1.200558782775014, -0.2737773771513731, 1.2166661048093794, 0.2739402077906878,
+                     -1.5913397469582256, 6.652845693193966e-18]])  # fmt: skip
+    times = np.array([[1.2577104547576345]])
+    assert cylinder.trajectories(taylor, row, times, 1e-10)[1][0, 0] == UNTOLD
+    assert cylinder_auto.trajectories(taylor, row, times, 1e-10)[1][0, 0] == 0
+    assert exact(row[0, :6], *row[0, 6:], times[0, 0])[1] > 0
 
 
 def test_a_lost_trajectory_is_not_answered():

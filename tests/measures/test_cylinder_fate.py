@@ -6,6 +6,8 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
+from flow_truth import exact
+from mpmath import mp
 from scipy.integrate import solve_ivp
 
 from survey.kernels import equilibria as eq
@@ -187,15 +189,26 @@ def test_equilibrium_starts():
 
 
 def test_a_start_beside_an_equilibrium_is_not_at_it():
-    """One ulp and less from a focus that attracts it is reached; from one that does not, and from saddles, untold."""
+    """One ulp and less from a focus that attracts it is reached; a saddle is left to the side to which g points."""
     s = cf.skeleton(taylor, SIX)
     for row in s.equilibria:
         x = row[eq.ANGLE]
-        found = fates(SIX, [[np.nextafter(x, -9), 0], [x, 0], [np.nextafter(x, 9), 0], [x + 1e-12, 0]])
-        attracts = row[eq.KIND] != eq.SADDLE and row[eq.STABLE] < 0
-        assert found["verdict"].tolist() == [REST if attracts else UNDECIDED] * 4
-        assert (found["turnings"] == (-1 if attracts else -2)).all()
-        assert (found["status"] == (0 if attracts else 18)).all()
+        starts = [np.nextafter(x, -9), x, np.nextafter(x, 9), x + 1e-12]
+        found = fates(SIX, [[phi, 0] for phi in starts])
+        if row[eq.KIND] != eq.SADDLE:
+            assert (found["verdict"] == REST).all() if row[eq.STABLE] < 0 else (found["verdict"] >= 0).all()
+            assert (found["turnings"] == -1).all() or row[eq.STABLE] >= 0
+            continue
+        with mp.workdps(40):
+            g = [force(SIX, mp.mpf(phi)) for phi in starts]
+        aside = fates(SIX, [[x + 1e-5 * mp.sign(value), 0] for value in g])
+        assert found["verdict"].tolist() == aside["verdict"].tolist() and (aside["verdict"] >= 0).all()
+
+
+def force(six, phi):
+    """g at phi, with mpmath."""
+    d, c23, s2, s3 = map(mp.mpf, six[2:])
+    return -d * mp.sin(2 * phi) / 2 - c23 * mp.cos(2 * phi) + s2 * mp.cos(phi) - s3 * mp.sin(phi)
 
 
 @pytest.mark.parametrize("ulps", [9, 18, 45, 450, 1e10])
@@ -263,13 +276,26 @@ def test_parity_law():
     assert checked > 40
 
 
-def test_beside_a_separatrix_nothing_is_claimed():
-    """N1: the threshold to 16 digits is undecided; 1e-9 beside it both sides are told apart."""
-    phi, w = 3.5, 1.85414457907569906
-    at, above, below = (fates(SIX, [phi, w + gap]) for gap in (0.0, 1e-9, -1e-9))
-    assert at["verdict"][0] == UNDECIDED and at["status"][0] == 18
-    assert above["verdict"][0] >= 0 and below["verdict"][0] >= 0
-    assert (above["verdict"][0], above["turnings"][0]) != (below["verdict"][0], below["turnings"][0])
+def test_beside_a_separatrix_fates_are_those_of_its_sides():
+    """N1: double-double tells on which side of the stable branch of a saddle the doubles next to it start."""
+    phi, nearest, saddle = 3.5, 1.85414457907569906, 4.65094863594827606
+    starts = [nearest - 1e-9, *(nearest + i * np.spacing(nearest) for i in (-1, 0, 1)), nearest + 1e-9]
+    found = fates(SIX, [[phi, w] for w in starts])
+    assert (found["verdict"] >= 0).all() and (found["status"] == 0).all()
+    told = list(zip(*(found[name].tolist() for name in ("verdict", "turnings", "net_turns")), strict=True))
+    passed = [exact(SIX, phi, w, 25.0, 40)[0] > saddle for w in starts]
+    assert told[0] != told[-1] and passed[-1] and not passed[0]
+    assert told == [told[-1] if beyond else told[0] for beyond in passed]
+
+
+def test_beside_separatrices_without_barnett_london_effect():
+    """H = w^2/2 - cos phi is 1 on the separatrix of the pendulum: doubles next to it are told from it."""
+    phi = np.array([0.1, 1.0, -2.0, 3.0])
+    starts = [[x, w] for x in phi for w in 2 * math.cos(x / 2) * (1 + np.arange(-2, 3) * 2e-16)]
+    found = fates((0, 0, 0, 0, 0, 1.0), starts)
+    with mp.workdps(50):
+        above = [mp.mpf(w) ** 2 / 2 - mp.cos(mp.mpf(x)) > 1 for x, w in starts]
+    assert found["verdict"].tolist() == [TURNS if side else SWINGS for side in above]
 
 
 def test_sides_of_cycles_are_consistent():

@@ -1,6 +1,7 @@
 """Portraits: K, L and equilibria in multiprecision, cycles by another integrator, symmetries, laws, exact strata."""
 
 import math
+from types import SimpleNamespace
 
 import mpmath
 import numpy as np
@@ -9,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 from survey.kernels import branches
 from survey.kernels import equilibria as eq
+from survey.kernels.flow import coefficients
 from survey.measures import cylinder_fate as cf
 from survey.measures import cylinder_portrait as cp
 from survey.methods import dop853, taylor
@@ -225,15 +227,72 @@ def test_hopf():
 
 
 def test_degenerate_points():
-    """Strata, a Hopf point, a double root of g: never called structurally stable."""
+    """Strata: never called structurally stable."""
     delta, sigma, b12, b31 = 0.8, 0.35, 0.5, 0.75
     I2 = (b12, b31, delta * (b12**2 - b31**2), delta * b12 * b31, sigma * b12, sigma * b31)
-    free, pendulum = (0.5, 0.3, 0, 0, 0, 0), (0, 0, 0, 0, 0, 1.0)
-    hopf, double = (0, 0.5, 0.3, 0.8, 0.8, 0.9), (0.7, -0.4, 1.0, 0.0, 0.0, -1.0)
-    found = portraits([free, pendulum, I2, hopf, double])
-    assert found["stratum"].tolist() == [0, 1, 2, 3, 3] and (found["verdict"] == 0).all()
-    assert found["equilibria"].tolist()[:2] == [-1, 2] and (found["end_plus"][:3] == 1).all()
-    assert 6 in found["equilibrium_type"][3] and 8 in found["equilibrium_type"][4]
+    found = portraits([(0.5, 0.3, 0, 0, 0, 0), (0, 0, 0, 0, 0, 1.0), I2])
+    assert found["stratum"].tolist() == [0, 1, 2] and (found["verdict"] == 0).all() and (found["status"] == 0).all()
+    assert found["equilibria"].tolist()[:2] == [-1, 2] and (found["end_plus"] == 1).all()
+
+
+def test_where_K_is_zero_within_its_rounding_only_the_verdict_is_degenerate():
+    """s3 = b31 s2 / b12, rounded: K is taken as 0, but the ends hang on the sign that it has."""
+    b12, b31, s2 = 0.6668855208492106, -1.2732093048880717, -0.0540824846984024
+    found = portraits((b12, b31, 0.9552966902164288, 0.36904143486989205, s2, 0.10325358790484557))
+    assert found["K"][0] == 0.0 < found["K_error"][0] and found["verdict"][0] == 0
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-16, -1e-16, 1e-15, -1e-15])
+@pytest.mark.parametrize(
+    "six",
+    [
+        (0.7, -0.4, 1.0, 0.25, 0.25, -1.0),  # at phi = 0 a double root of g
+        (0.7, -0.4, 1.0, 0.0, 0.0, -1.0),  # a triple one
+        (0.0, 0.0, 1.0, 0.25, 0.25, -1.0),  # without Barnett-London effect
+        (0.0, 0.5, 0.25, 0.75, 0.75, 1.0),  # f = g = 0: a Hopf point
+    ],
+)
+def test_at_degenerate_equilibria_nothing_is_counted(six, off):
+    """g = -c23 + s2, g' = -d - s3 and f = b12 at phi = 0; `off` splits or lifts the roots, by 1e-16 to 1e-5 rad."""
+    six = np.array(six)
+    six[5 if six[5] < 0 else 0] += off
+    found = portraits(six)
+    assert found["status"][0] == cp.UNTOLD_RESTS and found["verdict"][0] == 0
+    assert all(found[name][0] == -1 for name in cp.COUNTS)
+    assert np.isnan(found["equilibrium_phi"]).all() and np.isnan(found["cycle_w"]).all()
+    assert found["K"][0] == pytest.approx(six[0] * six[5] - six[1] * six[4], abs=1e-15)
+    assert found["stratum"][0] == (3 if six[1] else 1)
+
+
+def test_beside_degenerate_equilibria_roots_are_counted_right():
+    """Double and triple roots taken apart by 1e-18 to 1e-6 of a parameter: counted as mpmath does, or not at all."""
+    random = np.random.default_rng(5)
+    p, table, told = np.empty(10), np.zeros((eq.MOST, 10)), 0
+    for i in range(200):
+        six = random.integers(-8, 9, 6) / 4.0
+        six[5] = -six[2]  # g' = 0
+        six[4] = six[3] = six[3] * (i % 2)  # g = 0, of g'' too
+        six[4 + i // 2 % 2] += random.choice([-1, 1]) * 10.0 ** random.uniform(-18, -6)
+        p[:] = coefficients(*six)
+        rows = table[: eq.equilibria(p, table)]
+        s = SimpleNamespace(p=p, stratum=cf.I1)
+        if not rows.size or any(cp._is_degenerate(s, row) for row in rows):
+            continue
+        told += 1
+        assert len(rows) == roots(six)
+    assert told > 20
+
+
+def roots(six):
+    """Number of zeros of g: of a polynomial in exp(i phi) on the unit circle."""
+    with mpmath.workdps(60):
+        d, c23, s2, s3 = map(mpmath.mpf, six[2:])
+        a, b = mpmath.mpc(-c23, d / 2) / 2, mpmath.mpc(s2, s3) / 2
+        if a == 0 and b == 0:
+            return 0
+        row = [a, b, 0, mpmath.conj(b), mpmath.conj(a)] if a != 0 else [b, 0, mpmath.conj(b)]
+        found = mpmath.polyroots(row, maxsteps=500, extraprec=600)
+        return sum(abs(abs(z) - 1) < mpmath.mpf(10) ** -25 for z in found)
 
 
 def test_beside_a_saddle_connection_nothing_is_claimed():
