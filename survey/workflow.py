@@ -206,6 +206,15 @@ def _check_names(data, scene, near):
             raise BadInput(f"axes.{short(key, 40)}: {_unknown_parameter(name, key, known)}")
 
 
+def _not_beside(scene, when, key, given, table):
+    """Why a parameter that exists `when` does not go with the `given` ones, in words: it names the one in its way."""
+    options = {option.name: option.only_with for option in scene.OPTIONS}
+    for name, allowed in when.items():
+        if not any(allowed) and options[name] in given:
+            return f"does not go with {table}{options[name]}, which is given too; leave out one of them"
+    return f"does not go with the rest{condition(scene, when, key)}"
+
+
 def _unknown_parameter(scene, key, known):
     return modules.unknown(f"parameter of scene {scene}", key, known)
 
@@ -355,7 +364,7 @@ def check_parameters(scene, name, options, given, table=""):
             if key in {option.name for option in scene.OPTIONS}:
                 raise BadInput(f"{table}{key} is an option of {name}, not a parameter; put it under [options]")
             if key in all_of:
-                raise BadInput(f"{table}{key} does not go with the rest{condition(scene, all_of[key].when, key)}")
+                raise BadInput(f"{table}{key} {_not_beside(scene, all_of[key].when, key, given, table)}")
             raise BadInput(f"{table}{short(key, 40)}: {_unknown_parameter(name, key, list(known))}")
         original = known[key].instead_of or key
         if original in replaced:

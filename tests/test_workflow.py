@@ -190,3 +190,8 @@ def test_listed_values_and_numbers_arrive_exactly(k, rho):
     checked = workflow.check({"scene": "satellite", "axes": {"k": {"values": k}, "rho": rho}})
     np.testing.assert_array_equal(checked.grid.parameters["k"][1], k)
     assert checked.grid.parameters["rho"][1] == rho and checked.grid.shape == (len(k),)
+
+
+def test_a_parameter_in_the_way_is_named():
+    with pytest.raises(BadInput, match=r"^axes.theta0 does not go with axes.l, which is given too"):
+        workflow.check({"scene": "brun", "axes": {"l": 1.0, "theta0": 1.0}})

@@ -37,15 +37,6 @@ def rf_whole(above, g):
 
 
 @inline
-def rj_whole(above, g, p):
-    """R_J(0, y, z, p), from above = m + g."""
-    fourth, root = sqrt(p), sqrt(2.0 * g) * sqrt(above)
-    product = fourth * (p + fourth * sqrt(2.0 * above) + g)
-    rest = rj(g, above, root, p + g)  # a quarter of each argument makes 8 times as much, which counts a quarter
-    return 6.0 / product * rc_of_one(2.0 * fourth * (p + g) / product) + 2.0 * rest
-
-
-@inline
 def rc_of_one(s):
     """R_C(1, s), s > 0 (DLMF 19.2.18, 19.2.19)."""
     e = s - 1.0
@@ -87,3 +78,16 @@ def rj(x, m, g, p):
     series = 1.0 - 3.0 * e2 / 14.0 + e3 / 6.0 + 9.0 * e2 * e2 / 88.0 - 3.0 * e4 / 22.0 - 9.0 * e2 * e3 / 52.0
     series += 3.0 * e5 / 26.0 - e2**3 / 16.0 + 3.0 * e3 * e3 / 40.0 + 3.0 * e2 * e4 / 20.0
     return factor * series / (mean * sqrt(mean)) + 6.0 * total
+
+
+@inline
+def rj_spread(x, m, g, spread, p):
+    """As `rj`, from spread = g^2 - m^2, too: where m < 0, y and z are conjugate, and m + g may nearly cancel."""
+    above = m + g if m >= 0.0 else spread / (g - m)
+    first, pair, fourth = sqrt(x), sqrt(2.0 * above), sqrt(p)
+    shift, high = first * pair + g, above + first * pair
+    root = sqrt(g * g + shift * (2.0 * m + shift)) if m >= 0.0 else sqrt(high * high + spread)
+    product = (fourth + first) * (p + fourth * pair + g)
+    # the first duplication by hand; without its quarters R_J is an eighth of what it would be, and counts a quarter
+    rest = rj(x + shift, high, root, p + shift)
+    return 6.0 / product * rc_of_one(2.0 * fourth * (p + shift) / product) + 2.0 * rest

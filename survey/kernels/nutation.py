@@ -298,10 +298,16 @@ def still(gaps, k, level, ats, equatorial, loose, y, hum, chart, plus, row):
 
 
 @inline
+def spread(row):
+    """g^2 - s^2 of (S10)."""
+    return 0.25 * row[K] * row[WIDTH] ** 2 * row[BEND]
+
+
+@inline
 def above(row, g):
     """s + g of (S5), whose terms cancel where the motion nearly stops between its turning points."""
     s = row[MIDDLE]
-    return s + g if s >= 0.0 else 0.25 * row[K] * row[WIDTH] ** 2 * row[BEND] / (g - s)
+    return s + g if s >= 0.0 else spread(row) / (g - s)
 
 
 @kernel

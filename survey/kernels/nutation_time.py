@@ -9,7 +9,7 @@ from math import hypot, sqrt
 import numpy as np
 
 from survey.kernels import nutation as nu
-from survey.kernels.carlson import rf, rj
+from survey.kernels.carlson import rf, rj_spread
 from survey.kernels.elliptic import MEANS, means
 from survey.kernels.jit import inline
 
@@ -17,30 +17,32 @@ EPS = nu.EPS
 
 
 @inline
-def first_kind(low, high, kc):
-    """F(chi), c = cos chi, from low = (1 + c)/2 <= 1/2 or high = (1 - c)/2 <= 1/2 (DLMF 19.25.5), chi <= pi/2."""
-    sine, cosine = 2.0 * sqrt(low * high), low - high
-    delta = sqrt(cosine * cosine + (kc * sine) ** 2)
+def first_kind(sine, cosine, kc):
+    """F(chi) from sin chi and cos chi (DLMF 19.25.5), chi <= pi/2."""
+    delta = hypot(cosine, kc * sine)
     return sine * rf(cosine * cosine, 0.5 * (1.0 + delta * delta), delta)
 
 
 @inline
-def since(far, near, origin, ratio, rest, q_origin, root, width):
+def since(far, near, middle, spread, ratio, rest, q_origin, root, width):
     """The integral of dt/(distance from a pole) since u was at the turning point `origin`, less t/far.
 
     far, near: the distances from the pole of that turning point and of u; ratio = |u - that|/width, rest = 1 - ratio;
-    root = sqrt Q(u).
+    root = sqrt Q(u). middle = X0 + s, next to 0 where the motion nearly stops; spread = g^2 - s^2.
     """
     if ratio < 1e-290:
         return 0.0
     x = q_origin * rest / ratio
-    third = rj(x, x + origin, sqrt(q_origin) * root / ratio, q_origin * near / (ratio * far))
+    third = rj_spread(x, middle, sqrt(q_origin) * root / ratio, spread, q_origin * near / (ratio * far))
     return 2.0 * width * q_origin / (3.0 * far * far) * third
 
 
 @inline
-def place(row, low, high, roots, kc, out):
-    """out = u, 1 - u, 1 + u, (u - ul)/(uh - ul), 1 - that, sqrt Q(u) = g dn/(wl + wh)."""
+def place(row, low, high, c, roots, kc, out):
+    """From (1 + c)/2, (1 - c)/2 and c, each with all its digits.
+
+    out = u, 1 - u, 1 + u, (u - ul)/(uh - ul), 1 - that, sqrt Q(u) = g dn/(wl + wh), X0 + s of (S16) from ul and uh.
+    """
     left, right = roots[1] * low, roots[0] * high
     total = left + right
     left, right = left / total, right / total
@@ -48,20 +50,24 @@ def place(row, low, high, roots, kc, out):
     out[2] = row[nu.LOW_MINUS] * left + row[nu.HIGH_MINUS] * right
     out[0] = row[nu.LOW] * left + row[nu.HIGH] * right
     out[3], out[4] = right, left
-    out[5] = roots[0] * roots[1] * hypot(low - high, 2.0 * kc * sqrt(low * high)) / total
+    g = roots[0] * roots[1]
+    out[5] = g * hypot(c, 2.0 * kc * sqrt(low * high)) / total
+    above = nu.above(row, g)
+    out[6], out[7] = above + g * c / high, above - g * c / low
 
 
 @inline
 def angles(row, tau, half, down, at):
     """(b - a) G- / 2 and (b + a) G+ / 2 at the time tau in [0, half] since u = ul; `down` is the latter at `half`."""
-    width, s = row[nu.WIDTH], row[nu.MIDDLE]
+    width, spread = row[nu.WIDTH], nu.spread(row)
     first = second = 0.0
     if row[nu.MINUS] != 0.0:
         far = row[nu.LOW_PLUS]
-        first = 0.5 * row[nu.MINUS] * (tau / far + since(far, at[1], s, at[3], at[4], row[nu.Q_LOW], at[5], width))
+        rest = tau / far + since(far, at[1], at[6], spread, at[3], at[4], row[nu.Q_LOW], at[5], width)
+        first = 0.5 * row[nu.MINUS] * rest
     if row[nu.PLUS] != 0.0:
         far = row[nu.HIGH_MINUS]
-        rest = (half - tau) / far + since(far, at[2], s, at[4], at[3], row[nu.Q_HIGH], at[5], width)
+        rest = (half - tau) / far + since(far, at[2], at[7], spread, at[4], at[3], row[nu.Q_HIGH], at[5], width)
         second = down - 0.5 * row[nu.PLUS] * rest
     return first, second
 
@@ -77,9 +83,9 @@ def rates(row, at):
 def motion(cosine, row, start, period, times, out):
     """u, the angles (less the drift of phi) and bars (m, 6) at `times` (m) in units of A, from the values `period` (8).
 
-    cosine(z, kc, quarter, pairs, last) gives (1 + c)/2, (1 - c)/2 for z in [0, 2 K].
+    cosine(z, kc, quarter, pairs, last) gives (1 + c)/2, (1 - c)/2 and c for z in [0, 2 K].
     """
-    pairs, at = np.empty((2, MEANS)), np.empty(6)
+    pairs, at = np.empty((2, MEANS)), np.empty(8)
     roots = sqrt(row[nu.Q_LOW]), sqrt(row[nu.Q_HIGH])
     g = roots[0] * roots[1]
     kc, rate = sqrt(0.5 * nu.above(row, g) / g), sqrt(g)
@@ -89,8 +95,9 @@ def motion(cosine, row, start, period, times, out):
     whole, half = 4.0 * quarter, 0.5 * period[0]
     done, left = start[0] * roots[1], start[1] * roots[0]
     low, high = left / (done + left), done / (done + left)
-    z0 = first_kind(low, high, kc) if high <= low else 2.0 * quarter - first_kind(high, low, kc)
-    place(row, low, high, roots, kc, at)
+    sine, c = 2.0 * sqrt(low * high), low - high
+    z0 = first_kind(sine, c, kc) if c >= 0.0 else 2.0 * quarter - first_kind(sine, -c, kc)
+    place(row, low, high, c, roots, kc, at)
     first, second = angles(row, z0 / rate, half, down, at)
     base_up, base_down = start[2] * first, start[2] * second
     early = start[3] / max(row[nu.WIDTH] * sqrt(at[3] * at[4]) * at[5], nu.TINY)
@@ -104,8 +111,8 @@ def motion(cosine, row, start, period, times, out):
         z = z0 + rate * (times[j] - n * period[0])
         side = 1.0 if z >= 0.0 else -1.0
         z = min(abs(z), 2.0 * quarter)
-        low, high = cosine(z, kc, quarter, pairs, last)
-        place(row, low, high, roots, kc, at)
+        low, high, c = cosine(z, kc, quarter, pairs, last)
+        place(row, low, high, c, roots, kc, at)
         first, second = angles(row, z / rate, half, down, at)
         first, second = side * first - base_up, side * second - base_down
         all_up, all_down = first + 2.0 * n * up, second + 2.0 * n * down

@@ -170,12 +170,12 @@ def nutation_periods(rows, kinds, tolerance, out):
 
 @inline
 def cosine(z, kc, quarter, pairs, last):
-    """(1 + c)/2 and (1 - c)/2, c = cn z, for z in [0, 2 K]."""
+    """(1 + c)/2, (1 - c)/2 and c = cn z, for z in [0, 2 K]."""
     over = z > quarter
     sn, cn, _dn = jacobi(2.0 * quarter - z if over else z, pairs, last)
     cn = abs(cn)
     near, far = 0.5 * (1.0 + cn), 0.5 * sn * sn / (1.0 + cn)
-    return (far, near) if over else (near, far)
+    return (far, near, -cn) if over else (near, far, cn)
 
 
 @kernel

@@ -8,7 +8,7 @@ Source: B. C. Carlson, Numer. Algorithms 10 (1995) 13-26; formulas (S5), (S6), (
 from math import cos, hypot, pi, sin, sqrt
 
 from survey.kernels import nutation as nu
-from survey.kernels.carlson import rf_whole, rj, rj_whole
+from survey.kernels.carlson import rf_whole, rj, rj_spread
 from survey.kernels.jit import inline, kernel
 from survey.kernels.nutation_action import ROUGH, action
 from survey.kernels.nutation_time import first_kind, motion
@@ -20,11 +20,11 @@ STEPS = 60
 
 
 @inline
-def advance(gap, near, far, width, q, time, above, g):
+def advance(gap, near, far, width, q, time, s, g, spread):
     """(b -+ a) J/A (S6): J has its turning point far from the pole as origin; `time` is R_F."""
     if gap == 0.0:
         return 0.0
-    third = rj_whole(above, g, q * near / far)
+    third = rj_spread(0.0, s, g, spread, q * near / far)
     return gap * (2.0 * time / far + 2.0 * width * q / (3.0 * far * far) * third)
 
 
@@ -41,10 +41,10 @@ def periods_of(row, out):
     width = row[nu.WIDTH]
     low, high = row[nu.Q_LOW], row[nu.Q_HIGH]
     g = sqrt(low) * sqrt(high)
-    above = nu.above(row, g)
+    s, spread, above = row[nu.MIDDLE], nu.spread(row), nu.above(row, g)
     time = rf_whole(above, g)
-    up = advance(row[nu.MINUS], row[nu.HIGH_PLUS], row[nu.LOW_PLUS], width, low, time, above, g)
-    down = advance(row[nu.PLUS], row[nu.LOW_MINUS], row[nu.HIGH_MINUS], width, high, time, above, g)
+    up = advance(row[nu.MINUS], row[nu.HIGH_PLUS], row[nu.LOW_PLUS], width, low, time, s, g, spread)
+    down = advance(row[nu.PLUS], row[nu.LOW_MINUS], row[nu.HIGH_MINUS], width, high, time, s, g, spread)
     noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + row[nu.NOISE_ABOVE]
     out[0], out[1], out[2] = 4.0 * time, up + down, down - up
     out[4] = (32.0 * EPS + noise) * out[0]
@@ -69,20 +69,25 @@ def nutation_periods(rows, kinds, tolerance, out):
 
 @inline
 def cosine(z, kc, quarter, pairs, last):
-    """As `agm.cosine`: F(chi) = z by Newton's method, from the side where F, convex or concave, lets it be monotone."""
+    """As `agm.cosine`: F(chi) = z by Newton's method, from the side where F, convex or concave, lets it be monotone.
+
+    chi and pi/2 - chi, each with all its digits: next to a separatrix c = cos chi is as small as k'.
+    """
     over = z > quarter
     z = 2.0 * quarter - z if over else z
     chi = min(z, 0.5 * pi)
+    rest = 0.5 * pi - chi
     for _ in range(STEPS):
-        sine, cosine = sin(0.5 * chi), cos(0.5 * chi)
-        low, high = cosine * cosine, sine * sine
-        delta = hypot(low - high, kc * 2.0 * sine * cosine)
-        move = (first_kind(low, high, kc) - z) * delta
-        chi = min(max(chi - move, 0.0), 0.5 * pi)
-        if abs(move) <= 1e-15 * chi:
+        sine, c = (cos(rest), sin(rest)) if rest < chi else (sin(chi), cos(chi))
+        delta = hypot(c, kc * sine)
+        move = (first_kind(sine, c, kc) - z) * delta
+        move = min(max(move, -rest), chi)
+        chi, rest = chi - move, rest + move
+        if abs(move) <= 1e-15 * min(chi, delta):
             break
-    low, high = cos(0.5 * chi) ** 2, sin(0.5 * chi) ** 2
-    return (high, low) if over else (low, high)
+    sine, c = (cos(rest), sin(rest)) if rest < chi else (sin(chi), cos(chi))
+    low, high = 0.5 * (1.0 + c), 0.5 * sine * sine / (1.0 + c)
+    return (high, low, -c) if over else (low, high, c)
 
 
 @kernel

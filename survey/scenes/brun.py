@@ -342,5 +342,7 @@ def why(answer):
         return f"p_psi = +-p_phi exactly, so that the axis passes a pole; {apart}"
     width = np.nanmax(answer["u_max"] - answer["u_min"])
     bar = np.nanmax(answer["u_max_error"] + answer["u_min_error"])
+    if width <= bar and answer["verdict"] == "regular_nutation":
+        return f"0 < u_max - u_min < {bar:.1g}, which takes more digits than float64 has; {apart}"
     across = "beyond" if width > bar else "within"
     return f"u_max - u_min = {told(width, bar)}, {across} the error bars of the turning points; {apart}"
