@@ -102,7 +102,8 @@ def _by_series(e, mu, rtol, answers, left):
     results = results.reshape(rows.size, PLACES, RESULTS)
     series = np.ascontiguousarray(np.swapaxes(TO_SERIES @ results[..., :5], 1, 2))
     tail = abs(series[..., -2:]).sum(axis=-1)
-    bars = LEBESGUE * results[..., 5:].max(axis=1) + tail + 16 * EPS * abs(series).sum(axis=-1)
+    with np.errstate(over="ignore"):  # then the points are late
+        bars = LEBESGUE * results[..., 5:].max(axis=1) + tail + 16 * EPS * abs(series).sum(axis=-1)
     sound = (nodes.status == status.OK).reshape(rows.size, PLACES).all(axis=1)
     answers.late |= left.reshape(-1)
     traces.dense(series[sound], bars[sound], rows[sound], mu, rtol, status.OVERFLOW, *answers.all)
