@@ -9,6 +9,7 @@ from pathlib import Path
 
 import libration_elliptic_boundaries as boundaries
 import pytest
+from danby_exact import factors
 from mpmath import mp, mpf
 
 ROOT = Path(__file__).parent.parent
@@ -26,32 +27,6 @@ def test_known_points_of_the_curves(row):
         off = abs(mpf(float(found["mu"])) - mpf(row["mu"]))
         assert off <= mpf(found["mu_error"]) + mpf(2) ** -54
     assert float(found["mu_error"]) < 1e-12
-
-
-def factors(mu, e, steps, order=40):
-    """A, B, K over half a period by Taylor series in f, in mpmath."""
-    s = mp.sqrt(1 - 3 * mu * (1 - mu))
-    d1, d2, h, whole = 3 * (1 + s) / 2, 3 * (1 - s) / 2, mp.pi / steps, mp.eye(4)
-    for j in range(steps):
-        c = [mp.cos(j * h), -mp.sin(j * h), -mp.cos(j * h), mp.sin(j * h)]
-        below = [e * c[k % 4] * h**k / mp.factorial(k) + (k == 0) for k in range(order)]
-        r = []
-        for k in range(order):
-            r.append(((k == 0) - mp.fdot(below[1 : k + 1], r[::-1])) / below[0])
-        step = mp.matrix(4, 4)
-        for column in range(4):
-            x, q, p, m = ([mpf(column == i)] for i in range(4))
-            for k in range(order - 1):
-                dx, dm = h * (p[k] - m[k]) / (k + 1), h * (x[k] - q[k]) / (k + 1)
-                q.append(-dx - h * d2 * mp.fdot(r[: k + 1], m[::-1]) / (k + 1))
-                p.append(h * d1 * mp.fdot(r[: k + 1], x[::-1]) / (k + 1) - dm)
-                x.append(dx)
-                m.append(dm)
-            step[:, column] = mp.matrix([mp.fsum(values) for values in (x, q, p, m)])
-        whole = step * whole
-    a, b = mp.det(whole[:2, :2]), mp.det(whole[2:, 2:])
-    t = mp.fsum(whole[2 + i, 2 + j] * whole[i, j] for i in range(2) for j in range(2))
-    return {"A": a, "B": b, "KC": t * t - 4 * a * b}
 
 
 @pytest.mark.parametrize(

@@ -134,22 +134,25 @@ def closed_forms_double(mu, values, bars):
 
 @inline
 def product(k, f):
-    """k . omega = k1 omega1 - k2 omega2 + k3, whose sum cancels."""
-    first = dd.times((f[0, W1], f[1, W1]), k[0])
+    """k . omega = (k1 + k3) - k1 (1 - omega1) - k2 omega2 and its error bar; 1 - omega1 = v / (1 + omega1)."""
+    first = dd.times(dd.div((f[0, V], f[1, V]), dd.shifted((f[0, W1], f[1, W1]), 1.0)), -k[0])
     second = dd.times((f[0, W2], f[1, W2]), -k[1])
-    return dd.add(dd.add(first, second), (k[2], 0.0))
+    whole = k[0] + k[2]
+    total = dd.shifted(dd.add(first, second), whole)
+    size = abs(whole) + abs(first[0]) + abs(second[0])
+    return total[0], MARGIN * (UNIT * abs(total[0]) + WIDE * size)
 
 
 @kernel
 def linear(mu, vectors, frequencies, nearest, distance):
-    """omega1, omega2 (rows of `frequencies`), the place among `vectors` of the nearest resonance and |k . omega|.
+    """omega1, omega2 (rows of `frequencies`), the place among `vectors` of the nearest resonance, |k . omega|, its bar.
 
-    Every value is within half an ulp and a bit; NaN and -1 outside 0 < mu < mu_R. Of equals the first counts.
+    The last two are rows of `distance`. NaN and -1 outside 0 < mu < mu_R. Of equals the first counts.
     """
     f = np.empty((2, len(FACTORS)))
     near = 64.0 * UNIT  # |k . omega| in float64 is good to less
     for n in range(len(mu)):
-        frequencies[:, n], distance[n], nearest[n] = np.nan, np.nan, -1
+        frequencies[:, n], distance[:, n], nearest[n] = np.nan, np.nan, -1
         if not factors(mu[n], f):
             continue
         frequencies[0, n], frequencies[1, n] = f[0, W1], f[0, W2]
@@ -160,7 +163,7 @@ def linear(mu, vectors, frequencies, nearest, distance):
         for i in range(len(vectors)):
             k = vectors[i]
             if abs(k[0] * f[0, W1] - k[1] * f[0, W2] + k[2]) <= least + near:
-                here = abs(product(k, f)[0])
-                if here < best:
-                    best, nearest[n] = here, i
-        distance[n] = best
+                here, bar = product(k, f)
+                if abs(here) < best:
+                    best, nearest[n] = abs(here), i
+                    distance[0, n], distance[1, n] = best, bar

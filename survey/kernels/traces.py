@@ -56,15 +56,19 @@ def _judge(values, bars, i, rtol, overflow, floats, verdict, collision, late, st
         return
     floats[0, i], floats[1, i], floats[2, i], floats[3, i] = a, a_bar, b, b_bar
     k, k_bar = discriminant(t, ab, cd, t_bar, ab_bar, cd_bar)
-    verdict[i] = decide(t, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar)
+    verdict[i] = decide(t, t - 2.0, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar)
     collision[i] = UNDECIDED
     if verdict[i] == UNSTABLE:
-        collision[i] = lost(t, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar)
+        collision[i] = lost(t, t - 2.0, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar)
     elif verdict[i] == STABLE:
         definite = (values[1] > 0.0) == (values[3] > 0.0)
         collision[i] = MINUS_ONE if definite else nearest(t, k, t_bar, k_bar)
-    missed = not (a_bar <= rtol * (1.0 + abs(a)) and b_bar <= rtol * (1.0 + abs(b)))
-    late[i] = missed or verdict[i] == UNDECIDED
+    late[i] = missed(a, a_bar, b, b_bar, rtol) or verdict[i] == UNDECIDED
+
+
+@inline
+def missed(a, a_bar, b, b_bar, rtol):
+    return not (a_bar <= rtol * (1.0 + abs(a)) and b_bar <= rtol * (1.0 + abs(b)))
 
 
 @inline
@@ -86,23 +90,26 @@ def discriminant(t, ab, cd, t_bar, ab_bar, cd_bar):
 
 
 @inline
-def decide(t, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar):
-    """Stable: both w real, different and in (-1, 0). Certain only where the bars exclude the other answer."""
-    if ab < -ab_bar or cd < -cd_bar or k < -k_bar or t < -t_bar or t > 2.0 + t_bar:
+def decide(t, beyond, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar):
+    """Stable: both w real, different and in (-1, 0). Certain only where the bars exclude the other answer.
+
+    `beyond` is t - 2, whose bar is that of t.
+    """
+    if ab < -ab_bar or cd < -cd_bar or k < -k_bar or t < -t_bar or beyond > t_bar:
         return UNSTABLE
-    if ab > ab_bar and cd > cd_bar and k > k_bar and t > t_bar and t < 2.0 - t_bar:
+    if ab > ab_bar and cd > cd_bar and k > k_bar and t > t_bar and beyond < -t_bar:
         return STABLE
     return UNDECIDED
 
 
 @inline
-def lost(t, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar):
+def lost(t, beyond, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar):
     """Which multipliers are off the circle: a complex quadruple, a negative pair, or positive ones alone."""
     if k < -k_bar:
         return KREIN
     if ab < -ab_bar or (k > k_bar and t < -t_bar):
         return MINUS_ONE
-    if k > k_bar and ab > ab_bar and (cd < -cd_bar or t > 2.0 + t_bar):
+    if k > k_bar and ab > ab_bar and (cd < -cd_bar or beyond > t_bar):
         return NONE
     return UNDECIDED
 

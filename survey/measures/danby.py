@@ -7,7 +7,8 @@ of these, and A B = 0 are multipliers -1, K = 0 two pairs that meet.
 Effort: steps from a ladder, more where the bars ask for it, so that a point depends on itself, the method and rtol
 alone. A dense row (one e, many mu) is five Chebyshev series in s = sqrt(1 - 3 mu (1 - mu)), of which A to t are entire
 functions: they are solved at PLACES values of s in [1/2, 1], and what they leave undecided or too inaccurate is solved
-point by point. e = 0 has its closed form, and so has mu = 0.
+point by point. e = 0 has its closed form, and so has mu = 0. What float64 leaves open, or not as accurate as asked, is
+solved in double-double (`measures.danby_double`).
 """
 
 from functools import lru_cache
@@ -17,6 +18,8 @@ import numpy as np
 from survey import methods, modules, status
 from survey.kernels import traces
 from survey.kernels.traces import EPS, KREIN, MINUS_ONE, NONE, PLACES, RESULTS, STABLE, UNDECIDED, UNSTABLE
+from survey.measures import danby_double
+from survey.measures.danby_answers import Answers
 from survey.methods import taylor16
 from survey.scene import Output
 
@@ -33,7 +36,7 @@ LADDER = np.array([2, 3, 4, 5, 6, 7, 8, *((5 + i % 4) << (i // 4 + 1) for i in r
 FINEST = 1e-14
 TOLERANCES = 10.0 ** -np.arange(4.0, 16.0)
 # A series pays from so many points in the row on; of the asked accuracy for its values.
-DENSE, SHARE = 3 * PLACES, 0.05
+DENSE, SHARE, HARD = 3 * PLACES, 0.05, 0.25
 # Keep a kernel call below about a second: steps, or points of an adaptive method.
 CALL_WORK, WALKS = 3_000_000, 500
 ATTEMPTS = 5  # to meet the accuracy, each with steps 1.7 times as many
@@ -41,30 +44,6 @@ _ANGLES = np.pi * (np.arange(PLACES) + 0.5) / PLACES
 TO_SERIES = 2 / PLACES * np.cos(np.outer(np.arange(PLACES), _ANGLES))
 TO_SERIES[0] /= 2
 LEBESGUE = 1.0 + 2 / np.pi * np.log(PLACES)
-
-
-class Answers:
-    """a, b and their bars (4, N), `verdict`, `collision`, `status`, and who is `late`: undecided, or bars too wide."""
-
-    def __init__(self, size):
-        self.floats = np.empty((4, size))
-        self.verdict, self.collision = (np.full(size, UNDECIDED, np.int8) for _ in range(2))
-        self.status, self.late = np.zeros(size, np.int8), np.zeros(size, np.bool_)
-
-    @property
-    def all(self):
-        """What the kernels fill, in their order."""
-        return self.floats, self.verdict, self.collision, self.late, self.status
-
-    def judge(self, results, rtol):
-        """Answer every point whose status is ok from its results (N, 10)."""
-        traces.measure(results, rtol, status.OVERFLOW, *self.all)
-
-    def put(self, places, other):
-        """The answers of the points `places` are those of `other`, in that order."""
-        self.floats[:, places] = other.floats
-        for name in ("verdict", "collision", "status", "late"):
-            getattr(self, name)[places] = getattr(other, name)
 
 
 def solve(e, mu, method="auto", rtol=1e-10, dense=False):
@@ -77,13 +56,18 @@ def solve(e, mu, method="auto", rtol=1e-10, dense=False):
     left = valid & ((e > 0)[:, None] & (mu > 0) | (method != "auto"))
     closed = valid & ~left
     if closed.any():
-        answers.put(np.flatnonzero(closed), closed_form(mu[closed]))
+        answers.put(np.flatnonzero(closed), closed_form(mu[closed], rtol))
+    hard = ()
     if method == "auto" and dense:
-        left = _by_series(e, mu, rtol, answers, left)
+        left, hard = _by_series(e, mu, rtol, answers, left)
     if left.any():
         used = taylor16 if method == "auto" else modules.load(methods, method, "method")
         places = np.flatnonzero(left)
         answers.put(places, _point_by_point(e[places // mu.shape[1]], *rates(mu[left]), used, rtol))
+    if method == "auto":
+        places = np.flatnonzero((valid & (mu > 0)).reshape(-1) & answers.unsettled)
+        if places.size:
+            danby_double.solve(e, mu, rtol, answers, places, hard)
     answers.status[~valid.reshape(-1)] = status.INVALID_PARAMETERS
     answers.floats[:, answers.status != status.OK] = np.nan
     names = ("a", "a_error", "b", "b_error")
@@ -106,7 +90,10 @@ def factors(e, mu, rtol=1e-13):
 
 
 def _by_series(e, mu, rtol, answers, left):
-    """Answer the points `left` (R, L) from their rows' series; returns those that are late."""
+    """Answer the points `left` (R, L) from their rows' series; returns those that are late, and the hard rows.
+
+    Hard is a row where float64 misses `rtol` at a quarter of the nodes: points of other rows are few in double-double.
+    """
     rows = np.flatnonzero(left.any(axis=1))
     s = 0.75 + 0.25 * np.cos(_ANGLES)
     d1, d2 = np.tile(1.5 * (1.0 + s), rows.size), np.tile(1.5 * (1.0 - s), rows.size)
@@ -115,11 +102,13 @@ def _by_series(e, mu, rtol, answers, left):
     results = results.reshape(rows.size, PLACES, RESULTS)
     series = np.ascontiguousarray(np.swapaxes(TO_SERIES @ results[..., :5], 1, 2))
     tail = abs(series[..., -2:]).sum(axis=-1)
-    bars = LEBESGUE * results[..., 5:].max(axis=1) + tail + 16 * EPS * abs(series).sum(axis=-1)
+    with np.errstate(over="ignore"):  # then the points are late
+        bars = LEBESGUE * results[..., 5:].max(axis=1) + tail + 16 * EPS * abs(series).sum(axis=-1)
     sound = (nodes.status == status.OK).reshape(rows.size, PLACES).all(axis=1)
-    answers.late[:] = left.reshape(-1)
+    answers.late |= left.reshape(-1)
     traces.dense(series[sound], bars[sound], rows[sound], mu, rtol, status.OVERFLOW, *answers.all)
-    return answers.late.reshape(mu.shape)
+    hard = nodes.missed(rtol).reshape(rows.size, PLACES).mean(axis=1) >= HARD
+    return answers.late.reshape(mu.shape) & left, rows[hard]
 
 
 def _point_by_point(e, d1, d2, method, rtol, results=None):
@@ -207,7 +196,7 @@ def mesh(steps, grade, nodes):
     return 2.0 * np.sin(0.5 * (y[:-1, None] - h[:, None] * np.array(nodes))) ** 2, h
 
 
-def closed_form(mu):
+def closed_form(mu, rtol):
     """Answers where mu = 0 (all multipliers 1, and a secular term) or e = 0 (frequencies of the circular problem)."""
     answers = Answers(mu.size)
     x = 6.75 * mu * (1.0 - mu)
@@ -233,6 +222,7 @@ def closed_form(mu):
     rest = mu == 0
     answers.floats[:, rest] = np.array([4.0, 0.0, 6.0, 0.0])[:, None]
     answers.verdict[rest], answers.collision[rest] = UNSTABLE, NONE
+    answers.late[:] = answers.missed(rtol) | (answers.verdict == UNDECIDED)
     return answers
 
 

@@ -57,12 +57,12 @@ def solve(mu, method, rtol):
 
 def answers(mu, method):
     """All outputs at mu (N), by one method."""
-    omega, nearest, distance = np.empty((2, mu.size)), np.empty(mu.size, dtype=np.int64), np.empty(mu.size)
+    omega, nearest, distance = np.empty((2, mu.size)), np.empty(mu.size, dtype=np.int64), np.empty((2, mu.size))
     linear(mu, VECTORS, omega, nearest, distance)
     c, combined = forms(method, mu, omega)
     ray = on_ray(c, combined, omega)
-    values = np.vstack([omega, combined[0], ray[0], distance])
-    bars = np.vstack([UNIT * omega, combined[1], ray[1], MARGIN * UNIT * distance])
+    values = np.vstack([omega, combined[0], ray[0], distance[0]])
+    bars = np.vstack([UNIT * omega, combined[1], ray[1], distance[1]])
     stable = np.isfinite(omega[0])
     lost = stable & ~(np.isfinite(c).all(axis=(0, 1)) & np.isfinite(combined).all(axis=(0, 1)))
     values[:, lost], bars[:, lost] = np.nan, np.nan

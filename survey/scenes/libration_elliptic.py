@@ -21,8 +21,12 @@ meet without harm, so there it is 1. It is -1 where the error bars leave it open
 
 What is known. e = 0 is the circular problem: a = 2 cos 2 pi w1 + 2 cos 2 pi w2, stable for 27 mu (1 - mu) < 1 (Routh).
 mu = 0 is Kepler's problem: a = 4, b = 6, unstable by a secular term. a and b are even in e, and the same at 1 - mu.
-As e -> 1 the multipliers grow like (1 - e)^-5 and more: values are given to about 1 - e = 1e-10 (then `overflow`), the
-accuracy asked to about e = 0.95. For mu below about 1e-13 all is too near Kepler's problem for a verdict.
+As e -> 1 the multipliers grow like (1 - e)^-5 and more: values are given, as accurate as asked, to about 1 - e = 1e-13
+(then `overflow`, as their bars leave the range of float32). For mu below about 1e-26, e > 0, all is too near Kepler's
+problem for a verdict.
+
+`auto` takes Taylor series in float64 and, where these leave the verdict or `collision` open or miss `rtol`, in
+double-double; the other methods are float64 alone.
 
 Source: J. M. A. Danby, Astron. J. 69 (1964) 165; checked and completed in `libration_elliptic.md` beside this file.
 """

