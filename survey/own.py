@@ -9,17 +9,17 @@ The file holds
     BREAKS       where z or a derivative jumps, in [0, T]: number(s), or a function of p; none by default
 
 and, as it likes, a docstring, TITLE and REFERENCES. It is run, as any Python file is: use files that you trust. What
-it imports is not watched when a run is resumed. z goes on with period T. [boundaries] and [refine] take z to be analytic
-in the parameters.
+it imports is not watched when a run is resumed. z goes on with period T. [boundaries] and [refine] take z to be
+analytic in the parameters.
 
 z is known by samples. Every point has one at least every T/128 (T/256 if EVEN), which the file tells as
-`z_resolved_width`; at the ends and middles of the axes there is one every T/16384 (T/32768), and a spike that only these
-show is refused. What is narrower than both may go unseen; beside BREAKS the samples are as close as they need be.
+`z_resolved_width`; at the ends and middles of the axes there is one every T/16384 (T/32768), and a spike that only
+these show is refused. What is narrower than both may go unseen; beside BREAKS the samples are as close as they need be.
 
-Where float64 leaves a verdict open, the point is solved again in double-double, as built-in scenes do: z is run once more,
-as Python, with mpmath's functions in the place of math's and numpy's. Numbers in the code, PERIOD and BREAKS are taken
-as the binary64 numbers that they are (math.pi is not quite pi), and with EVEN z is that up to T/2 and its mirror image.
-Where z cannot be run so, the file's `z_more_digits` says why, and float64's answer stays.
+Where float64 leaves a verdict open, the point is solved again in double-double, as in built-in scenes: z is run once
+more, as Python, with mpmath's functions in the place of math's and numpy's. Numbers in the code, PERIOD and BREAKS are
+taken as the binary64 numbers that they are (math.pi is not quite pi), and with EVEN z is what it is up to T/2, and its
+mirror image. Where z cannot be run so, the file's `z_more_digits` says why, and float64's answer stays.
 """
 
 import hashlib
