@@ -1,7 +1,7 @@
 """Points a few doubles to 1e-12 beside edges of tongues: verdicts, exponents and rotation numbers within their bars.
 
-The truth beside an edge is the polynomial through the half-period factors, with 40 digits, at places 1e-7 around it. With
-30 digits it would not do: beside an edge an exponent hangs on the 28th digit of a factor.
+The truth beside an edge is the polynomial through the half-period factors, with 40 digits, at places 1e-7 around it.
+With 30 digits it would not do: beside an edge an exponent hangs on the 28th digit of a factor.
 """
 
 import numpy as np
@@ -18,9 +18,10 @@ EDGES = [
 ]  # fmt: skip
 
 
-def polynomial(family, k, rho, width=mpf("1e-7"), nodes=6):
-    """The four factors as functions of rho within `width`, by Newton's interpolation."""
+def polynomial(family, k, rho, nodes=6):
+    """The four factors as functions of rho within 1e-7, by Newton's interpolation."""
     with mp.workdps(45):
+        width = mpf("1e-7")
         places = [mpf(rho) + width * mp.cos(mp.pi * (i + 0.5) / nodes) for i in range(nodes)]
         table = [list(mp_factors(family, k, place, 40)[:4]) for place in places]
         for order in range(1, nodes):
