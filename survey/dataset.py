@@ -103,6 +103,7 @@ def attributes(scene, name, request):
         "source": f"survey {version('survey')}: scene {name}, method {request.method}",
         **provenance(),
         **({"scene_text": scene.TEXT, "scene_hash": scene.HASH} if hasattr(scene, "TEXT") else {}),
+        **getattr(scene, "NOTES", {}),
     }
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from survey import status
 from survey.errors import BadInput
 from survey.kernels.hill import EPS
 from survey.measures import hill as measure
-from survey.measures import hill_motion, hill_own, hill_why
+from survey.measures import hill_motion, hill_own, hill_why, more_digits
 from survey.scene import Parameter
 
 WORDS = {
@@ -62,6 +63,27 @@ class HillScene:
         """Those of Hill's question; where z is not even, y1 to dy2 are values at T."""
         return measure.OUTPUTS if self.EVEN else tuple(_of_whole_period(o) for o in measure.OUTPUTS)
 
+    @property
+    def _share(self):
+        """The part of the period that is solved is T over this."""
+        return 2 if self.EVEN else 1
+
+    @property
+    def _sampling(self):
+        return f"samples every T/{self._share * hill_own.PROBES}"
+
+    @cached_property
+    def NOTES(self):
+        """What a file says of how z is known: global attributes."""
+        checked = f"every T/{self._share * hill_own.CHECKED} at the ends and middles of the axes"
+        unseen = f"z is known by {self._sampling}, and {checked}; a spike narrower than that may go unseen"
+        digits = f"none: {self._words}" if self._words else "double-double, where float64 leaves a verdict open"
+        return {
+            "z_resolved_width": 1 / (self._share * hill_own.PROBES),
+            "z_resolution": f"{unseen} unless its place is one of BREAKS (z_resolved_width is a share of T)",
+            "z_more_digits": digits,
+        }
+
     def cost(self, options, sizes):
         """Seconds per point, roughly."""
         return 2e-5 if self.EVEN else 3e-5
@@ -73,7 +95,8 @@ class HillScene:
         points = np.stack(columns, axis=1).astype(float)
         period, edges, slack = self._ranges(points)
         edges[~np.isfinite(points).all(axis=1)] = np.nan
-        problem, rough = self._called(hill_own.problem, self.z, points, edges, period, slack, self.EVEN)
+        exact = None if self._words else self._exact
+        problem, rough = self._called(hill_own.problem, self.z, points, edges, period, slack, self.EVEN, exact)
         out = self._called(measure.solve, problem, request.method, request.rtol, request.variables)
         out["status"] = np.where(rough[:, None], status.NO_CONVERGENCE, out["status"]).astype(np.int8)
         out["period"] = np.where(out["status"] == status.OK, period[:, None], np.nan)
@@ -118,6 +141,37 @@ class HillScene:
                 row.append(place)
         return [*row, end]
 
+    @cached_property
+    def _lifted(self):
+        """z, PERIOD and BREAKS with more digits; numbers as they are."""
+        given = (self.z, self.period, self.breaks)
+        return [more_digits.lifted(value) if callable(value) else value for value in given]
+
+    @cached_property
+    def _words(self):
+        """Why z cannot be run with more digits; nothing where it can."""
+        point = [p.default if p.default is not None else 1.0 for p in self.PARAMETERS]
+        try:
+            with more_digits.LOCK:
+                z, _ = self._exact(point, np.zeros(1))
+                z(more_digits.context().mpf(0.25))
+        except more_digits.Unsupported as error:
+            return str(error)
+        return ""
+
+    def _exact(self, point, edges):
+        """z(u) at a point, and the edges of its pieces, with more digits; the edges as float64 knows them are given."""
+        mp = more_digits.context()
+        z, period, breaks = self._lifted
+        p = [mp.mpf(float(value)) for value in point]
+        whole = mp.mpf(period(p) if callable(period) else period)
+        own = breaks(p) if callable(breaks) else list(breaks)
+        own = own if isinstance(own, list) else [own]
+        known = [mp.mpf(u) for u in own] + [whole - u for u in own if self.EVEN]
+        end = whole / 2 if self.EVEN else whole
+        rows = [min(known, key=lambda u, edge=edge: abs(u - edge)) for edge in np.unique(edges)[1:-1].tolist()]
+        return lambda u: z(u, p), [mp.mpf(0), *rows, end]
+
     def check(self, points):
         """Raise BadInput if z cannot be compiled, or is not what the scene says at these points (N, n)."""
         self._try(points[0] if len(points) else np.ones(len(self.PARAMETERS)))
@@ -142,8 +196,23 @@ class HillScene:
                 f"EVEN = True, but z(T - u) is not z(u) at {self._where(points[i])}, T = {period[i]:g}",
                 "set EVEN = False, or mend z or PERIOD",
             )
+        self._check_spikes(points[finite], edges[finite], slack[finite])
         if not self.EVEN:
             self._check_period(points, period, size.max(axis=1))
+
+    def _check_spikes(self, points, edges, slack):
+        """Refuse what a much finer sampling shows of z, but that of a run does not."""
+        one, fine = (
+            self._called(hill_own.measured, self.z, points, edges, None, slack, probes)
+            for probes in (hill_own.PROBES, hill_own.CHECKED)
+        )
+        for i in np.flatnonzero((one[1] != fine[1]).any(axis=1) | (one[3] != fine[3])):
+            u = np.linspace(0, edges[i, -1], hill_own.CHECKED)
+            place = u[3 + abs(np.diff(hill_own.at(self.z, points[i : i + 1], u[None])[0], 6)).argmax()]
+            seen = f"too narrow to be seen by {self._sampling}"
+            self._refuse(
+                f"z has a spike near u = {place:.6g} at {self._where(points[i])}, {seen}", "name its place in BREAKS"
+            )
 
     def _check_period(self, points, period, size):
         ends = hill_own.at(self.z, points, np.stack([0 * period, period], axis=1))

@@ -10,8 +10,17 @@ The file holds
 
 and, as it likes, a docstring, TITLE and REFERENCES. It is run, as any Python file is: use files that you trust. One
 that only a survey's file names is run if this user has run it here before, or allows it (`survey/trust.py`). What it
-imports is not watched when a run is resumed. z goes on with period T; what is narrower than a hundredth of T may be
-missed unless BREAKS stand beside it. [boundaries] and [refine] take z to be analytic in the parameters.
+imports is not watched when a run is resumed. z goes on with period T. [boundaries] and [refine] take z to be analytic
+in the parameters.
+
+z is known by samples. Every point has one at least every T/128 (T/256 if EVEN), which the file tells as
+`z_resolved_width`; at the ends and middles of the axes there is one every T/16384 (T/32768), and a spike that only
+these show is refused. What is narrower than both may go unseen; beside BREAKS the samples are as close as they need be.
+
+Where float64 leaves a verdict open, the point is solved again in double-double, as in built-in scenes: z is run once
+more, as Python, with mpmath's functions in the place of math's and numpy's. Numbers in the code, PERIOD and BREAKS are
+taken as the binary64 numbers that they are (math.pi is not quite pi), and with EVEN z is what it is up to T/2, and its
+mirror image. Where z cannot be run so, the file's `z_more_digits` says why, and float64's answer stays.
 """
 
 import hashlib

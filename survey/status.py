@@ -3,7 +3,7 @@
 SENTENCES = {
     "ok": "every output that applies to the point is finite",
     "invalid_parameters": "the parameters lie outside the scene's domain: see `survey scenes` with its name",
-    "overflow": "a value left the range of binary64: the solution grows too fast for this method",
+    "overflow": "a value left the range of binary64, or its bar that of float32 (3.4e38): the solution grows too fast",
     "no_convergence": "the iteration did not converge: try another method or a larger rtol",
     "step_limit": "the step budget was used up: try a larger rtol or another method",
     "worker_died": "the worker that solved this block died more than once: run the command again",

@@ -84,12 +84,12 @@ def segments(level, top, order, rows, of_level, starts):
 
 
 @kernel
-def measure(results, rule, wanted, rtol, whole, overflow, floats, verdict, late, status):
+def measure(results, squares, rule, wanted, rtol, whole, overflow, floats, verdict, late, status):
     """What follows from `results` (N, 10) by arithmetic: `floats` (14, N) with the bars, `verdict`, who misses `rtol`.
 
     Points whose `status` is not 0 are passed over; those that leave the range of floats get the status `overflow`.
     `rule` (N, or empty) holds what exact rules say, `wanted` (7) which columns count for `late`; `whole` as in
-    `_squares`.
+    `_squares`; `squares` (N, 4, or empty) holds what it finds, where more digits of it are known.
     """
     for i in range(len(results)):
         late[i] = False
@@ -98,7 +98,7 @@ def measure(results, rule, wanted, rtol, whole, overflow, floats, verdict, late,
             for c in range(len(floats)):
                 floats[c, i] = np.nan
             continue
-        sine, sine_bar, cosine, cosine_bar = _squares(results[i], whole)
+        sine, sine_bar, cosine, cosine_bar = _squares(results[i], squares, i, whole)
         said = decide(sine, sine_bar, cosine, cosine_bar, rule[i] if len(rule) > 0 else NO_RULE)
         # D from 2 - 4 sin^2 or 4 cos^2 - 2, whichever has the smaller bar.
         by_sine = sine_bar <= cosine_bar
@@ -128,12 +128,12 @@ def measure(results, rule, wanted, rtol, whole, overflow, floats, verdict, late,
 
 
 @kernel
-def transcendental(results, wanted, rtol, whole, floats, verdict, late, status):
+def transcendental(results, squares, wanted, rtol, whole, floats, verdict, late, status):
     """The columns of `measure` that are no arithmetic: exponent and rotation number, if wanted, and who misses."""
     for i in range(len(results)):
         if status[i] != 0:
             continue
-        sine, sine_bar, cosine, cosine_bar = _squares(results[i], whole)
+        sine, sine_bar, cosine, cosine_bar = _squares(results[i], squares, i, whole)
         if wanted[EXPONENT // 2]:
             by_sine = sine < cosine
             growth, bar = -sine if by_sine else -cosine, sine_bar if by_sine else cosine_bar
@@ -161,8 +161,8 @@ def exponents(first, count, rtol, floats, verdict, late):
 
 
 @splice
-def _squares(result, whole):
-    """sin^2 and cos^2 of half the angle, each with its bar: -y1' y2 and y1 y2'.
+def _squares(result, squares, i, whole):
+    """sin^2 and cos^2 of half the angle, each with its bar: -y1' y2 and y1 y2', or row i of `squares` if it has rows.
 
     With `whole` the results are those at T: then (2 - D) / 4 and (2 + D) / 4, D = y1 + y2', and the zeros of y2 in
     (0, T) give the band (that solution's angle advances from 0 to between d pi and (d + 1) pi).
@@ -173,6 +173,8 @@ def _squares(result, whole):
         trace, size = result[0] + result[3], abs(result[0]) + abs(result[3]) + 2.0
         bar = 0.25 * (result[4] + result[7] + 2.0 * EPS * size)
         sine, cosine, sine_bar, cosine_bar = 0.25 * (2.0 - trace), 0.25 * (2.0 + trace), bar, bar
+    if len(squares) > 0:
+        sine, sine_bar, cosine, cosine_bar = squares[i, 0], squares[i, 1], squares[i, 2], squares[i, 3]
     return sine, sine_bar, cosine, cosine_bar
 
 

@@ -9,6 +9,7 @@ from survey.kernels import hill as kernels
 from survey.kernels.jit import wait_for_ahead
 
 NONE = np.zeros(0, np.int8)
+NO_SQUARES = np.zeros((0, 4))
 
 
 @dataclass(frozen=True)
@@ -35,14 +36,14 @@ class Answers:
         self.status = np.zeros(size, np.int8)
         self.late = np.zeros(size, np.bool_)
 
-    def judge(self, results, rule):
-        """Answer every point whose status is ok from its results (N, 10)."""
+    def judge(self, results, rule, squares=NO_SQUARES):
+        """Answer every point whose status is ok from its results (N, 10) and `squares` (see `kernels.hill.measure`)."""
         asked, own = self.asked, (self.floats, self.verdict, self.late, self.status)
         rule = NONE if rule is None else rule
-        kernels.measure(results, rule, asked.wanted, asked.rtol, asked.whole, status.OVERFLOW, *own)
+        kernels.measure(results, squares, rule, asked.wanted, asked.rtol, asked.whole, status.OVERFLOW, *own)
         if asked.wanted[kernels.EXPONENT // 2 :].any():
             wait_for_ahead()
-            kernels.transcendental(results, asked.wanted, asked.rtol, asked.whole, *own)
+            kernels.transcendental(results, squares, asked.wanted, asked.rtol, asked.whole, *own)
 
     def put(self, places, other, at=slice(None)):
         """The answers of the points `places` are those of `other` at `at` (all of them by default, in that order)."""

@@ -8,9 +8,9 @@ Measured (`survey precision satellite`): midpoint Taylor is the fastest at every
 import numpy as np
 
 from survey import status
-from survey.kernels.hill import DISCRIMINANT, UNDECIDED
+from survey.kernels.hill import DISCRIMINANT, RESULTS, UNDECIDED
 from survey.measures import hill_dense, hill_effort
-from survey.measures.hill_answers import Answers
+from survey.measures.hill_answers import NO_SQUARES, Answers
 from survey.methods import dop853, taylor16, taylor_double
 
 EPS = 2.3e-16
@@ -54,7 +54,7 @@ def solve(problem, asked, answers, decide=True):
 
 
 def _exactly(problem, answers, places, asked, most):
-    """Solve the points at `places` in double-double, where at most so many steps suffice."""
+    """Solve the points at `places` in double-double, where at most so many steps do; those without an answer stay."""
     if not places.size:
         return
     phase, distance = taylor_double.hill_density()
@@ -67,10 +67,14 @@ def _exactly(problem, answers, places, asked, most):
     steps = steps[within].astype(np.int64)
     calls = np.cumsum(steps) // CALL_STEPS
     for call in np.unique(calls):
-        these = calls == call
-        own = Answers(int(these.sum()), asked)
+        these = np.flatnonzero(calls == call)
+        results = problem.exact(rows[these], p[these], low[these], steps[these])
+        known = np.isfinite(results).all(axis=1)
+        these, results = these[known], results[known]
+        own = Answers(these.size, asked)
         rule = None if problem.rule is None else problem.rule.reshape(-1)[places[these]]
-        own.judge(problem.exact(rows[these], p[these], low[these], steps[these]), rule)
+        squares = np.ascontiguousarray(results[:, RESULTS:]) if problem.whole else NO_SQUARES
+        own.judge(np.ascontiguousarray(results[:, :RESULTS]), rule, squares)
         answers.put(places[these], own)
 
 

@@ -38,7 +38,7 @@ def _by_trace(answer):
     elif off > bar:
         side = f"{_times(off, bar)} its error bar: " + ("|D| > 2" if abs(d) > 2 else "|D| < 2")
     else:
-        side = "less than its error bar: the factors at T/2 decide, or an exact rule"
+        side = "less than its error bar: the factors at T/2, more digits of D or an exact rule decide"
     return f"D = {told(d, bar)}, {off:.2g} from |D| = 2, {side}"
 
 

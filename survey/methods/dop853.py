@@ -81,17 +81,17 @@ def hill_walk(potential, p, row, table, span, tolerance, out):
 
     Fills `out` as `survey.kernels.lanes.chain` does. False when STEP_LIMIT steps did not reach the end.
     """
-    return hill_walk_pieces(potential, p, row, table, np.array([0.0, span]), 0.0, tolerance, out)
+    return hill_walk_pieces(potential, p, row, table, np.array([0.0, span]), 0.0, span, tolerance, out)
 
 
 @inline
-def hill_walk_pieces(potential, p, row, table, edges, slack, tolerance, out):
+def hill_walk_pieces(potential, p, row, table, edges, slack, longest, tolerance, out):
     """As `hill_walk`, from the first to the last of `edges`; z may jump at those between, where a step ends.
 
-    `potential` is asked no nearer to an edge than `slack`: on the side that is meant.
+    No step is longer than `longest`. `potential` is asked no nearer to an edge than `slack`: on the side that is meant.
     """
     z, slopes = np.empty(STAGES), np.empty((4, STAGES))
-    longest = 0.25 * (edges[-1] - edges[0])  # else a coefficient whose average rules escapes the estimate
+    longest = min(longest, 0.25 * (edges[-1] - edges[0]))  # else a coefficient whose average rules escapes the estimate
     place, t, steps, h = 1, edges[0], 0, min(longest, 0.1)
     y1, v1, s1, t1, w1 = 1.0, 0.0, 0.0, 0.0, 0.0
     y2, v2, s2, t2, w2 = 0.0, 1.0, 0.0, 0.0, 0.0

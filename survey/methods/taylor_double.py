@@ -112,6 +112,13 @@ def hill_walk(start, expand, potential, miss, row, p, span, before, after, work,
 @inline
 def compose(chain, h, doubt, out):
     """The results from the propagators of all steps and the clock's error `doubt`."""
+    y1, v1, y2, v2 = composed(chain, doubt, out)
+    rounded(y1, v1, y2, v2, h, out)
+
+
+@inline
+def composed(chain, doubt, out):
+    """y1, h y1', y2 / h, y2' as double-doubles; their bars and zeros go into `out`."""
     y1, v1, s1, t1, w1 = (1.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0
     y2, v2, s2, t2, w2 = (0.0, 0.0), (1.0, 0.0), 0.0, 0.0, 0.0
     zeros1, zeros2, sum_ = 0.0, 0.0, 0.0
@@ -128,11 +135,17 @@ def compose(chain, h, doubt, out):
         zeros2 += 1.0 if (y2[0] < 0.0) != (old2 < 0.0) else 0.0
         sum_ += relative(matrix, 1.0)
     bars(s1, w1, s2, w2, len(chain), sum_, out)
+    out[8], out[9] = zeros1, zeros2
+    return y1, v1, y2, v2
+
+
+@inline
+def rounded(y1, v1, y2, v2, h, out):
+    """Keep y1, y1', y2, y2' as float64, and their bars with that rounding."""
     out[0], out[1], out[2], out[3] = y1[0], div(v1, h)[0], mul(y2, h)[0], v2[0]
     out[5], out[6] = out[5] / h[0], out[6] * h[0]
     for i in range(4):
         out[4 + i] += HALF_ULP * abs(out[i])
-    out[8], out[9] = zeros1, zeros2
 
 
 @inline

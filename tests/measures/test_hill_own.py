@@ -1,5 +1,6 @@
 """A user's z: closed forms, other scenes and other methods; true errors within the bars, with breaks and without."""
 
+import itertools
 from math import cos, pi, sin
 
 import numpy as np
@@ -198,3 +199,46 @@ def test_bits_do_not_depend_on_the_block(monkeypatch):
         monkeypatch.setattr(engine, "BLOCK_POINTS", 1)
         xr.testing.assert_identical(whole.drop_attrs(), survey.evaluate(one, **given).drop_attrs())
         monkeypatch.undo()
+
+
+def spike(u, p):
+    return p[0] + p[1] / p[3] * np.exp(-(((u - p[2]) / p[3]) ** 2))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_spike_is_seen_or_refused(seed):
+    """Gaussian spikes of an area that matters, down to 1e-4 of the period; by solve_ivp in pieces about the spike."""
+    random = np.random.default_rng(seed)
+    a, area, at = random.uniform(1, 40), random.uniform(0.5, 3), random.uniform(0.02, 0.98)
+    w = 10 ** random.uniform(-4, -2)
+    try:
+        own = survey.evaluate(SPIKE, a=a, area=area, at=at, w=w)
+    except survey.BadInput as refusal:
+        assert "spike near u" in str(refusal) or "not smooth" in str(refusal)
+        return
+    y = np.array([1.0, 0.0, 0.0, 1.0])
+    for low, high in itertools.pairwise(
+        np.unique(np.clip([0, *(at + w * np.array([-8, -4, -2, 0, 2, 4, 8])), 1], 0, 1))
+    ):
+
+        def slope(u, y):
+            z = spike(u, (a, area, at, w))
+            return [y[1], -z * y[0], y[3], -z * y[2]]
+
+        y = solve_ivp(slope, (low, high), y, method="DOP853", rtol=1e-12, atol=1e-12).y[:, -1]
+    assert abs(y[0] + y[3] - float(own.discriminant)) < 1e-8 * (1 + abs(y).max()) + float(own.discriminant_error)
+
+
+SPIKE = survey.hill(spike, period=1.0, parameters=("a", "area", "at", "w"))
+
+
+def test_a_spike_that_a_run_would_miss_is_refused_with_its_place_and_resolved_with_a_break_there():
+    point = {"a": 4.0, "area": 2.0, "at": 0.3045, "w": 2e-4}
+    with pytest.raises(survey.BadInput, match=r"z has a spike near u = 0\.304.*T/128; name its place in BREAKS"):
+        survey.evaluate(SPIKE, **point)
+    breaks = {"breaks": lambda p: [p[2] - 8 * p[3], p[2], p[2] + 8 * p[3]]}
+    named = survey.evaluate(survey.hill(spike, period=1.0, parameters=SPIKE.PARAMETERS, **breaks), **point)
+    # as narrow as this it makes y' jump by its area times y, to the order of w
+    trace = 2 * cos(2.0) - 2.0 * np.sqrt(pi) / 2 * sin(2.0)
+    assert abs(float(named.discriminant) - trace) < 5e-3 and float(named.discriminant_error) < 1e-8
+    assert named.attrs["z_resolved_width"] == 1 / 128 and "BREAKS" in named.attrs["z_resolution"]

@@ -1,0 +1,254 @@
+"""A user's function in more digits: its own Python code, with mpmath's functions in the place of math's and numpy's.
+
+Numbers that stand in the code, or beside it, are the binary64 numbers that they are; what is computed from them, the
+parameters and u is computed with PRECISION bits. What cannot be run so raises Unsupported, whose text says why.
+
+Source: F. Johansson and others, mpmath: a Python library for arbitrary-precision floating-point arithmetic.
+"""
+
+import builtins
+import math
+import threading
+from functools import cache
+from itertools import pairwise
+from operator import mul
+from types import CellType, CodeType, FunctionType, ModuleType
+
+import numpy as np
+from mpmath.libmp import to_fixed
+
+from survey.kernels.jit import fresh
+
+PRECISION = 128  # bits: a double-double number holds 106
+BITS = 192  # after the point, of what is multiplied by values of z
+# What numpy calls otherwise than mpmath.
+NUMPY = {
+    "arcsin": "asin", "arccos": "acos", "arctan": "atan", "arctan2": "atan2", "arcsinh": "asinh", "arccosh": "acosh",
+    "arctanh": "atanh", "absolute": "fabs", "abs": "fabs", "pow": "power",
+}  # fmt: skip
+SAME = frozenset(
+    "sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp expm1 log log1p log10 sqrt cbrt fabs hypot "
+    "floor ceil gamma erf erfc degrees radians power sign".split()
+)
+BUILTINS = ("abs", "bool", "int", "len", "max", "min", "pow", "range", "sum", "ArithmeticError", "ValueError")
+LOCK = threading.Lock()  # mpmath's numbers are not for two threads at a time
+DISPATCHER = type(fresh(lambda: None))
+
+
+class Unsupported(Exception):
+    """The function cannot be run with more digits; says why."""
+
+
+@cache
+def context():
+    """mpmath's functions and numbers at PRECISION, to be used under LOCK."""
+    from mpmath.ctx_mp import MPContext
+
+    own = MPContext()
+    own.prec = PRECISION
+    return own
+
+
+def lifted(function):
+    """The same function on numbers of `context`; raises Unsupported when it is made or called."""
+    made = _lift(function, {})
+    mp = context()
+
+    def call(*arguments):
+        try:
+            value = made(*arguments)
+            return mp.mpf(value) if isinstance(value, (bool, int, float, mp.mpf)) else _numbers(value)
+        except Unsupported:
+            raise
+        except Exception as error:
+            raise Unsupported(f"{type(error).__name__}: {error}") from None
+
+    return call
+
+
+def _numbers(values):
+    """A tuple or list of numbers as numbers of `context`."""
+    mp = context()
+    if isinstance(values, (list, tuple)) and all(isinstance(v, (int, float, mp.mpf)) for v in values):
+        return [mp.mpf(value) for value in values]
+    raise Unsupported(f"it returns {type(values).__name__}, no real number")
+
+
+class _Refused:
+    """Stands for what mpmath has not, until it is used."""
+
+    def __init__(self, words):
+        self._words = words
+
+    def __call__(self, *arguments):
+        raise Unsupported(self._words)
+
+    def __getattr__(self, name):
+        raise Unsupported(self._words)
+
+
+class _Module:
+    """math or numpy, with mpmath's functions."""
+
+    def __init__(self, module):
+        self._module = module
+
+    def __getattr__(self, name):
+        return _lift(getattr(self._module, name), {})
+
+
+def _lift(value, seen):
+    """The value as code on numbers of `context` may use it."""
+    value = getattr(value, "py_func", value) if isinstance(value, DISPATCHER) else value
+    if id(value) in seen:
+        return seen[id(value)]
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value.item() if isinstance(value, np.generic) else value
+    if isinstance(value, (np.number, np.ndarray)):
+        return value.item() if np.ndim(value) == 0 else value.tolist()
+    if isinstance(value, (tuple, list)):
+        return type(value)(_lift(item, seen) for item in value)
+    if isinstance(value, FunctionType):
+        return _function(value, seen)
+    if value in (math, np):
+        return _Module(value)
+    return _named(value)
+
+
+def _named(value):
+    """mpmath's function in the place of one of math's, numpy's or Python's."""
+    mp, name = context(), getattr(value, "__name__", type(value).__name__)
+    if isinstance(value, ModuleType):
+        return _Refused(f"it uses the module {name}")
+    if value in (float, np.float64):
+        return mp.mpf
+    if any(value is getattr(builtins, own) for own in BUILTINS):
+        return value
+    named = NUMPY.get(name, name)
+    if value in (getattr(math, name, None), getattr(np, name, None)):
+        if named in SAME:
+            return getattr(mp, named)
+        if name in OTHERS:
+            return OTHERS[name]
+    return _Refused(f"it uses {name}")
+
+
+def _truncated(x, y):
+    mp = context()
+    rest = mp.fmod(abs(x), abs(y))
+    return rest if x >= 0 else -rest
+
+
+def _square(x):
+    return x * x
+
+
+OTHERS = {
+    "pow": lambda x, y: context().power(x, y),
+    "fmod": _truncated,
+    "copysign": lambda x, y: abs(x) if y >= 0 else -abs(x),
+    "maximum": max,
+    "minimum": min,
+    "square": _square,
+    "where": lambda condition, x, y: x if condition else y,
+}
+
+
+def _function(function, seen):
+    """A copy of a Python function whose names mean lifted values."""
+    code, scope = function.__code__, {"__builtins__": {name: getattr(builtins, name) for name in BUILTINS}}
+    scope["__builtins__"]["float"] = context().mpf
+    cells = tuple(CellType() for _ in function.__closure__ or ())
+    made = FunctionType(code, scope, function.__name__, None, cells)
+    seen[id(function)] = made
+    for name in _names(code):
+        if name in function.__globals__:
+            scope[name] = _lift(function.__globals__[name], seen)
+    for cell, own in zip(cells, function.__closure__ or (), strict=True):
+        cell.cell_contents = _lift(own.cell_contents, seen)
+    made.__defaults__ = _lift(function.__defaults__, seen)
+    made.__kwdefaults__ = function.__kwdefaults__
+    return made
+
+
+def _names(code):
+    """Names that the code, or a function inside it, looks up."""
+    inner = [const for const in code.co_consts if isinstance(const, CodeType)]
+    return {*code.co_names, *(name for own in inner for name in _names(own))}
+
+
+def series(z, edges, start, nodes):
+    """What `sampled_double` needs of z(u), steps beginning at `start`, ends of pieces at `edges`, numbers of `context`.
+
+    Power series (steps, nodes, 2) and lengths (steps, 2) as double-doubles, the sizes of the last four Chebyshev
+    coefficients pair by pair and of z (3, steps), and u and z at the nodes (steps, nodes). None where z cannot be run.
+    """
+    mp = context()
+    ends = [mp.mpf(float(u)) for u in start] + [edges[-1]]
+    for edge in edges[1:-1]:
+        ends[int(abs(start - float(edge)).argmin())] = edge
+    lengths = [high - low for low, high in pairwise(ends)]
+    places = [[low + h * x for x in _nodes(nodes)] for low, h in zip(ends[:-1], lengths, strict=True)]
+    try:
+        values = [[z(u) for u in step] for step in places]
+    except Unsupported:
+        return None
+    if not all(mp.isfinite(value) for step in values for value in step):
+        return None
+    found, sizes = zip(*(_polynomial(step) for step in values), strict=True)
+    lengths = np.array([_two(h) for h in lengths])
+    return np.array(found), lengths, np.array(sizes).T, np.array(places, float), np.array(values, float)
+
+
+def _polynomial(values):
+    """The power series of the polynomial through the values, and the sizes; in whole numbers, so exactly."""
+    mp, nodes = context(), len(values)
+    power, last = _transforms(nodes)
+    size = max(abs(value) for value in values)
+    shift = PRECISION - (int(mp.mag(size)) if size else 0)
+    whole = [to_fixed(value._mpf_, shift) for value in values]
+    coefficients = [_ratio(sum(map(mul, row, whole)), shift + BITS) for row in power]
+    tail = [abs(_ratio(sum(map(mul, row, whole)), shift + BITS)[0]) for row in last]
+    return coefficients, (tail[0] + tail[1], tail[2] + tail[3], float(size))
+
+
+def _ratio(number, bits):
+    """A whole number / 2^bits as a double-double."""
+    high = float(number)
+    return math.ldexp(high, -bits), math.ldexp(float(number - int(high)), -bits)
+
+
+def _two(x):
+    """A number of `context` as a double-double."""
+    high = float(x)
+    return high, float(x - high)
+
+
+@cache
+def _nodes(number):
+    """Chebyshev points of the first kind on [0, 1]."""
+    mp = context()
+    return [(1 - mp.cos(mp.pi * (i + 0.5) / number)) / 2 for i in range(number)]
+
+
+@cache
+def _transforms(number):
+    """From values at `_nodes`: rows that give the power series, and the last four Chebyshev coefficients, 2^BITS times.
+
+    T_j(2 x - 1) has whole coefficients (of x^n, below 6^j): the digits that they cost are among BITS.
+    """
+    mp = type(context())()
+    mp.prec = BITS + 64
+    cosines = [
+        [(1 + (j > 0)) * mp.cos(mp.pi * j * (number - i - 0.5) / number) / number for i in range(number)]
+        for j in range(number)
+    ]
+    shifted = [[1], [-1, 2]]
+    for _ in range(2, number):
+        one, before = shifted[-1], [*shifted[-2], 0, 0]
+        up, same = [0, *one], [*one, 0]
+        shifted.append([4 * u - 2 * s - b for u, s, b in zip(up, same, before, strict=True)])
+    power = [
+        [sum(shifted[j][n] * cosines[j][i] for j in range(n, number)) for i in range(number)] for n in range(number)
+    ]
+    return tuple([[to_fixed(x._mpf_, BITS) for x in row] for row in rows] for rows in (power, cosines[-4:]))
