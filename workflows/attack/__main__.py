@@ -2,8 +2,8 @@
 
     python workflows/attack --points 1000000 --workers 2 -o results/attack.md
 
-writes the table, the same numbers as CSV by scene, method and region beside it, and every fault with a line of Python that
-shows it again. Stopped, it goes on where it was; the same seed draws the same points.
+writes the table, the same numbers as CSV by scene, method and region beside it, and every fault with a line of Python
+that shows it again. Stopped, it goes on where it was; the same seed draws the same points.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""Points of Brun's problem: initial states and scaled integrals, about poles, separatrices, precessions and without field."""
+"""Points of Brun's problem: states and scaled integrals, about poles, separatrices, precessions, without field."""
 
 from math import pi
 
@@ -11,6 +11,8 @@ from attack.judge import Batch
 NAMES = ("A", "C", "epsilon", "theta0", "p_theta0", "p_psi", "p_phi")
 METHODS = ("auto", "auto", "auto", "agm", "carlson", "chebyshev")
 OUTPUTS = ("u_min", "u_max", "period", "precession", "spin", "action")
+STATES = ("any", "pole +1", "pole -1", "passing closely", "pole passage", "tiny field", "no field", "fast spin", "no spin",
+          "regular precession", "saddle", "upright", "special", "large")  # fmt: skip
 SURE = 1e-20
 NODES = 2048
 
@@ -35,8 +37,7 @@ def chunk(random, size):
 
 def _states(random, number):
     """(region, (N, 7))."""
-    kind = str(random.choice(["any", "pole +1", "pole -1", "passing closely", "pole passage", "tiny field", "no field",
-                              "fast spin", "no spin", "regular precession", "saddle", "upright", "special", "large"]))  # fmt: skip
+    kind = str(random.choice(STATES))
     signs = random.choice([-1.0, 1.0], (4, number))
     A, C = 10 ** random.uniform(-0.5, 0.5, number), random.uniform(0.02, 1.999, number)
     epsilon = signs[0] * 10 ** random.uniform(-6, 1, number)
@@ -148,6 +149,9 @@ def _rows(out, answer):
             scale = scale + 1
         if name in ("precession", "spin"):
             scale = scale + 2 * pi * (1 + np.abs(out[..., 6]))
+        if name == "action":  # of a narrow well
+            half = (out[..., 2] - out[..., 0]) / 2
+            scale = scale * (1 + (1e-11 if out.ndim == 3 else 1e-21) / half / np.where(out.ndim == 3, half, 1))
         with np.errstate(invalid="ignore"):
             trusted = np.abs(out[..., 12]) < 1e-18 if name not in ("u_min", "u_max", "period") else True
         found[name] = np.where(trusted, value, np.nan), low, SURE * scale

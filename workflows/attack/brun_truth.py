@@ -1,9 +1,14 @@
 """Brun's problem in the attack's double-double arithmetic: periods by trapezoidal sums, not by elliptic integrals.
 
-The polynomial P of (S2) is expanded about the start (or u = 0); its roots are bisected between its stationary points and
-polished, those near a pole as roots in 1 -+ u. With u between its turning points as a cosine of x, P = (u - ul)(uh - u) Q and
-    T = 2 A int dx / sqrt Q,   an advance near a pole = sgn(d) (pi + int sqrt(vl vh) k (1 + u + S) / (sqrt Q (sqrt Q + sqrt Q1)) dx),
-d = b - a, v = 1 - u, Q1 = Q(1) (and likewise at -1), whose integrands are periodic and smooth: sums converge like exp(-n).
+The polynomial P of (S2) is expanded about the start (or u = 0); its roots are bisected between its stationary points
+and polished, those near a pole as roots in 1 -+ u. With u between its turning points as a cosine of x,
+P = (u - ul)(uh - u) Q and
+
+    T = 2 A int dx / sqrt Q,
+    advance at the pole u = 1: sgn(d) (pi + int sqrt(vl vh) k (1 + u + S) / (sqrt Q (sqrt Q + sqrt Q1)) dx),
+
+d = b - a, v = 1 - u, S = ul + uh, Q1 = Q(1), and likewise at -1. The integrands are periodic and smooth: sums converge
+like exp(-n).
 """
 
 import numpy as np
@@ -106,7 +111,7 @@ def at_pole(v, d2, c1, c2, c3, c4):
 
 @inline
 def well(A, k, L, a, b, level, below, ul, uh, vl, vh, wl, wh, out, most):
-    """T, advances at the poles, action of one well; `level` = L + k - a b, `below` = L + k + a b; v = 1 - u, w = 1 + u."""
+    """T, advances at the poles, action of a well; `level` is L + k - a b, `below` L + k + a b; v = 1 - u, w = 1 + u."""
     delta, sigma = sub(b, a), add(b, a)
     S, p = add(ul, uh), mul(ul, uh)
     half = times(sub(vl, vh), 0.5)
@@ -115,8 +120,6 @@ def well(A, k, L, a, b, level, below, ul, uh, vl, vh, wl, wh, out, most):
     kS = mul(k, S)
     q0 = add(sub(L, k), mul(k, sub(mul(S, S), p)))
 
-    g2 = (0.0, 0.0)
-    g = (0.0, 0.0)
     # by the mean (S5), in another arithmetic
     Ql = add(mul(add(mul(k, ul), kS), ul), q0)
     Qh = add(mul(add(mul(k, uh), kS), uh), q0)
@@ -247,6 +250,15 @@ def well(A, k, L, a, b, level, below, ul, uh, vl, vh, wl, wh, out, most):
 
 
 @inline
+def between_ends(A, k, L, a, b, level, below, e, one, most):
+    """As `well`, of the ends (2, 6): u, 1 - u, 1 + u of each."""
+    ul, uh = (e[0, 0], e[0, 1]), (e[1, 0], e[1, 1])
+    vl, vh = (e[0, 2], e[0, 3]), (e[1, 2], e[1, 3])
+    wl, wh = (e[0, 4], e[0, 5]), (e[1, 4], e[1, 5])
+    well(A, k, L, a, b, level, below, ul, uh, vl, vh, wl, wh, one, most)
+
+
+@inline
 def prepared(k, L, a, b, level, below, c, low, high, u0, v0, w0, work, found, ends):
     """Roots of P (expanded about u0, whose 1 -+ u0 are v0, w0) with their u, 1 - u, 1 + u; returns their number."""
     number = stationary(c, low, high, work, found)
@@ -254,12 +266,12 @@ def prepared(k, L, a, b, level, below, c, low, high, u0, v0, w0, work, found, en
     for j in range(number):
         x = (found[j, 0], found[j, 1])
         u, v, w = add(u0, x), sub(v0, x), add(w0, x)
-        # P(1 - v) = -d^2 + 2 level v - (L + 5 k - ...) v^2 ...: the Taylor series of P at 1 and at -1
-        if v[0] < 0.3:
+        # far nearer to a pole than the start: a root in v of P(1 - v) = -d^2 + 2 level v - (L + 5 k) v^2 ...
+        if v[0] < 0.01 * v0[0]:
             v = at_pole(v, mul(d, d), times(level, 2.0), sub(neg(times(k, 5.0)), L), times(k, 4.0), neg(k))
             w = sub((2.0, 0.0), v)
             u = sub((1.0, 0.0), v)
-        elif w[0] < 0.3:
+        elif w[0] < 0.01 * w0[0]:
             w = at_pole(w, mul(s, s), times(below, 2.0), sub(neg(times(k, 5.0)), L), times(k, 4.0), neg(k))
             v = sub((2.0, 0.0), w)
             u = sub(w, (1.0, 0.0))
@@ -308,8 +320,6 @@ def states(points, most, out):
         number = prepared(k, L, a, b, level, below, c, low, high, cos, v0, w0, work, found, ends)
         # the roots next to the start: below and above
         lower, upper = -1, -1
-        scale = abs(c[1, 0]) + abs(c[2, 0]) + abs(c[3, 0]) + abs(c[4, 0])
-        tiny = 1e-28 * scale
         for j in range(number):
             x = found[j, 0]
             here = abs(x) < 1e-26
@@ -352,8 +362,7 @@ def states(points, most, out):
         if e[1, 0] - e[0, 0] <= 1e-12:
             continue
         one[:] = np.nan
-        well(A, k, L, a, b, level, below, (e[0, 0], e[0, 1]), (e[1, 0], e[1, 1]), (e[0, 2], e[0, 3]), (e[1, 2], e[1, 3]),
-             (e[0, 4], e[0, 5]), (e[1, 4], e[1, 5]), one, most)  # fmt: skip
+        between_ends(A, k, L, a, b, level, below, e, one, most)
         drift = mul(a, div(sub(A, C), mul(A, C)))
         fill(o, e, one, drift)
 
@@ -397,7 +406,6 @@ def integrals(points, sign, ratio, most, out):
                 e = ends[j : j + 2]
                 one[:] = np.nan
                 if e[1, 0] - e[0, 0] > 1e-12:
-                    well((1.0, 0.0), k, L, a, b, level, below, (e[0, 0], e[0, 1]), (e[1, 0], e[1, 1]), (e[0, 2], e[0, 3]),
-                         (e[1, 2], e[1, 3]), (e[0, 4], e[0, 5]), (e[1, 4], e[1, 5]), one, most)  # fmt: skip
+                    between_ends((1.0, 0.0), k, L, a, b, level, below, e, one, most)
                     fill(o[at], e, one, drift)
                 at += 1

@@ -1,4 +1,4 @@
-"""The attack as a whole: chunks of points, each from a seed of its own, in processes; what is done is kept; the table."""
+"""The attack as a whole: chunks of points, each of its own seed, in processes; what is done is kept; the table."""
 
 import csv
 import hashlib
@@ -26,19 +26,15 @@ FAMILIES = {
     "brun": (0.15, 2500),
     "libration": (0.06, 2000),
 }
+WHERE = {"satellite": ("hill", "satellites"), "mathieu": ("hill", "mathieu"), "own": ("hill", "own"),
+         "libration_elliptic": ("danby", "chunk"), "gyrostat_fate": ("fate", "chunk")}  # fmt: skip
 FOLDER = Path(__file__).parent
 TOLD = 60  # faults in the page
 
 
-def modules():
-    return {"satellite": ("hill", "satellites"), "mathieu": ("hill", "mathieu"), "own": ("hill", "own"),
-            "libration_elliptic": ("danby", "chunk"), "gyrostat": ("gyrostat", "chunk"), "gyrostat_fate": ("fate", "chunk"),
-            "brun": ("brun", "chunk"), "libration": ("libration", "chunk")}  # fmt: skip
-
-
 def batches(family, seed, index, size):
     """The batches of a chunk: the same for the same seed."""
-    module, name = modules()[family]
+    module, name = WHERE.get(family, (family, "chunk"))
     random = np.random.default_rng([seed, sorted(FAMILIES).index(family), index])
     return getattr(importlib.import_module(f"attack.{module}"), name)(random, size)
 
@@ -109,9 +105,7 @@ def run(points, scenes, seed, output, workers, minutes, fresh):
     fell = write(output, found, identity, len(found) == len(chunks))
     console.print(f"attack: {output}: {'nothing fell' if not fell else f'{fell} faults'}", soft_wrap=True)
     if len(found) < len(chunks):
-        console.print(
-            f"attack: {len(chunks) - len(found)} of {len(chunks)} chunks are left: give the same command again"
-        )
+        console.print(f"attack: {len(chunks) - len(found)} of {len(chunks)} chunks left: give the same command again")
         return 4
     return 1 if fell else 0
 
@@ -158,15 +152,14 @@ def _merged(rows, key):
 
 def _table(rows, key, titles):
     counts, worst = _merged(rows, key)
-    lines = [" | ".join(["", *titles, "points", "undecided %", "missed %", "refused %", "unchecked %", "worst error / bar",
-                         "lies", "wrong", "silent", "tracebacks", "slow", "us a point", ""]).strip(),
-             "|" + "---|" * (len(titles) + 12)]  # fmt: skip
+    shares, numbers = ("undecided", "missed", "refused", "unchecked"), ("lies", "wrong", "silent", "tracebacks", "slow")
+    heads = [*titles, "points", *(f"{x} %" for x in shares), "worst error / bar", *numbers, "us a point"]
+    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
     for name in sorted(counts):
         c = counts[name]
-        share = [f"{100 * c[x] / c['points']:.1f}" for x in ("undecided", "missed", "refused", "unchecked")]
-        last = [str(c[x]) for x in ("lies", "wrong", "silent", "tracebacks", "slow")]
-        speed = f"{1e6 * c['seconds'] / c['points']:.0f}"
-        lines.append("| " + " | ".join([*name, f"{c['points']:,}", *share, f"{worst[name]:.2g}", *last, speed]) + " |")
+        share = [f"{100 * c[x] / c['points']:.1f}" for x in shares]
+        cells = [f"{c['points']:,}", *share, f"{worst[name]:.2g}", *(str(c[x]) for x in numbers)]
+        lines.append("| " + " | ".join([*name, *cells, f"{1e6 * c['seconds'] / c['points']:.0f}"]) + " |")
     return lines
 
 
@@ -189,9 +182,10 @@ def write(output, found, identity, complete):
             *_table(rows, lambda r: (r[0], r[2]), ("scene", "region")), ""]  # fmt: skip
     if faults:
         page += ["## What fell", ""]
-        for fault in _spread(faults):
-            page += [f"- {fault['kind']}, {fault['scene']}, {fault['region']}: {fault['what']} {fault['said']} (chunk {fault['chunk']})",
-                     "", "  ```python", *(f"  {line}" for line in fault["line"].splitlines()), "  ```"]  # fmt: skip
+    for fault in _spread(faults):
+        words = f"{fault['kind']}, {fault['scene']}, {fault['region']}: {fault['what']} {fault['said']}"
+        shown = [f"  {line}" for line in fault["line"].splitlines()]
+        page += [f"- {words} (chunk {fault['chunk']})", "", "  ```python", *shown, "  ```"]
     output.parent.mkdir(parents=True, exist_ok=True)
     output.write_text("\n".join(page) + "\n")
     return fell
@@ -207,26 +201,41 @@ def _spread(faults):
             yield fault
 
 
+PROSE = """# An attack on error bars and verdicts
+
+Made by `python workflows/attack {asked}`{stopped}:
+{points:,} points, {seconds:,.0f} s of one core; survey {version_survey}, numba {version_numba}, numpy {version_numpy},
+Python {version_python}, {cpu}, commit {commit} (changed since: {dirty}), sources {sources}.
+
+Random points are drawn where answers are hardest: consecutive doubles about edges of tongues and separatrices, tips, ends
+of domains, tiny and huge values, exact special values, long times, all methods, rtol from 1e-6 to 1e-13, one by one, in
+batches and as maps. Each answer is held against a truth of higher accuracy that shares no code with the package: Taylor
+series in double-double arithmetic of the attack's own, of other forms of the equations (Duffing's equation for
+satellites, the eccentric anomaly for Danby's map), trapezoidal sums for Brun's problem, exact fractions, 60 digits of the
+closed forms of the normal form (whose integers are the package's), long motions and exact mirror images for fates and
+portraits. Some points of each batch are solved again, alone and at another rtol: both answers must lie within the sum of
+their bars.
+
+A **lie** is a value farther from the truth than its error bar and the truth's own doubt together. A **wrong** verdict is
+one that the truth contradicts; an undecided one is honest, and so are a bar wider than rtol asks for (missed) and a
+refusal with its reason. **Silent** is a NaN, a negative bar or a flag without a word beside a status that is ok; slow is
+more than half a second a point. Unchecked are answered points whose truth would have been too dear or too coarse. The
+time is that of the package, without compiling."""
+
+
 def _prose(identity, total, seconds, complete):
     from survey.dataset import provenance
 
-    about = provenance()
     asked = f"--points {identity['points']} --seed {identity['seed']}"
     if identity["scenes"] != list(FAMILIES):
         asked += f" --scenes {','.join(identity['scenes'])}"
-    return [
-        "# An attack on error bars and verdicts", "",
-        f"Made by `python workflows/attack {asked}`{'' if complete else ' (stopped early)'}: {total['points']:,} points, "
-        f"{seconds:,.0f} s of one core; survey {about['version_survey']}, commit {about['commit']}, numba {about['version_numba']}, "
-        f"numpy {about['version_numpy']}, Python {about['version_python']}, {about['cpu']}, sources {identity['sources']}.", "",
-        "Random points are drawn where answers are hardest: consecutive doubles about edges of tongues and separatrices, tips,",
-        "ends of domains, tiny and huge values, exact special values, long times, all methods, rtol from 1e-6 to 1e-13, taken",
-        "one by one, in batches and as maps. Each answer is held against a truth of higher accuracy that shares no code with the",
-        "package: Taylor series in double-double arithmetic of the attack's own, of other forms of the equations (Duffing's",
-        "equation for satellites, the eccentric anomaly for Danby's map), trapezoidal sums for Brun's problem, 60-digit closed",
-        "forms for the normal form, identities and symmetries where no truth is cheap.", "",
-        "A **lie** is a value farther from the truth than its error bar and the truth's own doubt together. A **wrong** verdict is",
-        "one that the truth contradicts; an undecided one is honest, and so are a bar wider than rtol asks for (missed) and a",
-        "refusal with its reason. **Silent** is a NaN, a negative bar or a flag without a word beside a status that is ok; slow is",
-        "more than half a second a point. Unchecked are answered points whose truth would have been too dear or too coarse.",
-    ]  # fmt: skip
+    stopped = "" if complete else " (stopped early)"
+    words = PROSE.format(
+        asked=asked,
+        stopped=stopped,
+        points=total["points"],
+        seconds=seconds,
+        sources=identity["sources"],
+        **provenance(),
+    )
+    return words.splitlines()

@@ -5,22 +5,23 @@ import os
 from pathlib import Path
 
 import llvmlite
+import llvmlite.binding as llvm
 import numba
 import platformdirs
 
 
-def _folder():
-    digest = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__}".encode())
-    for path in sorted(Path(__file__).parent.glob("*.py")):
-        if "@kernel" in (text := path.read_text()) or "@inline" in text:
-            digest.update(text.encode())
+def _folder(function):
+    """Named by a hash of the function's file and of the arithmetic that is compiled into it."""
+    digest = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__} {llvm.get_host_cpu_name()}".encode())
+    for path in (function.__code__.co_filename, Path(__file__).with_name("double.py"), __file__):
+        digest.update(Path(path).read_bytes())
     base = Path(os.environ.get("NUMBA_CACHE_DIR") or platformdirs.user_cache_dir("survey"))
     return base / f"attack-{digest.hexdigest()[:16]}"
 
 
 def kernel(function):
     """Compile on the first call, and keep it."""
-    folder, previous = _folder(), numba.config.CACHE_DIR
+    folder, previous = _folder(function), numba.config.CACHE_DIR
     try:
         folder.mkdir(parents=True, exist_ok=True)
         numba.config.CACHE_DIR = str(folder)

@@ -48,12 +48,13 @@ def truth(given, answer):
         said, meeting = answer["verdict"], answer["collision"]
         off = k < -dk
         negative = (k > dk) & ((ab < -dab) | (t < -dt))
-        other = (ab > dab) & (k > dk) & (t > dt)  # neither
+        expected = np.where(off, 2, np.where(negative, 1, -1))
+        neither = (ab > dab) & (k > dk) & (t > dt)
+    other = (expected >= 0) & (meeting >= 0) & (meeting != expected) | neither & unstable & (meeting > 0)
     wrong = {
         "verdict": ((said == 1) & unstable) | ((said == 0) & stable),
-        "collision": (said == 0) & (mu > 0) & ((off & (meeting >= 0) & (meeting != 2)) | (negative & (meeting >= 0) & (meeting != 1))
-                                   | (other & unstable & (meeting > 0))),
-    }  # fmt: skip
+        "collision": (said == 0) & (mu > 0) & other,
+    }
     return {"a": (out[:, 0], out[:, 1], out[:, 4]), "b": (out[:, 2], out[:, 3], out[:, 5]), "wrong": wrong}
 
 
@@ -104,8 +105,9 @@ def chunk(random, size):
             mu[:4] = 0.5 - np.arange(4) * 2.0**-54  # (two of them are 1/2)
             mu = np.unique(mu)
             places = np.append(random.choice(mu.size - 3, 27, replace=False), mu.size - 1 - np.arange(3))
-            yield Batch("libration_elliptic", kind, {"mu": mu, "e": np.array([e])}, truth, None, {},
-                        "taylor16" if method == "taylor16" else "auto", rtol, cross=("mu", "e"), places=places)  # fmt: skip
+            method = "taylor16" if method == "taylor16" else "auto"
+            given = {"mu": mu, "e": np.array([e])}
+            yield Batch("libration_elliptic", kind, given, truth, None, {}, method, rtol, "", ("mu", "e"), places)
             used += 30
             continue
         yield Batch("libration_elliptic", kind, {"mu": mu, "e": e}, truth, None, {}, method, rtol)

@@ -125,7 +125,7 @@ def zero(series, goal, low, high):
 
 @kernel
 def along(points, tolerance, out):
-    """points (N, 9): b12 .. s3, phi0, w0, phi. out (N, 6): w, t (high, low) and 0, or phi, t of turning and 1; steps."""
+    """points (N, 9): b12 .. s3, phi0, w0, phi. out (N, 6): w, t (high, low), 0, or phi, t of turning, 1; steps."""
     y, p = np.zeros((7, 2, TERMS)), np.zeros(6)
     for i in range(len(points)):
         row, o = points[i], out[i]
@@ -176,8 +176,11 @@ def along(points, tolerance, out):
 
 @kernel
 def settle(points, section, span, tolerance, out):
-    """points (N, 8) without a time, for `span` in units of the fastest rate. out (N, 8): phi, w at the end (w over the
-    rate), w at the last and last but one passage of `section`, phi at the last two right turning points, the rate, and 1."""
+    """points (N, 8) without a time, for `span` in units of the fastest rate; velocities are over that rate.
+
+    out (N, 8): phi, w at the end, w at the last two passages of `section`, phi at the last two right turning points,
+    the rate, and 1 if all was done.
+    """
     y, p = np.zeros((7, 2, TERMS)), np.zeros(6)
     for i in range(len(points)):
         row, o = points[i], out[i]

@@ -7,7 +7,6 @@ import numpy as np
 
 import survey
 from attack import hill_truth
-from attack.compiled import kernel
 from attack.hill_truth import AMPLITUDE, COSINE, GAUSS, INERTIA, LORENTZ, NOT_EVEN, ONE_MINUS_K, RHO, STAIRS, K
 from attack.judge import Batch
 
@@ -17,6 +16,7 @@ WAYS = {"k": K, "one_minus_k": ONE_MINUS_K, "amplitude": AMPLITUDE}
 METHODS = ("auto", "auto", "auto", "taylor16", "magnus6", "rk4", "dop853")
 SPECIAL_K = (0.0, 5e-324, 1e-300, 1e-16, 0.5, np.sqrt(0.5), np.nextafter(1, 0), np.nextafter(1, 2), 2.0, 3.0, 1e3)
 SPECIAL_RHO = (0.0, 5e-324, 1e-300, 1e-8, 0.5, 1.0, 1.5, 2.0, np.sqrt(1.25), np.sqrt(3.0), 1 / np.sqrt(3.0), 10.0, -1.0)
+SPECIAL_ALPHA = (0.0, 2.0, 0.5, 1.5, 11 / 15, 8 / 9, 59 / 63, 4 / 3, 31 / 27, 13 / 12, 1.25, 1e-300)
 TOLERANCE = 1e-33
 
 
@@ -104,6 +104,10 @@ def _draw_modulus(random, size):
     return kind, way, np.arcsin(values) if way == "amplitude" else 1 - values if way == "one_minus_k" else values
 
 
+def _off_one(k):
+    return np.where(k == 1, np.nextafter(1, 0), k)
+
+
 def _draw_rate(random, kind, k, size):
     """(suffix of the region, rho)."""
     sub = random.choice(["", "special rho", "large rho", "beside a tip"], p=[0.6, 0.15, 0.05, 0.2])
@@ -145,8 +149,9 @@ def satellites(random, size):
         if not inertia and number > 1 and random.random() < 0.1:
             names = {way: np.unique(given[:4]), "rho": np.unique(random.uniform(0, 4, 150))}
             places = random.choice(names[way].size * 150, 60, replace=False)
-            yield Batch("satellite", f"{kind}, map", names, _true_satellite(way, False, 1, oblate), None, options,
-                        "auto" if method in ("rk4", "dop853") else str(method), rtol, cross=(way, "rho"), places=places)  # fmt: skip
+            method = "auto" if method in ("rk4", "dop853") else str(method)
+            true = _true_satellite(way, False, 1, oblate)
+            yield Batch("satellite", f"{kind}, map", names, true, None, options, method, rtol, "", (way, "rho"), places)
             used += 60
             continue
         region = f"{kind}{', ' + sub if sub else ''}{', inertia ratio' if inertia else ''}"
@@ -195,10 +200,9 @@ def _true_satellite(way, inertia, direction, oblate):
         rho = direction / np.sqrt(3 * np.abs(1 - other)) if inertia else other
         body = other > 1 if inertia else np.full(ok.shape, oblate)
         short = {"k": 1 - values, "one_minus_k": values, "amplitude": 2 * np.sin((pi / 2 - values) / 2) ** 2}[way]
-        orbits = np.abs(rho) * 2 * out[:, 8] / (2 * pi)
         found = hill_outputs(out, answer, True)
         found["period"] = 2 * out[:, 8], 2 * out[:, 9], 1e-29 * out[:, 8]
-        grows, low, doubt = found["exponent"]
+        grows, _low, doubt = found["exponent"]
         with np.errstate(all="ignore"):
             turns = _long(out, 8) * 2 / (2 * LONG_PI) * _rho_long(rho, other, inertia)
             found["exponent_per_orbit"] = grows / turns, 0.0, doubt / turns + 8 * ULP * np.abs(grows / turns)
@@ -299,79 +303,10 @@ def _angle_doubt(minus, plus, dminus, dplus):
         return (np.abs(ends[1] - ends[0]) / LONG_PI).astype(float)
 
 
-@kernel
-def _rough(k, short, rho, oblate, use, out):
-    """Zeros of a solution in PERIODS periods, over twice their number."""
-    for i in range(len(k)):
-        if not use[i]:
-            out[i] = np.nan
-            continue
-        kk = k[i]
-        kc = np.sqrt(abs(short[i]) * (1.0 + kk))
-        rotates = short[i] < 0.0
-        a, b = (kk if rotates else 1.0), kc
-        for _ in range(40):
-            a, b = 0.5 * (a + b), np.sqrt(a * b)
-        quarter = np.pi / 2 / a
-        n = int(16 + 10 * quarter * (abs(rho[i]) + kk + 1.0))
-        if n > 20000:
-            out[i] = np.nan
-            continue
-        h = quarter / (2 * n)
-        w = np.empty(2 * n + 1)
-        x, v = (kc, 0.0) if rotates else (0.0, kk * kc)
-        alpha = 2 * kk * kk - 1.0
-        w[0] = x
-        for j in range(2 * n):  # Runge-Kutta
-            a1, b1 = v, alpha * x - 2 * x * x * x
-            y = x + h / 2 * a1
-            a2, b2 = v + h / 2 * b1, alpha * y - 2 * y * y * y
-            y = x + h / 2 * a2
-            a3, b3 = v + h / 2 * b2, alpha * y - 2 * y * y * y
-            y = x + h * a3
-            a4, b4 = v + h * b3, alpha * y - 2 * y * y * y
-            x += h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
-            v += h / 6 * (b1 + 2 * b2 + 2 * b3 + b4)
-            w[j + 1] = x
-        c = -kk * kk if oblate[i] else short[i] * (1.0 + kk)
-        pieces = 2 if rotates else 4
-        m = np.empty((pieces * n, 4))
-        step = 2 * h
-        for j in range(pieces * n):
-            z = np.empty(3)
-            for s in range(3):
-                at = 2 * j + s
-                piece = min(at // (2 * n), pieces - 1)
-                inner = at - piece * 2 * n
-                back = piece % 2 == 0  # from the greatest |w| to the least
-                value = w[2 * n - inner] if back else w[inner]
-                if not rotates and piece in (1, 2):
-                    value = -value
-                z[s] = 2 * value * value + 2 * rho[i] * value + rho[i] * rho[i] + c
-            for col in range(2):
-                y, d = (1.0, 0.0) if col == 0 else (0.0, 1.0)
-                a1, b1 = d, -z[0] * y
-                a2, b2 = d + step / 2 * b1, -z[1] * (y + step / 2 * a1)
-                a3, b3 = d + step / 2 * b2, -z[1] * (y + step / 2 * a2)
-                a4, b4 = d + step * b3, -z[2] * (y + step * a3)
-                m[j, 2 * col] = y + step / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
-                m[j, 2 * col + 1] = d + step / 6 * (b1 + 2 * b2 + 2 * b3 + b4)
-        y, d, zeros = 1.0, 0.1, 0
-        for _ in range(20):
-            for j in range(pieces * n):
-                new = m[j, 0] * y + m[j, 2] * d
-                d = m[j, 1] * y + m[j, 3] * d
-                zeros += 1 if (new < 0) != (y < 0) else 0
-                y = new
-            size = abs(y) + abs(d)
-            y, d = y / size, d / size
-        out[i] = zeros / 40.0
-
-
 def rough_rotation(k, short, rho, oblate, use):
     """The rotation number to about 0.05, by counting zeros of a solution in 20 periods."""
     out = np.empty(len(k))
-    _rough(*(np.ascontiguousarray(x, float) for x in (k, short, rho)), np.ascontiguousarray(oblate, bool),
+    hill_truth.rough(*(np.ascontiguousarray(x, float) for x in (k, short, rho)), np.ascontiguousarray(oblate, bool),
            np.ascontiguousarray(use & (np.abs(short) > 1e-200) & (k < 1e6), bool), out)  # fmt: skip
     return out
 
@@ -400,7 +335,7 @@ def mathieu(random, size):
         elif kind == "beside an edge":
             scale = 10 ** random.uniform(-3, 1.5)
             fixed = scale * random.choice([-1, 1])
-            x = _edge(random, lambda x: _factors(_mathieu_truth(x, fixed)), -2 * scale - 1, 20.0, 24)
+            x = _edge(random, lambda x, fixed=fixed: _factors(_mathieu_truth(x, fixed)), -2 * scale - 1, 20.0, 24)
             if x is None:
                 continue
             a, q = beside(random, x, number), np.full(number, fixed)
@@ -479,20 +414,18 @@ def own(random, size):
             )
             if random.random() < 0.4:
                 row = p[0].copy()
-                x = _edge(random, lambda x: _own_margin(name, x, row), -5, 30, 20)
+                x = _edge(random, lambda x, row=row: _own_margin(name, x, row), -5, 30, 20)
                 if x is not None:
                     region, p[:] = "beside an edge", row
                     p[:, 0] = beside(random, x, number)
         elif name == "stairs":
             p[:, :2] = random.uniform(-30, 200, (number, 2))
-            p[:, 2] = (
-                random.uniform(1e-6, 1 - 1e-6, number)
-                if random.random() < 0.6
-                else random.choice([0.0, 1.0, 0.5, 1e-12, 1 - 1e-12])
-            )
+            p[:, 2] = random.uniform(1e-6, 1 - 1e-6, number)
+            if random.random() < 0.4:
+                p[:, 2] = random.choice([0.0, 1.0, 0.5, 1e-12, 1 - 1e-12])
             if random.random() < 0.4:
                 row = p[0].copy()
-                x = _edge(random, lambda x: _own_margin(name, x, row), -5, 60, 20)
+                x = _edge(random, lambda x, row=row: _own_margin(name, x, row), -5, 60, 20)
                 if x is not None:
                     region, p[:] = "beside an edge", row
                     p[:, 0] = beside(random, x, number)

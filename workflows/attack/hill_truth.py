@@ -1,8 +1,8 @@
 """Hill's equation in the attack's double-double arithmetic, in another form than the package's.
 
-Satellites: w = k cn u (or k dn k u) solves Duffing's equation w'' = (2 k^2 - 1) w - 2 w^3. It is solved from the place
-where w is least, so that its relative error does not grow however near k is to 1, and both solutions with it; the rest of
-the half period follows from rho -> -rho there. Taylor series of order 30, of steps that each choose themselves.
+Satellites: w = k cn u (or k dn k u) solves Duffing's equation w'' = (2 k^2 - 1) w - 2 w^3. It is solved from the
+place where w is least, so that its relative error does not grow however near k is to 1, and both solutions with it; the
+rest of the half period follows from rho -> -rho there. Taylor series of order 30, in steps of their own length.
 """
 
 import numpy as np
@@ -73,7 +73,6 @@ def satellites(which, given, rhowhich, rhogiven, direction, oblate, tolerance, o
         if rhowhich == RHO:
             ob = oblate
         rotates = (given[i] < 0.0) if which == ONE_MINUS_K else (given[i] > 1.0 if which == K else False)
-        k2 = mul(k, k)
         scale = k[0] if k[0] > 1.0 else 1.0
         # everything in units of `scale` (a float: its division is exact to double-double)
         kk, ro = div(k, (scale, 0.0)), div(rho, (scale, 0.0))
@@ -263,3 +262,72 @@ def own_points(kind, points, ends, length, tolerance, out):
         o[11] = float(steps)
         if steps >= MOST:
             o[:] = np.nan
+
+
+@kernel
+def rough(k, short, rho, oblate, use, out):
+    """Zeros of a solution in PERIODS periods, over twice their number."""
+    for i in range(len(k)):
+        if not use[i]:
+            out[i] = np.nan
+            continue
+        kk = k[i]
+        kc = np.sqrt(abs(short[i]) * (1.0 + kk))
+        rotates = short[i] < 0.0
+        a, b = (kk if rotates else 1.0), kc
+        for _ in range(40):
+            a, b = 0.5 * (a + b), np.sqrt(a * b)
+        quarter = np.pi / 2 / a
+        n = int(16 + 10 * quarter * (abs(rho[i]) + kk + 1.0))
+        if n > 20000:
+            out[i] = np.nan
+            continue
+        h = quarter / (2 * n)
+        w = np.empty(2 * n + 1)
+        x, v = (kc, 0.0) if rotates else (0.0, kk * kc)
+        alpha = 2 * kk * kk - 1.0
+        w[0] = x
+        for j in range(2 * n):  # Runge-Kutta
+            a1, b1 = v, alpha * x - 2 * x * x * x
+            y = x + h / 2 * a1
+            a2, b2 = v + h / 2 * b1, alpha * y - 2 * y * y * y
+            y = x + h / 2 * a2
+            a3, b3 = v + h / 2 * b2, alpha * y - 2 * y * y * y
+            y = x + h * a3
+            a4, b4 = v + h * b3, alpha * y - 2 * y * y * y
+            x += h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+            v += h / 6 * (b1 + 2 * b2 + 2 * b3 + b4)
+            w[j + 1] = x
+        c = -kk * kk if oblate[i] else short[i] * (1.0 + kk)
+        pieces = 2 if rotates else 4
+        m = np.empty((pieces * n, 4))
+        step = 2 * h
+        for j in range(pieces * n):
+            z = np.empty(3)
+            for s in range(3):
+                at = 2 * j + s
+                piece = min(at // (2 * n), pieces - 1)
+                inner = at - piece * 2 * n
+                back = piece % 2 == 0  # from the greatest |w| to the least
+                value = w[2 * n - inner] if back else w[inner]
+                if not rotates and piece in (1, 2):
+                    value = -value
+                z[s] = 2 * value * value + 2 * rho[i] * value + rho[i] * rho[i] + c
+            for col in range(2):
+                y, d = (1.0, 0.0) if col == 0 else (0.0, 1.0)
+                a1, b1 = d, -z[0] * y
+                a2, b2 = d + step / 2 * b1, -z[1] * (y + step / 2 * a1)
+                a3, b3 = d + step / 2 * b2, -z[1] * (y + step / 2 * a2)
+                a4, b4 = d + step * b3, -z[2] * (y + step * a3)
+                m[j, 2 * col] = y + step / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+                m[j, 2 * col + 1] = d + step / 6 * (b1 + 2 * b2 + 2 * b3 + b4)
+        y, d, zeros = 1.0, 0.1, 0
+        for _ in range(20):
+            for j in range(pieces * n):
+                new = m[j, 0] * y + m[j, 2] * d
+                d = m[j, 1] * y + m[j, 3] * d
+                zeros += 1 if (new < 0) != (y < 0) else 0
+                y = new
+            size = abs(y) + abs(d)
+            y, d = y / size, d / size
+        out[i] = zeros / 40.0

@@ -160,7 +160,7 @@ def _silent(batch, module, answer, counts, faults):
             missed |= _any(real & (bars > batch.rtol * (1 + np.abs(values)))) & ok
         if not o.applies:
             wrong |= ~real & _as(ok, values)
-        wrong |= real & _as(lost, values)
+        wrong |= real & _as(said == status.INVALID_PARAMETERS, values)
         if wrong.any():
             _tell(batch, counts, faults, "silent", np.flatnonzero(_any(wrong)), f"{o.name} or its bar", "")
     counts["missed"] += int(missed.sum())
@@ -217,7 +217,7 @@ def _truth(batch, answer, counts, faults):
 
 
 def _again(batch, answer, counts, faults):
-    """Some of the points in another order, alone, at another accuracy: within the sum of both bars, no other verdict."""
+    """Some of the points in another order, alone, at another rtol: within the sum of both bars, no other verdict."""
     random = np.random.default_rng(int(batch.rtol * 1e16))
     part = random.permutation(batch.size)[:3]
     each = {key: values[part] if np.ndim(values) else values for key, values in batch.each().items()}

@@ -1,4 +1,4 @@
-"""Points of the circular problem's normal form: 60 digits from the closed forms, and frequencies from their definition."""
+"""Points of the circular problem's normal form, held against 60 digits of the closed forms."""
 
 from itertools import product
 
