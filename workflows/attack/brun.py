@@ -11,8 +11,8 @@ from attack.judge import Batch
 NAMES = ("A", "C", "epsilon", "theta0", "p_theta0", "p_psi", "p_phi")
 METHODS = ("auto", "auto", "auto", "agm", "carlson", "chebyshev")
 OUTPUTS = ("u_min", "u_max", "period", "precession", "spin", "action")
-STATES = ("any", "pole +1", "pole -1", "passing closely", "pole passage", "tiny field", "no field", "fast spin", "no spin",
-          "regular precession", "saddle", "upright", "special", "large")  # fmt: skip
+STATES = ("any", "pole +1", "pole -1", "passing closely", "pole passage", "tiny field", "no field", "fast spin",
+          "no spin", "regular precession", "saddle", "upright", "special", "large")  # fmt: skip
 SURE = 1e-20
 NODES = 2048
 

@@ -204,23 +204,23 @@ def _spread(faults):
 PROSE = """# An attack on error bars and verdicts
 
 Made by `python workflows/attack {asked}`{stopped}:
-{points:,} points, {seconds:,.0f} s of one core; survey {version_survey}, numba {version_numba}, numpy {version_numpy},
-Python {version_python}, {cpu}, commit {commit} (changed since: {dirty}), sources {sources}.
+{points:,} points, {seconds:,.0f} s of one core; survey {version_survey}, numba {version_numba},
+numpy {version_numpy}, Python {version_python}, {cpu}, commit {commit} (changed since: {dirty}), sources {sources}.
 
-Random points are drawn where answers are hardest: consecutive doubles about edges of tongues and separatrices, tips, ends
-of domains, tiny and huge values, exact special values, long times, all methods, rtol from 1e-6 to 1e-13, one by one, in
-batches and as maps. Each answer is held against a truth of higher accuracy that shares no code with the package: Taylor
-series in double-double arithmetic of the attack's own, of other forms of the equations (Duffing's equation for
-satellites, the eccentric anomaly for Danby's map), trapezoidal sums for Brun's problem, exact fractions, 60 digits of the
-closed forms of the normal form (whose integers are the package's), long motions and exact mirror images for fates and
-portraits. Some points of each batch are solved again, alone and at another rtol: both answers must lie within the sum of
-their bars.
+Random points are drawn where answers are hardest: consecutive doubles about edges of tongues and separatrices, tips,
+ends of domains, tiny and huge values, exact special values, long times, all methods, rtol from 1e-6 to 1e-13, one by
+one, in batches and as maps. Each answer is held against a truth of higher accuracy that shares no code with the
+package: Taylor series in double-double arithmetic of the attack's own, of other forms of the equations (Duffing's
+equation for satellites, the eccentric anomaly for Danby's map), trapezoidal sums for Brun's problem, exact fractions,
+60 digits of the closed forms of the normal form (whose integers are the package's), long motions and exact mirror
+images for fates and portraits. Some points of each batch are solved again, alone and at another rtol: both answers
+must lie within the sum of their bars.
 
-A **lie** is a value farther from the truth than its error bar and the truth's own doubt together. A **wrong** verdict is
-one that the truth contradicts; an undecided one is honest, and so are a bar wider than rtol asks for (missed) and a
-refusal with its reason. **Silent** is a NaN, a negative bar or a flag without a word beside a status that is ok; slow is
-more than half a second a point. Unchecked are answered points whose truth would have been too dear or too coarse. The
-time is that of the package, without compiling."""
+A **lie** is a value farther from the truth than its error bar and the truth's own doubt together. A **wrong** verdict
+is one that the truth contradicts; an undecided one is honest, and so are a bar wider than rtol asks for (missed) and
+a refusal with its reason. **Silent** is a NaN, a negative bar or a flag without a word beside a status that is ok;
+slow is more than half a second a point. Unchecked are answered points whose truth would have been too dear or too
+coarse. The time is that of the package, without compiling."""
 
 
 def _prose(identity, total, seconds, complete):
