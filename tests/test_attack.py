@@ -159,7 +159,7 @@ def test_truth_of_bruns_problem():
 def test_the_command(tmp_path, capsys):
     """It writes its page and table, refuses another attack, and a resumed one has the same numbers."""
     page = tmp_path / "attack.md"
-    assert command.run(20, ["libration"], 1, page, 1, None, False) == 0
+    assert command.run(20, ["libration"], 1, page, 1, None, False) == 0, page.read_text()
     first, table = page.read_text(), page.with_suffix(".csv").read_text()
     assert "nothing fell" in capsys.readouterr().err
     assert "| libration |" in first and table.startswith("scene,method,region,points")
@@ -167,3 +167,17 @@ def test_the_command(tmp_path, capsys):
     assert page.with_suffix(".csv").read_text() == table
     assert command.run(21, ["libration"], 1, page, 1, None, False) == 2
     assert json.loads((tmp_path / "attack.md.chunks" / "attack.json").read_text())["points"] == 20
+
+
+def test_truth_of_a_spike():
+    """A weak spike changes y1(T) by its first-order term (Picard), which mpmath integrates."""
+    weak, at, wide, rate = 1e-9, 0.3, 1e-3, 5.0
+    out, rest = (hill._own_truth("lorentz", np.array([[rate, b, at, wide]]))[0] for b in (weak, 0.0))
+    root = mp.sqrt(rate)
+
+    def term(u):
+        shape = 1 / (1 + ((u - at) / wide) ** 2)
+        return -weak * shape * mp.sin(root * (1 - u)) / root * mp.cos(root * u)
+
+    true = mp.quad(term, [0, at - 20 * wide, at - 3 * wide, at, at + 3 * wide, at + 20 * wide, 1])
+    assert abs((in_full(out, 0) - in_full(rest, 0)) - true) < 1e-5 * abs(true)

@@ -7,7 +7,7 @@ import numpy as np
 
 import survey
 from attack import hill_truth
-from attack.hill_truth import AMPLITUDE, COSINE, GAUSS, INERTIA, LORENTZ, NOT_EVEN, ONE_MINUS_K, RHO, STAIRS, K
+from attack.hill_truth import AMPLITUDE, COSINE, INERTIA, LORENTZ, NOT_EVEN, ONE_MINUS_K, RHO, STAIRS, K
 from attack.judge import Batch
 
 LONG = np.longdouble
@@ -366,7 +366,7 @@ PERIOD = 1.0
 @lru_cache(maxsize=8)
 def own_scene(name):
     """An equation of one's own, p = (a, b, c, d)."""
-    from math import cos, exp, sin
+    from math import cos, sin
 
     def two_harmonics(u, p):
         return p[0] + p[1] * cos(2 * u) + p[2] * cos(4 * u)
@@ -381,22 +381,17 @@ def own_scene(name):
         x = (u - p[2]) / p[3]
         return p[0] + p[1] / (1 + x * x)
 
-    def gauss(u, p):
-        x = (u - p[2]) / p[3]
-        return p[0] + p[1] * exp(-x * x)
-
     names = ("a", "b", "c", "d")
     made = {
         "two_harmonics": dict(z=two_harmonics, period=pi, even=True),
         "not_even": dict(z=not_even, period=pi),
         "stairs": dict(z=stairs, period=PERIOD, breaks=lambda p: p[2]),
         "lorentz": dict(z=lorentz, period=PERIOD),
-        "gauss": dict(z=gauss, period=PERIOD),
     }[name]
     return survey.hill(made.pop("z"), parameters=names, **made)
 
 
-KINDS = {"two_harmonics": COSINE, "not_even": NOT_EVEN, "stairs": STAIRS, "lorentz": LORENTZ, "gauss": GAUSS}
+KINDS = {"two_harmonics": COSINE, "not_even": NOT_EVEN, "stairs": STAIRS, "lorentz": LORENTZ}
 
 
 def own(random, size):

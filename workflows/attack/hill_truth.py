@@ -159,7 +159,7 @@ def satellites(which, given, rhowhich, rhogiven, direction, oblate, tolerance, o
             o[:] = np.nan
 
 
-COSINE, NOT_EVEN, STAIRS, LORENTZ, GAUSS = 0, 1, 2, 3, 4
+COSINE, NOT_EVEN, STAIRS, LORENTZ = 0, 1, 2, 3
 
 
 @inline
@@ -181,41 +181,19 @@ def own_series(kind, p, u, z, work):
     elif kind == STAIRS:  # p[0] before the break, p[1] after it: which one `work` says
         put(z, 0, (p[1] if work > 0 else p[0], 0.0))
     else:
-        # p[0] + p[1] / (1 + x^2), or p[1] exp(-x^2), x = (u - p[2]) / p[3]
+        # p[0] + p[1] / (1 + x^2), x = (u - p[2]) / p[3]
         x = div(sub(u, (p[2], 0.0)), (p[3], 0.0))
         inverse = div((1.0, 0.0), (p[3], 0.0))
         ahead = times(mul(x, inverse), 2.0)
         square = mul(inverse, inverse)
-        if kind == LORENTZ:
-            whole = add(mul(x, x), (1.0, 0.0))
-            put(z, 0, div((p[1], 0.0), whole))
-            for n in range(1, TERMS):
-                s = mul(ahead, get(z, n - 1))
-                if n > 1:
-                    s = add(s, mul(square, get(z, n - 2)))
-                put(z, n, div(neg(s), whole))
-        else:
-            put(z, 0, times(exponential(neg(mul(x, x))), p[1]))
-            for n in range(1, TERMS):  # z' = -2 x z / s
-                s = mul(ahead, get(z, n - 1))
-                if n > 1:
-                    s = add(s, times(mul(square, get(z, n - 2)), 2.0))
-                put(z, n, div(neg(s), (float(n), 0.0)))
+        whole = add(mul(x, x), (1.0, 0.0))
+        put(z, 0, div((p[1], 0.0), whole))
+        for n in range(1, TERMS):
+            s = mul(ahead, get(z, n - 1))
+            if n > 1:
+                s = add(s, mul(square, get(z, n - 2)))
+            put(z, n, div(neg(s), whole))
         put(z, 0, add(get(z, 0), (p[0], 0.0)))
-
-
-@inline
-def exponential(x):
-    """exp of a double-double, x <= 0."""
-    if x[0] < -700.0:
-        return 0.0, 0.0
-    h = times(x, 1.0 / 1024.0)
-    s = (0.0, 0.0)
-    for i in range(14, 0, -1):  # exp(h) - 1
-        s = div(mul(add((1.0, 0.0), s), h), (float(i), 0.0))
-    for _ in range(10):
-        s = mul(s, add(s, (2.0, 0.0)))
-    return add(s, (1.0, 0.0))
 
 
 @kernel
