@@ -15,14 +15,16 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
+from attack.judge import FAULTS
+
 # share of the points, points of a chunk
 FAMILIES = {
-    "satellite": (0.26, 2500),
+    "satellite": (0.28, 2500),
     "mathieu": (0.10, 2500),
     "own": (0.08, 8000),
     "libration_elliptic": (0.16, 2500),
     "gyrostat": (0.16, 2000),
-    "gyrostat_fate": (0.03, 500),
+    "gyrostat_fate": (0.005, 250),
     "brun": (0.15, 2500),
     "libration": (0.06, 2000),
 }
@@ -44,7 +46,7 @@ def solve(family, seed, index, size):
     from attack import judge
 
     rows, faults = defaultdict(Counter), []
-    worst, began = defaultdict(float), time.perf_counter()
+    worst, began = defaultdict(float), time.process_time()
     for batch in batches(family, seed, index, size):
         try:
             counts, ratio, found = judge.judge(batch)
@@ -56,7 +58,7 @@ def solve(family, seed, index, size):
         faults += [fault | {"chunk": f"{family} {index}"} for fault in found]
     return {
         "family": family, "rows": [[*key, dict(counts), worst[key]] for key, counts in rows.items()],
-        "faults": faults[:200], "seconds": time.perf_counter() - began,
+        "faults": faults[:200], "seconds": time.process_time() - began,
     }  # fmt: skip
 
 
@@ -175,7 +177,7 @@ def write(output, found, identity, complete):
             c = counts[name]
             writer.writerow([*name, *(c[x] for x in COLUMNS), f"{worst[name]:.4g}", f"{c['seconds']:.4g}"])
     total = sum(counts.values(), Counter())
-    fell = sum(total[x] for x in ("lies", "wrong", "silent", "tracebacks", "slow"))
+    fell = sum(total[x] for x in FAULTS)
     seconds = sum(part["seconds"] for part in found)
     page = [*_prose(identity, total, seconds, complete), "", "## By scene and method", "",
             *_table(rows, lambda r: (r[0], r[1]), ("scene", "method")), "", "## By scene and region", "",
@@ -204,7 +206,7 @@ def _spread(faults):
 PROSE = """# An attack on error bars and verdicts
 
 Made by `python workflows/attack {asked}`{stopped}:
-{points:,} points, {seconds:,.0f} s of one core; survey {version_survey}, numba {version_numba},
+{points:,} points, {seconds:,.0f} s of processor time; survey {version_survey}, numba {version_numba},
 numpy {version_numpy}, Python {version_python}, {cpu}, commit {commit} (changed since: {dirty}), sources {sources}.
 
 Random points are drawn where answers are hardest: consecutive doubles about edges of tongues and separatrices, tips,

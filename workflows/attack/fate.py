@@ -157,7 +157,8 @@ def _portrait(given, answer):
         signs = np.signbit(force(p, x))
         crossings = int((signs != np.roll(signs, 1)).sum())
         wrong["equilibria"][i] = decided and any(p[name] for name in SYSTEM[2:]) and answer["equilibria"][i] < crossings
-        if decided and K:
+        # within the rounding of the parameters K counts as 0, as the scene's text says
+        if decided and abs(K) > 1e-15 * (abs(q["b12"] * q["s3"]) + abs(q["b31"] * q["s2"])):
             plus, minus = answer["end_plus"][i], answer["end_minus"][i]
             wrong["ends"][i] = (plus, minus) != ((2, 2) if K > 0 else (0, 0))
         e = answer["equilibrium_phi"][i]
