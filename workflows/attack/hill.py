@@ -199,7 +199,11 @@ def _true_satellite(way, inertia, direction, oblate):
         k = {"k": values, "one_minus_k": 1 - values, "amplitude": np.sin(values)}[way]
         rho = direction / np.sqrt(3 * np.abs(1 - other)) if inertia else other
         body = other > 1 if inertia else np.full(ok.shape, oblate)
-        short = {"k": 1 - values, "one_minus_k": values, "amplitude": 2 * np.sin((pi / 2 - values) / 2) ** 2}[way]
+        short = {
+            "k": 1 - values,
+            "one_minus_k": values,
+            "amplitude": 2 * np.sin((pi / 2 - values + 6.123233995736766e-17) / 2) ** 2,
+        }[way]
         found = hill_outputs(out, answer, True)
         found["period"] = 2 * out[:, 8], 2 * out[:, 9], 1e-29 * out[:, 8]
         grows, _low, doubt = found["exponent"]
