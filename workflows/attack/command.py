@@ -19,14 +19,14 @@ from attack.judge import FAULTS
 
 # share of the points, points of a chunk
 FAMILIES = {
-    "satellite": (0.28, 2500),
-    "mathieu": (0.10, 2500),
-    "own": (0.08, 8000),
-    "libration_elliptic": (0.16, 2500),
-    "gyrostat": (0.16, 2000),
-    "gyrostat_fate": (0.005, 250),
+    "satellite": (0.3, 2500),
+    "mathieu": (0.14, 2500),
+    "own": (0.03, 5000),
+    "libration_elliptic": (0.2, 2500),
+    "gyrostat": (0.12, 2000),
+    "gyrostat_fate": (0.004, 250),
     "brun": (0.15, 2500),
-    "libration": (0.06, 2000),
+    "libration": (0.056, 2000),
 }
 WHERE = {"satellite": ("hill", "satellites"), "mathieu": ("hill", "mathieu"), "own": ("hill", "own"),
          "libration_elliptic": ("danby", "chunk"), "gyrostat_fate": ("fate", "chunk")}  # fmt: skip

@@ -7,8 +7,10 @@ from attack.hill import accuracy
 from attack.judge import Batch
 
 SYSTEM = ("b12", "b31", "d", "c23", "s2", "s3")
-METHODS = {"trajectory": ("auto", "auto", "auto", "taylor", "dop853", "closed", "full", "rk4"),
-           "abel": ("auto", "auto", "taylor", "dop853", "closed", "rk4")}  # fmt: skip
+METHODS = {
+    "trajectory": ("auto",) * 7 + ("taylor", "taylor", "dop853", "dop853", "closed", "closed", "full", "full", "rk4"),
+    "abel": ("auto",) * 7 + ("taylor", "taylor", "dop853", "dop853", "closed", "closed", "rk4"),
+}
 NUMBERS = {"dop853": 16, "full": 8, "rk4": 2}
 SURE = 1e-26  # of the truth, relative, where nothing grows
 

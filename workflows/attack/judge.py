@@ -20,6 +20,7 @@ from survey.scene import exists
 COUNTS = ("points", "undecided", "missed", "refused", "unchecked", "lies", "wrong", "silent", "tracebacks", "slow")
 FAULTS = ("lies", "wrong", "silent", "tracebacks")
 SLOW, HALF = 5.0, 0.5  # seconds of a batch, and for each of its points
+TINY = 1e-200
 SHOWN = 6  # faults of a kind told of a batch
 
 
@@ -161,6 +162,7 @@ def _silent(batch, module, answer, counts, faults):
         real = np.isfinite(values)
         with np.errstate(invalid="ignore"):
             wrong = np.isinf(values) | (real & ~(np.isfinite(bars) & (bars >= 0)))
+            wrong |= real & (bars == 0) & (values != 0) & (np.abs(values) < TINY)  # the bar has underflowed
             missed |= _any(real & (bars > batch.rtol * (1 + np.abs(values)))) & ok
         if not o.applies:
             wrong |= ~real & _as(ok, values)
