@@ -1,0 +1,186 @@
+"""The attack in short form finds nothing; with bars made too small and verdicts turned it must find that."""
+
+import json
+
+import numpy as np
+import pytest
+from attack import brun_truth, command, danby, gyrostat_truth, hill, judge
+from brun_truth import truth as brun_in_full
+from mpmath import mp, mpf
+
+import survey
+
+FAULTS = judge.FAULTS
+
+
+def found(family, seed, size, index=0):
+    """(counts, faults) of a chunk."""
+    part = command.solve(family, seed, index, size)
+    faults = [fault for fault in part["faults"] if fault["kind"] in FAULTS]
+    return sum((judge.Counter(row[3]) for row in part["rows"]), judge.Counter()), faults
+
+
+@pytest.mark.parametrize(("family", "size"), [("satellite", 400), ("mathieu", 300), ("libration_elliptic", 300),
+                                              ("gyrostat", 300), ("brun", 400), ("libration", 60)])  # fmt: skip
+def test_nothing_falls(family, size):
+    counts, faults = found(family, 3, size)
+    assert counts["points"] >= size
+    assert not faults, "\n".join(f"{f['kind']} {f['what']} {f['said']}\n  {f['line']}" for f in faults)
+    assert counts["unchecked"] < 0.5 * counts["points"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("family", command.FAMILIES)
+def test_nothing_falls_at_length(family):
+    """10^5 points in all."""
+    share, size = command.FAMILIES[family]
+    for index in range(max(1, round(1e5 * share / size))):
+        _counts, faults = found(family, 5, size, index)
+        assert not faults, faults[0]
+
+
+def batch(**more):
+    """A few points of a satellite, unstable and stable, far from every edge."""
+    given = {"k": np.array([0.95, 0.5, 0.3, 0.9]), "rho": np.array([0.6, 1.3, 2.0, 0.8])}
+    true = hill._true_satellite("k", False, 1, False)
+    return judge.Batch("satellite", "control", given, true, None, {"body": "prolate"}, "auto", 1e-8, **more)
+
+
+def judged(monkeypatch, change):
+    """What the judge says of answers that were changed."""
+    honest = survey.evaluate
+    monkeypatch.setattr(
+        judge.survey, "evaluate", lambda *given, **named: change(honest(*given, **named).copy(deep=True))
+    )
+    return judge.judge(batch())[0]
+
+
+def test_the_honest_answers_pass():
+    assert not any(judge.judge(batch())[0][kind] for kind in FAULTS)
+
+
+def test_a_bar_too_small_is_a_lie(monkeypatch):
+    def smaller(ds):
+        ds["discriminant"] += 1e-9
+        ds["discriminant_error"][:] = 1e-10
+        return ds
+
+    assert judged(monkeypatch, smaller)["lies"] >= 4
+
+
+def test_a_turned_verdict_is_wrong(monkeypatch):
+    def turned(ds):
+        ds["verdict"] = 1 - ds.verdict
+        return ds
+
+    assert judged(monkeypatch, turned)["wrong"] >= 4
+
+
+def test_a_nan_beside_ok_is_silent(monkeypatch):
+    def emptied(ds):
+        ds["y1"][1] = np.nan
+        ds["y2_error"][2] = -1.0
+        return ds
+
+    assert judged(monkeypatch, emptied)["silent"] == 2
+
+
+def test_an_exception_is_a_traceback(monkeypatch):
+    def broken(ds):
+        raise ZeroDivisionError
+
+    assert judged(monkeypatch, broken)["tracebacks"] == 1
+
+
+def in_full(out, i):
+    """Number i of pairs (high, low)."""
+    return mpf(out[2 * i]) + mpf(out[2 * i + 1])
+
+
+@pytest.mark.parametrize(("k", "rho", "oblate"), [(0.3, 1.0, False), (0.9, 2.2, True), (1.3, -0.7, False)])
+def test_truth_of_satellites(k, rho, oblate):
+    """Against mpmath's Taylor series of the pendulum, 30 digits."""
+    with mp.workdps(34):
+        a, r = mpf(k), mpf(rho)
+
+        def slope(u, x):
+            s, c, w, y1, v1, y2, v2 = x
+            z = 2 * w * w + 2 * r * w + r * r + (-a * a if oblate else 1 - a * a)
+            return [c * w, -s * w, -s * c, v1, -z * y1, v2, -z * y2]
+
+        half = 2 * mp.ellipk(a * a) if k < 1 else mp.ellipk(1 / (a * a)) / a
+        y = mp.odefun(slope, 0, [0, 1, a, 1, 0, 0, 1], tol=mpf(10) ** -30)(half)
+        out = hill.solved(hill.K, k, hill.RHO, rho, 1.0, oblate)[0]
+        for i, true in enumerate((y[3], y[5], y[4], y[6], half)):
+            assert abs(in_full(out, i) - true) < 1e-28 * (1 + abs(true))
+
+
+def test_truth_of_danbys_map():
+    """At e = 0 the circular problem, at the tip a = -4, b = 6 to the digits of the tip's float64."""
+    mu = 0.01
+    root = mp.sqrt(1 - 27 * mpf(mu) * (1 - mpf(mu)))
+    true = 2 * mp.cos(2 * mp.pi * mp.sqrt((1 + root) / 2)) + 2 * mp.cos(2 * mp.pi * mp.sqrt((1 - root) / 2))
+    assert abs(danby.solved(mu, 0.0)[0, 0] - true) < 1e-15
+    assert danby.solved(*danby.TIP)[0, [0, 2]] == pytest.approx([-4, 6], abs=1e-13)
+
+
+def test_truth_of_a_gyrostat():
+    p = [0.7, -0.4, 1.1, 0.3, 0.5, -0.2, 1.5, 0.8, 4.0]
+    with mp.workdps(34):
+        b12, b31, d, c23, s2, s3 = (mpf(x) for x in p[:6])
+
+        def slope(t, x):
+            c, s = mp.cos(x[0]), mp.sin(x[0])
+            f, g = b12 * c - b31 * s, -d * c * s - c23 * (c * c - s * s) + s2 * c - s3 * s
+            return [x[1], f * x[1] + g]
+
+        y = mp.odefun(slope, 0, [mpf(p[6]), mpf(p[7])], tol=mpf(10) ** -30)(4)
+        out = np.empty((1, 6))
+        gyrostat_truth.flow(np.array([p]), gyrostat_truth.TINY, out)
+        assert all(abs(in_full(out[0], i) - y[i]) < 1e-27 for i in range(2))
+        # along phi to where it was: the same w, at that time
+        there = np.array([[*p[:8], 1.9]])
+        along, back = np.empty((1, 6)), np.empty((1, 6))
+        gyrostat_truth.along(there, gyrostat_truth.TINY, along)
+        gyrostat_truth.flow(np.array([[*p[:8], along[0, 2]]]), gyrostat_truth.TINY, back)
+        assert abs(back[0, 0] - 1.9) < 1e-15 and abs(back[0, 2] - along[0, 0]) < 1e-15
+
+
+def test_truth_of_bruns_problem():
+    """Against elliptic integrals at 60 digits."""
+    state = np.array([2.0, 1.0, 0.6, 1.1, 0.5, 1.3, 0.9])
+    out = np.empty((1, 16))
+    brun_truth.states(state[None], 1024, out)
+    with mp.workdps(60):
+        true, _floor = brun_in_full(state)
+        for i, value in enumerate(true):
+            assert abs(in_full(out[0], i) - value) < 1e-27 * (1 + abs(value))
+
+
+def test_the_command(tmp_path, capsys):
+    """It writes its page and table, refuses another attack, and a resumed one has the same numbers."""
+    page = tmp_path / "attack.md"
+    assert command.run(20, ["libration"], 1, page, 1, None, False) == 0, page.read_text()
+    first, table = page.read_text(), page.with_suffix(".csv").read_text()
+    assert "nothing fell" in capsys.readouterr().err
+    assert "| libration |" in first and table.startswith("scene,method,region,points")
+    assert command.run(20, ["libration"], 1, page, 1, None, False) == 0
+    assert page.with_suffix(".csv").read_text() == table
+    assert command.run(21, ["libration"], 1, page, 1, None, False) == 2
+    assert json.loads((tmp_path / "attack.md.chunks" / "attack.json").read_text())["points"] == 20
+
+
+def test_truth_of_a_spike():
+    """A weak spike changes y1(T) by its first-order term (Picard), which mpmath integrates."""
+    weak, at, wide, rate = 1e-9, 0.3, 1e-3, 5.0
+    out, rest = (hill._own_truth("lorentz", np.array([[rate, b, at, wide]]))[0] for b in (weak, 0.0))
+    root = mp.sqrt(mpf(rate))
+
+    def term(u):
+        shape = 1 / (1 + ((u - at) / wide) ** 2)
+        return -weak * shape * mp.sin(root * (1 - u)) / root * mp.cos(root * u)
+
+    true = mp.quad(term, [0, at - 20 * wide, at - 3 * wide, at, at + 3 * wide, at + 20 * wide, 1])
+    with mp.workdps(40):
+        change = in_full(out, 0) - in_full(rest, 0)
+    assert abs(change - true) < 1e-5 * abs(true)

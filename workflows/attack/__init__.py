@@ -1,0 +1,1 @@
+"""Hard random points for every scene, each compared with an independent truth: see `attack.command`."""

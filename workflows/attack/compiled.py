@@ -1,0 +1,37 @@
+"""The decorator of this folder's kernels: kept on disk under a hash of these sources, so that none goes stale."""
+
+import hashlib
+import os
+from pathlib import Path
+
+import llvmlite
+import llvmlite.binding as llvm
+import numba
+import platformdirs
+
+
+def _folder(function):
+    """Named by a hash of the function's file and of the arithmetic that is compiled into it."""
+    digest = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__} {llvm.get_host_cpu_name()}".encode())
+    for path in (function.__code__.co_filename, Path(__file__).with_name("double.py"), __file__):
+        digest.update(Path(path).read_bytes())
+    base = Path(os.environ.get("NUMBA_CACHE_DIR") or platformdirs.user_cache_dir("survey"))
+    return base / f"attack-{digest.hexdigest()[:16]}"
+
+
+def kernel(function):
+    """Compile on the first call, and keep it."""
+    folder, previous = _folder(function), numba.config.CACHE_DIR
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        numba.config.CACHE_DIR = str(folder)
+        return numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    except OSError:
+        return numba.njit(nogil=True, error_model="numpy")(function)
+    finally:
+        numba.config.CACHE_DIR = previous
+
+
+def inline(function):
+    """Compile as a part of the kernels that call it."""
+    return numba.njit(nogil=True, error_model="numpy", forceinline=True)(function)

@@ -1,0 +1,257 @@
+"""One batch of points solved and judged: what was said of each, held against a truth of higher accuracy.
+
+A lie is a value farther from the truth than its error bar and the truth's own doubt together; a wrong verdict one that
+the truth contradicts beyond its doubt. Silent is what the contract forbids without a word: a value or bar that is not
+finite although the status is ok, a negative bar, a status without a sentence, a verdict beside a status that is not ok.
+"""
+
+import time
+import traceback
+from collections import Counter
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import xarray as xr
+
+import survey
+from survey import own, status
+from survey.scene import exists
+
+COUNTS = ("points", "undecided", "missed", "refused", "unchecked", "lies", "wrong", "silent", "tracebacks", "slow")
+FAULTS = ("lies", "wrong", "silent", "tracebacks")
+SLOW, HALF = 5.0, 0.5  # seconds of a batch, and for each of its points
+TINY = 1e-200
+SHOWN = 6  # faults of a kind told of a batch
+
+
+@dataclass
+class Batch:
+    """Points of one request: `given` holds arrays (N) of parameters, `options` the rest of the call.
+
+    `truth(given, answer)` returns {output: (value, low, doubt)}, arrays that broadcast to the output, NaN where nothing
+    is known, and may hold "wrong": {what: mask}. `how` is the source text of the scene where it is not a name.
+    """
+
+    name: str
+    region: str
+    given: dict
+    truth: object
+    scene: object = None
+    options: dict = field(default_factory=dict)
+    method: str = "auto"
+    rtol: float = 1e-10
+    how: str = ""
+    cross: tuple = ()  # parameters that are axes of their own, not taken point by point
+    places: object = None  # of a map: the points that are judged
+
+    @property
+    def size(self):
+        return int(np.prod(shape(self))) if self.places is None else len(self.places)
+
+    def each(self):
+        """The parameters of each point that is judged."""
+        grids = np.indices(shape(self)).reshape(1 + len(self.cross), -1)
+        grids = grids if self.places is None else grids[:, self.places]
+        return {key: values if not np.ndim(values) else
+                np.asarray(values, float)[grids[1 + self.cross.index(key)] if key in self.cross else grids[0]]
+                for key, values in self.given.items()}  # fmt: skip
+
+
+def solve(batch, part=slice(None)):
+    """The answer as a dataset; the points `part` of it."""
+    given = {}
+    for key, values in batch.given.items():
+        if key in batch.cross:
+            given[key] = np.asarray(values)
+        elif np.ndim(values):
+            given[key] = xr.DataArray(np.asarray(values, float)[part], dims="point")
+        else:
+            given[key] = values
+    return survey.evaluate(batch.scene or batch.name, method=batch.method, rtol=batch.rtol, **given, **batch.options)
+
+
+def line(batch, i):
+    """One line of Python that solves point i alone."""
+    words = [batch.how or repr(batch.scene or batch.name)]
+    words += [f"{key}={float(values[i] if np.ndim(values) else values)!r}" for key, values in batch.each().items()]
+    words += [f"{key}={value!r}" for key, value in batch.options.items()]
+    return f"survey.evaluate({', '.join(words)}, method={batch.method!r}, rtol={batch.rtol!r})"
+
+
+def shape(batch):
+    """(points taken together, each of the axes of their own)."""
+    shared = max([np.size(v) for k, v in batch.given.items() if k not in batch.cross], default=1)
+    return (shared, *(np.size(batch.given[k]) for k in batch.cross))
+
+
+def judge(batch):
+    """(counts, worst error over bar, faults as a list of dicts) of a batch."""
+    counts, faults, began = Counter(points=batch.size), [], time.perf_counter()
+    compiled = _compile_seconds()
+    try:
+        ds = solve(batch)
+    except survey.BadInput as error:
+        if "\n" in str(error) or len(str(error)) > 400:
+            _tell(batch, counts, faults, "silent", [0], "refusal of several lines", str(error))
+        counts["refused"] += batch.size
+        return counts, 0.0, faults
+    except Exception:
+        _tell(batch, counts, faults, "tracebacks", [0], "traceback", traceback.format_exc(limit=-3))
+        return counts, 0.0, faults
+    counts["seconds"] = seconds = time.perf_counter() - began - (_compile_seconds() - compiled)
+    if seconds > SLOW + HALF * np.prod(shape(batch)):  # again, as the first call loads what was compiled
+        began = time.process_time()
+        solve(batch)
+        counts["seconds"] = seconds = time.process_time() - began
+        if seconds > SLOW + HALF * np.prod(shape(batch)):
+            _tell(batch, counts, faults, "slow", [0], "seconds a point", f"{seconds / np.prod(shape(batch)):.3g}")
+    answer = {name: _flat(batch, ds[name]) for name in ds.data_vars}
+    _, module = own.find(batch.scene or batch.name)
+    _silent(batch, module, answer, counts, faults)
+    worst = _truth(batch, answer, counts, faults)
+    if batch.size > 2 and batch.method in ("auto", "taylor16", "agm", "taylor"):
+        _again(batch, answer, counts, faults)
+    return counts, worst, faults
+
+
+def failed(batch):
+    """The same where judging itself ended in an exception, which is being handled."""
+    counts, faults = Counter(points=batch.size), []
+    _tell(batch, counts, faults, "tracebacks", [0], "while it was judged", traceback.format_exc(limit=-3))
+    return counts, 0.0, faults
+
+
+def _compile_seconds():
+    from survey.kernels import jit
+
+    return jit.compile_seconds()
+
+
+def _flat(batch, array):
+    """The values with all dimensions of points made one, extra ones last."""
+    dims = ["point", *batch.cross]
+    here = [d for d in dims if d in array.dims]
+    array = array.transpose(*here, ...)
+    size = int(np.prod([array.sizes[d] for d in here]))
+    values = array.values.reshape((size, *(array.sizes[d] for d in array.dims if d not in here)))
+    return values if batch.places is None else values[batch.places]
+
+
+def _silent(batch, module, answer, counts, faults):
+    codes = {code for code, _ in status.table(module).values()}
+    said = answer["status"]
+    ok = said == status.OK
+    lost = np.isin(said, list(status.UNANSWERED))
+    counts["refused"] += int((~ok).sum())
+    bad = ~np.isin(said, list(codes))
+    missed = np.zeros(ok.shape, bool)
+    options = dict(batch.options)
+    for o in module.OUTPUTS:
+        if o.name not in answer or not exists(o, options | _defaults(module, batch)):
+            continue
+        values = answer[o.name]
+        if o.flags is not None:
+            bad |= _any(~np.isin(values, list(o.flags.values())))
+            if o.name == "verdict":
+                counts["undecided"] += int((ok & (values == -1)).sum())
+                bad |= lost & (values != -1)
+            continue
+        if o.integer:
+            continue
+        bars = answer[f"{o.name}_error"]
+        real = np.isfinite(values)
+        with np.errstate(invalid="ignore"):
+            wrong = np.isinf(values) | (real & ~(np.isfinite(bars) & (bars >= 0)))
+            wrong |= real & (bars == 0) & (values != 0) & (np.abs(values) < TINY)  # the bar has underflowed
+            missed |= _any(real & (bars > batch.rtol * (1 + np.abs(values)))) & ok
+        if not o.applies:
+            wrong |= ~real & _as(ok, values)
+        wrong |= real & _as(said == status.INVALID_PARAMETERS, values)
+        if wrong.any():
+            _tell(batch, counts, faults, "silent", np.flatnonzero(_any(wrong)), f"{o.name} or its bar", "")
+    counts["missed"] += int(missed.sum())
+    if bad.any():
+        _tell(batch, counts, faults, "silent", np.flatnonzero(bad), "status or flag", "")
+
+
+def _defaults(module, batch):
+    return {o.name: o.default for o in module.OPTIONS if not o.only_with and o.name not in batch.options}
+
+
+def _any(mask):
+    return mask.reshape(len(mask), -1).any(axis=1)
+
+
+def _as(mask, like):
+    return mask.reshape(mask.shape + (1,) * (like.ndim - 1))
+
+
+def _truth(batch, answer, counts, faults):
+    truth = batch.truth(batch.each(), answer)
+    worst = 0.0
+    for what, mask in truth.pop("wrong", {}).items():
+        mask = np.broadcast_to(mask, answer["status"].shape)
+        if mask.any():
+            verdicts = answer.get("verdict", answer["status"])
+            _tell(batch, counts, faults, "wrong", np.flatnonzero(mask), what, lambda i, v=verdicts: f"said {v[i]}")
+    checked = np.zeros(answer["status"].shape, bool) | truth.pop("checked", False)
+    for name, (value, low, doubt) in truth.items():
+        said, bar = answer[name], answer[f"{name}_error"].astype(float)
+        with np.errstate(all="ignore"):
+            off = np.abs((said - value) - low).astype(float)
+            known = np.isfinite(off) & np.isfinite(np.broadcast_to(np.asarray(doubt, float), off.shape))
+            over = np.where(known, np.maximum(off - doubt, 0.0), 0.0)
+            lie = known & (over > bar)
+            ratio = np.where(over > 0, over / bar, 0.0)
+        checked |= _any(known)
+        if known.any():
+            worst = max(worst, float(np.nanmax(np.where(known, ratio, 0.0))))
+        if lie.any():
+            true = np.broadcast_to(value, off.shape)
+
+            def told(i, name=name, said=said, bar=bar, off=off, true=true, ratio=ratio):
+                j = np.nanargmax(ratio[i]) if ratio[i].ndim else ()
+                place = np.unravel_index(j, ratio[i].shape) if ratio[i].ndim else ()
+                return (
+                    f"{name} = {said[i][place]!r} +- {bar[i][place]:.3g}, truth {true[i][place]!r}: off by "
+                    f"{off[i][place]:.3g}, {ratio[i][place]:.3g} bars"
+                )
+
+            _tell(batch, counts, faults, "lies", np.flatnonzero(_any(lie)), name, told)
+    counts["unchecked"] += int((~checked & (answer["status"] == status.OK)).sum())
+    return worst
+
+
+def _again(batch, answer, counts, faults):
+    """Some of the points in another order, alone, at another rtol: within the sum of both bars, no other verdict."""
+    random = np.random.default_rng(int(batch.rtol * 1e16))
+    part = random.permutation(batch.size)[:3]
+    each = {key: values[part] if np.ndim(values) else values for key, values in batch.each().items()}
+    other = replace(batch, given=each, cross=(), places=None, rtol=float(10.0 ** -random.uniform(6, 13)))
+    ds = solve(other)
+    ok = (answer["status"][part] == status.OK) & (ds["status"].values == status.OK)
+    for name in ds.data_vars:
+        if f"{name}_error" not in ds:
+            continue
+        a, b = answer[name][part], _flat(other, ds[name])
+        with np.errstate(invalid="ignore"):
+            apart = np.abs(a - b) > answer[f"{name}_error"][part] + _flat(other, ds[f"{name}_error"]).astype(float)
+        apart = _any(apart) & ok
+        if apart.any():
+            places = np.flatnonzero(apart)
+            _tell(other, counts, faults, "lies", places, f"{name} alone or at another rtol",
+                  lambda i, a=a, b=b: f"{a[i]!r} in its batch at rtol {batch.rtol!r}, {b[i]!r} alone")  # fmt: skip
+    if "verdict" in ds:
+        a, b = answer["verdict"][part], _flat(other, ds["verdict"])
+        apart = ok & (a >= 0) & (b >= 0) & (a != b) & ~((batch.name == "brun states") & (np.minimum(a, b) >= 1))
+        if apart.any():
+            _tell(other, counts, faults, "wrong", np.flatnonzero(apart), "verdict alone or at another rtol",
+                  lambda i, a=a, b=b: f"{a[i]} in its batch at rtol {batch.rtol!r}, {b[i]} alone")  # fmt: skip
+
+
+def _tell(batch, counts, faults, kind, places, what, words):
+    counts[kind] += len(places)
+    for i in places[:SHOWN]:
+        said = words(i) if callable(words) else words
+        faults.append({"kind": kind, "scene": batch.name, "region": batch.region, "what": what, "said": said,
+                       "line": line(batch, i)})  # fmt: skip
