@@ -158,7 +158,7 @@ def _from_file(name: str, digest: Any, near: Path) -> HillScene:
     return _from_text(str(path), text)
 
 
-def _read(name: str | Path, near: str | Path | None) -> tuple[Path, str]:
+def _read(name: str | os.PathLike[str], near: str | Path | None) -> tuple[Path, str]:
     """(path, text) of a scene's file, read once: what is hashed is what runs. Raises BadInput."""
     paths = [Path(name), *([Path(near) / name] if near is not None else [])]
     path = next((path for path in paths if _is_file(path)), None)
