@@ -38,8 +38,8 @@ ROUNDING = 8.8e-16
 SLACK = 2.0**-50
 # Steps are dealt out by rate, and by frequency at this share of it.
 BY_PHASE = 0.15
-# DOP853 makes no step longer than so many distances to a singularity: it would pass a spike unseen.
-STRIDE = 2.0
+# DOP853 makes no step longer than this share of the distance to a singularity: it would pass a spike unseen.
+STRIDE = 0.5
 CALL_SAMPLES = 4_000_000
 # In double-double: what follows the results of a whole period, and the most steps (20 ms a hundred).
 SQUARES, EXACT_STEPS = 4, 2000

@@ -258,7 +258,7 @@ def _across(row, ends):
 def _problem(row, rho, low=None, line=None, ends=None):
     half, half_low = row.half
     rows = np.column_stack([row.k, row.kc, half, np.full(row.k.size, float(row.oblate)), row.given, row.which])
-    rule, constant = _rules(row, rho)
+    rule, constant = _rules(row, rho, low)
     return hill.Problem(
         p=rho,
         p_low=low,
@@ -277,7 +277,7 @@ def _problem(row, rho, low=None, line=None, ends=None):
     )
 
 
-def _rules(row, rho):
+def _rules(row, rho, low=None):
     """What exact rules say of the points: no unstable side at k = 0, |D| = 2 at rho = 0; and z at k = 0.
 
     At k = 0 also |D| = 2 where 2 rho is an integer (oblate). For the prolate body 2 sqrt(1 + rho^2) = n asks for
@@ -292,6 +292,7 @@ def _rules(row, rho):
         return rule, None
     still = rho[at_rest]
     whole = (still == 0) | ((2 * still == np.rint(2 * still)) if row.oblate else False)
+    whole &= True if low is None else low[at_rest] == 0  # of rho exactly, as no rounded one says
     rule[at_rest] = np.where(whole, ON_EDGE, NO_UNSTABLE_SIDE)
     return rule, (at_rest, still * still + (0.0 if row.oblate else 1.0))
 
