@@ -161,7 +161,11 @@ def _from_file(name: str, digest: Any, near: Path) -> HillScene:
 def _read(name: str | os.PathLike[str], near: str | Path | None) -> tuple[Path, str]:
     """(path, text) of a scene's file, read once: what is hashed is what runs. Raises BadInput."""
     paths = [Path(name), *([Path(near) / name] if near is not None else [])]
-    path = next((path for path in paths if _is_file(path)), None)
+    try:
+        path = next((path for path in paths if path.is_file()), None)
+    except (OSError, ValueError) as error:  # a name that the system does not take
+        reason = getattr(error, "strerror", None) or error
+        raise BadInput(f"scene = {shown(str(name), 120)}: no file can have this name ({reason})") from None
     if path is None:
         looked = " or ".join(dict.fromkeys(short(path, 120) for path in paths))
         raise BadInput(
@@ -176,13 +180,6 @@ def _read(name: str | os.PathLike[str], near: str | Path | None) -> tuple[Path, 
         return path, content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
     except (OSError, UnicodeDecodeError) as error:
         raise BadInput(f"{path}: cannot read this scene ({getattr(error, 'strerror', None) or error})") from None
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except (OSError, ValueError):  # a name that the system does not take
-        return False
 
 
 @lru_cache(maxsize=32)

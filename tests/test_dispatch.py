@@ -202,7 +202,8 @@ def test_a_cluster_stops_for_a_task_without_end(cluster, in_time, monkeypatch):
 
     heard = Heard()
     with clusters.client_of(cluster.scheduler_address) as client:
-        with pytest.raises(Stopped, match=r"^3 workers .* had a block for over 1 s and finished none; run .* again"):
+        words = r"^(3 workers .* had a block for over 1 s and finished none|.* lost its last worker .*); .*run .* again"
+        with pytest.raises(Stopped, match=words):  # the second where dask does not restart a worker it has killed
             clusters.on_cluster(endless, NUMBERS, heard.finished, heard.died, client, dispatch.Patience(1.0))
     assert heard.dead == [] and len(heard.results) >= 9
 

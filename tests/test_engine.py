@@ -65,10 +65,10 @@ def test_labels_of_an_extra_dimension_are_kept(tmp_path):
 def test_counts_are_those_of_the_whole(small, tmp_path, monkeypatch):
     monkeypatch.setattr(engine, "BLOCK_POINTS", 4)
     monkeypatch.setattr(dataset, "CHUNK", 3)
-    checked = workflow.read(small, ["solver.rtol=1e-15", "axes.t.stop=300.0"], tmp_path / "o.nc")
+    checked = workflow.read(small, ["solver.rtol=1e-17", "axes.t.stop=300.0"], tmp_path / "o.nc")
     finished = engine.run(checked)
     ds = survey.open(checked.path)
-    missed = (ds.w_error > 1e-15 * (1 + abs(ds.w))) | (ds.phi_error > 1e-15 * (1 + abs(ds.phi)))
+    missed = (ds.w_error > 1e-17 * (1 + abs(ds.w))) | (ds.phi_error > 1e-17 * (1 + abs(ds.phi)))
     assert ds.attrs["accuracy_missed"] == int(missed.sum()) > 0
     assert finished.counts["status"] == {name: int((ds.status == code).sum()) for name, code in _codes(ds).items()}
 

@@ -43,7 +43,7 @@ def replace_rows(plane, rows, places, **more):
 def test_every_error_lies_within_its_bar(maps, true, method):
     for name, plane in maps.items():
         j = workflow.judge(plane, method, true[name])
-        assert not j.wrong.any() and j.ratio.max() < 1 and j.shaky.max() < 1e-6, name
+        assert not j.wrong.any() and j.ratio.max() < 1 and j.shaky.max() < 1e-3, name  # bars of double-double, too
         assert (j.error[j.met] < workflow.RTOL).all()
 
 

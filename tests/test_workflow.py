@@ -109,7 +109,7 @@ def test_defaults_are_filled_in():
         (["output.path=" + "n" * 240 + ".nc"], ["output.path", "too long for the files beside it"]),
         (["output.path=a\u0000.nc"], ["output.path = 'a\\x00.nc'", "cannot be printed"]),
         (["title=\u001b[31mred"], ["title = '\\x1b[31mred'", "cannot be printed"]),
-        (["scene=" + "n" * 5000 + ".py"], ["scene = 'nnn", "nnn ... nnn", "no file can be called so"]),
+        (["scene=" + "n" * 5000 + ".py"], ["scene = 'nnn", "nnn ... nnn", "no file can have this name"]),
     ],
 )
 def test_bad_input_is_refused_in_one_line(overrides, words):

@@ -8,7 +8,7 @@ separatrix or a regular precession, as far as can be told. A point takes about a
 Formulas (S1)-(S14) of `scenes/brun.md`; the quartic by Ferrari's resolvent.
 """
 
-from decimal import MAX_EMAX, MIN_EMIN, Context, Decimal, getcontext, localcontext
+from decimal import MAX_EMAX, MIN_EMIN, Context, Decimal, DivisionByZero, InvalidOperation, getcontext, localcontext
 from functools import cache
 from itertools import pairwise
 
@@ -53,7 +53,7 @@ def _settled(solve):
         with localcontext(Context(prec=digits, Emax=MAX_EMAX, Emin=MIN_EMIN)):
             try:
                 now = solve()
-            except Unclear:
+            except (Unclear, DivisionByZero, InvalidOperation):  # 0 for what has yet too few digits
                 now = None
             if now is not None and before is not None and _agree(before, now):
                 passes, number, found = now

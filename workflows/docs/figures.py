@@ -50,8 +50,10 @@ def _fit(command, figure):
         names = [f"precision_{words[2]}.png"]
     elif words[:2] == ["survey", "run"]:
         names = [] if "output.figures=[]" in words else _of_workflow(ROOT / words[2])
-    else:  # {...} in a name may be anything
-        names = re.findall(r'"((?:\w|\{\w+\})+\.(?:png|\{\w+\}))"', (ROOT / words[1]).read_text())
+    else:  # {...} in a name may be anything; a script may be a folder
+        script = ROOT / words[1]
+        texts = [path.read_text() for path in (script.glob("*.py") if script.is_dir() else [script])]
+        names = re.findall(r'"((?:\w|\{\w+\})+\.(?:png|\{\w+\}))"', "\n".join(texts))
     fixed = [re.sub(r"\{\w+\}", "", name) for name in names]
     patterns = [re.sub(r"\\\{\w+\\\}", r"\\w+", re.escape(name)) for name in names]
     return max((len(f) for f, p in zip(fixed, patterns, strict=True) if re.fullmatch(p, figure)), default=0)
