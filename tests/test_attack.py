@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from attack import brun_truth, command, danby, gyrostat_truth, hill, judge
+from attack import brun, brun_truth, command, danby, gyrostat_truth, hill, judge
 from brun_truth import truth as brun_in_full
 from mpmath import mp, mpf
 
@@ -21,7 +21,7 @@ def found(family, seed, size, index=0):
 
 
 @pytest.mark.parametrize(("family", "size"), [("satellite", 400), ("mathieu", 300), ("libration_elliptic", 300),
-                                              ("gyrostat", 300), ("brun", 400), ("libration", 60)])  # fmt: skip
+                                              ("gyrostat", 300), ("brun", 400), ("libration", 60), ("own", 60)])  # fmt: skip
 def test_nothing_falls(family, size):
     counts, faults = found(family, 3, size)
     assert counts["points"] >= size
@@ -149,12 +149,74 @@ def test_truth_of_a_gyrostat():
 def test_truth_of_bruns_problem():
     """Against elliptic integrals at 60 digits."""
     state = np.array([2.0, 1.0, 0.6, 1.1, 0.5, 1.3, 0.9])
-    out = np.empty((1, 16))
+    out = np.empty((1, brun_truth.COLUMNS))
     brun_truth.states(state[None], 1024, out)
     with mp.workdps(60):
         true, _floor = brun_in_full(state)
         for i, value in enumerate(true):
             assert abs(in_full(out[0], i) - value) < 1e-27 * (1 + abs(value))
+
+
+# L - L_sep is 2e-27: the double-double truth of T is off by 3.75e-6, its last digits are mpmath's with 120 digits
+SADDLE = [2.2392854657601977, 2.129834011504694, 1.9042235387022515, 1.6708645190597524, 3.202817341372608e-14,
+          -0.5746061869076509, -0.021826613975397063]  # fmt: skip
+SADDLE_PERIOD = "836.306482278309585838774447"
+
+
+def test_truth_beside_a_saddle_of_bruns_problem():
+    out = np.empty((1, brun_truth.COLUMNS))
+    brun_truth.states(np.array([SADDLE]), brun.NODES, out)
+    value, low, doubt = (x[0] for x in brun._rows(out, None)["period"])
+    off = abs(mpf(value) + mpf(low) - mpf(SADDLE_PERIOD))
+    assert 1e-7 < off < doubt < 1
+    full = brun._in_full(np.array(SADDLE))
+    with mp.workdps(40):
+        assert abs(in_full(full, 2) - mpf(SADDLE_PERIOD)) < 1e-24
+    given = dict(zip(brun.NAMES, np.array([SADDLE]).T, strict=True))
+    one = judge.Batch("brun states", "saddle", given, brun._of_states, "brun")
+    counts, worst, faults = judge.judge(one)
+    assert not faults and counts["unchecked"] == 0 and worst < 1
+
+
+OWN = {
+    "harmonics": [3.0, 1.0, -2.0, 0.0, 0.5, 0.3, 0.0, -1.0, 0.2, 2.5],
+    "harmonics even": [-1.0, 4.0, -2.0, 0.7, 0.5, 0.0, 0.0, 0.0, 0.0, 2.5],
+    "meissner": [20.0, -3.0, 0.3],
+    "meissner even": [-2.0, 30.0, 0.2],
+    "bent": [5.0, -20.0, 7.0, 3.0, 0.4],
+    "spike": [5.0, 40.0, 0.3, 0.25],
+}
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_truth_of_own_equations(name):
+    """Against mpmath's Taylor series, piece by piece."""
+    p = np.array(OWN[name])
+    length = p[9] if name.startswith("harmonics") else 1.0
+    end = length / 2 if "even" in name else length
+    place = p[-1] if name in ("meissner", "meissner even", "bent") else end
+    with mp.workdps(28):
+        exact = [mpf(x) for x in p]
+
+        def z(u, piece):
+            if name.startswith("harmonics"):
+                x = mpf(hill.TWO_PI) * u / exact[9]
+                waves = (exact[n] * mp.cos(n * x) + exact[4 + n] * mp.sin(n * x) for n in range(1, 5))
+                return exact[0] + sum(waves)
+            if name == "spike":
+                return exact[0] + exact[1] / (1 + ((u - exact[2]) / exact[3]) ** 2)
+            if name == "bent":
+                return exact[2] + exact[3] * mp.cos(6 * u) if piece else exact[0] + exact[1] * u
+            return exact[piece]
+
+        x = [mpf(1), mpf(0), mpf(0), mpf(1)]
+        for piece, (start, stop) in enumerate([(0, place), (place, end)]):
+            if start < stop:
+                x = mp.odefun(lambda u, x, n=piece: [x[1], -z(u, n) * x[0], x[3], -z(u, n) * x[2]], mpf(start), x,
+                              tol=mpf(10) ** -24)(mpf(stop))  # fmt: skip
+        out = hill._own_truth(name, p[None])[0]
+        for i, true in zip((0, 2, 1, 3), x, strict=True):
+            assert abs(in_full(out, i) - true) < 1e-22 * (1 + abs(true))
 
 
 def test_the_command(tmp_path, capsys):
@@ -173,7 +235,7 @@ def test_the_command(tmp_path, capsys):
 def test_truth_of_a_spike():
     """A weak spike changes y1(T) by its first-order term (Picard), which mpmath integrates."""
     weak, at, wide, rate = 1e-9, 0.3, 1e-3, 5.0
-    out, rest = (hill._own_truth("lorentz", np.array([[rate, b, at, wide]]))[0] for b in (weak, 0.0))
+    out, rest = (hill._own_truth("spike", np.array([[rate, b, at, wide]]))[0] for b in (weak, 0.0))
     root = mp.sqrt(mpf(rate))
 
     def term(u):

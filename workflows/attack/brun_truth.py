@@ -17,6 +17,8 @@ from attack.compiled import inline, kernel
 from attack.double import PI, add, div, mean, mul, neg, root, sine_cosine, sub, times
 
 MOST = 4096
+COLUMNS = 17
+ROUNDS = 1e-31  # of double-double, relative to the terms of L
 
 
 @inline
@@ -281,9 +283,34 @@ def prepared(k, L, a, b, level, below, c, low, high, u0, v0, w0, work, found, en
     return number
 
 
+@inline
+def doubts(A, k, L, a, b, c, low, high, u0, e, work, found, o):
+    """What rounds of L of ROUNDS times the size of its terms do beside a separatrix (floats suffice), into o[13:17].
+
+    These are the doubt of T relative to it, those of u_min and u_max, and the fastest precession at a saddle. A saddle
+    is a minimum of P (as c, expanded about u0) with P = (1 - u^2) (L - L_sep) there.
+    """
+    rounds = ROUNDS * (abs(L) + 2.0 * abs(k) + a * a + b * b)
+    slopes, square = np.zeros((5, 2)), np.zeros((4, 2))
+    derived(c, slopes[:4])
+    derived(slopes[:4], square)
+    o[13] = o[16] = 0.0
+    number = stationary(slopes, low, high, work, found)
+    for j in range(number):
+        x = (found[j, 0], found[j, 1])
+        u = add(u0, x)[0]
+        if value(square, x)[0] > 0.0 and abs(u) < 1.0:
+            o[13] = max(o[13], rounds * (1.0 - u * u) / abs(value(c, x)[0]))
+            o[16] = max(o[16], (abs(b - a * u) + abs(a - b * u)) / (1.0 - u * u) / A)
+    for side in range(2):
+        u = e[side, 0]
+        x = sub((e[side, 0], e[side, 1]), u0)
+        o[14 + side] = rounds * (1.0 - u * u) / abs(value(slopes[:4], x)[0])
+
+
 @kernel
 def states(points, most, out):
-    """points (N, 7): A, C, epsilon, theta0, p_theta0, p_psi, p_phi. out (N, 16): see `fill`."""
+    """points (N, 7): A, C, epsilon, theta0, p_theta0, p_psi, p_phi. out (N, 17): see `fill` and `doubts`."""
     work = (np.empty((5, 2)), np.empty((5, 2)), np.empty((5, 2)))
     found, ends, c, one = np.empty((8, 2)), np.empty((8, 6)), np.empty((5, 2)), np.empty(10)
     for i in range(len(points)):
@@ -365,6 +392,7 @@ def states(points, most, out):
         between_ends(A, k, L, a, b, level, below, e, one, most)
         drift = mul(a, div(sub(A, C), mul(A, C)))
         fill(o, e, one, drift)
+        doubts(A[0], k[0], L[0] + energy[0], a[0], b[0], c, low, high, cos, e, work, found, o)
 
 
 @inline
@@ -381,8 +409,9 @@ def fill(o, e, one, drift):
 
 @kernel
 def integrals(points, sign, ratio, most, out):
-    """points (N, 3): l, alpha, beta. out (N, 2, 16): of each well, lower u first."""
+    """points (N, 3): l, alpha, beta. out (N, 2, 17): of each well, lower u first."""
     work = (np.empty((5, 2)), np.empty((5, 2)), np.empty((5, 2)))
+    marks = np.empty((8, 2))
     found, ends, c, one = np.empty((8, 2)), np.empty((8, 6)), np.empty((5, 2)), np.empty(10)
     for i in range(len(points)):
         q, o = points[i], out[i]
@@ -408,4 +437,6 @@ def integrals(points, sign, ratio, most, out):
                 if e[1, 0] - e[0, 0] > 1e-12:
                     between_ends((1.0, 0.0), k, L, a, b, level, below, e, one, most)
                     fill(o[at], e, one, drift)
+                    zero = (0.0, 0.0)
+                    doubts(1.0, k[0], L[0], a[0], b[0], c, (-1.0, 0.0), (1.0, 0.0), zero, e, work, marks, o[at])
                 at += 1

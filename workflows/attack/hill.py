@@ -1,13 +1,14 @@
 """Points of Hill's equation: the satellite in all ways of naming it, Mathieu's equation, and equations of one's own."""
 
 from functools import lru_cache
-from math import pi
+from math import cos, pi, sin
 
 import numpy as np
+from mpmath import mp, mpf
 
 import survey
 from attack import hill_truth
-from attack.hill_truth import AMPLITUDE, COSINE, INERTIA, LORENTZ, NOT_EVEN, ONE_MINUS_K, RHO, STAIRS, K
+from attack.hill_truth import AMPLITUDE, BENT, COSINE, HARMONICS, INERTIA, LORENTZ, ONE_MINUS_K, RHO, TWO_PI, K
 from attack.judge import Batch
 
 LONG = np.longdouble
@@ -353,7 +354,8 @@ def _mathieu_truth(a, q):
     a, q = np.broadcast_arrays(np.asarray(a, float), np.asarray(q, float))
     points = np.column_stack([a, -2 * q, 0 * q, 0 * q])
     out = np.empty((len(points), 12))
-    hill_truth.own_points(COSINE, points, np.full(len(points), 9e9), (pi / 2, 6.123233995736766e-17), TOLERANCE, out)
+    quarter = np.tile([pi / 2, 6.123233995736766e-17], (len(points), 1))
+    hill_truth.own_points(COSINE, points, np.full(len(points), np.inf), quarter, TOLERANCE, out)
     return out
 
 
@@ -366,101 +368,168 @@ def _true_mathieu(given, answer):
 
 # Equations of one's own
 
-PERIOD = 1.0
+
+def harmonics(u, p):
+    x = TWO_PI * u / p[9]
+    even = p[1] * cos(x) + p[2] * cos(2 * x) + p[3] * cos(3 * x) + p[4] * cos(4 * x)
+    return p[0] + even + p[5] * sin(x) + p[6] * sin(2 * x) + p[7] * sin(3 * x) + p[8] * sin(4 * x)
+
+
+def meissner(u, p):
+    return p[0] if u < p[2] else p[1]
+
+
+def meissner_even(u, p):
+    return p[0] if u < p[2] or 1 - u < p[2] else p[1]
+
+
+def bent(u, p):
+    return p[0] + p[1] * u if u < p[4] else p[2] + p[3] * cos(6 * u)
+
+
+def lorentz(u, p):
+    x = (u - p[2]) / p[3]
+    return p[0] + p[1] / (1 + x * x)
+
+
+SHORT = ("a", "b", "c", "d")
+LONG_NAMES = ("a", "c1", "c2", "c3", "c4", "s1", "s2", "s3", "s4", "T")
+# z, parameters, kind of its truth, and the rest that survey.hill is given; z is not that of a smooth period but for
+# the harmonics, so 0 is a break
+OWN = {
+    "harmonics": (harmonics, LONG_NAMES, HARMONICS, dict(period=lambda p: p[9])),
+    "harmonics even": (harmonics, LONG_NAMES, HARMONICS, dict(period=lambda p: p[9], even=True)),
+    "meissner": (meissner, SHORT[:3], None, dict(period=1.0, breaks=lambda p: [0.0, p[2]])),
+    "meissner even": (meissner_even, SHORT[:3], None, dict(period=1.0, breaks=lambda p: p[2], even=True)),
+    "bent": (bent, (*SHORT, "place"), BENT, dict(period=1.0, breaks=lambda p: [0.0, p[4]])),
+    "spike": (lorentz, SHORT, LORENTZ, dict(period=1.0, breaks=0.0)),
+    "spike named": (lorentz, SHORT, LORENTZ, dict(period=1.0, breaks=lambda p: [0.0, p[2] - 4 * p[3], p[2], p[2] + 4 * p[3]])),
+}  # fmt: skip
+OWN_SHARES = (0.28, 0.24, 0.12, 0.1, 0.1, 0.1, 0.06)
+NARROW = 0.2  # of the spikes that are not named
 
 
 @lru_cache(maxsize=8)
 def own_scene(name):
-    """An equation of one's own, p = (a, b, c, d)."""
-    from math import cos, sin
-
-    def two_harmonics(u, p):
-        return p[0] + p[1] * cos(2 * u) + p[2] * cos(4 * u)
-
-    def not_even(u, p):
-        return p[0] + p[1] * cos(2 * u) + p[2] * sin(4 * u)
-
-    def stairs(u, p):
-        return p[0] if u < p[2] else p[1]
-
-    def lorentz(u, p):
-        x = (u - p[2]) / p[3]
-        return p[0] + p[1] / (1 + x * x)
-
-    names = ("a", "b", "c", "d")
-    made = {
-        "two_harmonics": dict(z=two_harmonics, period=pi, even=True),
-        "not_even": dict(z=not_even, period=pi),
-        "stairs": dict(z=stairs, period=PERIOD, breaks=lambda p: p[2]),
-        "lorentz": dict(z=lorentz, period=PERIOD),
-    }[name]
-    return survey.hill(made.pop("z"), parameters=names, **made)
-
-
-KINDS = {"two_harmonics": COSINE, "not_even": NOT_EVEN, "stairs": STAIRS, "lorentz": LORENTZ}
+    """An equation of one's own."""
+    z, parameters, _, more = OWN[name]
+    return survey.hill(z, parameters=parameters, **more)
 
 
 def own(random, size):
-    name = str(random.choice(list(KINDS)))
     used = 0
     while used < size:
-        number, rtol = int(random.choice([1, 16, 48])), accuracy(random)
-        method = str(random.choice(["auto", "auto", "taylor16", "magnus6", "dop853"]))
+        name, rtol = str(random.choice(list(OWN), p=OWN_SHARES)), accuracy(random)
+        number = int(random.choice([1, 16, 48]))
+        method = str(random.choice(["auto", "auto", "auto", "auto", "taylor16", "magnus6", "dop853"]))
         number = min(number, 4) if method == "dop853" else number
-        p = np.zeros((number, 4))
-        region = "generic"
-        if name in ("two_harmonics", "not_even"):
-            p[:, 0], p[:, 1:3] = (
-                random.uniform(-5, 30, number),
-                random.normal(size=(number, 2)) * 10 ** random.uniform(-8, 1),
-            )
-            if random.random() < 0.4:
-                row = p[0].copy()
-                x = _edge(random, lambda x, row=row: _own_margin(name, x, row), -5, 30, 20)
-                if x is not None:
-                    region, p[:] = "beside an edge", row
-                    p[:, 0] = beside(random, x, number)
-        elif name == "stairs":
-            p[:, :2] = random.uniform(-30, 200, (number, 2))
-            p[:, 2] = random.uniform(1e-6, 1 - 1e-6, number)
-            if random.random() < 0.4:
-                p[:, 2] = random.choice([0.0, 1.0, 0.5, 1e-12, 1 - 1e-12])
-            if random.random() < 0.4:
-                row = p[0].copy()
-                x = _edge(random, lambda x, row=row: _own_margin(name, x, row), -5, 60, 20)
-                if x is not None:
-                    region, p[:] = "beside an edge", row
-                    p[:, 0] = beside(random, x, number)
-        else:
-            width = 10 ** random.uniform(-4, -0.5)
-            region = "spike narrower than 0.0033 T" if width < 0.0033 else "spike"
-            p[:, 0], p[:, 1] = (
-                random.uniform(0, 60, number),
-                random.normal(size=number) / width * 10 ** random.uniform(-1, 1),
-            )
-            p[:, 2], p[:, 3] = random.uniform(0.1, 0.9, number), width
-        given = dict(zip(("a", "b", "c", "d"), p.T, strict=True))
+        draw = _draw_harmonics if name.startswith("harmonics") else _draw_spikes if "spike" in name else _draw_pieces
+        region, p, low, high = draw(random, name, number)
+        if random.random() < 0.4 and not region.startswith("narrow"):
+            row = p[0].copy()
+            x = _edge(random, lambda x, row=row, name=name: _own_margin(name, x, row), low, high, 20)
+            if x is not None:
+                region, p[:] = "beside an edge", row
+                p[:, 0] = beside(random, x, number)
+        given = dict(zip(OWN[name][1], p.T, strict=True))
         yield Batch(f"own {name}", region, given, _true_own(name), own_scene(name), {}, method, rtol,
                     f"own_scene({name!r})")  # fmt: skip
         used += number
 
 
+def _draw_harmonics(random, name, size):
+    """(region, (N, 10), range of a in which edges are looked for)."""
+    p = np.zeros((size, 10))
+    period = 10 ** random.uniform(-1, 2, size if random.random() < 0.5 else 1)
+    unit = (pi / period) ** 2  # the edges of z = a lie at its multiples by squares
+    kind = str(random.choice(["generic", "generic", "generic", "constant", "tiny", "large"]))
+    number = random.integers(2, 5)
+    p[:, 0] = random.uniform(-1, 12, size) * unit
+    strength = np.minimum(50.0, 300 * unit) * 10 ** -random.uniform(0, random.choice([1, 8]), size)
+    if kind == "constant":
+        strength = 0.0
+        p[:, 0] = random.choice([0.0, 1.0, 4.0, 9.0, 2.0, -1.0, 100.0], size) * unit
+    elif kind == "tiny":
+        strength = 10 ** -random.uniform(8, 300, size)
+        p[:, 0] = random.choice([0.0, 1.0, 4.0, 9.0, 1e-200, 1e-30, -1e-12], size) * unit
+    elif kind == "large":
+        p[:, 0] = 10 ** random.uniform(2, 5, size) * unit
+        strength = p[:, 0] * random.uniform(0, 0.9)
+    p[:, 1 : 1 + number] = random.uniform(-1, 1, (size, number)) * np.reshape(strength, (-1, 1)) / number
+    if name == "harmonics":
+        p[:, 5 : 5 + number] = random.uniform(-1, 1, (size, number)) * np.reshape(strength, (-1, 1)) / number
+    p[:, 9] = period
+    return kind, p, -unit[0], 12 * unit[0]
+
+
+def _draw_pieces(random, name, size):
+    p = np.zeros((size, len(OWN[name][1])))
+    p[:, : p.shape[1] - 1] = random.uniform(-30, 200, (size, p.shape[1] - 1))
+    end = 0.5 if name == "meissner even" else 1.0
+    p[:, -1] = random.uniform(1e-6, end - 1e-6, size)
+    kind = "generic"
+    if random.random() < 0.3:
+        kind, p[:, -1] = "break at an end", random.choice([0.0, end, 1e-12, end - 1e-12])
+    elif random.random() < 0.4:
+        kind, p[:, :-1] = "special", random.choice([0.0, 1e-300, -1e-30, pi * pi, 4 * pi * pi, 1e4], p[:, :-1].shape)
+    return kind, p, -5.0, 60.0
+
+
+def _draw_spikes(random, name, size):
+    narrow = name == "spike" and random.random() < NARROW
+    width = 10 ** (random.uniform(-4, -2.5) if narrow else random.uniform(-4 if "named" in name else -1.5, -0.5))
+    p = np.empty((size, 4))
+    p[:, 0] = random.uniform(0, 60, size)
+    p[:, 1] = random.normal(size=size) / width * 10 ** random.uniform(-1, 1)
+    p[:, 2], p[:, 3] = random.uniform(0.1, 0.9, size), width
+    if "named" in name:
+        p[:, 3] = np.minimum(p[:, 3], 0.24 * np.minimum(p[:, 2], 1 - p[:, 2]))
+    return "narrow spike" if narrow else "spike", p, -5.0, 60.0
+
+
 def _own_truth(name, p):
-    out = np.empty((len(p), 12))
     p = np.ascontiguousarray(p)
-    ends = p[:, 2].copy() if name == "stairs" else np.full(len(p), 9e9)
-    length = {"two_harmonics": (pi / 2, 6.123233995736766e-17), "not_even": (pi, 1.2246467991473532e-16)}.get(
-        name, (PERIOD, 0.0)
-    )
-    hill_truth.own_points(KINDS[name], p, ends, length, TOLERANCE, out)
+    _, _, kind, more = OWN[name]
+    if kind is None:
+        return np.array([_steps_truth(row, more.get("even", False)) for row in p]).reshape(-1, 12)
+    ends = p[:, 4].copy() if kind == BENT else np.full(len(p), np.inf)
+    length = p[:, 9] if kind == HARMONICS else np.ones(len(p))
+    if more.get("even"):
+        length = length / 2
+    out = np.empty((len(p), 12))
+    hill_truth.own_points(kind, p, ends, np.column_stack([length, 0 * length]), TOLERANCE, out)
     return out
+
+
+def _steps_truth(row, even):
+    """As `hill_truth.own_points` for z = a before the break and b behind it: the closed form, 50 digits."""
+    with mp.workdps(50):
+        a, b, place = (mpf(float(x)) for x in row)
+        end = mpf(0.5 if even else 1)
+        flow = mp.eye(2)
+        for z, length in ((a, min(place, end)), (b, end - min(place, end))):
+            root = mp.sqrt(abs(z))
+            x = root * length
+            if z > 0:
+                c, s = mp.cos_sin(x)
+            else:
+                c, s = mp.cosh(x), mp.sinh(x)
+            # sin(x) / root loses nothing but where z is 0
+            step = mp.matrix([[c, s / root if root else length], [-s * root if z > 0 else s * root, c]])
+            flow = step * flow
+        out = []
+        for value in (flow[0, 0], flow[0, 1], flow[1, 0], flow[1, 1]):
+            high = float(value)
+            out += [high, float(value - high)]
+        biggest = max(1.0, *(abs(x) for x in out))
+    return [*out, float(end), 0.0, 1e-31 * biggest, 2.0]
 
 
 def _own_margin(name, x, row):
     p = np.tile(row, (len(x), 1))
     p[:, 0] = x
     out = _own_truth(name, p)
-    if name == "two_harmonics":
+    if OWN[name][3].get("even"):
         return _factors(out)
     trace = out[:, 0] + out[:, 6]
     return np.column_stack([trace - 2, trace + 2])
@@ -468,11 +537,11 @@ def _own_margin(name, x, row):
 
 def _true_own(name):
     def truth(given, answer):
-        p = np.column_stack([given[x] for x in ("a", "b", "c", "d")])
+        p = np.column_stack([given[x] for x in OWN[name][1]])
         out = np.full((len(p), 12), np.nan)
         ok = answer["status"] == 0
         out[ok] = _own_truth(name, p[ok])
-        found = hill_outputs(out, answer, name == "two_harmonics")
+        found = hill_outputs(out, answer, OWN[name][3].get("even", False))
         found.pop("unstable")
         return found
 

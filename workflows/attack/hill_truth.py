@@ -159,27 +159,47 @@ def satellites(which, given, rhowhich, rhogiven, direction, oblate, tolerance, o
             o[:] = np.nan
 
 
-COSINE, NOT_EVEN, STAIRS, LORENTZ = 0, 1, 2, 3
+COSINE, HARMONICS, BENT, LORENTZ = 0, 1, 2, 3
+TWO_PI = 6.283185307179586  # as it stands in the z of one's own
 
 
 @inline
-def own_series(kind, p, u, z, work):
-    """Series of z about u (a double-double)."""
+def wave(z, sin, cos, rate, a, b):
+    """Add a cos(rate u) + b sin(rate u) to the series z about a place where their sine and cosine are these."""
+    f = add(times(cos, a), times(sin, b))
+    g = sub(times(cos, b), times(sin, a))
+    for n in range(TERMS):
+        put(z, n, add(get(z, n), f))
+        f, g = div(mul(g, rate), (n + 1.0, 0.0)), div(mul(f, neg(rate)), (n + 1.0, 0.0))
+
+
+@inline
+def own_series(kind, p, u, z, piece):
+    """Series of z about u (a double-double); `piece` is 1 behind the break."""
     for n in range(TERMS):
         put(z, n, (0.0, 0.0))
-    if kind == COSINE or kind == NOT_EVEN:
-        # a + q cos 2u + r cos 4u, or with r sin 4u
-        for harmonic in range(2):
-            sin, cos = sine_cosine(times(u, 2.0 * (harmonic + 1)))
-            f = (cos, neg(sin)) if harmonic == 0 or kind == COSINE else (sin, cos)
-            a, b = times(f[0], p[1 + harmonic]), times(f[1], p[1 + harmonic])
-            rate = 2.0 * (harmonic + 1)
-            for n in range(TERMS):
-                put(z, n, add(get(z, n), a))
-                a, b = div(times(b, rate), (n + 1.0, 0.0)), div(times(a, -rate), (n + 1.0, 0.0))
+    if kind == COSINE:  # a + b cos 2u + c cos 4u
+        for n in range(2):
+            if p[1 + n] != 0.0:
+                sin, cos = sine_cosine(times(u, 2.0 * (n + 1)))
+                wave(z, sin, cos, (2.0 * (n + 1), 0.0), p[1 + n], 0.0)
         put(z, 0, add(get(z, 0), (p[0], 0.0)))
-    elif kind == STAIRS:  # p[0] before the break, p[1] after it: which one `work` says
-        put(z, 0, (p[1] if work > 0 else p[0], 0.0))
+    elif kind == HARMONICS:  # a + sum of c_n cos n x + s_n sin n x, x = 2 pi u / T
+        base = div((TWO_PI, 0.0), (p[9], 0.0))
+        for n in range(4):
+            if p[1 + n] != 0.0 or p[5 + n] != 0.0:
+                rate = times(base, n + 1.0)
+                sin, cos = sine_cosine(mul(rate, u))
+                wave(z, sin, cos, rate, p[1 + n], p[5 + n])
+        put(z, 0, add(get(z, 0), (p[0], 0.0)))
+    elif kind == BENT:  # a + b u before the break, c + d cos 6u behind it
+        if piece == 0:
+            put(z, 0, add((p[0], 0.0), times(u, p[1])))
+            put(z, 1, (p[1], 0.0))
+        else:
+            sin, cos = sine_cosine(times(u, 6.0))
+            wave(z, sin, cos, (6.0, 0.0), p[3], 0.0)
+            put(z, 0, add(get(z, 0), (p[2], 0.0)))
     else:
         # p[0] + p[1] / (1 + x^2), x = (u - p[2]) / p[3]
         x = div(sub(u, (p[2], 0.0)), (p[3], 0.0))
@@ -197,33 +217,38 @@ def own_series(kind, p, u, z, work):
 
 
 @kernel
-def own_points(kind, points, ends, length, tolerance, out):
-    """y1, y2, y1', y2' at the end of [0, length] of points (N, 4): as `satellites`; `ends` (N) are breaks."""
+def own_points(kind, points, ends, lengths, tolerance, out):
+    """y1, y2, y1', y2' at the end of [0, length] of points (N, n): as `satellites`; `ends` (N) are breaks.
+
+    `lengths` (N, 2) are double-doubles.
+    """
     z, q = np.zeros((2, TERMS)), np.zeros((2, 2, TERMS))
     x = np.zeros((2, 4))
     for i in range(len(points)):
         p, o = points[i], out[i]
+        length = lengths[i, 0], lengths[i, 1]
+        size = abs(p[0]) + abs(p[1])
+        for n in range(2, 4 if kind == BENT else (9 if kind == HARMONICS else (3 if kind == COSINE else 2))):
+            size += abs(p[n])
         x[:] = 0.0
         x[0, 0] = x[1, 2] = 1.0
         u = (0.0, 0.0)
         steps, biggest = 0, 1.0
         for piece in range(2):
-            end = (ends[i], 0.0) if piece == 0 else (length[0], length[1])
-            if ends[i] >= length[0] and piece == 0:
-                continue
+            end = length
+            if piece == 0 and ends[i] < length[0]:
+                end = (ends[i], 0.0)
             left = sub(end, u)
             while left[0] > 0.0 and steps < MOST:
                 steps += 1
                 own_series(kind, p, u, z, piece)
-                h = 1e30
-                if kind != STAIRS:
-                    h = reach(z, 1e-25 + abs(p[0]) + abs(p[1]) + (abs(p[2]) if kind < STAIRS else 0.0), tolerance)
+                h = reach(z, 1e-25 + size, tolerance)
                 for s in range(2):
                     put(q[s], 0, (x[s, 0], x[s, 1]))
                     put(q[s], 1, (x[s, 2], x[s, 3]))
                     for n in range(TERMS - 2):
                         put(q[s], n + 2, div(neg(conv(z, q[s], n)), ((n + 1.0) * (n + 2.0), 0.0)))
-                    h = min(h, reach(q[s], abs(x[s, 0]) + abs(x[s, 2]) / (1.0 + np.sqrt(abs(p[0]))), tolerance))
+                    h = min(h, reach(q[s], abs(x[s, 0]) + abs(x[s, 2]) / (1.0 + np.sqrt(size)), tolerance))
                 last = h >= left[0]
                 step = left if last else (h, 0.0)
                 for s in range(2):
@@ -236,7 +261,7 @@ def own_points(kind, points, ends, length, tolerance, out):
         o[0], o[1], o[2], o[3] = x[0, 0], x[0, 1], x[1, 0], x[1, 1]
         o[4], o[5], o[6], o[7] = x[0, 2], x[0, 3], x[1, 2], x[1, 3]
         o[8], o[9] = length
-        o[10] = 1e-29 * (1.0 + steps) * biggest * biggest * (1.0 + np.sqrt(abs(p[0])) * length[0])
+        o[10] = 1e-29 * (1.0 + steps) * biggest * biggest * (1.0 + np.sqrt(size) * length[0])
         o[11] = float(steps)
         if steps >= MOST:
             o[:] = np.nan

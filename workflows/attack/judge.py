@@ -203,7 +203,7 @@ def _truth(batch, answer, counts, faults):
             over = np.where(known, np.maximum(off - doubt, 0.0), 0.0)
             lie = known & (over > bar)
             ratio = np.where(over > 0, over / bar, 0.0)
-        checked |= _any(known)
+        checked |= _any(known & ((doubt <= bar) | (off == 0)))  # a vaguer truth checks little
         if known.any():
             worst = max(worst, float(np.nanmax(np.where(known, ratio, 0.0))))
         if lie.any():
