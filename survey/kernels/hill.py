@@ -13,6 +13,7 @@ from survey.kernels.unroll import unroll
 
 RESULTS = 10
 EPS = 2.3e-16
+LEAST = 2e-323  # what a few products lose where they underflow
 LARGEST = float(np.finfo(np.float32).max)  # bars are kept as float32
 UNDECIDED, UNSTABLE, STABLE, MARGINAL = -1, 0, 1, 2
 # What an exact rule says of a point.
@@ -189,7 +190,7 @@ def _grows(growth, bar, rtol, floats, verdict):
 @unroll
 def _product(a, b, ea, eb):
     """a b and its error bound, the rounding of the product included."""
-    return a * b, ea * abs(b) + eb * abs(a) + ea * eb + EPS * abs(a * b)
+    return a * b, ea * abs(b) + eb * abs(a) + ea * eb + EPS * abs(a * b) + LEAST
 
 
 @inline

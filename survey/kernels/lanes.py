@@ -6,9 +6,13 @@ into vector code; a lane's operations do not depend on its neighbours, nor its b
 
 Beside the two columns of the fundamental matrix goes, for each, the 2x2 matrix S of its error ellipse:
 S <- P S P^T + diag(d^2) with d = D |column| the step's local error bound. To first order the error after n steps
-is a sum of n propagated local errors, hence |error_i| <= sqrt(n S_ii) (Cauchy-Schwarz), whatever their signs. The
-first order is trusted as far as the local errors are small: with M their sum, relative to the step's own matrix,
-the bounds are multiplied by exp(M), else a step so long that the method damps would damp its errors too.
+is a sum of n propagated local errors, each of two components: 2 n terms, the squares of whose bounds S_ii sums, hence
+|error_i| <= sqrt(2 n S_ii) (Cauchy-Schwarz), whatever their signs. The first order is trusted as far as the local
+errors are small: with M their sum, relative to the step's own matrix, the bounds are multiplied by exp(M), else a step
+so long that the method damps would damp its errors too.
+
+S is kept in units of 1 / SCALE^2, and LEAST is added to it in every step: no bar underflows, nor falls below what the
+step itself loses where z is so small that its products underflow.
 """
 
 import numpy as np
@@ -21,6 +25,8 @@ VECTOR = 8
 STATE = 13
 WORST = 300.0
 ROUNDING = 1.8e-15
+SCALE = 2.0**350  # bars of 1e-259 to 1e48 have squares within the range of float64
+LEAST = 2.3e-308
 
 
 @splice
@@ -127,15 +133,15 @@ def relative(matrix, h):
 def column(matrix, y, v, s, t, w):
     """(y, v) and its error ellipse (s, t; t, w) after the step with propagator and bounds `matrix`."""
     a, b, c, d, diagonal, upper, lower = matrix
-    error_y = diagonal * abs(y) + upper * abs(v)
-    error_v = lower * abs(y) + diagonal * abs(v)
+    error_y = SCALE * (diagonal * abs(y) + upper * abs(v))
+    error_v = SCALE * (lower * abs(y) + diagonal * abs(v))
     left, right = a * s + b * t, a * t + b * w
     low, high = c * s + d * t, c * t + d * w
     # rounding: where one solution outgrows the other by 1e16 in square, a thin ellipse would lose its positive sign
     round_y, round_v = ROUNDING * (a * a * s + b * b * w), ROUNDING * (c * c * s + d * d * w)
-    s = left * a + right * b + (error_y * error_y + round_y)
+    s = left * a + right * b + (error_y * error_y + LEAST + round_y)
     t = left * c + right * d
-    w = low * c + high * d + (error_v * error_v + round_v)
+    w = low * c + high * d + (error_v * error_v + LEAST + round_v)
     return a * y + b * v, c * y + d * v, s, t, w
 
 
@@ -150,6 +156,6 @@ def _finish(state, i, steps, out):
 @splice
 def bars(s1, w1, s2, w2, steps, total, out):
     """The four error bounds from the diagonals of the ellipses, the number of steps and M."""
-    doubt = np.exp(min(total, WORST))
-    out[4], out[5] = doubt * np.sqrt(steps * s1), doubt * np.sqrt(steps * w1)
-    out[6], out[7] = doubt * np.sqrt(steps * s2), doubt * np.sqrt(steps * w2)
+    doubt, terms = np.exp(min(total, WORST)) / SCALE, 2.0 * steps
+    out[4], out[5] = doubt * np.sqrt(terms * s1), doubt * np.sqrt(terms * w1)
+    out[6], out[7] = doubt * np.sqrt(terms * s2), doubt * np.sqrt(terms * w2)

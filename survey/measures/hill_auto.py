@@ -8,7 +8,7 @@ Measured (`survey precision satellite`): midpoint Taylor is the fastest at every
 import numpy as np
 
 from survey import status
-from survey.kernels.hill import DISCRIMINANT, RESULTS, UNDECIDED
+from survey.kernels.hill import DISCRIMINANT, LEAST, RESULTS, UNDECIDED
 from survey.measures import hill_dense, hill_effort
 from survey.measures.hill_answers import NO_SQUARES, Answers
 from survey.methods import dop853, taylor16, taylor_double
@@ -92,7 +92,7 @@ def closed_form(z, span):
     # Zeros inside: of cos at odd multiples of pi/2, of sin at multiples of pi; the computed signs settle ties.
     m = np.where(z > 0, _zeros(x / np.pi + 0.5, c < 0), 0)
     d = np.where(z > 0, _zeros(x / np.pi, s < 0), 0)
-    return np.stack([c, dy1, y2, c, de, rate * se + 3 * EPS * abs(dy1), y2_error, de, m, d], axis=-1)
+    return np.stack([c, dy1, y2, c, de, rate * se + 3 * EPS * abs(dy1) + LEAST, y2_error, de, m, d], axis=-1)
 
 
 def _zeros(turns, negative):

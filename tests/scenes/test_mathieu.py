@@ -6,6 +6,9 @@ from hill_problems import REFERENCE
 from mpmath import mp, mpf
 
 import survey
+from survey.kernels.hill import STABLE, UNDECIDED, UNSTABLE
+from survey.measures import hill
+from survey.scenes import mathieu
 
 STANDARD = REFERENCE["standard"]
 # The factor that vanishes at a_n and b_n: even n are periodic, a_n belongs to even solutions (DLMF 28.2(v)).
@@ -66,3 +69,38 @@ def test_where_the_amplitude_leaves_binary64_the_point_says_overflow():
     ds = survey.evaluate("mathieu", a=[-1e6, 1.0], q=0.5)
     assert ds.status.attrs["flag_meanings"].split()[int(ds.status[0])] == "overflow"
     assert int(ds.status[1]) == 0 and np.isnan(ds.discriminant[0]) and int(ds.verdict[0]) == -1
+
+
+@pytest.mark.parametrize("method", ["auto", "taylor16", "magnus6", "rk4", "dop853"])
+def test_bars_do_not_underflow(method):
+    """To first order in a and q^2, y1'(T/2) = -(a + q^2/2) pi/2 and a_0(q) = -q^2/2 (DLMF 28.6.1)."""
+    tiny = [1e-80, 1e-140, 1e-150, 1e-200, 3.182584613881663e-290, -2e-283, 1e-300, 1e-308, 5e-324]
+    points = [(a, q) for q in tiny for a in (0.0, q, -abs(q), 0.25 * q)] + [
+        (sign * q, 0.0) for q in tiny for sign in (1, -1)
+    ]
+    for rtol in (1.156e-13, 6.96e-13, 1e-9):
+        for a, q in points:
+            out = hill.solve(mathieu._problem(np.array([q]), np.array([[a]])), method, rtol)
+            said, dy1, bar = int(out["verdict"][0, 0]), float(out["dy1"][0, 0]), float(out["dy1_error"][0, 0])
+            with mp.workdps(700):
+                beyond = mpf(a) + mpf(q) ** 2 / 2
+                assert abs(mpf(dy1) + beyond * mp.pi / 2) <= bar, (a, q, rtol)
+            assert said in (UNDECIDED, STABLE if beyond > 0 else UNSTABLE), (a, q, rtol)
+            # no floor hides what is known
+            decided = 1e-220 < abs(a) and abs(q) < 1e-30 and method != "dop853"
+            assert not decided or (said != UNDECIDED and bar < 1e-10 * abs(a)), (a, q, rtol)
+
+
+@pytest.mark.parametrize("q", [5e-324, 1e-300])
+def test_the_same_rounding_in_every_step_lies_within_the_bars(q):
+    """Where z hardly varies, all steps err alike, and errors of y and y' add up (a < 0: nothing turns)."""
+    with mp.workdps(30):
+        exact = {
+            "y1": mp.cosh(mp.pi / 2),
+            "dy1": mp.sinh(mp.pi / 2),
+            "y2": mp.sinh(mp.pi / 2),
+            "dy2": mp.cosh(mp.pi / 2),
+        }
+        ds = survey.evaluate("mathieu", a=-1.0, q=q, rtol=9.427827650403594e-13)
+        for name, value in exact.items():
+            assert abs(mpf(float(ds[name])) - value) <= float(ds[f"{name}_error"]), name

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -114,6 +115,20 @@ def test_marginal_by_exact_rules_only():
     rho = np.array([0.5, 1.0, 1.5, 1.5 + 2e-16 * 2, np.sqrt(5) / 2, 0.0])
     assert list(solve("oblate", k=0.0, rho=rho)["verdict"]) == [2, 2, 2, 1, 1, 2]
     assert list(solve("prolate", k=0.0, rho=rho)["verdict"]) == [1, 1, 1, 1, 1, 2]
+
+
+@pytest.mark.parametrize(("alpha", "direction"), [(4 / 3, "1"), (4 / 3, "-1"), (31 / 27, "1"), (31 / 27, "-1")])
+def test_no_inertia_ratio_is_marginal_without_amplitude(alpha, direction):
+    """rho^2 = 1 / (3 (alpha - 1)) = n^2 / 4 has no solution in binary fractions; rho itself rounds to 1 and 3/2."""
+    ds = survey.evaluate("satellite", k=0.0, inertia_ratio=alpha, direction=direction)
+    square = 1 / (3 * (Fraction(alpha) - 1))
+    assert int(ds.verdict) == 1 and (4 * square).denominator > 1
+    with mp.workdps(40):
+        turns = mp.sqrt(mpf(square.numerator) / square.denominator)
+        known = {"discriminant": 2 * mp.cos(2 * mp.pi * turns), "rotation_number": turns}
+        assert turns != mpf(float(turns))
+        for name, value in known.items():
+            assert abs(mpf(float(ds[name])) - value) <= float(ds[f"{name}_error"]), name
 
 
 @pytest.mark.parametrize(
