@@ -406,7 +406,8 @@ OWN = {
     "meissner even": (meissner_even, SHORT[:3], None, dict(period=1.0, breaks=lambda p: p[2], even=True)),
     "bent": (bent, (*SHORT, "place"), BENT, dict(period=1.0, breaks=lambda p: [0.0, p[4]])),
     "spike": (lorentz, SHORT, LORENTZ, dict(period=1.0, breaks=0.0)),
-    "spike named": (lorentz, SHORT, LORENTZ, dict(period=1.0, breaks=lambda p: [0.0, p[2] - 4 * p[3], p[2], p[2] + 4 * p[3]])),
+    "spike named": (lorentz, SHORT, LORENTZ, dict(
+        period=1.0, breaks=lambda p: [0.0, p[2] - 4 * p[3], p[2], p[2] + 4 * p[3]])),
 }  # fmt: skip
 OWN_SHARES = (0.28, 0.24, 0.12, 0.1, 0.1, 0.1, 0.06)
 NARROW = 0.2  # of the spikes that are not named
@@ -428,7 +429,7 @@ def own(random, size):
         number = min(number, 4) if method == "dop853" else number
         draw = _draw_harmonics if name.startswith("harmonics") else _draw_spikes if "spike" in name else _draw_pieces
         region, p, low, high = draw(random, name, number)
-        if random.random() < 0.4 and not region.startswith("narrow"):
+        if random.random() < 0.2 and not region.startswith("narrow"):
             row = p[0].copy()
             x = _edge(random, lambda x, row=row, name=name: _own_margin(name, x, row), low, high, 20)
             if x is not None:
