@@ -170,7 +170,7 @@ def test_truth_beside_a_saddle_of_bruns_problem():
     value, low, doubt = (x[0] for x in brun._rows(out, None)["period"])
     off = abs(mpf(value) + mpf(low) - mpf(SADDLE_PERIOD))
     assert 1e-7 < off < doubt < 1
-    full = brun._in_full(np.array(SADDLE))
+    full = brun._in_full(np.array(SADDLE), out[0, :4])
     with mp.workdps(40):
         assert abs(in_full(full, 2) - mpf(SADDLE_PERIOD)) < 1e-24
     given = dict(zip(brun.NAMES, np.array([SADDLE]).T, strict=True))

@@ -170,8 +170,11 @@ def _rows(out, answer):
     return found
 
 
-def _in_full(point):
-    """The outputs at a state with DIGITS digits, from elliptic integrals, as `brun_truth.states`; its time is 0.1 s."""
+def _in_full(point, ends):
+    """The outputs at a state with DIGITS digits, from elliptic integrals, as `brun_truth.states`: it takes 0.1 s.
+
+    `ends` are the turning points of double-double, u_min (high, low), u_max (high, low), where Newton's method begins.
+    """
     tests = str(Path(__file__).parents[2] / "tests")
     if tests not in sys.path:
         sys.path.append(tests)
@@ -179,7 +182,9 @@ def _in_full(point):
     row = np.zeros(brun_truth.COLUMNS)
     with mp.workdps(DIGITS):
         state = [mp.mpf(float(x)) for x in point]
-        for i, true in enumerate(full.outputs(full.integrals(state), full.turning_points(state))):
+        integrals = full.integrals(state)
+        turning = full.polished(integrals, [mp.mpf(ends[0]) + mp.mpf(ends[1]), mp.mpf(ends[2]) + mp.mpf(ends[3])])
+        for i, true in enumerate(full.outputs(integrals, turning)):
             row[2 * i] = float(true)
             row[2 * i + 1] = float(true - row[2 * i])
     return row
@@ -192,9 +197,10 @@ def _of_states(given, answer):
     brun_truth.states(points[ok], NODES, part := out[ok])
     out[ok] = part
     with np.errstate(invalid="ignore"):
-        vague = np.flatnonzero(ok & (out[:, 13] * out[:, 4] > answer["period_error"]) & (given["p_theta0"] != 0))
+        vague = ok & (out[:, 13] * out[:, 4] > answer["period_error"]) & (out[:, 13] < LOST)
+        vague = np.flatnonzero(vague & (given["p_theta0"] != 0))
     if len(vague):  # one of a batch in full
-        out[vague[0]] = _in_full(points[vague[0]])
+        out[vague[0]] = _in_full(points[vague[0]], out[vague[0], :4])
     width = answer["u_max"] - answer["u_min"]
     with np.errstate(invalid="ignore"):
         sure = out[:, 13] < LOST
