@@ -202,3 +202,10 @@ def test_what_is_no_scene_is_refused(folder):
         workflow.check({"scene": scene(), "axes": {"aa": {"num": 3}, "q": 1.0}})
     with pytest.raises(BadInput, match="a is missing"):
         survey.evaluate(scene(), q=1.0)
+
+
+def test_an_equation_without_a_force_is_answered():
+    free = survey.hill(lambda u, p: p[0] + 0 * u, period=92.65606698476718, parameters="a")
+    ds = survey.evaluate(free, a=[0.0, 1e-3])
+    assert (ds.status == 0).all() and ds.verdict[0] != 0  # y = 1 and y = u: D = 2, on an edge
+    assert abs(ds.discriminant[0] - 2) <= ds.discriminant_error[0]

@@ -61,7 +61,8 @@ def _exactly(problem, answers, places, asked, most):
     rows, p = places // problem.p.shape[1], problem.p.reshape(-1)[places]
     low = np.zeros(p.size) if problem.p_low is None else problem.p_low.reshape(-1)[places]
     frequency = np.sqrt((problem.bound[rows] * np.stack([p**0, abs(p), p**2], axis=1)).sum(axis=1))
-    steps = 2 * np.ceil(0.5 * problem.span[rows] * np.maximum(phase * frequency, distance * problem.rate[rows]))
+    length = 0.5 * problem.span[rows] * np.maximum(phase * frequency, distance * problem.rate[rows])
+    steps = 2 * np.maximum(np.ceil(length), 1)  # z = 0 asks for none
     within = steps <= most
     places, rows, p, low = places[within], rows[within], p[within], low[within]
     steps = steps[within].astype(np.int64)
