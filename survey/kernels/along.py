@@ -5,7 +5,8 @@ error noted in T) and `at` (the solution inside the step). The rest is common.
 
 The error of (phi, w) after n steps is, to first order, the sum of J_nk delta_k over the steps, |delta_k| <= d_k
 componentwise. S <- J S J^T + diag(d^2) holds the sum of squares, and by Cauchy and Schwarz |error_i| <=
-sqrt(2 n S_ii), for any correlation of the delta_k. Steps never depend on the times or places asked for.
+sqrt(2 n S_ii), for any correlation of the delta_k: an error of the initial phi is one term more, but of the last step
+only delta_i counts. Steps never depend on the times or places asked for.
 """
 
 import math
@@ -352,6 +353,7 @@ def fill_crossing(floats, j, n, v, t, a, b, c, f, g):
 
     Near a turning point w^2 is smooth in phi while w is not; there the bar is that of w^2.
     """
+    n += 2  # the initial phi, the target and the time where it is reached err too: no more than four terms
     floats[j, 0], floats[j, 1] = max(v, 0.0), t
     slope = (f * v + g) / v if v > 0.0 else math.inf
     spread = bar(n, c - 2.0 * slope * b + slope * slope * a) if v > 0.0 else math.inf

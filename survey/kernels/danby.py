@@ -8,7 +8,7 @@ xi' - eta, -eta) (the scene's notes, section 2):
 X = (x, q), Y = (p, m) are canonical, so that the inverse of a propagator (P, S; Q, T) is (T', -S'; -Q', P'). A step's
 propagator is forward @ inverse(backward), two matrices whose columns a method gives with a bound of each column's
 errors. Beside the product goes the matrix V of its error ellipse, V <- G V G' + diag(d^2) with d the
-largest local error of a column; |error| <= sqrt(n V_ii) after n steps, to first order (as in `kernels.lanes`).
+largest local error of a column; |error| <= sqrt((4 n - 3) V_ii) after n steps, to first order (as in `kernels.lanes`).
 """
 
 from itertools import combinations_with_replacement
@@ -133,9 +133,7 @@ def _by_inverse(f, b):
 @splice
 def finish(work, i, steps, out):
     """A, B, C, D, t of lane i after `steps` steps, and their error bounds."""
-    doubt = np.exp(min(work[SUM, i], WORST))
-    e0, e1 = doubt * np.sqrt(steps * work[16, i]), doubt * np.sqrt(steps * work[20, i])
-    e2, e3 = doubt * np.sqrt(steps * work[23, i]), doubt * np.sqrt(steps * work[25, i])
+    e0, e1, e2, e3 = bars(work, i, steps)
     out[0], out[5] = _determinant(work[0, i], work[1, i], work[4, i], work[5, i], e0, e1)
     out[1], out[6] = _determinant(work[10, i], work[11, i], work[14, i], work[15, i], e2, e3)
     out[2], out[7] = _determinant(work[8, i], work[9, i], work[12, i], work[13, i], e2, e3)
@@ -147,6 +145,16 @@ def finish(work, i, steps, out):
         bar += e0 * abs(c) + e2 * abs(a) + e0 * e2 + e1 * abs(d) + e3 * abs(b) + e1 * e3
         bar += EPS * 3.0 * (abs(a * c) + abs(b * d))
     out[4], out[9] = t, bar
+
+
+@inline
+def bars(work, i, steps):
+    """Error bounds of the entries of each row of the propagator of lane i."""
+    # Cauchy and Schwarz: V_ii sums the squares of 4 n - 3 terms, four of each step but one of the last
+    doubt, terms = np.exp(min(work[SUM, i], WORST)), 4.0 * steps - 3.0
+    e0, e1 = doubt * np.sqrt(terms * work[16, i]), doubt * np.sqrt(terms * work[20, i])
+    e2, e3 = doubt * np.sqrt(terms * work[23, i]), doubt * np.sqrt(terms * work[25, i])
+    return e0, e1, e2, e3
 
 
 @inline

@@ -201,11 +201,17 @@ def advance(step, off, whole, spread):
 
 
 @inline
+def row_bars(spread, steps, bars):
+    """Fill `bars` with the error bounds of the entries of each row after `steps` steps."""
+    for i in range(4):
+        bars[i] = MARGIN * sqrt((4.0 * steps - 3.0) * spread[i, i])  # of so many terms, as in `kernels.danby`
+
+
+@inline
 def finish(whole, spread, steps, out):
     """A, B, C, D, t and the bounds of their errors: A = det P, B = det T, C = det Q, D = det S, t = tr T'P."""
     bars = np.zeros(4)
-    for i in range(4):
-        bars[i] = MARGIN * sqrt(steps * spread[i, i])
+    row_bars(spread, steps, bars)
     for at in range(FACTORS - 1):
         i, j = 0 if at in (0, 3) else 2, 0 if at in (0, 2) else 2
         a, b = (whole[0, i, j], whole[1, i, j]), (whole[0, i, j + 1], whole[1, i, j + 1])

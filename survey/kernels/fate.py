@@ -209,7 +209,8 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
         saa, sab, sbb = carried(p, T, h, w1, saa, sab, sbb)
         phi, w = (target if passed else x1), (0.0 if turned else w1)
         f, g, _dg = values(p, phi)
-        bar_phi, bar_w = bar(n, saa), bar(n, sbb)
+        # the initial phi and w err as those of a step do
+        bar_phi, bar_w = bar(n + 1, saa), bar(n + 1, sbb)
         if not (bar_phi < TRUST and bar_w < TRUST * (1.0 + abs(w))):
             out[4] = SEPARATRIX
             return
@@ -248,7 +249,7 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
                 right, right_bar, left = unwrapped, bar_phi, math.nan
         elif passed:
             slope = f + g / w
-            own = bar(n, max(sbb - 2.0 * slope * sab + slope * slope * saa, 0.0))
+            own = bar(n + 1, max(sbb - 2.0 * slope * sab + slope * slope * saa, 0.0))
             if not own < 0.1 * abs(w):
                 out[4] = SEPARATRIX
                 return

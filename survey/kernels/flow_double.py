@@ -416,6 +416,7 @@ def abel(p, phi0, w0, targets, floats, status):
 @inline
 def fill(p, row, n, phi, w, t, a, b, c):
     """w, t and their bars where phi is passed, as `along.fill_crossing`."""
+    n += 1  # the target errs too
     row[0], row[1] = max(w, 0.0), t
     f, g = values(p, phi[0])[0], acceleration(p, phi)[0]
     slope = (f * w + g) / w if w > 0.0 else math.inf

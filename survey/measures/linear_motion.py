@@ -2,7 +2,8 @@
 
 Gauss collocation with three nodes, order 6; each step is taken whole and in two halves, whose difference tells the
 local error d. It is carried to the end by the linearised flow: beside each column of Y goes the matrix V of its error
-ellipse, as in `survey.kernels.lanes`: V <- P V P' + diag(d^2), |error_i| <= sqrt(n V_ii) after n steps.
+ellipse, as in `survey.kernels.lanes`: V <- P V P' + diag(d^2), |error_i| <= sqrt(m n V_ii) after n steps of m
+equations.
 
 Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.7, table 7.4.
 """
@@ -64,7 +65,8 @@ def _chain(steps, local, units, periods):
             ellipses = p @ ellipses @ p.T
             ellipses[:, diagonal, diagonal] += (local[i % len(steps)] @ abs(y[i])).T ** 2
             y[i + 1], squares[i + 1] = p @ y[i], ellipses[:, diagonal, diagonal].T
-        count = np.arange(number + 1)[:, None, None]
+        # Cauchy and Schwarz: n components of each step's error add up, and V sums the squares of all
+        count = n * np.arange(number + 1)[:, None, None]
         relative = np.tile((local / units).sum(axis=(1, 2)), periods)
         doubt = np.exp(np.concatenate([[0.0], np.cumsum(relative)]))[:, None, None]  # of the first order
         return y, doubt * np.sqrt(count * squares)

@@ -20,6 +20,7 @@ WHEN = {"question": ("trajectory",)}
 COST = {"cylinder": 90.0}  # time, relative to the default method
 FLOW_FINEST = 1e-17  # useful truncation error of a step
 FLOW_WORK = 2  # steps, relative to the Taylor method
+_PAIRS = 3  # of components, in each of which a step and the initial state err; `bar` counts two for each step
 _FIRST = 4.0 * UNIT  # rounding of the initial state in the rotated frame
 
 
@@ -40,8 +41,8 @@ def read(state, squares, n, near, out):
             a += (c * frame[i, 1] - s * frame[i, 2]) * squares[3 + i, 3 + j] * (c * frame[j, 1] - s * frame[j, 2])
             b += frame[i, 0] * squares[i, j] * frame[j, 0]
     out[0], out[1] = phi + turns * TWO_PI, w
-    out[2] = bar(n, a) + UNIT * (4.0 + 4.0 * abs(turns) * TWO_PI)
-    out[3] = bar(n, b) + UNIT * 4.0 * abs(w)
+    out[2] = bar(_PAIRS * (n + 1), a) + UNIT * (4.0 + 4.0 * abs(turns) * TWO_PI)
+    out[3] = bar(_PAIRS * (n + 1), b) + UNIT * 4.0 * abs(w)
 
 
 @kernel

@@ -6,8 +6,8 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+from survey.kernels import along, flow
 from survey.kernels import equilibria as eq
-from survey.kernels import flow
 from survey.methods import taylor
 
 SIX = (0.7, -0.4, 1.1, 0.3, 0.5, -0.2)
@@ -105,3 +105,11 @@ def test_regions_of_attraction_hold():
             assert np.abs(floats[:, 0, 0] - row[eq.ANGLE]).max() < 1e-6
             tried += 1
     assert tried > 10
+
+
+@pytest.mark.parametrize("n", [1, 2, 10])
+def test_errors_of_the_start_and_the_target_lie_within_the_bar_of_a_crossing(n):
+    """2 n local errors, and those of the initial phi, the target and the time, which all add up in w."""
+    floats, size = np.empty((1, 4)), 1e-10
+    along.fill_crossing(floats, 0, n, 1.0, 0.0, (n + 3) * size**2, 0.0, n * size**2, -1.0, 0.0)
+    assert (2 * n + 3) * size <= floats[0, 2] < 1.1 * (2 * n + 4) * size

@@ -202,3 +202,28 @@ def test_bars_hold_and_are_narrow_at_coarse_tolerances(scale):
     assert (ok == 0).all() and (fine == 0).all()
     assert (np.abs(mine - best)[..., :2] <= mine[..., 2:] + best[..., 2:]).all()
     assert np.median(mine[..., 2:]) < 1e-11
+
+
+@pytest.mark.parametrize("steps", [1, 4, 100])
+@pytest.mark.parametrize("growth", [0.1, 1.0, 5.0])
+def test_errors_that_add_up_lie_within_the_bars(steps, growth):
+    """The local errors of all six components, each with its worst sign, by equal steps that mix them."""
+    G, T, V = np.zeros((14, 3)), np.zeros((gyrostat.LAST + 1, 12)), np.zeros((gyrostat.LOW + 1, 6, 12))
+    T[gyrostat.LAST, 0] = local = 1e-12
+    _G, state = system(LARGEST)
+    s, c = np.sin(START[0]), np.cos(START[0])
+    weights = np.zeros((2, 6))  # of the components in phi and in w
+    weights[0, 3:] = c * gyrostat.FRAME[:, 1] - s * gyrostat.FRAME[:, 2]
+    weights[1, :3] = gyrostat.FRAME[:, 0]
+    for at, weight in enumerate(weights):
+        signs = np.where(weight < 0, -1.0, 1.0)
+        matrix = np.eye(6) + np.expm1(growth / steps) * np.outer(signs, signs) / 6
+        V[0, :, :6] = matrix.T
+        squares, J, work, out = local**2 * np.eye(6), np.empty((6, 6)), np.empty((6, 6)), np.empty(4)
+        worst, rows = 0.0, weight
+        for _ in range(steps):
+            gyrostat.carry(G, T, V, 0.0, squares, J, work)
+            worst, rows = worst + local * abs(rows).sum(), rows @ matrix
+        worst += local * abs(rows).sum()  # of the initial state
+        full.read(state, squares, steps, START[0], out)
+        assert worst <= out[2 + at] * (1 + 1e-9)
