@@ -18,12 +18,14 @@ from survey.kernels.flow import (
     BOUND_G,
     C23,
     LAST,
+    PHI,
     S2,
     TRUNC_PHI,
     TRUNC_W,
     TWO_PI,
     TWO_PI_LOW,
     UNIT,
+    WEIGHT,
     jacobian,
     longest_step,
     reduced,
@@ -42,9 +44,17 @@ UNTOLD = -2  # a count that the error bar cannot tell
 
 @kernel
 def local_error(p, T, w, dt):
-    """Error bars (phi, w) that one step adds: truncation as the method notes it, and rounding."""
-    rate = p[BOUND_F] * abs(w) + p[BOUND_G]
-    phi = T[LAST, TRUNC_PHI] + UNIT * (4.0 + 3.0 * dt * (abs(w) + dt * rate))
+    """Error bars (phi, w) that one step adds: truncation as the method notes it, and rounding.
+
+    The slope w' of each stage is rounded by 4 UNIT rate, and by |dw'/dphi| ulp(phi)/2 since phi is rounded there. Stage
+    i has a share b_i in w, and b_i (1 - c_i) in phi, as simplifying assumption D(1) has it: so signed sums of b_i a_ij
+    count, and the weight is that of the b_i.
+    """
+    weight = T[LAST, WEIGHT]
+    many, phi_in_step = max(1.0, weight), abs(T[0, PHI]) + dt * abs(w)
+    rate = many * (p[BOUND_F] * abs(w) + p[BOUND_G])
+    rate += 0.25 * weight * (p[BOUND_F] * abs(w) + p[BOUND_DG]) * phi_in_step
+    phi = T[LAST, TRUNC_PHI] + UNIT * (4.0 + 3.0 * dt * (many * abs(w) + dt * rate))
     return phi, T[LAST, TRUNC_W] + UNIT * (1.5 * abs(w) + 4.0 * dt * rate)
 
 

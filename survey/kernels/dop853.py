@@ -225,13 +225,13 @@ D = np.array([_row(16, entries) for entries in _D])
 
 
 def _refuse_malformed():
-    """The quadrature conditions to order 8, the stage conditions A 1 = C, A C = C^2/2, and sums of the estimates."""
+    """The quadrature conditions to order 8, A 1 = C, A C = C^2/2, D(1): B A = B (1 - C), and sums of the estimates."""
 
     def close(value, wanted):
         return np.allclose(value, wanted, rtol=0, atol=2e-13)
 
     quadrature = all(close(B @ C**q, 1 / (q + 1)) for q in range(ORDER))
-    stages = close(A.sum(axis=1), C) and close((A @ C)[2:], C[2:] ** 2 / 2)
+    stages = close(A.sum(axis=1), C) and close((A @ C)[2:], C[2:] ** 2 / 2) and close(B @ A, B * (1 - C))
     trees = close(B @ (A @ C**6), 1 / 56) and close(B @ (C * (A @ C**5)), 1 / 48)
     estimates = close(E3.sum(), 0) and close(E5.sum(), 0) and close(E5 @ C, 0) and close(D.sum(axis=1)[1:], 0)
     if not (quadrature and stages and trees and estimates):

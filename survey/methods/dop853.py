@@ -14,7 +14,7 @@ import numpy as np
 from survey.kernels import along, danby, fate, returns
 from survey.kernels.danby import COLUMN, COLUMNS
 from survey.kernels.dop853 import E3, E5, STAGES, A, B, C
-from survey.kernels.flow import BOUND_DG, BOUND_F, LAST, LOW, PHI, STEP, TRUNC_PHI, TRUNC_W, W, series, values
+from survey.kernels.flow import BOUND_DG, BOUND_F, LAST, LOW, PHI, STEP, TRUNC_PHI, TRUNC_W, WEIGHT, W, series, values
 from survey.kernels.jit import inline, kernel
 from survey.kernels.lanes import bars, column, relative
 from survey.kernels.matrix import rounding
@@ -27,6 +27,7 @@ FLOW_WORK = 4  # steps, relative to the Taylor method
 _FIRST = LOW + 1  # stages lie in the lines of the table after the low series
 ADAPTIVE = True
 NODES = tuple(C[:STAGES])
+_WEIGHT = float(np.abs(B).sum())  # 12.9: some of B are negative
 SMALLEST, LARGEST = 0.2, 5.0
 # Zeros are counted by signs at the ends of steps: a step stays below this many radians of the fastest phase.
 LONGEST = 2.0
@@ -189,7 +190,7 @@ def flow_begin(p, phi, w, tolerance, T):
             break
         h *= factor
     T[LAST, STEP] = h * factor
-    T[LAST, TRUNC_PHI], T[LAST, TRUNC_W] = dphi, dw
+    T[LAST, TRUNC_PHI], T[LAST, TRUNC_W], T[LAST, WEIGHT] = dphi, dw, _WEIGHT
     return h if math.isfinite(w1) else math.nan
 
 

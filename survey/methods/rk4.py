@@ -12,7 +12,7 @@ import numpy as np
 
 from survey.kernels import along, danby, fate, returns
 from survey.kernels.danby import D1, D2, OWN, E, copy
-from survey.kernels.flow import BOUND_DG, BOUND_F, LAST, LOW, PHI, TRUNC_PHI, TRUNC_W, W, series, values
+from survey.kernels.flow import BOUND_DG, BOUND_F, LAST, LOW, PHI, TRUNC_PHI, TRUNC_W, WEIGHT, W, series, values
 from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.lanes import chain, scatter
 from survey.kernels.matrix import doubled, samples_only
@@ -118,7 +118,7 @@ def flow_begin(p, phi, w, h, T):
     series(p, phi, w, T, LOW)
     x1, w1, _e, _y = _flow_classical(p, phi, w, h)
     x2, w2, _e, _y = flow_at(p, T, h)
-    T[LAST, TRUNC_PHI], T[LAST, TRUNC_W] = abs(x2 - x1) / 7.5, abs(w2 - w1) / 7.5
+    T[LAST, TRUNC_PHI], T[LAST, TRUNC_W], T[LAST, WEIGHT] = abs(x2 - x1) / 7.5, abs(w2 - w1) / 7.5, 1.0
     return h
 
 

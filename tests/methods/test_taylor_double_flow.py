@@ -8,7 +8,7 @@ from mpmath import mp, mpf
 from survey.kernels import flow_double
 from survey.kernels.along import NO_CONVERGENCE, OK, SEPARATRIX, STEP_LIMIT, TURNING
 from survey.measures import cylinder, cylinder_auto
-from survey.methods import dop853, taylor, taylor_double_flow
+from survey.methods import dop853, rk4, taylor, taylor_double_flow
 
 SIX = (0.7, -0.4, 1.1, 0.3, 0.5, -0.2)
 NEAR = [3.5, 1.85414457907569906]  # next to the stable branch of a saddle at 4.65095
@@ -79,6 +79,44 @@ def test_one_short_step_keeps_within_its_rounding(method, fast):
     assert (status == OK).all()
     error, bars = np.abs(found - truth)[..., :2], found[..., 2:] + 1.2e-16 * np.abs(truth[..., :2])
     assert (error <= bars).all()
+
+
+@pytest.mark.parametrize("method", [dop853, taylor, rk4])
+def test_beside_saddles_a_short_step_counts_the_rounding_of_every_stage(method):
+    """There w and its change are so small that nothing hides what the stages round: phi, and terms that cancel."""
+    random = np.random.default_rng(1)
+    rows = random.normal(size=(3000, 8))
+    rows[::3, :4] = random.integers(-2, 3, (1000, 4))
+    rows[1::3, :2] *= 10.0 ** random.uniform(0.0, 1.6, (1000, 1))
+    saddle = random.uniform(-np.pi, np.pi, 3000)
+    s, c, double = np.sin(saddle), np.cos(saddle), np.cos(2 * saddle)
+    across = rows[:, 2] * c * s + rows[:, 3] * double  # g(saddle) = 0
+    along = -rows[:, 2] * double + 4 * rows[:, 3] * s * c - 2 * np.abs(rows[:, 4])  # g'(saddle) >= 0
+    rows[:, 4], rows[:, 5] = across * c + along * s, along * c - across * s
+    rows[:, 6] = saddle + random.choice([-1, 1], 3000) * 10.0 ** random.uniform(-6, -1, 3000)
+    rows[:, 7] = random.choice([-1, 1], 3000) * 10.0 ** random.uniform(-6, -1, 3000)
+    size = 1 + np.abs(rows[:, :6]).max(axis=1, keepdims=True)
+    times = random.choice([-1, 1], (3000, 1)) * 10.0 ** random.uniform(-4, -1.3, (3000, 1)) / size
+    truth, _turnings, fine = cylinder.trajectories(taylor_double_flow, rows, times, 0.0)
+    found, _turnings, status = cylinder.trajectories(method, rows, times, 1e-11)
+    assert (status == OK).all() and (fine == OK).all()
+    error, bars = np.abs(found - truth)[..., :2], found[..., 2:] + 1.2e-16 * np.abs(truth[..., :2])
+    assert (error <= bars).all()
+
+
+@pytest.mark.parametrize(
+    "six, phi, w, t",
+    [
+        ((-2.0, -2.0, -2.0, -1.0, -2.0, 0.0), 2.2290410185099954, -0.0011125970712905814, 0.0072402503017094675),
+        ((-1.389808512226827, 2.5547491227577033, -0.7916020016796301, 0.47434415625972387, -0.9560388961783558,
+          1.3535366736515712), 2.9041607647499617, -0.004547703132447713, 0.004917358940409421),
+        ((-26.968987047629245, -31.405995826332965, 0.15154881327396186, -0.3469366525293508, -0.8647679873868779,
+          0.154479070638798), 2.0557384284098403, -0.003321777991317204, -0.0016229513955336081),
+    ],
+)  # fmt: skip
+def test_dop853_beside_saddles_as_mpmath_has_it(six, phi, w, t):
+    found, _turnings, _status = cylinder.trajectories(dop853, np.array([[*six, phi, w]]), np.array([[t]]), 1.5e-11)
+    assert within(found[0, 0], exact(six, phi, w, t, float_out=False))
 
 
 @pytest.mark.slow
