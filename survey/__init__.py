@@ -15,7 +15,7 @@ Importing this package compiles nothing and loads nothing heavy.
 import sys
 from importlib import import_module
 
-_HOME = {"run": "survey.api", "evaluate": "survey.api", "open": "survey.api", "hill": "survey.own"}
+_HOME = {"run": "survey.api", "evaluate": "survey.api", "open": "survey.api", "hill": "survey.request.user_scene"}
 _HOME |= {
     "SurveyError": "survey.errors",
     "BadInput": "survey.errors",

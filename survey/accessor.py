@@ -1,9 +1,11 @@
 """`ds.survey`: what a finished survey is asked in a notebook. Importing survey registers it, before or after xarray."""
 
+import contextlib
+
 import xarray as xr
 
-from survey import schema
 from survey.errors import BadInput
+from survey.file import schema
 from survey.wording import plain
 
 
@@ -39,13 +41,9 @@ class Survey:
         (`ax.figure.savefig("map.pdf")`). `style="paper"`: for print, hatched, without title, a single or double column
         wide; `survey plot --style paper` also embeds the fonts as journals ask.
         """
-        import matplotlib
-        import matplotlib.pyplot as plt
+        from survey.show import figures
 
-        from survey import figures
-
-        plt.draw_if_interactive()  # a notebook's backend, loaded within rc_context, would show no later figure
-        with matplotlib.rc_context(figures.look(style).rc):
+        with _looking(style):
             ax = _new_axes(figures.size(style, width)) if ax is None else ax
             figures.onto(ax, self._ds, var, boundaries, style)
         return ax
@@ -66,12 +64,9 @@ class Survey:
 
         found = trajectory.solve(point.nearest(self._ds, coords).load(), time)
         if figure is not False:
-            import matplotlib
+            from survey.show import portrait
 
-            from survey import figures
-            from survey.analysis import portrait
-
-            with matplotlib.rc_context(figures.look(None).rc):
+            with _looking(None):
                 portrait.draw(found, _new_figure() if figure is None else figure)
         return found
 
@@ -126,6 +121,19 @@ class Survey:
         from survey.analysis import areas
 
         return areas.of_map(self._ds)
+
+
+@contextlib.contextmanager
+def _looking(style):
+    """matplotlib's settings of a style, for the time of a drawing."""
+    import matplotlib
+    import matplotlib.pyplot as plt
+
+    from survey.show import figures
+
+    plt.draw_if_interactive()  # a notebook's backend, loaded within rc_context, would show no later figure
+    with matplotlib.rc_context(figures.look(style).rc):
+        yield
 
 
 def _new_axes(size):

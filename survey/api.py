@@ -11,15 +11,19 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-import survey.methods as method_folder
 import survey.scenes as scene_folder
-from survey import engine, modules, own, schema, status, store, trust
-from survey import workflow as workflows
-from survey.dataset import count, counts, describe, flag_codes, layout, percent
+from survey import measures, status
 from survey.errors import BadInput
+from survey.file import disk, reading, schema
+from survey.file.labels import count, counts, describe, flag_codes, layout, percent
 from survey.grid import Grid, line
-from survey.hill_scene import HillScene, is_number
+from survey.request import trust
+from survey.request import user_scene as own
+from survey.request import workflow as workflows
+from survey.request.hill_scene import HillScene, is_number
 from survey.scene import Option, Output, Parameter, Request, condition, exists
+from survey.sweep import engine
+from survey.sweep import solve as sweep_solve
 from survey.wording import counted, short, shown
 
 
@@ -59,7 +63,7 @@ def run(
     if block_timeout is not None and not (is_number(block_timeout) and 0 < block_timeout < np.inf):
         raise BadInput(f"block_timeout = {shown(block_timeout)}: it must be a positive number of seconds, or None")
     engine.run(checked, workers, scheduler, fresh, block_timeout=block_timeout)
-    ds = store.load(checked.path)
+    ds = reading.load(checked.path)
     draw(ds, checked)
     return ds
 
@@ -71,7 +75,7 @@ def draw(ds: xr.Dataset, workflow: Any) -> list[Path]:
     """
     if not workflow.figures:
         return []
-    from survey import figures
+    from survey.show import figures
 
     first, suffix = workflow.figures[0], ".pdf" if workflow.style == "paper" else ".png"
     paths = {
@@ -79,7 +83,7 @@ def draw(ds: xr.Dataset, workflow: Any) -> list[Path]:
         for name in workflow.figures
     }
     for name, path in paths.items():
-        with store.refused(path):
+        with disk.refused(path):
             figures.save(ds, path, name, workflow.style)
     return list(paths.values())
 
@@ -97,7 +101,7 @@ def evaluate(
     Parameters
     ----------
     scene : name of a scene, such as "satellite" (`survey.scenes()` lists them, `survey scenes NAME` explains one); the
-        path of a file with your own Hill equation (see `survey/own.py`); or what `survey.hill` returns.
+        path of a file with your own Hill equation (see `survey/request/user_scene.py`); or what `survey.hill` returns.
     method : "auto" or the name of a method.
     rtol : asked accuracy, |error| <= rtol (1 + |value|); the `X_error` variables say what was reached.
     variables : names of the outputs wanted; all by default. Errors and status come along.
@@ -138,7 +142,7 @@ def evaluate(
         return _lazy(module, scene, request, given)
     grid = _grid(used, given)
     own.check(module, grid)
-    ds = describe(grid, module, scene, request, engine.compute(grid, module, request))
+    ds = describe(grid, module, scene, request, sweep_solve.compute(grid, module, request))
     return count(ds.assign_coords(_own_coordinates(given)))
 
 
@@ -152,7 +156,7 @@ def open(path: str | os.PathLike[str], *, trust_scene: bool = False) -> xr.Datas
     Raises survey.BadInput if there is no such file or survey did not write it, survey.Damaged if it is incomplete, or
     holds what no survey does.
     """
-    ds = store.load(path)
+    ds = reading.load(path)
     if trust_scene:
         trust.allow(ds.attrs.get("scene_hash", ""))
     return ds
@@ -261,7 +265,7 @@ def _lazy(module: Any, scene: str, request: Request, given: dict[str, xr.DataArr
     def solve(*arrays: Any) -> tuple[Any, ...]:
         shape = np.broadcast_shapes(*(array.shape for array in arrays))
         wide = [array.reshape((1,) * (len(shape) - array.ndim) + array.shape) for array in arrays]
-        solved = engine.solve_point(module, request, dict(zip(names, wide, strict=True)), shape)
+        solved = sweep_solve.solve_point(module, request, dict(zip(names, wide, strict=True)), shape)
         return tuple(solved[name] for name in table)
 
     outputs = {o.name: o for o in module.OUTPUTS if exists(o, request.options)}
@@ -371,6 +375,6 @@ def _output_text(o: Output) -> str:
 
 
 def _method_line(module: Any, name: str) -> str:
-    method = modules.load(method_folder, name, "method")
+    method = measures.method(name)
     first, when = inspect.cleandoc(method.__doc__).splitlines()[0], condition(module, getattr(method, "WHEN", {}))
     return first.removesuffix(".") + when if when else first

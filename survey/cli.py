@@ -77,9 +77,9 @@ def program():
 @click.option("--quiet", is_flag=True, help="No progress and no closing lines.")
 def run(workflow, output, overrides, workers, scheduler, block_timeout, fresh, quiet):
     """Run, or resume, a sweep; write OUT.nc and the pictures that the workflow asks for."""
-    from survey import engine
-    from survey import workflow as workflows
-    from survey.progress import Progress
+    from survey.request import workflow as workflows
+    from survey.sweep import engine
+    from survey.sweep.progress import Progress
 
     checked, finished = workflows.read(workflow, overrides, output), None
     again = shlex.join(["survey", *(word for word in sys.argv[1:] if word != "--fresh")])
@@ -103,10 +103,10 @@ def run(workflow, output, overrides, workers, scheduler, block_timeout, fresh, q
 @click.option("--json", "as_json", is_flag=True, help="For a program to read.")
 def plan(workflow, overrides, output, as_json):
     """Points, blocks, bytes, method and estimated time; no kernel is called."""
-    from survey import engine
-    from survey import workflow as workflows
+    from survey.request import workflow as workflows
+    from survey.sweep import plan as sweep_plan
 
-    _show(engine.plan(workflows.read(workflow, overrides, output)), as_json)
+    _show(sweep_plan.plan(workflows.read(workflow, overrides, output)), as_json)
 
 
 @program.command()
@@ -116,13 +116,14 @@ def plan(workflow, overrides, output, as_json):
 @click.option("--trust-scene", is_flag=True, help=TRUST)
 def verify(path, points, seed, trust_scene):
     """Check digest, completeness and counts; solve N random points again by another method."""
-    from survey import store, trust
+    from survey.file import reading
+    from survey.request import trust
 
-    ds = store.load(path)
-    complaints = store.check(path, ds)
+    ds = reading.load(path)
+    complaints = reading.check(path, ds)
     for complaint in complaints:
         complain(complaint, 3)
-    if complaints != store.undigested(path):
+    if complaints != reading.undigested(path):
         return 3
     if trust_scene:
         trust.allow(ds.attrs.get("scene_hash", ""))
@@ -141,8 +142,8 @@ def verify(path, points, seed, trust_scene):
 
 def _audit(ds, points, seed):
     """`audit`; of a survey with a stranger's scene after the user has said in the terminal that it may run."""
-    from survey import trust
-    from survey.audit import audit
+    from survey.analysis.audit import audit
+    from survey.request import trust
 
     try:
         return audit(ds, points, seed)
@@ -178,7 +179,8 @@ def _audited(again):
 @click.option("--json", "as_json", is_flag=True, help="For a program to read.")
 def info(path, as_json):
     """What is in the file: axes, variables, counts, provenance; and what an unfinished run has left beside it."""
-    from survey import api, unfinished
+    from survey import api
+    from survey.file import unfinished
 
     left = unfinished.told(path)
     table = api.summary(api.open(path)) if os.path.exists(path) or not left else {}
@@ -201,8 +203,9 @@ def plot(path, output, var, style, width, at):
     """Draw the stability map, or the named variable."""
     from pathlib import Path
 
-    from survey import api, figures
+    from survey import api
     from survey.analysis.point import plane
+    from survey.show import figures
 
     if width != "single" and style != "paper":
         raise BadInput(f"--width {width} is one of --style paper, where columns have widths; give both, or neither")
@@ -332,7 +335,7 @@ def _end_interrupted(code, path, finished, again):
 
     Threads inside a kernel cannot be interrupted, and need not be waited for.
     """
-    from survey import unfinished
+    from survey.file import unfinished
 
     for impatient in (signal.SIGINT, signal.SIGTERM):
         signal.signal(impatient, signal.SIG_IGN)

@@ -118,7 +118,7 @@ class Request:
 @dataclass(frozen=True)
 class Trajectory:
     """One point solved in time: `data` as xarray.Dataset takes it, {name: (dimensions, values, attributes)}, and how
-    `survey.analysis.portrait` draws it: `panels`, each its kind and the names of the variables that it shows.
+    `survey.show.portrait` draws it: `panels`, each its kind and the names of the variables that it shows.
     """
 
     data: Mapping[str, tuple[Any, ...]]

@@ -6,9 +6,9 @@ from importlib import resources
 import numpy as np
 from mpmath import mp, mpf
 
-from survey.kernels.hill import NO_RULE, ON_EDGE
-from survey.measures import hill
-from survey.methods import taylor_double
+from survey.kernels.hill import taylor_double
+from survey.kernels.hill.answers import NO_RULE, ON_EDGE
+from survey.measures.hill import monodromy
 from survey.scene import Request
 from survey.scenes import satellite
 
@@ -75,7 +75,7 @@ def mathieu(a, q, half_periods=1):
 
     rule = np.where((q[:, None] == 0) & (np.sqrt(abs(a)) == np.rint(np.sqrt(abs(a)))) & (a >= 0), ON_EDGE, NO_RULE)
     rule = np.where((q[:, None] == 0) & (np.sqrt(abs(a)) == np.rint(np.sqrt(abs(a)))) & (a >= 0), ON_EDGE, NO_RULE)
-    return hill.Problem(
+    return monodromy.Problem(
         p=a.copy(), span=np.full(len(a), half), rate=np.full(len(a), 2.0), c2=0.0, sample=sample,
         bound=np.column_stack([2 * abs(q), np.ones(len(a)), np.zeros(len(a))]), rule=rule.astype(np.int8),
     )  # fmt: skip

@@ -6,7 +6,7 @@ from importlib import resources
 import numpy as np
 from mpmath import mp, mpf
 
-from survey.kernels.libration_forms import FORMS, LABELS, NAMES
+from survey.kernels.libration.coefficients import FORMS, LABELS, NAMES
 
 REFERENCE = json.loads(resources.files("survey.reference").joinpath("libration.json").read_text())
 CONSTANTS = REFERENCE["constants"]

@@ -63,7 +63,7 @@ def test_any_order_of_imports_registers_the_accessor(first):
 
 
 def test_figures_leave_the_backend_of_a_notebook_alone():
-    code = "import survey.figures, matplotlib; assert matplotlib.get_backend() == 'svg', matplotlib.get_backend()"
+    code = "import survey.show.figures, matplotlib; assert matplotlib.get_backend() == 'svg', matplotlib.get_backend()"
     subprocess.run([sys.executable, "-c", code], check=True, env=os.environ | {"MPLBACKEND": "svg"})
 
 
@@ -198,7 +198,8 @@ def test_solutions_of_mathieus_equation_are_within_their_bars(a, q):
 
 
 def test_multipliers_of_the_elliptic_problem_are_those_of_its_monodromy():
-    from survey.measures import libration_motion, linear_motion
+    from survey.measures import linear_motion
+    from survey.measures.libration import motion as libration_motion
 
     ds = survey.evaluate("libration_elliptic", mu=[0.01, 0.05], e=0.3)
     for mu in ds.mu.values:

@@ -12,9 +12,10 @@ import time
 import netCDF4
 import pytest
 
-from survey import engine, workflow
 from survey.cli import main
 from survey.kernels import jit
+from survey.request import workflow
+from survey.sweep import plan
 
 
 def test_run_ends_with_a_file_a_digest_and_a_picture(program, small):
@@ -91,7 +92,7 @@ def test_no_words_show_the_help(capsys, monkeypatch):
 @pytest.mark.parametrize("new", [True, False])
 def test_the_plan_says_what_its_time_leaves_out(small, new, monkeypatch):
     monkeypatch.setattr(jit, "is_new", lambda: new)
-    told = engine.plan(workflow.read(small))["not_estimated"]
+    told = plan.plan(workflow.read(small))["not_estimated"]
     assert "writing the file" in told and "compiling" in told
     assert ("this machine has none of them yet" in told) == new
 

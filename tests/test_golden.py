@@ -12,10 +12,21 @@ import numpy as np
 import pytest
 
 import survey.scenes
-from survey import modules, store
+from survey import modules
+from survey.file import reading
 
 FOLDER = Path(__file__).parent / "golden"
-CHANGING = {"date_created", "history", "wall_time_s", "compile_time_s", "commit", "dirty", "kernel_hash", "cpu"}
+CHANGING = {
+    "fingerprint",
+    "date_created",
+    "history",
+    "wall_time_s",
+    "compile_time_s",
+    "commit",
+    "dirty",
+    "kernel_hash",
+    "cpu",
+}
 CHANGING |= {"summary", "references", "areas", "refine_points"}  # words, and what other processors round otherwise
 WORDS = {"_FillValue", "comment", "long_name"}  # a fill value may be NaN, and words may be bettered
 COMPILERS = ("version_numba", "version_llvmlite", "version_numpy", "cpu")
@@ -29,7 +40,7 @@ def both(request, tmp_path_factory):
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     kept = FOLDER / f"{request.param}.nc"
-    assert store.check(kept) == [] and store.check(folder / "now.nc") == []
+    assert reading.check(kept) == [] and reading.check(folder / "now.nc") == []
     with netCDF4.Dataset(kept) as old, netCDF4.Dataset(folder / "now.nc") as new:
         for file in (old, new):
             file.set_auto_maskandscale(False)

@@ -19,8 +19,10 @@ import pytest
 import xarray as xr
 
 import survey
-from survey import errors, figures, modules, scenes, unfinished
+from survey import errors, modules, scenes
 from survey.errors import BadInput, Damaged
+from survey.file import unfinished
+from survey.show import figures
 from survey.viewer import looks
 from survey.wording import plain
 

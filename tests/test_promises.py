@@ -46,7 +46,7 @@ import pytest
 import xarray as xr
 
 import survey
-from survey import store
+from survey.file import reading
 
 SWEEP = """
 title  = "A sweep to be killed"
@@ -68,7 +68,7 @@ method = "dop853"
 path = "sweep.nc"
 """
 # the program with small blocks: many of them, each soon done
-PROGRAM = "import survey.engine; survey.engine.BLOCK_POINTS = 100; from survey.cli import main; main()"
+PROGRAM = "import survey.sweep.engine; survey.sweep.cost.BLOCK_POINTS = 100; from survey.cli import main; main()"
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +104,7 @@ def resume(folder, *words):
 def same(folder, unbroken):
     """The output is there, sound, and has the bits of the unbroken run."""
     path = folder / "sweep.nc"
-    assert store.check(path) == []
+    assert reading.check(path) == []
     xr.testing.assert_equal(xr.load_dataset(path).drop_attrs(), unbroken.drop_attrs())
     assert not path.with_name("sweep.nc.blocks").exists()
 
@@ -148,7 +148,7 @@ def test_kills_at_random_times_lose_and_corrupt_nothing(folder, unbroken, kills,
         wait_for(lambda gone=children: not any(child.is_running() and _works(child) for child in gone), 20)
         assert len(blocks(folder)) >= before or (folder / "sweep.nc").exists()
         if (folder / "sweep.nc").exists():
-            assert store.check(folder / "sweep.nc") == []
+            assert reading.check(folder / "sweep.nc") == []
     reused = len(blocks(folder))
     code, told = resume(folder)
     counted = f"computed {45 - reused}, reused {reused} of 45 blocks"
@@ -193,9 +193,9 @@ width = 0.001
 # the program with many small parts of cells, telling which of them it works out
 PARTS = """
 import os
-from survey import store
-from survey.measures import hill_cells
-hill_cells.BATCH = 1
+from survey.file import blocks as store
+from survey.measures.hill import cells
+cells.BATCH = 1
 once = store.Blocks.once
 def told(kept, name, make):
     def make_and_tell():
@@ -223,7 +223,7 @@ def test_cells_go_on_where_a_kill_left_them(tmp_path):
         known = _parts_of_cells(tmp_path)
     done = subprocess.run(command, **keywords, timeout=120)
     assert done.returncode == 0 and sorted([*known, *done.stdout.split()]) == sorted(parts), done.stderr
-    assert store.check(tmp_path / "cells.nc") == []
+    assert reading.check(tmp_path / "cells.nc") == []
     xr.testing.assert_equal(*(xr.load_dataset(tmp_path / name).drop_attrs() for name in ("whole.nc", "cells.nc")))
 
 
@@ -299,12 +299,12 @@ def test_a_bad_point_costs_itself_alone(tmp_path):
         assert name == "without" or "status: ok: 6, invalid_parameters: 2" in done.stderr, done.stderr
     bad, good = (xr.load_dataset(tmp_path / f"{name}.nc") for name in axes)
     xr.testing.assert_equal(bad.sel(k=good.k).drop_attrs(), good.drop_attrs())
-    assert store.check(tmp_path / "with.nc") == [] and bad.discriminant.sel(k=1.0).isnull().all()
+    assert reading.check(tmp_path / "with.nc") == [] and bad.discriminant.sel(k=1.0).isnull().all()
 
 
 def test_a_log_gets_a_line_now_and_then(folder):
     """Without a terminal, as under nohup; a minute is shortened to a twentieth of a second."""
-    program = "import survey.progress; survey.progress.LOG_SECONDS = 0.05; " + PROGRAM
+    program = "import survey.sweep.progress; survey.sweep.progress.LOG_SECONDS = 0.05; " + PROGRAM
     done = subprocess.run(
         [sys.executable, "-c", program, "run", "sweep.toml"], cwd=folder, capture_output=True, text=True
     )
@@ -350,7 +350,7 @@ def test_a_full_disk_is_one_line_and_the_run_can_go_on(folder, unbroken):
         code, told = resume(disk, "--quiet")
         assert code == 2 and "the disk of" in told and told.count("\n") == 1, told
         (disk / "filler").write_bytes(bytes(60_000))
-        program = PROGRAM.replace("from", "survey.engine._refuse_too_large = lambda _: None; from")
+        program = PROGRAM.replace("from", "survey.sweep.engine.refuse_too_large = lambda _: None; from")
         command = [sys.executable, "-c", program, "run", "sweep.toml", "--quiet"]
         done = subprocess.run(command, cwd=disk, capture_output=True, text=True, timeout=60)
         assert done.returncode == 4 and "are free" in done.stderr and done.stderr.count("\n") == 1, done.stderr
@@ -384,7 +384,7 @@ def test_two_processes_fill_one_empty_kernel_cache(folder):
 def test_an_edit_of_what_a_kernel_calls_takes_effect_in_the_next_process(tmp_path):
     shutil.copytree(Path(survey.__file__).parent, tmp_path / "survey")
     words = (
-        "import numpy as np; from survey.kernels.satellite import sample; out = np.empty((1, 2, 2, 2));"
+        "import numpy as np; from survey.kernels.hill.satellite import sample; out = np.empty((1, 2, 2, 2));"
         "sample(np.array([[0.5, 0.75**0.5, 1.6, 0.0, 0.5, 0.0]]), np.array([0.2, 0.8]), out); print(out)"
     )
     environment = os.environ | {"PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
@@ -395,7 +395,7 @@ def test_an_edit_of_what_a_kernel_calls_takes_effect_in_the_next_process(tmp_pat
         return done.stdout
 
     first = told()
-    source = tmp_path / "survey" / "kernels" / "elliptic.py"
+    source = tmp_path / "survey" / "kernels" / "math" / "elliptic.py"
     text = source.read_text()
     edited = text.replace("mean = 0.5 * (pairs", "mean = 0.6 * (pairs")
     assert edited != text
@@ -415,7 +415,7 @@ KEPT = sorted((Path(__file__).parent.parent / "results").glob("*_small.nc"))
 def test_files_that_are_kept_open_and_verify(path, tmp_path):
     for file in (path, Path(f"{path}.sha256")):
         shutil.copy(file, tmp_path)
-    assert store.check(tmp_path / path.name) == []
+    assert reading.check(tmp_path / path.name) == []
     done = subprocess.run(
         [sys.executable, "-m", "survey", "verify", path.name], cwd=tmp_path, capture_output=True, text=True
     )

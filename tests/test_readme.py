@@ -11,7 +11,8 @@ import snippets
 from snippets import ROOT
 
 import survey
-from survey import engine, workflow
+from survey.request import workflow
+from survey.sweep import engine
 
 README = (ROOT / "README.md").read_text()
 BIN = Path(sys.executable).parent
@@ -86,7 +87,7 @@ def test_every_command_in_the_table_runs(folder):
         for word, name in names.items():
             command = command.replace(word, name)
         if "precision" in command or "view" in command:
-            continue  # takes minutes, serves until it is stopped: see tests/test_precision.py, tests/test_viewer.py
+            continue  # takes minutes, serves until it is stopped: see tests/precision and tests/viewer
         done = run(f"{shlex.quote(str(BIN))}/{command}", folder)
         assert done.returncode == 0, (command, done.stderr)
 
@@ -98,9 +99,11 @@ def test_the_override_on_the_command_line_runs(folder):
 
 
 def test_the_map_of_the_folders_is_the_tree():
-    listed = re.findall(r"^(?:  )?([a-z_]+(?:\.py|/))(?:  ([a-z_]+\.py))?", fenced("")[0], re.MULTILINE)
-    for name in {name for pair in listed for name in pair if name}:
-        assert (ROOT / name).exists() or (ROOT / "survey" / name).exists(), name
-    for path in (ROOT / "survey").iterdir():
-        if path.is_dir() and path.name != "__pycache__":
-            assert f"  {path.name}/" in README, path
+    (tree,) = re.findall(r"^```\nsurvey/\n(.*?)^```", README, re.DOTALL | re.MULTILINE)
+    rows = re.findall(r"^  ([a-z_]+(?:\.py|/)(?:  [a-z_]+\.py)*)(?= )", tree, re.MULTILINE)
+    listed = sorted(name for row in rows for name in row.split())
+    apart = {"__init__.py", "__main__.py", "__pycache__"}
+    there = [path for path in (ROOT / "survey").iterdir() if path.is_dir() or path.suffix == ".py"]
+    assert listed == sorted(path.name + "/" * path.is_dir() for path in there if path.name not in apart)
+    for name in re.findall(r"^([a-z]+)/ ", tree, re.MULTILINE):
+        assert (ROOT / name).is_dir(), name

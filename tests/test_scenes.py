@@ -8,9 +8,11 @@ import xarray as xr
 
 import survey
 import survey.scenes
-from survey import engine, modules, status, workflow
-from survey.dataset import error_bars
+from survey import modules, status
+from survey.file.labels import error_bars
+from survey.request import workflow
 from survey.scene import exists
+from survey.sweep import cost
 
 
 def questions():
@@ -133,7 +135,7 @@ def has_outputs_bars_and_a_status(ds):
 def test_bits_do_not_depend_on_the_block(scene, options, seed, monkeypatch):
     point = draw(scene, options, seed)
     whole = evaluate(scene, options, point)
-    monkeypatch.setattr(engine, "BLOCK_POINTS", 1)
+    monkeypatch.setattr(cost, "BLOCK_POINTS", 1)
     xr.testing.assert_identical(whole.drop_attrs(), evaluate(scene, options, point).drop_attrs())
 
 

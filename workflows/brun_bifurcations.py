@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from script import parser
 
-from survey.measures.nutation_sheets import surface
+from survey.measures.nutation.sheets import surface
 
 ALONG, ACROSS = 161, 31
 HIGHEST = {1: 1.6, -1: 5.5}  # l

@@ -17,8 +17,8 @@ import numpy as np
 from scipy.special import elliprf, elliprj
 
 import survey
-from survey.peers import scipy as integrator
-from survey.precision import brun as chart
+from survey.precision.cases import brun as chart
+from survey.precision.peers import scipy as integrator
 
 FAMILIES = {
     "separatrix": "energy above the separatrix, over k",

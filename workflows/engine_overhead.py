@@ -15,15 +15,17 @@ from pathlib import Path
 
 import netCDF4
 
-from survey import engine, workflow
-from survey.dataset import now, provenance
+from survey.file.labels import now, provenance
+from survey.request import workflow
+from survey.sweep import cost, dispatch
+from survey.sweep import solve as sweep_solve
 
 WORKFLOW = Path(__file__).with_name("satellite_prolate.toml")
 REPEATS = 5
 # the program, telling when its first block was solved
 FIRST_BLOCK = """
 import sys, time
-from survey import store
+from survey.file import blocks as store
 save = store.Blocks.save
 def told(*given):
     print(time.time(), flush=True)
@@ -36,7 +38,7 @@ main(sys.argv[1:])
 # the program, telling when all that reads a workflow is imported
 READING = """
 import sys, time
-from survey import workflow
+from survey.request import workflow
 from survey.cli import main
 print(time.time(), flush=True)
 main(sys.argv[1:])
@@ -82,7 +84,7 @@ def measure(given, target):
     own = provenance()
     return f"""# What the engine adds
 
-Made by `python {" ".join(sys.argv)}`, {now()}, commit {own["commit"][:10]}, on {own["cpu"]}, {engine.cpus()} threads,
+Made by `python {" ".join(sys.argv)}`, {now()}, commit {own["commit"][:10]}, on {own["cpu"]}, {dispatch.cpus()} threads,
 load {os.getloadavg()[0]:.1f}; medians of {REPEATS}.
 
 A map of {points:,} points, {k} x {rho}: `{given.variables}` with error bars and status, from the workflow file to the
@@ -145,14 +147,14 @@ def run(command):
 
 def kernels(checked):
     """Seconds of solving all blocks, on as many threads as the command takes."""
-    blocks = engine.blocks_of(checked)
+    blocks = cost.blocks_of(checked)
 
     def solve(block):
-        engine.solve_block(checked.scene, checked.request, checked.grid, block)
+        sweep_solve.solve_block(checked.scene, checked.request, checked.grid, block)
 
     solve(blocks[0])
     begin = time.perf_counter()
-    with ThreadPoolExecutor(engine.cpus()) as pool:
+    with ThreadPoolExecutor(dispatch.cpus()) as pool:
         list(pool.map(solve, blocks))
     return time.perf_counter() - begin
 

@@ -12,9 +12,9 @@ import numpy as np
 from script import parser, say
 
 import survey
-from survey.figures import COLOURS
-from survey.kernels import gyrostat
-from survey.kernels.flow import coefficients
+from survey.kernels.cylinder import gyrostat
+from survey.kernels.cylinder.flow import coefficients
+from survey.show.figures import COLOURS
 
 SIX = {"b12": 0.7, "b31": -0.4, "d": 1.1, "c23": 0.3, "s2": 0.5, "s3": -0.2}
 START = {"phi0": 1.5, "w0": 0.8}

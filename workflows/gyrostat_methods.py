@@ -22,9 +22,9 @@ from script import parser, say
 
 import survey
 from survey import methods, modules
-from survey.kernels.double import add, convolved, mul, over, sub, times
-from survey.kernels.flow import coefficients, longest_step
+from survey.kernels.cylinder.flow import coefficients, longest_step
 from survey.kernels.jit import fresh
+from survey.kernels.math.double import add, convolved, mul, over, sub, times
 
 RTOL, GREY = 1e-10, "#c8c8c8"
 SIX = (0.7, -0.4, 1.1, 0.3, 0.5, -0.2)

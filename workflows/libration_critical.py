@@ -19,8 +19,8 @@ import numpy as np
 from script import parser
 
 import survey
-from survey.kernels.libration_forms import FORMS, LABELS
-from survey.measures.normal_form import vectors
+from survey.kernels.libration.coefficients import FORMS, LABELS
+from survey.measures.libration.normal_form import vectors
 
 DIGITS = 60  # of the square roots that lead from v to mu
 SHOWN = Decimal("1e-31")  # mu is printed in multiples of it

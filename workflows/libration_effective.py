@@ -2,18 +2,18 @@
 
     python workflows/libration_effective.py [-o results]
 
-Definition and assumptions: `survey/measures/effective_stability.py`; series: `survey/methods/lie.py`.
+Definition and assumptions: `survey/measures/libration/effective_stability.py`; series: `survey/methods/lie.py`.
 """
 
 import matplotlib.pyplot as plt
 import numpy as np
 from script import parser, say
 
-from survey.figures import COLOURS
-from survey.kernels.lie_plan import plan
-from survey.measures import effective_stability
-from survey.measures.normal_form import MU_R
+from survey.kernels.libration.lie_plan import plan
+from survey.measures.libration import effective_stability
+from survey.measures.libration.normal_form import MU_R
 from survey.methods import lie
+from survey.show.figures import COLOURS
 
 ORDERS = (6, 8, 10, 12)
 PERIODS = (1e3, 1e6, 1e9)  # of the primaries
@@ -89,7 +89,8 @@ PAGE = """# Effective stability of the triangular libration points
 Made by `python workflows/libration_effective.py`. The radius rho is the greatest for which motions that start with all
 |z_j| <= rho, in the variables of the normal form (action r_j = |z_j|^2, unit distance, mass and mean motion), keep
 their actions below 2 rho^2 for the stated time, as far as the remainders of the series tell: degrees up to the order
-plus 1, then a geometric tail (`survey/measures/effective_stability.py`). r, of 2, ..., order - 1, is the degree to
+plus 1, then a geometric tail (`survey/measures/libration/effective_stability.py`). r, of 2, ..., order - 1, is the
+degree to
 which the Hamiltonian was normalised for it. It is an estimate from truncated series, not a proof; where r is the
 greatest that the order allows, higher orders would give a larger radius. The bars hold rounding only.
 

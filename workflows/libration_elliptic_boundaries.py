@@ -14,9 +14,9 @@ import xarray as xr
 from script import parser, say
 
 import survey
-from survey.kernels.traces import discriminant, product
-from survey.measures import danby
-from survey.measures.hill_edges import close_in
+from survey.kernels.libration.traces import discriminant, product
+from survey.measures.hill.edges import close_in
+from survey.measures.libration import danby
 
 ROWS = np.round(np.concatenate([np.arange(0, 0.9, 0.01), np.arange(0.9, 0.991, 0.005)]), 3)
 STRIP = np.round(np.concatenate([np.arange(0.296, 0.3141, 0.002), [0.3142, 0.3144, 0.3145]]), 4)
@@ -131,7 +131,7 @@ def draw(points, end, path):
     import matplotlib.pyplot as plt
     from matplotlib.colors import ListedColormap
 
-    from survey.figures import COLOURS, UNDECIDED
+    from survey.show.figures import COLOURS, UNDECIDED
 
     figure, panels = plt.subplots(1, 2, figsize=(9.6, 4.6), layout="constrained")
     near = np.linspace(*NEAR[1], 99)

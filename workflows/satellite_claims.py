@@ -18,7 +18,7 @@ from scipy.special import ellipe, ellipj, ellipk
 from script import parser, say
 
 import survey
-from survey.figures import COLOURS
+from survey.show.figures import COLOURS
 
 BODIES = ("prolate", "oblate")
 LEAST_RHO = 3**-0.5  # the thin rod and the flat disc; every other body has a larger |rho|

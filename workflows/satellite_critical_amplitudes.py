@@ -14,7 +14,7 @@ import numpy as np
 from script import parser, say
 
 import survey
-from survey.measures import hill_edges
+from survey.measures.hill import edges as hill_edges
 from survey.scene import Request
 from survey.scenes import satellite
 

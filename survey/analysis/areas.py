@@ -5,9 +5,11 @@ from itertools import product
 import numpy as np
 import xarray as xr
 
-from survey import own, schema, status
-from survey.dataset import flag_codes, percent
+from survey import status
 from survey.errors import BadInput
+from survey.file import schema
+from survey.file.labels import flag_codes, percent, undecided_share
+from survey.request import user_scene as own
 
 NO_ANSWER = -2
 SLAB = 2**20  # points read at once
@@ -52,14 +54,9 @@ def _of_cells(ds):
     share = ds.area_fraction.values
     total = float(ds.area.values[share.argmax()] / share.max())
     bar = ds.area_error.values.astype(float)
-    values, bars = [*ds.area.values, total * undecided(ds)], [*bar, 1e-13 * total]
+    values, bars = [*ds.area.values, total * undecided_share(ds)], [*bar, 1e-13 * total]
     words = "from cells that are decided as wholes; the area of the undecided cells is the others' error bar"
     return _described([*names, "undecided"], np.array(values), np.array(bars), total, ds.area.attrs["units"], words)
-
-
-def undecided(ds):
-    """The share of a refined map that its undecided cells take."""
-    return max(1.0 - float((ds.area_fraction - ds.area_fraction_error).sum()), 0.0)
 
 
 def _counted(ds, codes):

@@ -3,9 +3,10 @@
 import numpy as np
 import xarray as xr
 
-from survey import modules, schema
-from survey.dataset import flag_codes
+from survey import modules
 from survey.errors import BadInput
+from survey.file import schema
+from survey.file.labels import flag_codes
 
 
 def find(ds, kind=None, index=None):

@@ -4,8 +4,8 @@ import numpy as np
 import xarray as xr
 
 from survey.analysis.point import of_points
-from survey.dataset import error_bars, flag_attributes
 from survey.errors import BadInput
+from survey.file.labels import error_bars, flag_attributes
 from survey.wording import counted
 
 VERDICTS = {"same": 0, "one_undecided": 1, "differ": 2}

@@ -7,9 +7,10 @@ from itertools import islice
 import numpy as np
 import xarray as xr
 
-from survey import modules, own, status, workflow
-from survey.dataset import UNDECIDED, error_bars, fill_of, flag_codes, options_of
+from survey import modules, status
 from survey.errors import BadInput, Damaged, Untrusted
+from survey.file.labels import UNDECIDED, error_bars, fill_of, flag_codes, options_of
+from survey.request import user_scene, workflow
 from survey.wording import plain
 
 MOST = 1000  # places of an output that are told
@@ -140,7 +141,7 @@ class Point:
         if "verdict" not in ds:
             return sentence(ds)
         try:
-            judge = getattr(own.find(own.of_dataset(ds))[1], "why", None)
+            judge = getattr(user_scene.find(user_scene.of_dataset(ds))[1], "why", None)
         except Untrusted as untrusted:
             return str(untrusted)
         except BadInput:

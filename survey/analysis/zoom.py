@@ -5,11 +5,13 @@ import warnings
 
 import numpy as np
 
-from survey import api, engine, modules, own, workflow
+from survey import api, modules
 from survey.analysis.point import asked
-from survey.dataset import count, describe
 from survey.errors import BadInput, Damaged
+from survey.file.labels import count, describe
 from survey.grid import coordinates, logarithmic
+from survey.request import user_scene, workflow
+from survey.sweep import extras, solve
 
 
 def sweep(ds, ranges, num=None, output=None):
@@ -20,9 +22,9 @@ def sweep(ds, ranges, num=None, output=None):
     _warn(ds, ranges)
     if output is not None:
         return api.run(data, output=output)
-    found = engine.compute(checked.grid, checked.scene, checked.request)
+    found = solve.compute(checked.grid, checked.scene, checked.request)
     finer = count(describe(checked.grid, checked.scene, checked.name, checked.request, found))
-    for beside in engine.extras(checked, lambda name, make: make()):
+    for beside in extras.extras(checked, lambda name, make: make()):
         finer = finer.assign(beside.variables).assign_attrs(beside.attrs)
     return finer.assign_attrs(title=checked.title, workflow=checked.text)
 
@@ -54,8 +56,8 @@ def _warn(ds, ranges):
 def _workflow(ds, ranges, num):
     """The workflow as a mapping: that in the file, or what the attributes say, with other axes."""
     data = _further(ds)
-    data |= {"title": f"{ds.attrs.get('title', '')}, a part".lstrip(", "), "scene": own.of_dataset(ds)}
-    scene = own.find(data["scene"])[1]
+    data |= {"title": f"{ds.attrs.get('title', '')}, a part".lstrip(", "), "scene": user_scene.of_dataset(ds)}
+    scene = user_scene.find(data["scene"])[1]
     data |= {"options": asked(ds, scene), "axes": _axes(ds, ranges, num)}
     solver = {"method": ds.attrs.get("method"), "rtol": ds.attrs.get("rtol")}
     data["solver"] = {key: str(v) if key == "method" else float(v) for key, v in solver.items() if v is not None}
@@ -98,7 +100,7 @@ def _axes(ds, ranges, num):
 
 
 def _parameters(ds):
-    return {p.name for p in own.find(own.of_dataset(ds))[1].PARAMETERS}
+    return {p.name for p in user_scene.find(user_scene.of_dataset(ds))[1].PARAMETERS}
 
 
 def _as_it_is(values):

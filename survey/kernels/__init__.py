@@ -1,1 +1,1 @@
-"""Numbers only: no labels, files, threads or units (`.ci/imports.py` keeps it so)."""
+"""Numbers only: no labels, files, processes or units (`lint-imports` keeps it so)."""

@@ -1,16 +1,15 @@
-"""The one decorator, its flags, and a kernel cache that cannot go stale.
+"""The decorators of kernels, their flags, and a kernel cache that cannot go stale.
 
 nogil: dask's threads run kernels side by side. error_model="numpy": a division by zero gives inf, which is checked,
 and loops vectorise. No fastmath and no contraction: compiled code and plain Python (NUMBA_DISABLE_JIT=1) give the
 same bits, and NaN checks stay. No signatures: importing compiles nothing.
 
 numba's own cache returns stale results when an imported module changes; here its directory is named by a hash of
-every source that can reach a kernel, of the versions and of the CPU, so that any edit starts an empty one.
+every source that is compiled, of the versions and of the CPU, so that any edit starts an empty one.
 """
 
 import hashlib
 import os
-import subprocess
 import time
 from pathlib import Path
 
@@ -20,29 +19,35 @@ import numba
 import platformdirs
 from numba.core import event
 
-SOURCES = ("kernels", "methods", "measures", "scenes")
-FILES = ("boundaries.py", "grid.py", "hill_scene.py", "own.py", "refine.py")  # what else makes numbers
+COMPILED = ("kernels", "methods", "measures", "scenes")  # the packages whose functions are compiled
+# What decides no number of the output: all other sources do, those that are yet to be written included.
+APART = ("__main__.py", "accessor.py", "analysis", "cli.py", "precision", "show", "viewer")
 
 
-def source_hash():
-    """Hash of all sources that can reach a number of the output and of the compiler versions (16 hex digits)."""
-    root = Path(__file__).parent.parent
+def source_hash(*names):
+    """Hash (16 hex digits) of the compilers' versions and of these modules and packages of survey."""
+    root = Path(__file__).parents[1]
     digest = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__}".encode())
-    paths = [root / name for name in FILES]
-    for folder in SOURCES:
-        paths += sorted((root / folder).glob("*.py"))
-    for path in paths:
-        digest.update(f"{path.relative_to(root).as_posix()}\0".encode() + path.read_bytes() + b"\0")
+    for name in sorted(names):
+        path = root / name
+        for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
+            digest.update(f"{file.relative_to(root).as_posix()}\0".encode() + file.read_bytes() + b"\0")
     return digest.hexdigest()[:16]
 
 
+def deciding():
+    """The names of the modules and packages of survey that decide numbers of the output."""
+    names = (path.name for path in Path(__file__).parents[1].iterdir() if path.suffix == ".py" or path.is_dir())
+    return [name for name in names if name not in APART and not name.startswith("__pycache__")]
+
+
 def kernel_hash():
-    """Hash of the sources and of the CPU that they are compiled for (16 hex digits)."""
+    """Hash (16 hex digits) of what is compiled and of the CPU that it is compiled for."""
     cpu = f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
-    return hashlib.sha256(f"{SOURCE_HASH} {cpu}".encode()).hexdigest()[:16]
+    return hashlib.sha256(f"{source_hash(*COMPILED)} {cpu}".encode()).hexdigest()[:16]
 
 
-SOURCE_HASH = source_hash()
+SOURCE_HASH = source_hash(*deciding())
 KERNEL_HASH = kernel_hash()
 
 
@@ -67,17 +72,17 @@ def is_new():
     return _DIRECTORY is not None and not numba.config.DISABLE_JIT and next(_DIRECTORY.rglob("*.nbi"), None) is None
 
 
-ahead: subprocess.Popen | None = None  # a process that compiles for this one, on a new machine
+ahead = None  # wait() returns once what compiles for this process, on a new machine, is done (see `sweep.ahead`)
 waited = 0.0
 
 
 def wait_for_ahead():
-    """Wait for the process that compiles ahead: it will be done sooner than if this one began now."""
+    """Wait for what compiles ahead: it will be done sooner than if this process began now."""
     global waited
-    process = ahead
-    if process is not None and process.poll() is None:
+    wait = ahead
+    if wait is not None:
         began = time.perf_counter()
-        process.wait()
+        wait()
         waited = max(waited, time.perf_counter() - began)  # threads wait side by side
 
 

@@ -7,25 +7,25 @@ Source: DLMF 19.8(i), 19.22(ii); formulas (S5), (S10)-(S14), (S22) of `scenes/br
 
 from math import copysign, log, pi, sqrt
 
-from survey.kernels import double as dd
-from survey.kernels import nutation as nu
-from survey.kernels.elliptic import jacobi
 from survey.kernels.jit import inline, kernel
-from survey.kernels.nutation_action import ROUGH, action
-from survey.kernels.nutation_time import motion
-from survey.kernels.third_kind import mean, third, third_double
+from survey.kernels.math import double as dd
+from survey.kernels.math.elliptic import jacobi
+from survey.kernels.math.third_kind import mean, third, third_double
+from survey.kernels.nutation import wells as nu
+from survey.kernels.nutation.action import ROUGH, action
+from survey.kernels.nutation.motion import motion
 
 ORDER = 0  # no steps
 SERVES = ("nutation",)
-EPS = nu.EPS
-CANCELLED = 0.05  # advances that are a smaller part of their terms are computed in double-double
-FINE = 2.0**-94
-CLOSE = 0.1  # poles that are nearer, in units of a well's width, bound rates by nothing
-SLANT = 0.25  # where the line through the roots of Q is lower at the pole, relative, pi is not split off
+_EPS = nu.EPS
+_CANCELLED = 0.05  # advances that are a smaller part of their terms are computed in double-double
+_FINE = 2.0**-94
+_CLOSE = 0.1  # poles that are nearer, in units of a well's width, bound rates by nothing
+_SLANT = 0.25  # where the line through the roots of Q is lower at the pole, relative, pi is not split off
 
 
 @kernel
-def advance(gap, near, far, width, root_near, root_far, incline, q, bend, period, x, y):
+def _advance(gap, near, far, width, root_near, root_far, incline, q, bend, period, x, y):
     """(b -+ a) J/A, J the time integral of 1/(1 -+ u) over half a period (S11), (S13).
 
     As whole multiples of pi, the rest, and the size of its terms.
@@ -33,7 +33,7 @@ def advance(gap, near, far, width, root_near, root_far, incline, q, bend, period
     if gap == 0.0:
         return 0.0, 0.0, 0.0
     line = root_near + incline * near
-    if line <= SLANT * root_near:
+    if line <= _SLANT * root_near:
         p = root_far * sqrt(near / far)
         half = 0.5 * (p + y * y / p)
         ratio = 1.0 + 0.5 * (p - y) * (p + y) / (p * p + y * y) * third(x, y, half * half)
@@ -47,8 +47,8 @@ def advance(gap, near, far, width, root_near, root_far, incline, q, bend, period
 
 
 @kernel
-def fine_part(gap, near, far, root_near, root_far, incline, bend, x, y):
-    """What `advance` splits off pi, times 2 / T, and the mean of x and y: pairs, in double-double."""
+def _fine_part(gap, near, far, root_near, root_far, incline, bend, x, y):
+    """What `_advance` splits off pi, times 2 / T, and the mean of x and y: pairs, in double-double."""
     line = dd.add(root_near, dd.mul(incline, near))
     q = dd.div(dd.mul(gap, gap), dd.mul(near, far))
     ratio = dd.div(y, line)
@@ -59,7 +59,7 @@ def fine_part(gap, near, far, root_near, root_far, incline, bend, x, y):
 
 
 @kernel
-def fine_parts(row):
+def _fine_parts(row):
     """The sum of the parts of both poles and their difference, where one of these is next to nothing (fast spin)."""
     k, total, near, far = nu.pair(row, nu.K), nu.pair(row, nu.SUM), nu.pair(row, nu.Q_HIGH), nu.pair(row, nu.Q_LOW)
     high, low = dd.sqrt(near), dd.sqrt(far)
@@ -74,20 +74,20 @@ def fine_parts(row):
     x, y = dd.sqrt(dd.times(above, 0.5)), dd.sqrt(g)
     plus = nu.pair(row, nu.MINUS), nu.pair(row, nu.HIGH_PLUS), nu.pair(row, nu.LOW_PLUS)
     minus = nu.pair(row, nu.PLUS), nu.pair(row, nu.LOW_MINUS), nu.pair(row, nu.HIGH_MINUS)
-    up, middle = fine_part(*plus, high, low, incline, bend, x, y)
-    down, middle = fine_part(*minus, low, high, dd.neg(incline), bend, x, y)
+    up, middle = _fine_part(*plus, high, low, incline, bend, x, y)
+    down, middle = _fine_part(*minus, low, high, dd.neg(incline), bend, x, y)
     return dd.add(down, up)[0] * (pi / middle[0]), dd.sub(down, up)[0] * (pi / middle[0])
 
 
 @inline
-def shares(x, y):
+def _shares(x, y):
     """What part of relative changes of x and of y, at most, their mean changes by (S23)."""
     least = 1.0 / log(4.0 * max(x, y) / min(x, y))
     return (least, 1.0) if x < y else (1.0, least)
 
 
 @inline
-def rates(row, to_plus, to_minus):
+def _rates(row, to_plus, to_minus):
     """2 psi' and 2 phi' (S4), less the drift, in size, where 1 - u and 1 + u are these."""
     up = row[nu.MINUS] / to_plus if row[nu.MINUS] != 0.0 else 0.0
     down = row[nu.PLUS] / to_minus if row[nu.PLUS] != 0.0 else 0.0
@@ -95,27 +95,27 @@ def rates(row, to_plus, to_minus):
 
 
 @inline
-def blurred(row, roots, up, down, period, x, y):
+def _blurred(row, roots, up, down, period, x, y):
     """What errors of Q at the turning points and of s + g make of precession and spin (S23); of advances up, down."""
-    share, low, high, above = shares(x, y), row[nu.NOISE_LOW], row[nu.NOISE_HIGH], row[nu.NOISE_ABOVE]
+    share, low, high, above = _shares(x, y), row[nu.NOISE_LOW], row[nu.NOISE_HIGH], row[nu.NOISE_ABOVE]
     full, rest, time = abs(up) + abs(down), min(x, y) / max(x, y), 0.5 * period
     if x < y:  # the motion is slow where Q is least
         to_plus = (row[nu.LOW_PLUS] * roots[1] + row[nu.HIGH_PLUS] * roots[0]) / (roots[0] + roots[1])
         to_minus = (row[nu.LOW_MINUS] * roots[1] + row[nu.HIGH_MINUS] * roots[0]) / (roots[0] + roots[1])
-        psi, phi = rates(row, to_plus, to_minus)
+        psi, phi = _rates(row, to_plus, to_minus)
         generic, part = (low + high + rest * above) * full, share[0] * above * time
         return generic + part * psi, generic + part * phi
-    if min(row[nu.HIGH_PLUS], row[nu.LOW_MINUS]) < CLOSE * row[nu.WIDTH]:
+    if min(row[nu.HIGH_PLUS], row[nu.LOW_MINUS]) < _CLOSE * row[nu.WIDTH]:
         generic = (low + high + above) * full
         return generic, generic
     generic, part = (above + rest * (low + high)) * full, share[1] * time
-    psi, phi = rates(row, row[nu.LOW_PLUS], row[nu.LOW_MINUS])
-    other_psi, other_phi = rates(row, row[nu.HIGH_PLUS], row[nu.HIGH_MINUS])
+    psi, phi = _rates(row, row[nu.LOW_PLUS], row[nu.LOW_MINUS])
+    other_psi, other_phi = _rates(row, row[nu.HIGH_PLUS], row[nu.HIGH_MINUS])
     return generic + part * (low * psi + high * other_psi), generic + part * (low * phi + high * other_phi)
 
 
 @inline
-def periods_of(row, out):
+def _periods_of(row, out):
     """T / A, the precession, the spin less a (1/C - 1/A) T, the action, and their bars; of one well."""
     root_low, root_high = sqrt(row[nu.Q_LOW]), sqrt(row[nu.Q_HIGH])
     g = root_low * root_high
@@ -127,25 +127,25 @@ def periods_of(row, out):
     bend = 0.5 * k * row[nu.BEND] / above
     plus = row[nu.MINUS], row[nu.HIGH_PLUS], row[nu.LOW_PLUS]  # what the pole u = 1 asks for
     minus = row[nu.PLUS], row[nu.LOW_MINUS], row[nu.HIGH_MINUS]
-    turns_up, up, size_up = advance(*plus, width, root_high, root_low, incline, row[nu.Q_PLUS], bend, period, x, y)
-    turns_down, down, size_down = advance(
+    turns_up, up, size_up = _advance(*plus, width, root_high, root_low, incline, row[nu.Q_PLUS], bend, period, x, y)
+    turns_down, down, size_down = _advance(
         *minus, width, root_low, root_high, -incline, row[nu.Q_MINUS], bend, period, x, y
     )
     low, high = row[nu.NOISE_LOW], row[nu.NOISE_HIGH]
-    noise, share = low + high + row[nu.NOISE_ABOVE], shares(x, y)
+    noise, share = low + high + row[nu.NOISE_ABOVE], _shares(x, y)
     out[0] = period
-    out[4] = (12.0 * EPS + 0.5 * share[0] * row[nu.NOISE_ABOVE] + 0.25 * share[1] * (low + high)) * period
+    out[4] = (12.0 * _EPS + 0.5 * share[0] * row[nu.NOISE_ABOVE] + 0.25 * share[1] * (low + high)) * period
     total, difference, size = down + up, down - up, size_up + size_down
     roots = root_low, root_high
-    blur_psi, blur_phi = blurred(row, roots, pi * turns_up + up, pi * turns_down + down, period, x, y)
+    blur_psi, blur_phi = _blurred(row, roots, pi * turns_up + up, pi * turns_down + down, period, x, y)
     ends = 4.0 * row[nu.WIDTH] * (row[nu.NOISE_ENDS] + row[nu.NOISE_WIDTH])
-    error, rounding = (24.0 * EPS + ends) * size, 2.0 * EPS
+    error, rounding = (24.0 * _EPS + ends) * size, 2.0 * _EPS
     bare = abs(total) if turns_up + turns_down == 0.0 else abs(difference)  # without multiples of pi
-    if bare < CANCELLED * size and turns_up * turns_down != 0.0:
-        total, difference = fine_parts(row)
-        error, rounding = (FINE + ends) * size, 12.0 * EPS
+    if bare < _CANCELLED * size and turns_up * turns_down != 0.0:
+        total, difference = _fine_parts(row)
+        error, rounding = (_FINE + ends) * size, 12.0 * _EPS
     out[1], out[2] = pi * (turns_down + turns_up) + total, pi * (turns_down - turns_up) + difference
-    turned = 2.0 * EPS * pi
+    turned = 2.0 * _EPS * pi
     out[5] = error + min(4.0 * noise * size, blur_psi) + rounding * abs(total) + turned * abs(turns_down + turns_up)
     out[6] = (
         error + min(4.0 * noise * size, blur_phi) + rounding * abs(difference) + turned * abs(turns_down - turns_up)
@@ -155,7 +155,7 @@ def periods_of(row, out):
     out[3] = (period * (row[nu.LEVEL] + rest) - up - down) / (2.0 * pi)
     size = period * (abs(row[nu.LEVEL]) + abs(rest))
     size += abs(row[nu.MINUS]) * (pi + size_up) + abs(row[nu.PLUS]) * (pi + size_down)
-    out[7] = (24.0 * EPS + 4.0 * noise) * size / (2.0 * pi)
+    out[7] = (24.0 * _EPS + 4.0 * noise) * size / (2.0 * pi)
     if out[7] > ROUGH * abs(out[3]):
         out[3], out[7] = action(row)
 
@@ -165,11 +165,11 @@ def nutation_periods(rows, kinds, tolerance, out):
     """Fill `out` (n, 8) for the wells `rows` (n, SIZE): values, then bars; a well of another kind is left alone."""
     for i in range(len(rows)):
         if kinds[i] >= nu.NUTATION:
-            periods_of(rows[i], out[i])
+            _periods_of(rows[i], out[i])
 
 
 @inline
-def cosine(z, kc, quarter, pairs, last):
+def _cosine(z, kc, quarter, pairs, last):
     """(1 + c)/2, (1 - c)/2 and c = cn z, for z in [0, 2 K]."""
     over = z > quarter
     sn, cn, _dn = jacobi(2.0 * quarter - z if over else z, pairs, last)
@@ -183,4 +183,4 @@ def nutation_motions(rows, kinds, starts, periods, times, out):
     """Fill `out` (n, m, 6): u, psi, phi less the drift, and bars, at `times` (n, m) in units of A."""
     for i in range(len(rows)):
         if kinds[i] >= nu.NUTATION:
-            motion(cosine, rows[i], starts[i], periods[i], times[i], out[i])
+            motion(_cosine, rows[i], starts[i], periods[i], times[i], out[i])

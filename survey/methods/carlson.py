@@ -7,20 +7,20 @@ Source: B. C. Carlson, Numer. Algorithms 10 (1995) 13-26; formulas (S5), (S6), (
 
 from math import cos, hypot, pi, sin, sqrt
 
-from survey.kernels import nutation as nu
-from survey.kernels.carlson import rf_whole, rj, rj_spread
 from survey.kernels.jit import inline, kernel
-from survey.kernels.nutation_action import ROUGH, action
-from survey.kernels.nutation_time import first_kind, motion
+from survey.kernels.math.carlson import rf_whole, rj, rj_spread
+from survey.kernels.nutation import wells as nu
+from survey.kernels.nutation.action import ROUGH, action
+from survey.kernels.nutation.motion import first_kind, motion
 
 ORDER = 0  # no steps
 SERVES = ("nutation",)
-EPS = nu.EPS
-STEPS = 60
+_EPS = nu.EPS
+_STEPS = 60
 
 
 @inline
-def advance(gap, near, far, width, q, time, s, g, spread):
+def _advance(gap, near, far, width, q, time, s, g, spread):
     """(b -+ a) J/A (S6): J has its turning point far from the pole as origin; `time` is R_F."""
     if gap == 0.0:
         return 0.0
@@ -29,32 +29,32 @@ def advance(gap, near, far, width, q, time, s, g, spread):
 
 
 @inline
-def second_kind(first, y, z, g):
+def _second_kind(first, y, z, g):
     """R_G(0, X, Y), g^2 = X Y, from `first` = R_F and the means of sqrt X, sqrt Y, squared (DLMF 19.22.2, 19.21.10)."""
     y, z = max(y, z), min(y, z)
     return (z - 0.5 * g) * first + z * (y - z) / 3.0 * rj(0.0, 0.5 * (y + z), sqrt(y) * sqrt(z), z)
 
 
 @inline
-def periods_of(row, out):
+def _periods_of(row, out):
     """See `agm.periods_of`."""
     width = row[nu.WIDTH]
     low, high = row[nu.Q_LOW], row[nu.Q_HIGH]
     g = sqrt(low) * sqrt(high)
     s, spread, above = row[nu.MIDDLE], nu.spread(row), nu.above(row, g)
     time = rf_whole(above, g)
-    up = advance(row[nu.MINUS], row[nu.HIGH_PLUS], row[nu.LOW_PLUS], width, low, time, s, g, spread)
-    down = advance(row[nu.PLUS], row[nu.LOW_MINUS], row[nu.HIGH_MINUS], width, high, time, s, g, spread)
+    up = _advance(row[nu.MINUS], row[nu.HIGH_PLUS], row[nu.LOW_PLUS], width, low, time, s, g, spread)
+    down = _advance(row[nu.PLUS], row[nu.LOW_MINUS], row[nu.HIGH_MINUS], width, high, time, s, g, spread)
     noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + row[nu.NOISE_ABOVE]
     out[0], out[1], out[2] = 4.0 * time, up + down, down - up
-    out[4] = (32.0 * EPS + noise) * out[0]
+    out[4] = (32.0 * _EPS + noise) * out[0]
     # here, other than in agm, advances know the distances from poles by these alone
     noise += 0.5 * row[nu.NOISE_ENDS]
-    out[5] = out[6] = (48.0 * EPS + 4.0 * noise) * (abs(up) + abs(down))
-    square = second_kind(time, 0.5 * above, g, g)
+    out[5] = out[6] = (48.0 * _EPS + 4.0 * noise) * (abs(up) + abs(down))
+    square = _second_kind(time, 0.5 * above, g, g)
     parts = out[0] * row[nu.LEVEL], 4.0 * square, row[nu.MINUS] * up, row[nu.PLUS] * down
     out[3] = (parts[0] + parts[1] - parts[2] - parts[3]) / (2.0 * pi)
-    out[7] = (48.0 * EPS + 4.0 * noise) * (abs(parts[0]) + parts[1] + abs(parts[2]) + abs(parts[3])) / (2.0 * pi)
+    out[7] = (48.0 * _EPS + 4.0 * noise) * (abs(parts[0]) + parts[1] + abs(parts[2]) + abs(parts[3])) / (2.0 * pi)
     if out[7] > ROUGH * abs(out[3]):
         out[3], out[7] = action(row)
 
@@ -64,11 +64,11 @@ def nutation_periods(rows, kinds, tolerance, out):
     """See `agm.nutation_periods`."""
     for i in range(len(rows)):
         if kinds[i] >= nu.NUTATION:
-            periods_of(rows[i], out[i])
+            _periods_of(rows[i], out[i])
 
 
 @inline
-def cosine(z, kc, quarter, pairs, last):
+def _cosine(z, kc, quarter, pairs, last):
     """As `agm.cosine`: F(chi) = z by Newton's method, from the side where F, convex or concave, lets it be monotone.
 
     chi and pi/2 - chi, each with all its digits: next to a separatrix c = cos chi is as small as k'.
@@ -77,7 +77,7 @@ def cosine(z, kc, quarter, pairs, last):
     z = 2.0 * quarter - z if over else z
     chi = min(z, 0.5 * pi)
     rest = 0.5 * pi - chi
-    for _ in range(STEPS):
+    for _ in range(_STEPS):
         sine, c = (cos(rest), sin(rest)) if rest < chi else (sin(chi), cos(chi))
         delta = hypot(c, kc * sine)
         move = (first_kind(sine, c, kc) - z) * delta
@@ -95,4 +95,4 @@ def nutation_motions(rows, kinds, starts, periods, times, out):
     """See `agm.nutation_motions`."""
     for i in range(len(rows)):
         if kinds[i] >= nu.NUTATION:
-            motion(cosine, rows[i], starts[i], periods[i], times[i], out[i])
+            motion(_cosine, rows[i], starts[i], periods[i], times[i], out[i])

@@ -11,20 +11,20 @@ from math import atan2, cos, exp, inf, log1p, pi, sin, sqrt
 
 import numpy as np
 
-from survey.kernels import nutation as nu
-from survey.kernels.double import two_sum
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math.double import two_sum
+from survey.kernels.nutation import wells as nu
 
 ORDER = 0  # no steps: convergence is exponential
 SERVES = ("nutation",)
-EPS = nu.EPS
-FIRST, MOST = 8, 2**15
-LONGEST = 512  # terms of the series in time
-FULL = 38.0  # the first neglected coefficient is exp(-FULL)
+_EPS = nu.EPS
+_FIRST, _MOST = 8, 2**15
+_LONGEST = 512  # terms of the series in time
+_FULL = 38.0  # the first neglected coefficient is exp(-FULL)
 
 
 @inline
-def rate(row):
+def _rate(row):
     """Logarithm of the sum of the half axes of the ellipse about [ul, uh], scaled to [-1, 1], without singularities."""
     width, total, k, bend = row[nu.WIDTH], row[nu.SUM], row[nu.K], row[nu.BEND]
     if width <= 0.0:
@@ -48,13 +48,13 @@ def rate(row):
 
 
 @inline
-def gathered(total, term):
+def _gathered(total, term):
     high, low = two_sum(total[0], term)
     return high, total[1] + low
 
 
 @inline
-def sums(row, n, out):
+def _sums(row, n, out):
     """T/A, the halves of the advances, the action, and the rounding of Q relative to it, by n nodes in x = 0..pi."""
     low, high, bow = row[nu.Q_LOW], row[nu.Q_HIGH], row[nu.K] * row[nu.WIDTH] ** 2
     minus, plus = row[nu.MINUS], row[nu.PLUS]
@@ -68,10 +68,10 @@ def sums(row, n, out):
         root = sqrt(square)
         to_plus = row[nu.LOW_PLUS] * s + row[nu.HIGH_PLUS] * c
         to_minus = row[nu.LOW_MINUS] * s + row[nu.HIGH_MINUS] * c
-        time = gathered(time, 1.0 / root)
-        up = gathered(up, 1.0 / (to_plus * root) if minus != 0.0 else 0.0)
-        down = gathered(down, 1.0 / (to_minus * root) if plus != 0.0 else 0.0)
-        action = gathered(action, s * c * root / (to_plus * to_minus))
+        time = _gathered(time, 1.0 / root)
+        up = _gathered(up, 1.0 / (to_plus * root) if minus != 0.0 else 0.0)
+        down = _gathered(down, 1.0 / (to_minus * root) if plus != 0.0 else 0.0)
+        action = _gathered(action, s * c * root / (to_plus * to_minus))
         rough = max(rough, (low * s + high * c + abs(bow) * s * c) / square)
     step = pi / n
     out[0], out[1], out[2] = (
@@ -83,11 +83,11 @@ def sums(row, n, out):
 
 
 @inline
-def periods_of(row, n, speed, half, whole, out):
+def _periods_of(row, n, speed, half, whole, out):
     """See `agm.periods_of`; the error of n nodes follows from the difference to half of them."""
-    sums(row, n // 2, half)
-    sums(row, n, whole)
-    noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + 16.0 * EPS * whole[4]
+    _sums(row, n // 2, half)
+    _sums(row, n, whole)
+    noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + 16.0 * _EPS * whole[4]
     seen, missed = exp(-speed * n), exp(-2.0 * speed * n)
     for i in range(4):
         half[i] = 10.0 * (abs(whole[i] - half[i]) * seen + abs(whole[i]) * missed) + noise * abs(whole[i])
@@ -104,16 +104,16 @@ def nutation_periods(rows, kinds, tolerance, out):
     half, whole = np.empty(5), np.empty(5)
     for i in range(len(rows)):
         if kinds[i] >= nu.NUTATION:
-            speed = rate(rows[i])
-            n = FIRST
-            while 2.0 * n * speed < FULL and n <= MOST:
+            speed = _rate(rows[i])
+            n = _FIRST
+            while 2.0 * n * speed < _FULL and n <= _MOST:
                 n *= 2
-            if n <= MOST:
-                periods_of(rows[i], n, speed, half, whole, out[i])
+            if n <= _MOST:
+                _periods_of(rows[i], n, speed, half, whole, out[i])
 
 
 @inline
-def integrands(row, x, out):
+def _integrands(row, x, out):
     """dt/dx / A at u = ul + (uh - ul) sin^2(x/2), the rates of both angles, u and Q."""
     s, c = sin(0.5 * x) ** 2, cos(0.5 * x) ** 2
     q = row[nu.Q_LOW] * c + row[nu.Q_HIGH] * s - row[nu.K] * row[nu.WIDTH] ** 2 * s * c
@@ -126,12 +126,12 @@ def integrands(row, x, out):
 
 
 @inline
-def series(row, n, waves, value):
+def _series(row, n, waves, value):
     """Coefficients of the integrals from 0 to x: waves[:, 0] x + sum of waves[:, j] sin j x."""
     waves[:, :n] = 0.0
     for i in range(n):
         x = (i + 0.5) * pi / n
-        integrands(row, x, value)
+        _integrands(row, x, value)
         for j in range(n):
             wave = cos(j * x) * (2.0 / n if j else 1.0 / n) / (j if j else 1.0)
             for m in range(3):
@@ -139,7 +139,7 @@ def series(row, n, waves, value):
 
 
 @inline
-def integrals(waves, n, x, out):
+def _integrals(waves, n, x, out):
     """t/A and both angles at x in [0, pi] since u = ul."""
     for m in range(3):
         total = 0.0
@@ -149,34 +149,34 @@ def integrals(waves, n, x, out):
 
 
 @inline
-def when(row, waves, n, time, value, out):
-    """x at which `time` is reached, by Newton's method between brackets; `out` as `integrals`."""
+def _when(row, waves, n, time, value, out):
+    """x at which `time` is reached, by Newton's method between brackets; `out` as `_integrals`."""
     low, high = 0.0, pi
     x = pi * time / (pi * waves[0, 0])
     for _ in range(100):
-        integrals(waves, n, x, out)
-        integrands(row, x, value)
+        _integrals(waves, n, x, out)
+        _integrands(row, x, value)
         move = (out[0] - time) / value[0]
         low, high = (low, x) if move > 0.0 else (x, high)
         new = x - move
         if not low <= new <= high:
             new = 0.5 * (low + high)
-        if abs(new - x) <= 4.0 * EPS * x:
+        if abs(new - x) <= 4.0 * _EPS * x:
             break
         x = new
     return x
 
 
 @inline
-def motion(row, start, n, noise, times, waves, out):
-    """See `nutation_time.motion`."""
+def _motion(row, start, n, noise, times, waves, out):
+    """See `kernels.nutation.motion.motion`."""
     value, here = np.empty(5), np.empty(3)
-    series(row, n, waves, value)
+    _series(row, n, waves, value)
     half = pi * waves[0, 0]
     size = pi * (abs(waves[1, 0]) + abs(waves[2, 0]))
     x = 2.0 * atan2(sqrt(start[0]), sqrt(start[1]))
-    integrals(waves, n, x, here)
-    integrands(row, x, value)
+    _integrals(waves, n, x, here)
+    _integrands(row, x, value)
     early = start[3] * value[0] / max(row[nu.WIDTH] * abs(sin(0.5 * x) * cos(0.5 * x)), nu.TINY)
     first_up, first_down = value[1] / value[0], value[2] / value[0]
     first, base_up, base_down = start[2] * here[0], start[2] * here[1], start[2] * here[2]
@@ -184,8 +184,8 @@ def motion(row, start, n, noise, times, waves, out):
         turns = np.floor((first + times[j]) / (2.0 * half) + 0.5)
         time = first + times[j] - turns * 2.0 * half
         side = 1.0 if time >= 0.0 else -1.0
-        x = when(row, waves, n, min(abs(time), half), value, here)
-        integrands(row, x, value)
+        x = _when(row, waves, n, min(abs(time), half), value, here)
+        _integrands(row, x, value)
         up = side * here[1] - base_up + 2.0 * pi * turns * waves[1, 0]
         down = side * here[2] - base_down + 2.0 * pi * turns * waves[2, 0]
         late = 2.0 * noise * (abs(times[j]) + half)
@@ -198,20 +198,20 @@ def motion(row, start, n, noise, times, waves, out):
         moved = (abs(rate_up) + abs(rate_down)) * late + (abs(rate_up - first_up) + abs(rate_down - first_down)) * early
         late += early
         out[j, 0], out[j, 1], out[j, 2] = value[3], up + down, down - up
-        out[j, 3] = speed * late + bend * late * late + 3.0 * (row[nu.BAR_LOW] + row[nu.BAR_HIGH]) + 8.0 * EPS * wide
+        out[j, 3] = speed * late + bend * late * late + 3.0 * (row[nu.BAR_LOW] + row[nu.BAR_HIGH]) + 8.0 * _EPS * wide
         out[j, 4] = out[j, 5] = moved + 2.0 * noise * (1.0 + abs(turns)) * 2.0 * size
 
 
 @kernel
 def nutation_motions(rows, kinds, starts, periods, times, out):
     """See `agm.nutation_motions`; by Fourier series of the integrals, of at most LONGEST terms."""
-    waves = np.empty((3, LONGEST))
+    waves = np.empty((3, _LONGEST))
     for i in range(len(rows)):
         if kinds[i] >= nu.NUTATION:
-            speed = rate(rows[i])
-            n = FIRST
-            while 2.0 * n * speed < 2.0 * FULL and n <= LONGEST:
+            speed = _rate(rows[i])
+            n = _FIRST
+            while 2.0 * n * speed < 2.0 * _FULL and n <= _LONGEST:
                 n *= 2
-            if n <= LONGEST:
-                noise = periods[i, 4] / periods[i, 0] + 4.0 * EPS * n
-                motion(rows[i], starts[i], n, noise, times[i], waves, out[i])
+            if n <= _LONGEST:
+                noise = periods[i, 4] / periods[i, 0] + 4.0 * _EPS * n
+                _motion(rows[i], starts[i], n, noise, times[i], waves, out[i])

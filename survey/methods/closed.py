@@ -10,11 +10,11 @@ import math
 
 import numpy as np
 
-from survey.kernels import closed, trigonometric, weierstrass
-from survey.kernels.along import EQUILIBRIUM, NO_CONVERGENCE, OK, TRUST, TURNING, finite
-from survey.kernels.flow import UNIT
+from survey.kernels.cylinder import closed, trigonometric, weierstrass
+from survey.kernels.cylinder.along import EQUILIBRIUM, NO_CONVERGENCE, OK, TRUST, TURNING, finite
+from survey.kernels.cylinder.flow import UNIT
+from survey.kernels.cylinder.weierstrass import BAR_W, BAR_X, COUNT, LANES, W, X
 from survey.kernels.jit import inline, kernel
-from survey.kernels.weierstrass import BAR_W, BAR_X, COUNT, LANES, W, X
 
 ORDER = 0  # no steps
 SERVES = ("cylinder",)
@@ -22,7 +22,7 @@ WHEN = {"question": ("trajectory", "abel")}
 COST = {"cylinder": 0.2}  # time, relative to the default method
 FLOW_FINEST = 1.0  # nothing to refine
 FLOW_WORK = 1
-NO_FORM = 19  # as in the STATUS of scenes/gyrostat.py
+_NO_FORM = 19  # as in the STATUS of scenes/gyrostat.py
 
 
 def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
@@ -40,7 +40,7 @@ def _sort(P, starts, times, forms, curves, floats, turnings, status):
     """Fill `forms` (as times) with the closed form that is to be evaluated there, curves with its mu and 1 - mu."""
     for i in range(len(P)):
         kind, curves[i, 0], curves[i, 1] = closed.applies(P[i], starts[i, 0], starts[i, 1])
-        status[i] = NO_FORM if kind == closed.NONE else NO_CONVERGENCE
+        status[i] = _NO_FORM if kind == closed.NONE else NO_CONVERGENCE
         for j in range(finite(times[i]) if kind != closed.NONE else 0):
             if times[i, j] != 0.0:
                 forms[i, j] = kind
@@ -98,7 +98,7 @@ def flow_abels(P, starts, targets, tolerance, limit, floats, status):
         for j in range(finite(targets[i])):
             out, x = floats[i, j], targets[i, j] - phi0
             if kind == closed.NONE or kind == closed.LOST:
-                status[i, j] = NO_FORM if kind == closed.NONE else NO_CONVERGENCE
+                status[i, j] = _NO_FORM if kind == closed.NONE else NO_CONVERGENCE
             elif x == 0.0:
                 out[0], out[1], out[2], out[3], status[i, j] = w0, 0.0, 0.0, 0.0, OK
             elif kind == closed.TRIGONOMETRIC:

@@ -11,13 +11,27 @@ import math
 
 import numpy as np
 
-from survey.kernels import along, danby, fate, returns
-from survey.kernels.danby import COLUMN, COLUMNS
-from survey.kernels.dop853 import E3, E5, STAGES, A, B, C
-from survey.kernels.flow import BOUND_DG, BOUND_F, LAST, LOW, PHI, STEP, TRUNC_PHI, TRUNC_W, WEIGHT, W, series, values
+from survey.kernels.cylinder import along, fate, returns
+from survey.kernels.cylinder.flow import (
+    BOUND_DG,
+    BOUND_F,
+    LAST,
+    LOW,
+    PHI,
+    STEP,
+    TRUNC_PHI,
+    TRUNC_W,
+    WEIGHT,
+    W,
+    series,
+    values,
+)
+from survey.kernels.hill.matrix import rounding
 from survey.kernels.jit import inline, kernel
 from survey.kernels.lanes import bars, column, relative
-from survey.kernels.matrix import rounding
+from survey.kernels.libration import danby
+from survey.kernels.libration.danby import COLUMN, COLUMNS
+from survey.kernels.math.dop853 import E3, E5, STAGES, A, B, C
 
 ORDER = 8
 SERVES = ("cylinder", "danby", "hill")
@@ -28,12 +42,12 @@ _FIRST = LOW + 1  # stages lie in the lines of the table after the low series
 ADAPTIVE = True
 NODES = tuple(C[:STAGES])
 _WEIGHT = float(np.abs(B).sum())  # 12.9: some of B are negative
-SMALLEST, LARGEST = 0.2, 5.0
+_SMALLEST, _LARGEST = 0.2, 5.0
 # Zeros are counted by signs at the ends of steps: a step stays below this many radians of the fastest phase.
-LONGEST = 2.0
-STEP_LIMIT = 200_000
-DOUBT = 0.01
-OTHER = 0.3
+_LONGEST = 2.0
+_STEP_LIMIT = 200_000
+_DOUBT = 0.01
+_OTHER = 0.3
 
 
 @inline
@@ -51,7 +65,7 @@ def hill_step(z, h, slopes):
     for i in range(STAGES):
         size = max(size, abs(z[i]))
     # an error of order h^9 is (h sqrt z)^3 of the estimate of order h^6
-    doubt = DOUBT * (h * np.sqrt(size)) ** 3
+    doubt = _DOUBT * (h * np.sqrt(size)) ** 3
     p11, d11 = _sums(1.0, h, slopes[0], doubt)
     p21, d21 = _sums(0.0, h, slopes[1], doubt)
     p12, d12 = _sums(0.0, h, slopes[2], doubt)
@@ -97,7 +111,7 @@ def hill_walk_pieces(potential, p, row, table, edges, slack, longest, tolerance,
     y1, v1, s1, t1, w1 = 1.0, 0.0, 0.0, 0.0, 0.0
     y2, v2, s2, t2, w2 = 0.0, 1.0, 0.0, 0.0, 0.0
     zeros1, zeros2, total = 0.0, 0.0, 0.0
-    for _ in range(STEP_LIMIT):
+    for _ in range(_STEP_LIMIT):
         final = t + 1.01 * h >= edges[place]
         if final:
             h = edges[place] - t
@@ -109,7 +123,7 @@ def hill_walk_pieces(potential, p, row, table, edges, slack, longest, tolerance,
         wave = np.sqrt(size) + 1e-3
         p11, p12, p21, p22, d11, d12, d21 = hill_step(z, h, slopes)
         error = d11  # all four entries speak in it
-        if error <= tolerance and h * wave <= 1.01 * LONGEST:
+        if error <= tolerance and h * wave <= 1.01 * _LONGEST:
             # The stages pass through sums of size 60 that cancel; t itself is rounded.
             r11, r12, r21 = rounding(terms, 8.0 * h)
             matrix = (p11, p12, p21, p22, d11 + 2.0 * r11, d12 + r12, d21 + r21)
@@ -129,8 +143,8 @@ def hill_walk_pieces(potential, p, row, table, edges, slack, longest, tolerance,
                 return True
         elif not error >= 0.0:
             return False
-        h *= min(LARGEST, max(SMALLEST, 0.9 * (tolerance / (error + 1e-300)) ** 0.125))
-        h = min(h, longest, LONGEST / wave)
+        h *= min(_LARGEST, max(_SMALLEST, 0.9 * (tolerance / (error + 1e-300)) ** 0.125))
+        h = min(h, longest, _LONGEST / wave)
     return False
 
 
@@ -180,10 +194,10 @@ def flow_begin(p, phi, w, tolerance, T):
     h = T[LAST, STEP] if T[LAST, STEP] > 0.0 else 0.1 / rate
     for _ in range(50):
         _x, w1, _e, _y = flow_at(p, T, h)
-        doubt, speed = 8.0 * DOUBT * (h * rate) ** 3, max(rate, 1.0 / h)
+        doubt, speed = 8.0 * _DOUBT * (h * rate) ** 3, max(rate, 1.0 / h)
         dphi, dw = _flow_estimate(T, h, PHI, doubt), _flow_estimate(T, h, W, doubt)
         # where the motion starts at rest, one of the two may vanish by symmetry: each speaks for both, less loudly
-        dphi, dw = max(dphi, OTHER * dw / speed), max(dw, OTHER * dphi * speed)
+        dphi, dw = max(dphi, _OTHER * dw / speed), max(dw, _OTHER * dphi * speed)
         error = max(dphi, dw / (1.0 + abs(w))) / tolerance
         factor = min(max(0.9 * (error + 1e-30) ** -0.125, 0.2), 4.0)
         if error <= 1.0:
@@ -261,7 +275,7 @@ def _danby_step(e, d1, d2, angle, h, slopes, state, work):
                 third += E3[j] * slope
             # an error of order h^9 is h^3 of the estimate of order h^6
             local = abs(h) * (fifth * fifth / (math.sqrt(fifth * fifth + 0.01 * third * third) + 1e-300))
-            error = max(error, local + abs(h) ** 4 * DOUBT * abs(fifth))
+            error = max(error, local + abs(h) ** 4 * _DOUBT * abs(fifth))
             size += abs(value)
             work[one + i, 0], work[one + 4 + i, 0] = value, 1.0 if i == c else 0.0
         worst = max(worst, error)
@@ -272,12 +286,12 @@ def _danby_step(e, d1, d2, angle, h, slopes, state, work):
 
 @kernel
 def danby_walk(e, d1, d2, tolerance, out):
-    """Points (N each), each with its tolerance, in steps of the eccentric anomaly; see `kernels.danby.chain`."""
+    """Points (N each), each with its tolerance, in steps of the eccentric anomaly; see `chain`."""
     work, slopes, state = np.empty((danby.OWN, 1)), np.empty((STAGES, 16)), np.empty(16)
     for i in range(len(e)):
         danby.start(work, 1)
         angle, h, steps = 0.0, 0.1 * math.sqrt(1.0 - e[i]), 0
-        for _ in range(STEP_LIMIT):
+        for _ in range(_STEP_LIMIT):
             last = angle + 1.01 * h >= math.pi
             h = math.pi - angle if last else h
             error = _danby_step(e[i], d1[i], d2[i], angle, h, slopes, state, work)
@@ -286,7 +300,7 @@ def danby_walk(e, d1, d2, tolerance, out):
                 angle, steps = angle + h, steps + 1
                 if last:
                     break
-            h *= min(LARGEST, max(SMALLEST, 0.9 * (tolerance[i] / (error + 1e-300)) ** 0.125))
+            h *= min(_LARGEST, max(_SMALLEST, 0.9 * (tolerance[i] / (error + 1e-300)) ** 0.125))
             h = min(h, 1.0)
         danby.finish(work, 0, steps, out[i])
         if not last:

@@ -1,6 +1,7 @@
 """The six equations (1)-(6) of a gyrostat whose invariant set is the scene, in a rotated body frame: an audit.
 
-Builds A, B, C, s, lambda from the reduced parameters, what these leave free being generic (`kernels/gyrostat.py`),
+Builds A, B, C, s, lambda from the reduced parameters, what these leave free being generic
+(`kernels/cylinder/gyrostat.py`),
 and knows nothing of the set: its bars hold the growth of deviations from it. Taylor series of order 20. Domain:
 trajectories whose set is not strongly unstable.
 """
@@ -9,9 +10,19 @@ import math
 
 import numpy as np
 
-from survey.kernels import gyrostat
-from survey.kernels.along import NO_CONVERGENCE, OK, OVERFLOW, STEP_LIMIT, TRUST, UNTOLD, bar, finite, start_sign
-from survey.kernels.flow import LOW, TWO_PI, TWO_PI_LOW, UNIT, longest_step, reduced
+from survey.kernels.cylinder import gyrostat
+from survey.kernels.cylinder.along import (
+    NO_CONVERGENCE,
+    OK,
+    OVERFLOW,
+    STEP_LIMIT,
+    TRUST,
+    UNTOLD,
+    bar,
+    finite,
+    start_sign,
+)
+from survey.kernels.cylinder.flow import LOW, TWO_PI, TWO_PI_LOW, UNIT, longest_step, reduced
 from survey.kernels.jit import kernel
 
 ORDER = gyrostat.ORDER
@@ -25,7 +36,7 @@ _FIRST = 4.0 * UNIT  # rounding of the initial state in the rotated frame
 
 
 @kernel
-def read(state, squares, n, near, out):
+def _read(state, squares, n, near, out):
     """out = phi next to `near`, w = phi', and their bars, of a state and its error ellipse after n steps."""
     frame = gyrostat.FRAME
     w = s = c = 0.0
@@ -46,7 +57,7 @@ def read(state, squares, n, near, out):
 
 
 @kernel
-def trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
+def _trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
     """As `along.trajectory`, by the full equations."""
     free, G, squares, axis = np.empty(8), np.empty((14, 3)), np.zeros((6, 6)), gyrostat.FRAME[:, 0].copy()
     T, V = np.zeros((gyrostat.LAST + 1, 12)), np.zeros((LOW + 1, 6, 12))
@@ -73,7 +84,7 @@ def trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
                 for k in range(6):
                     there[i, k] = squares[i, k]
             gyrostat.carry(G, T, V, dt, there, J, work)
-            read(new, there, n, phi + gyrostat.angle(T, dt, axis), here)
+            _read(new, there, n, phi + gyrostat.angle(T, dt, axis), here)
             if not (here[2] < TRUST and here[3] < TRUST * (1.0 + abs(here[1]))):
                 return NO_CONVERGENCE
             floats[j, 0], floats[j, 1] = (here[0] + before * TWO_PI_LOW) + before * TWO_PI, here[1]
@@ -84,7 +95,7 @@ def trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
             j += 1
         gyrostat.at(T, h, new)
         gyrostat.carry(G, T, V, h, squares, J, work)
-        read(new, squares, n, phi + gyrostat.angle(T, h, axis), here)
+        _read(new, squares, n, phi + gyrostat.angle(T, h, axis), here)
         state, new = new, state
         phi, w = here[0], here[1]
         high = t + h
@@ -107,5 +118,5 @@ def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, stat
     """See `along.trajectories`."""
     for i in range(len(P)):
         size = finite(times[i])
-        status[i] = trajectory(P[i], starts[i, 0], starts[i, 1], times[i, :size], tolerance, limit, floats[i],
+        status[i] = _trajectory(P[i], starts[i, 0], starts[i, 1], times[i, :size], tolerance, limit, floats[i],
                                turnings[i])  # fmt: skip

@@ -1,17 +1,17 @@
 """Lie series at L4: the Birkhoff normal form of any even order, from the Taylor expansion of the Hamiltonian.
 
 Independent of the closed forms, and not bound to their orders 4 and 6; what the normalisation leaves: `remainders`.
-Bars: running error analysis (`kernels/lie.py`). Domain: 0 < mu < mu_R - 4e-15; NaN outside, and where a divisor of a
-generator is below 1e-12.
+Bars: running error analysis (`kernels/libration/lie.py`). Domain: 0 < mu < mu_R - 4e-15; NaN outside, and where a
+divisor of a generator is below 1e-12.
 
-Source: A. P. Markeev, Libration Points (1978), ch. 8; algorithm: `kernels/lie_plan.py`.
+Source: A. P. Markeev, Libration Points (1978), ch. 8; algorithm: `kernels/libration/lie_plan.py`.
 """
 
 import numpy as np
 
-from survey.kernels.lie import normal_forms
-from survey.kernels.lie_plan import plan
-from survey.kernels.monomials import monomials
+from survey.kernels.libration.lie import normal_forms
+from survey.kernels.libration.lie_plan import plan
+from survey.kernels.libration.monomials import monomials
 
 ORDER = 0  # no steps: each order's sum is finite
 SERVES = ("normal_form",)
@@ -19,7 +19,7 @@ SERVES = ("normal_form",)
 
 def coefficients(mu, order):
     """Values and bars (M, N) of the M coefficients named by `labels(order)`, any even order >= 4, at N values of mu."""
-    values, _norms = solve(mu, order)
+    values, _norms = _solve(mu, order)
     return values[0], values[2]
 
 
@@ -39,12 +39,12 @@ def remainders(mu, order):
     The norm for r_j is the sum over monomials of |k_j| |coefficient|, so that these terms change r_j by at most
     norm rho^d per unit of time where all |z_j| <= rho, r_j = |z_j|^2. r = 2: before the first step.
     """
-    _values, norms = solve(mu, order, True)
+    _values, norms = _solve(mu, order, True)
     return dict(zip(plan(order, True).measured, norms, strict=True))
 
 
-def solve(mu, order, remainders=False):
-    """(values (3, M, N), norms (., 2, 3, N)) as `kernels.lie.normal_forms` gives them."""
+def _solve(mu, order, remainders=False):
+    """(values (3, M, N), norms (., 2, 3, N)) as `kernels.libration.lie.normal_forms` gives them."""
     what, mu = plan(order, remainders), np.ascontiguousarray(mu, dtype=float)
     values, norms = np.empty((3, len(what.diagonal), mu.size)), np.empty((len(what.measured), 2, 3, mu.size))
     normal_forms(*what[:6], mu, values, norms)

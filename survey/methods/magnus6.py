@@ -8,9 +8,9 @@ Source: S. Blanes, F. Casas, J. A. Oteo, J. Ros, Physics Reports 470 (2009) 151-
 
 from math import sqrt
 
+from survey.kernels.hill.matrix import doubled, exponential, samples_only
 from survey.kernels.jit import inline, kernel
 from survey.kernels.lanes import chain, scatter
-from survey.kernels.matrix import doubled, samples_only
 
 ORDER = 6
 SERVES = ("hill",)
@@ -26,24 +26,6 @@ def hill_density(rtol):
     """Steps per radian of the fastest phase, and per distance to the nearest singularity of z, for accuracy rtol."""
     scale = max(rtol, 1e-13) ** (-1 / ORDER)
     return 0.15 * scale, 0.55 * scale
-
-
-@inline
-def exponential(x, y, z):
-    """exp of the traceless matrix (x, y; z, -x): branch-free, to rounding for |x^2 + y z| <= 16.
-
-    cosh and sinh(r)/r of r = sqrt(delta) are entire in delta: series at delta/16, then twice the doubling rules,
-    in e = cosh - 1 and s = sinh(r)/r, which lose no digits.
-    """
-    delta = x * x + y * z
-    d = delta * 0.0625
-    e = 1 + d * (1 / 90) * (1 + d * (1 / 132) * (1 + d * (1 / 182) * (1 + d * (1 / 240))))
-    e = d * (1 / 2) * (1 + d * (1 / 12) * (1 + d * (1 / 30) * (1 + d * (1 / 56) * e)))
-    s = 1 + d * (1 / 110) * (1 + d * (1 / 156) * (1 + d * (1 / 210) * (1 + d * (1 / 272))))
-    s = 1 + d * (1 / 6) * (1 + d * (1 / 20) * (1 + d * (1 / 42) * (1 + d * (1 / 72) * s)))
-    s, e = s * (1 + e), 2 * e * (e + 2)
-    s, e = s * (1 + e), 2 * e * (e + 2)
-    return 1 + e + s * x, s * y, s * z, 1 + e - s * x
 
 
 @inline

@@ -5,14 +5,11 @@ Domain: 0 < mu < mu_R, every mu that is a float64, those next to the resonances 
 rational reconstruction (`scenes/libration.md`, section 3).
 """
 
-import numpy as np
-
-from survey.kernels.libration import closed_forms
-from survey.kernels.libration_forms import LABELS, NAMES
+from survey.kernels.libration.closed_forms import ROWS, closed_forms, tabulate
+from survey.kernels.libration.coefficients import NAMES
 
 ORDER = 0  # no truncation
 SERVES = ("normal_form",)
-ROWS = {4: 6, 6: len(LABELS)}
 
 
 def coefficients(mu, order):
@@ -26,10 +23,3 @@ def coefficients(mu, order):
 def combined(mu):
     """All coefficients, then a20, a11, a02, D4 and D6: in closed form too, so that nothing cancels."""
     return tabulate(closed_forms, mu, len(NAMES))
-
-
-def tabulate(kernel, mu, rows):
-    """The first rows of the table of closed forms, and their bars."""
-    values, bars = np.empty((rows, mu.size)), np.empty((rows, mu.size))
-    kernel(mu, values, bars)
-    return values, bars

@@ -3,9 +3,8 @@
 Domain and sources: those of `rational`. It decides next to the critical values, where float64's bars do not.
 """
 
-from survey.kernels.libration import closed_forms_double
-from survey.kernels.libration_forms import NAMES
-from survey.methods.rational import ROWS, tabulate
+from survey.kernels.libration.closed_forms import ROWS, closed_forms_double, tabulate
+from survey.kernels.libration.coefficients import NAMES
 
 ORDER = 0  # no truncation
 SERVES = ("normal_form",)

@@ -10,12 +10,25 @@ import math
 
 import numpy as np
 
-from survey.kernels import along, danby, fate, returns
-from survey.kernels.danby import D1, D2, OWN, E, copy
-from survey.kernels.flow import BOUND_DG, BOUND_F, LAST, LOW, PHI, TRUNC_PHI, TRUNC_W, WEIGHT, W, series, values
+from survey.kernels.cylinder import along, fate, returns
+from survey.kernels.cylinder.flow import (
+    BOUND_DG,
+    BOUND_F,
+    LAST,
+    LOW,
+    PHI,
+    TRUNC_PHI,
+    TRUNC_W,
+    WEIGHT,
+    W,
+    series,
+    values,
+)
+from survey.kernels.hill.matrix import doubled, samples_only
 from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.lanes import chain, scatter
-from survey.kernels.matrix import doubled, samples_only
+from survey.kernels.libration import danby
+from survey.kernels.libration.danby import D1, D2, OWN, E, copy
 
 ORDER = 4
 SERVES = ("cylinder", "danby", "hill")
@@ -154,7 +167,7 @@ def flow_fates(p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance
     )
 
 
-ENDS = OWN + len(NODES)
+_ENDS = OWN + len(NODES)
 
 
 def danby_steps(e, rtol):
@@ -187,7 +200,7 @@ def _danby_step(r0, r1, r2, h, d1, d2, x, q, p, m):
 
 @splice
 def danby_columns(v, h, work, count):
-    """See `kernels.danby.chain`: two half steps, and their error by Richardson with a margin of 2."""
+    """See `kernels.libration.danby.chain`: two half steps, and their error by Richardson with a margin of 2."""
     for j in range(len(NODES)):
         for i in range(count):
             e = work[E, i]
@@ -200,13 +213,13 @@ def danby_columns(v, h, work, count):
             x1, q1, p1, m1 = _danby_step(r0, r1, r2, 0.5 * h, d1, d2, x, q, p, m)
             x1, q1, p1, m1 = _danby_step(r2, r3, r4, 0.5 * h, d1, d2, x1, q1, p1, m1)
             x2, q2, p2, m2 = _danby_step(r0, r2, r4, h, d1, d2, x, q, p, m)
-            work[ENDS, i], work[ENDS + 1, i], work[ENDS + 2, i], work[ENDS + 3, i] = x1, q1, p1, m1
+            work[_ENDS, i], work[_ENDS + 1, i], work[_ENDS + 2, i], work[_ENDS + 3, i] = x1, q1, p1, m1
             error = max(max(abs(x1 - x2), abs(q1 - q2)), max(abs(p1 - p2), abs(m1 - m2)))
-            work[ENDS + 4, i] = error * (2.0 / 15.0)
-        copy(work, ENDS, c, count)
+            work[_ENDS + 4, i] = error * (2.0 / 15.0)
+        copy(work, _ENDS, c, count)
 
 
 @kernel
 def danby_chain(v, h, e, d1, d2, out):
-    """See `kernels.danby.chain`."""
+    """See `kernels.libration.danby.chain`."""
     danby.chain(danby_columns, len(NODES) + 5, v, h, e, d1, d2, out)

@@ -1,20 +1,20 @@
 """Taylor series in t with variable steps and dense output, for flows on the cylinder: the default.
 
-Order 20; the coefficients come from recurrences (`kernels/flow.py`). Step size after A. Jorba and M. Zou, "A
+Order 20; the coefficients come from recurrences (`kernels/cylinder/flow.py`). Step size after A. Jorba and M. Zou, "A
 software package for the numerical integration of ODEs by means of high-order Taylor methods", Experimental
 Mathematics 14 (2005) 99-117. Domain: every parameter value; explicit, so steps shrink as 1/|b| on stiff systems.
 """
 
 import math
 
-from survey.kernels import along, fate, lockstep, returns, winding
-from survey.kernels.flow import LAST, PHI, TRUNC_PHI, TRUNC_W, E, W, Y, longest_step, series
-from survey.kernels.flow import ORDER as _ORDER
+from survey.kernels.cylinder import along, fate, lockstep, returns, winding
+from survey.kernels.cylinder.flow import LAST, PHI, TRUNC_PHI, TRUNC_W, E, W, Y, longest_step, series
+from survey.kernels.cylinder.flow import ORDER as _ORDER
 from survey.kernels.jit import inline, kernel
 
 ORDER = 20
 SERVES = ("cylinder",)
-FALL = 1.0 / 50.0  # by more, two terms further on, no series is trusted to fall
+_FALL = 1.0 / 50.0  # by more, two terms further on, no series is trusted to fall
 FLOW_FINEST = 1e-17  # useful truncation error of a step
 FLOW_WORK = 1  # steps, relative to this method
 
@@ -33,7 +33,7 @@ def flow_begin(p, phi, w, tolerance, T):
     h = math.inf
     for n in range(_ORDER - 3, _ORDER + 1):
         # a last term that happens to vanish tells nothing, so those two before it are asked, less strictly
-        share = 1.0 if n > _ORDER - 2 else FALL
+        share = 1.0 if n > _ORDER - 2 else _FALL
         term = share * max(abs(T[n, PHI]), scale * abs(T[n, W])) + 1e-300
         h = min(h, (tolerance / term) ** (1.0 / n))
     shorter = min(1.0, longest_step(p, w) / h)  # the last terms, and what follows them, at the step that is taken

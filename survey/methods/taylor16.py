@@ -12,32 +12,32 @@ II.7 (why Gauss points give twice the order).
 import numpy as np
 from numpy.polynomial import legendre
 
-from survey.kernels import danby
-from survey.kernels.danby import COLUMN, COLUMNS, D1, D2, OWN, TILE, E
 from survey.kernels.jit import kernel, splice
 from survey.kernels.lanes import chain, scatter
+from survey.kernels.libration import danby
+from survey.kernels.libration.danby import COLUMN, COLUMNS, D1, D2, OWN, TILE, E
 from survey.kernels.unroll import largest, unroll
 
 ORDER = 16
 SERVES = ("danby", "hill")
 COST = {"danby": 10.0}  # time, relative to the default of each family
 
-DEGREE = 9
-_POINTS, _WEIGHTS = legendre.leggauss(DEGREE + 1)
+_DEGREE = 9
+_POINTS, _WEIGHTS = legendre.leggauss(_DEGREE + 1)
 NODES = tuple(0.5 + 0.5 * _POINTS)
-HALF = (DEGREE + 1) // 2
+_HALF = (_DEGREE + 1) // 2
 # Samples -> Legendre coefficients (well conditioned), then -> powers of x: the noise of the second stage is relative
 # to each Legendre coefficient, and these decay. Sums and differences of mirrored samples give the even and odd ones.
-TO_LEGENDRE = np.array([(j + 0.5) * _WEIGHTS * legendre.Legendre.basis(j)(_POINTS) for j in range(DEGREE + 1)])
-TO_POWERS = np.zeros((DEGREE + 1, DEGREE + 1))
-for _j in range(DEGREE + 1):
-    TO_POWERS[: _j + 1, _j] = legendre.leg2poly([0.0] * _j + [1.0])
-TO_LEGENDRE = np.stack([TO_LEGENDRE[parity::2, HALF:] for parity in (0, 1)])
-TO_POWERS = np.stack([TO_POWERS[parity::2, parity::2] for parity in (0, 1)])
-WIDTH = DEGREE + 3
-TAIL, SIZE = DEGREE + 1, DEGREE + 2
-ROUNDING = 4.4e-16
-ENDS = OWN + WIDTH
+_TO_LEGENDRE = np.array([(j + 0.5) * _WEIGHTS * legendre.Legendre.basis(j)(_POINTS) for j in range(_DEGREE + 1)])
+_TO_POWERS = np.zeros((_DEGREE + 1, _DEGREE + 1))
+for _j in range(_DEGREE + 1):
+    _TO_POWERS[: _j + 1, _j] = legendre.leg2poly([0.0] * _j + [1.0])
+_TO_LEGENDRE = np.stack([_TO_LEGENDRE[parity::2, _HALF:] for parity in (0, 1)])
+_TO_POWERS = np.stack([_TO_POWERS[parity::2, parity::2] for parity in (0, 1)])
+WIDTH = _DEGREE + 3
+_TAIL, _SIZE = _DEGREE + 1, _DEGREE + 2
+_ROUNDING = 4.4e-16
+_ENDS = OWN + WIDTH
 
 
 def hill_density(rtol):
@@ -54,36 +54,36 @@ def _product(matrix, k, x, i):
 
 
 @splice
-def hill_row(samples, h, coefficients):
+def _hill_row(samples, h, coefficients):
     """Per function, in units of -4/h^2: powers of x, then the last two Legendre coefficients, then the largest."""
     count = samples.shape[2]
-    paired, series = np.empty((HALF, count)), np.empty((HALF, count))
+    paired, series = np.empty((_HALF, count)), np.empty((_HALF, count))
     for c in range(2):
         first = c * WIDTH
         for i in range(count):
-            coefficients[first + TAIL, i] = coefficients[first + SIZE, i] = 0.0
+            coefficients[first + _TAIL, i] = coefficients[first + _SIZE, i] = 0.0
         for parity in range(2):
             sign = 1.0 - 2.0 * parity
-            for k in range(HALF):
+            for k in range(_HALF):
                 for i in range(count):
-                    left, right = samples[c, HALF - 1 - k, i], samples[c, HALF + k, i]
+                    left, right = samples[c, _HALF - 1 - k, i], samples[c, _HALF + k, i]
                     paired[k, i] = right + sign * left
                     largest = max(abs(left), abs(right))
-                    coefficients[first + SIZE, i] = max(coefficients[first + SIZE, i], 0.25 * h[i] * h[i] * largest)
-            for k in range(HALF):
+                    coefficients[first + _SIZE, i] = max(coefficients[first + _SIZE, i], 0.25 * h[i] * h[i] * largest)
+            for k in range(_HALF):
                 for i in range(count):
-                    series[k, i] = _product(TO_LEGENDRE[parity], k, paired, i)
-            for k in range(HALF):
+                    series[k, i] = _product(_TO_LEGENDRE[parity], k, paired, i)
+            for k in range(_HALF):
                 for i in range(count):
-                    power = -0.25 * h[i] * h[i] * _product(TO_POWERS[parity], k, series, i)
+                    power = -0.25 * h[i] * h[i] * _product(_TO_POWERS[parity], k, series, i)
                     coefficients[first + 2 * k + parity, i] = power
             for i in range(count):
-                coefficients[first + TAIL, i] += 0.25 * h[i] * h[i] * abs(series[HALF - 1, i])
+                coefficients[first + _TAIL, i] += 0.25 * h[i] * h[i] * abs(series[_HALF - 1, i])
 
 
 def _convolved(z, x, n, zeros=()):
     """The n-th coefficient of the product of the series z, of degree 9, and x, the `zeros` of which are passed over."""
-    terms = [z[n - j] * x[j] for j in range(max(0, n - DEGREE), n + 1) if j not in zeros]
+    terms = [z[n - j] * x[j] for j in range(max(0, n - _DEGREE), n + 1) if j not in zeros]
     return sum(terms[1:], terms[0])
 
 
@@ -99,7 +99,7 @@ def _sums(terms):
 def hill_step(f, c2, p, h):
     """P and its local error bounds."""
     c2 = -0.25 * h * h * c2
-    z = [f[0] + p * (f[WIDTH] + p * c2)] + [f[k] + p * f[WIDTH + k] for k in range(1, DEGREE + 1)]
+    z = [f[0] + p * (f[WIDTH] + p * c2)] + [f[k] + p * f[WIDTH + k] for k in range(1, _DEGREE + 1)]
     a, b = [1.0, 0.0, z[0] * (1 / 2)], [0.0, 1.0, 0.0]
     for n in range(1, ORDER):
         b.append(_convolved(z, b, n, (0, 2)) * (1 / ((n + 2) * (n + 1))))
@@ -135,21 +135,21 @@ def hill_step(f, c2, p, h):
     # What the projection left out acts only through the solutions' own components of that degree.
     missing = (f[10] + abs(p) * f[WIDTH + 10]) * (4.0 * (abs(a[9]) + abs(a[10]) + abs(b[9]) + abs(b[10])))
     size = f[11] + abs(p) * (f[WIDTH + 11] + abs(p * c2))
-    d11 = by_slope + 19.0 * by_value + missing + ROUNDING
-    d12 = 2.0 * by_value + missing + 2.0 * ROUNDING
-    d21 = 38.0 * by_slope + missing + 4.0 * ROUNDING * size
+    d11 = by_slope + 19.0 * by_value + missing + _ROUNDING
+    d12 = 2.0 * by_value + missing + 2.0 * _ROUNDING
+    d21 = 38.0 * by_slope + missing + 4.0 * _ROUNDING * size
     half, steep = 0.5 * h, 2.0 / h
     return p11, p12 * half, p21 * steep, p22, d11, d12 * half, d21 * steep
 
 
 @kernel
 def hill_chain(samples, c2, h, p, order, starts, ends, out):
-    chain(hill_row, hill_step, WIDTH, samples, c2, h, p, order, starts, ends, out)
+    chain(_hill_row, hill_step, WIDTH, samples, c2, h, p, order, starts, ends, out)
 
 
 @kernel
 def hill_scatter(samples, c2, h, p, order, starts, out):
-    scatter(hill_row, hill_step, WIDTH, samples, c2, h, p, order, starts, out)
+    scatter(_hill_row, hill_step, WIDTH, samples, c2, h, p, order, starts, out)
 
 
 def danby_steps(e, rtol):
@@ -161,34 +161,34 @@ def danby_steps(e, rtol):
 @splice
 def _danby_row(v, k, work, count):
     """Powers of x in k r(f) (rows OWN to OWN + 9), and a bound of the Legendre coefficients left out (OWN + 10)."""
-    paired, series = np.empty((HALF, TILE)), np.empty((HALF, TILE))
+    paired, series = np.empty((_HALF, TILE)), np.empty((_HALF, TILE))
     for i in range(count):
-        work[OWN + TAIL, i] = work[OWN + SIZE, i] = 0.0
+        work[OWN + _TAIL, i] = work[OWN + _SIZE, i] = 0.0
     for parity in range(2):
         sign = 1.0 - 2.0 * parity
-        for j in range(HALF):
-            left, right = v[HALF - 1 - j], v[HALF + j]
+        for j in range(_HALF):
+            left, right = v[_HALF - 1 - j], v[_HALF + j]
             for i in range(count):
                 e = work[E, i]
                 paired[j, i] = k / ((1.0 - e) + e * right) + sign * (k / ((1.0 - e) + e * left))
-        for j in range(HALF):
+        for j in range(_HALF):
             for i in range(count):
-                series[j, i] = _product(TO_LEGENDRE[parity], j, paired, i)
-        for j in range(HALF):
+                series[j, i] = _product(_TO_LEGENDRE[parity], j, paired, i)
+        for j in range(_HALF):
             for i in range(count):
-                work[OWN + 2 * j + parity, i] = _product(TO_POWERS[parity], j, series, i)
+                work[OWN + 2 * j + parity, i] = _product(_TO_POWERS[parity], j, series, i)
         for i in range(count):
-            work[OWN + TAIL, i] += abs(series[HALF - 1, i])
-            work[OWN + SIZE, i] += abs(series[HALF - 2, i])
+            work[OWN + _TAIL, i] += abs(series[_HALF - 1, i])
+            work[OWN + _SIZE, i] += abs(series[_HALF - 2, i])
     for i in range(count):  # those left out, at the rate at which the last four fall
-        tail = work[OWN + TAIL, i]
-        work[OWN + TAIL, i] = tail * (2.0 * tail / (work[OWN + SIZE, i] + 1e-150) + 0.004)
+        tail = work[OWN + _TAIL, i]
+        work[OWN + _TAIL, i] = tail * (2.0 * tail / (work[OWN + _SIZE, i] + 1e-150) + 0.004)
 
 
 @unroll
 def _danby_column(f, i, k, d1, d2, x0, q0, p0, m0):
     """A column of Y at both ends of a step, and the bound of its errors."""
-    r = [f[OWN + j, i] for j in range(DEGREE + 1)]
+    r = [f[OWN + j, i] for j in range(_DEGREE + 1)]
     x, q, p, m = [x0], [q0], [p0], [m0]
     for n in range(ORDER):
         share = 1 / (n + 1)
@@ -204,14 +204,14 @@ def _danby_column(f, i, k, d1, d2, x0, q0, p0, m0):
     last, before = sizes[15] + sizes[16], sizes[13] + (sizes[14] + 1e-150)
     error = last * (2.0 * last / before + 0.004)
     # What the projection left out acts only through the solutions' own components of that degree.
-    error = error + 4.0 * d1 * f[OWN + TAIL, i] * (abs(x[9]) + abs(x[10]) + abs(m[9]) + abs(m[10]))
+    error = error + 4.0 * d1 * f[OWN + _TAIL, i] * (abs(x[9]) + abs(x[10]) + abs(m[9]) + abs(m[10]))
     ends = [a + b for a, b in zip(even, odd, strict=True)] + [a - b for a, b in zip(even, odd, strict=True)]
     return (*ends, error, error)
 
 
 @splice
 def danby_columns(v, h, work, count):
-    """See `kernels.danby.chain`."""
+    """See `kernels.libration.danby.chain`."""
     k = 0.5 * h
     _danby_row(v, k, work, count)
     for c in range(4):
@@ -219,13 +219,13 @@ def danby_columns(v, h, work, count):
         for i in range(count):  # into rows that are constants, else it would not become vector code
             ends = _danby_column(work, i, k, work[D1, i], work[D2, i], x, q, p, m)
             for j in range(COLUMN):
-                work[ENDS + j, i] = ends[j]
+                work[_ENDS + j, i] = ends[j]
         for j in range(COLUMN):
             for i in range(count):
-                work[COLUMNS + COLUMN * c + j, i] = work[ENDS + j, i]
+                work[COLUMNS + COLUMN * c + j, i] = work[_ENDS + j, i]
 
 
 @kernel
 def danby_chain(v, h, e, d1, d2, out):
-    """See `kernels.danby.chain`."""
+    """See `kernels.libration.danby.chain`."""
     danby.chain(danby_columns, WIDTH + COLUMN, v, h, e, d1, d2, out)

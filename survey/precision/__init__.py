@@ -6,7 +6,7 @@ Everything that belongs to one scene lies in the file of its name beside this on
     references(work)       [(parameters, options, {output: exact value}, verdict or None), ...] like the work's points,
                            the very same list for works that share it
     works()                {name of the work: (point, options)}, what is timed; the arrays of `point` broadcast
-    system(point, options) the same question as ODEs, for the peers in `survey.peers`
+    system(point, options) the same question as ODEs, for the peers in `survey.precision.peers`
     outcome(ends)          {ERROR: values} from the states (points, n) at the ends of the spans, and "verdict" if any
     LIMITED                the method whose operations, at the machine's peak rate, are the least time of the chart
     operations_of(run)     its operations while `run()` solves a work with it (both optional)
@@ -29,14 +29,16 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-import survey.peers as programs
-import survey.precision as folder
+import survey.precision.cases as cases
+import survey.precision.peers as programs
 import survey.scenes as scenes
-from survey import modules, peak, workflow
-from survey.dataset import provenance
+from survey import modules
 from survey.errors import BadInput
+from survey.file.labels import provenance
 from survey.grid import line
-from survey.measures import hill_dense
+from survey.measures.hill import dense
+from survey.precision import peak
+from survey.request import workflow
 from survey.scene import Request, exists
 
 SETTINGS = tuple(10.0**-n for n in range(4, 14))
@@ -75,8 +77,8 @@ class Least:
 def write(scene, directory, peers=False, say=lambda line: None):
     """Measure and write precision_SCENE.json, .csv and .png into `directory`; returns the three paths."""
     directory = Path(directory)
-    modules.load(scenes, scene, "scene")
-    case = modules.load(folder, scene, "scene with a precision chart")
+    scenes.load(scene)
+    case = modules.load(cases, scene, "scene with a precision chart")
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -90,7 +92,7 @@ def write(scene, directory, peers=False, say=lambda line: None):
         table = csv.DictWriter(file, list(asdict(records[0])))
         table.writeheader()
         table.writerows(asdict(record) for record in records)
-    from survey.chart import draw
+    from survey.precision.chart import draw
 
     draw(records, machine, scene, case.ERROR, paths[2])
     return paths
@@ -101,7 +103,7 @@ def measure(scene, case, peers=False, say=lambda line: None):
 
     A method is left out where it has no answer for a reference of the work (closed forms, where there is none).
     """
-    module = modules.load(scenes, scene, "scene")
+    module = scenes.load(scene)
     methods = ["auto", *workflow.methods_of(module, next(iter(case.works().values()))[1])]
     fewer = getattr(case, "MOST", {})
     runs = {(method, ""): (_solver(module, method, case.ERROR), fewer.get(method)) for method in methods}
@@ -146,7 +148,7 @@ def limit(scene, case):
     rates = peak.rates()
     if not hasattr(case, "LIMITED"):
         return {"rates": rates, "least": []}
-    solve = _solver(modules.load(scenes, scene, "scene"), case.LIMITED, case.ERROR)
+    solve = _solver(scenes.load(scene), case.LIMITED, case.ERROR)
     least = []
     for work, (point, options) in case.works().items():
         point = _thinned(point)
@@ -195,7 +197,7 @@ def _solver(module, method, error):
         request = Request(options, method, rtol, wanted, _lines(point))
         ndim = max(np.ndim(values) for values in point.values()) or 1
         whole = {key: np.asarray(point.get(key, p.default), float) for key, p in used.items()}
-        hill_dense.panels.cache_clear()  # every call pays for its set-up
+        dense.panels.cache_clear()  # every call pays for its set-up
         return module.solve({key: v if v.ndim else v.reshape((1,) * ndim) for key, v in whole.items()}, request)
 
     return solve
@@ -214,8 +216,8 @@ def _cold(scene, method):
 
 def first_call(scene, method):
     """Seconds that the first call of a scene's method takes in this process, less those of the second."""
-    case = modules.load(folder, scene, "scene with a precision chart")
-    solve = _solver(modules.load(scenes, scene, "scene"), method, case.ERROR)
+    case = modules.load(cases, scene, "scene with a precision chart")
+    solve = _solver(scenes.load(scene), method, case.ERROR)
     return _first_call(solve, case.works(), getattr(case, "MOST", {}).get(method))
 
 

@@ -31,9 +31,10 @@ import numpy as np
 
 from survey import methods
 from survey.errors import BadInput
-from survey.kernels import brun, brun_lanes
-from survey.kernels import nutation as nu
-from survey.measures import nutation, nutation_again, nutation_digits
+from survey.kernels.nutation import brun, brun_lanes
+from survey.kernels.nutation import wells as nu
+from survey.measures.nutation import again, digits
+from survey.measures.nutation import wells as nutation
 from survey.measures.rows import Rows
 from survey.modules import load
 from survey.scene import Option, Output, Parameter, Request, Trajectory, named, told
@@ -56,7 +57,7 @@ _HARMLESS = (1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0)
 _LARGEST = 1e290
 _BLURRED = 4e-13  # relative bars of actions of wells so narrow that turning points lose digits: see `brun.measure`
 _LARGE = {"minimum": -1e25, "maximum": 1e25}  # products of four such numbers, and of their inverses, are floats
-MOTION_PERIODS, MOTION_POINTS = 6, 3001  # of a trajectory
+_MOTION_PERIODS, _MOTION_POINTS = 6, 3001  # of a trajectory
 DIMENSIONS = {"well": np.array([1, 2])}
 
 PARAMETERS = (
@@ -145,17 +146,17 @@ def solve(point, request):
     wanted = request.variables or {"action", "separatrix_distance"}
     if "l" in given:
         sign = int(request.options["sign"])
-        solver = partial(nutation_digits.of_integrals, sign=sign)
+        solver = partial(digits.of_integrals, sign=sign)
         slowly = partial(_scaled, sign=sign, method=method, rtol=request.rtol)
         out = _scaled_in_lanes(given, valid, sign, slowly, wanted) if auto else slowly(given, valid)
     else:
         times = block.per_point(point["t"]) if "t" in point else None
         valid &= (given["C"] <= 2.0 * given["A"]) & ((given["theta0"] > 0.0) | (given["p_psi"] == given["p_phi"]))
-        solver = nutation_digits.of_state
+        solver = digits.of_state
         slowly = partial(_state, method=method, request=request, times=times)
         out = _state_in_lanes(given, columns, valid, slowly, wanted) if auto else slowly(given, valid)
     if "t" not in point:
-        nutation_again.settle(out, _ordered(given), solver, valid, request)
+        again.settle(out, _ordered(given), solver, valid, request)
     out |= nutation.rates(out, request.variables)
     return {name: _back(block, values) for name, values in out.items()}
 
@@ -227,7 +228,7 @@ def _state(given, valid, method, request, times):
     status = np.where(kinds == nu.LOST, np.where(_too_large(points), OVERFLOW, NO_CONVERGENCE), OK)
     out = _finished(out, status, valid, count, heights)
     if times is not None:
-        nutation_again.settle(out, points.T, nutation_digits.of_state, valid, request, known=True)
+        again.settle(out, points.T, digits.of_state, valid, request, known=True)
     return _with_motion(out, valid, kinds, times, lambda at: nutation.motions(
         method, rows, kinds, starts, periods, at, a, drift)) if times is not None else out  # fmt: skip
 
@@ -294,7 +295,7 @@ def trajectory(point, answer, options, time=None):
     state = {p.name: point[p.name] for p in PARAMETERS[:7] if p.name in point}
     if "l" in point:
         state = _state_of(point, float(np.ravel(answer["u_min"])[well]), int(options["sign"]))
-    t = np.linspace(0.0, MOTION_PERIODS * period if time is None else time, MOTION_POINTS)
+    t = np.linspace(0.0, _MOTION_PERIODS * period if time is None else time, _MOTION_POINTS)
     asked = {name: np.full((1, 1), value) for name, value in state.items()} | {"t": t[None]}
     out = {name: values[0] for name, values in solve(asked, Request({"motion": "at_t"}, rtol=1e-9)).items()}
     words = "time, over A / sqrt|k|" if "l" in point else "time"

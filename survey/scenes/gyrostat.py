@@ -54,8 +54,8 @@ the system, without an initial state).
 import numpy as np
 
 from survey import methods
-from survey.measures import cylinder, cylinder_auto, cylinder_fate, cylinder_portrait
-from survey.measures.cylinder_fate import NO_TURNS
+from survey.measures.cylinder import auto, fate, portrait, solution
+from survey.measures.cylinder.fate import NO_TURNS
 from survey.modules import load
 from survey.scene import Option, Output, Parameter, Request, Trajectory, named, told
 from survey.status import INVALID_PARAMETERS, OK
@@ -106,7 +106,7 @@ STATUS = {
     "saddle: the numbers of equilibria and of cycles are not told; K, L, the stratum and the ends are",
 }
 _TURNING = 16
-MOST_TURNINGS = 2**31 - 1  # are kept as int32
+_MOST_TURNINGS = 2**31 - 1  # are kept as int32
 _FATES = {
     "undecided": -1, "focus_or_node": 0, "saddle": 1, "rotation_plus": 2, "rotation_minus": 3, "libration": 4,
     "spin_up_plus": 5, "spin_up_minus": 6, "periodic_rotation": 7, "periodic_libration": 8, "equilibrium_start": 9,
@@ -114,10 +114,10 @@ _FATES = {
 _ENDS = {"repelling": 0, "neutral": 1, "attracting": 2}
 _TYPES = ("none", "saddle", "attracting_node", "weak_node", "repelling_node", "attracting_focus", "weak_focus",
           "repelling_focus", "degenerate")  # fmt: skip
-AROUND, ORBIT_POINTS = np.arange(0, 2 * np.pi, np.pi / 3), 2001  # of the phase portrait
+_AROUND, _ORBIT_POINTS = np.arange(0, 2 * np.pi, np.pi / 3), 2001  # of the phase portrait
 DIMENSIONS = {
-    "equilibrium": np.arange(1, cylinder_portrait.EQUILIBRIA + 1),
-    "cycle": np.arange(1, cylinder_portrait.CYCLES + 1),
+    "equilibrium": np.arange(1, portrait.EQUILIBRIA + 1),
+    "cycle": np.arange(1, portrait.CYCLES + 1),
 }
 
 OUTPUTS = (
@@ -189,7 +189,7 @@ def solve(point, request):
     question = request.options.get("question", "fate")
     if question in ("fate", "portrait"):
         return {"fate": _fate, "portrait": _portrait}[question](point, method, request.rtol)
-    measure = cylinder_auto if request.method == "auto" else cylinder
+    measure = auto if request.method == "auto" else solution
     if question == "trajectory":
         return _trajectory(point, measure, method, request.rtol)
     return _abel(point, measure, method, request.rtol, request.options.get("branch") == "before")
@@ -233,8 +233,8 @@ def trajectory(point, answer, options, time=None):
     """The orbit on the cylinder and some of its neighbours, from `phi0`, `w0` (see `survey.scenes`)."""
     time = 40.0 if time is None else float(time)
     own = point.get("phi0", 0.0), point.get("w0", 1.0)
-    starts = np.array([own, *[(phi, w) for phi in AROUND for w in (-1.5, -0.5, 0.0, 0.5, 1.5)]])
-    t = np.linspace(0.0, time, ORBIT_POINTS)
+    starts = np.array([own, *[(phi, w) for phi in _AROUND for w in (-1.5, -0.5, 0.0, 0.5, 1.5)]])
+    t = np.linspace(0.0, time, _ORBIT_POINTS)
     asked = {name: np.full((1, 1), point[name]) for name in _SYSTEM} | {"t": t[None]}
     asked |= {
         "phi0": starts[:, :1],
@@ -289,7 +289,7 @@ def _trajectory(point, measure, method, rtol):
     floats, turnings, status = measure.trajectories(method, rows, times, rtol)
     status = np.where(good, status, INVALID_PARAMETERS)
     lost = status != OK
-    floats[lost], turnings[lost | (turnings > MOST_TURNINGS)] = np.nan, -2
+    floats[lost], turnings[lost | (turnings > _MOST_TURNINGS)] = np.nan, -2
     names = ("phi", "w", "phi_error", "w_error")
     results = {name: back(floats[..., i]) for i, name in enumerate(names)}
     return results | {"turnings": back(turnings), "status": back(status)}
@@ -316,14 +316,14 @@ def _fate(point, method, rtol):
     group = np.arange(systems[..., 0].size).reshape(systems.shape[:-1])
     group = np.broadcast_to(group, shape).ravel()
     starts = np.stack([np.broadcast_to(array, shape).ravel() for array in arrays[6:]], axis=-1)
-    result = cylinder_fate.empty(len(starts), INVALID_PARAMETERS)
+    result = fate.empty(len(starts), INVALID_PARAMETERS)
     order = np.argsort(group, kind="stable")
     cuts = np.flatnonzero(np.diff(group[order])) + 1
     for members in np.split(order, cuts):
         six = systems.reshape(-1, 6)[group[members[0]]]
         good = members[np.isfinite(starts[members]).all(axis=1)]
         if np.isfinite(six).all() and len(good):
-            cylinder_fate.solve(method, six, starts[good], rtol, result, good)
+            fate.solve(method, six, starts[good], rtol, result, good)
     return {name: values.reshape(shape) for name, values in result.items()}
 
 
@@ -332,7 +332,7 @@ def _portrait(point, method, rtol):
     systems = np.stack(np.broadcast_arrays(*(np.asarray(point[key], dtype=float) for key in _SYSTEM)), axis=-1)
     rows = systems.reshape(-1, 6)
     good = np.isfinite(rows).all(axis=1)
-    result = cylinder_portrait.empty(len(rows), INVALID_PARAMETERS)
-    for name, values in cylinder_portrait.solve(method, rows[good], rtol).items():
+    result = portrait.empty(len(rows), INVALID_PARAMETERS)
+    for name, values in portrait.solve(method, rows[good], rtol).items():
         result[name][good] = values
     return {name: values.reshape(systems.shape[:-1] + values.shape[1:]) for name, values in result.items()}

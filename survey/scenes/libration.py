@@ -33,8 +33,8 @@ Deprit-Bartholome, Astronomical Journal 72 (1967) 173; K. R. Meyer, D. S. Schmid
 
 import numpy as np
 
-from survey.kernels.libration_forms import LABELS
-from survey.measures import libration_motion, normal_form
+from survey.kernels.libration.coefficients import LABELS
+from survey.measures.libration import motion, normal_form
 from survey.scene import Output, Parameter, Trajectory, named
 
 TITLE = "Formal stability of the triangular libration points"
@@ -51,7 +51,7 @@ REFERENCES = (
 )
 PARAMETERS = (Parameter("mu", "mass of the smaller primary over that of both", r"\mu", minimum=1e-100, maximum=0.5),)
 DIMENSIONS = {"monomial": np.array(LABELS)}
-VERDICTS = {
+_VERDICTS = {
     "undecided": normal_form.UNDECIDED,
     "linearly_unstable": normal_form.UNSTABLE,
     "formally_stable_by_order_4": normal_form.ORDER_4,
@@ -76,7 +76,7 @@ OUTPUTS = (
            integer=True, applies=_BELOW),
     Output("resonance_distance", "distance |k1 omega1 - k2 omega2 + k3| of that resonance", r"|k \cdot \omega|",
            applies=_BELOW + "; (2, 0, -2) and (1, 1, 0), met at mu = 0 and mu_R, count too"),
-    Output("verdict", "formal stability", flags=VERDICTS,
+    Output("verdict", "formal stability", flags=_VERDICTS,
            applies="by order 6 is proved unless omega1 and omega2 are both rational (rank-2 resonances: countable, "
            "dense, but no float64 mu is one), where M != 0 settles nothing; formal is not Lyapunov stability"),
 )  # fmt: skip
@@ -99,7 +99,7 @@ def trajectory(point, answer, options, time=None):
     """A planar orbit of the linear equations, from rest beside L4 (see `survey.scenes`)."""
     slow = float(answer["omega2"])
     suits = 3 * 2 * np.pi / slow if np.isfinite(slow) else 4 * np.pi
-    data = libration_motion.orbit(point["mu"], 0.0, min(suits, 100 * np.pi) if time is None else time)
+    data = motion.orbit(point["mu"], 0.0, min(suits, 100 * np.pi) if time is None else time)
     return Trajectory(data, (("plane", "eta", "xi"), ("lines", "f", "xi", "eta")))
 
 

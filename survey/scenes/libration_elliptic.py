@@ -33,7 +33,8 @@ Source: J. M. A. Danby, Astron. J. 69 (1964) 165; checked and completed in `libr
 
 import numpy as np
 
-from survey.measures import danby, libration_motion, linear_motion
+from survey.measures import linear_motion
+from survey.measures.libration import danby, motion
 from survey.measures.rows import Rows
 from survey.scene import Parameter, Trajectory, told
 
@@ -71,10 +72,10 @@ def solve(point, request):
 
 def trajectory(point, answer, options, time=None):
     """A planar orbit of the linear equations, from rest beside L4, and the multipliers (see `survey.scenes`)."""
-    found, bars = libration_motion.multipliers(*(float(answer[name]) for name in ("a", "a_error", "b", "b_error")))
+    found, bars = motion.multipliers(*(float(answer[name]) for name in ("a", "a_error", "b", "b_error")))
     growth = np.log(abs(found).max())
-    turns = np.clip(libration_motion.GROWTH / growth if growth > 1e-6 else 6, 1, 6) // 1
-    data = libration_motion.orbit(point["mu"], point["e"], 2 * np.pi * turns if time is None else time)
+    turns = np.clip(motion.GROWTH / growth if growth > 1e-6 else 6, 1, 6) // 1
+    data = motion.orbit(point["mu"], point["e"], 2 * np.pi * turns if time is None else time)
     data |= linear_motion.described(found, bars)
     return Trajectory(data, (("plane", "eta", "xi"), ("multipliers",)))
 

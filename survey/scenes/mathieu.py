@@ -16,12 +16,14 @@ from math import cos, pi
 import numpy as np
 
 from survey import status
-from survey.kernels import double as dd
-from survey.kernels.hill import NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE
+from survey.kernels.hill import taylor_double
+from survey.kernels.hill.answers import NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE
 from survey.kernels.jit import inline, kernel
-from survey.measures import hill, hill_dense, hill_motion, hill_why
+from survey.kernels.math import double as dd
+from survey.measures.hill import dense, monodromy, motion
+from survey.measures.hill import why as hill_why
 from survey.measures.rows import Rows
-from survey.methods import dop853, taylor_double
+from survey.methods import dop853
 from survey.scene import Parameter
 
 TITLE = "Stability of Mathieu's equation"
@@ -38,8 +40,8 @@ PARAMETERS = (
 )
 OPTIONS = ()
 why = hill_why.why
-OUTPUTS = hill.OUTPUTS
-HALF_PERIOD = pi / 2
+OUTPUTS = monodromy.OUTPUTS
+_HALF_PERIOD = pi / 2
 
 
 def cost(options, sizes):
@@ -51,7 +53,7 @@ def solve(point, request):
     """All outputs of a block that the request wants (see `survey.scenes`)."""
     block = Rows((point["q"],), point["a"])
     problem = _problem(block.per_row(point["q"]), block.per_point(point["a"]), request.line("a"), request.line("q"))
-    out = hill.solve(problem, request.method, request.rtol, request.variables)
+    out = monodromy.solve(problem, request.method, request.rtol, request.variables)
     out["period"] = np.where(out["status"] == status.OK, pi, np.nan)
     out["period_error"] = 1.3e-16 + 0.0 * out["period"]  # pi is rounded
     return {name: block.back(values) for name, values in out.items()}
@@ -59,28 +61,28 @@ def solve(point, request):
 
 def compile_ahead(variables):
     """Compile some of the kernels of a map of these variables (see `survey.scenes`)."""
-    hill_dense.compile_ahead(sample, np.empty(0), variables)
+    dense.compile_ahead(_sample, np.empty(0), variables)
 
 
 def trajectory(point, answer, options, time=None):
     """Solutions and multipliers of a point (see `survey.scenes`)."""
-    return hill_motion.solve(_problem(np.array([point["q"]]), np.array([[point["a"]]])), answer, time)
+    return motion.solve(_problem(np.array([point["q"]]), np.array([[point["a"]]])), answer, time)
 
 
 def _problem(q, a, line=None, ends=None):
     rule, constant = _rules(q, a)
-    return hill.Problem(
+    return monodromy.Problem(
         p=a,
-        span=np.where(np.isfinite(q), HALF_PERIOD, np.nan),
+        span=np.where(np.isfinite(q), _HALF_PERIOD, np.nan),
         bound=np.column_stack([2 * abs(q), np.ones(q.size), np.zeros(q.size)]),
         rate=np.full(q.size, 2.0),
         c2=0.0,
-        **hill.of_rows(q, sample, walk_points, solve_points),
+        **monodromy.of_rows(q, _sample, _walk_points, _solve_points),
         rule=rule,
         constant=constant,
         line=line,
         span_low=np.full(q.size, dd.HALF_PI[1]),
-        across=hill.Across("mathieu", *ends, at=lambda q: _problem(q, np.zeros((q.size, 0)))) if ends else None,
+        across=monodromy.Across("mathieu", *ends, at=lambda q: _problem(q, np.zeros((q.size, 0)))) if ends else None,
         places=q,
     )
 
@@ -98,46 +100,46 @@ def _rules(q, a):
 
 
 @inline
-def excitation(t, q):
+def _excitation(t, q):
     """-2 q cos 2t."""
     return -2.0 * q * cos(2.0 * t)
 
 
 @kernel
-def sample(q, nodes, out):
+def _sample(q, nodes, out):
     """c0 = -2 q cos 2t and c1 = 1 at the `nodes` (fractions) of the steps of the half period: out[r, step, c, node]."""
     steps = out.shape[1]
     for n in range(steps):
         for i in range(len(nodes)):
-            t = (n + nodes[i]) * HALF_PERIOD / steps
+            t = (n + nodes[i]) * _HALF_PERIOD / steps
             for r in range(len(q)):
-                out[r, n, 0, i] = excitation(t, q[r])
+                out[r, n, 0, i] = _excitation(t, q[r])
                 out[r, n, 1, i] = 1.0
 
 
 @inline
-def potential(t, a, row, table):
+def _potential(t, a, row, table):
     """z at any t and what its rounding is relative to, for the methods that choose their own steps."""
-    z = a + excitation(t, row)
+    z = a + _excitation(t, row)
     return z, abs(a) + 2.0 * abs(row)
 
 
 @kernel
-def walk_points(q, a, tolerance, out, reached):
+def _walk_points(q, a, tolerance, out, reached):
     """Points of their own, by DOP853."""
     for i in range(len(a)):
-        reached[i] = dop853.hill_walk(potential, a[i], q[i], 0.0, HALF_PERIOD, tolerance[i], out[i])
+        reached[i] = dop853.hill_walk(_potential, a[i], q[i], 0.0, _HALF_PERIOD, tolerance[i], out[i])
 
 
 @inline
-def start(row, clock):
+def _start(row, clock):
     """cos 2t and sin 2t at t = 0."""
     clock[0, 0, 0], clock[0, 1, 0] = 1.0, 0.0
     clock[1, 0, 0], clock[1, 1, 0] = 0.0, 0.0
 
 
 @inline
-def circular(row, h, clock):
+def _circular(row, h, clock):
     """Series of cos 2t and sin 2t in x = t / h."""
     for n in range(clock.shape[2] - 1):
         for c in range(2):
@@ -146,7 +148,7 @@ def circular(row, h, clock):
 
 
 @inline
-def coefficient(side, row, a, clock, z):
+def _coefficient(side, row, a, clock, z):
     """Series of z = a - 2 q cos 2t."""
     for n in range(clock.shape[2]):
         z[0, n], z[1, n] = dd.times((clock[0, 0, n], clock[0, 1, n]), -2.0 * row)
@@ -155,16 +157,16 @@ def coefficient(side, row, a, clock, z):
 
 
 @inline
-def missed(row, clock):
+def _missed(row, clock):
     """cos 2t = -1 and sin 2t = 0 at t = T/2: how far off."""
     return abs(dd.add((clock[0, 0, 0], clock[0, 1, 0]), (1.0, 0.0))[0]) + abs(clock[1, 0, 0])
 
 
 @kernel
-def solve_points(q, a, low, steps, out):
+def _solve_points(q, a, low, steps, out):
     """Points of their own, in double-double, in `steps` steps each."""
     work, chain = taylor_double.workspace(2), np.empty((steps.max(), taylor_double.STEP))
     for i in range(len(a)):
         taylor_double.hill_walk(
-            start, circular, coefficient, missed, q[i], (a[i], low[i]), dd.HALF_PI, 0, steps[i], work, chain, out[i]
+            _start, _circular, _coefficient, _missed, q[i], (a[i], low[i]), dd.HALF_PI, 0, steps[i], work, chain, out[i]
         )

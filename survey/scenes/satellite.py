@@ -17,22 +17,23 @@ an edge of Lame's equation, |D| = 2; D is even in rho for librations; tongue n o
 problem that has no verdict, and tongues accumulate there.
 """
 
-from dataclasses import dataclass
-from functools import cached_property
 from math import pi
 
 import numpy as np
 
 from survey import status
-from survey.kernels import satellite as motion
-from survey.kernels.double import split_error
-from survey.kernels.elliptic import MEANS
-from survey.kernels.hill import LARGEST, NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE
+from survey.kernels.hill import satellite as motion
+from survey.kernels.hill import taylor_double
+from survey.kernels.hill.answers import LARGEST, NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE
+from survey.kernels.hill.satellite import potential, sample, tabulate
 from survey.kernels.jit import kernel
-from survey.kernels.satellite import complete_integrals, half_periods, potential, sample, tabulate
-from survey.measures import hill, hill_dense, hill_motion, hill_why
+from survey.kernels.math.elliptic import MEANS
+from survey.measures.hill import dense, monodromy
+from survey.measures.hill import motion as hill_motion
+from survey.measures.hill import why as hill_why
+from survey.measures.hill.satellite import EPS, Motion, moduli, rates
 from survey.measures.rows import Rows
-from survey.methods import dop853, taylor_double
+from survey.methods import dop853
 from survey.scene import Option, Output, Parameter
 
 TITLE = "Out-of-plane stability of a satellite's planar librations and rotations"
@@ -62,16 +63,15 @@ OPTIONS = (
 )
 why = hill_why.why
 OUTPUTS = (
-    *hill.OUTPUTS,
+    *monodromy.OUTPUTS,
     Output("exponent_per_orbit", "growth of the logarithm of the amplitude per orbital revolution", r"\mu",
            applies="where rho is not 0"),
     Output("lyapunov", "Lyapunov's criterion: z >= 0 and T times the integral of z over T <= 4",
            flags={"silent": 0, "certifies_stability": 1}),
 )  # fmt: skip
 
-EPS = 2.3e-16
 # K by the arithmetic-geometric mean, as it is where a machine has no longer floats than float64, and k' from k.
-PERIOD_ULPS = 6
+_PERIOD_ULPS = 6
 
 
 def cost(options, sizes):
@@ -96,7 +96,7 @@ def solve(point, request):
 
 def compile_ahead(variables):
     """Compile some of the kernels of a map of these variables (see `survey.scenes`)."""
-    hill_dense.compile_ahead(sample, np.empty((0, 6)), variables)
+    dense.compile_ahead(sample, np.empty((0, 6)), variables)
 
 
 def trajectory(point, answer, options, time=None):
@@ -115,11 +115,11 @@ def _solve(shared, rho, oblate, request, low=None, line=None, ends=None):
     row = Motion(*(block.per_row(values) for values in shared), bool(oblate))
     problem = _problem(row, block.per_point(rho), None if low is None else block.per_point(low), line, ends)
     wanted = set(request.variables) | ({"exponent"} if "exponent_per_orbit" in request.variables else set())
-    out = hill.solve(problem, request.method, request.rtol, wanted)
+    out = monodromy.solve(problem, request.method, request.rtol, wanted)
     ok = out["status"] == status.OK
     if "period" in wanted:
         out["period"] = np.where(ok, row.period[:, None], np.nan)
-        out["period_error"] = PERIOD_ULPS * EPS * out["period"]
+        out["period_error"] = _PERIOD_ULPS * EPS * out["period"]
     if "exponent_per_orbit" in wanted:
         _per_orbit(out, abs(problem.p) * (row.period[:, None] / (2 * pi)))
     if "lyapunov" in wanted:
@@ -132,104 +132,9 @@ def _per_orbit(out, orbits):
     orbits = np.where(orbits > 0, orbits, np.nan)
     out["exponent_per_orbit"] = out["exponent"] / orbits
     out["exponent_per_orbit_error"] = (
-        out["exponent_error"] / orbits + (PERIOD_ULPS + 4) * EPS * out["exponent_per_orbit"]
+        out["exponent_error"] / orbits + (_PERIOD_ULPS + 4) * EPS * out["exponent_per_orbit"]
     )
-    hill.overflow(out, out["exponent_per_orbit_error"] > LARGEST)
-
-
-def moduli(point):
-    """k, the complement (of 1/k for rotations), what was given, and which it is: no digit is lost near k = 1.
-
-    From k, from 1 - k, or from the amplitude asin k.
-    """
-    if "amplitude" in point:
-        amplitude = np.asarray(point["amplitude"], dtype=float)
-        return np.sin(amplitude), np.cos(amplitude), amplitude, np.full_like(amplitude, motion.AMPLITUDE)
-    with np.errstate(all="ignore"):
-        if "one_minus_k" in point:
-            given = short = np.asarray(point["one_minus_k"], dtype=float)
-            which, high = motion.ONE_MINUS_K, 1 - short
-            k = np.where(short < 0, np.maximum(high, np.nextafter(1, 2)), high)  # a rotation remains one
-        else:
-            given = k = np.asarray(point["k"], dtype=float)
-            which, short = motion.K, 1 - k
-        scale = np.maximum(k, 1)
-        complement = np.sqrt((abs(short) / scale) * ((1 + k) / scale))
-        period = (k < np.inf) & (complement > 0)  # there is none where k = 1
-        k, complement = np.where(period, k, np.nan), np.where(period, complement, np.nan)
-    return k, complement, given, np.full_like(given, which)
-
-
-def rates(inertia_ratio, direction):
-    """rho = +-1 / sqrt(3 |1 - alpha|) rounded, and what float64 took from it."""
-    with np.errstate(all="ignore"):
-        short = 1 - inertia_ratio
-        rest = (1 - (short - (short - 1))) - (inertia_ratio + (short - 1))  # the rounding of 1 - alpha, exactly (Knuth)
-        short, rest = abs(short), np.sign(short) * rest
-        rho = 1 / np.sqrt(3 * short)
-        # one step of Newton's: 1 - 3 rho^2 (short + rest), each product with its own rounding
-        square = rho * rho
-        triple = 3 * square
-        triple_rest = split_error(3.0, square, triple) + 3 * split_error(rho, rho, square)
-        total = triple * short
-        missing = (1 - total) - (split_error(triple, short, total) + (triple * rest + triple_rest * short))
-        low = 0.5 * rho * missing
-        high = rho + low
-        return float(direction) * high, float(direction) * (low - (high - rho))
-
-
-@dataclass(frozen=True)
-class Motion:
-    """The planar motions of the rows: k, the complement, what was given and which, and what follows from them."""
-
-    k: np.ndarray
-    kc: np.ndarray
-    given: np.ndarray
-    which: np.ndarray
-    oblate: bool
-
-    @cached_property
-    def integrals(self):
-        """K and E of the smaller of k and 1/k."""
-        return complete_integrals(np.minimum(self.k, 1 / np.maximum(self.k, 1)), self.kc)
-
-    @cached_property
-    def rotates(self):
-        return self.k > 1
-
-    @cached_property
-    def half(self):
-        """The half period, rounded, and what float64 took from it."""
-        return half_periods(self.k, self.kc)
-
-    @property
-    def period(self):
-        return 2 * self.half[0]
-
-    @cached_property
-    def rate(self):
-        """1 / distance of the poles of w from the real axis: K' or K'/k."""
-        conjugate, _ = complete_integrals(self.kc, np.minimum(self.k, 1 / np.maximum(self.k, 1)))
-        return np.maximum(self.k, 1) / conjugate
-
-    def lyapunov(self, rho):
-        """Does Lyapunov's criterion (corrected: T int z <= 4, and z >= 0) certify stability, rounding aside?"""
-        k, period, rotates = self.k[:, None], self.period[:, None], self.rotates[:, None]
-        first, second = (values[:, None] for values in self.integrals)
-        squares = np.where(rotates, 2 * k * second, 8 * (second - self.kc[:, None] ** 2 * first))
-        drift = np.where(rotates, pi * rho, 0.0)  # integral of w over T, times rho: am advances by pi
-        c = -k * k if self.oblate else (1 - k) * (1 + k)
-        size = period * (2 * squares + 2 * abs(drift) + (rho * rho + k * k + 1) * period)
-        total = period * (2 * squares + 2 * drift + (rho * rho + c) * period)
-        return (total <= 4 - 100 * EPS * size) & (self._nonnegative(rho) if self.oblate else True)
-
-    def _nonnegative(self, rho):
-        """z > 0 all along an oblate body's motion: the least of 2 w^2 + 2 rho w + rho^2 - k^2 over the range of w."""
-        k = self.k[:, None]
-        low = np.where(self.rotates[:, None], k * self.kc[:, None], -k)
-        w = np.clip(-rho / 2, low, k)
-        least = 2 * w * w + 2 * rho * w + rho * rho - k * k
-        return least > 16 * EPS * (rho * rho + k * k)
+    monodromy.overflow(out, out["exponent_per_orbit_error"] > LARGEST)
 
 
 def _ends(request):
@@ -252,14 +157,14 @@ def _at(s, oblate, rotates):
 def _across(row, ends):
     rotates = bool(row.rotates.any())
     key = "satellite", row.oblate, rotates
-    return hill.Across(key, *ends, at=lambda places: _at(places, row.oblate, rotates))
+    return monodromy.Across(key, *ends, at=lambda places: _at(places, row.oblate, rotates))
 
 
 def _problem(row, rho, low=None, line=None, ends=None):
     half, half_low = row.half
     rows = np.column_stack([row.k, row.kc, half, np.full(row.k.size, float(row.oblate)), row.given, row.which])
     rule, constant = _rules(row, rho, low)
-    return hill.Problem(
+    return monodromy.Problem(
         p=rho,
         p_low=low,
         span=half,
@@ -267,7 +172,7 @@ def _problem(row, rho, low=None, line=None, ends=None):
         bound=np.column_stack([row.k**2 + 1, 2 * row.k, np.ones(row.k.size)]),  # (|rho| + k)^2 + 1
         rate=row.rate,
         c2=1.0,
-        **hill.of_rows(rows, sample, walk_points, solve_points),
+        **monodromy.of_rows(rows, sample, _walk_points, _solve_points),
         rule=rule,
         constant=constant,
         line=line,
@@ -298,7 +203,7 @@ def _rules(row, rho, low=None):
 
 
 @kernel
-def walk_points(rows, rho, tolerance, out, reached):
+def _walk_points(rows, rho, tolerance, out, reached):
     """Points of their own, by DOP853."""
     table = np.empty((2, MEANS + 1))
     for i in range(len(rho)):
@@ -307,7 +212,7 @@ def walk_points(rows, rho, tolerance, out, reached):
 
 
 @kernel
-def solve_points(rows, rho, low, steps, out):
+def _solve_points(rows, rho, low, steps, out):
     """Points of their own, in double-double, in `steps` (even) steps each."""
     work, chain = taylor_double.workspace(motion.CLOCK), np.empty((steps.max(), taylor_double.STEP))
     row = np.empty(motion.EXACTLY)

@@ -7,7 +7,7 @@ from base64 import b64encode
 
 from bokeh.models import CustomJSTickFormatter
 
-from survey import figures
+from survey.show import figures
 from survey.viewer import raster
 from survey.viewer.shown import short
 from survey.wording import plain
@@ -24,7 +24,7 @@ MARKERS = {"D": "diamond", "o": "circle"}
 
 
 def curve(plot, name):
-    """A renderer of the boundaries of a class, with the looks of `survey.figures`."""
+    """A renderer of the boundaries of a class, with the looks of `survey.show.figures`."""
     _, look = figures.CURVES[name]
     if "marker" in look:
         style = {"marker": MARKERS[look["marker"]], "size": 1.6 * look["ms"], "line_color": look["mec"]}

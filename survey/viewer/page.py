@@ -12,8 +12,9 @@ from bokeh.palettes import Viridis256
 from bokeh.plotting import figure
 from matplotlib.figure import Figure
 
-from survey import figures, trust
 from survey.errors import BadInput, SurveyError, Untrusted
+from survey.request import trust
+from survey.show import figures
 from survey.viewer import looks, raster
 
 SIDE, WIDTH = 510, 470  # width in pixels of what stands beside the map, and of its parts

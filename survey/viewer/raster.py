@@ -1,6 +1,7 @@
 """A window of a map -> the pixels of a screen, reading no more than it must: maps of 10^8 points and more.
 
-A pixel that holds many points tells of all of them, as in `survey.reduced`; one that holds none shows the nearest.
+A pixel that holds many points tells of all of them, as in `survey.file.overview`; one that holds none shows the
+nearest.
 """
 
 from dataclasses import dataclass
@@ -9,10 +10,10 @@ from functools import cached_property, lru_cache
 import numpy as np
 from matplotlib import colormaps
 
-from survey.dataset import flag_codes, unanswered
-from survey.figures import colours_of, greys_of, limits
+from survey.file.labels import flag_codes, unanswered
+from survey.file.overview import NO_ANSWER, UNIONS, UNREAD, Overview, Points, over, unranked
 from survey.grid import logarithmic
-from survey.reduced import NO_ANSWER, UNIONS, UNREAD, Overview, Points, over, unranked
+from survey.show.figures import colours_of, greys_of, limits
 
 DIRECT = 2**22  # points: a smaller window is read from the file, a larger one from the overview
 OVERVIEW = 4096  # cells along an axis of the overview, at most

@@ -13,8 +13,8 @@ import webbrowser
 from contextlib import contextmanager, nullcontext
 from urllib.parse import urlsplit
 
-from survey import trust
 from survey.errors import BadInput
+from survey.request import trust
 from survey.viewer.shown import Map
 from survey.wording import counted
 

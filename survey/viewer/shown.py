@@ -9,10 +9,12 @@ from urllib.parse import parse_qsl, urlencode
 
 import numpy as np
 
-from survey import modules, schema, status, store
+from survey import modules, status
 from survey.analysis.point import has_verdict, meaning, reading, sentence
-from survey.dataset import flag_codes, percent
 from survey.errors import BadInput, Damaged
+from survey.file import reading as file_reading
+from survey.file import schema
+from survey.file.labels import flag_codes, percent
 from survey.viewer import raster
 from survey.wording import plain
 
@@ -35,7 +37,7 @@ class Map:
     """A survey's file, lazy if it is large, and its two axes; raises BadInput or Damaged for a file that has no map."""
 
     def __init__(self, path):
-        ds = store.load(path, chunks=None)
+        ds = file_reading.load(path, chunks=None)
         _check(path, ds)
         if len(ds.status.dims) < 2:
             raise BadInput(f"{path}: this survey has no two axes, so there is no map to view; draw it with survey plot")

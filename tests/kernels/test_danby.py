@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from survey.kernels import danby, danby_double
+from survey.kernels.libration import danby, danby_double
 
 ERROR = 1e-12
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import survey
-from survey.measures import cylinder, cylinder_auto
+from survey.measures.cylinder import auto as cylinder_auto
+from survey.measures.cylinder import solution
 from survey.methods import closed, taylor
-from survey.precision import gyrostat as precision
+from survey.precision.cases import gyrostat as precision
 from survey.scene import Request
 from survey.scenes import gyrostat
 
@@ -19,12 +20,12 @@ NO_FORM, EQUILIBRIUM, TURNING = 19, 17, 16
 
 
 def at(row, *times):
-    floats, turnings, status = cylinder.trajectories(closed, np.array([row], float), np.array([times], float), 1e-10)
+    floats, turnings, status = solution.trajectories(closed, np.array([row], float), np.array([times], float), 1e-10)
     return floats[0], turnings[0], status[0]
 
 
 def passing(row, *places):
-    floats, status = cylinder.abel(closed, np.array([row], float), np.array([places], float), 1e-10)
+    floats, status = solution.abel(closed, np.array([row], float), np.array([places], float), 1e-10)
     return floats[0], status[0]
 
 
@@ -167,8 +168,8 @@ def test_time_of_flight_against_quadrature(name):
 @pytest.mark.parametrize("name", ELLIPTIC)
 def test_elliptic_against_taylor(name):
     row, times = np.array([[0, 0, *ELLIPTIC[name]]]), np.array([[-9.0, -0.01, 0.0, 0.7, 3.0, 20.0]])
-    mine, n, ok = cylinder.trajectories(closed, row, times, 1e-10)
-    other, m, fine = cylinder.trajectories(taylor, row, times, 1e-13)
+    mine, n, ok = solution.trajectories(closed, row, times, 1e-10)
+    other, m, fine = solution.trajectories(taylor, row, times, 1e-13)
     assert (ok == 0).all() and (fine == 0).all() and np.array_equal(n, m)
     assert (np.abs(mine - other)[..., :2] <= mine[..., 2:] + other[..., 2:]).all()
 
@@ -198,13 +199,13 @@ def test_random_points_agree_with_taylor_within_both_bars(kind):
                                      n * (mu - 1) * b12, n * (mu - 1) * b31])  # fmt: skip
         rows[:, 7] = mu * (b12 * np.sin(rows[:, 6]) + b31 * np.cos(rows[:, 6])) + n
     times = np.tile([-2.0, 0.3, 6.0], (150, 1))
-    mine, n, ok = cylinder.trajectories(closed, rows, times, 1e-10)
-    other, m, fine = cylinder.trajectories(taylor, rows, times, 1e-13)
+    mine, n, ok = solution.trajectories(closed, rows, times, 1e-10)
+    other, m, fine = solution.trajectories(taylor, rows, times, 1e-13)
     both = (ok == 0) & (fine == 0)
     assert both.mean() > 0.9 and ((n == m) | (n == -2))[both].all()
     assert (np.abs(mine - other)[both][:, :2] <= mine[both][:, 2:] + other[both][:, 2:]).all()
-    mine, ok = cylinder.abel(closed, rows, rows[:, 6:7] + times, 1e-10)
-    other, fine = cylinder.abel(taylor, rows, rows[:, 6:7] + times, 1e-13)
+    mine, ok = solution.abel(closed, rows, rows[:, 6:7] + times, 1e-10)
+    other, fine = solution.abel(taylor, rows, rows[:, 6:7] + times, 1e-13)
     both = (ok == fine) & ((ok == 0) | (ok == TURNING))
     assert (np.abs(mine - other)[both][:, :2] <= mine[both][:, 2:] + other[both][:, 2:]).all()
     decided = ~np.isin(ok, (3, NO_FORM)) & np.isin(fine, (0, TURNING, EQUILIBRIUM))
@@ -236,7 +237,7 @@ def test_auto_takes_the_closed_form_point_by_point():
 def test_auto_falls_back_near_a_separatrix():
     row = np.array([[0, 0, 0, 0, 0, 1.0, 0.0, 2.0 * (1 - 1e-15)]])
     times = np.array([[2.0]])
-    assert cylinder.trajectories(closed, row, times, 1e-10)[2][0, 0] == 3
+    assert solution.trajectories(closed, row, times, 1e-10)[2][0, 0] == 3
     floats, _n, status = cylinder_auto.trajectories(taylor, row, times, 1e-10)
     with mp.workdps(30):
         wanted = float(2 * mp.asin(mp.tanh(2)))

@@ -8,9 +8,9 @@ import pytest
 
 import survey.methods
 from survey import modules
-from survey.kernels import danby as lanes
 from survey.kernels.jit import kernel, splice
-from survey.measures import danby
+from survey.kernels.libration import danby as lanes
+from survey.measures.libration import danby
 from survey.methods import rk4, taylor16
 
 METHODS = [modules.load(survey.methods, name, "method") for name in modules.names(survey.methods)]

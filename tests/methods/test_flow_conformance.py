@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from survey import methods, modules
-from survey.kernels import flow
-from survey.measures import cylinder
+from survey.kernels.cylinder import flow
+from survey.measures.cylinder import solution
 
 FOUND = [modules.load(methods, name, "method") for name in modules.names(methods)]
 FLOWS = [pytest.param(m, id=m.__name__.split(".")[-1]) for m in FOUND if "cylinder" in m.SERVES and m.ORDER]
@@ -96,7 +96,7 @@ def test_reference_trajectories_lie_within_their_bars(method, rtol):
             if case.get("form", "time") != "time":
                 continue
             row = np.array([[*map(float, case["p"]), float(case["phi0"]), float(case["w0"])]])
-            floats, _n, status = cylinder.trajectories(method, row, np.array([[float(case["t"])]]), rtol)
+            floats, _n, status = solution.trajectories(method, row, np.array([[float(case["t"])]]), rtol)
             error = np.abs(floats[0, 0, :2] - [float(case["phi"]), float(case["w"])])
             assert status[0, 0] == 0
             assert (error <= floats[0, 0, 2:] + 1e-12 * (1 + np.abs(floats[0, 0, :2]))).all()
@@ -106,9 +106,9 @@ def test_reference_trajectories_lie_within_their_bars(method, rtol):
 @each
 def test_values_do_not_depend_on_the_other_times(method):
     row, times = np.array([[*SIX, *START]]), np.array([[5.0, -2.0, 0.0, 3.25, 7.5, -0.125]])
-    together = cylinder.trajectories(method, row, times, 1e-9)
+    together = solution.trajectories(method, row, times, 1e-9)
     for j in range(times.shape[1]):
-        alone = cylinder.trajectories(method, row, times[:, j : j + 1], 1e-9)
+        alone = solution.trajectories(method, row, times[:, j : j + 1], 1e-9)
         for one, all_of_them in zip(alone, together, strict=True):
             assert np.array_equal(one[:, 0], all_of_them[:, j])
 
@@ -118,8 +118,8 @@ def test_methods_agree_within_their_bars(method):
     random = np.random.default_rng(8)
     rows = random.normal(size=(20, 8)) * [1, 1, 2, 2, 2, 2, 2, 3]
     times = np.tile([-2.0, 1.0, 5.0], (20, 1))
-    mine, _n, ok = cylinder.trajectories(method, rows, times, 1e-8)
-    best, _n, fine = cylinder.trajectories(best_method(), rows, times, 1e-13)
+    mine, _n, ok = solution.trajectories(method, rows, times, 1e-8)
+    best, _n, fine = solution.trajectories(best_method(), rows, times, 1e-13)
     both = (ok == 0) & (fine == 0)
     assert both.mean() > 0.9
     assert (np.abs(mine - best)[both][:, :2] <= mine[both][:, 2:] + best[both][:, 2:]).all()

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import survey
-from survey.kernels import gyrostat
-from survey.kernels.flow import coefficients
-from survey.measures import cylinder
+from survey.kernels.cylinder import gyrostat
+from survey.kernels.cylinder.flow import coefficients
+from survey.measures.cylinder import solution
 from survey.methods import full, taylor
 
 SIX, START = (0.7, -0.4, 1.1, 0.3, 0.5, -0.2), (1.5, 0.8)
@@ -142,7 +142,7 @@ def test_reference_in_the_rotated_frame():
 def residual(free, six=SIX, start=START):
     """Largest distance of the full motion to the reduced one over t <= 20, and the largest growth of a deviation."""
     states, tangent = motion(*system(free, six, start))
-    floats, _n, status = cylinder.trajectories(taylor, np.array([[*six, *start]]), TIMES[None], 1e-13)
+    floats, _n, status = solution.trajectories(taylor, np.array([[*six, *start]]), TIMES[None], 1e-13)
     assert (status == 0).all()
     phi, w = floats[0, :, 0], floats[0, :, 1]
     zero = np.zeros_like(phi)
@@ -183,8 +183,8 @@ def test_the_tangent_map_is_the_derivative():
 def test_bars_hold_on_random_points():
     rows = np.random.default_rng(7).normal(size=(40, 8)) * [1, 1, 2, 2, 2, 2, 2, 3]
     times = np.tile([-20.0, -3.0, 0.0, 1.0, 20.0], (40, 1))
-    mine, count, ok = cylinder.trajectories(full, rows, times, 1e-11)
-    best, truth, fine = cylinder.trajectories(taylor, rows, times, 1e-13)
+    mine, count, ok = solution.trajectories(full, rows, times, 1e-11)
+    best, truth, fine = solution.trajectories(taylor, rows, times, 1e-13)
     both = (ok == 0) & (fine == 0)
     assert both.mean() > 0.95
     assert (np.abs(mine - best)[both][:, :2] <= mine[both][:, 2:] + best[both][:, 2:]).all()
@@ -197,8 +197,8 @@ def test_bars_hold_on_random_points():
 def test_bars_hold_and_are_narrow_at_coarse_tolerances(scale):
     """From rest every second term vanishes; steps are shorter than the tolerance asks, and the bars know."""
     rows, times = np.random.default_rng(8).normal(size=(20, 8)) * scale, np.tile([0.3, 2.0, 8.0], (20, 1))
-    mine, _count, ok = cylinder.trajectories(full, rows, times, 1e-4)
-    best, _truth, fine = cylinder.trajectories(taylor, rows, times, 1e-13)
+    mine, _count, ok = solution.trajectories(full, rows, times, 1e-4)
+    best, _truth, fine = solution.trajectories(taylor, rows, times, 1e-13)
     assert (ok == 0).all() and (fine == 0).all()
     assert (np.abs(mine - best)[..., :2] <= mine[..., 2:] + best[..., 2:]).all()
     assert np.median(mine[..., 2:]) < 1e-11
@@ -225,5 +225,5 @@ def test_errors_that_add_up_lie_within_the_bars(steps, growth):
             gyrostat.carry(G, T, V, 0.0, squares, J, work)
             worst, rows = worst + local * abs(rows).sum(), rows @ matrix
         worst += local * abs(rows).sum()  # of the initial state
-        full.read(state, squares, steps, START[0], out)
+        full._read(state, squares, steps, START[0], out)
         assert worst <= out[2 + at] * (1 + 1e-9)

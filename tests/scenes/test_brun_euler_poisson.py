@@ -10,7 +10,7 @@ import xarray as xr
 from brun_truth import NAMES, draw, draw_scaled
 
 import survey
-from survey.kernels.dop853 import STAGES, A, B
+from survey.kernels.math.dop853 import STAGES, A, B
 
 STEPS = 300
 

@@ -10,10 +10,10 @@ import pytest
 import xarray as xr
 
 import survey
-from survey import engine
 from survey.scene import Request
 from survey.scenes import gyrostat
 from survey.status import INVALID_PARAMETERS, OK
+from survey.sweep import cost
 
 SIX = dict(zip(("b12", "b31", "d", "c23", "s2", "s3"), (0.7, -0.4, 1.1, 0.3, 0.5, -0.2), strict=True))
 
@@ -160,7 +160,7 @@ def test_times_are_solved_together_whatever_the_blocks(axes, monkeypatch):
         return survey.evaluate("gyrostat", method="taylor", **(system | {name: values[name] for name in axes} | given))
 
     whole = solved()
-    monkeypatch.setattr(engine, "BLOCK_POINTS", 1)
+    monkeypatch.setattr(cost, "BLOCK_POINTS", 1)
     xr.testing.assert_identical(whole.drop_attrs(), solved().drop_attrs())
     alone = solved(t=values["t"][1:2])
     for name in ("phi", "w"):

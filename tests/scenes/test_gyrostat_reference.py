@@ -15,7 +15,7 @@ import pytest
 import xarray as xr
 
 import survey
-from survey.measures import cylinder_fate
+from survey.measures.cylinder import fate
 from survey.methods import taylor
 
 REFERENCE = json.loads((files("survey.reference") / "gyrostat.json").read_text())
@@ -275,7 +275,7 @@ def test_classification(case, method):
 @pytest.mark.parametrize("case", REFERENCE["classification"], ids=lambda case: case["name"][:20])
 def test_what_a_portrait_does_not_print(case):
     """Section, thresholds w_c, w_d of the rotation maps, turning points of librations: the skeleton behind it."""
-    s = cylinder_fate.skeleton(taylor, case["p"])
+    s = fate.skeleton(taylor, case["p"])
     assert s.section % (2 * math.pi) == pytest.approx(case["section"], abs=1e-9)
     for (w_c, w_d), name in zip(s.thresholds, ("rotation_plus", "rotation_minus"), strict=True):
         wanted = case[name]
@@ -288,9 +288,9 @@ def test_what_a_portrait_does_not_print(case):
             ds = survey.evaluate("gyrostat", question="abel", **six, **start)
             assert abs(float(ds.w)) == pytest.approx(wanted["w_d"], abs=1e-9)
     for found, wanted in zip(s.librations, case["libration"], strict=True):
-        places = found[cylinder_fate.rt.CYCLE_X], found[cylinder_fate.rt.CYCLE_LEFT]
+        places = found[fate.rt.CYCLE_X], found[fate.rt.CYCLE_LEFT]
         assert places == pytest.approx((wanted["phi_right"], wanted["phi_left"]), abs=1e-8)
-        assert found[cylinder_fate.rt.CYCLE_CLASS] == wanted["equilibria_inside"]
+        assert found[fate.rt.CYCLE_CLASS] == wanted["equilibria_inside"]
 
 
 @each

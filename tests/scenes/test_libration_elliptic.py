@@ -13,8 +13,8 @@ from mpmath import mp, mpf
 from scipy.integrate import solve_ivp
 
 import survey
-from survey import engine
-from survey.measures import danby
+from survey.measures.libration import danby
+from survey.sweep import cost
 
 REFERENCE = json.loads(resources.files("survey.reference").joinpath("libration_elliptic.json").read_text())
 POINTS, BOUNDARY = REFERENCE["points"], REFERENCE["boundary"]
@@ -170,7 +170,7 @@ def test_a_dense_row_is_that_of_its_points():
 def test_a_dense_map_has_the_same_bits_in_any_block(monkeypatch):
     given = {"mu": np.linspace(0.0, 0.05, 90), "e": np.array([0.0, 0.2, 0.314, 0.9])}
     whole = survey.evaluate("libration_elliptic", **given)
-    monkeypatch.setattr(engine, "BLOCK_POINTS", 17)
+    monkeypatch.setattr(cost, "BLOCK_POINTS", 17)
     xr.testing.assert_identical(whole.drop_attrs(), survey.evaluate("libration_elliptic", **given).drop_attrs())
 
 
@@ -186,7 +186,7 @@ def test_eccentricities_near_one_keep_honest_bars():
 
 PLAIN = """
 import numpy as np
-from survey.measures import danby
+from survey.measures.libration import danby
 e, mu = np.array([0.1, 0.93]), np.array([[0.02, 0.3], [1e-4, 0.5]])
 for method, rtol in (("auto", 1e-9), ("dop853", 1e-3), ("rk4", 1e-3)):
     out = danby.solve(e, mu, method, rtol)

@@ -6,8 +6,8 @@ from hill_problems import REFERENCE
 from mpmath import mp, mpf
 
 import survey
-from survey.kernels.hill import STABLE, UNDECIDED, UNSTABLE
-from survey.measures import hill
+from survey.kernels.hill.answers import STABLE, UNDECIDED, UNSTABLE
+from survey.measures.hill import monodromy
 from survey.scenes import mathieu
 
 STANDARD = REFERENCE["standard"]
@@ -80,7 +80,7 @@ def test_bars_do_not_underflow(method):
     ]
     for rtol in (1.156e-13, 6.96e-13, 1e-9):
         for a, q in points:
-            out = hill.solve(mathieu._problem(np.array([q]), np.array([[a]])), method, rtol)
+            out = monodromy.solve(mathieu._problem(np.array([q]), np.array([[a]])), method, rtol)
             said, dy1, bar = int(out["verdict"][0, 0]), float(out["dy1"][0, 0]), float(out["dy1_error"][0, 0])
             with mp.workdps(700):
                 beyond = mpf(a) + mpf(q) ** 2 / 2

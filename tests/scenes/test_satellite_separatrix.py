@@ -7,8 +7,8 @@ from mpmath import mp, mpf
 
 import survey
 from survey import status
-from survey.kernels.hill import MARGINAL, STABLE, UNSTABLE
-from survey.kernels.satellite import half_periods
+from survey.kernels.hill.answers import MARGINAL, STABLE, UNSTABLE
+from survey.kernels.hill.satellite import half_periods
 
 NAMES = ("y1", "dy1", "y2", "dy2")
 BODIES = ("prolate", "oblate")

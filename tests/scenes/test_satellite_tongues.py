@@ -10,7 +10,7 @@ from hill_problems import BODY, cases, solve
 from mpmath import mp, mpf
 
 import survey
-from survey.kernels.hill import STABLE, UNSTABLE
+from survey.kernels.hill.answers import STABLE, UNSTABLE
 
 DIGITS = 40
 FACTORS = ("y1", "dy1", "y2", "dy2")

@@ -9,8 +9,8 @@ from mpmath import mp, mpf
 
 import survey
 from survey import status
-from survey.kernels.double import HALF_PI
-from survey.kernels.hill import STABLE, UNSTABLE
+from survey.kernels.hill.answers import STABLE, UNSTABLE
+from survey.kernels.math.double import HALF_PI
 from survey.scenes import mathieu, satellite
 
 WAYS = [

@@ -117,7 +117,7 @@ def _path(kept, chunk):
 
 
 def _work(left, seed, kept, workers, minutes, console, done, number):
-    from survey.progress import Progress
+    from survey.sweep.progress import Progress
 
     began = time.monotonic()
     context = multiprocessing.get_context("spawn")
@@ -228,7 +228,7 @@ coarse. The time is that of the package, without compiling."""
 
 
 def _prose(identity, total, seconds, complete):
-    from survey.dataset import provenance
+    from survey.file.labels import provenance
 
     asked = f"--points {identity['points']} --seed {identity['seed']}"
     if identity["scenes"] != list(FAMILIES):

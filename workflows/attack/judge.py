@@ -14,7 +14,8 @@ import numpy as np
 import xarray as xr
 
 import survey
-from survey import own, status
+from survey import status
+from survey.request import user_scene
 from survey.scene import exists
 
 COUNTS = ("points", "undecided", "missed", "refused", "unchecked", "lies", "wrong", "silent", "tracebacks", "slow")
@@ -106,7 +107,7 @@ def judge(batch):
         if seconds > SLOW + HALF * np.prod(shape(batch)):
             _tell(batch, counts, faults, "slow", [0], "seconds a point", f"{seconds / np.prod(shape(batch)):.3g}")
     answer = {name: _flat(batch, ds[name]) for name in ds.data_vars}
-    _, module = own.find(batch.scene or batch.name)
+    _, module = user_scene.find(batch.scene or batch.name)
     _silent(batch, module, answer, counts, faults)
     worst = _truth(batch, answer, counts, faults)
     if batch.size > 2 and batch.method in ("auto", "taylor16", "agm", "taylor"):

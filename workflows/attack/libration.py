@@ -41,7 +41,7 @@ def chunk(random, size):
 
 def _forms(w1, w2):
     """The closed forms (their integers), in the arithmetic of w1 and w2."""
-    from survey.kernels.libration_forms import FORMS, LABELS
+    from survey.kernels.libration.coefficients import FORMS, LABELS
 
     u, v = w1 * w1, w2 * w2
     factors = (w1, w2, u, v, u - v, 1 - 5 * u, 1 - 5 * v, 1 - 10 * u, 1 - 10 * v, 4 - u, 4 - v, 9 - 4 * u * v)
@@ -67,7 +67,7 @@ def _split(x):
 
 
 def truth(given, answer):
-    from survey.kernels.libration_forms import LABELS
+    from survey.kernels.libration.coefficients import LABELS
 
     mu = np.asarray(given["mu"], float)
     names = ("omega1", "omega2", "a20", "a11", "a02", "D4", "D6", "M_ray")

@@ -1,0 +1,85 @@
+"""What a module of a folder must offer: a table of its public names, checked when the module is loaded.
+
+A module's public names are those at its top level, imports and names with a leading underscore apart.
+"""
+
+import ast
+import inspect
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import lru_cache
+from pathlib import Path
+
+from survey.errors import BadInput
+
+
+@dataclass(frozen=True)
+class Value:
+    """A public constant: its type (or types), what it means, and whether every module must have it."""
+
+    meaning: str
+    kind: type | tuple[type, ...] = object
+    needed: bool = False
+
+
+@dataclass(frozen=True)
+class Function:
+    """A public function: what it does, its arguments' names (None: any), and whether every module must have it."""
+
+    meaning: str
+    arguments: tuple[str, ...] | None = ()
+    needed: bool = False
+
+
+def check(module, table, where):
+    """Raise BadInput, in one line, if the module does not keep to the table.
+
+    `table` is {name: Value | Function}, and `where` the file in which it stands.
+    """
+    for name in public(module.__file__):
+        if name not in table:
+            near = get_close_matches(name, table, n=1, cutoff=0.6)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            refuse(module, f"{name} is not in the table{hint} (a helper's name begins with an underscore)", where)
+    for name, entry in table.items():
+        if not hasattr(module, name):
+            if entry.needed:
+                refuse(module, f"{name} is missing: {entry.meaning}", where)
+        elif isinstance(entry, Function):
+            _check_function(module, name, getattr(module, name), entry, where)
+        elif not isinstance(getattr(module, name), entry.kind):
+            refuse(module, f"{name} = {getattr(module, name)!r:.60} must be of type {_named(entry.kind)}", where)
+
+
+@lru_cache(maxsize=256)
+def public(path):
+    """The public names of the module in the file `path`, in their order."""
+    names = []
+    for node in ast.parse(Path(path).read_text(encoding="utf-8")).body:
+        if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+            names.append(node.name)
+        elif isinstance(node, (ast.Assign, ast.AnnAssign)):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            names += [name.id for target in targets for name in ast.walk(target) if isinstance(name, ast.Name)]
+    return tuple(dict.fromkeys(name for name in names if not name.startswith("_")))
+
+
+def _check_function(module, name, function, entry, where):
+    function = getattr(function, "py_func", function)  # what numba has compiled
+    if not callable(function):
+        refuse(module, f"{name} must be a function", where)
+    parameters = inspect.signature(function).parameters.values()
+    given = tuple(p.name for p in parameters)
+    more = [p for p in list(parameters)[len(entry.arguments or ()) :] if p.default is p.empty]  # asked of nobody
+    if entry.arguments is not None and (given[: len(entry.arguments)] != entry.arguments or more):
+        words = f"{name}({', '.join(given)}) must be {name}({', '.join(entry.arguments)})"
+        refuse(module, words, where)
+
+
+def _named(kind):
+    return " or ".join(one.__name__ for one in (kind if isinstance(kind, tuple) else (kind,)))
+
+
+def refuse(module, words, where):
+    """Raise BadInput: the module does not keep to the table in `where`."""
+    raise BadInput(f"{module.__file__}: {words}; the table is in {where}")

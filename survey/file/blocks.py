@@ -1,0 +1,282 @@
+"""The finished blocks of a run: one writer, each block durable as it finishes."""
+
+import contextlib
+import hashlib
+import io
+import json
+import os
+import shutil
+import socket
+import uuid
+from math import prod
+from pathlib import Path
+
+import numpy as np
+from isal import isal_zlib
+
+from survey.errors import BadInput, Damaged, Stopped
+from survey.file import lock, unfinished
+from survey.file.disk import digest_of, refused, sync, write_atomically
+from survey.file.reading import attributes_of
+
+FORMAT = 3
+
+
+class Blocks:
+    """The finished blocks of a run in `OUT.nc.blocks/`: one writer, each block durable as it finishes.
+
+    Each block says of which survey it is; the manifest beside them, which is made first and removed last, tells users.
+    Use as a context manager; raises BadInput if another run holds the output, or if the blocks that are there
+    belong to another survey (unless `fresh`), Damaged if it cannot be told to which. For users the folder keeps
+    what `about` tells, the text of the `workflow`, and `again`, the command that goes on.
+    If a run that did not end has left something beside a complete output of the same workflow, `published` is that
+    output's attributes: all that is to be done is to `remove` what was left.
+    """
+
+    def __init__(self, path, fingerprint, fresh=False, about=None, workflow="", again=None, text=None):
+        self.folder = unfinished.folder_of(path)
+        self.path = Path(path)
+        self.fingerprint = {"format": FORMAT, **fingerprint}
+        self.identity = _hash(self.fingerprint)
+        # of the output, which is the same however it was cut into blocks
+        self.of_output = _hash({key: self.fingerprint[key] for key in self.fingerprint.keys() - {"format", "blocks"}})
+        self.fresh = fresh
+        self.about, self.workflow, self.text = about or {}, workflow, text
+        name = {"host": socket.gethostname(), "pid": os.getpid(), "run": uuid.uuid4().hex}
+        self.lock = lock.Lock(f"{path}.lock", name)
+        self.holder = name | {"folder": os.getcwd(), "again": again}
+        self.published = None
+
+    def __enter__(self):
+        with refused(self.path):
+            left = self._hold()
+            try:
+                self._prepare(bool(left) or self.folder.exists())
+            except BaseException:
+                self.__exit__()
+                raise
+        return self
+
+    def __exit__(self, *_):
+        with contextlib.suppress(OSError):  # what ended the run is told, and the next one takes the lock
+            self.lock.release()
+
+    def __getstate__(self):
+        # a worker saves blocks, wherever it runs; only the parent holds the lock
+        return self.__dict__ | {"lock": None, "workflow": "", "text": None, "folder": self.folder.absolute()}
+
+    def done(self):
+        """Numbers of the blocks that are finished."""
+        return {int(file.stem) for file in self.folder.glob("*.block") if file.stem.isdecimal()}
+
+    def sound(self):
+        """Numbers of the blocks that are finished and whose checksums hold; the others are removed."""
+        return {number for number in self.done() if self._sound(number)}
+
+    def save(self, number, arrays):
+        """Keep the arrays of block `number`; once this returns, a power cut does not lose them."""
+        with refused(self.path):
+            write_atomically(self._file(number), lambda file: pack(arrays, file, self._label(number)))
+
+    def keep(self, number, arrays):
+        """Save the block where this process reaches the run's folder; else return the bytes that `put` saves there."""
+        if self._reached():
+            self.save(number, arrays)
+            return None
+        file = io.BytesIO()
+        pack(arrays, file, self._label(number))
+        return file.getvalue()
+
+    def put(self, number, content):
+        """Save a block that `keep` returned elsewhere."""
+        with refused(self.path):
+            write_atomically(self._file(number), content)
+
+    def once(self, name, make):
+        """The arrays that an earlier run kept under this name, else those of `make()`, kept from now on."""
+        file, label = self.folder / f"{name}.extra", self._label(name)
+        with contextlib.suppress(OSError, ValueError):
+            return unpack(file.read_bytes(), label)
+        arrays = make()
+        with refused(self.path):
+            write_atomically(file, lambda opened: pack(arrays, opened, label))
+        return arrays
+
+    def load(self, number):
+        """The arrays of block `number`; raises Damaged (and removes the block) if its checksum fails."""
+        with refused(self.path, "reading a block"):
+            try:
+                return self._read(number)
+            except (FileNotFoundError, ValueError) as error:
+                self._file(number).unlink(missing_ok=True)
+                told = f"{self._file(number)}: this block is damaged ({error}); run the command again"
+                raise Damaged(told) from None
+
+    def refuse_lost_lock(self):
+        """Raise Stopped if the lock names another run: where file systems share no locks, a halted run may lose it."""
+        if not self.lock.owned():
+            raise Stopped(f"{self.path}: another run has taken its lock, since this one had halted; wait, or use -o")
+
+    def remove(self):
+        """Drop the blocks once the output is complete, and the lock."""
+        try:
+            clear(self.folder)
+            self.lock.release()
+        except OSError as error:
+            told = f"what the run kept beside it could not be removed ({error.strerror}: {error.filename})"
+            raise Stopped(f"{self.path} is complete, but {told}; mend it and run the command again") from None
+
+    def _reached(self):
+        """Does this process see the very folder that the run's parent holds?"""
+        return unfinished.table(self.folder / "holder.json") == self.holder
+
+    def _file(self, number):
+        return self.folder / f"{number:08d}.block"
+
+    def _label(self, name):
+        """What a file in the folder says of itself: of which survey, which part."""
+        return f"{self.identity} {name}"
+
+    def _read(self, number):
+        return unpack(self._file(number).read_bytes(), self._label(number))
+
+    def _sound(self, number):
+        try:
+            self._read(number)
+        except (OSError, ValueError):
+            self._file(number).unlink(missing_ok=True)
+            return False
+        return True
+
+    def _hold(self):
+        """Hold the lock; what it says of a run that has ended without removing it."""
+        try:
+            return self.lock.acquire()
+        except lock.Held as held:
+            raise BadInput(f"{self.path}: another run is writing it ({held}); wait, or use -o") from None
+
+    def _prepare(self, left):
+        if self.fresh:
+            clear(self.folder)
+        finished = [file for file in self.folder.glob("*") if file.suffix in (".block", ".extra")]
+        self._refuse_other_survey(finished)
+        if left and not self.fresh and self._complete():
+            return
+        if not finished:  # nothing is lost
+            clear(self.folder)
+        self.folder.mkdir(exist_ok=True)
+        sync(self.path.parent)
+        known = self.fingerprint | self.about
+        if not self._is_own(unfinished.table(self.folder / "manifest.json")):
+            write_atomically(self.folder / "workflow.toml", self.workflow.encode())
+            write_atomically(self.folder / "manifest.json", json.dumps(known, indent=1).encode())
+        write_atomically(self.folder / "holder.json", json.dumps(self.holder).encode())
+
+    def _is_own(self, manifest):
+        return all(manifest.get(key) == value for key, value in self.fingerprint.items())
+
+    def _refuse_other_survey(self, finished):
+        manifest = self.folder / "manifest.json"
+        old = unfinished.table(manifest)
+        if self._is_own(old) or not any(map(self._is_foreign, finished)):
+            return
+        changed = [key for key in self.fingerprint if old.get(key) != self.fingerprint[key]]
+        if old:
+            known = self.fingerprint | self.about
+            raise BadInput(unfinished.drift(self.path, old, known, changed, self.workflow))
+        raise Damaged(
+            f"{manifest} is missing or damaged, and blocks beside it are of another survey; "
+            "--fresh deletes them and starts anew, -o writes another file"
+        )
+
+    def _is_foreign(self, file):
+        """Is the file sound and of another survey? (One that is not sound is of no use to any.)"""
+        try:
+            if label_of(file).startswith(f"{self.identity} "):
+                return False
+            checked(file.read_bytes())
+        except (OSError, ValueError):
+            return False
+        return True
+
+    def _complete(self):
+        """Is the output complete and of this very workflow? Then `published` is known, and one digest beside it."""
+        try:
+            with open(self.path, "rb") as file:
+                line = f"{hashlib.file_digest(file, 'sha256').hexdigest()}  {self.path.name}\n".encode()
+            digests = digest_of(self.path).read_bytes()
+            if line not in digests:
+                return False
+            attributes = attributes_of(self.path)
+        except (OSError, RuntimeError):
+            return False
+        wanted = {"complete": 1, "fingerprint": self.of_output, "workflow": self.text}
+        if any(attributes.get(key) != value for key, value in wanted.items()):
+            return False
+        if digests != line:  # the run ended between the file and its digest
+            self.folder.mkdir(exist_ok=True)
+            write_atomically(digest_of(self.path), line, self.folder)
+        self.published = attributes
+        return True
+
+
+def _hash(table):
+    """16 hex digits of a table's values."""
+    return hashlib.sha256(json.dumps(table, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def clear(folder):
+    """Remove a run's folder, its manifest last: whatever ends this half-way, what is left can be told."""
+    if not folder.exists():
+        return
+    manifest = folder / "manifest.json"
+    for file in sorted(folder.iterdir()):
+        if file.is_dir() and not file.is_symlink():
+            shutil.rmtree(file)
+        elif file != manifest:
+            file.unlink(missing_ok=True)
+    manifest.unlink(missing_ok=True)
+    folder.rmdir()
+
+
+def pack(arrays, file, label=""):
+    """Write the arrays to a binary file: a line with the label and their names, their bytes in multiples of 8, a
+    checksum."""
+    names = {name: (array.dtype.str, array.shape) for name, array in arrays.items()}
+    parts = [json.dumps([label, names]).encode() + b"\n"] + [np.ascontiguousarray(array) for array in arrays.values()]
+    check = 0
+    for part in parts:
+        for piece in (part, bytes(-memoryview(part).nbytes % 8)):
+            file.write(piece)
+            check = isal_zlib.crc32(piece, check)
+    file.write(check.to_bytes(8, "little"))
+
+
+def unpack(content, label=None):
+    """The arrays that `pack` wrote; raises ValueError if a bit is not as it was, or if its label is another one."""
+    body = checked(content)
+    place = content.index(b"\n") + 1
+    own, names = json.loads(content[:place])
+    if label not in (None, own):
+        raise ValueError("it is of another survey")
+    arrays = {}
+    for name, (kind, shape) in names.items():
+        place += -place % 8
+        arrays[name] = np.frombuffer(body, kind, prod(shape), place).reshape(shape)
+        place += arrays[name].nbytes
+    return arrays
+
+
+def checked(content):
+    """What a block of any format holds before its checksum; ValueError if a bit is not as it was."""
+    body, check = memoryview(content)[:-8], content[-8:]
+    if len(content) < 16 or isal_zlib.crc32(body).to_bytes(8, "little") != check:
+        raise ValueError("its checksum fails")
+    return body
+
+
+def label_of(file):
+    """The label that `pack` gave the file, not checked; empty for one that has none."""
+    with open(file, "rb") as opened:
+        head = json.loads(opened.readline())
+    return head[0] if isinstance(head, list) and head and isinstance(head[0], str) else ""

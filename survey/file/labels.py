@@ -1,0 +1,336 @@
+"""Labels for arrays: CF attributes, flags, error bars, counts and provenance; as a dataset, or for a file."""
+
+import datetime
+import platform
+import re
+import subprocess
+import sys
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from survey import status
+from survey.file import schema
+from survey.scene import exists
+
+CONVENTIONS = "CF-1.11, ACDD-1.3"
+UNDECIDED = -1  # of every verdict
+CHUNK = 2**14  # points: what is computed of them stays in the cache
+
+
+def outputs_of(scene, request):
+    """The Outputs that the request asks for, in the scene's order."""
+    return [o for o in scene.OUTPUTS if o.name in request.variables and exists(o, request.options)]
+
+
+def layout(scene, request):
+    """What is stored per point: {variable: (dtype, fill, extra shape)}: outputs, their errors, and `status`."""
+    table = {}
+    for output in outputs_of(scene, request):
+        extra = tuple(len(scene.DIMENSIONS[dim]) for dim in output.dims)
+        fill = np.nan if output.dtype.kind == "f" else output.fill
+        table[output.name] = (output.dtype, fill, extra)
+        if output.dtype.kind == "f":
+            table[f"{output.name}_error"] = (np.dtype("float32"), np.nan, extra)
+    table["status"] = (np.dtype("int8"), status.PENDING, ())
+    return table
+
+
+def round_up(errors):
+    """float64 error bars (not negative) as float32, never smaller than before."""
+    errors = np.asarray(errors, dtype=float)
+    with np.errstate(over="ignore"):
+        small = errors.astype(np.float32)
+    bits = small.view(np.int32)
+    bits += small < errors  # the next float32 up: consecutive floats are consecutive integers
+    return small
+
+
+def percent(share, bar):
+    """`34.97 +- 0.58 %`: to two digits of the bar."""
+    digits = int(np.clip(1 - np.floor(np.log10(100 * bar)), 0, 12)) if bar > 0 else 2
+    return f"{100 * share:.{digits}f} +- {100 * bar:.{digits}f} %"
+
+
+def describe(grid, scene, name, request, arrays):
+    """The dataset of a survey: `arrays` holds the variables of `layout` in the grid's shape."""
+    import xarray as xr
+
+    data = {key: (dims, arrays[key], meaning) for key, (dims, meaning) in variables(grid, scene, request).items()}
+    return xr.Dataset(data, coordinates(grid, scene, request), attributes(scene, name, request))
+
+
+def coordinates(grid, scene, request):
+    """{name: (dimensions, values, attributes)}: the parameters, then the extra dimensions of the outputs."""
+    used = {p.name: p for p in scene.PARAMETERS}
+    coords = {key: (dims, values, _meaning(used[key])) for key, (dims, values) in grid.parameters.items()}
+    extra = dict.fromkeys(dim for output in outputs_of(scene, request) for dim in output.dims)
+    return coords | {dim: _index(dim, np.asarray(scene.DIMENSIONS[dim])) for dim in extra}
+
+
+def _index(dim, values):
+    """An extra dimension's coordinate: names, or numbers, which have a unit."""
+    unit = {"units": "1"} if values.dtype.kind in "if" else {}
+    return (dim,), values, {"long_name": dim, "symbol": rf"\mathrm{{{dim}}}"} | unit
+
+
+def variables(grid, scene, request):
+    """{name: (dimensions, attributes)} of the variables of `layout`."""
+    dims = tuple(grid.sizes)
+    table = {}
+    for output in outputs_of(scene, request):
+        table[output.name] = (dims + output.dims, meaning(output))
+        if output.dtype.kind == "f":
+            bar = {"long_name": f"error bound of {output.name}", "units": output.units}
+            bar |= {"coverage_content_type": "qualityInformation", "symbol": rf"\delta {output.symbol or output.name}"}
+            table[f"{output.name}_error"] = (dims + output.dims, bar)
+    return table | {"status": (dims, _status_attributes(scene))}
+
+
+def attributes(scene, name, request):
+    """The global attributes that say what was asked, of what, and by which code."""
+    return {
+        "Conventions": CONVENTIONS,
+        "title": scene.TITLE,
+        "summary": (scene.__doc__ or scene.TITLE).strip().split("\n\n")[0].replace("\n", " "),
+        "keywords": f"stability, parameter survey, {name}",
+        "scene": name,
+        "options": ", ".join(f"{key}={value}" for key, value in request.options.items()),
+        "method": request.method,
+        "rtol": request.rtol,
+        "references": "; ".join(scene.REFERENCES),
+        "source": f"survey {version('survey')}: scene {name}, method {request.method}",
+        **provenance(),
+        **({"scene_text": scene.TEXT, "scene_hash": scene.HASH} if hasattr(scene, "TEXT") else {}),
+        **getattr(scene, "NOTES", {}),
+    }
+
+
+class Tally:
+    """Counts by status and verdict, and of points whose bar exceeds the asked accuracy, over pieces of a map.
+
+    `flags` is {"status": its attributes, "verdict": its attributes (where there is one)}. `unanswered` counts, by
+    status, the points whose verdict is -1 because there is no answer.
+    """
+
+    def __init__(self, flags, rtol):
+        self.codes = {name: flag_codes(meaning) for name, meaning in flags.items()}
+        self.counts = {name: dict.fromkeys(codes, 0) for name, codes in self.codes.items()}
+        self.unanswered = {name: 0 for name, code in self.codes["status"].items() if code != status.OK}
+        self.rtol = rtol
+        self.points = self.missed = 0
+
+    def add(self, arrays):
+        """Count the points of a piece: {variable: array}."""
+        size = np.size(arrays["status"])
+        flat = {name: np.asarray(array).reshape(size, -1) for name, array in arrays.items()}
+        bars = [name for name in flat if f"{name}_error" in flat]
+        for first in range(0, size, CHUNK):
+            some = slice(first, first + CHUNK)
+            missed = np.zeros(min(CHUNK, size - first), bool)
+            for name in bars:
+                missed |= _above(flat[name][some], flat[f"{name}_error"][some], self.rtol).any(axis=-1)
+            self.missed += int(np.count_nonzero(missed))
+        self.points += size
+        for name, codes in self.codes.items():
+            for key, code in codes.items():
+                self.counts[name][key] += int(np.count_nonzero(arrays[name] == code))
+        if "verdict" in self.codes:
+            why = arrays["status"][(arrays["verdict"] == UNDECIDED) & (arrays["status"] != status.OK)]
+            for key in self.unanswered if why.size else ():
+                self.unanswered[key] += int(np.count_nonzero(why == self.codes["status"][key]))
+
+    @property
+    def kinds(self):
+        """{"status" and "verdict": {kind: points}}: a point without an answer is of its status, not undecided."""
+        told = {name: dict(number) for name, number in self.counts.items()}
+        if "undecided" in told.get("verdict", ()):
+            told["verdict"]["undecided"] -= sum(self.unanswered.values())
+            told["verdict"] |= {name: n for name, n in self.unanswered.items() if n}
+        return told
+
+    @property
+    def attributes(self):
+        """The counts as global attributes."""
+        return {"points": self.points, "accuracy_missed": self.missed} | _counts(self.kinds)
+
+    @property
+    def before(self):
+        """The counts as older files tell them, where what has no answer is undecided."""
+        return _counts(self.counts)
+
+
+def _counts(table):
+    return {f"{name}_counts": ", ".join(f"{k}: {n}" for k, n in number.items() if n) for name, number in table.items()}
+
+
+def counts_in(attributes):
+    """{"status" and "verdict": {kind: points}} of a file's attributes: what `Tally.attributes` wrote."""
+    told = {name: attributes[f"{name}_counts"] for name in ("status", "verdict") if f"{name}_counts" in attributes}
+    pairs = {name: [part.rpartition(": ") for part in text.split(", ")] for name, text in told.items()}
+    return {name: {kind: int(number) for kind, _, number in some} for name, some in pairs.items()}
+
+
+def _above(value, bar, rtol):
+    """Where the bar exceeds rtol (1 + |value|)."""
+    asked = np.abs(value)
+    asked += 1
+    asked *= rtol
+    with np.errstate(invalid="ignore"):
+        return bar > asked
+
+
+def tally(ds):
+    """The empty Tally of a survey's dataset."""
+    return Tally({name: ds[name].attrs for name in ("status", "verdict") if name in ds}, ds.attrs["rtol"])
+
+
+def count(ds):
+    """Add the counts of `Tally` to `ds.attrs`, from its data in memory."""
+    whole = tally(ds)
+    names = ["status", *whole.codes, *error_bars(ds), *(f"{name}_error" for name in error_bars(ds))]
+    point = ds.status.dims
+    whole.add({name: ds[name].transpose(*point, ...).values for name in names})
+    ds.attrs |= whole.attributes
+    return ds
+
+
+def counts(ds):
+    """{"verdict" (where there is one) and "status": {kind: number of points}}, as `Tally.kinds`."""
+    whole = tally(ds)
+    whole.add({name: ds[name].transpose(*ds.status.dims).values for name in whole.codes})
+    return {name: whole.kinds[name] for name in ("verdict", "status") if name in whole.codes}
+
+
+def unanswered(ds):
+    """{name: code} of the scene's own statuses: why a point has no answer by nature."""
+    codes = flag_codes(ds.status.attrs) if "flag_values" in ds.status.attrs else {}
+    return {name: code for name, code in codes.items() if code >= status.FIRST_OF_SCENE}
+
+
+def undecided_share(ds):
+    """The share of a refined map that its undecided cells take."""
+    return max(1.0 - float((ds.area_fraction - ds.area_fraction_error).sum()), 0.0)
+
+
+def flag_codes(meaning):
+    """{flag meaning: code} from the attributes of a CF flag variable; raises Damaged where they are none."""
+    return schema.flags(meaning)
+
+
+def options_of(ds):
+    """{name: value} of the scene's options; raises Damaged where they are not told."""
+    return schema.options(ds.attrs)
+
+
+def error_bars(ds):
+    """Names of the float outputs of `ds`, one value or more per point (those that have an error bar)."""
+    point = set(ds.status.dims)
+    return [name for name in ds.data_vars if f"{name}_error" in ds.data_vars and point <= set(ds[name].dims)]
+
+
+@cache
+def provenance():
+    """Versions, commit and dirty flag of the source, kernel hash and processor."""
+    from survey.kernels.jit import KERNEL_HASH
+
+    commit, dirty = _commit()
+    return {
+        "version_survey": version("survey"),
+        "version_numba": version("numba"),
+        "version_llvmlite": version("llvmlite"),
+        "version_numpy": version("numpy"),
+        "version_python": platform.python_version(),
+        "commit": commit,
+        "dirty": dirty,
+        "kernel_hash": KERNEL_HASH,
+        "cpu": _cpu(),
+    }
+
+
+def now():
+    """The time in UTC, ISO 8601."""
+    return datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
+def command():
+    """The command line of this process, as the history records it."""
+    return " ".join([Path(sys.argv[0]).name, *sys.argv[1:]])
+
+
+def _commit():
+    """(commit, "yes" or "no") of the repository that holds this package, or ("unknown", "unknown")."""
+    root = Path(__file__).parents[2]
+
+    def git(*words):
+        return subprocess.run(["git", "-C", root, *words], capture_output=True, text=True, check=True).stdout.strip()
+
+    try:
+        tracked = git("ls-files", "survey/file/labels.py")
+        return (
+            (git("rev-parse", "HEAD"), "yes" if git("status", "--porcelain", "survey") else "no")
+            if tracked
+            else ("unknown",) * 2
+        )
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown", "unknown"
+
+
+def _cpu():
+    """The processor's name."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.processor() or platform.machine()
+
+
+def _meaning(parameter):
+    return {
+        "long_name": parameter.long_name,
+        "units": parameter.units,
+        "symbol": parameter.symbol,
+        "comment": f"domain: {parameter.domain}",
+    }
+
+
+def meaning(output):
+    """The attributes of an Output."""
+    attributes = {"long_name": output.long_name, "coverage_content_type": "modelResult"}
+    attributes |= {"units": output.units, "symbol": output.symbol or output.name}
+    if output.flags is not None:
+        attributes |= flag_attributes(output.flags)
+    if output.dtype.kind == "f":
+        attributes["ancillary_variables"] = f"{output.name}_error"
+    comment = [output.applies] if output.applies else []
+    comment += [f"{output.fill} where it does not apply"] if output.integer else []
+    if output.flags is not None and output.fill not in output.flags.values():
+        comment.append(f"{output.fill} where there is no answer")
+    if comment:
+        attributes["comment"] = "; ".join(comment)
+    return attributes
+
+
+def fill_of(variable):
+    """The integer that stands where an integer output does not apply; None for an output that has none."""
+    told = re.search(r"(-?\d+) where it does not apply", variable.attrs.get("comment", ""))
+    return int(told[1]) if told else None
+
+
+def flag_attributes(codes):
+    """The attributes of a CF flag variable, from {flag meaning: code}."""
+    return {"flag_values": np.array(list(codes.values()), np.int8), "flag_meanings": " ".join(codes)}
+
+
+def _status_attributes(scene):
+    table = status.table(scene)
+    return {
+        "long_name": "why the point has or has not an answer",
+        "coverage_content_type": "qualityInformation",
+        "units": "1",
+        "symbol": "status",
+        **flag_attributes({name: code for name, (code, _) in table.items()}),
+        "comment": "; ".join(f"{name}: {sentence}" for name, (_, sentence) in table.items()),
+    }

@@ -1,0 +1,1 @@
+"""Kernels of flows on the cylinder."""

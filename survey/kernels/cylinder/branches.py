@@ -1,0 +1,62 @@
+"""Unstable branches of the saddles: w(x) = a1 x + a2 x^2 + ..., x = phi - phi_s, solves w w' = f w + g (57)."""
+
+import math
+
+import numpy as np
+
+from survey.kernels.cylinder.equilibria import ANGLE, BAR, KIND, SADDLE
+from survey.kernels.cylinder.flow import B12, B31, BOUND_DDG, BOUND_DG, BOUND_F, C23, S2, S3, UNIT, D, values
+from survey.kernels.jit import inline, kernel
+
+ORDER = 16
+TRUNCATION = 1e-17  # of the series, relative
+FURTHEST = 0.1  # rad from the saddle
+
+
+@inline
+def forces(p, phi, f, g):
+    """Taylor coefficients of f and of g about phi, where g = 0."""
+    s, c = math.sin(phi), math.cos(phi)
+    s2, c2 = 2.0 * s * c, (c - s) * (c + s)
+    one, two = 1.0, 1.0  # 1/n! and 2^n/n!
+    for n in range(ORDER + 1):
+        f[n] = one * (p[B12] * c - p[B31] * s)
+        g[n] = one * (p[S2] * c - p[S3] * s) - two * (0.5 * p[D] * s2 + p[C23] * c2)
+        s, c, s2, c2 = c, -s, c2, -s2
+        one, two = one / (n + 1), two * 2.0 / (n + 1)
+    g[0] = 0.0
+
+
+@kernel
+def unstable(p, eqs, count, starts):
+    """Fill rows phi, w, bar phi, bar w of `starts`: a point of each unstable branch, two per saddle; their number."""
+    f, g, a = np.zeros(ORDER + 1), np.zeros(ORDER + 1), np.zeros(ORDER + 1)
+    size = 0
+    for i in range(count):
+        if eqs[i, KIND] != SADDLE:
+            continue
+        phi, slip = eqs[i, ANGLE], eqs[i, BAR]
+        forces(p, phi, f, g)
+        _f, _g, dg = values(p, phi)
+        spread = math.sqrt(f[0] * f[0] + 4.0 * dg)
+        a[1] = 0.5 * (f[0] + spread) if f[0] > 0.0 else 2.0 * dg / (spread - f[0])
+        for n in range(2, ORDER + 1):
+            known = g[n]
+            for j in range(1, n):
+                known += f[n - j] * a[j]
+            for j in range(2, n):
+                known -= a[j] * (n + 1 - j) * a[n + 1 - j]
+            a[n] = known / ((n + 1) * a[1] - f[0])
+        reach = FURTHEST
+        for n in (ORDER - 1, ORDER):
+            reach = min(reach, (TRUNCATION * a[1] / (abs(a[n]) + 1e-300)) ** (1.0 / (n - 1)))
+        slope = slip * (p[BOUND_F] * a[1] + p[BOUND_DDG]) + 4.0 * UNIT * (p[BOUND_F] * a[1] + p[BOUND_DG])
+        for side in (-1.0, 1.0):
+            x, w = side * reach, 0.0
+            for n in range(ORDER, 0, -1):
+                w = (w + a[n]) * x
+            starts[size, 0], starts[size, 1] = phi + x, w
+            starts[size, 2] = slip + 4.0 * UNIT
+            starts[size, 3] = 20.0 * UNIT * abs(w) + 2.0 * reach * slope / spread + 2.0 * a[1] * slip
+            size += 1
+    return size

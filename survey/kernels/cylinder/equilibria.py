@@ -1,0 +1,168 @@
+"""Equilibria of the flow: all roots of g on the circle, their type, and regions that they are proven to attract."""
+
+import math
+
+import numpy as np
+
+from survey.kernels.cylinder.flow import BOUND_DDG, BOUND_DG, BOUND_F, BOUND_G, C23, S2, TWO_PI, UNIT, values
+from survey.kernels.jit import inline, kernel
+
+MOST = 12  # rows of a table of equilibria: 4 at most, and degenerate ones
+ANGLE, F, DG, BAR, KIND, STABLE, VAA, VAB, VBB, LEVEL = range(10)
+SADDLE, NODE, FOCUS, DEGENERATE = range(4)
+
+
+@kernel
+def equilibria(p, table):
+    """Fill the rows of `table` (MOST, 10) with the equilibria in [0, 2 pi), ascending; returns their number."""
+    found = np.empty(64)
+    lows, highs = np.empty(4096), np.empty(4096)
+    count, top, pieces, start = 0, 0, 16, 0.123456
+    for i in range(pieces - 1, -1, -1):
+        lows[top], highs[top] = start + i * TWO_PI / pieces, start + (i + 1) * TWO_PI / pieces
+        top += 1
+    while top > 0:  # |g'| <= BOUND_DG excludes a root, |g''| <= BOUND_DDG shows that g is monotone
+        top -= 1
+        low, high = lows[top], highs[top]
+        half, middle = 0.5 * (high - low), 0.5 * (low + high)
+        _f, g, dg = values(p, middle)
+        if abs(g) > 1.001 * p[BOUND_DG] * half:
+            continue
+        if abs(dg) > 1.001 * p[BOUND_DDG] * half:
+            if (values(p, low)[1] >= 0.0) != (values(p, high)[1] >= 0.0):
+                found[count] = root(p, low, high)
+                count += 1
+        elif half < 1e-13:
+            if count == 0 or abs(middle - found[count - 1]) > 1e-6:
+                found[count] = middle
+                count += 1
+        elif top + 2 < len(lows):
+            lows[top], highs[top], lows[top + 1], highs[top + 1] = middle, high, low, middle
+            top += 2
+        if count >= MOST:
+            break
+    for i in range(count):  # into [0, 2 pi), by insertion
+        x = max(found[i] - TWO_PI, 0.0) if found[i] >= TWO_PI else found[i]
+        k = i
+        while k > 0 and found[k - 1] > x:
+            found[k] = found[k - 1]
+            k -= 1
+        found[k] = x
+    for i in range(count):
+        describe(p, found[i], table[i])
+    return count
+
+
+@kernel
+def root(p, low, high):
+    """The root of g between low and high, where g is monotone and changes sign."""
+    sign = values(p, high)[1] >= 0.0
+    x = 0.5 * (low + high)
+    for _ in range(80):
+        _f, g, dg = values(p, x)
+        if (g >= 0.0) == sign:
+            high = x
+        else:
+            low = x
+        new = x - g / dg if dg != 0.0 else low
+        if not low <= new <= high:
+            new = 0.5 * (low + high)
+        if abs(new - x) < 2e-16 * (1.0 + abs(x)):
+            return new
+        x = new
+    return x
+
+
+@kernel
+def describe(p, x, row):
+    """Type, error bar and region of attraction of the equilibrium at x."""
+    f, _g, dg = values(p, x)
+    row[ANGLE], row[F], row[DG] = x, f, dg
+    noise = 4.0 * UNIT * p[BOUND_G]
+    row[BAR] = 4e-16 * (1.0 + abs(x)) + noise / max(abs(dg), 1e-300)
+    row[VAA], row[VAB], row[VBB], row[LEVEL] = 0.0, 0.0, 0.0, 0.0
+    row[STABLE] = 0.0 if abs(f) <= 16.0 * UNIT * p[BOUND_F] + p[BOUND_F] * row[BAR] else math.copysign(1.0, f)
+    if row[BAR] > 1e-7 or dg == 0.0:
+        row[KIND], row[STABLE] = DEGENERATE, 0.0
+        row[BAR] = max(1e-6, 2.0 * math.sqrt(noise / max(p[BOUND_DDG], 1e-300)))
+    elif dg > 0.0:
+        row[KIND] = SADDLE
+    else:
+        row[KIND] = NODE if f * f + 4.0 * dg >= 0.0 else FOCUS
+        if row[STABLE] < 0.0:
+            attracted(p, f, dg, row)
+
+
+@inline
+def attracted(p, f, dg, row):
+    """V(x) = x' P x with A'P + PA = -1 falls where |x| < r = 1/(2 max eig P c), the quadratic terms being < c |x|^2.
+
+    The region V < LEVEL lies inside that ball.
+    """
+    b = -0.5 / dg
+    e = (1.0 + 2.0 * b) / (-2.0 * f)
+    a = -f * b - dg * e
+    middle, spread = 0.5 * (a + e), math.hypot(0.5 * (a - e), b)
+    largest = middle + spread
+    smallest = (a * e - b * b) / largest
+    r = 0.5 / (largest * 0.5 * (p[BOUND_F] + p[BOUND_DDG]))
+    row[VAA], row[VAB], row[VBB], row[LEVEL] = a, b, e, 0.9 * smallest * r * r
+
+
+@inline
+def offset(phi, angle):
+    """phi - angle, brought into [-pi, pi], and the turns taken out."""
+    x = phi - angle
+    turns = math.floor(x / TWO_PI + 0.5)
+    return x - turns * TWO_PI, turns
+
+
+@kernel
+def resting(p, table, count, phi0):
+    """The row of the equilibrium that phi0 is exactly, or -1.
+
+    Of binary64 angles only 0 can be one: at any other exp(i phi0) is transcendental (Lindemann), so it is no root of a
+    polynomial with rational coefficients, as which g can be written.
+    """
+    best, least = -1, math.inf
+    if phi0 != 0.0 or p[S2] != p[C23]:
+        return best
+    for i in range(count):
+        away = abs(offset(phi0, table[i, ANGLE])[0])
+        if away < least:
+            best, least = i, away
+    return best
+
+
+@kernel
+def captured(table, count, phi, w, bar):
+    """The row of the equilibrium that certainly attracts every state within `bar` of (phi, w), or -1."""
+    for i in range(count):
+        row = table[i]
+        if row[LEVEL] > 0.0:
+            x, _turns = offset(phi, row[ANGLE])
+            v = row[VAA] * x * x + 2.0 * row[VAB] * x * w + row[VBB] * w * w
+            reach = math.sqrt(v) + math.sqrt(row[VAA] + row[VBB]) * (bar + row[BAR])
+            if reach * reach < row[LEVEL]:
+                return i
+    return -1
+
+
+@kernel
+def settled(p, f, dg, x, w):
+    """Is it certain that w keeps its sign from here to the stable node at distance x?
+
+    For m = w/x, m' = -(m - fast)(m - slow) + O(r): m in a band between fast and slow/2 stays there and tends to slow,
+    when the quadratic terms c r (1 + m^2) are small against the speed at the edges of the band.
+    """
+    square = f * f + 4.0 * dg
+    if x == 0.0 or square <= 0.0:
+        return False
+    fast = 0.5 * (f - math.sqrt(square))
+    slow = -dg / fast
+    m, gap = w / x, slow - fast
+    low, high = fast + 0.25 * gap, 0.5 * slow
+    if not low < m < high:
+        return False
+    error = 4.0 * abs(x) * (1.0 + fast * fast) * (p[BOUND_F] + p[BOUND_DDG])
+    return error < 0.1875 * gap * gap and error < (high - fast) * -0.5 * slow

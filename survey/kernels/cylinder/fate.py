@@ -1,0 +1,313 @@
+"""The fate of an initial state: followed event by event until the monotone return maps decide it.
+
+Every step ends at the next turning point (w = 0) or passage of the section; there the error ellipse is projected
+along the flow, since an error along an orbit does not change its fate. Nothing is decided by a limit of steps.
+"""
+
+import math
+
+from survey.kernels.cylinder.along import (
+    NO_CONVERGENCE,
+    OK,
+    SEPARATRIX,
+    STEP_LIMIT,
+    bar,
+    carried,
+    clean_turning,
+    expand,
+    start_sign,
+    time_of_turning,
+)
+from survey.kernels.cylinder.equilibria import (
+    ANGLE,
+    BAR,
+    DG,
+    FOCUS,
+    KIND,
+    NODE,
+    STABLE,
+    F,
+    captured,
+    offset,
+    resting,
+    settled,
+)
+from survey.kernels.cylinder.flow import TWO_PI, TWO_PI_LOW, UNIT, reduced, table, values
+from survey.kernels.cylinder.returns import ABOVE, BELOW, CYCLE_BAR, CYCLE_CLASS, CYCLE_X, INTERVAL, between
+from survey.kernels.jit import inline, kernel
+
+UNDECIDED, EQUILIBRIUM, SADDLE, ROTATION_PLUS, ROTATION_MINUS, LIBRATION = -1, 0, 1, 2, 3, 4
+SPIN_UP_PLUS, SPIN_UP_MINUS, PERIODIC_ROTATION, PERIODIC_LIBRATION, EQUILIBRIUM_START = 5, 6, 7, 8, 9
+INFINITE, UNTOLD, NO_TURNS = -1, -2, -(2**31)
+TRUST = 1e-4
+GENERIC, REVERSIBLE = 0, 3  # strata that are followed; REVERSIBLE is I2, K = L = 0
+
+
+@inline
+def place_of(cycles, size, x, error):
+    """(index of the cycle that x lies on within the bars, or -1; number of cycles below x)."""
+    below = 0
+    for i in range(size):
+        if abs(x - cycles[i, CYCLE_X]) <= error + cycles[i, CYCLE_BAR]:
+            return i, below
+        if cycles[i, CYCLE_X] < x:
+            below = i + 1
+    return -1, below
+
+
+@inline
+def attracts(cycle):
+    """Does the cycle certainly attract on both sides?"""
+    return cycle[CYCLE_CLASS] >= 0.0 and cycle[BELOW] > 0.0 and cycle[ABOVE] < 0.0
+
+
+@kernel
+def rotation_decides(cycles, size, end, w, error, before, before_error):
+    """(decided, index of the cycle or -1 for spin-up) at a passage with |w|; before = |w| one turn ago or -1.
+
+    decided: 1 yes, 0 not yet, -1 the error bar cannot tell.
+    """
+    on, below = place_of(cycles, size, w, error)
+    if on >= 0:
+        return (1, on) if attracts(cycles[on]) else (-1, -1)
+    if below == size and size > 0:
+        up = end > 0.0
+    elif below > 0:
+        up = cycles[below - 1, ABOVE] > 0.0
+    elif before < 0.0 or abs(w - before) <= error + before_error:
+        return 0, -1
+    else:
+        up = w > before
+    if up and below == size:
+        return (1, -1) if end > 0.0 else (0, -1)
+    if not up and below == 0:
+        return 0, -1
+    reached = below if up else below - 1
+    if cycles[reached, CYCLE_CLASS] < 0.0 or (cycles[reached, BELOW] < 0.0 if up else cycles[reached, ABOVE] > 0.0):
+        return -1, -1
+    return 1, reached
+
+
+@kernel
+def libration_decides(cycles, size, interval, inside, x, error, before, before_error):
+    """(decided, index of the cycle, or -1 for what lies inside) from two right turning points x and `before`."""
+    if abs(x - before) <= error + before_error:
+        for i in range(size):
+            if cycles[i, INTERVAL] == interval and abs(x - cycles[i, CYCLE_X]) <= error + cycles[i, CYCLE_BAR]:
+                return (1, i) if attracts(cycles[i]) else (-1, -1)
+        return 0, -1
+    inward = x < before
+    best = -1
+    for i in range(size):
+        row = cycles[i]
+        if row[INTERVAL] != interval or abs(row[CYCLE_CLASS]) != inside:
+            continue
+        if abs(x - row[CYCLE_X]) <= error + row[CYCLE_BAR]:
+            return (1, i) if attracts(row) else (-1, -1)
+        if inward and row[CYCLE_X] < before and (best < 0 or row[CYCLE_X] > cycles[best, CYCLE_X]):
+            best = i
+        if not inward and row[CYCLE_X] > before and (best < 0 or row[CYCLE_X] < cycles[best, CYCLE_X]):
+            best = i
+    if best < 0:
+        return (1, -1) if inward else (0, -1)
+    row = cycles[best]
+    beyond = row[CYCLE_X] > x if inward else row[CYCLE_X] < x
+    wrong = row[ABOVE] > 0.0 if inward else row[BELOW] < 0.0
+    if beyond or wrong or row[CYCLE_CLASS] < 0.0:
+        return -1, -1
+    return 1, best
+
+
+@kernel
+def interval_of(eqs, count, x):
+    """The equilibrium next below the angle x (any real), and x brought to the turn that starts there."""
+    best, least = 0, 1e9
+    for i in range(count):
+        gap = x - eqs[i, ANGLE]
+        gap -= math.floor(gap / TWO_PI) * TWO_PI
+        if gap < least:
+            best, least = i, gap
+    return best, eqs[best, ANGLE] + least
+
+
+@kernel
+def section_ahead(phi, w, section, spacing):
+    """The next section (section + a multiple of spacing) in the direction of w, strictly ahead of phi."""
+    k = (phi - section) / spacing
+    if w > 0.0:
+        target = section + (math.floor(k + 1e-12) + 1.0) * spacing
+    else:
+        target = section + (math.ceil(k - 1e-12) - 1.0) * spacing
+    return target
+
+
+@inline
+def crossing_time(at, p, T, target, h):
+    """dt in [0, h] where phi = target, w of either sign."""
+    low, high, dt = 0.0, h, 0.5 * h
+    up = at(p, T, h)[0] > T[0, 0]
+    for _ in range(60):
+        x, v, _e, _y = at(p, T, dt)
+        if (x < target) == up:
+            low = dt
+        else:
+            high = dt
+        new = dt - (x - target) / v if v != 0.0 else low
+        if not low <= new <= high:
+            new = 0.5 * (low + high)
+        if abs(new - dt) <= 1e-17 + 1e-16 * h:
+            return new
+        dt = new
+    return dt
+
+
+@inline
+def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, start, tolerance, limit, out):
+    """Fill out = verdict, index of the limit, turnings, unwrapped turns of the limit, status.
+
+    start = phi0, w0 and their bars. The index is a row of eqs (verdicts 0, 9), of plus or minus (2, 3) or of lib (4).
+    sizes = numbers of rows of these, then the stratum and whether weak foci attract.
+    """
+    count, n_plus, n_minus, n_lib, stratum, weak = sizes[0], sizes[1], sizes[2], sizes[3], sizes[4], sizes[5] > 0
+    out[0], out[1], out[2], out[3], out[4] = UNDECIDED, -1, UNTOLD, NO_TURNS, OK
+    phi0, w0 = start[0], start[1]
+    phi, turns = reduced(phi0)
+    w, slip = w0, start[2] + 4.0 * UNIT * (turns != 0.0)
+    sign = start_sign(p, phi, w)
+    if w == 0.0:
+        row = resting(p, eqs, count, phi0)
+        if row >= 0:
+            out[0], out[1], out[2], out[3] = EQUILIBRIUM_START, row, 0, offset(phi, eqs[row, ANGLE])[1]
+            return
+        if sign == 0:  # beside an equilibrium, within rounding
+            row = captured(eqs, count, phi, w, slip + 16.0 * UNIT)
+            if row < 0:
+                out[4] = SEPARATRIX
+                return
+            out[0], out[1], out[3] = EQUILIBRIUM, row, turns + offset(phi, eqs[row, ANGLE])[1]
+            out[2] = INFINITE if eqs[row, KIND] == FOCUS else UNTOLD
+            return
+    T = table()
+    how = setting(p, w0, tolerance)
+    saa, sab, sbb, n, turnings = slip * slip, 0.0, start[3] * start[3], 0, 0
+    before, before_bar = -1.0, 0.0  # last passage of the section without a turning since
+    right, right_bar, left = math.nan, 0.0, math.nan  # last turning points, unwrapped from `turns` = base
+    spacing = TWO_PI if stratum == GENERIC else math.pi
+    axis = math.nan
+    held, target = -1, section_ahead(phi, float(sign), section, spacing)
+    while n < limit:
+        h = expand(begin, p, phi, w, how, T)
+        n += 1
+        x1, w1, _e, _y = at(p, T, h)
+        if not (h > 0.0 and math.isfinite(w1)):
+            out[4] = NO_CONVERGENCE
+            return
+        turned = w1 * sign <= 0.0
+        if turned:
+            h = time_of_turning(at, p, T, h)
+            x1, w1, _e, _y = at(p, T, h)
+        passed = (x1 - target) * sign >= 0.0
+        if passed:
+            turned = False
+            h = crossing_time(at, p, T, target, h)
+            x1, w1, _e, _y = at(p, T, h)
+        saa, sab, sbb = carried(p, T, h, w1, saa, sab, sbb)
+        phi, w = (target if passed else x1), (0.0 if turned else w1)
+        f, g, _dg = values(p, phi)
+        # the initial phi and w err as those of a step do
+        bar_phi, bar_w = bar(n + 1, saa), bar(n + 1, sbb)
+        if not (bar_phi < TRUST and bar_w < TRUST * (1.0 + abs(w))):
+            out[4] = SEPARATRIX
+            return
+        if turned:
+            if not clean_turning(p, phi, bar_phi, bar_w):
+                out[4] = SEPARATRIX
+                return
+            turnings += 1
+            sbb, sab, before = 0.0, 0.0, -1.0
+            unwrapped = phi + turns * TWO_PI
+            sign = -sign
+            target = section_ahead(phi, float(sign), section, spacing)
+            if sign > 0:
+                left = unwrapped
+            else:
+                row, at_home = interval_of(eqs, count, phi)
+                shift = at_home - phi
+                same = not math.isnan(right) and not math.isnan(left) and stratum == GENERIC
+                same = same and between(eqs, count, min(right, unwrapped), max(right, unwrapped)) == 0
+                if same:
+                    inside = between(eqs, count, left, unwrapped)
+                    decided, which = libration_decides(lib, n_lib, row, inside, at_home, bar_phi,
+                                                       right + (at_home - unwrapped), right_bar)  # fmt: skip
+                    if decided < 0:
+                        out[4] = SEPARATRIX
+                        return
+                    if decided > 0 and which >= 0:
+                        out[0], out[1], out[2] = LIBRATION, which, INFINITE
+                        out[3] = turns - round(shift / TWO_PI)
+                        return
+                    focus = eqs[row, KIND] == FOCUS and (eqs[row, STABLE] < 0.0 or weak)
+                    if decided > 0 and inside == 1 and focus:
+                        out[0], out[1], out[2] = EQUILIBRIUM, row, INFINITE
+                        out[3] = turns - round(shift / TWO_PI)
+                        return
+                right, right_bar, left = unwrapped, bar_phi, math.nan
+        elif passed:
+            slope = f + g / w
+            own = bar(n + 1, max(sbb - 2.0 * slope * sab + slope * slope * saa, 0.0))
+            if not own < 0.1 * abs(w):
+                out[4] = SEPARATRIX
+                return
+            saa, sab, sbb = 0.0, 0.0, max(sbb - 2.0 * slope * sab + slope * slope * saa, 0.0)
+            target += sign * spacing
+            if stratum != GENERIC:
+                here = phi + turns * TWO_PI
+                if not math.isnan(axis):
+                    away = round((here - axis) / math.pi)
+                    rotating = away % 2 != 0
+                    out[0] = PERIODIC_ROTATION if rotating else PERIODIC_LIBRATION
+                    out[2], out[3] = (0, NO_TURNS) if rotating else (INFINITE, 0)
+                    return
+                axis = here
+            else:
+                cycles, size, end = (plus, n_plus, ends[0]) if sign > 0 else (minus, n_minus, ends[1])
+                decided, which = rotation_decides(cycles, size, end, abs(w), own, before, before_bar)
+                if decided < 0:
+                    out[4] = SEPARATRIX
+                    return
+                if decided > 0:
+                    cycle, spin = (ROTATION_PLUS, SPIN_UP_PLUS) if sign > 0 else (ROTATION_MINUS, SPIN_UP_MINUS)
+                    out[0], out[1], out[2] = (cycle if which >= 0 else spin), which, turnings
+                    return
+                before, before_bar = abs(w), own
+        elif abs(w) <= 2.0 * bar_w and n > 1 and held < 0:
+            out[4] = SEPARATRIX
+            return
+        if abs(phi) > math.pi:
+            k = 1.0 if phi > 0.0 else -1.0
+            phi = (phi - k * TWO_PI) - k * TWO_PI_LOW
+            target -= k * TWO_PI
+            turns += k
+        if held < 0:
+            held = captured(eqs, count, phi, w, bar_phi + bar_w)
+        if held >= 0:
+            x, k = offset(phi, eqs[held, ANGLE])
+            out[0], out[1], out[3] = EQUILIBRIUM, held, turns + k
+            if eqs[held, KIND] != NODE:
+                out[2] = INFINITE
+                return
+            if settled(p, eqs[held, F], eqs[held, DG], x, w):
+                out[2] = turnings
+                return
+            if abs(x) + abs(w) < 1e3 * (bar_phi + bar_w + eqs[held, BAR]):
+                return
+    out[4] = STEP_LIMIT if held < 0 else OK
+
+
+@inline
+def fates(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out):
+    """`fate` for each row (phi0, w0 and their bars) of starts."""
+    for i in range(len(starts)):
+        fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, starts[i], tolerance, limit, out[i])
+        if out[i, 0] != UNDECIDED:
+            out[i, 4] = OK

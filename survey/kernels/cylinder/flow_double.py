@@ -1,0 +1,430 @@
+"""The flow on the cylinder in double-double arithmetic: Taylor series of order 30, for what float64 leaves open.
+
+As `flow` and `along`, whose error ellipse is carried here too, by the variational equation in float64: it only carries
+bars. A step expands S = sin phi, C = cos phi and w in A[quantity, hi or lo, order]; they start anew in each step.
+
+    phi' = w,  S' = C w,  C' = -S w,  w' = b12 S' + b31 C' - d C S - c23 (1 - 2 S S) + s2 C - s3 S      (57)
+
+Sources: those of `kernels.math.double`; A. Jorba, M. Zou, Experimental Mathematics 14 (2005) 99-117 (steps).
+"""
+
+import math
+
+import numpy as np
+
+from survey.kernels.cylinder.along import (
+    EQUILIBRIUM,
+    NO_CONVERGENCE,
+    OK,
+    OVERFLOW,
+    SEPARATRIX,
+    STEP_LIMIT,
+    TRUST,
+    TURNING,
+    UNTOLD,
+    bar,
+    certain,
+    node_ahead,
+    rests,
+)
+from survey.kernels.cylinder.equilibria import MOST, equilibria
+from survey.kernels.cylinder.flow import (
+    B12,
+    B31,
+    BOUND_DG,
+    BOUND_F,
+    BOUND_G,
+    C23,
+    COS,
+    COS2,
+    LOW,
+    S2,
+    S3,
+    SIN,
+    SIN2,
+    TWO_PI,
+    TWO_PI_LOW,
+    UNIT,
+    D,
+    jacobian,
+    longest_step,
+    table,
+    values,
+    variation,
+)
+from survey.kernels.cylinder.winding import ends, zeros
+from survey.kernels.jit import inline, kernel
+from survey.kernels.math.double import (
+    HALF_PI,
+    HALF_PI_REST,
+    add,
+    convolved,
+    mul,
+    neg,
+    over,
+    shifted,
+    square,
+    times,
+    two_prod,
+)
+
+ORDER = 30
+TOLERANCE = 1e-30  # truncation of one step, relative to 1 + |w|
+ROUGH = 16.0 * 2.0**-104  # rounding of a sum or a product of the series, relative
+FALL = 1.0 / 50.0  # by more, two terms further on, no series is trusted to fall
+LIMIT = 20_000  # steps; about 0.4 s
+SLOWER = 3.0  # steps may grow by so much: what then needs more than LIMIT is given up at once
+TERMS = 15  # of the sine and of the cosine of an eighth of a turn at most
+_S, _C, _W = range(3)
+
+
+@inline
+def scratch():
+    """The series of S, C and w."""
+    return np.zeros((3, 2, ORDER + 1))
+
+
+@inline
+def whole(turns):
+    """2 pi turns."""
+    high, low = two_prod(4.0 * turns, HALF_PI[0])
+    return add(add((high, low), two_prod(4.0 * turns, HALF_PI[1])), (4.0 * turns * HALF_PI_REST, 0.0))
+
+
+@inline
+def centred(phi):
+    """phi in about [-pi, pi], and the turns taken out of it."""
+    turns = math.floor(phi[0] / (4.0 * HALF_PI[0]) + 0.5)
+    return add(phi, neg(whole(turns))), turns
+
+
+@kernel
+def sine_cosine(phi):
+    """sin and cos of |phi| < 4, to a few units of double-double."""
+    quarter = math.floor(phi[0] / HALF_PI[0] + 0.5)
+    x = add(phi, neg(whole(0.25 * quarter)))
+    z = square(x)
+    s, c = (1.0, 0.0), (1.0, 0.0)
+    for n in range(TERMS, 0, -1):
+        s = shifted(neg(over(mul(z, s), 2.0 * n * (2.0 * n + 1.0))), 1.0)
+        c = shifted(neg(over(mul(z, c), 2.0 * n * (2.0 * n - 1.0))), 1.0)
+    s = mul(s, x)
+    for _ in range(int(quarter) % 4):
+        s, c = c, neg(s)
+    return s, c
+
+
+@inline
+def force(p, s, c, sw, cw, cs, double):
+    """b12 C w - b31 S w + g, from the products."""
+    f = add(times(cw, p[B12]), times(sw, -p[B31]))
+    g = add(times(c, p[S2]), times(s, -p[S3]))
+    return add(f, add(g, add(times(cs, -p[D]), times(double, -p[C23]))))
+
+
+@kernel
+def acceleration(p, phi):
+    """g at phi, to ROUGH times BOUND_G."""
+    s, c = sine_cosine(phi)
+    nothing, double = (0.0, 0.0), shifted(times(square(s), -2.0), 1.0)
+    return force(p, s, c, nothing, nothing, mul(c, s), double)
+
+
+@kernel
+def energy(p, phi, w, rest):
+    """H(phi, w) - H(rest, 0), H = w^2/2 + V, rounded; and a bound of its error for an equilibrium next to `rest`."""
+    s, c = sine_cosine(centred((phi, 0.0))[0])
+    s0, c0 = sine_cosine(centred((rest, 0.0))[0])
+    kinetic = times(two_prod(w, w), 0.5)
+    first = add(times(add(s, neg(s0)), -p[S2]), times(add(c, neg(c0)), -p[S3]))
+    second = add(times(add(square(s), neg(square(s0))), 0.5 * p[D]), times(add(mul(s, c), neg(mul(s0, c0))), p[C23]))
+    return add(kinetic, add(first, second))[0], ROUGH * (w * w + p[BOUND_G])
+
+
+@kernel
+def begin(p, phi, w, A, T):
+    """Expand at (phi, w), for the variational equation in T too; returns the step."""
+    s, c = sine_cosine(phi)
+    A[_S, 0, 0], A[_S, 1, 0] = s
+    A[_C, 0, 0], A[_C, 1, 0] = c
+    A[_W, 0, 0], A[_W, 1, 0] = w
+    for n in range(ORDER):
+        s, c = (A[_S, 0, n], A[_S, 1, n]), (A[_C, 0, n], A[_C, 1, n])
+        cw, sw, cs = convolved(A[_C], A[_W], n), convolved(A[_S], A[_W], n), convolved(A[_C], A[_S], n)
+        double = shifted(times(convolved(A[_S], A[_S], n), -2.0), 1.0 if n == 0 else 0.0)
+        if n <= LOW:
+            T[n, SIN], T[n, COS], T[n, SIN2], T[n, COS2] = s[0], c[0], 2.0 * cs[0], double[0]
+        A[_W, 0, n + 1], A[_W, 1, n + 1] = over(force(p, s, c, sw, cw, cs, double), n + 1.0)
+        A[_S, 0, n + 1], A[_S, 1, n + 1] = over(cw, n + 1.0)
+        A[_C, 0, n + 1], A[_C, 1, n + 1] = over(neg(sw), n + 1.0)
+    variation(p, T)
+    h = longest_step(p, w[0])
+    for n in range(ORDER - 3, ORDER + 1):
+        # as in `taylor`: a last term that happens to vanish tells nothing
+        share = 1.0 if n > ORDER - 2 else FALL
+        term = share * max(abs(A[_W, 0, n - 1]) / n, abs(A[_W, 0, n]) / (1.0 + abs(w[0]))) + 1e-300
+        h = min(h, (TOLERANCE / term) ** (1.0 / n))
+    return h
+
+
+@kernel
+def at(phi, A, dt):
+    """phi and w at dt (double-double) after the start of the step."""
+    w = (A[_W, 0, ORDER], A[_W, 1, ORDER])
+    x = over(w, ORDER + 1.0)
+    for n in range(ORDER - 1, -1, -1):
+        term = (A[_W, 0, n], A[_W, 1, n])
+        w, x = add(mul(w, dt), term), add(mul(x, dt), over(term, n + 1.0))
+    return add(phi, mul(x, dt)), w
+
+
+@kernel
+def carried(p, T, dt, w, ellipse):
+    """The error ellipse (phi phi, phi w, w w) after dt of the current step, as `along.carried`."""
+    saa, sab, sbb = ellipse
+    a, b, c, d = jacobian(T, dt)
+    rate = p[BOUND_F] * abs(w) + p[BOUND_G]
+    e = TOLERANCE + ROUGH * (4.0 + 3.0 * dt * (abs(w) + dt * rate))
+    f = TOLERANCE * (1.0 + abs(w)) + ROUGH * (1.5 * abs(w) + 8.0 * dt * rate)
+    return (
+        a * a * saa + 2.0 * a * b * sab + b * b * sbb + e * e,
+        a * c * saa + (a * d + b * c) * sab + b * d * sbb,
+        c * c * saa + 2.0 * c * d * sab + d * d * sbb + f * f,
+    )
+
+
+@kernel
+def side(p, phi, w):
+    """Sign of w just after the start: that of g where w = 0, and 0 at an equilibrium."""
+    g = acceleration(p, phi)[0] if w == 0.0 else w
+    if abs(g) <= (4.0 * ROUGH * p[BOUND_G] if w == 0.0 else 0.0):
+        return 0
+    return 1 if g > 0.0 else -1
+
+
+@kernel
+def clean(p, phi, w, bar_phi, bar_w):
+    """Is a zero of w certain near phi: does g keep its sign over the error bars?"""
+    g = abs(acceleration(p, phi)[0])
+    return 10.0 * (p[BOUND_DG] * bar_phi + p[BOUND_F] * (abs(w) + bar_w)) + 4.0 * ROUGH * p[BOUND_G] < g
+
+
+@kernel
+def trajectory(p, phi0, w0, asked, floats, turnings):
+    """As `along.trajectory`, and `winding.counts`."""
+    A, T, eqs, end = scratch(), table(), np.zeros((MOST, 10)), np.zeros(5)
+    size = equilibria(p, eqs)
+    phi, turns = centred((phi0, 0.0))
+    w, t, ellipse = (w0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.0)
+    sign, count, j, unsure = side(p, phi, w0), 0, 0, 0
+    known, since = False, (0.0, 0.0)  # `end` tells the turnings after that time
+    still = rests(p, phi0, w0)
+    for n in range(1, LIMIT):
+        h = begin(p, phi, w, A, T)
+        if not (h > 0.0 and math.isfinite(h)):
+            return OVERFLOW
+        if asked[j] - t[0] > SLOWER * h * (LIMIT - n):
+            return STEP_LIMIT
+        while j < len(asked):
+            dt = add((asked[j], 0.0), neg(t))
+            if dt[0] >= h:
+                break
+            x, v = at(phi, A, dt)
+            a, _b, c = carried(p, T, dt[0], v[0], ellipse)
+            late = n * ROUGH * asked[j]
+            wide, high = bar(n, a) + abs(v[0]) * late, bar(n, c) + (p[BOUND_F] * abs(v[0]) + p[BOUND_G]) * late
+            if not (wide < TRUST and high < TRUST * (1.0 + abs(v[0]))):
+                return NO_CONVERGENCE
+            floats[j, 0], floats[j, 1] = add(x, whole(turns))[0], v[0]
+            floats[j, 2], floats[j, 3] = wide + UNIT * abs(floats[j, 0]), high + UNIT * abs(v[0])
+            from_rest = n == 1 and w0 == 0.0
+            if still:
+                turnings[j] = 0
+            elif known:
+                more = zeros(end, add((asked[j], 0.0), neg(since))[0])
+                turnings[j] = count + more if more >= 0 else UNTOLD
+            elif unsure < 3 and (abs(v[0]) > high or from_rest):
+                turnings[j] = count + (v[0] * sign < 0.0 and not from_rest)
+            j += 1
+        if j == len(asked):
+            return OK
+        x, v = at(phi, A, (h, 0.0))
+        ellipse = carried(p, T, h, v[0], ellipse)
+        t = shifted(t, h)
+        phi, w = x, v
+        if abs(phi[0]) > math.pi:
+            phi, k = centred(phi)
+            turns += k
+        if not (ellipse[0] < TRUST and ellipse[2] < (1.0 + abs(w[0])) ** 2):
+            return NO_CONVERGENCE if math.isfinite(w[0]) else OVERFLOW
+        bar_phi, bar_w = bar(n, ellipse[0]), bar(n, ellipse[2])
+        if known or still or abs(w[0]) <= bar_w:
+            unsure += not known
+            continue
+        if unsure > 2:
+            unsure = LIMIT  # for good
+            continue
+        count += w[0] * sign < 0.0
+        sign, unsure = (1 if w[0] > 0.0 else -1), 0
+        # its angle is that of float64
+        known = ends(p, eqs, size, phi[0], w[0], bar_phi + UNIT * abs(phi[0]), bar_w + UNIT * abs(w[0]), end)
+        since = t
+    return STEP_LIMIT
+
+
+@kernel
+def time_where(phi, A, target, h):
+    """dt in [0, h] where phi = target, for w > 0 on the step: Newton's method, kept inside a bracket at first."""
+    low, high, dt = 0.0, h, 0.5 * h
+    for _ in range(60):
+        x, v = at(phi, A, (dt, 0.0))
+        off = add(x, neg(target))[0]
+        if off < 0.0:
+            low = dt
+        else:
+            high = dt
+        new = dt - off / v[0] if v[0] != 0.0 else low
+        if not low <= new <= high:
+            new = 0.5 * (low + high)
+        moved, dt = abs(new - dt), new
+        if moved <= 1e-17 + 1e-16 * h:
+            break
+    exact = (dt, 0.0)
+    for _ in range(3):
+        x, v = at(phi, A, exact)
+        move = -add(x, neg(target))[0] / v[0] if v[0] != 0.0 else 0.0
+        if not abs(move) < 1e-8 * h:
+            break
+        exact = shifted(exact, move)
+    return exact
+
+
+@kernel
+def time_of_turning(p, phi, A, h):
+    """dt in [0, h] where w, which changes sign on the step, is 0: as `time_where`."""
+    low, high, dt = 0.0, h, 0.5 * h
+    for _ in range(60):
+        x, v = at(phi, A, (dt, 0.0))
+        if v[0] > 0.0:
+            low = dt
+        else:
+            high = dt
+        f, g, _dg = values(p, x[0])
+        slope = f * v[0] + g
+        new = dt - v[0] / slope if slope != 0.0 else low
+        if not low <= new <= high:
+            new = 0.5 * (low + high)
+        moved, dt = abs(new - dt), new
+        if moved <= 1e-17 + 1e-16 * h:
+            break
+    exact = (dt, 0.0)
+    for _ in range(3):
+        x, v = at(phi, A, exact)
+        f, _g, _dg = values(p, x[0])
+        slope = f * v[0] + acceleration(p, x)[0]
+        move = -v[0] / slope if slope != 0.0 else 0.0
+        if not abs(move) < 1e-8 * h:
+            break
+        exact = shifted(exact, move)
+    return exact
+
+
+@kernel
+def abel(p, phi0, w0, targets, floats, status):
+    """As `along.abel`."""
+    A, T = scratch(), table()
+    phi, turns = centred((phi0, 0.0))
+    w, t, ellipse, n, started = (w0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.0), 0, w0 > 0.0
+    j, size, doubt, ending = 0, len(targets), -1, OK  # doubt: the first target in doubt
+    while j < size and targets[j] == phi0:
+        floats[j, 0], floats[j, 1], floats[j, 2], floats[j, 3], status[j] = w0, 0.0, 0.0, 0.0, OK
+        j += 1
+    sign = side(p, phi, w0)
+    if sign <= 0:
+        for i in range(j, size):
+            status[i] = TURNING if sign < 0 else (EQUILIBRIUM if rests(p, phi0, w0) else SEPARATRIX)
+            floats[i, 0], floats[i, 1], floats[i, 2], floats[i, 3] = phi0, 0.0, 0.0, 0.0
+        return
+    while j < size or doubt >= 0:
+        if n >= LIMIT:
+            ending = STEP_LIMIT
+            break
+        h = begin(p, phi, w, A, T)
+        n += 1
+        if not (h > 0.0 and math.isfinite(h)):
+            ending = OVERFLOW
+            break
+        dt = (h, 0.0)
+        x, v = at(phi, A, dt)
+        turned = v[0] <= 0.0
+        if turned:
+            dt = time_of_turning(p, phi, A, h)
+            x, v = at(phi, A, dt)
+        while j < size:
+            target = add((targets[j], 0.0), neg(whole(turns)))
+            if add(target, neg(x))[0] > 0.0:
+                break
+            when = time_where(phi, A, target, dt[0])
+            _x, there = at(phi, A, when)
+            a, b, c = carried(p, T, when[0], there[0], ellipse)
+            a += (ROUGH * (abs(targets[j]) + h * there[0])) ** 2
+            fill(p, floats[j], n, target, there[0], add(t, when)[0], a, b, c)
+            usable = bar(n, a) < TRUST and floats[j, 2] < TRUST * (1.0 + abs(there[0]))
+            status[j] = OK if usable and floats[j, 3] < TRUST * (1.0 + floats[j, 1]) else NO_CONVERGENCE
+            if doubt < 0 and not certain(floats[j]):
+                doubt = j
+            j += 1
+        ellipse = carried(p, T, dt[0], v[0], ellipse)
+        bar_phi, bar_w = bar(n, ellipse[0]), bar(n, ellipse[2])
+        edge = 1.1 * bar_phi + ROUGH * (1.0 + abs(x[0] + turns * TWO_PI))
+        # from here on a turning point lies beyond x
+        while 0 <= doubt < j and add(x, neg(add((targets[doubt], 0.0), neg(whole(turns)))))[0] > edge:
+            doubt += 1
+        if doubt == j:
+            doubt = -1
+        if turned:
+            ending = TURNING if clean(p, x, v[0], bar_phi, bar_w) else SEPARATRIX
+            bar_t = 1.2 * bar_w / abs(acceleration(p, x)[0]) if ending == TURNING else 0.0
+            end, when = add(x, whole(turns))[0], add(t, dt)[0]
+            for i in range(doubt if doubt >= 0 else j, size):
+                if i >= j or not certain(floats[i]):
+                    status[i] = ending
+                    floats[i, 0], floats[i, 1] = end, when
+                    floats[i, 2], floats[i, 3] = edge + UNIT * abs(end), bar_t + UNIT * when
+            return
+        phi, w, t = x, v, shifted(t, h)
+        if phi[0] > math.pi:
+            phi, k = centred(phi)
+            turns += k
+        if not (ellipse[0] < TRUST and ellipse[2] < (1.0 + abs(w[0])) ** 2):
+            ending = NO_CONVERGENCE if math.isfinite(w[0]) else OVERFLOW
+            break
+        started = started or w[0] > 2.0 * bar_w
+        if started and not w[0] > 2.0 * bar_w:
+            ending = SEPARATRIX
+            break
+        if w[0] < 0.3 * p[BOUND_G] / (p[BOUND_F] + 1e-300) and j < size:
+            gap = node_ahead(p, phi[0], w[0])
+            if gap > 0.0 and (targets[j] - turns * TWO_PI) - turns * TWO_PI_LOW >= phi[0] + gap:
+                ending = EQUILIBRIUM
+                break
+    for i in range(doubt if doubt >= 0 else j, size):
+        if i >= j or not certain(floats[i]):
+            status[i] = ending
+
+
+@inline
+def fill(p, row, n, phi, w, t, a, b, c):
+    """w, t and their bars where phi is passed, as `along.fill_crossing`."""
+    n += 1  # the target errs too
+    row[0], row[1] = max(w, 0.0), t
+    f, g = values(p, phi[0])[0], acceleration(p, phi)[0]
+    slope = (f * w + g) / w if w > 0.0 else math.inf
+    spread = bar(n, abs(c - 2.0 * slope * b + slope * slope * a)) if w > 0.0 else math.inf
+    bar_phi, bar_w = bar(n, a), bar(n, c)
+    if not spread < 0.1 * w:
+        spread = 2.0 * (bar_w + math.sqrt(abs(2.0 * (abs(g) + abs(f) * bar_w) * bar_phi))) + w
+    row[2] = spread + UNIT * w
+    accel = max(abs(f * w + g), 1e-300)
+    late = min(bar_phi / w if w > 0.0 else math.inf, spread / accel + bar_w / accel) * 1.2
+    row[3] = late + UNIT * abs(t)

@@ -1,0 +1,358 @@
+"""Many trajectories of a flow on the cylinder in lock step: Taylor series in t, one lane a solution, its own steps.
+
+Order 16: its 16th root is four square roots, so no lane calls libm, and the loops over lanes are vector code. In axes
+turned by a (symmetry S4 of `gyrostat.md`) c23 = 0, and psi = phi - a obeys, with S = sin psi, C = cos psi,
+
+    psi' = w,  S' = C w,  C' = -S w,  w' = b12 S' + b31 C' - d C S + s2 C - s3 S        (57):
+
+three Cauchy products. S and C are worked out anew for each step. Errors are carried as in `along`, by the
+variational equation in its Lienard form (`flow.variation`), to order LOW.
+
+A lane whose next time lies within its step is evaluated there and then goes on from where the step began: so steps
+never depend on the times asked for, and no solution on its neighbours. A lane that has finished takes the next row.
+"""
+
+import math
+
+import numpy as np
+
+from survey.kernels.cylinder.along import (
+    NO_CONVERGENCE,
+    OK,
+    OVERFLOW,
+    STEP_LIMIT,
+    TRUST,
+    UNTOLD,
+    bar,
+    finite,
+    start_sign,
+)
+from survey.kernels.cylinder.flow import (
+    B12,
+    B31,
+    BOUND_DG,
+    BOUND_F,
+    BOUND_G,
+    C23,
+    S2,
+    S3,
+    TWO_PI,
+    TWO_PI_LOW,
+    UNIT,
+    D,
+    reduced,
+)
+from survey.kernels.jit import inline, kernel
+from survey.kernels.unroll import unroll
+
+ORDER = 16
+LOW = 6
+LANES = 32
+
+# Rows of the series: S, C, w and U1, Z1, U2, Z2 (variations), f, g'.
+_S, _C, _W = 0, ORDER + 1, 2 * (ORDER + 1)
+_SERIES = 3 * (ORDER + 1)
+_U1, _Z1, _U2, _Z2, _F, _DG = (_SERIES + i * (LOW + 1) for i in range(6))
+_TABLE = _DG + LOW + 1
+# Rows of the state that a step changes, ...
+(_PSI, _TURNS, _V, _T, _T_LOW, _RATE, _SAA, _SAB, _SBB, _STEPS, _SIGN, _UNSURE, _COUNT) = range(13)
+_STATE = 13
+# ... and of what it does not: the coefficients, their bounds, the next time asked for, a.
+(_P12, _P31, _PD, _P2, _P3, _PF, _PG, _PDG, _NEXT, _TURN) = range(10)
+_FIXED = 10
+ROWS = _TABLE + 2 * _STATE + _FIXED + 1
+
+_GOING, _AT, _LOST = 0.0, 1.0, 2.0  # what a step has made of a lane
+# Steps shorter than this have a share of the tolerance only: so many short steps add up to what few long ones do.
+_SHORT = 1.0 / 8.0
+_COARSEST = 1e-11  # per step: above, the terms that follow the last two may be no smaller than these
+_FALL = 1.0 / 50.0  # by more, two terms further on, no series is trusted to fall
+_MANY = -1e9  # a count that stays below zero
+
+# Cody and Waite's reduction, and the polynomials of fdlibm's kernels for sin and cos in [-pi/4, pi/4].
+_NEAREST = 6755399441055744.0  # 1.5 * 2^52: adding and subtracting it rounds to an integer
+_HALF_PI, _HALF_PI_LOW = 0.5 * math.pi, 6.123233995736766e-17
+_S1, _S2, _S3 = -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04
+_S4, _S5, _S6 = 2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10
+_C1, _C2, _C3 = 4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05
+_C4, _C5, _C6 = -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11
+
+
+@inline
+def sine_cosine(x):
+    """sin and cos of x in [-3.2, 3.2], to 1 ulp; branch-free and without libm."""
+    k = (x * (1.0 / _HALF_PI) + _NEAREST) - _NEAREST
+    first = x - k * _HALF_PI  # exact
+    r = first - k * _HALF_PI_LOW
+    low = (first - r) - k * _HALF_PI_LOW
+    z = r * r
+    odd = _S2 + z * (_S3 + z * (_S4 + z * (_S5 + z * _S6)))
+    s = r + (low + r * z * (_S1 + z * odd))
+    even = _C1 + z * (_C2 + z * (_C3 + z * (_C4 + z * (_C5 + z * _C6))))
+    half = 0.5 * z
+    top = 1.0 - half
+    c = top + (((1.0 - top) - half) + (z * z * even - r * low))
+    swapped = abs(k) == 1.0
+    sine = c if swapped else s
+    cosine = s if swapped else c
+    sine = -sine if k > 1.5 or (-2.5 < k and k < -0.5) else sine
+    cosine = -cosine if k > 0.5 or k < -1.5 else cosine
+    return sine, cosine
+
+
+def _orders(first, last):
+    """What adds the coefficients first + 1 to `last` of the series of S, C and w of a lane."""
+
+    @unroll
+    def expand(T, fixed, i):
+        p12, p31, p2, p3, pd = (fixed[row, i] for row in (_P12, _P31, _P2, _P3, _PD))
+        s, c, w = ([T[row + n, i] for n in range(first + 1)] for row in (_S, _C, _W))
+        for n in range(first, last):
+            r = 1.0 / (n + 1)
+            cw, sw, cs = _product(c, w, n), _product(s, w, n), _product(c, s, n)
+            g = p2 * c[n] - p3 * s[n] - pd * cs
+            s.append(cw * r)
+            c.append(-sw * r)
+            w.append((p12 * cw - p31 * sw + g) * r)
+            T[_S + n + 1, i], T[_C + n + 1, i], T[_W + n + 1, i] = s[n + 1], c[n + 1], w[n + 1]
+
+    return expand
+
+
+def _product(a, b, n):
+    """Coefficient n of the product of two series, from the outside."""
+    terms = [a[n - k] * b[k] + a[k] * b[n - k] for k in range((n + 1) // 2)]
+    terms += [a[n // 2] * b[n // 2]] if n % 2 == 0 else []
+    return sum(terms[1:], terms[0])
+
+
+@inline
+def _begin(T, state):
+    """Take whole turns out of psi; the first coefficients."""
+    for i in range(LANES):
+        psi = state[_PSI, i]
+        k = (psi * (1.0 / TWO_PI) + _NEAREST) - _NEAREST
+        psi = (psi - k * TWO_PI) - k * TWO_PI_LOW
+        s, c = sine_cosine(psi)
+        state[_PSI, i] = psi
+        state[_TURNS, i] += k
+        T[_S, i], T[_C, i], T[_W, i] = s, c, state[_V, i]
+
+
+_low_orders, _middle_orders, _high_orders = _orders(0, 7), _orders(7, 12), _orders(12, ORDER)
+
+
+@unroll
+def _vary(T, fixed, i):
+    """Series of f and g', and of the variations: u' = f u + z, z' = g' u; of lane i."""
+    p12, p31, p2, p3, pd = (fixed[row, i] for row in (_P12, _P31, _P2, _P3, _PD))
+    s, c = [T[_S + n, i] for n in range(LOW + 1)], [T[_C + n, i] for n in range(LOW + 1)]
+    f, dg = [], []
+    for n in range(LOW + 1):
+        squares = _product(s, s, n)
+        double = 1.0 - 2.0 * squares if n == 0 else -2.0 * squares  # cos 2 psi
+        f.append(p12 * c[n] - p31 * s[n])
+        dg.append(-pd * double - p2 * s[n] - p3 * c[n])
+        T[_F + n, i], T[_DG + n, i] = f[n], dg[n]
+    for first, u, z in ((_U1, [1.0], [-f[0]]), (_U2, [0.0], [1.0])):
+        for n in range(LOW):
+            r = 1.0 / (n + 1)
+            fu = sum((f[k] * u[n - k] for k in range(1, n + 1)), f[0] * u[n])
+            gu = sum((dg[k] * u[n - k] for k in range(1, n + 1)), dg[0] * u[n])
+            u.append((fu + z[n]) * r)
+            z.append(gu * r)
+        for n in range(LOW + 1):
+            T[first + n, i], T[first + LOW + 1 + n, i] = u[n], z[n]
+
+
+@inline
+def _series(T, state, fixed):
+    """All coefficients of all lanes; in several loops, since one has more numbers than there are registers."""
+    _begin(T, state)
+    for i in range(LANES):
+        _low_orders(T, fixed, i)
+    for i in range(LANES):
+        _middle_orders(T, fixed, i)
+    for i in range(LANES):
+        _high_orders(T, fixed, i)
+    for i in range(LANES):
+        _vary(T, fixed, i)
+
+
+@inline
+def split(work):
+    """The parts of the work array: series, state, state before the step, what stays fixed, what became of lanes."""
+    first, second = _TABLE + _STATE, _TABLE + 2 * _STATE
+    return work[:_TABLE], work[_TABLE:first], work[first:second], work[second : second + _FIXED], work[second + _FIXED]
+
+
+@inline
+def step(T, state, before, fixed, fate, tolerance):
+    """One step of every lane."""
+    _series(T, state, fixed)
+    _advance(T, state, before, fixed, fate, tolerance)
+    _turnings(state)
+
+
+@inline
+def _advance(T, state, before, fixed, fate, tolerance):
+    """One step of every lane, to its next time where that lies within the step; `before` keeps the state before it."""
+    for k in range(_STATE):
+        for i in range(LANES):
+            before[k, i] = state[k, i]
+    for i in range(LANES):
+        w, last, previous = state[_V, i], abs(T[_W + ORDER, i]), abs(T[_W + ORDER - 1, i])
+        # a term that vanishes, as every second does where the motion starts at rest, tells nothing: two more are asked
+        fall = _FALL * state[_RATE, i] * state[_RATE, i]
+        size = max(last, fall * abs(T[_W + ORDER - 2, i]))
+        size = max(size, max(previous, fall * abs(T[_W + ORDER - 3, i])) * state[_RATE, i])
+        size = size * max(1.0, _SHORT * state[_RATE, i])
+        size = size / (tolerance * (1.0 + abs(w)))
+        # within `flow.longest_step` w has one zero at most
+        square = fixed[_PDG, i] + fixed[_PF, i] * (abs(w) + 0.25 * fixed[_PF, i])
+        rate = math.sqrt(max(math.sqrt(math.sqrt(math.sqrt(size))), square) + 1e-300)
+        h = 1.0 / rate
+        rest = (fixed[_NEXT, i] - state[_T, i]) - state[_T_LOW, i]
+        at = rest < h
+        dt = rest if at else h
+        x, v = T[_W + ORDER, i] * (1.0 / (ORDER + 1)), T[_W + ORDER, i]
+        for k in range(ORDER - 1, 0, -1):
+            x, v = x * dt + T[_W + k, i] * (1.0 / (k + 1)), v * dt + T[_W + k, i]
+        x, v = state[_PSI, i] + (x * dt + w) * dt, w + v * dt
+        u1, z1, u2, z2, f = T[_U1 + LOW, i], T[_Z1 + LOW, i], T[_U2 + LOW, i], T[_Z2 + LOW, i], T[_F + LOW, i]
+        for k in range(LOW - 1, -1, -1):
+            u1, z1 = u1 * dt + T[_U1 + k, i], z1 * dt + T[_Z1 + k, i]
+            u2, z2, f = u2 * dt + T[_U2 + k, i], z2 * dt + T[_Z2 + k, i], f * dt + T[_F + k, i]
+        z1, z2 = z1 + f * u1, z2 + f * u2
+        # the last terms, and what follows them
+        d2 = dt * dt
+        d4 = d2 * d2
+        d13 = d4 * d4 * d4 * dt
+        last = max(last * d2, _FALL * abs(T[_W + ORDER - 2, i]))
+        cut = d13 * max(last * dt, max(previous * d2, _FALL * abs(T[_W + ORDER - 3, i])))
+        speed = fixed[_PF, i] * abs(v) + fixed[_PG, i]
+        e = cut * dt * (1.0 / ORDER) + UNIT * (4.0 + 3.0 * dt * (abs(v) + dt * speed))
+        g = cut + UNIT * (1.5 * abs(v) + 8.0 * dt * speed)
+        saa, sab, sbb = state[_SAA, i], state[_SAB, i], state[_SBB, i]
+        state[_SAA, i] = u1 * u1 * saa + 2.0 * u1 * u2 * sab + u2 * u2 * sbb + e * e
+        state[_SAB, i] = u1 * z1 * saa + (u1 * z2 + u2 * z1) * sab + u2 * z2 * sbb
+        sbb = z1 * z1 * saa + 2.0 * z1 * z2 * sab + z2 * z2 * sbb + g * g
+        n = state[_STEPS, i] + 1.0
+        state[_SBB, i], state[_STEPS, i] = sbb, n
+        high = state[_T, i] + h
+        state[_T_LOW, i] += h - (high - state[_T, i])
+        state[_T, i], state[_PSI, i], state[_V, i], state[_RATE, i] = high, x, v, rate
+        good = state[_SAA, i] < TRUST and sbb < (1.0 + abs(v)) * (1.0 + abs(v))
+        fate[i] = _AT if at else (_GOING if good else _LOST)
+
+
+@inline
+def _turnings(state):
+    """Count the sign changes of w; where the bar reaches zero for more than two steps the count is lost."""
+    for i in range(LANES):
+        v, sign, unsure, count = state[_V, i], state[_SIGN, i], state[_UNSURE, i], state[_COUNT, i]
+        near = not v * v > 2.0402 * state[_STEPS, i] * state[_SBB, i]
+        lost = unsure > 2.0
+        passed = count + (1.0 if v * sign < 0.0 else 0.0)
+        state[_COUNT, i] = count if near else (_MANY if lost else passed)
+        state[_SIGN, i] = sign if near else (1.0 if v > 0.0 else -1.0)
+        state[_UNSURE, i] = unsure + 1.0 if near else 0.0
+
+
+@inline
+def _enter(p, phi0, w0, state, fixed, i):
+    """Set lane i to the start of a solution, in axes where c23 = 0."""
+    angle, wide, tall = 0.0, p[D] + 0.0, 2.0 * p[C23]  # no negative zero: its sign is taken
+    if tall != 0.0:
+        angle = 0.5 * math.atan2(-tall if wide >= 0.0 else tall, abs(wide))
+        wide = math.copysign(math.sqrt(wide * wide + tall * tall), wide)
+    s, c = math.sin(angle), math.cos(angle)
+    rest, turns = reduced(phi0)
+    fixed[_P12, i], fixed[_P31, i] = p[B12] * c - p[B31] * s, p[B12] * s + p[B31] * c
+    fixed[_P2, i], fixed[_P3, i], fixed[_PD, i] = p[S2] * c - p[S3] * s, p[S2] * s + p[S3] * c, wide
+    fixed[_PF, i], fixed[_PG, i], fixed[_PDG, i], fixed[_TURN, i] = p[BOUND_F], p[BOUND_G], p[BOUND_DG], angle
+    for k in range(_STATE):
+        state[k, i] = 0.0
+    state[_PSI, i], state[_TURNS, i], state[_V, i] = rest - angle, turns, w0
+    slip = UNIT * 4.0 * (turns != 0.0 or angle != 0.0)
+    state[_SAA, i] = slip * slip
+    state[_RATE, i] = abs(w0) + math.sqrt(p[BOUND_DG] + p[BOUND_F] * (abs(w0) + 0.25 * p[BOUND_F]))
+    state[_SIGN, i] = start_sign(p, rest, w0)
+
+
+@inline
+def _tell(state, before, fixed, i, floats, turnings):
+    """Write down lane i at its next time and go back to where the step began; False where the bar is too wide."""
+    n, v, turns, angle = state[_STEPS, i], state[_V, i], state[_TURNS, i], fixed[_TURN, i]
+    wide, high = bar(n, state[_SAA, i]), bar(n, state[_SBB, i])
+    if not (wide < TRUST and high < TRUST * (1.0 + abs(v))):
+        return False
+    floats[0], floats[1] = (state[_PSI, i] + angle) + turns * TWO_PI, v
+    floats[2], floats[3] = wide + 3e-16 * (abs(turns) * TWO_PI + abs(angle)), high
+    from_rest = before[_STEPS, i] == 0.0 and before[_V, i] == 0.0  # then w is 0 at the start and nowhere else
+    told = before[_UNSURE, i] < 3.0 and before[_COUNT, i] >= 0.0 and (abs(v) > high or from_rest)
+    passed = before[_SIGN, i] * v < 0.0 and not from_rest
+    turnings[0] = int(before[_COUNT, i]) + passed if told else UNTOLD
+    for k in range(_STATE):
+        state[k, i] = before[k, i]
+    return True
+
+
+@kernel
+def _refill(P, starts, times, waiting, state, fixed, row, column, status):
+    """Give free lanes the rows that wait; returns the first that still waits."""
+    for i in range(LANES):
+        while waiting < len(P) and row[i] < 0:
+            if finite(times[waiting]) == 0:
+                status[waiting] = OK
+            else:
+                _enter(P[waiting], starts[waiting, 0], starts[waiting, 1], state, fixed, i)
+                fixed[_NEXT, i], row[i], column[i] = times[waiting, 0], waiting, 0
+            waiting += 1
+    return waiting
+
+
+@kernel
+def _collect(times, limit, state, before, fixed, fate, row, column, floats, turnings, status):
+    """Write down what the lanes have reached and free those that have ended; returns whether any has."""
+    freed = False
+    for i in range(LANES):
+        if row[i] < 0 or (fate[i] == _GOING and state[_STEPS, i] < limit):
+            continue
+        r, j = row[i], column[i]
+        ending = -1
+        if fate[i] == _AT:
+            if not _tell(state, before, fixed, i, floats[r, j], turnings[r, j : j + 1]):
+                ending = NO_CONVERGENCE
+            elif j + 1 == times.shape[1] or not math.isfinite(times[r, j + 1]):
+                ending = OK
+            else:
+                column[i] = j + 1
+                fixed[_NEXT, i] = times[r, j + 1]
+        elif fate[i] == _GOING:
+            ending = STEP_LIMIT
+        else:
+            ending = NO_CONVERGENCE if math.isfinite(state[_V, i]) else OVERFLOW
+        if ending >= 0:
+            status[r], row[i], freed = ending, -1, True
+    return freed
+
+
+@inline
+def trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
+    """phi, w, their bars and turnings at the ascending times >= 0 of each row, which end at its first infinity.
+
+    P (rows, 10) from `flow.coefficients`; as `along.trajectories`. Returns the number of steps
+    of lanes, free ones too.
+    """
+    work = np.zeros((ROWS, LANES))  # one array: LLVM sees that its rows do not overlap
+    T, state, before, fixed, fate = split(work)
+    tolerance = min(tolerance, _COARSEST)
+    row, column = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
+    waiting, steps = _refill(P, starts, times, 0, state, fixed, row, column, status), 0
+    while row.max() >= 0:
+        step(T, state, before, fixed, fate, tolerance)
+        steps += LANES
+        if _collect(times, limit, state, before, fixed, fate, row, column, floats, turnings, status):
+            waiting = _refill(P, starts, times, waiting, state, fixed, row, column, status)
+    return steps

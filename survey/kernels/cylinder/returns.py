@@ -1,0 +1,277 @@
+"""Return maps of the flow and their fixed points, the cycles.
+
+Rotations (kind 0): w > 0 on the section phi = phi_s to w one turn later; an orbit that turns first has no image.
+Librations (kind 1): a right turning point x in an interval {w = 0, g < 0} to the next one; the class of an orbit is
+the number of equilibria between its turning points, and only orbits that stay in the interval have an image.
+Both maps increase. D = map - identity; map' = exp(int f dt) times w/w1, or g/g1.
+"""
+
+import math
+
+import numpy as np
+
+from survey.kernels.cylinder.along import bar, carried, expand, local_error, time_at, time_of_turning
+from survey.kernels.cylinder.equilibria import ANGLE, captured
+from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, BOUND_G, TWO_PI, table, values
+from survey.kernels.jit import inline, kernel, splice
+
+ROTATION, LIBRATION = 0, 1
+NO_IMAGE, UNKNOWN = 0, -1  # classes without an image
+X, CLASS, CHANGE, SLOPE, ERROR, TIME, LEFT = range(7)  # a node of a scan: x, class, D, map', bar of D, time, left
+CYCLE_X, MULTIPLIER, PERIOD, CYCLE_BAR, MULTIPLIER_BAR, CYCLE_LEFT, CYCLE_CLASS, INTERVAL, BELOW, ABOVE = range(10)
+MOST_CYCLES = 16
+MOST_NODES = 400
+LIMIT = 40_000
+
+
+@inline
+def rotation(setting, begin, at, p, eqs, count, section, w0, tolerance, node):
+    """One turn from (section, w0 > 0)."""
+    T = table()
+    how = setting(p, w0, tolerance)
+    phi, w, saa, sab, sbb, e, y, y_error, t = section, w0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    node[X], node[CLASS] = w0, UNKNOWN
+    target = section + TWO_PI
+    for n in range(1, LIMIT):
+        h = expand(begin, p, phi, w, how, T)
+        x1, w1, de, dy = at(p, T, h)
+        if not math.isfinite(w1):
+            return
+        if w1 <= 0.0:
+            reach = time_of_turning(at, p, T, h)
+            if at(p, T, reach)[0] < target:
+                node[CLASS] = NO_IMAGE
+                return
+        elif x1 < target:
+            reach = h
+        if x1 >= target or w1 <= 0.0:
+            reach = time_at(at, p, T, target, reach if w1 <= 0.0 else h)
+            x1, w1, de, dy = at(p, T, reach)
+        saa, sab, sbb = carried(p, T, reach, w1, saa, sab, sbb)
+        y_error += local_error(p, T, 0.0, reach)[1]
+        phi, w, e, y, t = x1, w1, e + de, y + dy, t + reach
+        if reach < h or x1 >= target:
+            f, g, _dg = values(p, section)
+            slope = f + g / w
+            own = bar(n, max(sbb - 2.0 * slope * sab + slope * slope * saa, 0.0))
+            fast = w0 / (p[BOUND_F] + math.sqrt(p[BOUND_DG]) + 1e-300) > 10.0
+            other = y_error + 7.0 * (own * p[BOUND_G] / w0 + bar(n, saa) * p[BOUND_DG]) / w0
+            node[CLASS], node[CHANGE], node[SLOPE], node[TIME] = 1.0, y, math.exp(e) * w0 / (w0 + y), t
+            node[ERROR] = min(own, other) if fast else own
+            return
+        if n % 4 == 0 and captured(eqs, count, phi, w, bar(n, saa) + bar(n, sbb)) >= 0:
+            node[CLASS] = NO_IMAGE
+            return
+
+
+@inline
+def libration(setting, begin, at, p, eqs, count, high, x0, tolerance, node):
+    """From the right turning point x0 to the next, which must lie below `high`, the next equilibrium."""
+    T = table()
+    how = setting(p, 0.0, tolerance)
+    phi, w, saa, sab, sbb, e, t, right = x0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False
+    node[X], node[CLASS] = x0, UNKNOWN
+    for n in range(1, LIMIT):
+        h = expand(begin, p, phi, w, how, T)
+        x1, w1, de, _dy = at(p, T, h)
+        if not math.isfinite(w1):
+            return
+        turned = w1 >= 0.0 if not right else w1 <= 0.0
+        if turned:
+            h = time_of_turning(at, p, T, h)
+            x1, w1, de, _dy = at(p, T, h)
+            w1 = 0.0
+        saa, sab, sbb = carried(p, T, h, w1, saa, sab, sbb)
+        phi, w, e, t = x1, w1, e + de, t + h
+        if phi < x0 - TWO_PI or phi > high:
+            node[CLASS] = NO_IMAGE
+            return
+        if n % 4 == 0 and captured(eqs, count, phi, w, bar(n, saa) + bar(n, sbb)) >= 0:
+            node[CLASS] = NO_IMAGE
+            return
+        if turned and right:
+            inside = between(eqs, count, node[LEFT], phi)
+            node[CHANGE], node[TIME], node[ERROR] = phi - x0, t, bar(n, saa)
+            node[SLOPE] = math.exp(e) * values(p, x0)[1] / values(p, phi)[1]
+            node[CLASS] = inside if between(eqs, count, min(phi, x0), max(phi, x0)) == 0 else NO_IMAGE
+            return
+        if turned:
+            node[LEFT], right = phi, True
+
+
+@kernel
+def between(eqs, count, low, high):
+    """How many equilibria lie between the unwrapped angles low and high."""
+    inside = 0
+    for i in range(count):
+        inside += int(math.floor((high - eqs[i, ANGLE]) / TWO_PI) - math.floor((low - eqs[i, ANGLE]) / TWO_PI))
+    return inside
+
+
+@inline
+def image(setting, begin, at, kind, p, eqs, count, place, x, tolerance, node):
+    """The map of `kind` at x: place is the section (rotations) or the right end of the interval (librations)."""
+    if kind == ROTATION:
+        rotation(setting, begin, at, p, eqs, count, place, x, tolerance, node)
+    else:
+        libration(setting, begin, at, p, eqs, count, place, x, tolerance, node)
+
+
+@splice
+def fixed_points(image_of, kind, p, eqs, count, place, interval, xs, tolerance, cycles, found, edges):
+    """All fixed points on the lattice xs (ascending), appended to `cycles`; returns their number.
+
+    Borders of a class are bisected, so that a fixed point beside one is not lost; where D has no change of sign but
+    dips towards 0, the dip is followed down (a pair of cycles near its fold). edges = (w_c, w_d) of a rotation, D
+    and its bar at the last node and at the first, the number of nodes without an answer.
+    """
+    nodes = np.zeros((MOST_NODES, 7))
+    size = scan(image_of, kind, p, eqs, count, place, xs, tolerance, nodes)
+    edges[0], edges[1], edges[2], edges[3] = math.nan, math.nan, nodes[size - 1, CHANGE], nodes[size - 1, ERROR]
+    edges[4], edges[5], edges[6] = nodes[0, CHANGE], nodes[0, ERROR], 1.0 * (nodes[0, CLASS] == UNKNOWN)
+    m = np.zeros(7)
+    for i in range(1, size):
+        a, b = nodes[i - 1], nodes[i]
+        edges[6] += b[CLASS] == UNKNOWN
+        if b[CLASS] == 1.0 and a[CLASS] != 1.0:
+            edges[0], edges[1] = b[X], b[X] + b[CHANGE]
+        if a[CLASS] <= 0.0 or a[CLASS] != b[CLASS] or found + 2 > len(cycles) or b[X] <= a[X]:
+            continue
+        put(m, b)
+        if differ(a, b) or followed_down(image_of, kind, p, eqs, count, place, a, b, tolerance, m):
+            touching = not differ(a, b) and not differ(a, m)
+            if touching:  # touches 0 within the error bar: one cycle or two or none
+                write_cycle(a, b, m, interval, steepness(kind, p, m[X]), cycles[found])
+                cycles[found, CYCLE_BAR] = max(cycles[found, CYCLE_BAR], 0.1 * (b[X] - a[X]))
+                cycles[found, CYCLE_CLASS] = -m[CLASS]
+                found += 1
+                continue
+            for half in range(2):
+                low, high = (a, m) if half == 0 else (m, b)
+                if high[X] > low[X] and differ(low, high):
+                    solved(image_of, kind, p, eqs, count, place, interval, low, high, tolerance, cycles[found])
+                    found += 1
+    return found
+
+
+@kernel
+def put(target, source):
+    """Copy a node (an element-wise loop compiles ten times faster than an assignment of slices)."""
+    for i in range(len(source)):
+        target[i] = source[i]
+
+
+@splice
+def scan(image_of, kind, p, eqs, count, place, xs, tolerance, nodes):
+    """Fill `nodes` with the images of xs, and more beside every border of a class; returns their number."""
+    a, c, d = np.zeros(7), np.zeros(7), np.zeros(7)
+    grain = 1e-15 * (xs[-1] - xs[0])
+    image_of(kind, p, eqs, count, place, xs[0], tolerance, nodes[0])
+    size, i, x, step = 1, 1, xs[0], 0.0
+    while i < len(xs):
+        near = step > 0.0 and x + step < xs[i]  # geometric steps away from a border
+        image_of(kind, p, eqs, count, place, x + step if near else xs[i], tolerance, c)
+        put(a, nodes[size - 1])
+        crossed = c[CLASS] != a[CLASS]
+        while crossed and c[X] - a[X] > 2e-15 * abs(c[X]) + grain:
+            middle = 0.5 * (a[X] + c[X])
+            if not a[X] < middle < c[X]:
+                break
+            image_of(kind, p, eqs, count, place, middle, tolerance, d)
+            if d[CLASS] == nodes[size - 1, CLASS]:
+                put(a, d)
+            else:
+                put(c, d)
+        if crossed and size + 2 < len(nodes):
+            put(nodes[size], a)
+            put(nodes[size + 1], c)
+            size, x, step = size + 2, c[X], 16.0 * (2e-15 * abs(c[X]) + grain)
+            if c[X] >= xs[i]:
+                i += 1
+        else:
+            if size < len(nodes):
+                put(nodes[size], c)
+                size += 1
+            step *= 10.0
+            i += not near
+    return size
+
+
+@inline
+def differ(a, b):
+    """Does D change sign between two nodes of one class?"""
+    return (a[CHANGE] > 0.0) != (b[CHANGE] > 0.0)
+
+
+@splice
+def followed_down(image_of, kind, p, eqs, count, place, a, b, tolerance, m):
+    """Follow a dip of |D| between a and b; True when D crosses 0 or touches it at the node m."""
+    left, right = np.empty(7), np.empty(7)
+    put(left, a)
+    put(right, b)
+    sign = 1.0 if a[CHANGE] > 0.0 else -1.0
+    for _ in range(40):
+        da, db = sign * (left[SLOPE] - 1.0), sign * (right[SLOPE] - 1.0)
+        if not (da < 0.0 < db):
+            return False
+        # tangents meet below a convex D: nothing to find while they meet above 0
+        low = (sign * left[CHANGE] * db - sign * right[CHANGE] * da + da * db * (right[X] - left[X])) / (db - da)
+        if low > 0.0:
+            return False
+        image_of(kind, p, eqs, count, place, 0.5 * (left[X] + right[X]), tolerance, m)
+        if m[CLASS] != a[CLASS]:
+            return False
+        if sign * m[CHANGE] <= 0.0 or right[X] - left[X] < 1e-9 * abs(right[X]):
+            return sign * m[CHANGE] <= 2.0 * m[ERROR]
+        if sign * (m[SLOPE] - 1.0) < 0.0:
+            put(left, m)
+        else:
+            put(right, m)
+    return False
+
+
+@splice
+def solved(image_of, kind, p, eqs, count, place, interval, a, b, tolerance, row):
+    """The fixed point between a and b, where D changes sign: Newton's method kept inside a bracket."""
+    low, high, m = a[X], b[X], np.zeros(7)
+    rising = b[CHANGE] > 0.0
+    share = a[CHANGE] / (a[CHANGE] - b[CHANGE])
+    x = low + min(max(share, 0.02), 0.98) * (high - low)
+    for _ in range(60):
+        image_of(kind, p, eqs, count, place, x, tolerance, m)
+        if m[CLASS] != a[CLASS]:
+            break
+        if (m[CHANGE] > 0.0) == rising:
+            high = x
+        else:
+            low = x
+        slope = m[SLOPE] - 1.0
+        new = x - m[CHANGE] / slope if slope != 0.0 else low
+        if abs(new - x) <= 1e-15 * abs(x) or abs(m[CHANGE]) <= 0.02 * m[ERROR]:
+            break
+        x = new if low < new < high else 0.5 * (low + high)
+    write_cycle(a, b, m, interval, steepness(kind, p, m[X]), row)
+    below, above = abs(a[CHANGE]) > a[ERROR], abs(b[CHANGE]) > b[ERROR]
+    if not (below and above):  # D may change sign by its rounding alone
+        row[CYCLE_CLASS], row[BELOW], row[ABOVE] = -m[CLASS], row[BELOW] * below, row[ABOVE] * above
+
+
+@inline
+def steepness(kind, p, x):
+    """Relative change of map' per unit of D: of its factor w/w1, or g/g1."""
+    return 1.0 / x if kind == ROTATION else p[BOUND_DG] / (abs(values(p, x)[1]) + 1e-300)
+
+
+@kernel
+def write_cycle(a, b, m, interval, steep, row):
+    """Note the cycle at node m between a and b; its bar from those of D and of the slope."""
+    slope = m[SLOPE] - 1.0
+    away = abs((b[CHANGE] - a[CHANGE]) / (b[X] - a[X]))
+    row[CYCLE_X], row[MULTIPLIER], row[PERIOD], row[CYCLE_LEFT] = m[X], m[SLOPE], m[TIME], m[LEFT]
+    row[CYCLE_BAR] = 1.2 * (abs(m[CHANGE]) + m[ERROR]) / max(abs(slope), 1e-12) + 4e-16 * abs(m[X])
+    bend = (abs(a[SLOPE] - m[SLOPE]) + abs(b[SLOPE] - m[SLOPE])) / max(b[X] - a[X], 1e-300) + away
+    row[MULTIPLIER_BAR] = 1e-14 * (1.0 + m[SLOPE]) + 20.0 * m[ERROR] + 3.0 * bend * row[CYCLE_BAR]
+    row[MULTIPLIER_BAR] += 2.0 * m[SLOPE] * steep * (abs(m[CHANGE]) + m[ERROR])
+    row[CYCLE_CLASS], row[INTERVAL] = m[CLASS], interval
+    row[BELOW] = 1.0 if a[CHANGE] > 0.0 else -1.0
+    row[ABOVE] = 1.0 if b[CHANGE] > 0.0 else -1.0

@@ -1,0 +1,244 @@
+"""Arithmetic of Hill's question, point by point: how many steps, and what follows from the half-period factors.
+
+Results of a point are ten numbers: y1, y1', y2, y2' at T/2, their error bounds, and the zeros of y1, y2 in (0, T/2).
+Formulas: `survey.measures.hill.monodromy`.
+"""
+
+from math import asinh, atan2, isfinite, pi, sqrt
+
+import numpy as np
+
+from survey.kernels.jit import inline, kernel, splice
+from survey.kernels.unroll import unroll
+
+RESULTS = 10
+EPS = 2.3e-16
+LEAST = 2e-323  # what a few products lose where they underflow
+LARGEST = float(np.finfo(np.float32).max)  # bars are kept as float32
+UNDECIDED, UNSTABLE, STABLE, MARGINAL = -1, 0, 1, 2
+# What an exact rule says of a point.
+NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE = 0, 1, 2
+# Columns of `measure`, each followed by that of its error bound.
+FLOATS = ("discriminant", "y1", "y2", "dy1", "dy2", "exponent", "rotation_number")
+DISCRIMINANT, Y1, Y2, DY1, DY2, EXPONENT, ROTATION = range(0, 14, 2)
+FACTORS = np.array([Y1, DY1, Y2, DY2])  # in the order of the results
+UNTRIED = -1
+
+
+@kernel
+def levels(p, bound, span, rate, phase, distance, ladder, out):
+    """The ladder's first step number that gives every point `phase` steps per radian and `distance` times `rate`.
+
+    |z| <= bound[r, 0] + |p| bound[r, 1] + p^2 bound[r, 2] in row r of `p` and of `out`, which holds places in the
+    ladder: its length where no number is enough, UNTRIED where the point or its row is not finite.
+    """
+    top = len(ladder)
+    for r in range(p.shape[0]):
+        least = distance * rate[r] * span[r]
+        level = 0
+        for i in range(p.shape[1]):
+            size = abs(p[r, i])
+            frequency = sqrt(bound[r, 0] + size * (bound[r, 1] + size * bound[r, 2]))
+            steps = phase * frequency * span[r]
+            if not isfinite(steps + least):
+                out[r, i] = UNTRIED
+                continue
+            steps = max(steps, least)
+            while level < top and ladder[level] < steps:
+                level += 1
+            while level > 0 and ladder[level - 1] >= steps:
+                level -= 1
+            out[r, i] = level
+
+
+@kernel
+def segments(level, top, order, rows, of_level, starts):
+    """Points with a level in 0..top by row and level: their flat places in `order`; returns the number of segments.
+
+    Segment i is order[starts[i] : starts[i + 1]], all in row rows[i] and of level of_level[i].
+    """
+    counts = np.empty(top + 2, np.int64)
+    for at in range(top + 2):
+        counts[at] = 0
+    count = place = 0
+    for r in range(level.shape[0]):
+        low, high = top + 1, -1
+        for i in range(level.shape[1]):
+            at = level[r, i]
+            if 0 <= at <= top:
+                counts[at] += 1
+                low, high = min(low, at), max(high, at)
+        for at in range(low, high + 1):
+            if counts[at] > 0:
+                rows[count], of_level[count], starts[count] = r, at, place
+                place, counts[at] = place + counts[at], place
+                count += 1
+        for i in range(level.shape[1]):
+            at = level[r, i]
+            if 0 <= at <= top:
+                order[counts[at]] = r * level.shape[1] + i
+                counts[at] += 1
+        for at in range(low, high + 1):
+            counts[at] = 0
+    starts[count] = place
+    return count
+
+
+@kernel
+def measure(results, squares, rule, wanted, rtol, whole, overflow, floats, verdict, late, status):
+    """What follows from `results` (N, 10) by arithmetic: `floats` (14, N) with the bars, `verdict`, who misses `rtol`.
+
+    Points whose `status` is not 0 are passed over; those that leave the range of floats get the status `overflow`.
+    `rule` (N, or empty) holds what exact rules say, `wanted` (7) which columns count for `late`; `whole` as in
+    `_squares`; `squares` (N, 4, or empty) holds what it finds, where more digits of it are known.
+    """
+    for i in range(len(results)):
+        late[i] = False
+        verdict[i] = UNDECIDED
+        if status[i] != 0:
+            for c in range(len(floats)):
+                floats[c, i] = np.nan
+            continue
+        sine, sine_bar, cosine, cosine_bar = _squares(results[i], squares, i, whole)
+        said = decide(sine, sine_bar, cosine, cosine_bar, rule[i] if len(rule) > 0 else NO_RULE)
+        # D from 2 - 4 sin^2 or 4 cos^2 - 2, whichever has the smaller bar.
+        by_sine = sine_bar <= cosine_bar
+        d = 2.0 - 4.0 * sine if by_sine else 4.0 * cosine - 2.0
+        bar = 4.0 * (sine_bar if by_sine else cosine_bar) + 2.0 * EPS * (2.0 + abs(d))
+        if said == MARGINAL and abs(d) > bar:  # on an edge |D| = 2
+            d, bar = 2.0 if d > 0.0 else -2.0, 0.0
+        within = isfinite(d) and bar < LARGEST
+        for c in range(4):
+            within &= results[i, 4 + c] < LARGEST
+        if not within:
+            status[i] = overflow
+            for c in range(len(floats)):
+                floats[c, i] = np.nan
+            continue
+        verdict[i] = said
+        missed = said == UNDECIDED
+        if wanted[0]:
+            floats[DISCRIMINANT, i], floats[DISCRIMINANT + 1, i] = d, bar
+            missed |= not bar <= rtol * (1.0 + abs(d))
+        for c in range(4):
+            at, bar = FACTORS[c], results[i, 4 + c]
+            if wanted[at // 2]:
+                floats[at, i], floats[at + 1, i] = results[i, c], bar
+                missed |= not bar <= rtol * (1.0 + abs(results[i, c]))
+        late[i] = missed
+
+
+@kernel
+def transcendental(results, squares, wanted, rtol, whole, floats, verdict, late, status):
+    """The columns of `measure` that are no arithmetic: exponent and rotation number, if wanted, and who misses."""
+    for i in range(len(results)):
+        if status[i] != 0:
+            continue
+        sine, sine_bar, cosine, cosine_bar = _squares(results[i], squares, i, whole)
+        if wanted[EXPONENT // 2]:
+            by_sine = sine < cosine
+            growth, bar = -sine if by_sine else -cosine, sine_bar if by_sine else cosine_bar
+            late[i] |= _grows(growth, bar, rtol, floats[:, i], verdict[i])
+        if wanted[ROTATION // 2]:
+            zeros, doubt = results[i, 8] + results[i, 9], 0.0
+            if whole:  # where y2's last zero may lie on either side of T: sin^2 of the angle is at most -y1' y2
+                zeros = results[i, 9]
+                if abs(results[i, 2]) <= results[i, 6]:
+                    doubt = min(results[i, 6] * (abs(results[i, 1]) + results[i, 5]), 1.0)
+            x, bar = _rotation(sine, sine_bar, cosine, cosine_bar, verdict[i], zeros)
+            bar += sqrt(doubt) if verdict[i] != UNSTABLE else 0.0
+            floats[ROTATION, i], floats[ROTATION + 1, i] = x, bar
+            late[i] |= not bar <= rtol * (1.0 + x)
+
+
+@kernel
+def exponents(first, count, rtol, floats, verdict, late):
+    """The exponents of `count` points from each of `first` on, whose D and bar are known, and who misses `rtol`."""
+    for start in first:
+        for i in range(start, start + count):
+            # |D| - 2 = 4 sinh^2(exponent / 2)
+            growth = 0.25 * (abs(floats[DISCRIMINANT, i]) - 2.0)
+            late[i] |= _grows(growth, 0.25 * floats[DISCRIMINANT + 1, i], rtol, floats[:, i], verdict[i])
+
+
+@splice
+def _squares(result, squares, i, whole):
+    """sin^2 and cos^2 of half the angle, each with its bar: -y1' y2 and y1 y2', or row i of `squares` if it has rows.
+
+    With `whole` the results are those at T: then (2 - D) / 4 and (2 + D) / 4, D = y1 + y2', and the zeros of y2 in
+    (0, T) give the band (that solution's angle advances from 0 to between d pi and (d + 1) pi).
+    """
+    sine, sine_bar = _product(-result[1], result[2], result[5], result[6])
+    cosine, cosine_bar = _product(result[0], result[3], result[4], result[7])
+    if whole:
+        trace, size = result[0] + result[3], abs(result[0]) + abs(result[3]) + 2.0
+        bar = 0.25 * (result[4] + result[7] + 2.0 * EPS * size)
+        sine, cosine, sine_bar, cosine_bar = 0.25 * (2.0 - trace), 0.25 * (2.0 + trace), bar, bar
+    if len(squares) > 0:
+        sine, sine_bar, cosine, cosine_bar = squares[i, 0], squares[i, 1], squares[i, 2], squares[i, 3]
+    return sine, sine_bar, cosine, cosine_bar
+
+
+@inline
+def _grows(growth, bar, rtol, floats, verdict):
+    """Keep a point's exponent and its bar; does it miss `rtol`?"""
+    x, bar = exponent(growth, bar, verdict)
+    floats[EXPONENT], floats[EXPONENT + 1] = x, bar
+    return not bar <= rtol * (1.0 + x)
+
+
+@unroll
+def _product(a, b, ea, eb):
+    """a b and its error bound, the rounding of the product included."""
+    return a * b, ea * abs(b) + eb * abs(a) + ea * eb + EPS * abs(a * b) + LEAST
+
+
+@inline
+def decide(sine, sine_bar, cosine, cosine_bar, rule):
+    """The verdict: certain only when the bars exclude the other answer, or by an exact rule."""
+    if rule == ON_EDGE:
+        return MARGINAL
+    if sine < -sine_bar or cosine < -cosine_bar:
+        return UNSTABLE
+    if (sine > sine_bar and cosine > cosine_bar) or rule == NO_UNSTABLE_SIDE:
+        return STABLE
+    return UNDECIDED
+
+
+@inline
+def exponent(growth, bar, verdict):
+    """2 asinh sqrt(growth), growth = -sin^2 or -cos^2 of half the angle, and how far the bar can move it."""
+    if verdict == STABLE or verdict == MARGINAL:
+        return 0.0, 0.0
+    middle = _asinh(growth)
+    return middle, max(_asinh(growth + bar) - middle, middle - _asinh(growth - bar)) + 8.0 * EPS * middle
+
+
+@inline
+def _asinh(growth):
+    return 2.0 * asinh(sqrt(max(growth, 0.0)))
+
+
+@inline
+def _rotation(sine, sine_bar, cosine, cosine_bar, verdict, zeros):
+    """theta_total / (2 pi): `zeros` of y1, y2 in (0, T/2) give the band; n / 2 exactly in gaps."""
+    odd = zeros % 2.0 == 1.0
+    if sine < 0.0 or cosine < 0.0:
+        value = 0.5 * (zeros + (1.0 if odd != (cosine < sine) else 0.0))
+    else:
+        half = atan2(sqrt(sine), sqrt(cosine)) / pi
+        value = 0.5 * (zeros + (1.0 - 2.0 * half if odd else 2.0 * half))
+    if verdict == MARGINAL:
+        return 0.5 * np.rint(2.0 * value), 0.0
+    if verdict == UNSTABLE:
+        return value, 0.0
+    bar = max(_spread(sine, sine_bar), _spread(cosine, cosine_bar)) / pi  # arctan2 of both is no worse than either
+    return value, max(bar, 4.0 * EPS * (1.0 + value))
+
+
+@inline
+def _spread(square, bar):
+    """How far arcsin sqrt(square) moves within the bar: by its steepest slope there, at most by arcsin sqrt(bar)."""
+    slope = 2.0 * sqrt(max(square - bar, 0.0) * max(1.0 - square - bar, 0.0))
+    most = 0.5 * pi * sqrt(min(bar, 1.0))
+    return min(bar / slope, most) if slope > 0.0 else most

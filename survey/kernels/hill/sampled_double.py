@@ -1,0 +1,59 @@
+"""Taylor series of order 34 in double-double arithmetic, of z known in every step by its interpolant.
+
+On a step z is the polynomial through its values at NODES Chebyshev points of the first kind, given as a power series
+from the step's start; the rest is `taylor_double`. What that polynomial misses follows from its last Chebyshev
+coefficients, and counts as an error of z all over the step. Domain: z smooth on the scale of a step, known to 32
+digits; steps of any lengths.
+
+Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 3 and 8.
+"""
+
+import numpy as np
+
+from survey.kernels.hill.taylor_double import HALF_ULP, STEP, composed, rounded, step, workspace
+from survey.kernels.jit import kernel
+from survey.kernels.math.double import UNIT, add, div, mul
+
+ORDER = 34
+SERVES = ()  # a last resort, never a user's choice
+NODES = 20
+
+
+def missing(before, last, size):
+    """What an interpolant misses, from the sizes of its last four Chebyshev coefficients, pair by pair, and of z."""
+    # rounding may leave nothing of two coefficients, but no more is known of them than that
+    return 3 * last * (last / (before + UNIT * size + 1e-300) + 0.02)
+
+
+@kernel
+def solve(series, misses, lengths, whole, out):
+    """y'' + z y = 0 over all steps, from z's series in x = t / h (steps, NODES, 2), lengths (steps, 2), `missing` of z.
+
+    Fills `out` as `survey.kernels.lanes.chain` does; with `whole` also, from its place 10 on, (2 - D) / 4, its bar,
+    (2 + D) / 4, its bar, D = y1 + y2'.
+    """
+    steps, work = len(series), workspace(0)
+    z, even, odd = work[0], work[1], work[2]
+    chain, unit = np.empty((steps, STEP)), (lengths[0, 0], lengths[0, 1])
+    for n in range(steps):
+        h, c = (lengths[n, 0], lengths[n, 1]), chain[n]
+        z[:, :] = 0.0
+        for i in range(NODES):
+            z[0, i], z[1, i] = series[n, i, 0], series[n, i, 1]
+        square = mul(h, h)
+        step(z, even, odd, square, False, c)
+        # Variation of constants: an error of z moves the propagator by at most so much times both solutions.
+        size = np.abs(even[0]).sum() + np.abs(odd[0]).sum()
+        miss = square[0] * misses[n] * size * size
+        longer, shorter = div(h, unit), div(unit, h)
+        c[2], c[3] = mul((c[2], c[3]), longer)
+        c[4], c[5] = mul((c[4], c[5]), shorter)
+        c[8], c[9], c[10] = c[8] + miss, (c[9] + miss) * longer[0], (c[10] + 2.0 * miss) * shorter[0]
+        c[11] = 0.0
+    y1, v1, y2, v2 = composed(chain, 0.0, out)
+    if whole:
+        bar, trace = out[4] + out[7] + UNIT * (abs(y1[0]) + abs(v2[0]) + 2.0), add(y1, v2)
+        out[10] = 0.25 * add((2.0, 0.0), (-trace[0], -trace[1]))[0]
+        out[12] = 0.25 * add((2.0, 0.0), trace)[0]
+        out[11], out[13] = 0.25 * bar + HALF_ULP * abs(out[10]), 0.25 * bar + HALF_ULP * abs(out[12])
+    rounded(y1, v1, y2, v2, unit, out)

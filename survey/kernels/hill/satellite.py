@@ -1,0 +1,208 @@
+"""Planar motions of a satellite along one row of the map: w = dx/du and z = c0 + rho c1 + rho^2 at given u.
+
+A row is `rows[r]` = (k, k', half period, oblate, given, which): for rotations k > 1 and k' is the complement of 1/k;
+`given` is the parameter of this row that is known exactly, and `which` says which one it is.
+Notes (scenes/satellite.md), section 1: z = (rho + w)^2 + g with g = dn^2 (PL), -k^2 sn^2 (OL), cn^2 (PR),
+-sn^2 (OR): no cancelling constant.
+"""
+
+import numpy as np
+
+from survey.kernels.jit import inline, kernel
+from survey.kernels.math import double as dd
+from survey.kernels.math.elliptic import GAP, LANES, MEANS, jacobi, jacobi_lanes, means
+from survey.kernels.math.sines import sin_cos
+
+# A relative gap of the means whose square is below the rounding of extended floats.
+CLOSE = 1e-10
+
+
+def complete_integrals(k, kc):
+    """K and E of arrays of moduli and complements, as `elliptic.complete` in numpy, which has nothing to compile."""
+    a, b, weight, total = np.ones_like(kc), kc, 0.5, 0.5 * k * k
+    for _ in range(MEANS):
+        wide = abs(a - b) > GAP * a
+        if not wide.any():
+            break
+        c = np.where(wide, 0.5 * (a - b), 0.0)
+        a, b = np.where(wide, 0.5 * (a + b), a), np.where(wide, np.sqrt(a * b), b)
+        weight *= 2.0
+        total = total + weight * c * c
+    first = np.pi / (a + b)
+    return first, first * (1.0 - total)
+
+
+def half_periods(k, kc):
+    """2 K(k), or K(1/k) / k for rotations, rounded, and the rest, as phases are rho times as long (DLMF 19.8.5).
+
+    In the machine's extended floats (on some machines float64) and numpy, which has nothing to compile.
+    """
+    a, b = np.ones_like(kc, dtype=np.longdouble), kc.astype(np.longdouble)
+    wide = np.flatnonzero(b < a)
+    while wide.size:  # each row goes its own way, so that its bits do not depend on others
+        one, other = a[wide], b[wide]
+        a[wide], b[wide] = (one + other) / 2, np.sqrt(one * other)
+        wide = wide[one - other > CLOSE * one]
+    two = (np.longdouble(dd.PI[0]) + np.longdouble(dd.PI[1])) / a
+    half = np.where(k > 1, two / (2 * np.maximum(k, 1)), two)
+    return half.astype(float), (half - half.astype(float)).astype(float)
+
+
+@inline
+def motion(u, k, oblate, pairs, last):
+    """w and g at u: w = k cn(u, k) for librations, k dn(k u, 1/k) for rotations."""
+    if k <= 1.0:
+        sn, cn, dn = jacobi(u, pairs, last)
+        return k * cn, -(k * k) * sn * sn if oblate else dn * dn
+    sn, cn, dn = jacobi(k * u, pairs, last)
+    return k * dn, -sn * sn if oblate else cn * cn
+
+
+@kernel
+def sample(rows, nodes, out):
+    """c0 = w^2 + g and c1 = 2 w at the `nodes` (fractions) of the steps of the half period: out[r, step, c, node].
+
+    Steps are even in number, and `nodes` symmetric: cn(2K - u) = -cn(u) gives the second half of a libration from the
+    first, where u has a smaller rounding error.
+    """
+    pairs = np.empty((2, MEANS))
+    steps, width = out.shape[1], len(nodes)
+    lanes, partner = np.empty((LANES, steps * width)), np.empty(width, np.int64)
+    for i in range(width):
+        partner[i] = 0
+        for j in range(width):  # by hand: argmin takes 0.15 s to compile
+            if abs(nodes[i] + nodes[j] - 1.0) < abs(nodes[i] + nodes[partner[i]] - 1.0):
+                partner[i] = j
+    for r in range(rows.shape[0]):
+        k, kc, span, oblate = rows[r, 0], rows[r, 1], rows[r, 2], rows[r, 3] > 0.0
+        last = means(kc, pairs)
+        librates = k <= 1.0
+        scale = span / steps if librates else k * (span / steps)
+        own = steps // 2 if librates else steps
+        for n in range(own):
+            for i in range(width):
+                lanes[0, n * width + i] = (n + nodes[i]) * scale
+        jacobi_lanes(lanes, own * width, pairs, last)
+        # w = k cn and g = dn^2 or -k^2 sn^2 for librations, k dn and cn^2 or -sn^2 for rotations
+        squared = -k * k if oblate and librates else -1.0 if oblate else 1.0
+        shape = 1 if oblate else 3 if librates else 2
+        velocity = 2 if librates else 3
+        for i in range(own * width):
+            w = k * lanes[velocity, i]
+            lanes[0, i], lanes[4, i] = w * w + squared * (lanes[shape, i] * lanes[shape, i]), 2.0 * w
+        for n in range(own):
+            for i in range(width):
+                out[r, n, 0, i], out[r, n, 1, i] = lanes[0, n * width + i], lanes[4, n * width + i]
+        for n in range(steps - own):
+            for i in range(width):
+                out[r, steps - 1 - n, 0, partner[i]] = lanes[0, n * width + i]
+                out[r, steps - 1 - n, 1, partner[i]] = -lanes[4, n * width + i]
+
+
+@inline
+def potential(u, rho, row, table):
+    """z at any u in [0, half period] and what its rounding is relative to; `table` from `tabulate`."""
+    mirror = row[0] <= 1.0 and 2.0 * u > row[2]
+    w, g = motion(row[2] - u if mirror else u, row[0], row[3] > 0.0, table, int(table[0, MEANS]))
+    shifted = rho - w if mirror else rho + w
+    return shifted * shifted + g, (abs(rho) + abs(w)) * abs(shifted) + abs(g)
+
+
+@inline
+def tabulate(row, table):
+    """What `potential` needs of a row, once: the means of 1 and k', and in the last place their number."""
+    table[0, MEANS] = means(row[1], table)
+
+
+# In double-double the clock is the pendulum itself, x'' = -sin x cos x: sin x, cos x, w = x', and w^2 for z.
+# dn = cos x and k sn = sin x for librations; cn and sn for rotations.
+SIN, COS, W, SQUARE = range(4)
+CLOCK = 4
+# What a row is given by: k, 1 - k or asin k.
+K, ONE_MINUS_K, AMPLITUDE = 0.0, 1.0, 2.0
+# A row in double-double: k and sqrt(|1 - k^2|), each as two numbers, rotates, oblate.
+EXACTLY = 6
+
+
+@inline
+def exactly(row, exact):
+    """Fill `exact` (EXACTLY) from what the row is given by."""
+    given, which = (row[4], 0.0), row[5]
+    rotates = False
+    if which == AMPLITUDE:
+        rest = dd.add(dd.two_sum(dd.HALF_PI[0], -row[4]), (dd.HALF_PI[1], dd.HALF_PI_REST))
+        k, _ = sin_cos(row[4])
+        sine, cosine = sin_cos(rest[0])
+        complement = dd.shifted(sine, rest[1] * cosine[0])
+    else:
+        other = dd.two_sum(1.0, -row[4])
+        k, short = (given, other) if which == K else (other, given)
+        rotates = short[0] < 0.0
+        short = dd.neg(short) if rotates else short
+        complement = dd.sqrt(dd.mul(short, dd.add((1.0, 0.0), k)))
+    exact[0], exact[1] = k
+    exact[2], exact[3] = complement
+    exact[4], exact[5] = 1.0 if rotates else 0.0, row[3]
+
+
+@inline
+def half_period(exact):
+    """2 K(k), or K(1/k) / k for rotations, as a double-double."""
+    k, complement = (exact[0], exact[1]), (exact[2], exact[3])
+    if exact[4] > 0.0:
+        return dd.div(dd.HALF_PI, dd.mean(k, complement))
+    return dd.div(dd.PI, dd.mean((1.0, 0.0), complement))
+
+
+@inline
+def slowest(exact, clock):
+    """The clock where w is least, from where errors do not grow: u = K for librations, K(1/k) / k for rotations."""
+    for n in range(CLOCK):
+        clock[n, 0, 0], clock[n, 1, 0] = 0.0, 0.0
+    if exact[4] > 0.0:
+        clock[SIN, 0, 0] = 1.0
+        clock[W, 0, 0], clock[W, 1, 0] = exact[2], exact[3]
+    else:
+        clock[SIN, 0, 0], clock[SIN, 1, 0] = exact[0], exact[1]
+        clock[COS, 0, 0], clock[COS, 1, 0] = exact[2], exact[3]
+
+
+@inline
+def pendulum(exact, h, clock):
+    """Series of the clock in x = u / h: (sin x)' = w cos x, (cos x)' = -w sin x, w' = -sin x cos x."""
+    sine, cosine, w = clock[SIN], clock[COS], clock[W]
+    for n in range(clock.shape[2] - 1):
+        scale = n + 1.0
+        sine[0, n + 1], sine[1, n + 1] = dd.over(dd.mul(h, dd.convolved(cosine, w, n)), scale)
+        cosine[0, n + 1], cosine[1, n + 1] = dd.over(dd.mul(h, dd.convolved(sine, w, n)), -scale)
+        w[0, n + 1], w[1, n + 1] = dd.over(dd.mul(h, dd.convolved(sine, cosine, n)), -scale)
+    for n in range(clock.shape[2]):
+        clock[SQUARE, 0, n], clock[SQUARE, 1, n] = dd.convolved(w, w, n)
+
+
+@inline
+def coefficient(side, exact, rho, clock, z):
+    """Series of z = (rho + w)^2 + g; w is odd about u = K for librations, even about K(1/k) / k for rotations."""
+    sign, oblate = 1.0 if exact[4] > 0.0 else side, exact[5] > 0.0
+    twice = dd.scaled(rho, 2.0 * sign)
+    for n in range(1, clock.shape[2]):
+        shift = dd.mul((clock[W, 0, n], clock[W, 1, n]), twice)
+        # w^2 + sin^2 x is constant, so g' = (w^2)'
+        z[0, n], z[1, n] = dd.add(shift, (2.0 * clock[SQUARE, 0, n], 2.0 * clock[SQUARE, 1, n]))
+    shifted = dd.add(rho, (sign * clock[W, 0, 0], sign * clock[W, 1, 0]))
+    place = SIN if oblate else COS
+    g = (clock[place, 0, 0], clock[place, 1, 0])
+    g = dd.mul(g, g)
+    z[0, 0], z[1, 0] = dd.add(dd.mul(shifted, shifted), dd.neg(g) if oblate else g)
+    return 2.0 * (abs(rho[0]) + exact[0]) * exact[0] + 2.0
+
+
+@inline
+def missed(exact, clock):
+    """Where w is largest sin x = 0, |cos x| = 1, |w| = k: how far off, sin x and w relative to their amplitudes."""
+    k = exact[0], exact[1]
+    sine = abs(clock[SIN, 0, 0]) / min(1.0, k[0])
+    cosine, w = (clock[COS, 0, 0], clock[COS, 1, 0]), (clock[W, 0, 0], clock[W, 1, 0])
+    cosine = dd.sub(dd.neg(cosine) if cosine[0] < 0.0 else cosine, (1.0, 0.0))
+    w = dd.sub(dd.neg(w) if w[0] < 0.0 else w, k)
+    return max(sine, max(abs(cosine[0]), abs(w[0]) / k[0]))

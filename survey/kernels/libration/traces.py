@@ -1,0 +1,158 @@
+"""Trace invariants of a reversible linear Hamiltonian system with two degrees of freedom, point by point.
+
+With (P, S; Q, T) the propagator over half the period in canonical coordinates X, Y that the reflection maps to X, -Y:
+
+    A = det P, B = det T, C = det Q, D = det S, t = tr T'P,     A B - C D = t - 1
+    a = 4 t - 4,   b = 6 - 8 t + 16 A B = 8 t - 10 + 16 C D,   K = t^2 - 4 A B = (t - 2)^2 - 4 C D
+
+lambda + 1 / lambda = 2 + 4 w for the two eigenvalues w of S'Q, whose discriminant is K
+(`survey.measures.libration.danby`).
+"""
+
+from math import isfinite, sqrt
+
+import numpy as np
+
+from survey.kernels.jit import inline, kernel
+
+EPS = 2.3e-16
+LARGEST = float(np.finfo(np.float32).max)  # bars are kept as float32
+UNDECIDED, UNSTABLE, STABLE = -1, 0, 1
+NONE, MINUS_ONE, KREIN = 0, 1, 2
+RESULTS = 10  # A, B, C, D, t and the bound of each
+PLACES = 24  # of a row's series
+TILE = 64
+
+
+@kernel
+def measure(results, rtol, overflow, floats, verdict, collision, late, status):
+    """a, its bar, b, its bar (4, N), verdict and collision from `results` (N, 10); who misses `rtol` is `late`.
+
+    Points whose `status` is not 0 are passed over; those that leave the range of floats get the status `overflow`.
+    """
+    for i in range(len(results)):
+        if status[i] == 0:
+            values = results[i, 0], results[i, 1], results[i, 2], results[i, 3], results[i, 4]
+            bars = results[i, 5], results[i, 6], results[i, 7], results[i, 8], results[i, 9]
+            _judge(values, bars, i, rtol, overflow, floats, verdict, collision, late, status)
+
+
+@inline
+def _judge(values, bars, i, rtol, overflow, floats, verdict, collision, late, status):
+    """Answer point i from its A, B, C, D, t and their bars."""
+    late[i] = False
+    t, t_bar = values[4], bars[4]
+    ab, ab_bar = product(values[0], values[1], bars[0], bars[1])
+    cd, cd_bar = product(values[2], values[3], bars[2], bars[3])
+    a, a_bar = 4.0 * t - 4.0, 4.0 * t_bar + EPS * (4.0 * abs(t) + 4.0)
+    by_ab = ab_bar <= cd_bar
+    b = 6.0 - 8.0 * t + 16.0 * ab if by_ab else 8.0 * t - 10.0 + 16.0 * cd
+    b_bar = 16.0 * min(ab_bar, cd_bar) + 8.0 * t_bar
+    b_bar += EPS * (16.0 * abs(ab if by_ab else cd) + 16.0 * abs(t) + 20.0)
+    if not (isfinite(a) and isfinite(b) and a_bar < LARGEST and b_bar < LARGEST):
+        status[i] = overflow
+        floats[0, i] = floats[1, i] = floats[2, i] = floats[3, i] = np.nan
+        verdict[i] = collision[i] = UNDECIDED
+        late[i] = True
+        return
+    floats[0, i], floats[1, i], floats[2, i], floats[3, i] = a, a_bar, b, b_bar
+    k, k_bar = discriminant(t, ab, cd, t_bar, ab_bar, cd_bar)
+    verdict[i] = decide(t, t - 2.0, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar)
+    collision[i] = UNDECIDED
+    if verdict[i] == UNSTABLE:
+        collision[i] = lost(t, t - 2.0, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar)
+    elif verdict[i] == STABLE:
+        definite = (values[1] > 0.0) == (values[3] > 0.0)
+        collision[i] = MINUS_ONE if definite else nearest(t, k, t_bar, k_bar)
+    late[i] = missed(a, a_bar, b, b_bar, rtol) or verdict[i] == UNDECIDED
+
+
+@inline
+def missed(a, a_bar, b, b_bar, rtol):
+    return not (a_bar <= rtol * (1.0 + abs(a)) and b_bar <= rtol * (1.0 + abs(b)))
+
+
+@inline
+def product(a, b, ea, eb):
+    """a b and its error bound, the rounding of the product included."""
+    return a * b, ea * abs(b) + eb * abs(a) + ea * eb + EPS * abs(a * b)
+
+
+@inline
+def discriminant(t, ab, cd, t_bar, ab_bar, cd_bar):
+    """K and its bar, from whichever of its two forms has the smaller one."""
+    near, far = abs(t), abs(t - 2.0)
+    by_ab = 2.0 * near * t_bar + 4.0 * ab_bar <= 2.0 * far * t_bar + 4.0 * cd_bar
+    root = t if by_ab else t - 2.0
+    other, bar = (ab, ab_bar) if by_ab else (cd, cd_bar)
+    k = root * root - 4.0 * other
+    rounding = EPS * (2.0 * root * root + 4.0 * abs(other) + (0.0 if by_ab else 4.0 * abs(root)))
+    return k, 2.0 * abs(root) * t_bar + t_bar * t_bar + 4.0 * bar + rounding
+
+
+@inline
+def decide(t, beyond, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar):
+    """Stable: both w real, different and in (-1, 0). Certain only where the bars exclude the other answer.
+
+    `beyond` is t - 2, whose bar is that of t.
+    """
+    if ab < -ab_bar or cd < -cd_bar or k < -k_bar or t < -t_bar or beyond > t_bar:
+        return UNSTABLE
+    if ab > ab_bar and cd > cd_bar and k > k_bar and t > t_bar and beyond < -t_bar:
+        return STABLE
+    return UNDECIDED
+
+
+@inline
+def lost(t, beyond, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar):
+    """Which multipliers are off the circle: a complex quadruple, a negative pair, or positive ones alone."""
+    if k < -k_bar:
+        return KREIN
+    if ab < -ab_bar or (k > k_bar and t < -t_bar):
+        return MINUS_ONE
+    if k > k_bar and ab > ab_bar and (cd < -cd_bar or beyond > t_bar):
+        return NONE
+    return UNDECIDED
+
+
+@inline
+def nearest(t, k, t_bar, k_bar):
+    """Which arc of the unit circle is the shorter: from one pair to the other, or through -1 within one pair?
+
+    cos theta = 1 + 2 w; the arcs are theta2 - theta1 and 2 (pi - theta2), and the second is the shorter where
+    theta1 < 3 theta2 - 2 pi: where theta2 > 2 pi / 3 and cos theta1 > cos 3 theta2.
+    """
+    root, low = sqrt(max(k, 0.0)), sqrt(max(k - k_bar, 0.0))
+    bar = t_bar + max(sqrt(k + k_bar) - root, root - low) + 4.0 * EPS
+    one, two = t - 1.0 + root, t - 1.0 - root
+    gap, margin = one - two * (4.0 * two * two - 3.0), bar * (1.0 + abs(12.0 * two * two - 3.0) + 24.0 * bar)
+    if gap > margin and two < -0.5 - bar:
+        return MINUS_ONE
+    return KREIN if gap < -margin or two > -0.5 + bar else UNDECIDED
+
+
+@kernel
+def dense(series, bars, rows, mu, rtol, overflow, floats, verdict, collision, late, status):
+    """Answer the late points of `rows` of mu (R, L) from their Chebyshev series in 4 s - 3 (rows, 5, PLACES).
+
+    `bars` (rows, 5) hold for the whole row; late stays who misses `rtol` or is undecided.
+    """
+    here, x = np.empty((5, TILE)), np.empty(TILE)
+    for r in range(len(rows)):
+        bar = bars[r, 0], bars[r, 1], bars[r, 2], bars[r, 3], bars[r, 4]
+        for first in range(0, mu.shape[1], TILE):
+            count = min(TILE, mu.shape[1] - first)
+            for i in range(count):
+                m = mu[rows[r], first + i]
+                x[i] = 4.0 * sqrt(1.0 - 3.0 * m * (1.0 - m)) - 3.0
+            for j in range(5):
+                for i in range(count):  # Clenshaw; PLACES is a constant, so that the inner loop is unrolled
+                    ahead = further = 0.0
+                    for n in range(PLACES - 1, 0, -1):
+                        ahead, further = series[r, j, n] + 2.0 * x[i] * ahead - further, ahead
+                    here[j, i] = series[r, j, 0] + x[i] * ahead - further
+            for i in range(count):
+                at = rows[r] * mu.shape[1] + first + i
+                if late[at]:
+                    values = here[0, i], here[1, i], here[2, i], here[3, i], here[4, i]
+                    _judge(values, bar, at, rtol, overflow, floats, verdict, collision, late, status)

@@ -1,0 +1,171 @@
+"""As `kernels/nutation/brun.py` and `methods/agm.py`, in lanes: with few steps, with more, or in double-double at last.
+
+Points are columns of GIVEN numbers: A, C, epsilon, theta0, p_theta0, b, a; or l, the sign of k, -1 for the lower of two
+wells and 1 for the upper one, C/A, nothing, b, a.
+"""
+
+import numpy as np
+
+from survey.kernels.jit import inline, kernel, splice
+from survey.kernels.math import double as dd
+from survey.kernels.nutation import action, fine
+from survey.kernels.nutation import lanes as nl
+from survey.kernels.nutation.brun import of_state
+from survey.kernels.nutation.lanes import GIVEN, GOOD, OUTPUTS, TILE, WELLS, A, B, finish, put
+
+# steps of Laguerre's method and of Newton's, means; at first from the initial state or from the poles
+FEW, FEW_FROM_POLES, MORE, MOST = (3, 1, 8), (6, 1, 8), (12, 1, 12), (30, 4, 26)
+LEFT, CANCELLED, DONE = 0, 1, 2
+
+
+@inline
+def polynomial(work, k, level, at_plus, at_minus, i):
+    put(work, nl.K, i, k)
+    put(work, nl.L, i, level)
+    put(work, nl.PLUS_POLE, i, at_plus)
+    put(work, nl.MINUS_POLE, i, at_minus)
+    put(work, nl.MINUS, i, dd.two_sum(work[B + i], -work[A + i]))
+    put(work, nl.PLUS, i, dd.two_sum(work[B + i], work[A + i]))
+
+
+@kernel
+def states(work):
+    """The polynomials of initial states."""
+    for i in range(TILE):
+        b, a = work[B + i], work[A + i]
+        k, level, at_plus, at_minus, u, inside = of_state(
+            work[i], work[TILE + i], work[2 * TILE + i], work[3 * TILE + i], work[4 * TILE + i], b, a
+        )
+        polynomial(work, (k[0] if inside else np.nan, k[1]), level, at_plus, at_minus, i)
+        work[nl.U + i] = u[0]
+        work[nl.HERE + i] = work[4 * TILE + i] ** 2 * (1.0 - u[0]) * (1.0 + u[0])
+
+
+@kernel
+def integrals(work):
+    """The polynomials of scaled integrals."""
+    for i in range(TILE):
+        level, sign, product = work[i], work[TILE + i], dd.two_prod(work[B + i], work[A + i])
+        high = dd.two_sum(level, sign)
+        polynomial(work, (sign, 0.0), (level, 0.0), dd.sub(high, product), dd.add(high, product), i)
+        work[nl.U + i] = 2.0 * work[2 * TILE + i]
+
+
+@inline
+def together(which, first):
+    """The points of a tile lie side by side."""
+    return first + TILE <= len(which) and which[first + TILE - 1] == which[first] + TILE - 1
+
+
+@kernel
+def enter(points, which, first, work):
+    """A tile of the points `which`, the last of which is repeated."""
+    start, last = which[first], len(which) - 1
+    if together(which, first):
+        for j in range(GIVEN):
+            row = points[j, start : start + TILE]
+            for i in range(TILE):
+                work[j * TILE + i] = row[i]
+        return
+    for i in range(TILE):
+        at = which[min(first + i, last)]
+        for j in range(GIVEN):
+            work[j * TILE + i] = points[j, at]
+
+
+@kernel
+def leave(work, told, which, first, out, wells, done):
+    start = which[first]
+    if together(which, first):
+        for j in range(OUTPUTS):
+            row = out[j, start : start + TILE]
+            for i in range(TILE):
+                row[i] = told[j * TILE + i]
+        number, state = wells[start : start + TILE], done[start : start + TILE]
+        for i in range(TILE):
+            number[i], state[i] = work[WELLS + i], work[GOOD + i]
+        return
+    for i in range(min(TILE, len(which) - first)):
+        at = which[first + i]
+        for j in range(OUTPUTS):
+            out[j, at] = told[j * TILE + i]
+        wells[at], done[at] = work[WELLS + i], work[GOOD + i]
+
+
+@splice
+def solve(work, steps, within, exactly, actions):
+    if steps[1] > 1:
+        nl.approach_slowly(work, steps[0])
+    else:
+        if within:
+            nl.inside(work)
+        else:
+            nl.poles(work)
+        nl.approach(work, steps[0])
+    nl.wells(work, steps[1])
+    nl.means(work, steps[2])
+    if exactly:
+        fine.fine(work, steps[2])
+    if actions:
+        nl.small_actions(work)
+
+
+@kernel
+def tell_states(work, told):
+    for i in range(TILE):
+        a, c = work[i], work[TILE + i]
+        finish(work, a, work[A + i] * ((a - c) / (a * c)), i, told)
+
+
+@kernel
+def tell_integrals(work, told):
+    for i in range(TILE):
+        ratio = work[3 * TILE + i]
+        finish(work, 1.0, work[A + i] * ((1.0 - ratio) / ratio), i, told)
+
+
+@kernel
+def in_state(done, low, high, which):
+    """Those of the points `which` whose state is in this range."""
+    found, count = np.empty(len(which), np.int64), 0
+    for i in which:
+        found[count] = i
+        count += (done[i] >= low) & (done[i] <= high)
+    return found[:count]
+
+
+@splice
+def answer(polynomials, tell, told_u, points, actions, out, wells, done):
+    """Tile after tile: the polynomials of its points, their wells, and what is told of these.
+
+    All of them go with FEW steps, what these leave with MORE and then with MOST; exactly where that is asked for.
+    """
+    work, told = np.zeros(fine.ALL), np.empty(OUTPUTS * TILE)
+    left = which = np.arange(len(done))
+    for n in range(6):
+        steps, exactly = (FEW if told_u else FEW_FROM_POLES, MORE, MOST)[n // 2], n % 2 == 1
+        for first in range(0, len(which), TILE):
+            enter(points, which, first, work)
+            polynomials(work)
+            solve(work, steps, told_u and n < 2, exactly, actions)
+            tell(work, told)
+            if actions:
+                action.mend(work, told)
+            leave(work, told, which, first, out, wells, done)
+        left = in_state(done, LEFT, CANCELLED, left) if exactly else left
+        which = left if exactly else in_state(done, CANCELLED, CANCELLED, left)
+
+
+@kernel
+def of_states(points, actions, out, wells, done):
+    """Outputs (OUTPUTS, n) of initial states (GIVEN, n), the numbers of wells (n), and which are DONE (n).
+
+    actions: accurate ones of small wells.
+    """
+    answer(states, tell_states, True, points, actions, out, wells, done)
+
+
+@kernel
+def of_integrals(points, actions, out, wells, done):
+    """As `of_states`, at scaled integrals."""
+    answer(integrals, tell_integrals, False, points, actions, out, wells, done)

@@ -1,0 +1,131 @@
+"""u, psi and phi of a nutation at given times: u by an elliptic function, the angles by R_J (S7), (S16).
+
+u = (ul wl + uh wh)/(wl + wh), wl = sqrt Q(uh) (1 + c)/2, wh = sqrt Q(ul) (1 - c)/2, c = cn(sqrt g t/A), with 1 - m =
+(s + g)/(2 g), of any size (S17): real roots and conjugate ones are one case.
+"""
+
+from math import hypot, sqrt
+
+import numpy as np
+
+from survey.kernels.jit import inline
+from survey.kernels.math.carlson import rf, rj_spread
+from survey.kernels.math.elliptic import MEANS, means
+from survey.kernels.nutation import wells as nu
+
+EPS = nu.EPS
+
+
+@inline
+def first_kind(sine, cosine, kc):
+    """F(chi) from sin chi and cos chi (DLMF 19.25.5), chi <= pi/2."""
+    delta = hypot(cosine, kc * sine)
+    return sine * rf(cosine * cosine, 0.5 * (1.0 + delta * delta), delta)
+
+
+@inline
+def since(far, near, middle, spread, ratio, rest, q_origin, root, width):
+    """The integral of dt/(distance from a pole) since u was at the turning point `origin`, less t/far.
+
+    far, near: the distances from the pole of that turning point and of u; ratio = |u - that|/width, rest = 1 - ratio;
+    root = sqrt Q(u). middle = X0 + s, next to 0 where the motion nearly stops; spread = g^2 - s^2.
+    """
+    if ratio < 1e-290:
+        return 0.0
+    x = q_origin * rest / ratio
+    third = rj_spread(x, middle, sqrt(q_origin) * root / ratio, spread, q_origin * near / (ratio * far))
+    return 2.0 * width * q_origin / (3.0 * far * far) * third
+
+
+@inline
+def place(row, low, high, c, roots, kc, out):
+    """From (1 + c)/2, (1 - c)/2 and c, each with all its digits.
+
+    out = u, 1 - u, 1 + u, (u - ul)/(uh - ul), 1 - that, sqrt Q(u) = g dn/(wl + wh), X0 + s of (S16) from ul and uh.
+    """
+    left, right = roots[1] * low, roots[0] * high
+    total = left + right
+    left, right = left / total, right / total
+    out[1] = row[nu.LOW_PLUS] * left + row[nu.HIGH_PLUS] * right
+    out[2] = row[nu.LOW_MINUS] * left + row[nu.HIGH_MINUS] * right
+    out[0] = row[nu.LOW] * left + row[nu.HIGH] * right
+    out[3], out[4] = right, left
+    g = roots[0] * roots[1]
+    out[5] = g * hypot(c, 2.0 * kc * sqrt(low * high)) / total
+    above = nu.above(row, g)
+    out[6], out[7] = above + g * c / high, above - g * c / low
+
+
+@inline
+def angles(row, tau, half, down, at):
+    """(b - a) G- / 2 and (b + a) G+ / 2 at the time tau in [0, half] since u = ul; `down` is the latter at `half`."""
+    width, spread = row[nu.WIDTH], nu.spread(row)
+    first = second = 0.0
+    if row[nu.MINUS] != 0.0:
+        far = row[nu.LOW_PLUS]
+        rest = tau / far + since(far, at[1], at[6], spread, at[3], at[4], row[nu.Q_LOW], at[5], width)
+        first = 0.5 * row[nu.MINUS] * rest
+    if row[nu.PLUS] != 0.0:
+        far = row[nu.HIGH_MINUS]
+        rest = (half - tau) / far + since(far, at[2], at[7], spread, at[4], at[3], row[nu.Q_HIGH], at[5], width)
+        second = down - 0.5 * row[nu.PLUS] * rest
+    return first, second
+
+
+@inline
+def rates(row, at):
+    """(b - a)/(2(1 - u)) and (b + a)/(2(1 + u))."""
+    up = 0.5 * row[nu.MINUS] / at[1] if row[nu.MINUS] != 0.0 else 0.0
+    return up, (0.5 * row[nu.PLUS] / at[2] if row[nu.PLUS] != 0.0 else 0.0)
+
+
+@inline
+def motion(cosine, row, start, period, times, out):
+    """u, the angles (less the drift of phi) and bars (m, 6) at `times` (m) in units of A, from the values `period` (8).
+
+    cosine(z, kc, quarter, pairs, last) gives (1 + c)/2, (1 - c)/2 and c for z in [0, 2 K].
+    """
+    pairs, at = np.empty((2, MEANS)), np.empty(8)
+    roots = sqrt(row[nu.Q_LOW]), sqrt(row[nu.Q_HIGH])
+    g = roots[0] * roots[1]
+    kc, rate = sqrt(0.5 * nu.above(row, g) / g), sqrt(g)
+    last = means(kc, pairs)
+    quarter = 0.25 * period[0] * rate
+    up, down = 0.25 * (period[1] - period[2]), 0.25 * (period[1] + period[2])  # in half a period
+    whole, half = 4.0 * quarter, 0.5 * period[0]
+    done, left = start[0] * roots[1], start[1] * roots[0]
+    low, high = left / (done + left), done / (done + left)
+    sine, c = 2.0 * sqrt(low * high), low - high
+    z0 = first_kind(sine, c, kc) if c >= 0.0 else 2.0 * quarter - first_kind(sine, -c, kc)
+    place(row, low, high, c, roots, kc, at)
+    first, second = angles(row, z0 / rate, half, down, at)
+    base_up, base_down = start[2] * first, start[2] * second
+    early = start[3] / max(row[nu.WIDTH] * sqrt(at[3] * at[4]) * at[5], nu.TINY)
+    first_up, first_down = rates(row, at)  # the phase of the start moves it and what follows alike
+    z0 *= start[2]
+    relative = period[4] / period[0]
+    for j in range(len(times)):
+        z = z0 + rate * times[j]
+        n = np.floor(z / whole + 0.5)  # a float: of so many periods that no integer holds them, too
+        # the number of periods is taken off in time, where the period is what has been found best
+        z = z0 + rate * (times[j] - n * period[0])
+        side = 1.0 if z >= 0.0 else -1.0
+        z = min(abs(z), 2.0 * quarter)
+        low, high, c = cosine(z, kc, quarter, pairs, last)
+        place(row, low, high, c, roots, kc, at)
+        first, second = angles(row, z / rate, half, down, at)
+        first, second = side * first - base_up, side * second - base_down
+        all_up, all_down = first + 2.0 * n * up, second + 2.0 * n * down
+        late = (relative + 4.0 * EPS) * abs(times[j]) + (16.0 * EPS + relative) * (1.0 + quarter) / rate
+        rate_up, rate_down = rates(row, at)
+        moved = (abs(rate_up) + abs(rate_down)) * late + (abs(rate_up - first_up) + abs(rate_down - first_down)) * early
+        late += early
+        speed = row[nu.WIDTH] * sqrt(at[3] * at[4]) * at[5]
+        bend = row[nu.WIDTH] * max(row[nu.Q_LOW], row[nu.Q_HIGH]) + 4.0 * abs(row[nu.K]) * row[nu.WIDTH] ** 2
+        rounding = 3.0 * (row[nu.BAR_LOW] + row[nu.BAR_HIGH]) + 8.0 * EPS * row[nu.WIDTH]
+        out[j, 0], out[j, 1], out[j, 2] = at[0], all_up + all_down, all_down - all_up
+        out[j, 3] = speed * late + bend * late * late + rounding
+        size = abs(first) + abs(second) + abs(base_up) + abs(base_down) + abs(up) + abs(down)
+        turned = abs(n) * (period[5] + 4.0 * EPS * (abs(up) + abs(down)))
+        out[j, 4] = moved + (24.0 * EPS + 2.0 * relative) * size + turned
+        out[j, 5] = out[j, 4]

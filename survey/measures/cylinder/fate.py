@@ -1,0 +1,354 @@
+"""Fates of the flow phi' = w, w' = f w + g on the cylinder: the skeleton of a parameter point, then each initial state.
+
+The skeleton holds what decides fates: stratum, ends, equilibria, cycles of the return maps. It depends on the six
+parameters alone and is computed once for all initial states.
+"""
+
+import math
+import sys
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from survey.kernels.cylinder import equilibria as eq
+from survey.kernels.cylinder import fate as kf
+from survey.kernels.cylinder import returns as rt
+from survey.kernels.cylinder import taylor_double
+from survey.kernels.cylinder.along import OK, SEPARATRIX, STEP_LIMIT
+from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, coefficients
+from survey.kernels.cylinder.flow_double import energy as energy_beside
+from survey.measures.cylinder.solution import tolerances, trajectories
+
+NO_TURNS = kf.NO_TURNS
+I0, I1, I2, G = 0, 1, 2, 3  # strata
+EXACT = 7e-16  # three ulp: K and L are 0 within the rounding of decimal parameters
+STEPS = 20_000  # budget of one fate: about 15 ms
+MORE = 10  # times the budget for those that use it up
+MOST = 2_000_000  # steps in all
+BATCH = 50  # fates per kernel call, so that a call stays below a second
+HANDED_OVER = np.geomspace(0.5, 2000.0, 28)  # times, in those of the system, at which float64 takes over again
+LEAST = 1e-6  # slowest rotation of the lattice, in velocities of the system
+FINE = 1e-16  # truncation per step for cycles, or the finest of the method
+
+
+def empty(size, status):
+    """The outputs of `solve` for `size` states, filled with what does not apply."""
+    floats = ("limit_phi", "limit_w", "multiplier")
+    result = {name + end: np.full(size, np.nan) for name in floats for end in ("", "_error")}
+    for name, fill in (("verdict", -1), ("turnings", kf.UNTOLD), ("net_turns", NO_TURNS), ("status", status)):
+        result[name] = np.full(size, fill, dtype=np.int64)
+    return result
+
+
+def solve(method, six, starts, rtol, result, where):
+    """Fates at one parameter point, written into `result` (see `empty`) at the indices `where`."""
+    s = remembered(method, six)
+    out = followed(method, s, starts, rtol)
+    result["verdict"][where], result["turnings"][where], result["status"][where] = out[:, 0], out[:, 2], out[:, 4]
+    result["net_turns"][where] = out[:, 3]
+    for i, row in zip(where, out, strict=True):
+        _limits(s, row, result, i)
+    middle = np.where(out[:, 3] != NO_TURNS, 0.0, np.nan) + _middles(s, out)
+    turns = np.trunc((middle + 2.0 * math.pi * out[:, 3] - starts[:, 0]) / (2.0 * math.pi))
+    told = np.isfinite(turns) & (out[:, 0] != kf.PERIODIC_LIBRATION)
+    result["net_turns"][where[told]] = turns[told]
+
+
+def followed(method, s, starts, rtol):
+    """`fates` of the skeleton s, once more with more effort where they are not decided."""
+    first, second = tolerances(method, rtol)
+    out = fates(method, s, starts, first)
+    for code, tolerance in ((STEP_LIMIT, first), (SEPARATRIX, second)):
+        again = out[:, 4] == code
+        if again.any():
+            out[again] = fates(method, s, starts[again], tolerance, MORE)
+    if s.stratum not in (I0, I1) and starts.shape[1] == 2:  # no better than the bars of a start can its fate be
+        for i in np.flatnonzero(out[:, 4] == SEPARATRIX):
+            _handed_over(method, s, starts[i], first, out[i])
+    return out
+
+
+def _handed_over(method, s, start, tolerance, out):
+    """Follow one start in double-double past what float64 cannot tell, until its fate from there on is decided."""
+    times = HANDED_OVER / (s.p[BOUND_F] + math.sqrt(s.p[BOUND_DG]) + abs(start[1]))
+    row, done = np.concatenate([s.p[:6], start])[None], 0
+    for last in (10, 19, len(times)):  # most are decided early, and what comes later costs most
+        floats, turnings, status = trajectories(taylor_double, row, times[None, :last], 0.0)
+        for state, turned, code in list(zip(floats[0], turnings[0], status[0], strict=True))[done:]:
+            later = fates(method, s, state[None], tolerance)[0] if code == OK else [kf.UNDECIDED]
+            if later[0] != kf.UNDECIDED:
+                out[:] = later
+                if later[2] >= 0:
+                    out[2] = later[2] + turned if turned >= 0 else kf.UNTOLD
+                return
+        done = last
+
+
+def _middles(s, out):
+    """Angle that counts for net_turns: the equilibrium, or the middle of a libration cycle."""
+    angles = np.full(len(out), np.nan)
+    for i, row in enumerate(out):
+        if row[0] in (kf.EQUILIBRIUM, kf.EQUILIBRIUM_START) and row[1] >= 0:
+            angles[i] = s.equilibria[int(row[1]), eq.ANGLE]
+        elif row[0] == kf.LIBRATION:
+            cycle = s.librations[int(row[1])]
+            angles[i] = 0.5 * (cycle[rt.CYCLE_X] + cycle[rt.CYCLE_LEFT])
+    return angles
+
+
+def _limits(s, row, result, i):
+    """limit_phi, limit_w and multiplier of one fate."""
+    verdict, index = int(row[0]), int(row[1])
+    phi = w = cycle = None
+    if verdict in (kf.EQUILIBRIUM, kf.EQUILIBRIUM_START):
+        angle, bar = (s.equilibria[index, eq.ANGLE], s.equilibria[index, eq.BAR]) if index >= 0 else row[5:7]
+        phi = angle % (2.0 * math.pi), bar
+    elif verdict == kf.LIBRATION:
+        cycle = s.librations[index]
+        phi = cycle[rt.CYCLE_X], cycle[rt.CYCLE_BAR]
+    elif verdict in (kf.ROTATION_PLUS, kf.ROTATION_MINUS):
+        sign = 1.0 if verdict == kf.ROTATION_PLUS else -1.0
+        cycle = (s.plus if sign > 0 else s.minus)[index]
+        w = sign * cycle[rt.CYCLE_X], cycle[rt.CYCLE_BAR]
+    if phi is not None:
+        result["limit_phi"][i], result["limit_phi_error"][i] = phi[0], phi[1] + 1e-15
+    if w is not None:
+        result["limit_w"][i], result["limit_w_error"][i] = w
+    if cycle is not None:
+        result["multiplier"][i] = cycle[rt.MULTIPLIER]
+        result["multiplier_error"][i] = cycle[rt.MULTIPLIER_BAR]
+
+
+def remembered(method, six):
+    """The skeleton of the parameter point `six`; blocks of one survey share it."""
+    return _remembered(method.__name__, tuple(float(value) for value in six))
+
+
+@lru_cache(maxsize=256)
+def _remembered(method, six):
+    return skeleton(sys.modules[method], six)
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """What decides the fates at one parameter point; tables with the columns of `kernels/equilibria`, `returns`."""
+
+    p: np.ndarray
+    stratum: int
+    K: float
+    L: float
+    ends: np.ndarray  # 1 attracting, 0 neutral, -1 repelling, for w -> +inf and w -> -inf
+    section: float
+    equilibria: np.ndarray
+    plus: np.ndarray
+    minus: np.ndarray
+    librations: np.ndarray
+    thresholds: np.ndarray  # (w_c, w_d) of the two rotation maps; NaN where every turn from w > 0 is completed
+    conclusive: bool  # do the signs of D fit together (so the parity law holds), and did every map answer?
+
+
+def sizes(b12, b31, d, c23, s2, s3):
+    """Sums of the magnitudes of the terms of K and of L."""
+    b = math.hypot(b12, b31)
+    return abs(b12 * s3) + abs(b31 * s2), math.pi * (abs(c23) * b * b + abs(d * b12 * b31))
+
+
+def constants(b12, b31, d, c23, s2, s3):
+    """K and L, which decide the ends; 0 where they vanish within rounding."""
+    K = b12 * s3 - b31 * s2
+    L = 0.5 * math.pi * (c23 * (b12 * b12 - b31 * b31) - d * b12 * b31)
+    return tuple(
+        0.0 if abs(value) <= EXACT * size else value
+        for value, size in zip((K, L), sizes(b12, b31, d, c23, s2, s3), strict=True)
+    )
+
+
+def stratum_of(b12, b31, d, c23, s2, s3):
+    """I0: g = 0, I1: b = 0, I2: K = L = 0, and the rest G."""
+    if d == c23 == s2 == s3 == 0.0:
+        return I0
+    if b12 == b31 == 0.0:
+        return I1
+    return I2 if constants(b12, b31, d, c23, s2, s3) == (0.0, 0.0) else G
+
+
+def skeleton(method, six):
+    """The skeleton of one parameter point (six numbers)."""
+    six = [float(value) for value in six]
+    p = np.ascontiguousarray(coefficients(*six))
+    K, L = constants(*six)
+    stratum = stratum_of(*six)
+    sign = np.sign(K) if K != 0.0 else np.sign(L)
+    ends = np.array([sign, sign if K != 0.0 else -sign])
+    table = np.zeros((eq.MOST, 10))
+    eqs = table[: eq.equilibria(p, table)] if stratum != I0 else table[:0]
+    section = _section(p, eqs)
+    none, thresholds = np.zeros((0, 10)), np.full((2, 2), np.nan)
+    if stratum != G:
+        return Skeleton(p, stratum, K, L, ends, section, eqs, none, none, none, thresholds, True)
+    plus, thresholds[0], first = _rotations(method, six, eqs, section, K, L)
+    mirrored = [six[0], -six[1], six[2], -six[3], -six[4], six[5]]
+    minus, thresholds[1], second = _rotations(method, mirrored, _mirrored(eqs), -section, K, -L)
+    librations, third = _librations(method, p, eqs)
+    conclusive = first and second and third
+    return Skeleton(p, stratum, K, L, ends, section, eqs, plus, minus, librations, thresholds, conclusive)
+
+
+def _section(p, eqs):
+    """The saddle of highest V, in [-pi, pi]; 0 where there is none."""
+    saddles = eqs[eqs[:, eq.KIND] == eq.SADDLE, eq.ANGLE] if len(eqs) else ()
+    if not len(saddles):
+        return 0.0
+    d, c23, s2, s3 = p[2:6]
+    s, c = np.sin(saddles), np.cos(saddles)
+    highest = saddles[np.argmax(0.5 * d * s * s + c23 * s * c - s2 * s - s3 * c)]
+    return float(highest - 2.0 * math.pi if highest > math.pi else highest)
+
+
+def _mirrored(eqs):
+    """The equilibria under S2."""
+    turned = eqs.copy()
+    turned[:, eq.ANGLE] = -eqs[:, eq.ANGLE] % (2.0 * math.pi)
+    return turned
+
+
+def _rotations(method, six, eqs, section, K, L):
+    """Cycles with w > 0 of the system `six`, ascending in w; (w_c, w_d); are they conclusive?"""
+    p = np.ascontiguousarray(coefficients(*six))
+    scale = p[BOUND_F] + math.sqrt(p[BOUND_DG])
+    table, edges, fine = np.zeros((rt.MOST_CYCLES, 10)), np.zeros(7), max(FINE, method.FLOW_FINEST)
+    xs = scale * np.geomspace(LEAST, 30.0, 80)
+    found = method.flow_cycles(rt.ROTATION, p, eqs, len(eqs), section, 0, xs, fine, table, 0, edges)
+    border, start, untold = edges[:2].copy(), edges[4], edges[6]
+    end = np.sign(K) if K != 0.0 else np.sign(L)
+    top, change, error, last = xs[-1], edges[2], edges[3], 0.0
+    while change * end < 0.0 and abs(change) > 4.0 * error and top < 1e5 * scale and found < len(table) - 1:
+        last = np.sign(change)
+        xs = top * np.array([1.0, 1.3, 1.7, 2.2, 3.0])
+        before = found
+        found = method.flow_cycles(rt.ROTATION, p, eqs, len(eqs), section, 0, xs, fine, table, found, edges)
+        untold += edges[6]
+        if found > before and (found - before) % 2:
+            break
+        top, change, error = xs[-1], edges[2], edges[3]
+    cycles = table[:found]
+    last = np.sign(change) if abs(change) > error else last  # the last certain sign of D
+    last = cycles[-1, rt.ABOVE] if found else last
+    if last * end < 0.0 and K != 0.0:
+        cycles = np.vstack([cycles, _far_cycle(p, section, K, L, scale)])
+    # where every turn is completed, D tends to w_d > 0 as w -> 0: cycles below the lattice need w_d below it too
+    near = np.sign(border[1] - border[0]) if border[0] > 0.0 else np.sign(start)
+    sure = border[0] > 0.0 or start > LEAST * scale
+    sides = [near, *(cycles[:, rt.ABOVE])], [*cycles[:, rt.BELOW], end]
+    return cycles, border, bool(untold == 0.0 and sure and found < len(table) - 2 and sides[0] == sides[1])
+
+
+def _far_cycle(p, section, K, L, scale):
+    """The large cycle w(0) ~ -L/(pi K) where the return map cannot tell it (D = pi K/w^2 + ..., below rounding).
+
+    The expansion leaves a shift of the size of the velocities of the system, which the bar covers.
+    """
+    b12, b31 = p[0], p[1]
+    w = -L / (math.pi * K) - 2.0 * b31 + b12 * math.sin(section) + b31 * math.cos(section) - b31
+    w = max(w, 30.0 * scale)
+    slope = math.pi * K / w**3
+    side = np.sign(K)
+    return np.array([w, 1.0 + slope, 2 * math.pi / w, 10.0 * scale, abs(slope) + 1e-15, 0.0, 1.0, 0, -side, side])
+
+
+def _librations(method, p, eqs):
+    """Libration cycles, by their right turning point, of every interval where g < 0; are they conclusive?"""
+    table, edges, fine, found = np.zeros((rt.MOST_CYCLES, 10)), np.zeros(7), max(FINE, method.FLOW_FINEST), 0
+    share, sure = 1.0 / (1.0 + np.exp(-np.linspace(-11.0, 11.0, 56))), True
+    for i, row in enumerate(eqs):
+        if row[eq.DG] < 0.0 and row[eq.KIND] != eq.DEGENERATE:
+            high = eqs[i + 1, eq.ANGLE] if i + 1 < len(eqs) else eqs[0, eq.ANGLE] + 2.0 * math.pi
+            xs = row[eq.ANGLE] + share * (high - row[eq.ANGLE])
+            found = method.flow_cycles(rt.LIBRATION, p, eqs, len(eqs), high, i, xs, fine, table, found, edges)
+            against = row[eq.KIND] == eq.FOCUS and edges[4] * row[eq.STABLE] < 0.0 and abs(edges[4]) > edges[5]
+            sure = sure and not against and edges[6] == 0.0
+    return table[:found], bool(sure and found < len(table) - 2)
+
+
+def fates(method, skeleton, starts, tolerance, more=1):
+    """Verdict, row of the limit, turning points, turns of the limit, status: for rows phi0, w0 (and their bars)."""
+    if skeleton.stratum in (I0, I1):
+        return (_free if skeleton.stratum == I0 else _conservative)(skeleton, starts)
+    out = np.zeros((len(starts), 5))
+    s, starts = skeleton, np.pad(starts, ((0, 0), (0, 4 - starts.shape[1])))
+    section = s.section if s.stratum == G else math.atan2(s.p[0], s.p[1])
+    sizes = np.array([len(s.equilibria), len(s.plus), len(s.minus), len(s.librations),
+                      kf.GENERIC if s.stratum == G else kf.REVERSIBLE, int(s.K < 0.0)])  # fmt: skip
+    tables = [np.ascontiguousarray(table) for table in (s.equilibria, s.plus, s.minus, s.librations)]
+    size = max(1, BATCH // (more * method.FLOW_WORK))
+    for i in range(0, len(starts), size):
+        part = np.ascontiguousarray(starts[i : i + size])
+        limit = min(more * STEPS * method.FLOW_WORK, MOST)
+        method.flow_fates(s.p, section, s.ends, sizes, *tables, part, tolerance, limit, out[i : i + size])
+    return out
+
+
+def _free(s, starts):
+    """g = 0: w - F is conserved and phi' = w on a line; every state with w = 0 is an equilibrium.
+
+    The row of the limit is replaced by its unwrapped angle, given in a sixth column, its bar in a seventh.
+    """
+    b12, b31 = s.p[:2]
+    b, axis = math.hypot(b12, b31), math.atan2(b12, b31)
+    out = np.zeros((len(starts), 7))
+    for row, (phi, w) in zip(out, starts, strict=True):
+        y = w - b12 * math.sin(phi) - b31 * math.cos(phi)
+        noise = 4e-16 * (abs(w) + b * (1.0 + abs(phi)))
+        row[:] = kf.EQUILIBRIUM, -1, 0, kf.NO_TURNS, 0, np.nan, np.nan
+        if w == 0.0:
+            row[0], row[3], row[5], row[6] = kf.EQUILIBRIUM_START, 0, phi, 0.0
+        elif abs(abs(y) - b) <= noise:
+            row[0], row[2], row[4] = kf.UNDECIDED, kf.UNTOLD, SEPARATRIX
+        elif abs(y) > b:
+            row[0] = kf.PERIODIC_ROTATION
+        else:  # the next root of y + b cos(phi - axis) ahead
+            half = math.acos(-y / b)
+            ahead = [((axis + side * half - phi) * np.sign(w)) % (2.0 * math.pi) for side in (1, -1)]
+            row[5] = phi + np.sign(w) * min(ahead)
+            row[6] = 2.0 * noise / math.sqrt(b * b - y * y) + 1e-15 * (1.0 + abs(row[5]))
+            row[3] = math.trunc((row[5] - phi) / (2.0 * math.pi))
+    return out
+
+
+def _above(p, phi, w, row):
+    """Sign of the energy less that of the equilibrium `row`, in double-double; 0 where its bar reaches 0."""
+    gap, bar = energy_beside(p, phi, w, row[eq.ANGLE])
+    bar += 0.5 * p[BOUND_DG] * row[eq.BAR] ** 2  # V' = 0 at the equilibrium
+    return 0 if abs(gap) <= bar else math.copysign(1.0, gap)
+
+
+def _conservative(s, starts):
+    """b = 0: H = w^2/2 + V is conserved; rotation above the highest V, libration below, but for separatrices."""
+    _b12, _b31, d, c23, s2, s3 = s.p[:6]
+
+    def potential(phi):
+        sin, cos = np.sin(phi), np.cos(phi)
+        return 0.5 * d * sin * sin + c23 * sin * cos - s2 * sin - s3 * cos
+
+    phi, w = starts.T
+    energy = 0.5 * w * w + potential(phi)
+    rest = s.equilibria[(s.equilibria[:, eq.KIND] == eq.SADDLE) | (s.equilibria[:, eq.KIND] == eq.DEGENERATE)]
+    levels = potential(rest[:, eq.ANGLE])
+    noise = 4e-16 * (np.abs(energy) + w * w + (abs(d) + abs(c23) + abs(s2) + abs(s3)) * (1.0 + np.abs(phi)))
+    near = (np.abs(energy[:, None] - levels) <= noise[:, None] + 1e-15).any(axis=1)
+    rotates = energy > levels.max()
+    for i in np.flatnonzero(near):
+        above = [_above(s.p, phi[i], w[i], row) for row in rest]
+        near[i], rotates[i] = 0 in above, min(above) > 0
+    out = np.zeros((len(starts), 5))
+    out[:, 0] = np.where(rotates, kf.PERIODIC_ROTATION, kf.PERIODIC_LIBRATION)
+    out[:, 1] = -1
+    out[:, 2] = np.where(rotates, 0, kf.INFINITE)
+    out[:, 3] = np.where(rotates, kf.NO_TURNS, 0)
+    out[near, 0], out[near, 2], out[near, 3], out[near, 4] = kf.UNDECIDED, kf.UNTOLD, kf.NO_TURNS, SEPARATRIX
+    for i in np.flatnonzero(w == 0.0):
+        row = eq.resting(s.p, s.equilibria, len(s.equilibria), phi[i])
+        if row >= 0:
+            out[i] = kf.EQUILIBRIUM_START, row, 0, round((phi[i] - s.equilibria[row, eq.ANGLE]) / (2 * math.pi)), 0
+    return out

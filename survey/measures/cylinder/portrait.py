@@ -1,0 +1,197 @@
+"""Portraits of the flow phi' = w, w' = f w + g on the cylinder: what does not depend on the initial state, in numbers.
+
+Ends, equilibria and cycles are those of the skeleton that decides the fates (`fate`). Here each cycle is
+followed once more for its period, and the unstable branches of the saddles are followed to where they end: where all
+of them end elsewhere than in a saddle there is no saddle connection.
+"""
+
+import math
+from fractions import Fraction
+
+import numpy as np
+
+from survey.kernels.cylinder import equilibria as eq
+from survey.kernels.cylinder import returns as rt
+from survey.kernels.cylinder.along import TURNING
+from survey.kernels.cylinder.branches import unstable
+from survey.kernels.cylinder.flow import BOUND_DDG, BOUND_DG, BOUND_F, UNIT
+from survey.measures.cylinder import solution
+from survey.measures.cylinder.fate import EXACT, I0, G, followed, remembered, sizes
+from survey.status import NO_CONVERGENCE, OK
+
+CYCLES, EQUILIBRIA = 8, 4  # places; surveys of random points found no more than 4 cycles, and g has 4 roots at most
+NONE, ROTATION_PLUS, ROTATION_MINUS, LIBRATION = range(4)
+TOO_MANY, UNTOLD_RESTS = 20, 21  # as in the STATUS of scenes/gyrostat.py
+UNDECIDED, DEGENERATE, STABLE = -1, 0, 1
+COUNTS = ("equilibria", "saddles", "rotations_plus", "rotations_minus", "librations")
+ROUNDING = 4e-16  # of K and L, relative to the sizes of their terms
+TINY = 1e-300
+
+
+def empty(count, status):
+    """The outputs of `solve` for `count` parameter points, filled with what does not apply."""
+    floats = {"K": (), "L": (), "equilibrium_phi": (EQUILIBRIA,)}
+    floats |= {f"cycle_{name}": (CYCLES,) for name in ("w", "multiplier", "period")}
+    result = {name + end: np.full((count, *extra), np.nan) for name, extra in floats.items() for end in ("", "_error")}
+    for name in ("stratum", "end_plus", "end_minus", *COUNTS, "verdict"):
+        result[name] = np.full(count, -1, dtype=np.int64)
+    for name, places in (("equilibrium_type", EQUILIBRIA), ("cycle_kind", CYCLES)):
+        result[name] = np.full((count, places), NONE, dtype=np.int64)
+    return result | {"status": np.full(count, status, dtype=np.int64)}
+
+
+def solve(method, systems, rtol):
+    """Every output for rows of six finite parameters."""
+    result, listed = empty(len(systems), OK), []
+    for i, six in enumerate(systems):
+        s = remembered(method, six)
+        _ends(s, six, result, i)
+        if any(_is_degenerate(s, row) for row in s.equilibria):
+            # how many equilibria and cycles there are then, the error bars do not tell
+            result["verdict"][i], result["status"][i] = DEGENERATE, UNTOLD_RESTS
+            continue
+        result["verdict"][i] = _verdict(method, s, rtol)
+        _rests(s, result, i)
+        cycles = [(kind, row) for kind, table in enumerate((s.plus, s.minus, s.librations), 1) for row in table]
+        if len(cycles) > CYCLES:
+            result["verdict"][i], result["status"][i] = UNDECIDED, TOO_MANY
+        listed += [(i, place, kind, row, s, six) for place, (kind, row) in enumerate(cycles[:CYCLES])]
+    for kinds, timed in (((ROTATION_PLUS, ROTATION_MINUS), _rotations), ((LIBRATION,), _librations)):
+        some = [cycle for cycle in listed if cycle[2] in kinds]
+        if some:
+            _write(some, timed(method, some, rtol), result)
+    return result
+
+
+def _ends(s, six, result, i):
+    """K, L, stratum and ends of point i."""
+    for name, value, size in zip(("K", "L"), (s.K, s.L), sizes(*six), strict=True):
+        bar = (ROUNDING + EXACT * (value == 0.0)) * size
+        result[name][i], result[f"{name}_error"][i] = value, bar + TINY * (size > 0.0)
+    result["stratum"][i] = s.stratum
+    result["end_plus"][i], result["end_minus"][i] = s.ends + 1
+
+
+def _rests(s, result, i):
+    """Equilibria with their types, and the counts, of point i; in the stratum I0 every angle is one."""
+    kinds = s.equilibria[:, eq.KIND]
+    cycles = len(s.plus), len(s.minus), len(s.librations)
+    rests = (-1, -1) if s.stratum == I0 else (len(kinds), np.count_nonzero(kinds == eq.SADDLE))
+    for name, number in zip(COUNTS, (*rests, *cycles), strict=True):
+        result[name][i] = number
+    for place, row in enumerate(s.equilibria[:EQUILIBRIA]):
+        result["equilibrium_phi"][i, place] = row[eq.ANGLE]
+        result["equilibrium_phi_error"][i, place] = row[eq.BAR] + 1e-15
+        result["equilibrium_type"][i, place] = _type(row)
+
+
+def _type(row):
+    """1 saddle, 2 to 7 node or focus: attracting, weak (f = 0 within the bar), repelling; 8 degenerate."""
+    kind = int(row[eq.KIND])
+    if kind in (eq.NODE, eq.FOCUS):
+        return 3 + int(row[eq.STABLE]) + 3 * (kind == eq.FOCUS)
+    return 1 if kind == eq.SADDLE else 8
+
+
+def _verdict(method, s, rtol):
+    """Is the point structurally stable, by the error bars?"""
+    scale = s.p[BOUND_F] + math.sqrt(s.p[BOUND_DG])
+    degenerate = s.stratum != G or (s.K == 0.0 and not _is_exact(s.p))
+    degenerate = degenerate or any(not _hyperbolic(row) for row in s.librations)
+    for cycles in (s.plus, s.minus):
+        degenerate = degenerate or any(not (_hyperbolic(row) or _far(row, s.K, scale)) for row in cycles)
+    if degenerate:
+        return DEGENERATE
+    if not s.conclusive or 2 * np.count_nonzero(s.equilibria[:, eq.KIND] == eq.SADDLE) != len(s.equilibria):
+        return UNDECIDED
+    starts = np.zeros((2 * eq.MOST, 4))
+    starts = starts[: unstable(s.p, s.equilibria, len(s.equilibria), starts)]
+    return STABLE if (followed(method, s, starts, rtol)[:, 0] >= 0).all() else UNDECIDED
+
+
+def _is_exact(p):
+    """Is K = b12 s3 - b31 s2 zero, and not only within its rounding?"""
+    b12, b31, _d, _c23, s2, s3 = map(Fraction, p[:6])
+    return b12 * s3 == b31 * s2
+
+
+def _is_degenerate(s, row):
+    """Does the bar of an equilibrium reach g' = 0, or f = 0 where it is no saddle (in stratum G a Hopf point)?"""
+    p = s.p
+    if row[eq.KIND] == eq.DEGENERATE or abs(row[eq.DG]) <= p[BOUND_DDG] * row[eq.BAR] + 8.0 * UNIT * p[BOUND_DG]:
+        return True
+    return s.stratum == G and row[eq.KIND] != eq.SADDLE and row[eq.STABLE] == 0.0
+
+
+def _hyperbolic(row):
+    """Does the bar of a cycle's multiplier keep off 1?"""
+    return row[rt.CYCLE_CLASS] >= 0.0 and abs(row[rt.MULTIPLIER] - 1.0) > row[rt.MULTIPLIER_BAR]
+
+
+def _far(row, K, scale):
+    """Is a rotation so fast that D = pi K/w^2 + C3/w^3 + C4/w^4 shows it to be hyperbolic: D' = pi K/w^3?
+
+    On 600 random systems |C4| < 0.21 scale^5.
+    """
+    w = row[rt.CYCLE_X]
+    return row[rt.CYCLE_CLASS] >= 0.0 and w > 30.0 * scale and math.pi * abs(K) * w * w > 10.0 * scale**5
+
+
+def _rotations(method, cycles, rtol):
+    """|w|, bar, period, bar of rotation cycles, in columns: w on the section, the period by one turn from there."""
+    w, bar = np.array([[row[rt.CYCLE_X], row[rt.CYCLE_BAR]] for _, _, _, row, _, _ in cycles]).T
+    side = np.array([1.0 if kind == ROTATION_PLUS else -1.0 for _, _, kind, _, _, _ in cycles])
+    section = np.array([s.section for _, _, _, _, s, _ in cycles])
+    six = np.array([six for *_, six in cycles])
+
+    def period(x):
+        rows = np.column_stack([six, section, side * np.maximum(x, 0.0)])
+        floats, status = solution.abel(method, rows, (section + 2.0 * math.pi * side)[:, None], rtol)
+        return np.where(status[:, 0] == OK, floats[:, 0, 1], np.nan), floats[:, 0, 3]
+
+    return np.column_stack([side * w, bar, *_within(period, w, bar)])
+
+
+def _librations(method, cycles, rtol):
+    """w > 0 at the equilibrium to the left of the right turning point, bar, period, bar, in columns.
+
+    From the right turning point the cycle is followed to the left one forward in time, and backward (S1: b -> -b).
+    """
+    x, bar = np.array([[row[rt.CYCLE_X], row[rt.CYCLE_BAR]] for _, _, _, row, _, _ in cycles]).T
+    rests = np.array([s.equilibria[int(row[rt.INTERVAL])] for _, _, _, row, s, _ in cycles])
+    six = np.array([six for *_, six in cycles])
+    angle = rests[:, eq.ANGLE]
+
+    def half(x, b):
+        rows = np.column_stack([six * [b, b, 1, 1, 1, 1], x, np.zeros(len(x))])
+        floats, status = solution.abel(method, rows, np.column_stack([angle, angle - 2.0 * math.pi]), rtol)
+        met = (status[:, 0] == OK) & (status[:, 1] == TURNING)
+        return np.where(met[:, None, None], floats, np.nan)
+
+    def period(x):
+        one, two = half(x, 1.0), half(x, -1.0)
+        return one[:, 1, 1] + two[:, 1, 1], one[:, 1, 3] + two[:, 1, 3]
+
+    def passage(x):
+        back = half(x, -1.0)
+        return -back[:, 0, 0], back[:, 0, 2] + np.abs(rests[:, eq.F]) * rests[:, eq.BAR]
+
+    return np.column_stack([*_within(passage, x, bar), *_within(period, x, bar)])
+
+
+def _within(function, x, bar):
+    """Value and bar of `function` (x -> value, bar) at x known within `bar`."""
+    (value, own), low, high = function(x), function(x - bar)[0], function(x + bar)[0]
+    return value, 1.2 * np.maximum(np.abs(low - value), np.abs(high - value)) + 2.0 * own
+
+
+def _write(cycles, columns, result):
+    """Write |w|, period and multiplier of cycles; a cycle that could not be followed has no answer."""
+    for (i, place, kind, row, _s, _six), (w, w_bar, period, period_bar) in zip(cycles, columns, strict=True):
+        result["cycle_kind"][i, place] = kind
+        values = (w, w_bar), (row[rt.MULTIPLIER], row[rt.MULTIPLIER_BAR]), (period, period_bar)
+        for name, (value, bar) in zip(("w", "multiplier", "period"), values, strict=True):
+            if math.isfinite(value) and math.isfinite(bar):
+                result[f"cycle_{name}"][i, place], result[f"cycle_{name}_error"][i, place] = value, bar
+            else:
+                result["status"][i], result["verdict"][i] = NO_CONVERGENCE, UNDECIDED

@@ -1,0 +1,197 @@
+"""Single solutions of a flow on the cylinder phi' = w, w' = f(phi) w + g(phi): in time, and w and t over phi (57).
+
+Arrays in, arrays out; a row is one solution, its columns are the times or places asked for. A row that misses the
+asked accuracy is solved again with smaller steps, and the better answer is kept.
+"""
+
+import numpy as np
+
+from survey.kernels.cylinder.along import OK, TURNING, UNTOLD
+from survey.kernels.cylinder.flow import spread
+
+STEPS = 200_000  # budget of one solution; about 0.1 s with the Taylor method
+SHARE = 1e-3  # of the asked accuracy, for the truncation error of one step
+ATTEMPTS = (3e-4, 1e-5, 1e-7)  # the same for trajectories: most of what misses the accuracy misses it by little
+FINEST = 2e-16  # of a step: below, the truncation is lost in the rounding
+
+
+def reverse(rows):
+    """S1: (b, w, t) -> -(b, w, t). `rows` is six parameters, phi, w in columns."""
+    return rows * np.array([-1, -1, 1, 1, 1, 1, 1, -1.0])
+
+
+def mirror(rows):
+    """S2: (phi, w, b31, c23, s2) -> -(phi, w, b31, c23, s2)."""
+    return rows * np.array([1, -1, 1, -1, -1, 1, -1, -1.0])
+
+
+def tolerances(method, rtol):
+    """Truncation per step, for the first attempt and for the second."""
+    first = min(max(SHARE * rtol, method.FLOW_FINEST), 1e-6)
+    return first, max(1e-4 * first, method.FLOW_FINEST)
+
+
+def attempts(method, rtol):
+    """Truncation per step of trajectories, ever finer."""
+    tolerances = [min(max(share * rtol, FINEST, method.FLOW_FINEST), 1e-6) for share in ATTEMPTS]
+    return [first for first, finer in zip(tolerances, [*tolerances[1:], 0.0], strict=True) if finer < 0.5 * first]
+
+
+def split(rows):
+    """Rows of eight numbers as the kernels take them: coefficients and initial states."""
+    P, starts = np.empty((len(rows), 10)), np.empty((len(rows), 2))
+    spread(np.ascontiguousarray(rows, dtype=float), P, starts)
+    return P, starts
+
+
+def trajectories(method, rows, times, rtol):
+    """phi, w, their bars (last axis), turnings and status at `times` (rows, columns), of either sign.
+
+    turnings counts the sign changes of w between 0 and t; it is -2 where the error bar cannot tell.
+    """
+    past = times < 0
+    if not past.any():
+        return _in_time(method, rows, times, rtol)
+    results = _nothing(times.shape)
+    for mine, back in ((~past, False), (past, True)):
+        picked = mine.any(axis=1)
+        if not picked.any():
+            continue
+        places = np.where(mine, np.abs(times), np.inf)[picked]
+        parts = _in_time(method, reverse(rows[picked]) if back else rows[picked], places, rtol)
+        if back:
+            parts[0][..., 1] *= -1.0
+        take = mine[picked]
+        for whole, part in zip(results, parts, strict=True):
+            held = whole[picked]
+            held[take] = part[take]
+            whole[picked] = held
+    return results
+
+
+def _nothing(shape):
+    """floats, turnings and status before anything is known."""
+    return np.full((*shape, 4), np.nan), np.full(shape, UNTOLD, dtype=np.int64), np.zeros(shape, dtype=np.int64)
+
+
+def _in_time(method, rows, places, rtol):
+    places, back = _sorted(places)
+    budget = STEPS * min(method.FLOW_WORK, 10)
+
+    def run(pick, tolerance):
+        P, starts = split(rows[pick])
+        at = np.ascontiguousarray(places[pick])
+        floats, turnings, status = _nothing(at.shape)
+        ends = np.zeros(len(P), dtype=np.int64)
+        method.flow_trajectories(P, starts, at, tolerance, budget, floats, turnings, ends)
+        np.copyto(status, ends[:, None], where=~np.isfinite(floats[..., 0]))  # else OK
+        return floats, turnings, status
+
+    asked = np.isfinite(places)
+    results = _repeated(run, asked, attempts(method, rtol), rtol)
+    if hasattr(method, "flow_turnings"):
+        _count(method, rows, places, attempts(method, rtol)[-1], asked, results)
+    return back(results)
+
+
+def _count(method, rows, places, tolerance, asked, results):
+    """Tell the turnings that the steps have not told, as those beside a focus, where w is less than its bar."""
+    _floats, turnings, status = results
+    pick = (asked & (turnings == UNTOLD) & (status == OK)).any(axis=1)
+    if pick.any():
+        P, starts = split(rows[pick])
+        told = turnings[pick]
+        method.flow_turnings(P, starts, np.ascontiguousarray(places[pick]), tolerance, STEPS, told)
+        turnings[pick] = np.where(status[pick] == OK, told, turnings[pick])
+
+
+def abel(method, rows, targets, rtol, before=False):
+    """w, t and their bars, or those of the turning point (status TURNING), at phi = `targets` (rows, columns).
+
+    Where w0 = 0 and g != 0 the solution starts at its turning point; it is followed forward in time, or backward if
+    `before`; both branches lie to the side of g, and at targets on the other side it has turned at t = 0.
+    """
+    back = rows[:, 7] == 0.0 if before else np.zeros(len(rows), bool)
+    floats = np.full((*targets.shape, 4), np.nan)
+    status = np.zeros(targets.shape, dtype=np.int64)
+    for side in (1.0, -1.0):
+        ahead = targets >= rows[:, 6:7] if side > 0 else targets < rows[:, 6:7]
+        for past in (False, True):
+            picked = ahead.any(axis=1) & (((rows[:, 7] * side < 0) | back) == past)
+            if not picked.any():
+                continue
+            part = reverse(rows[picked]) if past else rows[picked]
+            part = mirror(part) if side < 0 else part
+            part[:, 7] = np.abs(part[:, 7])
+            f, s = _in_phi(method, part, np.where(ahead[picked], side * targets[picked], np.inf), rtol)
+            first = np.where(s == TURNING, side, side * (-1.0 if past else 1.0))
+            f[..., 0] *= first
+            f[..., 1] *= -1.0 if past else 1.0
+            f += 0.0  # no negative zeros
+            for whole, new in ((floats, f), (status, s)):
+                held = whole[picked]
+                held[ahead[picked]] = new[ahead[picked]]
+                whole[picked] = held
+    return floats, status
+
+
+def _in_phi(method, rows, targets, rtol):
+    targets, back = _sorted(targets)
+    budget = STEPS * min(method.FLOW_WORK, 10)
+
+    def run(pick, tolerance):
+        P, starts = split(rows[pick])
+        floats = np.full((*targets[pick].shape, 4), np.nan)
+        status = np.zeros(targets[pick].shape, dtype=np.int64)
+        at = np.ascontiguousarray(targets[pick])
+        method.flow_abels(P, starts, at, tolerance, budget, floats, status)
+        return floats, status
+
+    return back(_repeated(run, np.isfinite(targets), tolerances(method, rtol), rtol))
+
+
+def _repeated(run, asked, ladder, rtol):
+    """Solve all rows, then again, finer, those that miss the asked accuracy; keep the better of two."""
+    first, *others = ladder
+    results = run(slice(None), first)
+    for tolerance in others:
+        again = (missed(results, rtol) & asked).any(axis=1)
+        if not again.any() or tolerance >= first:
+            break
+        finer = run(again, tolerance)
+        kept = [result[again] for result in results]
+        better = badness(finer) <= badness(kept)
+        for result, old, new in zip(results, kept, finer, strict=True):
+            old[better] = new[better]
+            result[again] = old
+    return results
+
+
+def missed(results, rtol):
+    """Where the answer misses the asked accuracy, or there is none."""
+    floats, status = results[0], results[-1]
+    good = (status == OK) | (status == TURNING)
+    for i in (0, 1):
+        good &= floats[..., 2 + i] <= rtol * (1.0 + np.abs(floats[..., i]))
+    return ~good
+
+
+def badness(results):
+    floats, status = results[0], results[-1]
+    worst = np.where(np.isnan(floats[..., 2]), 0.0, np.nanmax(floats[..., 2:], axis=-1, initial=0.0))
+    return worst + np.where((status == OK) | (status == TURNING), 0.0, 1e300)
+
+
+def _sorted(places):
+    """`places` in ascending columns, and the function that brings results back into their order."""
+    if (places[:, 1:] >= places[:, :-1]).all():
+        return places, lambda results: results
+    order = np.argsort(places, axis=1, kind="stable")
+    back = np.argsort(order, axis=1)
+
+    def undone(results):
+        return tuple(
+            np.take_along_axis(result, back[..., None] if result.ndim == 3 else back, axis=1) for result in results
+        )
+
+    return np.take_along_axis(places, order, axis=1), undone

@@ -1,0 +1,267 @@
+"""Edges of tongues as curves on a map of two parameters: each zero set of a factor, followed through its folds.
+
+An edge is a zero of one of the four factors F of `edges`, analytic in both parameters. From edges of rows (and
+of some columns) as seeds, both ways along F = 0: predictor by tangent and curvature, corrector along the normal with
+F, its gradient and second derivatives from nine neighbouring points; all curves step together. A step is taken if the
+corrector is short against it, the curve turns little, and F keeps its positive side (neighbouring zeros of F have
+opposite ones); else it is halved. Curves end at the border of the map, where they close, or are lost where F has a
+double point. At last every point is closed in by certain signs of F.
+
+Places are in the unit square: both axes' ranges are 1, in logarithms where the axis is logarithmic.
+A closed curve that meets neither a row nor a column that was searched has no seed, and is not found.
+
+Source: E. L. Allgower, K. Georg, Numerical Continuation Methods (1990), chapters 2, 6 and 10.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from survey.measures.hill.edges import ASIDE, COUNTS, FACTORS, close_in, of_kind, tongue
+from survey.measures.hill.look import looker
+
+LONGEST, SHORTEST = 0.02, 1e-9  # steps
+BEND = 0.15  # radians per step
+TURN = np.cos(2 * BEND)  # a step that turns more is taken again
+OFF = 0.05  # of a step: how long the corrector may be
+STEPS = 10_000
+NEAR = 0.02  # of a step: how far a seed may lie from the curve that goes through it
+WIDE = 1e-7  # the first half width of a point, before it is closed in
+CHUNK = 256  # points closed in together
+
+
+@dataclass
+class Seeds:
+    """Edges as places (n, 2) with `kind`, `index`; `low`, `high` (n, 2) the rectangle in which F is analytic."""
+
+    x: np.ndarray
+    kind: np.ndarray
+    index: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+@dataclass
+class Curves:
+    """Curves one after another: `count` points each, `kind`, `index`, `complete` per curve; `of_seed` the curve of each
+    seed. Per point places `x` (m, 2), unit tangents `along` (m, 2) and `error`, the distance from the curve at most.
+    """
+
+    count: np.ndarray
+    kind: np.ndarray
+    index: np.ndarray
+    complete: np.ndarray
+    x: np.ndarray
+    along: np.ndarray
+    error: np.ndarray
+    of_seed: np.ndarray
+
+
+def in_turn(task, numbers, what):
+    """Call the task for every number."""
+    for number in numbers:
+        task(number)
+
+
+def trace(solve, square, seeds, each=in_turn):
+    """The Curves through all seeds.
+
+    `solve(q, p, wanted)` gives outputs at q (m, 1), p (m, n), the square's parameters. `each(task, numbers, what)`
+    calls the task for every number, in any order, on threads if it likes.
+    """
+    look = looker(solve, square)
+    of_seed = np.full(seeds.kind.size, -1)
+    towards = np.zeros(seeds.x.shape)
+
+    def task(own):
+        # on the edge itself the rotation number would ask for double-double arithmetic
+        step = np.full(own.size, LONGEST)
+        seen = look(seeds.x[own], seeds.kind[own], step, seeds.low[own], seeds.high[own], count=False)
+        towards[own] = seen.course(np.ones(own.size))[0]
+
+    _in_chunks(each, task, of_seed.size, "parts of the curves' seeds")
+    paths, starts = [], []
+    while (of_seed < 0).any():
+        left = np.flatnonzero(of_seed < 0)
+        group = np.unique(np.stack([seeds.kind[left], seeds.index[left]], axis=1), axis=0, return_index=True)[1]
+        start = np.sort(left[group])  # one of each kind and index: no two on the same curve
+        for path, seed in zip(_follow(look, seeds, start), start, strict=True):
+            on_it = (of_seed < 0) & (seeds.kind == seeds.kind[seed]) & (seeds.index == seeds.index[seed])
+            near = np.flatnonzero(on_it)
+            of_seed[near[_on(path, seeds.x[near], towards[near])]] = len(paths)
+            of_seed[seed] = len(paths)
+            paths.append(path)
+            starts.append(seed)
+    return _close_all_in(solve, square, paths, np.array(starts, int), seeds, of_seed, each)
+
+
+def _in_chunks(each, task, number, what):
+    each(lambda at: task(np.arange(at * CHUNK, min((at + 1) * CHUNK, number))), range(-(-number // CHUNK)), what)
+
+
+@dataclass
+class Path:
+    """Points of a curve in order: places, tangents, lines to close in along; is it closed or does it end at borders?"""
+
+    x: np.ndarray
+    along: np.ndarray
+    line: np.ndarray
+    complete: bool
+
+
+def _follow(look, seeds, start):
+    """The paths through the seeds `start`, both ways, all together."""
+    n = start.size
+    kind, index = np.tile(seeds.kind[start], 2), np.tile(seeds.index[start], 2)
+    low, high = (np.tile(v[start], (2, 1)) for v in (seeds.low, seeds.high))
+    side = np.repeat([1.0, -1.0], n)
+    x = np.tile(seeds.x[start], (2, 1))
+    step = np.full(2 * n, 0.1 * LONGEST)
+    along, normal, bend = look(x, kind, step, low, high, count=False).course(side)
+    home, heading, gone = x.copy(), along.copy(), np.zeros(2 * n)
+    ended, closed, lost = np.zeros((3, 2 * n), bool)
+    trail = [(np.arange(2 * n), home, heading, _first_line(x, normal, low, high))]
+    for _ in range(STEPS):
+        a = np.flatnonzero(~ended & ~lost)
+        if not a.size:
+            break
+        length, guess, edge, border = _predict(x[a], along[a], normal[a], bend[a], step[a], low[a], high[a])
+        leaves = border & (length < 4 * SHORTEST)  # it stands at the border and points outside
+        with np.errstate(all="ignore"):
+            seen = look(guess, kind[a], length, low[a], high[a])
+            border &= abs(seen.zero(edge)) <= OFF * length
+            line = np.where(border[:, None], edge, seen.course(side[a])[1])
+            off = seen.zero(line)
+            new = guess + off[:, None] * line
+            t, nrm, c = seen.moved(new - guess).course(side[a])
+        good = (abs(off) <= OFF * length) & ((t * along[a]).sum(axis=1) >= TURN) & np.isfinite(c) & ~leaves
+        good &= ((new >= low[a]) & (new <= high[a])).all(axis=1)
+        astray = abs(seen.turns - index[a])
+        good &= (astray < 0.5) | (astray == 1)  # in the tongue, near it, or beyond a band too thin to be seen
+        closing = good & _returns(x[a], new, t, home[a], heading[a], length, gone[a])
+        new[closing], t[closing], line[closing] = home[a][closing], heading[a][closing], trail[0][3][a][closing]
+        took = a[good]
+        trail.append((took, new[good], t[good], line[good]))
+        x[took], along[took], normal[took], bend[took] = new[good], t[good], nrm[good], c[good]
+        gone[took] += length[good]
+        with np.errstate(all="ignore"):
+            step[took] = np.minimum(np.minimum(2 * length, LONGEST), BEND / abs(c))[good]
+        step[a[~good]] = 0.5 * length[~good]
+        ended[a[leaves | (good & border) | closing]] = True
+        lost[a[~good & ~leaves & (step[a] < SHORTEST)]] = True
+        closed[a[closing]] = True
+        ended[(a[closing] + n) % (2 * n)] = True  # its twin would go round the same way
+    return _joined(trail, ended, closed)
+
+
+def _predict(x, along, normal, bend, step, low, high):
+    """Steps along the parabola of tangent and curvature: (length, place, line to correct along, border).
+
+    Where it leaves the rectangle it goes to its border, and is corrected along that.
+    """
+
+    def place(length):
+        return x + length[:, None] * along + (0.5 * bend * length**2)[:, None] * normal
+
+    def outside(at):
+        return (at < low) | (at > high)
+
+    guess = place(step)
+    border = outside(guess).any(axis=1)
+    length, line = step.copy(), np.zeros_like(x)
+    if border.any():
+        inner, outer = np.zeros_like(step), step.copy()
+        for _ in range(50):
+            middle = 0.5 * (inner + outer)
+            out = outside(place(middle)).any(axis=1)
+            inner, outer = np.where(out, inner, middle), np.where(out, middle, outer)
+        end = place(outer)
+        across = outside(end)
+        end = np.clip(end, low, high)
+        guess[border], length[border] = end[border], outer[border]
+        line = np.where(border[:, None], ~across & (np.cumsum(~across, axis=1) == 1), 0.0)
+    return length, guess, line, border
+
+
+def _first_line(x, normal, low, high):
+    """The line to close a seed in along: the normal, or the border on which it lies."""
+    on = (x <= low) | (x >= high)
+    border = np.stack([on[:, 1] & ~on[:, 0], on[:, 0]], axis=1)
+    return np.where(on.any(axis=1)[:, None], border, normal)
+
+
+def _returns(x, new, t, home, heading, length, gone):
+    """Does the step from x to new pass the place where its curve began?"""
+    before, after = home - x, home - new
+    there = ((before * t).sum(axis=1) >= 0) & ((after * t).sum(axis=1) <= 0)
+    near = abs(after[:, 0] * heading[:, 1] - after[:, 1] * heading[:, 0]) <= OFF * length
+    return there & near & ((t * heading).sum(axis=1) > TURN) & (gone > 2 * length)
+
+
+def _joined(trail, ended, closed):
+    """The paths: backwards to the seed and forwards from it, or once round."""
+    who, *values = (np.concatenate(parts) for parts in zip(*trail, strict=True))
+    order, n = np.argsort(who, kind="stable"), ended.size // 2
+    tips = np.split(order, np.cumsum(np.bincount(who, minlength=2 * n))[:-1])
+    paths = []
+    for tip in range(n):
+        forth, back = tips[tip], tips[tip + n][::-1]
+        if closed[tip]:
+            back = back[:0]
+        elif closed[tip + n]:
+            forth = forth[:0]
+        else:
+            forth = forth[1:]  # the seed is in both
+        x, along, line = (np.concatenate([v[back], v[forth]]) for v in values)
+        along[: back.size] *= -1
+        paths.append(Path(x, along, line, bool(ended[tip] and ended[tip + n])))
+    return paths
+
+
+def _on(path, x, towards):
+    """Which of the places x (n, 2), with tangents `towards`, lie on the path (its cubic Hermite pieces)?"""
+    found = np.zeros(len(x), bool)
+    a, b, ta, tb = path.x[:-1], path.x[1:], path.along[:-1], path.along[1:]
+    length = np.hypot(*(b - a).T)
+    for i in range(len(x)):
+        with np.errstate(all="ignore"):
+            s = np.clip(((x[i] - a) * (b - a)).sum(axis=1) / length**2, 0, 1)[:, None]
+        curve = (1 + 2 * s) * (1 - s) ** 2 * a + s**2 * (3 - 2 * s) * b
+        curve += length[:, None] * (s * (1 - s) ** 2 * ta - s**2 * (1 - s) * tb)
+        tangent = (1 - s) * ta + s * tb
+        same = (tangent * towards[i]).sum(axis=1) > TURN
+        found[i] = (same & (np.hypot(*(curve - x[i]).T) <= NEAR * length)).any()
+    return found
+
+
+def _close_all_in(solve, square, paths, starts, seeds, of_seed, each):
+    """The Curves of the paths, each point closed in on its line and counted by its rotation number."""
+    count = np.array([len(path.x) for path in paths], int)
+    whose = np.repeat(np.arange(len(paths)), count)
+    x, along, line = (np.concatenate([getattr(p, name) for p in paths] or [np.zeros((0, 2))])
+                      for name in ("x", "along", "line"))  # fmt: skip
+    kind, index = seeds.kind[starts], seeds.index[starts]
+    new, error, sure = x.copy(), np.zeros(len(x)), np.zeros(len(x), bool)
+
+    def task(own):
+        def at(who, t, wanted):
+            places = square.places(x[own[who], None] + t[..., None] * line[own[who], None])
+            out = solve(places[..., 0].reshape(-1, 1), places[..., 1].reshape(-1, 1), wanted)
+            return {name: values.reshape(t.shape) for name, values in out.items()}
+
+        mine = kind[whose[own]]
+        t, width, good = close_in(
+            lambda who, t: of_kind(at(who, t, FACTORS), mine[who]),
+            np.zeros(own.size), np.full(own.size, WIDE), np.full(own.size, square.grain),
+        )  # fmt: skip
+        sides = t[:, None] + ASIDE * width[:, None] * np.array([-1.0, 1.0])
+        good &= tongue(at(slice(None), sides, COUNTS), mine) == index[whose[own]]
+        new[own], error[own], sure[own] = x[own] + t[:, None] * line[own], width + square.grain, good
+
+    _in_chunks(each, task, len(x), "parts of the curves")
+    complete = np.array([path.complete for path in paths], bool)
+    complete[whose[~sure]] = False
+    return Curves(
+        np.bincount(whose[sure], minlength=len(paths)), kind, index, complete, new[sure], along[sure], error[sure],
+        of_seed,
+    )  # fmt: skip

@@ -1,0 +1,167 @@
+"""Hill's question: is y'' + z(t) y = 0, z even and of period T, stable? Half-period factors, verdict, Floquet data.
+
+With y1, y2 the solutions with y1(0) = y2'(0) = 1, y1'(0) = y2(0) = 0, and everything at T/2:
+
+    discriminant D = trace of the monodromy;  D - 2 = 4 y1' y2,  D + 2 = 4 y1 y2'
+    unstable  <=>  y1' y2 > 0  or  y1 y2' < 0          (signs of four numbers: nothing cancels)
+    sinh^2(exponent / 2) = y1' y2 or -y1 y2';  sin^2(theta / 2) = -y1' y2,  cos^2(theta / 2) = y1 y2'
+
+det M = 1 is no check: it fails by 1e3 where |D| is 1e19. A verdict is given only where the bars leave no other.
+Source: W. Magnus, S. Winkler, Hill's Equation (1966), 1.3 and 2.1; symmetric z: theorem 1.1 there.
+"""
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from survey import measures, status
+from survey.kernels.hill.answers import FLOATS, MARGINAL, RESULTS, STABLE, UNDECIDED, UNSTABLE
+from survey.kernels.math.double import split_error
+from survey.measures.hill import auto, effort
+from survey.measures.hill.answers import Answers, Asked
+from survey.scene import Output
+
+# Outputs that follow from the verdict, or are sharper with it.
+DECIDED = frozenset({"verdict", "exponent", "rotation_number", "discriminant"})
+VERDICTS = {"undecided": UNDECIDED, "unstable": UNSTABLE, "stable": STABLE, "marginal": MARGINAL}
+OUTPUTS = (
+    Output("discriminant", "trace of the monodromy matrix over one period T", "D"),
+    Output("y1", "y1(T/2), where y1(0) = 1, y1'(0) = 0", "y_1(T/2)"),
+    Output("y2", "y2(T/2), where y2(0) = 0, y2'(0) = 1", "y_2(T/2)"),
+    Output("dy1", "derivative of y1 at T/2", "y_1'(T/2)"),
+    Output("dy2", "derivative of y2 at T/2", "y_2'(T/2)"),
+    Output("exponent", "growth exponent of the amplitude per period", r"\mu T"),
+    Output("rotation_number", "rotation number per period", r"\theta / 2\pi"),
+    Output("period", "period of the coefficient", "T"),
+    Output("verdict", "stability of the linear motion", flags=VERDICTS),
+)
+
+
+@dataclass(frozen=True)
+class Across:
+    """An axis of `number` rows from place `low` to `high`; equal keys, and so equal axes, mean the same equations.
+
+    The factors are analytic in the place; `at(places)` is the Problem of rows there, without points of its own.
+    """
+
+    key: Hashable
+    number: int
+    low: float
+    high: float
+    at: Callable = field(compare=False)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """R rows of L points: y'' + (c0(t) + p c1(t) + p^2 c2) y = 0 on half a period, p varying along the row.
+
+    `sample(rows, nodes, steps)` gives c0, c1 of the rows at `nodes` (fractions) of each step as an array
+    (rows, steps, 2, nodes); `walk(rows, p, tolerance)`, for adaptive methods, gives the results of a chain for
+    points p of those rows, and which of them reached the end; `exact(rows, p, low, steps)` gives them in double-double,
+    for p + low, each in its even number of steps. |z| <= bound[r, 0] + |p| bound[r, 1] + p^2 bound[r, 2];
+    `rate` is 1 / distance to z's nearest singularity. `rule` (R, L) holds what exact rules say (`answers`), and
+    `constant` the rows where z does not depend on t, with z there (rows, L); None where nothing is to be said.
+    `line` is the whole axis of p, when every row has the same points: (number, least, greatest). `even` (R) says
+    where p -> -p exchanges y1 and y2' at T/2, and leaves y2 and y1'. `across` is the axis of the rows, if there
+    is one, and `places` (R) where they lie on it, known to 4 + |place| ulp.
+    `cut(rows, steps)` gives the lengths of the steps (rows, steps) where they differ. With `whole`, where z is not
+    even, the whole period stands for the half. `span_low` and `p_low` are what float64 took from the half period and
+    from p: None where nothing is known of it, or where it is 0.
+    """
+
+    p: np.ndarray
+    span: np.ndarray
+    bound: np.ndarray
+    rate: np.ndarray
+    c2: float
+    sample: Callable
+    walk: Callable | None = None
+    exact: Callable | None = None
+    rule: np.ndarray | None = None
+    constant: tuple[np.ndarray, np.ndarray] | None = None
+    line: tuple[int, float, float] | None = None
+    even: np.ndarray | None = None
+    across: Across | None = None
+    places: np.ndarray | None = None
+    cut: Callable | None = None
+    whole: bool = False
+    span_low: np.ndarray | None = None
+    p_low: np.ndarray | None = None
+
+    def lengths(self, rows, steps):
+        """Lengths of the steps (rows, steps), some an ulp longer or shorter, evenly spread, to fill the half period."""
+        if self.cut:
+            return self.cut(rows, steps)
+        span = self.span[rows]
+        h = span / steps
+        left = (span - steps * h) - split_error(float(steps), h, steps * h)
+        if self.span_low is not None:
+            left += self.span_low[rows]
+        ulp = np.spacing(h)
+        ulps = np.floor((np.rint(left / ulp) / steps)[:, None] * np.arange(steps + 1) + 0.5)
+        return h[:, None] + ulp[:, None] * np.diff(ulps, axis=1)
+
+    def at(self, rows, p, rule=None):
+        """Points `p` (one row for each of `rows`) on their own, no axis, with what exact rules say of them."""
+        span_low = None if self.span_low is None else self.span_low[rows]
+        return replace(
+            self, p=p, span=self.span[rows], bound=self.bound[rows], rate=self.rate[rows], rule=rule, constant=None,
+            span_low=span_low, p_low=None, line=None, across=None, exact=None,
+            sample=lambda used, nodes, steps: self.sample(rows[used], nodes, steps),
+            walk=self.walk and (lambda used, p, tolerance: self.walk(rows[used], p, tolerance)),
+            cut=self.cut and (lambda used, steps: self.cut(rows[used], steps)),
+        )  # fmt: skip
+
+
+def of_rows(rows, sample, walk, exact=None):
+    """The functions of a Problem from a scene's kernels, which take some of its `rows` (R, ...) and fill `out`.
+
+    `sample(rows, nodes, out)`; `walk(rows, p, tolerance, out, reached)`; `exact(rows, p, low, steps, out)` or None.
+    """
+
+    def samples(used, nodes, steps):
+        out = np.empty((used.size, steps, 2, nodes.size))
+        sample(rows[used], nodes, out)
+        return out
+
+    def walked(used, p, tolerance):
+        out, reached = np.full((used.size, RESULTS), np.nan), np.zeros(used.size, np.bool_)
+        walk(rows[used], p, tolerance, out, reached)
+        return out, reached
+
+    def solved(used, p, low, steps):
+        out = np.empty((used.size, RESULTS))
+        exact(rows[used], p, low, steps, out)
+        return out
+
+    return {"sample": samples, "walk": walked, "exact": solved if exact else None}
+
+
+def solve(problem, method, rtol, wanted=()):
+    """The wanted outputs (R, L; all by default) with `_error` each, `verdict`, `status`.
+
+    `method` is the name of a method, or "auto" (see `auto`); effort grows until `rtol` is met or useless.
+    """
+    asked = Asked(rtol, np.array([name in wanted or not wanted for name in FLOATS]), whole=problem.whole)
+    answers = Answers(problem.p.size, asked)
+    if method == "auto":
+        decide = not wanted or not DECIDED.isdisjoint(wanted)
+        auto.solve(problem, asked, answers, decide)
+    else:
+        effort.solve(problem, measures.method(method), asked, answers)
+    out = {"verdict": answers.verdict.reshape(problem.p.shape), "status": answers.status.reshape(problem.p.shape)}
+    for i in np.flatnonzero(asked.wanted):
+        out[FLOATS[i]], out[f"{FLOATS[i]}_error"] = answers.floats[2 * i : 2 * i + 2].reshape(2, *problem.p.shape)
+    return out
+
+
+def overflow(out, where):
+    """Take back the answers of the points `where` a value or bar lies beyond the range of floats; changes `out`."""
+    if where.any():
+        failed = (out["status"] == status.OK) & where
+        out["status"] = np.where(failed, status.OVERFLOW, out["status"]).astype(np.int8)
+        out["verdict"] = np.where(failed, UNDECIDED, out["verdict"]).astype(np.int8)
+        for name, values in out.items():
+            if values.dtype.kind == "f":
+                out[name] = np.where(failed, np.nan, values)

@@ -1,0 +1,108 @@
+"""Planar motions of a satellite, a row each: from what is given to moduli, periods and rho, and no digit is lost."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import pi
+
+import numpy as np
+
+from survey.kernels.hill import satellite as motion
+from survey.kernels.hill.satellite import complete_integrals, half_periods
+from survey.kernels.math.double import split_error
+
+EPS = 2.3e-16
+
+
+def moduli(point):
+    """k, the complement (of 1/k for rotations), what was given, and which it is: no digit is lost near k = 1.
+
+    From k, from 1 - k, or from the amplitude asin k.
+    """
+    if "amplitude" in point:
+        amplitude = np.asarray(point["amplitude"], dtype=float)
+        return np.sin(amplitude), np.cos(amplitude), amplitude, np.full_like(amplitude, motion.AMPLITUDE)
+    with np.errstate(all="ignore"):
+        if "one_minus_k" in point:
+            given = short = np.asarray(point["one_minus_k"], dtype=float)
+            which, high = motion.ONE_MINUS_K, 1 - short
+            k = np.where(short < 0, np.maximum(high, np.nextafter(1, 2)), high)  # a rotation remains one
+        else:
+            given = k = np.asarray(point["k"], dtype=float)
+            which, short = motion.K, 1 - k
+        scale = np.maximum(k, 1)
+        complement = np.sqrt((abs(short) / scale) * ((1 + k) / scale))
+        period = (k < np.inf) & (complement > 0)  # there is none where k = 1
+        k, complement = np.where(period, k, np.nan), np.where(period, complement, np.nan)
+    return k, complement, given, np.full_like(given, which)
+
+
+def rates(inertia_ratio, direction):
+    """rho = +-1 / sqrt(3 |1 - alpha|) rounded, and what float64 took from it."""
+    with np.errstate(all="ignore"):
+        short = 1 - inertia_ratio
+        rest = (1 - (short - (short - 1))) - (inertia_ratio + (short - 1))  # the rounding of 1 - alpha, exactly (Knuth)
+        short, rest = abs(short), np.sign(short) * rest
+        rho = 1 / np.sqrt(3 * short)
+        # one step of Newton's: 1 - 3 rho^2 (short + rest), each product with its own rounding
+        square = rho * rho
+        triple = 3 * square
+        triple_rest = split_error(3.0, square, triple) + 3 * split_error(rho, rho, square)
+        total = triple * short
+        missing = (1 - total) - (split_error(triple, short, total) + (triple * rest + triple_rest * short))
+        low = 0.5 * rho * missing
+        high = rho + low
+        return float(direction) * high, float(direction) * (low - (high - rho))
+
+
+@dataclass(frozen=True)
+class Motion:
+    """The planar motions of the rows: k, the complement, what was given and which, and what follows from them."""
+
+    k: np.ndarray
+    kc: np.ndarray
+    given: np.ndarray
+    which: np.ndarray
+    oblate: bool
+
+    @cached_property
+    def integrals(self):
+        """K and E of the smaller of k and 1/k."""
+        return complete_integrals(np.minimum(self.k, 1 / np.maximum(self.k, 1)), self.kc)
+
+    @cached_property
+    def rotates(self):
+        return self.k > 1
+
+    @cached_property
+    def half(self):
+        """The half period, rounded, and what float64 took from it."""
+        return half_periods(self.k, self.kc)
+
+    @property
+    def period(self):
+        return 2 * self.half[0]
+
+    @cached_property
+    def rate(self):
+        """1 / distance of the poles of w from the real axis: K' or K'/k."""
+        conjugate, _ = complete_integrals(self.kc, np.minimum(self.k, 1 / np.maximum(self.k, 1)))
+        return np.maximum(self.k, 1) / conjugate
+
+    def lyapunov(self, rho):
+        """Does Lyapunov's criterion (corrected: T int z <= 4, and z >= 0) certify stability, rounding aside?"""
+        k, period, rotates = self.k[:, None], self.period[:, None], self.rotates[:, None]
+        first, second = (values[:, None] for values in self.integrals)
+        squares = np.where(rotates, 2 * k * second, 8 * (second - self.kc[:, None] ** 2 * first))
+        drift = np.where(rotates, pi * rho, 0.0)  # integral of w over T, times rho: am advances by pi
+        c = -k * k if self.oblate else (1 - k) * (1 + k)
+        size = period * (2 * squares + 2 * abs(drift) + (rho * rho + k * k + 1) * period)
+        total = period * (2 * squares + 2 * drift + (rho * rho + c) * period)
+        return (total <= 4 - 100 * EPS * size) & (self._nonnegative(rho) if self.oblate else True)
+
+    def _nonnegative(self, rho):
+        """z > 0 all along an oblate body's motion: the least of 2 w^2 + 2 rho w + rho^2 - k^2 over the range of w."""
+        k = self.k[:, None]
+        low = np.where(self.rotates[:, None], k * self.kc[:, None], -k)
+        w = np.clip(-rho / 2, low, k)
+        least = 2 * w * w + 2 * rho * w + rho * rho - k * k
+        return least > 16 * EPS * (rho * rho + k * k)

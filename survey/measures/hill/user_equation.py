@@ -1,0 +1,317 @@
+"""A user's z(u, p) as a Hill problem: every point a row of its own, and what its steps need measured from z itself.
+
+z is sampled at Chebyshev points on each piece between its breaks. From the coefficients c_k on a piece of length 2 L:
+
+    rate    max over k of (k / L) / (1 + ln(max |c| / |c_k|)): 1 / distance of the nearest singularity where c_k falls
+            geometrically, the highest frequency that matters where z is entire
+    noise   what does not fall: the rounding of z and of u, and what is too fine to be resolved
+
+The noise enters the bars: z is handed on as (z - B) + B, so that its rounding counts relative to B >= max |z|, and
+B is as large as the noise asks. All depends on the point alone.
+
+Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 3, 7 and 8.
+"""
+
+from functools import cache, lru_cache
+from math import inf, isfinite, log, sqrt
+from types import SimpleNamespace
+
+import numpy as np
+
+from survey.kernels.hill import sampled_double
+from survey.kernels.hill.answers import RESULTS
+from survey.kernels.jit import fresh, inline, kernel
+from survey.measures.hill import effort, monodromy
+from survey.measures.hill import more_digits as digits
+from survey.methods import dop853
+
+SIZES = (65, 513, 4097)
+# z is looked at in so many evenly spread places of the part that is solved, however smooth it seems, and in so many
+# when a scene is checked; in so many at least between two breaks.
+PROBES, CHECKED, LEAST_PROBES = 128, 16384, 8
+# Relative to max |z|: z is resolved where its last coefficients are below the first, rough where above the second.
+RESOLVED, ROUGH = 1e-14, 1e-8
+# An even z may differ from its mirror image by so much, which then counts as noise.
+MIRRORED = 1e-8
+# What the bars of every method allow at least for the rounding of z, relative to B.
+ROUNDING = 8.8e-16
+# z is asked for no nearer to a break than this share of the period: rounding decides there on which side.
+SLACK = 2.0**-50
+# Steps are dealt out by rate, and by frequency at this share of it.
+BY_PHASE = 0.15
+# DOP853 makes no step longer than this share of the distance to a singularity: it would pass a spike unseen.
+STRIDE = 0.5
+CALL_SAMPLES = 4_000_000
+# In double-double: what follows the results of a whole period, and the most steps (20 ms a hundred).
+SQUARES, EXACT_STEPS = 4, 2000
+# z in float64 and with more digits may differ by so many times the rounding that the bars allow for.
+SAME_Z = 1000
+
+
+@lru_cache(maxsize=32)
+def kernels(z):
+    """Kernels of the function z(u, p): `look(points, u, out)`, z at u (N, M); `probe`, z between those places; `walk`,
+    DOP853 point by point.
+    """
+    z = inline(getattr(z, "py_func", z))
+
+    @fresh
+    def look(points, u, out):
+        for i in range(u.shape[0]):
+            for j in range(u.shape[1]):
+                out[i, j] = z(u[i, j], points[i])
+
+    @fresh
+    def probe(points, ends, values, size, x, number, missed):
+        """How far z (N, M) at the places x of ends (N, 2) misses z at the one of `number` places most unlike the rest.
+
+        That is where the sixth differences of z at evenly spread places are largest: in the middle of seven. Where all
+        are below ROUGH times the `size` of z there is none.
+        """
+        for i in range(len(points)):
+            low, step = ends[i, 0], (ends[i, 1] - ends[i, 0]) / number[i]
+            most, middle = -1.0, 0
+            d0 = d1 = d2 = d3 = d4 = d5 = missed[i] = 0.0
+            for j in range(number[i]):
+                e0 = z(low + (j + 0.5) * step, points[i])
+                missed[i] = missed[i] if isfinite(e0) else inf
+                e1 = e0 - d0
+                e2 = e1 - d1
+                e3 = e2 - d2
+                e4 = e3 - d3
+                e5 = e4 - d4
+                e6 = abs(e5 - d5)
+                d0, d1, d2, d3, d4, d5 = e0, e1, e2, e3, e4, e5
+                if j >= 6 and e6 > most:
+                    most, middle = e6, j - 3
+            if most <= ROUGH * size[i]:
+                continue
+            # where two places are unlike the rest, it may be beside both
+            first = 0 if middle == 3 else middle - 1
+            last = number[i] if middle == number[i] - 4 else middle + 2
+            for j in range(first, last):
+                u = low + (j + 0.5) * step
+                off = abs(z(u, points[i]) - interpolated(values[i], x, (j + 0.5) / number[i]))
+                missed[i] = max(missed[i], off)
+
+    @inline
+    def potential(u, p, point, scale):
+        return z(u, point), scale
+
+    @fresh
+    def walk(points, edges, pieces, slack, longest, scale, tolerance, out, reached):
+        for i in range(len(points)):
+            own = edges[i, : pieces[i] + 1]
+            reached[i] = dop853.hill_walk_pieces(
+                potential, 0.0, points[i], scale[i], own, slack[i], longest[i], tolerance[i], out[i]
+            )
+
+    return SimpleNamespace(look=look, probe=probe, walk=walk)
+
+
+class Raised(Exception):
+    """z raised its cause, or cannot be compiled."""
+
+
+def at(z, points, u):
+    """z at the places u (N, M) of the points (N, n)."""
+    out = np.empty(u.shape)
+    try:
+        kernels(z).look(np.ascontiguousarray(points), np.ascontiguousarray(u), out)
+    except Exception as error:
+        raise Raised from error
+    return out
+
+
+def problem(z, points, edges, period, slack, even, exact=None):
+    """The Hill problem of z at the points (N, n), and where z is `rough`, not smooth between its breaks.
+
+    `exact(point, edges)`, if given, says z(u) and the `edges` (P + 1) of a point in more digits (`more_digits`).
+
+    `edges` (N, P + 1): 0, the breaks, and the end of the part that is solved, T/2 if `even`, else T; where a point has
+    fewer, its last one repeated. Points whose z is rough, not finite, or not even where it should be, have span NaN.
+    """
+    size, rate, scale, rough = measured(z, points, edges, period if even else None, slack)
+    length, end = np.diff(edges, axis=1), edges[:, -1]
+    pieces = np.count_nonzero(length > 0, axis=1)
+    frequency, more = np.sqrt(size), np.where(pieces > 1, pieces, 0) / end
+    # Each piece gets steps by its weight: so many in all that each has what it needs, and one more.
+    weight = length * np.maximum(np.maximum(BY_PHASE * frequency, rate), 1 / end[:, None])
+    total = np.cumsum(weight, axis=1)[:, -1:]
+    need = length * total / (np.where(weight > 0, weight, 1) * end[:, None])
+    frequency = (need * frequency).max(axis=1) + effort.LONGEST * more
+
+    def steps(rows, number):
+        """Starts and lengths of the steps (rows, number), and the places between which z may be asked for in each."""
+        i = np.arange(rows.size)[:, None]
+        count = np.floor((number - pieces[rows, None]) * (weight[rows] / total[rows])).astype(int) + (length[rows] > 0)
+        count[i[:, 0], weight[rows].argmax(axis=1)] += number - count.sum(axis=1)
+        last, k = np.cumsum(count, axis=1), np.arange(number)
+        piece = (k[:, None] >= last[:, None]).sum(axis=2)
+        low, high = edges[rows[:, None], piece], edges[rows[:, None], piece + 1]
+        h = (high - low) / count[i, piece]
+        return low + (k - (last - count)[i, piece]) * h, h, low + slack[rows, None], high - slack[rows, None]
+
+    def sample(rows, nodes, number):
+        start, h, low, high = (values[:, :, None] for values in steps(rows, number))
+        u = np.clip(start + h * nodes, low, high)
+        out = np.empty((rows.size, number, 2, nodes.size))
+        out[:, :, 1] = scale[rows, None, None]
+        out[:, :, 0] = at(z, points[rows], u.reshape(rows.size, -1)).reshape(u.shape) - out[:, :, 1]
+        return out
+
+    def walk(rows, p, tolerance):
+        out, reached = np.full((rows.size, RESULTS), np.nan), np.zeros(rows.size, np.bool_)
+        own = points[rows], edges[rows], pieces[rows], slack[rows], STRIDE / rate[rows].max(axis=1), scale[rows]
+        kernels(z).walk(*own, tolerance, out, reached)
+        return out, reached
+
+    def exactly(rows, p, low, number):
+        out = np.full((rows.size, RESULTS + (0 if even else SQUARES)), np.nan)
+        for i in np.flatnonzero(number <= EXACT_STEPS):
+            start = steps(rows[i : i + 1], number[i])[0][0]
+            with digits.LOCK:
+                found = digits.series(*exact(points[rows[i]], edges[rows[i]]), start, sampled_double.NODES)
+            if found is None or not _agree(z, points[rows[i]], scale[rows[i]], *found[3:]):
+                continue
+            terms, lengths, sizes = found[:3]
+            sampled_double.solve(terms, sampled_double.missing(*sizes), lengths, not even, out[i])
+        return out
+
+    own = monodromy.Problem(
+        p=np.ones((len(points), 1)), span=np.where(rough | np.isnan(scale), np.nan, end), c2=0.0,
+        bound=np.column_stack([frequency**2, 0 * end, 0 * end]), rate=(need * rate).max(axis=1) + 2 * more,
+        sample=sample, walk=walk, cut=lambda rows, number: steps(rows, number)[1], whole=not even,
+        exact=exactly if exact else None,
+    )  # fmt: skip
+    return own, rough
+
+
+def _agree(z, point, scale, u, values):
+    """Is z with more digits the z of float64, to what its rounding may move?"""
+    inside = at(z, point[None], u.reshape(1, -1)).reshape(u.shape)
+    return bool((abs(values - inside) <= SAME_Z * ROUNDING * scale).all())
+
+
+def measured(z, points, edges, period, slack, probes=PROBES):
+    """Of each piece `size` = max |z| and `rate` (N, P); of each point `scale` = B, NaN if z is not finite, and `rough`.
+
+    With a `period` (N), z is compared with its mirror image, and scale is NaN where they differ. `probes` as PROBES.
+    """
+    shape, owner = (len(points), edges.shape[1] - 1), np.repeat(np.arange(len(points)), edges.shape[1] - 1)
+    left, right = edges[:, :-1].reshape(-1, 1), edges[:, 1:].reshape(-1, 1)
+
+    def values(pieces, number, mirrored=False):
+        own, ends = owner[pieces], slack[owner[pieces], None]
+        u = left[pieces] + (right - left)[pieces] * chebyshev_points(number)
+        u = np.clip(u, left[pieces] + ends, right[pieces] - ends) if ends.any() else u
+        return at(z, points[own], period[own, None] - u if mirrored else u)
+
+    def missed(pieces, known, size):
+        """How far z between the places of `known`, z at Chebyshev points, is from what these tell of it."""
+        ends, own = np.concatenate([left[pieces], right[pieces]], axis=1), owner[pieces]
+        share = np.diff(ends, axis=1)[:, 0] / edges[own, -1]
+        number = np.maximum(np.ceil(probes * np.nan_to_num(share)), LEAST_PROBES).astype(np.int64)
+        return unlike(z, points[own], ends, known, size, number)
+
+    size, rate, noise, last = np.empty((4, owner.size))
+    unresolved, off = np.arange(owner.size), np.zeros(owner.size)
+    for number in SIZES:
+        for some in np.array_split(unresolved, unresolved.size * number // CALL_SAMPLES + 1):
+            known = values(some, number)
+            size[some], rate[some], noise[some], last[some] = spectrum(known)
+            if number == SIZES[0] and period is not None:
+                off[some] = abs(known - values(some, number, mirrored=True)).max(axis=1)
+            smooth = np.flatnonzero((last[some] <= RESOLVED * size[some]) | (number == SIZES[-1]))
+            some = some[smooth]
+            hidden = missed(some, known[smooth], size[some])
+            hidden[~(hidden > 10 * RESOLVED * size[some] + 4 * noise[some])] = 0
+            noise[some], last[some] = np.maximum(noise[some], hidden), np.maximum(last[some], hidden)
+        unresolved = unresolved[last[unresolved] > RESOLVED * size[unresolved]]
+    length = (right - left)[:, 0]
+    rate = np.where(length > 0, 2 * rate / np.where(length > 0, length, 1), 0)
+    size, rate, noise, last, off = (a.reshape(shape) for a in (size, rate, noise, last, off))
+    scale, off = size.max(axis=1), off.max(axis=1)
+    known = np.maximum(scale, np.maximum(noise.max(axis=1), off) / ROUNDING)
+    return size, rate, np.where(off <= MIRRORED * scale, known, np.nan), (last > ROUGH * size).any(axis=1)
+
+
+def unlike(z, points, ends, known, size, number):
+    """See `probe` of `kernels`: `known` (N, M) are values of z at Chebyshev points between `ends` (N, 2)."""
+    out = np.empty(len(points))
+    try:
+        kernels(z).probe(np.ascontiguousarray(points), ends, known, size, chebyshev_points(known.shape[1]), number, out)
+    except Exception as error:
+        raise Raised from error
+    return out
+
+
+@inline
+def interpolated(values, x, place):
+    """The polynomial through `values` at the Chebyshev points x (M) on [0, 1], at a place there (barycentric)."""
+    above = below = 0.0
+    for j in range(len(x)):
+        if x[j] == place:
+            return values[j]
+        weight = (1.0 - 2.0 * (j % 2)) * (0.5 if j == 0 or j == len(x) - 1 else 1.0) / (place - x[j])
+        above += weight * values[j]
+        below += weight
+    return above / below
+
+
+def spectrum(values):
+    """max |z|, rate (on [-1, 1]), noise and the largest of the last coefficients, from z at Chebyshev points (n, M)."""
+    size, rate, noise, last = np.empty((4, len(values)))
+    if values.shape[1] == SIZES[0]:
+        series = np.empty((0, SIZES[0]))
+    else:
+        series = abs(np.fft.rfft(np.concatenate([values, values[:, -2:0:-1]], axis=1), axis=1).real)
+        series /= values.shape[1] - 1
+    fall(values, series, cosines(SIZES[0]), size, rate, noise, last)
+    return size, rate, noise, last
+
+
+@kernel
+def fall(values, series, transform, size, rate, noise, last):
+    """See `spectrum`: from the sizes of the coefficients, `series`, or, if that is empty, by `transform` (M, M)."""
+    count = values.shape[1]
+    own, n = np.empty(count), count - 1
+    for i in range(len(values)):
+        top = 0.0
+        if len(series) == 0:
+            own[:] = 0.0
+            for j in range(count):
+                for k in range(count):  # no sum over k: vector code with the same bits
+                    own[k] += values[i, j] * transform[j, k]
+        for k in range(count):
+            own[k] = abs(own[k]) if len(series) == 0 else series[i, k]
+            top = max(top, own[k])
+        size[i] = last[i] = total = 0.0
+        for k in range(count):
+            size[i] = max(size[i], abs(values[i, k]))
+        for k in range(count - n // 4, count):
+            last[i] = max(last[i], own[k])
+            total += own[k] * own[k]
+        noise[i] = 3.0 * sqrt(0.5 * n * total / (n // 4))
+        least = max(RESOLVED * size[i], 2.0 * last[i])
+        rate[i] = 0.0
+        for k in range(count):
+            if own[k] > least:
+                rate[i] = max(rate[i], k / (1.0 + log(top / max(own[k], 1e-300))))
+        if not isfinite(size[i] + total):
+            size[i] = rate[i] = noise[i] = last[i] = np.nan
+
+
+@cache
+def cosines(number):
+    """(M, M): values at Chebyshev points (first index) to coefficients."""
+    n = number - 1
+    j, k = np.arange(number)[:, None], np.arange(number)
+    weight = np.where((j == 0) | (j == n), 1.0, 2.0)
+    return weight * np.cos(np.pi * ((j * k) % (2 * n)) / n) / n
+
+
+@cache
+def chebyshev_points(number):
+    """Chebyshev points of the second kind on [0, 1], both ends among them."""
+    return 0.5 - 0.5 * np.cos(np.pi * np.arange(number) / (number - 1))

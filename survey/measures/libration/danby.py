@@ -1,0 +1,233 @@
+"""Danby's question: are the triangular points of the elliptic problem stable? Trace invariants, verdict, collision.
+
+The monodromy's characteristic polynomial is l^4 - a l^3 + b l^2 - a l + 1. By the reversibility half a period gives all
+(`traces`; the scene's notes, section 3): stable <=> A B > 0, C D > 0, K > 0 and 0 < t < 2, decided by the bars
+of these, and A B = 0 are multipliers -1, K = 0 two pairs that meet.
+
+Effort: steps from a ladder, more where the bars ask for it, so that a point depends on itself, the method and rtol
+alone. A dense row (one e, many mu) is five Chebyshev series in s = sqrt(1 - 3 mu (1 - mu)), of which A to t are entire
+functions: they are solved at PLACES values of s in [1/2, 1], and what they leave undecided or too inaccurate is solved
+point by point. e = 0 has its closed form, and so has mu = 0. What float64 leaves open, or not as accurate as asked, is
+solved in double-double (`measures.libration.danby_double`).
+"""
+
+from functools import lru_cache
+
+import numpy as np
+
+from survey import measures, status
+from survey.kernels.libration import traces
+from survey.kernels.libration.traces import EPS, KREIN, MINUS_ONE, NONE, PLACES, RESULTS, STABLE, UNDECIDED, UNSTABLE
+from survey.measures.libration import danby_double
+from survey.measures.libration.danby_answers import Answers
+from survey.methods import taylor16
+from survey.scene import Output
+
+VERDICTS = {"undecided": UNDECIDED, "unstable": UNSTABLE, "stable": STABLE}
+COLLISIONS = {"undecided": UNDECIDED, "none": NONE, "minus_one": MINUS_ONE, "krein": KREIN}
+OUTPUTS = (
+    Output("a", "trace of the monodromy matrix over one period, the sum of its multipliers", "a"),
+    Output("b", "sum of the products of two multipliers", "b"),
+    Output("verdict", "stability of the linear motion", flags=VERDICTS),
+    Output("collision", "how stability is lost nearest, or has been lost: multipliers meet at -1, or two pairs meet",
+           flags=COLLISIONS),
+)  # fmt: skip
+LADDER = np.array([2, 3, 4, 5, 6, 7, 8, *((5 + i % 4) << (i // 4 + 1) for i in range(49))])
+FINEST = 1e-14
+TOLERANCES = 10.0 ** -np.arange(4.0, 16.0)
+# A series pays from so many points in the row on; of the asked accuracy for its values.
+DENSE, SHARE, HARD = 3 * PLACES, 0.05, 0.25
+# Keep a kernel call below about a second: steps, or points of an adaptive method.
+CALL_WORK, WALKS = 3_000_000, 500
+ATTEMPTS = 5  # to meet the accuracy, each with steps 1.7 times as many
+_ANGLES = np.pi * (np.arange(PLACES) + 0.5) / PLACES
+TO_SERIES = 2 / PLACES * np.cos(np.outer(np.arange(PLACES), _ANGLES))
+TO_SERIES[0] /= 2
+LEBESGUE = 1.0 + 2 / np.pi * np.log(PLACES)
+
+
+def solve(e, mu, method="auto", rtol=1e-10, dense=False):
+    """The outputs for rows e (R) of points mu (R, L), all (R, L): a, b, their bars, verdict, collision, status.
+
+    `dense`: the rows are long enough for series (see DENSE), wherever they are cut.
+    """
+    answers = Answers(mu.size)
+    valid = np.isfinite(e)[:, None] & np.isfinite(mu)
+    left = valid & ((e > 0)[:, None] & (mu > 0) | (method != "auto"))
+    closed = valid & ~left
+    if closed.any():
+        answers.put(np.flatnonzero(closed), closed_form(mu[closed], rtol))
+    hard = ()
+    if method == "auto" and dense:
+        left, hard = _by_series(e, mu, rtol, answers, left)
+    if left.any():
+        used = taylor16 if method == "auto" else measures.method(method)
+        places = np.flatnonzero(left)
+        answers.put(places, _point_by_point(e[places // mu.shape[1]], *rates(mu[left]), used, rtol))
+    if method == "auto":
+        places = np.flatnonzero((valid & (mu > 0)).reshape(-1) & answers.unsettled)
+        if places.size:
+            danby_double.solve(e, mu, rtol, answers, places, hard)
+    answers.status[~valid.reshape(-1)] = status.INVALID_PARAMETERS
+    answers.floats[:, answers.status != status.OK] = np.nan
+    names = ("a", "a_error", "b", "b_error")
+    out = dict(zip(names, answers.floats.reshape(4, *mu.shape), strict=True))
+    return out | {name: getattr(answers, name).reshape(mu.shape) for name in ("verdict", "collision", "status")}
+
+
+def rates(mu):
+    """d1, d2 = (3 / 2)(1 +- s); the smaller from the product, which loses no digits."""
+    x = 6.75 * mu * (1.0 - mu)
+    d1 = 1.5 * (1.0 + np.sqrt(1.0 - 3.0 * mu * (1.0 - mu)))
+    return d1, x / d1
+
+
+def factors(e, mu, rtol=1e-13):
+    """A, B, C, D, t (N, 5) and their bars (N, 5), to what midpoint Taylor can."""
+    results = np.empty((e.size, RESULTS))
+    _point_by_point(e, *rates(mu), taylor16, rtol, results)
+    return results[:, :5], results[:, 5:]
+
+
+def _by_series(e, mu, rtol, answers, left):
+    """Answer the points `left` (R, L) from their rows' series; returns those that are late, and the hard rows.
+
+    Hard is a row where float64 misses `rtol` at a quarter of the nodes: points of other rows are few in double-double.
+    """
+    rows = np.flatnonzero(left.any(axis=1))
+    s = 0.75 + 0.25 * np.cos(_ANGLES)
+    d1, d2 = np.tile(1.5 * (1.0 + s), rows.size), np.tile(1.5 * (1.0 - s), rows.size)
+    results = np.empty((rows.size * PLACES, RESULTS))
+    nodes = _point_by_point(np.repeat(e[rows], PLACES), d1, d2, taylor16, max(SHARE * rtol, 1e-13), results)
+    results = results.reshape(rows.size, PLACES, RESULTS)
+    series = np.ascontiguousarray(np.swapaxes(TO_SERIES @ results[..., :5], 1, 2))
+    tail = abs(series[..., -2:]).sum(axis=-1)
+    with np.errstate(over="ignore"):  # then the points are late
+        bars = LEBESGUE * results[..., 5:].max(axis=1) + tail + 16 * EPS * abs(series).sum(axis=-1)
+    sound = (nodes.status == status.OK).reshape(rows.size, PLACES).all(axis=1)
+    answers.late |= left.reshape(-1)
+    traces.dense(series[sound], bars[sound], rows[sound], mu, rtol, status.OVERFLOW, *answers.all)
+    hard = nodes.missed(rtol).reshape(rows.size, PLACES).mean(axis=1) >= HARD
+    return answers.late.reshape(mu.shape) & left, rows[hard]
+
+
+def _point_by_point(e, d1, d2, method, rtol, results=None):
+    """Answers of points (N each), each with its own effort; fills `results` (N, 10) if they are given."""
+    results = np.empty((e.size, RESULTS)) if results is None else results
+    adaptive = getattr(method, "ADAPTIVE", False)
+    run = _walk if adaptive else _chain
+    top = len(TOLERANCES if adaptive else LADDER) - 1
+    asked = max(rtol, FINEST)
+    level = np.full(e.size, np.searchsorted(-TOLERANCES, -0.01 * asked))
+    if not adaptive:
+        level = np.searchsorted(LADDER, method.danby_steps(e, asked))
+    answers = Answers(e.size)
+    answers.status[level > top] = status.STEP_LIMIT
+    left = np.flatnonzero(level <= top)
+    run(method, e, d1, d2, level, left, results)
+    answers.judge(results, rtol)
+    left = left[answers.late[left]]
+    for _ in range(ATTEMPTS):
+        if not left.size:
+            break
+        level[left] += 1 if adaptive else 3
+        left = left[level[left] <= top]
+        old, bar = results[left], _bar(results[left])
+        run(method, e, d1, d2, level, left, results)
+        better = _bar(results[left]) < bar
+        results[left[~better]] = old[~better]
+        again = Answers(left.size)
+        again.judge(results[left], rtol)
+        answers.put(left, again)
+        # Truncation falls by far more than 2 each time; where the bar does not halve, rounding rules.
+        halved = _bar(results[left]) < 0.5 * bar
+        left = left[again.late & (halved | (again.status == status.OVERFLOW))]
+    return answers
+
+
+def _bar(results):
+    bar = results[:, 5:].max(axis=1)
+    return np.where(np.isfinite(bar), bar, np.inf)
+
+
+def _chain(method, e, d1, d2, level, left, results):
+    """Points with the same steps together, in calls of bounded work."""
+    key = level[left] * 1000 + grading(e[left])
+    order = np.argsort(key, kind="stable")
+    nodes = tuple(method.NODES)
+    for same in np.split(left[order], np.flatnonzero(np.diff(key[order])) + 1):
+        if not same.size:
+            continue
+        steps = int(LADDER[level[same[0]]])
+        v, h = mesh(steps, int(grading(e[same[:1]])[0]), nodes)
+        most = max(64, CALL_WORK // steps)
+        for first in range(0, same.size, most):
+            some = same[first : first + most]
+            out = np.empty((some.size, RESULTS))
+            method.danby_chain(v, h, e[some], d1[some], d2[some], out)
+            results[some] = out
+
+
+def _walk(method, e, d1, d2, level, left, results):
+    """Points of their own, each with its tolerance."""
+    for first in range(0, left.size, WALKS):
+        some = left[first : first + WALKS]
+        out = np.empty((some.size, RESULTS))
+        method.danby_walk(e[some], d1[some], d2[some], TOLERANCES[level[some]], out)
+        results[some] = out
+
+
+def grading(e):
+    """How far the steps crowd towards f = pi, where r is singular at pi +- i arccosh(1 / e): see `mesh`."""
+    return np.rint(0.25 * np.log2((1.0 + e) / (1.0 - e))).astype(int)
+
+
+@lru_cache(maxsize=256)
+def mesh(steps, grade, nodes):
+    """1 + cos f at the nodes of each step (steps, nodes), and the steps' lengths (steps).
+
+    They are even in psi, tan((pi - f) / 2) = 2^-grade tan(psi / 2): between true (0) and eccentric anomaly, so that the
+    singularities of the equation and of this map lie about as far away.
+    """
+    psi = np.pi * np.arange(steps, -1, -1) / steps
+    y = 2.0 * np.arctan(2.0**-grade * np.tan(0.5 * psi))
+    y[0] = np.pi
+    h = y[:-1] - y[1:]
+    return 2.0 * np.sin(0.5 * (y[:-1, None] - h[:, None] * np.array(nodes))) ** 2, h
+
+
+def closed_form(mu, rtol):
+    """Answers where mu = 0 (all multipliers 1, and a secular term) or e = 0 (frequencies of the circular problem)."""
+    answers = Answers(mu.size)
+    x = 6.75 * mu * (1.0 - mu)
+    s = np.sqrt((1.0 - 4.0 * x).astype(complex))  # w1^2 - w2^2, imaginary beyond Routh's value
+    u = 0.5 * (1.0 + s)
+    v = x / u
+    (f, df), (g, dg) = _cosine(u), _cosine(v)
+    near = np.where(abs(s) < 1e-6, 1e-6, s)  # the differences below vanish with s
+    a, b = 2.0 * (f + g).real, 2.0 + (4.0 * f * g).real
+    moved = 4.0 * EPS * np.maximum(x, 1.0)
+    bars = 2.0 * abs((df - dg) / near) * moved, 4.0 * abs((df * g - f * dg) / near) * moved
+    size = 8.0 * EPS * (4.0 + abs(f) + abs(g))
+    answers.floats[:] = a, bars[0] + size, b, bars[1] + size * (2.0 + abs(f) + abs(g))
+    margin = 1.0 - 4.0 * x
+    stable, unstable = margin > 8 * EPS, margin < -8 * EPS
+    answers.verdict[:] = np.where(stable, STABLE, np.where(unstable, UNSTABLE, UNDECIDED))
+    answers.collision[:] = np.where(unstable, KREIN, UNDECIDED)
+    w1, w2 = np.sqrt(u.real), np.sqrt(v.real)
+    # beyond w2 = 1/2 the pairs are of unlike kind: arcs 2 pi (w1 - w2) and 2 pi (2 w2 - 1)
+    arcs = (w1 - w2) - (2.0 * w2 - 1.0)
+    nearer = np.where(arcs > 1e-7, MINUS_ONE, np.where(arcs < -1e-7, KREIN, UNDECIDED))
+    answers.collision[stable] = np.where(w2 <= 0.5, MINUS_ONE, nearer)[stable]
+    rest = mu == 0
+    answers.floats[:, rest] = np.array([4.0, 0.0, 6.0, 0.0])[:, None]
+    answers.verdict[rest], answers.collision[rest] = UNSTABLE, NONE
+    answers.late[:] = answers.missed(rtol) | (answers.verdict == UNDECIDED)
+    return answers
+
+
+def _cosine(u):
+    """cos(2 pi sqrt u) and its derivative with respect to u."""
+    root = np.sqrt(u)
+    x = 2.0 * np.pi * root
+    return np.cos(x), -np.pi * np.sin(x) / np.where(root == 0, 1.0, root)

@@ -1,0 +1,77 @@
+"""Which nutations are solved again with more digits (`digits`): open verdicts, and bars that miss rtol."""
+
+import numpy as np
+
+from survey.kernels.nutation import wells as nu
+from survey.measures.nutation import digits, wells
+from survey.status import NO_CONVERGENCE, OK, OVERFLOW
+
+ILL = 1e-13  # float64 reaches this, relative to 1 + |value|, at every point that is not ill conditioned
+DISTANCE = "separatrix_distance"
+_PARTS = {"nutation_frequency": {"period"}} | {
+    f"{name}_{kind}": {name, "period"} if kind == "rate" else {name}
+    for name in ("precession", "spin")
+    for kind in ("rate", "number")
+}
+
+
+def settle(out, points, solver, valid, request, known=False):
+    """Solve the points (parameters, n) again in place, as `solver` of `digits` does, where that is needed.
+
+    known: only motions whose period is known already. Of methods other than `auto` only distances from a separatrix
+    whose existence is in doubt.
+    """
+    doubt = np.isinf(out[f"{DISTANCE}_error"]) if DISTANCE in out else np.zeros(valid.size, bool)
+    again = valid & doubt
+    if request.method == "auto":
+        again |= valid & _open(out, request)
+    if known:
+        again &= (out["status"] == OK) & (out["verdict"] >= nu.NUTATION)
+    for i in np.flatnonzero(again):
+        _solve(out, i, points[:, i], solver, request.method == "auto")
+    if DISTANCE in out:
+        out[f"{DISTANCE}_error"][np.isnan(out[DISTANCE])] = np.nan
+
+
+def _open(out, request):
+    """Where a verdict is open, or a bar of an output that is asked for misses rtol."""
+    status, verdict = out["status"], out["verdict"]
+    found = (status == NO_CONVERGENCE) | (status == OVERFLOW)
+    found |= (status == OK) & (verdict != nu.NUTATION) & (verdict != nu.PASSAGE)
+    rtol = max(request.rtol, ILL)
+    asked = set().union(*(_PARTS.get(name, {name}) for name in request.variables or wells.NAMES))
+    for name in asked & {*wells.NAMES, DISTANCE} & out.keys():
+        with np.errstate(invalid="ignore"):
+            missed = out[f"{name}_error"] > rtol * (1.0 + np.abs(out[name]))
+        found |= missed.reshape(len(missed), -1).any(axis=1)
+    return found
+
+
+def _solve(out, i, point, solver, everything):
+    try:
+        answer = solver(*point.tolist())
+    except digits.NoMotion:
+        answer = None
+        if everything:
+            _put(out, i, [{}], wells.NO_MOTION, wells.UNDECIDED, 0)
+    if answer is None:
+        return
+    passes, number, found = answer
+    for name in (DISTANCE, f"{DISTANCE}_error"):
+        if name in out:
+            out[name][i] = found[0].get(name, np.nan)
+    if everything:
+        _put(out, i, found, OK, nu.PASSAGE if passes else nu.NUTATION, number)
+
+
+def _put(out, i, found, status, verdict, number):
+    """One point's answers, of each of its wells."""
+    numbers = [value for well in found for value in well.values()]
+    out["status"][i] = status if np.isfinite(numbers).all() else OVERFLOW
+    out["verdict"][i] = verdict if out["status"][i] == OK else wells.UNDECIDED
+    out["wells"][i] = number
+    for name in (*wells.NAMES, *(f"{name}_error" for name in wells.NAMES)):
+        row = out[name][i : i + 1].reshape(-1)
+        row[:] = np.nan
+        if out["status"][i] == OK:
+            row[: len(found)] = [well[name] for well in found]

@@ -1,0 +1,255 @@
+"""The bifurcation set of nutations on a map of two of the scaled integrals l, alpha, beta, in closed form.
+
+On maps of initial states the same curves are level curves, see `levels`.
+
+Regular precessions are the surface (S18) of `sheets`, which a map cuts in curves. They are stable, and a well
+begins, where A^2 omega_n^2 / |k| = y^2 + z^2 - s (1 - 3 y^2 z^2) is positive; where it is negative they are saddles,
+the separatrices; where it is 0 the sheets meet in cusps (k > 0). The surface ends, and for k < 0 threads go on without
+it, at the upright rotations, alpha = +-beta, l = alpha^2 - s; with the same alpha and beta and a greater l the motion
+passes the pole, where the advances jump. Equation numbers: `scenes/brun.md`.
+
+Curves are sampled until chords are short and near them, cut where they leave the map or become unstable.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise, product
+
+import numpy as np
+
+from survey.kernels.nutation.wells import EPS, TINY
+from survey.measures.nutation import levels
+from survey.measures.nutation.sheets import parts, surface
+from survey.scene import Output
+
+CLASSES = {
+    "stable_precession": 0, "separatrix": 1, "cusp": 2, "stable_upright": 3, "unstable_upright": 4, "pole_passage": 5,
+}  # fmt: skip
+STABLE, SADDLE, CUSP, UPRIGHT, THREAD, PASSAGE = CLASSES.values()
+TITLE = "motion that the curve belongs to"
+AXES = ("l", "alpha", "beta")
+ALONG = (
+    Output("u", "u = cos theta of the regular precession", "u", applies="not to curves of the class pole_passage"),
+    Output("precession_rate", "d psi / dt of the regular precession, times A / sqrt|k|", "y",
+           applies="to regular precessions off the poles"),
+    Output("reduced_spin_rate", "d phi / dt - p_phi (1/C - 1/A) of the regular precession, times A / sqrt|k|", "z",
+           applies="to regular precessions off the poles"),
+    Output("nutation_square", "squared frequency of small nutations, times A^2 / |k|; negative: unstable",
+           r"\omega_n^2", applies="not to curves of the class pole_passage"),
+)  # fmt: skip
+FIRST = 65
+LONGEST, FLAT = 0.02, 3e-5  # of the map: chords, and how far a curve may lie off them
+ROUNDS = 60
+
+
+@dataclass
+class Curves:
+    """Curves one after another: `count` points each, of class `kind`. Per point `places` (m, 2), the parameters; their
+    `error` (m), in the unit square of the map; and `along`: {name of ALONG: (values, errors)}.
+    """
+
+    count: np.ndarray
+    kind: np.ndarray
+    places: np.ndarray
+    error: np.ndarray
+    along: dict
+
+
+def refusal(axes):
+    """Why there are no curves on a map of these axes, in words; None if there are."""
+    if len(axes) in (2, 3) and (set(axes) <= set(AXES) or set(axes) <= set(levels.STATE)):
+        return None
+    return (
+        f"curves are known on two or three axes of {', '.join(AXES)} or of {', '.join(levels.STATE)}, "
+        f"not on {', '.join(axes) or 'none'}"
+    )
+
+
+def closed(square, axes, fixed, options):
+    """The Curves on the map of `axes`, the unit square `square`; `fixed` holds the other parameters."""
+    if not set(axes) <= set(AXES):
+        return _of_states(square, axes, fixed)
+    s = float(options["sign"])
+    third = next(name for name in AXES if name not in axes)
+    value = float(fixed[third])
+    found = []
+    for part in parts(third, value, s, _furthest(square, axes)):
+        found += _traced(part, square, axes, s)
+    found += _uprights(third, value, s, square, axes) + _passages(third, value, s, square, axes)
+    return _joined(found, square, axes)
+
+
+def _of_states(square, axes, fixed):
+    """The Curves on a map of initial states."""
+    count, kinds, places, errors, known = [], [], [], [], []
+    for function, x, error, columns in levels.traced(square, axes, fixed):
+        here = _nowhere(len(x)) | levels.along(function, columns)
+        kind = np.full(len(x), PASSAGE if function in (levels.upper_pole, levels.lower_pole) else SADDLE)
+        if function is levels.precession:
+            kind[here["nutation_square"][0] > 0.0] = STABLE
+        for part in np.split(np.arange(len(x)), 1 + np.flatnonzero(np.diff(kind))):
+            count.append(part.size)
+            kinds.append(kind[part[0]])
+        places.append(square.places(x))
+        errors.append(error)
+        known.append(here)
+    return Curves(
+        count=np.array(count, int),
+        kind=np.array(kinds, int),
+        places=np.concatenate([np.zeros((0, 2)), *places]),
+        error=np.concatenate([np.zeros(0), *errors]),
+        along={
+            output.name: tuple(np.concatenate([np.zeros(0), *(here[output.name][i] for here in known)]) for i in (0, 1))
+            for output in ALONG
+        },
+    )
+
+
+def _furthest(square, axes):
+    """The largest |alpha| or |beta| on the map."""
+    return max(max(abs(square.low[i]), abs(square.high[i])) for i, name in enumerate(axes) if name != "l")
+
+
+def _traced(part, square, axes, s):
+    """[(kind, {name: (values, errors)})]: the runs of a part on the map, cut at cusps, and these as points."""
+
+    def place(t):
+        here = surface(*part.at(t), s)
+        return square.inside(_positive(np.stack([here[name][0] for name in axes], axis=-1), square))
+
+    def inside(t):
+        x = place(t)
+        return ((x >= 0.0) & (x <= 1.0)).all(axis=-1)
+
+    def stable(t):
+        return s < 0.0 or surface(*part.at(t), s)["nutation_square"][0] >= 0.0
+
+    t = _sampled(part, place)
+    borders, cusps = _changes(inside, t), _changes(stable, t) if s > 0.0 else np.array([])
+    t = np.unique(np.concatenate([t, borders, cusps]))
+    cuts = np.unique(np.concatenate([t[[0, -1]], borders, cusps]))
+    found = [(CUSP, _points(part, cusps[[i]], s)) for i in np.flatnonzero(inside(cusps))]
+    for low, high in pairwise(cuts) if cuts.size > 1 else [(t[0], t[0])]:
+        own = t[(t >= low) & (t <= high)]
+        middle = own[own.size // 2] if own.size > 2 else 0.5 * (low + high)
+        if inside(middle):
+            found.append((STABLE if stable(middle) else SADDLE, _points(part, own, s)))
+    return found
+
+
+def _points(part, t, s):
+    return surface(*(np.broadcast_to(v, t.shape) for v in part.at(t)), s)
+
+
+def _positive(values, square):
+    """Values that have a logarithm where one is taken."""
+    return np.where(square.log, np.maximum(values, TINY), values)
+
+
+def _sampled(part, place):
+    """Parameters of a part so close that on the map chords are short and near the curve."""
+    if part.low == part.high:
+        return np.array([part.low])
+    t = np.linspace(part.low, part.high, FIRST)
+    for _ in range(ROUNDS):
+        middle = 0.5 * (t[:-1] + t[1:])
+        x, between = place(t), place(middle)
+        chord, half = x[1:] - x[:-1], between - x[:-1]
+        path = np.hypot(*half.T) + np.hypot(*(x[1:] - between).T)
+        with np.errstate(all="ignore"):
+            off = abs(chord[:, 0] * half[:, 1] - chord[:, 1] * half[:, 0]) / np.hypot(*chord.T)
+        away = np.maximum(np.maximum(-x, x - 1.0), 0.0).max(axis=1)
+        split = (np.minimum(away[1:], away[:-1]) <= path) & ((path > LONGEST) | ~(off <= FLAT) & (path > FLAT))
+        split &= (middle > t[:-1]) & (middle < t[1:])
+        if not split.any():
+            break
+        t = np.sort(np.concatenate([t, middle[split]]))
+    return t
+
+
+def _changes(test, t):
+    """The last parameters where the test holds, beside those where it does not."""
+    holds = test(t)
+    at = np.flatnonzero(holds[1:] != holds[:-1])
+    yes, no = np.where(holds[at], t[at], t[at + 1]), np.where(holds[at], t[at + 1], t[at])
+    while True:
+        middle = 0.5 * (yes + no)
+        if ((middle == yes) | (middle == no)).all():
+            return yes
+        good = test(middle)
+        yes, no = np.where(good, middle, yes), np.where(good, no, middle)
+
+
+def _uprights(third, value, s, square, axes):
+    """Upright rotations u = 1 (alpha = beta) and u = -1 (alpha = -beta), l = alpha^2 - s, on the map."""
+    found = []
+    for p, side in product(_momenta(third, value, s), (1.0, -1.0)):
+        a, b = (p, side * p) if third == "alpha" else (side * p, p)
+        square_p = (value + s if third == "l" else p * p) + 4.0 * s
+        here = _nowhere(1) | {
+            "l": (np.array([value if third == "l" else p * p - s]), np.array([2.0 * EPS * (p * p + 1.0)])),
+            "alpha": (np.array([a]), np.array([2.0 * EPS * abs(p) * (third == "l")])),
+            "beta": (np.array([b]), np.array([2.0 * EPS * abs(p) * (third == "l")])),
+            "u": (np.array([side]), np.zeros(1)),
+            "nutation_square": (np.array([square_p]), np.array([4.0 * EPS * (p * p + 4.0)])),
+        }
+        if _on_map(here, square, axes)[0]:
+            found.append((UPRIGHT if square_p >= 0.0 else THREAD, here))
+    return found
+
+
+def _momenta(third, value, s):
+    """alpha (or beta, where that is given) of upright rotations."""
+    if third != "l":
+        return [value]
+    if value + s <= 0.0:
+        return [0.0] if value + s == 0.0 else []
+    return [np.sqrt(value + s), -np.sqrt(value + s)]
+
+
+def _passages(third, value, s, square, axes):
+    """Straight lines alpha = +-beta, l >= alpha^2 - s, where motions pass a pole."""
+    low, high = (dict(zip(axes, ends, strict=True)) for ends in (square.low, square.high))
+    found = []
+    for side in (1.0, -1.0):
+        if third == "l":
+            far = np.sqrt(max(value + s, 0.0))
+            least, most = (low["beta"], high["beta"]) if side > 0.0 else (-high["beta"], -low["beta"])
+            ends = np.array([max(low["alpha"], least, -far), min(high["alpha"], most, far)])
+            here = {"alpha": ends, "beta": side * ends, "l": np.full(2, value)}
+        else:
+            ends = np.array([max(low["l"], value * value - s), high["l"]])
+            other = "beta" if third == "alpha" else "alpha"
+            here = {"l": ends, third: np.full(2, value), other: np.full(2, side * value)}
+        here = _nowhere(2) | {name: (v, 2.0 * EPS * (abs(v) + 1.0)) for name, v in here.items()}
+        if ends[0] < ends[1] and _on_map(here, square, axes).all():
+            found.append((PASSAGE, here))
+    return found
+
+
+def _nowhere(number):
+    return {output.name: (np.full(number, np.nan), np.full(number, np.nan)) for output in ALONG}
+
+
+def _on_map(here, square, axes):
+    values = np.stack([here[name][0] for name in axes], axis=-1)
+    return ((values >= square.low) & (values <= square.high)).all(axis=-1)
+
+
+def _joined(found, square, axes):
+    """The Curves of [(kind, {name: (values, errors)})]."""
+
+    def all_of(name, which):
+        return np.concatenate([here[name][which] for _, here in found] or [np.zeros(0)])
+
+    places = np.stack([all_of(name, 0) for name in axes], axis=-1)
+    bars = np.stack([all_of(name, 1) for name in axes], axis=-1)
+    ends = _positive(np.stack([square.low, square.high]), square)
+    ratios = np.log(np.divide(ends[1], ends[0], out=np.ones(2), where=square.log))
+    width = np.where(square.log, ratios * abs(places), square.high - square.low)
+    return Curves(
+        count=np.array([here["l"][0].size for _, here in found], int),
+        kind=np.array([kind for kind, _ in found], int),
+        places=places,
+        error=np.hypot(*(bars / width).T),
+        along={output.name: (all_of(output.name, 0), all_of(output.name, 1)) for output in ALONG},
+    )

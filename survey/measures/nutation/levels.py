@@ -1,0 +1,158 @@
+"""The bifurcation set of nutations on a map of two parameters of initial states, as level curves.
+
+On such a map there is no closed form. Its curves are zeros of functions that are known everywhere:
+
+    separatrix          L - L at the saddle with the same p_psi, p_phi (see `kernels.nutation.brun`)
+    regular precession  (b - a u)(a - b u) + k u (1 - u^2)^2, u = cos theta0, where p_theta0 = 0 is given (F of brun.md)
+    pole passage        p_psi -+ p_phi, where the motion reaches the pole u = +-1
+
+with b = p_psi, a = p_phi. They are sought on LINES lines of the map each way by marching squares, and every point is
+closed in along its line by certain signs: a closed curve narrower than a LINES-th of the map may be missed, and a
+curve ends up to as much before the cusp where its saddle ends. There is none where a well begins that the motion is not
+in. A precession is stable where its squared frequency (S18) is positive, else it is the saddle itself.
+
+Places are in the unit square, as in `curves`.
+"""
+
+import contourpy
+import numpy as np
+
+from survey.kernels.nutation import brun
+from survey.kernels.nutation.wells import EPS, HIGH, LOW, PASSAGE
+from survey.measures.hill.edges import close_in
+from survey.measures.nutation import wells
+
+STATE = ("A", "C", "epsilon", "theta0", "p_theta0", "p_psi", "p_phi")
+LINES, HALVINGS = 513, 30
+SURE = 1e-9  # half the width of what every point is closed in
+
+
+def traced(square, axes, fixed):
+    """[(function, places (m, 2) in the square, errors (m), columns (7, m) of states)] of every curve on the map.
+
+    The function is one of those below.
+    """
+    functions = [separatrix, *([precession] if fixed.get("p_theta0") == 0.0 else []), upper_pole, lower_pole]
+    found = []
+    for function in functions:
+
+        def look(x, function=function):
+            return function(states(square, axes, fixed, x))
+
+        for x, error in _lines(look, square.grain):
+            found.append((function, x, error, states(square, axes, fixed, x)))
+    return [(function, *part) for function, *rest in found for part in _reaching(function, *rest)]
+
+
+def states(square, axes, fixed, x):
+    """Columns (7, m) of the initial states at places x (m, 2)."""
+    here = dict(zip(axes, square.places(x).T, strict=True))
+    return np.stack([np.broadcast_to(here.get(name, fixed.get(name)), len(x)).astype(float) for name in STATE])
+
+
+def separatrix(columns):
+    """L above the separatrix over |k|, and its bar; NaN where there is none."""
+    out = wells.distance(wells.heights(brun.heights_of_states, columns))
+    a, c, _, theta, _, b, spin = columns
+    outside = (c > 2.0 * a) | ((theta == 0.0) & (b != spin))
+    return np.where(outside, np.nan, out["separatrix_distance"]), out["separatrix_distance_error"]
+
+
+def precession(columns):
+    """(b - a u)(a - b u) + k u (1 - u^2)^2, and its bar; NaN at the poles, where it has other zeros."""
+    size, c, epsilon, theta, _, b, a = columns
+    u, sine = np.cos(theta), np.sin(theta)
+    k, square = epsilon * size * (size - c), sine * sine
+    one, two, three = b - a * u, a - b * u, k * u * square * square
+    bar = 8.0 * EPS * ((abs(b) + abs(a * u)) * abs(two) + (abs(a) + abs(b * u)) * abs(one) + abs(k) * square * square)
+    return np.where((square > 0.0) & (c <= 2.0 * size) & (k != 0.0), one * two + three, np.nan), bar
+
+
+def upper_pole(columns):
+    """p_psi - p_phi."""
+    return columns[5] - columns[6], EPS * abs(columns[5] - columns[6])
+
+
+def lower_pole(columns):
+    """p_psi + p_phi."""
+    return columns[5] + columns[6], EPS * abs(columns[5] + columns[6])
+
+
+def _lines(look, grain):
+    """[(places (m, 2), errors (m))] of the curves where `look` is 0, from border to border or round."""
+    ticks = np.linspace(0.0, 1.0, LINES)
+    first, second = np.meshgrid(ticks, ticks, indexing="ij")
+    values = look(np.stack([first.ravel(), second.ravel()], axis=1))[0].reshape(LINES, LINES)
+    lines = contourpy.contour_generator(second, first, np.ma.masked_invalid(values)).lines(0.0)
+    return [part for line in lines for part in _closed_in(look, np.asarray(line)[:, ::-1], grain)]
+
+
+def _closed_in(look, x, grain):
+    """The curve through the places x, each between two crossings of lines; cut where one cannot be made certain."""
+    step, rows = (LINES - 1) * x, np.arange(len(x))
+    along = np.argmax(abs(step - np.rint(step)), axis=1)
+    x[rows, 1 - along] = np.rint(step)[rows, 1 - along] / (LINES - 1)
+    low = np.floor(step)[rows, along] / (LINES - 1)
+    high = np.minimum(low + 1.0 / (LINES - 1), 1.0)
+
+    def at(who, t):
+        places = np.repeat(x[who][:, None], t.shape[1], axis=1)
+        places[np.arange(len(t)), :, along[who]] = t
+        value, bar = look(places.reshape(-1, 2))
+        return value.reshape(t.shape), bar.reshape(t.shape)
+
+    sign = np.sign(at(rows, low[:, None])[0][:, 0])
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        same = np.sign(at(rows, middle[:, None])[0][:, 0]) == sign
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    t, width, sure = close_in(at, 0.5 * (low + high), high - low, np.full(len(x), grain))
+    sure &= (width < SURE) & (t >= 0.0) & (t <= 1.0)
+    x[rows, along] = t
+    return [(x[part], width[part] + grain) for part in _runs(sure)]
+
+
+def _runs(good):
+    """Index arrays of the runs of at least two places that are good."""
+    parts = np.split(np.arange(good.size), 1 + np.flatnonzero(np.diff(good)))
+    return [part for part in parts if part.size > 1 and good[part[0]]]
+
+
+def _reaching(function, x, error, columns):
+    """The curve's runs that count: of p_psi = +-p_phi those on which the motion passes that pole."""
+    good = np.ones(len(x), bool)
+    if function in (upper_pole, lower_pole):
+        side = 1.0 if function is upper_pole else -1.0
+        columns = columns.copy()
+        columns[5] = side * columns[6]
+        rows, kinds, *_ = wells.of_states(columns.T)
+        reached = rows[:, HIGH] if side > 0.0 else -rows[:, LOW]
+        good = (kinds == PASSAGE) & (reached == 1.0)
+    return [(x[part], error[part], columns[:, part]) for part in _runs(good)]
+
+
+def along(function, columns):
+    """{name: (values, bars)} of the regular precession that each state (7, m) of a curve belongs to; none at poles."""
+    if function in (upper_pole, lower_pole):
+        return {}
+    size, c, epsilon, theta, _, b, a = columns
+    k = epsilon * size * (size - c)
+    u, off = np.cos(theta), EPS * np.ones(theta.size)
+    if function is separatrix:
+        u, off = np.empty((2, theta.size))
+        brun.saddles_of_states(np.ascontiguousarray(columns), u, off)
+    v, root = (1.0 - u) * (1.0 + u), np.sqrt(abs(k))
+    y, y_bar = _rate(b, a, u, off, v, root)
+    z, z_bar = _rate(a, b, u, off, v, root)
+    square = y * y + z * z - np.sign(k) * (1.0 - 3.0 * u * u)
+    bar = 2.0 * (abs(y) * y_bar + abs(z) * z_bar) + 6.0 * abs(u) * off + 8.0 * EPS * (y * y + z * z + 4.0)
+    return {
+        "u": (u, off), "precession_rate": (y, y_bar), "reduced_spin_rate": (z, z_bar), "nutation_square": (square, bar),
+    }  # fmt: skip
+
+
+def _rate(own, other, u, off, v, root):
+    """(own - other u) / ((1 - u^2) sqrt|k|) and its bar: psi' or the reduced phi', times A / sqrt|k|."""
+    rate = (own - other * u) / (v * root)
+    bar = (4.0 * EPS * (abs(own) + abs(other * u)) + abs(other) * off) / (v * root)
+    return rate, bar + abs(rate) * (2.0 * abs(u) * off / v + 8.0 * EPS)

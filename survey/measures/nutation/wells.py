@@ -1,0 +1,166 @@
+"""Nutations between turning points: period, advances and action of each well, as arrays.
+
+A method fills, for each well (a row of `kernels/nutation/wells.py`), eight numbers: T/A, the precession, the spin less
+a (1/C - 1/A) T, the action, and their bars; and from these, at given times, u, psi and phi with their bars.
+"""
+
+import numpy as np
+
+from survey.kernels.nutation import brun, brun_lanes
+from survey.kernels.nutation import wells as nu
+
+PERIOD, PRECESSION, SPIN, ACTION = range(4)
+TURN = 2.0 * np.pi
+NAMES = ("u_min", "u_max", "period", "precession", "spin", "action")
+TRUST = 0.03  # relative errors beyond are no errors of first order
+UNDECIDED = -1
+NO_MOTION = 16  # the status of integrals without a motion
+FAR = 1e38  # distances in units of |k| beyond this say no more than that there is next to no field
+
+
+def of_states(points):
+    """rows (n, SIZE), kinds (n), numbers of wells (n), heights (n, 3) and starts (n, 4) of initial states (n, 7)."""
+    n = len(points)
+    rows, kinds, count = np.zeros((n, nu.SIZE)), np.zeros(n, np.int64), np.full(n, -1)
+    heights, starts = np.full((n, 3), np.nan), np.zeros((n, 4))
+    brun.of_states(np.ascontiguousarray(points), rows, kinds, count, heights, starts)
+    return rows, kinds, count, heights, starts
+
+
+def of_integrals(points, sign):
+    """The same but starts for (l, alpha, beta) (n, 3): rows (n, 2, SIZE), kinds (n, 2)."""
+    n = len(points)
+    rows, kinds, heights = np.zeros((n, 2, nu.SIZE)), np.zeros((n, 2), np.int64), np.full((n, 3), np.nan)
+    brun.of_integrals(np.ascontiguousarray(points), float(sign), rows, kinds, heights)
+    count = np.where((kinds == nu.SEPARATRIX).any(axis=1), -1, (kinds >= nu.NUTATION).sum(axis=1))
+    return rows, kinds, count, heights
+
+
+def in_lanes(kernel, points, actions):
+    """Values and bars (12, n) of `points` (7, n), numbers of wells (n), and which are answered (n): see `brun_lanes`.
+
+    actions: to full accuracy in small wells, too.
+    """
+    n = points.shape[1]
+    out, wells, done = np.empty((2 * len(NAMES), n)), np.empty(n), np.empty(n)
+    kernel(points, actions, out, wells, done)
+    return out, wells, done == brun_lanes.DONE
+
+
+def named(values):
+    """{name: values, name_error: bars} of the answers of `in_lanes`."""
+    return dict(zip((*NAMES, *(f"{name}_error" for name in NAMES)), values, strict=True))
+
+
+def periods(method, rows, kinds, rtol):
+    """The eight numbers of each well (n, 8), NaN where there is no nutation, and the kinds, LOST where there should be.
+
+    An error is trusted as one of first order only where it is small.
+    """
+    rows, kinds = np.ascontiguousarray(rows), np.ascontiguousarray(kinds)
+    out = np.full((len(rows), 8), np.nan)
+    method.nutation_periods(rows, kinds, rtol, out)
+    turning = kinds >= nu.NUTATION
+    good = turning & np.isfinite(out).all(axis=1) & (out[:, 4] < TRUST * out[:, PERIOD])
+    out[~good] = np.nan
+    return out, np.where(turning & ~good, nu.LOST, kinds)
+
+
+def outputs(rows, out, inertia, drift):
+    """{name: values, name_error: bars} of wells from `periods`; inertia is A, drift a (1/C - 1/A) to 8 roundings."""
+    values, bars, good = out[:, :4], out[:, 4:], np.isfinite(out[:, 0])
+    period = inertia * values[:, PERIOD]
+    bar = inertia * bars[:, PERIOD] + 2.0 * nu.EPS * period
+    spin = values[:, SPIN] + drift * period
+    spin_bar = bars[:, SPIN] + np.abs(drift) * (bar + 8.0 * nu.EPS * period) + nu.EPS * np.abs(spin)
+    found = {
+        "u_min": (rows[:, nu.LOW], rows[:, nu.BAR_LOW]),
+        "u_max": (rows[:, nu.HIGH], rows[:, nu.BAR_HIGH]),
+        "period": (period, bar),
+        "precession": (values[:, PRECESSION], bars[:, PRECESSION]),
+        "spin": (spin, spin_bar),
+        "action": (values[:, ACTION], bars[:, ACTION] + _smallest(rows)),
+    }
+    return _named(found, good)
+
+
+def _smallest(rows):
+    """What the action of a regular precession may be, by the bars of its turning points; 0 of other wells."""
+    wide = np.where(rows[:, nu.WIDTH] == 0.0, rows[:, nu.BAR_LOW] + rows[:, nu.BAR_HIGH], 0.0)
+    near = np.minimum(rows[:, nu.HIGH_PLUS], rows[:, nu.LOW_MINUS])
+    steep = np.sqrt(np.maximum(np.maximum(rows[:, nu.Q_LOW], rows[:, nu.Q_HIGH]), 0.0))
+    return steep * wide * np.minimum(1.0, wide / np.maximum(near, nu.TINY))
+
+
+def _named(found, good):
+    result = {}
+    for name, (value, error) in found.items():
+        result[name], result[f"{name}_error"] = np.where(good, value, np.nan), np.where(good, error, np.nan)
+    return result
+
+
+def rates(out, wanted):
+    """{name: values, name_error: bars} of those `wanted` that follow from `outputs`: frequencies, rotation numbers."""
+    period, bar = out["period"], out["period_error"]
+    result = {}
+    with np.errstate(invalid="ignore"):
+        if "nutation_frequency" in wanted:
+            value = TURN / period
+            result |= {
+                "nutation_frequency": value,
+                "nutation_frequency_error": value * (bar / (period - bar) + 4.0 * nu.EPS),
+            }
+        for name in ("precession", "spin"):
+            angle, rough = out[name], out[f"{name}_error"]
+            if f"{name}_rate" in wanted:
+                value = angle / period
+                result[f"{name}_rate"] = value
+                result[f"{name}_rate_error"] = (rough + np.abs(value) * bar) / (period - bar) + 2.0 * nu.EPS * np.abs(
+                    value
+                )
+            if f"{name}_number" in wanted:
+                value = angle / TURN
+                result[f"{name}_number"] = value
+                result[f"{name}_number_error"] = rough / TURN + 3.0 * nu.EPS * np.abs(value)
+    return result
+
+
+def motions(method, rows, kinds, starts, out, times, inertia, drift):
+    """{name: values, name_error: bars} of u, psi and phi at `times` (n, m)."""
+    here = np.full((*times.shape, 6), np.nan)
+    rows, kinds = np.ascontiguousarray(rows), np.ascontiguousarray(kinds)
+    method.nutation_motions(rows, kinds, starts, out, times / inertia[:, None], here)
+    turned = drift[:, None] * times
+    phi = here[..., 2] + turned
+    bar = here[..., 5] + 12.0 * nu.EPS * np.abs(turned) + nu.EPS * np.abs(phi)
+    found = {"u": (here[..., 0], here[..., 3]), "psi": (here[..., 1], here[..., 4]), "phi": (phi, bar)}
+    good = np.isfinite(here).all(axis=-1)
+    return _named(found, good)
+
+
+def verdicts(rows, kinds):
+    """The verdict of each well: its kind, and a regular precession also where the well's width is within its bar."""
+    one = (kinds == nu.NUTATION) & (rows[..., nu.NOISE_WIDTH] >= 1.0)
+    return np.where(one, nu.PRECESSION, np.maximum(kinds, UNDECIDED))
+
+
+def heights(kernel, points):
+    """Heights (n, 3) of points (7, n): see `kernels/nutation/brun.py`."""
+    found = np.empty((points.shape[1], 3))
+    kernel(points, found)
+    return found
+
+
+def distance(heights):
+    """The output of that name: (L - L of the separatrix)/|k|, and its bar; NaN where there is none, or FAR away.
+
+    An infinite bar is left beside NaN where it is in doubt whether there is one.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):  # k = 0 has no separatrix
+        value = heights[:, 0] / heights[:, 2]
+        bar = heights[:, 1] / heights[:, 2] + 4.0 * nu.EPS * np.abs(value)
+    near = np.abs(value) < FAR
+    return {
+        "separatrix_distance": np.where(near, value, np.nan),
+        "separatrix_distance_error": np.where(near, bar, np.where(np.isinf(heights[:, 1]), np.inf, np.nan)),
+    }

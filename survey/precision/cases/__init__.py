@@ -1,0 +1,1 @@
+"""What the work-precision charts measure, one file per scene."""

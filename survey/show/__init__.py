@@ -1,0 +1,1 @@
+"""Pictures of a survey: maps and curves, and the motion at one point."""

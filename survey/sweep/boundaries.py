@@ -1,0 +1,289 @@
+"""The boundaries on a map: the edges of tongues, row by row and as curves, or curves in closed form -> variables.
+
+Contiguous ragged arrays (CF 9.3.3): `edge_count` edges of each row lie one after another along `edge`, and
+`curve_count` points of each curve along `curve_point`.
+
+A scene has boundaries where its family has a measure of curves, `measures/FAMILY/curves.py`. One that knows them in
+closed form has `closed`, which gives them, with `refusal`, CLASSES, TITLE and ALONG (see `measures.nutation.curves`).
+The edges of all others are sought as the zeros of Hill's factors.
+"""
+
+from itertools import pairwise
+from math import prod
+
+import numpy as np
+import xarray as xr
+
+from survey import measures
+from survey.file.labels import flag_attributes, meaning
+from survey.grid import logarithmic
+from survey.measures.hill import curves as hill_curves
+from survey.measures.hill import edges as hill_edges
+from survey.measures.hill import folds as hill_folds
+from survey.measures.hill import look
+from survey.scene import Request
+
+ROWS = 8  # solved together
+COLUMNS = 9  # searched for curves that meet no row
+RTOL = 1e-13
+MARGIN = 1e-3  # of an axis: how near curves come to a value that is no parameter, such as k = 1
+
+
+def find(workflow, each=None, once=lambda name, make: make()):
+    """The dataset of the workflow's curves; of Hill's edges, and of their curves where there are two axes.
+
+    `each(task, numbers, what)` calls the task for every number, in any order, on threads if it likes;
+    `once(name, make)` gives the arrays of `make()`, or those that an earlier run has kept under this name.
+    """
+    measure = measures.curves_of(workflow.scene.FAMILY)
+    if hasattr(measure, "closed"):
+        return xr.Dataset(_closed(workflow, measure), attrs={"boundaries": workflow.boundaries})
+    each = each or hill_curves.in_turn
+    grid, axis = workflow.grid, workflow.boundaries
+    other = [dim for dim in grid.sizes if dim != axis]
+    across = next((dim for dim in other if grid.sizes[dim] > 1), None)  # curves need a range
+    edges = _edges(workflow, axis, grid.sizes[other[0]] if other else 1, each, once)
+    found = _rows(workflow, axis, other, edges)
+    about = {"boundaries": axis, "edge_incomplete_rows": int((edges.complete == 0).sum())}
+    if across:
+        found |= _curves(workflow, across, axis, edges, each)
+        about["curves_lost"] = int((found["curve_complete"][1] == 0).sum())
+    left_out = [
+        f"{name} from {a:.12g} to {b:.12g}"
+        for name in filter(None, (axis, across))
+        for (_, a), (b, _) in pairwise(_parts(workflow, name))
+    ]
+    if left_out:
+        about["edge_left_out"] = ", ".join(left_out)
+    return xr.Dataset(found, attrs=about)
+
+
+def plan(workflow, cost):
+    """(what is known before: rows, bytes of an edge, how many there are being found; seconds of one thread, roughly).
+
+    `cost` is the scene's figure for a point, in seconds.
+    """
+    measure = measures.curves_of(workflow.scene.FAMILY)
+    if hasattr(measure, "closed"):  # measured: about a tenth of a second each
+        size = 8 * (1 + len(workflow.grid.sizes) + 2 * len(measure.ALONG))
+        return {"bytes_per_curve_point": size}, 0.1 * prod(list(workflow.grid.sizes.values())[2:])
+    sizes = [size for dim, size in workflow.grid.sizes.items() if dim != workflow.boundaries and size > 1]
+    # measured: ten to twenty edges a row; half a thousand points of curves
+    seconds = prod(sizes) * (2e-3 + 250 * cost) + (0.2 + 1e4 * cost if sizes else 0.0)
+    return {"rows": prod(sizes), "bytes_per_edge": 25, "bytes_per_curve_point": 24 * len(sizes)}, seconds
+
+
+def _closed(workflow, measure):
+    """The variables of curves in closed form: on one map, or on each of those that a third axis makes a stack of."""
+    grid = workflow.grid
+    names, fixed = (
+        list(grid.sizes),
+        {name: float(values) for name, (dims, values) in grid.parameters.items() if not dims},
+    )
+    square, third = _square(workflow, *names[:2]), names[2:]
+    planes = [{third[0]: float(value)} for value in grid.parameters[third[0]][1]] if third else [{}]
+    found = [measure.closed(square, names[:2], fixed | plane, workflow.request.options) for plane in planes]
+    count, kind, flat, error = (
+        np.concatenate([getattr(curves, name) for curves in found]) for name in ("count", "kind", "places", "error")
+    )
+    points = [curves.count.sum() for curves in found]
+    places = np.column_stack([flat, *(np.repeat([plane[name] for plane in planes], points) for name in third)])
+    kind = _flags(measure.TITLE, measure.CLASSES, kind)
+    variables = _of_curves(workflow, names, count, kind, places, error, "on the curve")
+    for output in measure.ALONG:
+        values, errors = (np.concatenate([curves.along[output.name][i] for curves in found]) for i in (0, 1))
+        told = meaning(output) | {"ancillary_variables": f"curve_{output.name}_error"}
+        variables[f"curve_{output.name}"] = ("curve_point", values, told)
+        variables[f"curve_{output.name}_error"] = ("curve_point", errors, {
+            "long_name": f"error bound of curve_{output.name}", "units": output.units})  # fmt: skip
+    return variables
+
+
+def _of_curves(workflow, names, count, kind, places, error, where):
+    """The variables that all curves have."""
+    variables = {
+        "curve_count": ("curve", count.astype(np.int32), {
+            "long_name": "number of points of the curve", "units": "1", "sample_dimension": "curve_point"}),
+        "curve_class": ("curve", *kind),
+        "curve_position_error": ("curve_point", error, {
+            "long_name": "error bound of a point's distance from the curve", "units": "1",
+            "comment": "along the normal, on the map's border along that; unit: the range of either axis, "
+                       "of its logarithm if the axis is logarithmic"}),
+    }  # fmt: skip
+    for i, name in enumerate(names):
+        parameter, named = _named(workflow, name)
+        variables[f"curve_{name}"] = ("curve_point", places[:, i], named | {
+            "long_name": f"{parameter.long_name} {where}", "ancillary_variables": "curve_position_error"})  # fmt: skip
+    return variables
+
+
+def _edges(workflow, axis, rows, each, once):
+    """All Edges of all rows, a few rows at a time."""
+    parts, between = [None] * -(-rows // ROWS), _parts(workflow, axis)
+
+    def make(some):
+        solve = _row_solver(workflow, axis, some)
+        own = hill_edges.joined([hill_edges.find(solve, some.size, *ends) for ends in between])
+        own.row += some[0]
+        return vars(own)
+
+    def task(number):
+        some = np.arange(number * ROWS, min((number + 1) * ROWS, rows))
+        name = f"edges-{axis}-{some[0]}-{some.size}"
+        parts[number] = hill_edges.Edges(**once(name, lambda: make(some)))
+
+    each(task, range(len(parts)), "parts of the edges")
+    names = ("row", "position", "error", "kind", "index", "complete")
+    return hill_edges.Edges(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+
+def _row_solver(workflow, axis, rows):
+    """What `edges.find` asks of the scene, for these rows."""
+    others = {name: values for name, (_, values) in workflow.grid.parameters.items() if name != axis}
+
+    def solve(row, x, wanted):
+        point = {name: values[rows[row]][:, None] if np.ndim(values) else values for name, values in others.items()}
+        return _solve(workflow, point | {axis: x}, wanted)
+
+    return solve
+
+
+def _solve(workflow, point, wanted):
+    with np.errstate(all="ignore"):
+        return workflow.scene.solve(point, Request(workflow.request.options, "auto", RTOL, frozenset(wanted)))
+
+
+def _rows(workflow, axis, other, edges):
+    """The variables of the rows."""
+    rows = edges.complete.size
+    dims, shape = (tuple(other), (rows,)) if other else ((), ())
+    count = np.bincount(edges.row, minlength=rows).astype(np.int32).reshape(shape)
+    parameter, named = _named(workflow, axis)
+    position = named | {"long_name": f"{parameter.long_name} at the edge of a tongue"}
+    return {
+        "edge_count": (dims, count, {
+            "long_name": "number of edges of tongues", "units": "1", "sample_dimension": "edge"}),
+        "edge_complete": (dims, edges.complete.astype(np.int8).reshape(shape),
+                          _yes_or_no("are all edges of the row found", "not_shown complete")),
+        "edge_position": ("edge", edges.position, position | {"ancillary_variables": "edge_position_error"}),
+        "edge_position_error": ("edge", edges.error, named | {"long_name": "error bound of edge_position"}),
+        "edge_class": ("edge", *_class(edges.kind)),
+        "edge_index": ("edge", *_index(edges.index)),
+    }  # fmt: skip
+
+
+def _curves(workflow, across, axis, edges, each):
+    """The variables of the curves on the map of the axes `across` (its rows) and `axis`, and of their folds."""
+    square = _square(workflow, across, axis)
+    fixed = {name: values for name, (dims, values) in workflow.grid.parameters.items() if not dims}
+
+    def solve(q, p, wanted):
+        return _solve(workflow, fixed | {across: q, axis: p}, wanted)
+
+    pieces = [_pieces(workflow, name) for name in (across, axis)]
+    rows = np.asarray(workflow.grid.parameters[across][1])[edges.row]
+    of_rows = square.inside(np.stack([rows, edges.position], axis=1)), edges.kind, edges.index
+    found = [of_rows, *(_of_columns(solve, square, _columns(pieces[1]), *piece) for piece in pieces[0])]
+    seeds = _seeds(*(np.concatenate(values) for values in zip(*found, strict=True)), pieces)
+    curves = hill_curves.trace(solve, square, seeds, each)
+    folds = hill_folds.find(solve, square, curves)
+    names, places = (across, axis), (square.places(curves.x), square.places(folds.x))
+    where = "on the edge of a tongue"
+    variables = _of_curves(workflow, names, curves.count, _class(curves.kind), places[0], curves.error, where)
+    variables |= {
+        "edge_curve": ("edge", curves.of_seed[: edges.row.size].astype(np.int32), {
+            "long_name": "curve through the edge, counted from 0", "units": "1"}),
+        "curve_index": ("curve", *_index(curves.index)),
+        "curve_complete": ("curve", curves.complete.astype(np.int8),
+                           _yes_or_no("is the curve closed, or ended by the map or edge_left_out", "lost complete")),
+        "fold_curve": ("fold", folds.curve.astype(np.int32), {
+            "long_name": f"curve that turns back in {across}, counted from 0", "units": "1",
+            "instance_dimension": "curve"}),
+    }  # fmt: skip
+    for i, name in enumerate(names):
+        parameter, named = _named(workflow, name)
+        variables[f"fold_{name}"] = ("fold", places[1][:, i], named | {
+            "long_name": f"{parameter.long_name} at the fold of an edge",
+            "ancillary_variables": f"fold_{name}_error"})  # fmt: skip
+        ends = square.places(np.stack([folds.x - folds.error, folds.x + folds.error]))[..., i]
+        variables[f"fold_{name}_error"] = ("fold", abs(ends - places[1][:, i]).max(axis=0), named | {
+            "long_name": f"error bound of fold_{name}"})  # fmt: skip
+    return variables
+
+
+def _square(workflow, *names):
+    values = [np.asarray(workflow.grid.parameters[name][1]) for name in names]
+    low, high = (np.array([end(v) for v in values]) for end in (np.min, np.max))
+    return look.Square(low, high, np.array([logarithmic(v) for v in values]))
+
+
+def _pieces(workflow, name):
+    """Parts (low, high) of an axis, in units of its range, between the values that the parameter leaves out.
+
+    Singular there, tongues accumulate: the parts end half way to the map's nearest value, or MARGIN before.
+    """
+    line = _square(workflow, name)
+    excluded = np.array(next(p for p in workflow.scene.PARAMETERS if p.name == name).excluded)
+    known = np.asarray(workflow.grid.parameters[name][1])
+    inner = excluded[(excluded > line.low) & (excluded < line.high)]
+    units = [line.inside(v[:, None])[:, 0] for v in (inner, known[~np.isin(known, excluded)])]
+    apart = np.array([max(4 * line.grain, min(MARGIN, 0.5 * abs(units[1] - cut).min())) for cut in units[0]])
+    return list(zip([0.0, *(units[0] + apart)], [*(units[0] - apart), 1.0], strict=True))
+
+
+def _parts(workflow, name):
+    """The same parts, by the parameter's values."""
+    return _square(workflow, name).places(np.array(_pieces(workflow, name))[..., None])[..., 0].tolist()
+
+
+def _columns(pieces):
+    """Where columns are searched: evenly over the axis, but not between its pieces."""
+    columns = np.linspace(0, 1, COLUMNS)
+    for (_, a), (b, _) in pairwise(pieces):
+        columns[(columns > a) & (columns < b)] = a
+    return columns
+
+
+def _of_columns(solve, square, columns, low, high):
+    """(places, kind, index) of the edges along the columns, from low to high in the square."""
+
+    def along(column, x, wanted):
+        places = square.places(np.stack(np.broadcast_arrays(x, columns[column][:, None]), axis=-1))
+        out = solve(places[..., 0].reshape(-1, 1), places[..., 1].reshape(-1, 1), wanted)
+        return {name: values.reshape(x.shape) for name, values in out.items()}
+
+    edges = hill_edges.find(along, columns.size, low, high)
+    return np.stack([edges.position, columns[edges.row]], axis=1), edges.kind, edges.index
+
+
+def _seeds(x, kind, index, pieces):
+    """Seeds, each in the rectangle of pieces that holds it."""
+    low, high = np.zeros_like(x), np.ones_like(x)
+    for place, own in enumerate(pieces):
+        lows, highs = np.array(own).T
+        piece = np.clip(np.searchsorted(lows, x[:, place], "right") - 1, 0, None)
+        low[:, place], high[:, place] = lows[piece], highs[piece]
+    return hill_curves.Seeds(x, kind, index, low, high)
+
+
+def _named(workflow, name):
+    """A parameter, with the attributes of its values."""
+    parameter = next(p for p in workflow.scene.PARAMETERS if p.name == name)
+    return parameter, {"units": parameter.units, "symbol": parameter.symbol}
+
+
+def _class(kind):
+    return _flags("kind of the periodic solution at the edge", hill_edges.CLASSES, kind)
+
+
+def _flags(title, classes, kind):
+    return kind.astype(np.int8), flag_attributes(classes) | {"long_name": title, "units": "1"}
+
+
+def _index(index):
+    meaning = {"long_name": "number of the tongue, twice its rotation number", "units": "1", "symbol": "n"}
+    return index.astype(np.int32), meaning
+
+
+def _yes_or_no(question, answers):
+    return {"long_name": question, "units": "1", "flag_values": np.array([0, 1], np.int8), "flag_meanings": answers}

@@ -1,0 +1,262 @@
+"""Tasks on the workers of a dask cluster, which may die, freeze, or never come. Beside `dispatch`, all that knows dask.
+
+A block whose workers die again and again is set aside and called alone at the end, so that a block that was only beside
+it keeps its answer. A worker that finishes nothing for too long is restarted, or let go, and its blocks go elsewhere.
+"""
+
+import contextlib
+import itertools
+import json
+import logging
+import os
+import queue
+import time
+from collections import Counter
+
+from survey.errors import BadInput, Stopped, SurveyError
+from survey.sweep.dispatch import Patience
+
+SCHEDULER_SECONDS = 10
+WORKERLESS_SECONDS = 60
+RESTART_SECONDS = 10
+TRIES = 3  # workers that may take too long for a block
+STRIKES = 3  # blocks given up, one after another, with none finished in between: then no worker can do any
+ENCRYPTED = ("tls", "wss")
+
+
+def client_of(address):
+    """A client of the dask cluster at `address` (or in a scheduler file). Raises BadInput or Stopped."""
+    try:
+        from dask.distributed import Client
+    except ImportError:
+        raise BadInput("--scheduler needs dask.distributed: pip install distributed") from None
+    where = _address_in(address)
+    security = _security(where)
+    try:
+        client = Client(address=where, security=security, timeout=SCHEDULER_SECONDS, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise Stopped(_unreachable(where, error)) from None
+    for name in [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]:
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what they would log is told in one line
+    return client
+
+
+def _address_in(address):
+    """The scheduler's address, as it is or from its file."""
+    if not os.path.exists(address):
+        if address.endswith(".json"):
+            raise BadInput(f"--scheduler {address}: there is no such scheduler file; dask scheduler writes one")
+        return address
+    try:
+        with open(address, encoding="utf-8") as file:
+            return str(json.load(file)["address"])
+    except (OSError, ValueError, LookupError, TypeError):
+        raise BadInput(
+            f"--scheduler {address}: this is not a scheduler file; name one that dask scheduler --scheduler-file wrote"
+        ) from None
+
+
+def _security(address):
+    """dask's TLS settings where the scheduler asks for them, else None. Raises BadInput if they are not complete."""
+    if not address.startswith(tuple(f"{scheme}://" for scheme in ENCRYPTED)):
+        return None
+    from dask.distributed import Security
+
+    keys = "distributed.comm.tls: ca-file, client.cert and client.key"
+    try:
+        security = Security()
+        complete = security.get_connection_args("client")["ssl_context"] is not None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise BadInput(
+            f"the TLS certificates for the dask scheduler at {address} cannot be used ({reason}); set the files of "
+            f"{keys} in dask's configuration"
+        ) from None
+    if not complete:
+        raise BadInput(
+            f"the dask scheduler at {address} asks for TLS; set {keys} in dask's configuration, or as "
+            "DASK_DISTRIBUTED__COMM__TLS__CA_FILE, ...__CLIENT__CERT, ...__CLIENT__KEY"
+        )
+    return security
+
+
+def _unreachable(address, error):
+    """Why there is no connection to the scheduler, and what to do."""
+    cause = " ".join(str(error.__cause__ or error).split())
+    closed = address.startswith(tuple(f"{scheme}://" for scheme in ENCRYPTED)) and "CommClosedError" in _brief(error)
+    if "CERTIFICATE" in cause or "TLSV1_ALERT" in cause or "SSLV3_ALERT" in cause or closed:
+        expired = "expired" in cause.lower()
+        return (
+            f"the dask scheduler at {address} and this program do not accept each other's TLS certificates "
+            f"({cause.partition('] ')[2] or cause}); "
+            + ("renew the one that has expired" if expired else "use certificates of one CA, and its ca-file, on both")
+        )
+    return f"no dask scheduler answers at {address!r} ({_brief(error)}); start one with dask scheduler"
+
+
+def on_cluster(task, numbers, finished, died, client, patience=None):
+    """Call the task for every number on the cluster's workers (see `dispatch`). Raises Stopped where they cannot."""
+    done, watch = itertools.count(1), _Watch(client, patience or Patience())
+    finished(0)
+    aside = []
+    for number, result, killed in _results(task, numbers, client, watch):
+        if killed:
+            aside.append(number)
+            watch.struck(killed)
+        else:
+            finished(next(done), result)
+    for number in aside:
+        for _, result, killed in _results(task, [number], client, watch):
+            finished(next(done), died(number) if killed else result)
+
+
+def _results(task, numbers, client, watch):
+    """(number, its result, None) as they are ready; or (number, None, the address of the last worker it killed)."""
+    from dask.distributed import KilledWorker
+
+    ready = queue.SimpleQueue()
+
+    async def fetch(future):
+        try:
+            ready.put((future.key, await future.result(), None))
+        except Exception as error:
+            ready.put((future.key, None, error))
+
+    futures = client.map(task, numbers, pure=False, allow_other_workers=False)
+    waiting = {future.key: (future, number) for future, number in zip(futures, numbers, strict=True)}
+    for future in futures:
+        client.loop.add_callback(fetch, future)  # there: where a result lies on a worker that is stuck, only it waits
+    del futures, future
+    while waiting:
+        with contextlib.suppress(queue.Empty):
+            key, result, error = ready.get(timeout=watch.pause)
+            future, number = waiting.pop(key)
+            future.release()
+            killed = error.last_worker.address if isinstance(error, KilledWorker) else None
+            if isinstance(error, SurveyError):
+                raise error
+            if error and not killed:
+                told = f"the dask cluster at {client.scheduler.address} failed ({_brief(error)})"
+                raise Stopped(f"{told}; start one and run the command again to go on")
+            if not killed:
+                watch.finished()
+            yield number, result, killed
+        watch.look(waiting)
+
+
+class _Watch:
+    """Looks now and then who is at what: a worker that is stuck is replaced, and a cluster that is gone is told."""
+
+    def __init__(self, client, patience):
+        self.client, self.patience, self.address = client, patience, client.scheduler.address
+        now = time.monotonic()
+        self.looked, self.busy, self.staffed, self.warned = now, now, now, now
+        self.held, self.proven, self.late = {}, set(), Counter()
+        self.struck_by, self.had_some = set(), False
+
+    @property
+    def pause(self):
+        """Seconds between two looks."""
+        return min(max(self.patience.limit / 10, 0.1), 5.0)
+
+    def finished(self):
+        """A block is done: the workers can work."""
+        self.struck_by.clear()
+
+    def struck(self, worker):
+        """A block's last chance died with this worker."""
+        self.struck_by.add(worker)
+        if len(self.struck_by) >= STRIKES:
+            raise Stopped(
+                f"the workers of the dask cluster at {self.address} die again and again and finish no block; "
+                "give them more memory (their logs tell why) and run the command again to go on"
+            )
+
+    def look(self, waiting):
+        """What the workers hold of the blocks that are `waiting` ({key: (future, number)})."""
+        now = time.monotonic()
+        if not waiting or now - self.looked < self.pause:
+            return
+        self.looked = now
+        try:
+            at_work, finished = (
+                self.client.sync(ask, callback_timeout=SCHEDULER_SECONDS)
+                for ask in (self.client.scheduler.processing, self.client.scheduler.has_what)
+            )
+        except (OSError, TimeoutError, ValueError):
+            return  # the futures tell of a scheduler that is lost
+        # what is finished but not yet fetched, too: its worker may be stuck since
+        held = {
+            worker: frozenset(key for key in (*keys, *finished.get(worker, ())) if key in waiting)
+            for worker, keys in at_work.items()
+        }
+        late = [worker for worker, keys in held.items() if self._is_late(worker, keys, waiting, now)]
+        self.held = {worker: self.held[worker] for worker in held}
+        self._check_staff(held, now)
+        if late:
+            self._replace(late, waiting)
+
+    def _is_late(self, worker, keys, waiting, now):
+        """Has the worker held the same blocks for too long?"""
+        before, since = self.held.get(worker, (keys, now))
+        if keys != before:
+            since = now
+            if any(key not in waiting for key in before):
+                self.proven.add(worker)  # it has compiled what it needs
+        self.held[worker] = keys, since
+        limit = self.patience.limit if worker in self.proven else self.patience.first
+        return bool(keys) and now - since > limit
+
+    def _check_staff(self, held, now):
+        """Raise Stopped where nobody takes a block; where no worker has come yet, say so: a queue may start some."""
+        patience = max(self.patience.limit, WORKERLESS_SECONDS)
+        if any(held.values()) or not held:
+            self.busy = now
+        if held:
+            self.staffed = self.warned = now
+            self.had_some = True
+            if now - self.busy > patience:
+                raise Stopped(
+                    f"the workers of the dask cluster at {self.address} have taken no block for {now - self.busy:.0f} "
+                    "s; see their logs (a worker short of memory pauses) and run the command again to go on"
+                )
+            return
+        if self.had_some and now - self.staffed > patience:  # a nanny does not always start another one
+            raise Stopped(
+                f"the dask cluster at {self.address} lost its last worker {now - self.staffed:.0f} s ago; "
+                f"start some (dask worker {self.address}; their logs tell more) and run the command again to go on"
+            )
+        if now - self.warned > WORKERLESS_SECONDS:
+            self.warned = now
+            words = "the dask cluster at %s has no workers; waiting for some (dask worker %s starts one)"
+            logging.getLogger("survey").warning(words, self.address, self.address)
+
+    def _replace(self, late, waiting):
+        """Restart workers that are stuck (those without a nanny are let go): their blocks go to others."""
+        limit = self.patience.limit
+        for key in {key for worker in late for key in self.held[worker][0]}:
+            number = waiting[key][1]
+            self.late[number] += 1
+            if self.late[number] >= TRIES:
+                raise Stopped(
+                    f"{TRIES} workers of the dask cluster at {self.address} had a block for over {limit:.0f} s "
+                    "and finished none; run the command again to go on, with a longer --block-timeout if they need it"
+                )
+        words = "%d of the workers of %s finished no block for more than %.0f s; their blocks go to others"
+        logging.getLogger("survey").warning(words, len(late), self.address, limit)
+        with contextlib.suppress(OSError, TimeoutError, ValueError):
+            self.client.sync(
+                self.client.scheduler.restart_workers,
+                workers=late,
+                timeout=RESTART_SECONDS,
+                wait_for_workers=False,
+                on_error="return",
+                stimulus_id=f"survey-block-timeout-{time.time()}",
+                callback_timeout=2 * RESTART_SECONDS,
+            )
+
+
+def _brief(error):
+    """The first line of an error; of a lost connection not where it was lost."""
+    name = type(error).__name__
+    return name if name in ("CommClosedError", "CancelledError", "FutureCancelledError") else str(error).split("\n")[0]

@@ -1,0 +1,182 @@
+"""Blocks -> dataset: what is solved where and when, what is kept, what the file gets."""
+
+import contextlib
+import os
+import socket
+import time
+import tomllib
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import tomli_w
+
+from survey import status
+from survey.file import blocks as file_blocks
+from survey.file import disk
+from survey.file.labels import counts_in, layout
+from survey.kernels.jit import compile_seconds
+from survey.sweep import cluster, dispatch
+from survey.sweep.ahead import compiling_ahead
+from survey.sweep.assembly import Assembly
+from survey.sweep.cost import regions_of
+from survey.sweep.extras import extras
+from survey.sweep.fingerprint import code_version, compilers, fingerprint, refuse_other_code
+from survey.sweep.plan import refuse_too_large
+from survey.sweep.remaining import Remaining
+from survey.sweep.solve import solve_block
+
+SAMPLES = 16  # blocks from all over the map that are solved first
+
+
+@dataclass(frozen=True)
+class Finished:
+    """What a run has written: the file's attributes, the counts, and seconds of wall time (they do not overlap)."""
+
+    attributes: dict[str, Any]
+    counts: dict[str, dict[str, int]]
+    compiling: float
+    computing: float
+    beside: float  # edges, cells
+    writing: float
+    before: bool = False  # was the file complete already?
+
+
+class Solved(NamedTuple):
+    """What a worker tells of a block: its process, the seconds it has compiled in all, those of this block; and the
+    block itself where the worker cannot write it beside the output."""
+
+    number: int
+    process: str
+    compiling: float
+    seconds: float | None
+    content: bytes | None = None
+
+
+def numbered(number, block):
+    """A block as a Job takes it: (number, ((start, stop), ...)), which is small and can be hashed."""
+    return number, tuple((cut.start, cut.stop) for cut in block)
+
+
+@dataclass(frozen=True)
+class Job:
+    """All that a worker needs; called with a numbered block, it solves and keeps it.
+
+    It is sent with each block, so it does not hold them all.
+    """
+
+    scene: Any
+    request: Any
+    grid: Any
+    kept: file_blocks.Blocks
+    code: dict[str, str]
+
+    def __call__(self, block):
+        refuse_other_code(self.code)
+        number, ends = block
+        cuts = tuple(slice(*pair) for pair in ends)
+        began, before = time.perf_counter(), compile_seconds()
+        content = self.kept.keep(number, solve_block(self.scene, self.request, self.grid, cuts))
+        compiled = compile_seconds()
+        seconds = time.perf_counter() - began - (compiled - before)
+        return Solved(number, _process(), compiled, max(seconds, 0.0), content)
+
+    def died(self, block):
+        """Keep a block with the status of points whose worker died again and again."""
+        number, ends = block
+        shape = tuple(stop - start for start, stop in ends)
+        table = layout(self.scene, self.request)
+        arrays = {name: np.full(shape + extra, fill, kind) for name, (kind, fill, extra) in table.items()}
+        arrays["status"][...] = status.WORKER_DIED
+        self.kept.save(number, arrays)
+        return Solved(number, "", 0.0, None)
+
+
+def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, again=None, block_timeout=None):
+    """Run or resume the survey and write its netCDF file; returns what was Finished.
+
+    A part of the file is written as soon as the blocks of its region are there, while others are computed.
+    `progress(done, total, reused, what, left)` is called as blocks finish, and as parts of the boundaries do;
+    `left()` estimates the seconds that are left. `again` is the command that goes on after an interruption.
+    `block_timeout`: seconds after which a worker process that has finished no block is replaced.
+    Raises BadInput, Damaged or Stopped.
+    """
+    started = time.perf_counter()
+    refuse_too_large(workflow)
+    client = cluster.client_of(scheduler) if scheduler else contextlib.nullcontext()
+    tile, regions = regions_of(workflow)
+    blocks = [block for _, blocks in regions for block in blocks]
+    about = {"points": workflow.grid.points, "code": code_version() | compilers()}
+    kept = file_blocks.Blocks(
+        workflow.path, fingerprint(workflow), fresh, about, _findable(workflow), again, workflow.text
+    )
+    with disk.refused(workflow.path, "the run"), client, kept:
+        if kept.published:
+            kept.remove()
+            return Finished(kept.published, counts_in(kept.published), 0.0, 0.0, 0.0, 0.0, True)
+        reused = kept.sound()
+        job = Job(workflow.scene, workflow.request, workflow.grid, kept, code_version())
+        left = Remaining(workflow.grid.shape, blocks, reused)
+        compiled, patience = {}, dispatch.Patience(block_timeout)
+
+        here = len(reused) < len(blocks) and not (workers or scheduler)
+        ahead = compiling_ahead(workflow.scene, workflow.request) if here else contextlib.nullcontext()
+        with ahead, Assembly(workflow, kept, tile, regions) as assembly:
+
+            def finished(done, solved=None):
+                if solved:
+                    compiled[solved.process] = solved.compiling
+                    if solved.content is not None:
+                        kept.put(solved.number, solved.content)
+                    left.took(solved.number, solved.seconds)
+                    patience.took(solved.seconds)
+                    assembly.has(solved.number)
+                if progress:
+                    progress(len(reused) + done, len(blocks), len(reused), left=left)
+
+            before, began = compile_seconds(), time.perf_counter()
+            for number in sorted(reused):
+                assembly.has(number)
+            todo = _spread([number for number in range(len(blocks)) if number not in reused])
+            todo = [numbered(number, blocks[number]) for number in todo]
+            if scheduler:
+                cluster.on_cluster(job, todo, finished, job.died, client, patience)
+            elif workers:
+                dispatch.on_processes(job, todo, finished, job.died, workers, patience)
+            else:
+                dispatch.on_threads(job, todo, finished)
+            computed = time.perf_counter()
+            if _process() in compiled:
+                compiled[_process()] -= before
+            compiling = max(compiled.values(), default=0.0)  # processes compile side by side
+            before = compile_seconds()
+            further = extras(workflow, kept.once, progress)
+            more = compile_seconds() - before
+            compiling, beside = compiling + more, time.perf_counter() - computed - more
+            told = {
+                "wall_time_s": round(time.perf_counter() - started, 3),
+                "compile_time_s": round(compiling, 3),
+                "blocks_reused": len(reused),
+            }
+            written = assembly.finish(further, told)
+        kept.remove()
+    writing = time.perf_counter() - computed - beside - more
+    computing = max(0.0, computed - began - (compiling - more))
+    return Finished(written, assembly.tally.counts, compiling, computing, beside if further else 0.0, writing)
+
+
+def _findable(workflow):
+    """The workflow's text, a scene that is a file named as it is found from here, not from beside the workflow."""
+    table = tomllib.loads(workflow.text)
+    return workflow.text if table["scene"] == workflow.name else tomli_w.dumps(table | {"scene": workflow.name})
+
+
+def _spread(numbers):
+    """The numbers in order, but first some from all over the map, so that the time it takes can be told soon."""
+    first = numbers[:: max(1, len(numbers) // SAMPLES)] if len(numbers) > 4 * SAMPLES else []
+    return first + sorted(set(numbers) - set(first))
+
+
+def _process():
+    """What names this process among those of all hosts."""
+    return f"{socket.gethostname()} {os.getpid()}"

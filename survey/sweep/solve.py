@@ -1,0 +1,64 @@
+"""One block of a grid solved: the variables that are stored, in their types."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from survey import status
+from survey.file.labels import layout, round_up
+from survey.sweep import dispatch
+from survey.sweep.cost import points_per_block
+
+
+def solve_block(scene, request, grid, block):
+    """The variables of `layout` in one block of the grid."""
+    return solve_point(scene, replace(request, lines=grid.lines), grid.point(block), _shape(grid, block))
+
+
+def _shape(grid, block):
+    return tuple(len(range(*cut.indices(size))) for cut, size in zip(block, grid.shape, strict=True))
+
+
+def solve_point(scene, request, point, shape):
+    """The variables of `layout` at `point` ({name: array that broadcasts to shape}), as they are stored.
+
+    Values outside a parameter's domain reach the scene as NaN.
+    """
+    used = {p.name: p for p in scene.PARAMETERS}
+    valid = {key: np.where(used[key].holds(values), values, np.nan) for key, values in point.items()}
+    with np.errstate(all="ignore"):  # what overflows or is undefined gets a status, not a warning
+        solved = scene.solve({key: np.atleast_1d(values) for key, values in valid.items()}, request)
+    return stored(scene, request, solved, shape)
+
+
+def stored(scene, request, solved, shape):
+    """What a scene solved, in the types of the file and the block's shape; `overflow` where these cannot hold a bar."""
+    arrays, table = {}, layout(scene, request)
+    for name, (dtype, _, extra) in table.items():
+        values = round_up(solved[name]) if name.endswith("_error") else np.asarray(solved[name])
+        arrays[name] = values.astype(dtype, copy=False).reshape(shape + extra)
+    unbounded = [bad for bad in (np.isinf(arrays[name]) for name in table if name.endswith("_error")) if bad.any()]
+    for bad in unbounded:
+        lost = bad.reshape(*shape, -1).any(axis=-1)
+        for name, (dtype, fill, extra) in table.items():
+            where = lost.reshape(shape + (1,) * len(extra))
+            if name == "status":
+                where, fill = lost & ~np.isin(arrays[name], list(status.UNANSWERED)), status.OVERFLOW
+            arrays[name] = np.where(where, dtype.type(fill), arrays[name])
+    return arrays
+
+
+def compute(grid, scene, request, threads=None):
+    """All variables of the grid, in memory: {name: array in the grid's shape}."""
+    result = {name: np.empty(grid.shape + extra, kind) for name, (kind, _, extra) in layout(scene, request).items()}
+
+    def task(block):
+        for name, values in solve_block(scene, request, grid, block).items():
+            result[name][block] = values
+
+    blocks = grid.blocks(points_per_block(scene, request, grid))
+    if len(blocks) == 1:
+        task(blocks[0])
+    else:
+        dispatch.on_threads(lambda number: task(blocks[number]), range(len(blocks)), threads=threads)
+    return result

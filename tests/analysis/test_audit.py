@@ -1,0 +1,77 @@
+"""`survey verify` solves points again by another method: sound maps have no complaints, a planted value has one."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_scenes import draw, questions
+
+import survey
+from survey.analysis.audit import audit
+from survey.file.labels import error_bars
+
+WORKFLOWS = Path(__file__).parents[2] / "workflows"
+OTHERS = [
+    ("satellite", {}, {"inertia_ratio": [0.3, 0.8, 1.4], "amplitude": [0.4, 1.2]}),
+    ("satellite", {"direction": "-1"}, {"inertia_ratio": [0.3, 1.4], "k": [1.2, 2.0]}),
+    ("libration", {}, {"mu": [0.001, 0.012, 0.03]}),
+    ("libration_elliptic", {}, {"mu": [0.01, 0.03], "e": [0.0, 0.1, 0.4]}),
+    (str(WORKFLOWS / "meissner.py"), {}, {"q": [1.3, 2.6], "a": [1.1, 4.2, 9.3]}),
+]
+
+
+def maps():
+    """(scene, options, axes) of small maps of every scene and every value of its options."""
+    for case in questions():
+        scene, options = case.values
+        axes = {key: np.sort(np.atleast_1d(v)).tolist() for key, v in draw(scene, options, 5).items()}
+        yield pytest.param(scene.__name__.rpartition(".")[2], options, axes, id=case.id)
+    for scene, options, axes in OTHERS:
+        yield pytest.param(scene, options, axes, id="-".join([Path(scene).stem, *axes]))
+
+
+@pytest.mark.parametrize(("scene", "options", "axes"), list(maps()))
+def test_a_sound_map_has_no_complaints_and_every_planted_value_is_found(scene, options, axes, tmp_path):
+    listed = {key: {"values": values} if len(values) > 1 else values[0] for key, values in axes.items()}
+    ds = survey.run({"scene": scene, "options": options, "axes": listed}, output=tmp_path / "map.nc")
+    healthy = audit(ds, 12)
+    assert healthy["complaints"] == [] and healthy["points"] >= min(ds.status.size, 12) // 2, healthy
+    names = {name for name in ds.data_vars if not name.endswith("_error") and name != "status"}
+    for some in (names & {"verdict"}, names - {"verdict"}):  # beside a wrong verdict counts say nothing
+        planted = ds.copy(deep=True)
+        wrong = {name for name in some if _plant(planted, name)}
+        found = {line.split(" at ")[0] for line in audit(planted, 1000)["complaints"]}
+        assert found == wrong, (found, wrong)
+        assert wrong or "verdict" not in some or (ds.verdict == -1).all()
+
+
+def _plant(ds, name):
+    """Is there a known value of `name`, now wrong: just beyond its bar, or another code?"""
+    values = ds[name].values
+    known = np.argwhere(np.isfinite(values) if name in error_bars(ds) else values >= 0)
+    if not len(known):
+        return False
+    where = tuple(known[len(known) // 2])
+    if name in error_bars(ds):
+        values[where] += 1e-6 * (1 + abs(values[where])) + 4 * ds[f"{name}_error"].values[where]
+        return True
+    codes = ds[name].attrs.get("flag_values", np.array([values[where], values[where] + 1]))
+    values[where] = codes[(codes != values[where]) & (codes >= 0)][0]
+    return True
+
+
+def test_edges_and_cells_are_solved_again(tmp_path):
+    axes = {"a": {"start": 0.5, "stop": 9.5, "num": 5}, "q": {"start": 0.5, "stop": 5.0, "num": 4}}
+    workflow = {"scene": "mathieu", "axes": axes, "output": {"variables": ["verdict"]}}
+    ds = survey.run(workflow | {"boundaries": {"axis": "a"}, "refine": {"width": 0.05}}, output=tmp_path / "map.nc")
+    sound = audit(ds, 30)
+    assert sound["complaints"] == [] and sound["cells"] == 30 and sound["edges"] == ds.sizes["edge"] > 10
+    planted = ds.copy(deep=True)
+    planted.edge_position[5] += 1e-7
+    (line,) = audit(planted, 1000)["complaints"]
+    assert line.startswith("edge_position at q = ") and "has no zero within its error bar, by dop853" in line
+    planted = ds.copy(deep=True)
+    largest = ((ds.cell_a_high - ds.cell_a_low) * (ds.cell_verdict != -1)).values.argmax()
+    planted.cell_verdict[largest] = 1 - ds.cell_verdict[largest]
+    (line,) = audit(planted, 100_000)["complaints"]
+    assert line.startswith("cell_verdict at a = ") and " not " in line

@@ -1,0 +1,167 @@
+"""Trajectories in lock step against order 20 one by one, references of 30 digits and mpmath; bits whatever the lane."""
+
+import json
+from importlib.resources import files
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+from survey.kernels.cylinder import along, lockstep
+from survey.kernels.jit import fresh
+from survey.measures.cylinder import solution
+from survey.methods import closed, dop853, taylor
+from survey.precision.cases import gyrostat
+
+TURN = lockstep.LANES + 3  # more rows than lanes
+
+
+@fresh
+def one_by_one(P, starts, times, tolerance, limit, floats, turnings, status):
+    along.trajectories(taylor.flow_setting, taylor.flow_begin, taylor.flow_at, P, starts, times, tolerance, limit,
+                       floats, turnings, status)  # fmt: skip
+
+
+@fresh
+def sines(x, out):
+    for i in range(x.size):
+        out[0, i], out[1, i] = lockstep.sine_cosine(x[i])
+
+
+def solved(rows, times, tolerance=1e-13, run=taylor.flow_trajectories, limit=solution.STEPS):
+    """floats, turnings and status of `run` at the same times for every row."""
+    P, starts = solution.split(np.asarray(rows, float))
+    times = np.tile(np.asarray(times, float), (len(P), 1))
+    floats, turnings = np.full((*times.shape, 4), np.nan), np.full(times.shape, along.UNTOLD)
+    status = np.full(len(P), 99)
+    run(P, starts, times, tolerance, limit, floats, turnings, status)
+    return floats, turnings, status
+
+
+def drawn(count, seed, scale=(1, 1, 1, 1, 1, 1, 3, 1)):
+    return np.random.default_rng(seed).normal(size=(count, 8)) * scale
+
+
+def agree(rows, times, tolerance=1e-13):
+    """Where both solve them, values agree within both bars, and turnings wherever they are told; returns that share."""
+    mine, told, status = solved(rows, times, tolerance)
+    best, counted, _ = solved(rows, times, 1e-17, one_by_one)
+    both = np.isfinite(mine[..., 0]) & np.isfinite(best[..., 0])
+    assert (np.abs(mine - best)[both][:, :2] <= mine[both][:, 2:] + best[both][:, 2:]).all()
+    both &= (told != along.UNTOLD) & (counted != along.UNTOLD)
+    assert np.array_equal(told[both], counted[both])
+    assert ((status == along.OK) == np.isfinite(mine[:, -1, 0])).all()
+    return both.mean()
+
+
+def test_sine_and_cosine_to_one_ulp():
+    random = np.random.default_rng(1)
+    near = np.outer(np.arange(-4, 5) * (np.pi / 4), np.ones(40)) + random.normal(size=(9, 40)) * 10.0 ** random.uniform(
+        -17, -1, (9, 40)
+    )
+    x = np.concatenate([random.uniform(-np.pi, np.pi, 3000), near.ravel(), [0.0, 1e-300, np.pi, -np.pi]])
+    out = np.empty((2, x.size))
+    sines(x, out)
+    with mp.workdps(40):
+        for function, found in ((mp.sin, out[0]), (mp.cos, out[1])):
+            exact = [function(mp.mpf(float(value))) for value in x]
+            ulp = np.spacing(np.abs(np.array(exact, float)))
+            assert max(abs(mp.mpf(float(f)) - e) / u for f, e, u in zip(found, exact, ulp, strict=True)) <= 1
+
+
+@pytest.mark.parametrize("rtol", [1e-8, 1e-10, 1e-12])
+def test_references_to_t_20_lie_within_their_bars(rtol):
+    data = json.loads((files("survey.reference") / "gyrostat_trajectories.json").read_text())["trajectories"]
+    rows = np.array([[point[n] for n in gyrostat._NAMES] for point, *_ in gyrostat.references("trajectory")])
+    floats, _turnings, status = solution.trajectories(taylor, rows, np.full((len(rows), 1), 20.0), rtol)
+    assert (status == along.OK).all()
+    for found, case in zip(floats[:, 0], data, strict=True):
+        for value, bar, name in zip(found[:2], found[2:], ("phi", "w"), strict=True):
+            error = abs(mp.mpf(float(value)) - mp.mpf(case[name]))
+            assert error <= bar and error <= rtol * (1 + abs(value))
+
+
+@pytest.mark.parametrize("tolerance", [1e-11, 1e-13, 1e-16])
+def test_bars_hold_on_random_systems(tolerance):
+    assert agree(drawn(2000, 3), [0.3, 20.0], tolerance) > 0.9
+
+
+@pytest.mark.parametrize(
+    "scale",
+    [
+        (40, 40, 1, 1, 1, 1, 3, 1),  # stiff
+        (1, 1, 1, 1, 1, 1, 3, 300),  # fast
+        (0, 0, 9, 9, 9, 9, 3, 3),  # conserves H
+        (1, 1, 0, 0, 0, 0, 3, 1),  # g = 0
+        (1, 1, 1, 1, 1, 1, 1e6, 1),  # many turns from 0
+        (1e-9, 1e-9, 1e-9, 1e-9, 1e-9, 1e-9, 3, 1),
+        (0, 0, 0, 0, 0, 0, 3, 1),
+    ],
+)
+def test_bars_hold_on_hard_systems(scale):
+    assert agree(drawn(100, 4, scale), [1.0, 5.0]) > 0.8
+
+
+def test_the_same_bits_in_any_lane_beside_any_neighbour():
+    rows, times = drawn(3 * TURN, 5), [1.0, 7.0, 20.0]
+    whole = solved(rows, times)
+    order = np.random.default_rng(6).permutation(len(rows))
+    for pick in (order, order[: TURN // 2], order[:1]):
+        for part, all_of_them in zip(solved(rows[pick], times), whole, strict=True):
+            assert np.array_equal(part, all_of_them[pick], equal_nan=True)
+    alone = solved(rows, times[1:2])
+    assert np.array_equal(alone[0][:, 0], whole[0][:, 1], equal_nan=True) and np.array_equal(
+        alone[1][:, 0], whole[1][:, 1]
+    )
+
+
+@pytest.mark.parametrize("place", range(8))
+def test_a_row_of_nan_costs_itself_alone(place):
+    rows = drawn(TURN, 7)
+    good = solved(rows, [5.0])
+    rows[3, place] = np.nan
+    bad = solved(rows, [5.0])
+    assert np.isnan(bad[0][3]).all() and bad[2][3] != along.OK
+    for one, other in zip(good, bad, strict=True):
+        assert np.array_equal(np.delete(one, 3, axis=0), np.delete(other, 3, axis=0), equal_nan=True)
+
+
+def test_a_row_of_times_ends_at_its_first_infinity_and_a_budget_ends_a_row():
+    rows = drawn(TURN, 8)
+    floats, _turnings, status = solved(rows, [2.0, np.inf, 3.0])
+    assert np.isfinite(floats[:, 0]).all() and np.isnan(floats[:, 1:]).all() and (status == along.OK).all()
+    assert (solved(rows, [np.inf])[2] == along.OK).all()
+    assert (solved(rows, [1e9], limit=5)[2] == along.STEP_LIMIT).all()
+
+
+def test_exact_equilibria_stay():
+    """g = 0 exactly at phi = 0, for either sign of d."""
+    rows = [[-0.5, 0.2, d, 0.0, 0.0, 1.0, 0.0, 0.0] for d in (2.0, -0.9, 0.0)]
+    assert np.array_equal(solved(rows, [1e3])[0][:, 0, :2], np.zeros((3, 2)))
+
+
+def test_a_negative_zero_is_a_zero():
+    rows = drawn(4, 9)
+    rows[:, 2] = 0.0
+    other = rows * [1, 1, -1, 1, 1, 1, 1, 1]
+    for one, two in zip(solved(rows, [2.0]), solved(other, [2.0]), strict=True):
+        assert np.array_equal(one, two)
+
+
+def test_bars_hold_where_every_second_coefficient_vanishes():
+    """At rest with b = 0, w is odd in t; where one more coefficient is small by chance, the last two tell nothing."""
+    rows = drawn(3000, 9, (0, 0, 1, 1, 1, 1, 1, 0))
+    times = np.tile([0.2, 0.5, 1.0], (len(rows), 1))
+    exact, _, known = solution.trajectories(closed, rows, times, 1e-10)
+    for method in (taylor, dop853):
+        found, _, status = solution.trajectories(method, rows, times, 1e-8)
+        good = (known == along.OK) & (status == along.OK)
+        assert good.mean() > 0.95
+        bars = found[..., 2:] + exact[..., 2:]
+        assert (abs(found[..., :2] - exact[..., :2]) <= bars)[good].all(), method
+    targets = rows[:, 6:7] + np.sign(exact[:, :1, 0] - rows[:, 6:7]) * [[1e-3, 1e-2]]
+    exact, known = solution.abel(closed, rows, targets, 1e-10)
+    found, status = solution.abel(taylor, rows, targets, 1e-8)
+    good = (known == along.OK) & (status == along.OK)
+    assert good.mean() > 0.5
+    assert (abs(found - exact)[..., :2] <= (found + exact)[..., 2:])[good].all()

@@ -1,0 +1,104 @@
+"""The work-precision chart: real measurements, errors against the references, the same records in all three files."""
+
+import csv
+import importlib.util
+import json
+
+import numpy as np
+import pytest
+
+import survey.precision.cases as folder
+from survey import modules, precision
+from survey.errors import BadInput
+
+FIELDS = ["work", "method", "peer", "setting", "error", "seconds_per_point", "wrong_verdicts", "compile_seconds"]
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Two settings and tiny works instead of ten and the real ones, and no new process for each method."""
+    case = modules.load(folder, "satellite", "scene")
+    monkeypatch.setattr(precision, "SETTINGS", (1e-4, 1e-8))
+    monkeypatch.setattr(precision, "REPEATS", 1)
+    monkeypatch.setattr(precision, "_cold", lambda scene, method: float(len(method)))
+    row = {"k": np.array([[0.5]]), "rho": np.linspace(0.6, 4.0, 8)[None, :]}
+    monkeypatch.setattr(case, "works", lambda: {"row": (row, {})})
+    return case
+
+
+def test_records_hold_what_was_measured_and_the_asked_accuracy_is_reached(quick, tmp_path, monkeypatch):
+    said = []
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: name == "scipy" or None)
+    paths = precision.write("satellite", tmp_path, peers=True, say=said.append)
+    assert [path.name for path in paths] == [f"precision_satellite.{kind}" for kind in ("json", "csv", "png")]
+    told = json.loads(paths[0].read_text())
+    records = told["records"]
+    assert list(records[0]) == FIELDS and told["machine"]["cpu"]
+    times = {(r["method"], r["work"], r["setting"]): r["seconds_per_point"] for r in records}
+    for least in told["machine"]["least"]:
+        assert 0 < least["seconds_per_point"] < times[least["method"], least["work"], least["setting"]]
+    methods = {record["method"] for record in records if not record["peer"]}
+    assert {"auto", "rk4", "magnus6", "taylor16"} <= methods
+    assert {record["peer"] for record in records} == {"", "scipy"}
+    assert any(line.startswith("heyoka is not installed and is missing") for line in said)
+    own = [record for record in records if not record["peer"]]
+    assert all(record["compile_seconds"] == len(record["method"]) for record in own)
+    assert all(record["error"] <= record["setting"] for record in own)
+    assert all(record["seconds_per_point"] > 0 and record["error"] >= 0 for record in records)
+    assert sum(record["wrong_verdicts"] for record in records if not record["peer"]) == 0
+    with open(paths[1], newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["error"]) for row in rows] == [record["error"] for record in records]
+    assert paths[2].read_bytes()[:4] == b"\x89PNG"
+    assert any("measured" in line for line in said)
+
+
+def test_a_first_call_compiles_in_a_process_of_its_own():
+    assert precision._cold("satellite", "rk4") > 0
+
+
+def test_a_peer_is_judged_by_its_discriminant(quick):
+    def constant(value):
+        system = type("Constant", (), {"integrate": lambda self, system, rtol: np.full((1, 6), value)})()
+        return precision._against(precision._peer(quick, system), quick.references(), "discriminant", 1e-8)[1]
+
+    verdicts = [verdict for *_, verdict in quick.references()]
+    assert constant(0.1) == verdicts.count(0) and constant(10.0) == verdicts.count(1)
+
+
+def test_a_share_is_points_of_the_work(quick):
+    (point, _) = quick.works()["row"]
+    assert precision._share(point, None) is point and precision._share(point, 8) is point
+    share = precision._share(point, 3)
+    assert share["k"].shape == share["rho"].shape == (3,) and set(share["rho"]) < set(point["rho"][0])
+
+
+def test_a_wrong_value_or_verdict_shows_in_the_chart(quick):
+    def broken(point, options, rtol):
+        return {"discriminant": np.array([0.0]), "verdict": np.array([1])}
+
+    error, wrong = precision._against(broken, quick.references(), "discriminant", 1e-8)
+    assert error > 0.9 and wrong >= 4
+
+
+def test_a_folder_that_cannot_be_or_a_missing_chart_is_refused(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(BadInput, match="cannot make this folder"):
+        precision.write("satellite", tmp_path / "file" / "below")
+    with pytest.raises(BadInput, match="unknown scene 'satelite'"):
+        precision.write("satelite", tmp_path)
+
+
+def test_what_a_method_does_not_answer_is_not_in_the_chart(monkeypatch):
+    case = modules.load(folder, "gyrostat", "scene")
+    works = {name: ({key: v[:20] for key, v in point.items()}, o) for name, (point, o) in case.works().items()}
+    monkeypatch.setattr(precision, "SETTINGS", (1e-8,))
+    monkeypatch.setattr(precision, "REPEATS", 1)
+    monkeypatch.setattr(precision, "_cold", lambda *_: 0.0)
+    monkeypatch.setattr(case, "works", lambda: works)
+    records = precision.measure("gyrostat", case)
+    found = {(record.method, record.work) for record in records}
+    methods = {method for method, _ in found}
+    assert {"auto", "taylor", "dop853", "rk4", "closed", "full"} <= methods
+    assert found == {(method, work) for method in methods for work in works} - {("closed", "trajectory")}
+    assert all(record.error <= record.setting for record in records)

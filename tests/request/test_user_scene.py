@@ -1,0 +1,213 @@
+"""A user's own Hill equation goes through every command like a built-in scene; what is wrong is said in one line."""
+
+import dask.array as da
+import numpy as np
+import pytest
+import xarray as xr
+
+import survey
+from survey.errors import BadInput
+from survey.file import blocks
+from survey.request import user_scene, workflow
+from survey.sweep import cost, engine, fingerprint, solve
+
+SCENE = '''"""Mathieu's equation of my own.
+
+z = a - 2 q cos 2u."""
+from math import cos, pi
+
+PARAMETERS = ("a", "q")
+PERIOD = pi
+EVEN = True
+
+
+def z(u, p):
+    return p[0] - 2 * p[1] * cos(2 * u)
+'''
+WORKFLOW = """
+scene = "mine.py"
+[axes]
+a = { start = -1.0, stop = 10.0, num = 8 }
+q = { start = 0.1, stop = 2.0, num = 6 }
+[output]
+figures = ["verdict"]
+[boundaries]
+axis = "a"
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder with the scene in a folder below it, beside its workflow; the current folder."""
+    (tmp_path / "below").mkdir()
+    (tmp_path / "below/mine.py").write_text(SCENE)
+    (tmp_path / "below/mine.toml").write_text(WORKFLOW)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_every_command_takes_it(program, folder):
+    run = program("run", "below/mine.toml", "-o", "mine.nc", "--workers", "1")
+    assert run.returncode == 0, run.stderr
+    assert (folder / "mine.png").exists()
+    for words in (("plan", "below/mine.toml"), ("info", "mine.nc"), ("verify", "mine.nc"), ("plot", "mine.nc")):
+        done = program(*words)
+        assert done.returncode == 0, done.stderr
+    assert "Mathieu's equation of my own" in program("scenes", "below/mine.py").stdout
+    ds = survey.open("mine.nc")
+    assert ds.attrs["scene_text"] == SCENE and ds.attrs["title"] == "Mathieu's equation of my own"
+    same = survey.evaluate("mathieu", a=ds.a.values, q=ds.q.values)
+    assert (ds.verdict.values == same.verdict.values).all() and ds.edge_complete.values.all()
+    (folder / "below/mine.py").write_text(SCENE + "\n")
+    changed = program("verify", "mine.nc")
+    assert changed.returncode == 2 and "its file has changed since" in changed.stderr
+    (folder / "below/mine.py").unlink()
+    gone = program("verify", "mine.nc")
+    assert gone.returncode == 2 and "its file has gone" in gone.stderr and gone.stderr.count("\n") == 1
+    assert program("plot", "mine.nc").returncode == 0
+
+
+def test_finished_blocks_are_not_used_again_after_the_file_has_changed(folder):
+    first = workflow.read("below/mine.toml", output="o.nc")
+    block = cost.regions_of(first)[1][0][1][0]
+    with blocks.Blocks(first.path, fingerprint.fingerprint(first)) as kept:
+        kept.save(0, solve.solve_block(first.scene, first.request, first.grid, block))
+    (folder / "below/mine.py").write_text(SCENE.replace("- 2 *", "- 2.000001 *"))
+    with pytest.raises(BadInput, match=r"another z\(u, p\).*--fresh"):
+        engine.run(workflow.read("below/mine.toml", output="o.nc"))
+    (folder / "below/mine.py").write_text(SCENE)
+    engine.run(workflow.read("below/mine.toml", output="o.nc"))
+
+
+STRENGTH = 2.0
+
+
+def helper(x):
+    return STRENGTH * np.cos(2 * x)
+
+
+def calls(u, p):
+    return p[0] - p[1] * helper(u)
+
+
+def mathieu(u, p):
+    return p[0] - p[1] * (STRENGTH * np.cos(2 * u))
+
+
+def scene(z=mathieu, **given):
+    return survey.hill(z, **({"period": np.pi, "parameters": ("a", "q"), "even": True} | given))
+
+
+def test_the_hash_tells_of_all_that_a_function_depends_on(monkeypatch):
+    first = scene().HASH
+    assert scene().HASH == first
+    given = [{"period": 2 * np.pi}, {"even": False}, {"breaks": 1.0}, {"parameters": ("a", "b")}]
+    others = [scene(**more).HASH for more in given] + [scene(z).HASH for z in (_times(2.0), _times(3.0), calls)]
+    monkeypatch.setitem(globals(), "STRENGTH", 3.0)
+    others += [scene().HASH, scene(calls).HASH]
+    assert len({first, *others}) == 10
+
+
+def _times(f):
+    return lambda u, p: p[0] - f * p[1] * np.cos(2 * u)
+
+
+def test_a_function_from_python_runs_in_other_processes(tmp_path, monkeypatch):
+    axes = {"a": {"start": -1.0, "stop": 10.0, "num": 8}, "q": 1.0}
+    given = {"scene": scene(_times(2.0)), "axes": axes}
+    one = survey.run(given, output=tmp_path / "one.nc")
+    two = survey.run(given, output=tmp_path / "two.nc", workers=1)
+    xr.testing.assert_equal(one.drop_attrs(), two.drop_attrs())
+    assert "return lambda u, p" in one.attrs["scene_text"]
+    assert user_scene.of_dataset(one).HASH == one.attrs["scene_hash"]
+    monkeypatch.setattr(user_scene, "_made", {})  # as in another session
+    with pytest.raises(BadInput, match="was a function given from Python"):
+        user_scene.of_dataset(survey.open(tmp_path / "one.nc"))
+
+
+@pytest.mark.parametrize("workers", [None, 1])  # each worker compiles z anew
+def test_what_z_raises_in_the_middle_of_a_run_is_one_line(workers, tmp_path):
+    def z(u, p):
+        if 0.2 < p[0] < 0.3:
+            raise ValueError("no")
+        return p[0]
+
+    axes = {"a": {"start": 0.0, "stop": 1.0, "num": 50}, "q": 1.0}
+    with pytest.raises(BadInput, match=r"hill\(z\): z\(u, p\) raises ValueError\('no'\); let it return nan") as refusal:
+        survey.run({"scene": scene(z), "axes": axes}, output=tmp_path / "o.nc", workers=workers)
+    assert "\n" not in str(refusal.value)
+
+
+def test_dask_input_stays_lazy_and_gives_the_same_bits():
+    a, q = np.linspace(0.0, 9.0, 6), np.array([0.5, 1.0])
+    ds = survey.evaluate(scene(), a=xr.DataArray(da.from_array(a, chunks=4), dims="a"), q=q)
+    assert ds.y1.chunks
+    loaded = survey.evaluate(scene(), a=a, q=q)
+    for name in loaded.data_vars:
+        np.testing.assert_array_equal(ds[name].compute(), loaded[name])
+
+
+def test_where_z_is_not_even_the_outputs_say_so_and_there_are_no_edges():
+    odd = scene(lambda u, p: p[0] + p[1] * np.sin(2 * u) ** 3, even=False)
+    ds = survey.evaluate(odd, a=1.0, q=1.0)
+    assert ds.y1.attrs["long_name"].startswith("y1(T),") and ds.dy2.attrs["symbol"] == "y_2'(T)"
+    axes = {"a": {"start": -1.0, "stop": 10.0, "num": 8}, "q": {"start": 1.0, "stop": 2.0, "num": 8}}
+    for table in ({"boundaries": {}}, {"refine": {"width": 0.1}}):
+        with pytest.raises(BadInput, match=rf"{next(iter(table))}: the z of .* is not even"):
+            survey.run({"scene": odd, "axes": axes} | table)
+
+
+BAD = [
+    ("def z(u, p):", "def w(u, p):", "z is missing; write def z"),
+    ("PERIOD = pi", "", "PERIOD is missing; write"),
+    ("PERIOD = pi", "PERIOD = -pi", "PERIOD = -3.14.*positive number"),
+    ("PERIOD = pi", "PERIOD = lambda p: -p[1]", "PERIOD is -0.5 at a = 1, q = 0.5; make it positive"),
+    ("PERIOD = pi", "PERIOD = lambda p: p[2]", r"PERIOD\(p\) fails"),
+    ("PERIOD = pi", "PERIOD = 3.0", r"EVEN = True, but z\(T - u\) is not z\(u\) at a = 1, q = 0.5, T = 3"),
+    ("PERIOD = pi\nEVEN = True", "PERIOD = 3.0", r"z\(T\) is not z\(0\)"),
+    ("cos(2 * u)", "cos(2 * u - 0.3)", r"EVEN = True, but z\(T - u\) is not z\(u\).*set EVEN = False"),
+    ("EVEN = True", "EVEN = 'yes'", "EVEN = 'yes': it is True or False"),
+    ("cos(2 * u)", "abs(cos(2 * u))", "z is not smooth at a = 1, q = 0.5; name the places"),
+    ("p[0]", "(-p[0] - u) ** 0.5", "z has no finite value at a = 1, q = 0.5"),
+    ("p[0]", "p[2]", r"PARAMETERS names 2: p\[0\] to p\[1\]"),
+    ("p[0]", "unknown(u)", r"cannot compile z\(u, p\) \(name 'unknown' is not defined\)"),
+    ("return p[0]", "return 'a'\n    p[0]", r"z\(u, p\) returns 'a'; it must return a real number"),
+    ("return", "if p[0] > 0: raise ValueError('no')\n    return", r"z\(u, p\) raises ValueError\('no'\)"),
+    ("z(u, p)", "z(u, a, q)", "z must be a function of two arguments"),
+    ("def z(u, p):", "def z(u, p)", "no scene that runs .SyntaxError"),
+    ("from math", "from maths", "no scene that runs .ModuleNotFoundError"),
+    ('"a", "q"', '"a", "a"', "PARAMETERS = .*each once"),
+    ('"a", "q"', '"a", "y1"', "PARAMETERS = .*no output's"),
+    ("EVEN = True", "BREAKS = (1.0, 4.0)", "BREAKS: 4 lies outside 0 <= u <= T"),
+    ("EVEN = True", "BREAKS = lambda p: 7.0", "BREAKS lie outside 0 <= u <= T at a = 1"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "words"), BAD, ids=[new.split("\n")[0] for _, new, _ in BAD])
+def test_what_is_wrong_with_a_scene_is_said_in_one_line(folder, old, new, words):
+    assert old in SCENE
+    (folder / "bad.py").write_text(SCENE.replace(old, new, 1))
+    names = {"a": 1.0, "q": 0.5} if '"y1"' not in new else {"a": 1.0, "y1": 0.5}
+    with pytest.raises(BadInput, match=words) as refusal:
+        survey.evaluate("bad.py", **names)
+    assert "\n" not in str(refusal.value) and str(refusal.value).startswith("bad.py: ")
+
+
+def test_what_is_no_scene_is_refused(folder):
+    with pytest.raises(BadInput, match=r"there is no file gone\.py or below/gone\.py; name the file"):
+        workflow.check({"scene": "gone.py", "axes": {"a": 1.0}}, near="below")
+    with pytest.raises(BadInput, match=r"is a function; give survey\.hill\(mathieu"):
+        survey.evaluate(mathieu, a=1.0, q=1.0)
+    with pytest.raises(BadInput, match="scene = 5: input should be a valid string"):
+        workflow.check({"scene": 5, "axes": {"a": 1.0}})
+    with pytest.raises(BadInput, match=r"axes\.aa: unknown parameter of scene hill\(mathieu\) 'aa'; did you mean 'a'"):
+        workflow.check({"scene": scene(), "axes": {"aa": {"num": 3}, "q": 1.0}})
+    with pytest.raises(BadInput, match="a is missing"):
+        survey.evaluate(scene(), q=1.0)
+
+
+def test_an_equation_without_a_force_is_answered():
+    free = survey.hill(lambda u, p: p[0] + 0 * u, period=92.65606698476718, parameters="a")
+    ds = survey.evaluate(free, a=[0.0, 1e-3])
+    assert (ds.status == 0).all() and ds.verdict[0] != 0  # y = 1 and y = u: D = 2, on an edge
+    assert abs(ds.discriminant[0] - 2) <= ds.discriminant_error[0]

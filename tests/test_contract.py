@@ -1,0 +1,80 @@
+"""A scene or method that does not keep to its table is refused in one line that names the file and the table."""
+
+import importlib.util
+import shutil
+from pathlib import Path
+
+import pytest
+
+import survey.methods
+import survey.scenes
+from survey import BadInput, contract, measures, modules
+
+SCENE = Path(survey.scenes.__file__).with_name("mathieu.py")
+METHOD = Path(survey.methods.__file__).with_name("magnus6.py")
+
+
+def changed(path, tmp_path, old, new):
+    """The module of a copy of the file in which `old` stands as `new`."""
+    text = path.read_text()
+    assert text.count(old) >= 1
+    copy = tmp_path / path.name
+    copy.write_text(text.replace(old, new))
+    spec = importlib.util.spec_from_file_location(f"changed_{path.stem}", copy)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("def trajectory(", "def trajectry(", "trajectry is not in the table; did you mean 'trajectory'"),
+        ("TITLE = ", "TITEL = ", "TITEL is not in the table; did you mean 'TITLE'"),
+        ("AUDIT = ", "_AUDIT = ", "AUDIT is missing: methods by which"),
+        ("def cost(options, sizes)", "def cost(options)", r"cost\(options\) must be cost\(options, sizes\)"),
+        ("OPTIONS = ()", "OPTIONS = []", r"OPTIONS = \[\] must be of type tuple"),
+        ("def cost(options, sizes):", "cost = 1e-6\n\n\ndef _cost(options, sizes):", "cost must be a function"),
+    ],
+)
+def test_a_typo_in_a_scene_is_one_line(tmp_path, old, new, words):
+    scene = changed(SCENE, tmp_path, old, new)
+    with pytest.raises(BadInput, match=words) as refused:
+        contract.check(scene, survey.scenes.CONTRACT, "survey/scenes/__init__.py")
+    line = str(refused.value)
+    assert line.startswith(str(tmp_path / "mathieu.py")) and line.endswith("the table is in survey/scenes/__init__.py")
+    assert "\n" not in line
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("def hill_scatter(", "def hill_scater(", "hill_scater is not in the table; did you mean 'hill_scatter'"),
+        ('SERVES = ("hill",)', 'SERVES = ("hil",)', "SERVES names no family 'hil'"),
+        ("ORDER = 6", "ORDER = 6.0", "ORDER = 6.0 must be of type int"),
+        ("def hill_density(rtol)", "def hill_density(tolerance)", r"must be hill_density\(rtol\)"),
+        ("SERVES = ", "_SERVES = ", "SERVES is missing"),
+    ],
+)
+def test_a_typo_in_a_method_is_one_line(tmp_path, old, new, words):
+    method = changed(METHOD, tmp_path, old, new)
+    with pytest.raises(BadInput, match=words) as refused:
+        measures.check(method)
+    assert str(tmp_path / "magnus6.py") in str(refused.value) and "survey/methods/__init__.py" in str(refused.value)
+
+
+def test_all_scenes_and_methods_keep_to_their_tables():
+    for name in modules.names(survey.scenes):
+        survey.scenes.load(name)
+    for name in modules.names(survey.methods):
+        measures.method(name)
+
+
+def test_a_new_file_is_checked_when_it_is_loaded(tmp_path, monkeypatch):
+    folder = tmp_path / "more"
+    folder.mkdir()
+    shutil.copy(SCENE, folder / "mathew.py")
+    (folder / "mathew.py").write_text(SCENE.read_text().replace("def trajectory(", "def trajectry("))
+    monkeypatch.setattr(survey.scenes, "__path__", [*survey.scenes.__path__, str(folder)])
+    with pytest.raises(BadInput, match="did you mean 'trajectory'"):
+        survey.evaluate("mathew", a=1.0, q=0.1)
