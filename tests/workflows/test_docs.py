@@ -135,6 +135,34 @@ def test_the_method_of_the_page_passes_what_every_method_passes(added, monkeypat
     assert conformance.bars_hold(method)
 
 
+def test_the_graph_of_imports_is_drawn_and_every_arrow_points_down(tool, tmp_path):
+    architecture = tool("architecture")
+    imports = architecture.modules()
+    architecture.check(imports)
+    architecture.draw(imports, tmp_path / "imports.svg")
+    assert (tmp_path / "imports.svg").read_text().rstrip().endswith("</svg>")
+    page = architecture.page(imports)
+    for path in (ROOT / "survey").iterdir():
+        if path.suffix == ".py" or (path / "__init__.py").exists():
+            assert path.stem == "__init__" or f"| `{path.stem}` |" in page, path.stem
+
+
+@pytest.mark.parametrize(
+    ("importer", "imported", "words"),
+    [
+        ("survey.kernels.jit", "survey.kernels.lanes", "in a cycle"),
+        ("survey.kernels.jit", "survey.sweep.plan", "in a cycle|not below"),
+        ("survey.errors", "survey.scene", "errors imports scene, which is not below it"),
+        ("survey.errors", "survey.unheard_of", "no layer for unheard_of"),
+    ],
+)
+def test_an_import_upwards_or_in_a_cycle_is_refused(tool, importer, imported, words):
+    imports = tool("architecture").modules()
+    imports[importer] = {*imports[importer], imported}
+    with pytest.raises(ValueError, match=words):
+        tool("architecture").check(imports)
+
+
 def test_every_figure_has_its_words_and_one_command(tool):
     figures = tool("figures")
     for path in (ROOT / "results").glob("*.png"):

@@ -12,6 +12,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import architecture
 import comparisons
 import figures
 import scene_pages
@@ -30,7 +31,11 @@ def assemble(source):
     (source / "notebooks").mkdir()
     for path in sorted((ROOT / "workflows/notebooks").glob("*.ipynb")):
         shutil.copy(path, source / "notebooks")
+    imports = architecture.modules()
+    architecture.check(imports)
+    architecture.draw(imports, source / "imports.svg")
     made = scene_pages.pages() | {"figures.md": figures.page(), "peers.md": comparisons.page()}
+    made["architecture.md"] = architecture.page(imports)
     made["changelog.md"] = (ROOT / ".github/CHANGELOG.md").read_text()
     made["contributing.md"] = (ROOT / ".github/CONTRIBUTING.md").read_text()
     made["notebooks/index.md"] = _notebooks(source / "notebooks")
