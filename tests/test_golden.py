@@ -1,6 +1,7 @@
 """Small files of every scene, kept: an accidental change of the layout, of a code, or of a value beyond its bar shows.
 
-What is meant to change is written anew: `survey run NAME.toml --fresh` in `tests/golden`, and the change is told.
+After an intended change, regenerate them (`survey run NAME.toml --fresh` in `tests/golden`) and document the change.
+Every scene with its own page of mathematics has one (`tests/workflows/test_docs.py`).
 """
 
 import subprocess
@@ -11,8 +12,6 @@ import netCDF4
 import numpy as np
 import pytest
 
-import survey.scenes
-from survey import modules
 from survey.file import reading
 
 FOLDER = Path(__file__).parent / "golden"
@@ -23,7 +22,7 @@ WORDS = {"_FillValue", "comment", "long_name"}  # a fill value may be NaN, and w
 COMPILERS = ("version_numba", "version_llvmlite", "version_numpy", "cpu")
 
 
-@pytest.fixture(scope="module", params=modules.names(survey.scenes))
+@pytest.fixture(scope="module", params=sorted(path.stem for path in FOLDER.glob("*.toml")))
 def both(request, tmp_path_factory):
     """The kept file and one of today, open."""
     folder = tmp_path_factory.mktemp(request.param)

@@ -1,20 +1,26 @@
 """Every snippet of the documentation runs; every figure has its command; the page on adding files adds working ones."""
 
+import importlib
 import inspect
 import json
 import re
 import shlex
 import sys
 import tomllib
+from pathlib import Path
 
 import matplotlib.pyplot as plt
+import numpy as np
 import pytest
 import snippets
+import xarray as xr
+from mpmath import mp
 from snippets import ROOT, fenced
 
 import survey.methods
 import survey.scenes
-from survey import cli, modules, status
+from survey import cli, measures, modules, status
+from survey.methods import agm, carlson
 from survey.request import workflow
 
 DOCS = ROOT / "workflows/docs"
@@ -44,7 +50,7 @@ def tool(monkeypatch):
 def test_the_python_of_a_page_runs(page, folder):
     scope = {"__name__": "__main__"}
     for code in fenced(page.read_text(), "python"):
-        if not code.startswith("# file: "):
+        if not code.startswith(("# file: ", "# added to: ")):
             exec(compile(code, page.name, "exec"), scope)
 
 
@@ -79,42 +85,72 @@ def test_every_key_of_a_workflow_is_told():
 
 @pytest.fixture
 def added(tmp_path, monkeypatch):
-    """The module of a file on the page `extend`, in its folder for the time of the test: added(folder, name)."""
+    """Put a file of the page `extend` in its package for the time of the test: added(path) gives its module."""
+    blocks = dict(re.findall(r"```python\n# file: (\S+)\n(.*?)```", (DOCS / "extend.md").read_text(), re.DOTALL))
 
-    def add(package, name):
-        kind = package.__name__.rpartition(".")[2]
-        (code,) = re.findall(rf"```python\n# file: survey/{kind}/{name}\.py\n(.*?)```", page, re.DOTALL)
-        (tmp_path / f"{name}.py").write_text(code)
-        monkeypatch.setattr(package, "__path__", [*package.__path__, str(tmp_path)])
-        monkeypatch.setitem(sys.modules, f"{package.__name__}.{name}", None)
-        del sys.modules[f"{package.__name__}.{name}"]
-        return modules.load(package, name, kind)
+    def add(path):
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).write_text(blocks[path])
+        name = path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+        package = importlib.import_module(name.rpartition(".")[0])
+        if str(tmp_path) not in package.__path__[0]:
+            monkeypatch.setattr(
+                package, "__path__", [*package.__path__, str(tmp_path / package.__name__.replace(".", "/"))]
+            )
+        monkeypatch.setitem(sys.modules, name, None)
+        del sys.modules[name]
+        return importlib.import_module(name)
 
-    page = (DOCS / "extend.md").read_text()
-    return add
+    yield add
+    _forget()
 
 
-def test_the_scene_of_the_page_passes_what_every_scene_passes(added, monkeypatch):
+def _forget():
+    """Forget which families and methods there were."""
+    measures._folder.cache_clear()
+    measures.check.cache_clear()
+
+
+@pytest.fixture
+def extended(tmp_path, monkeypatch):
+    """Give a method what the page `extend` adds to its file: extended(method)."""
+    blocks = dict(re.findall(r"```python\n# added to: (\S+)\n(.*?)```", (DOCS / "extend.md").read_text(), re.DOTALL))
+
+    def extend(method):
+        name = Path(method.__file__).name
+        (tmp_path / name).write_text(blocks[f"survey/methods/{name}"])
+        scope = dict(vars(method))
+        exec(compile((tmp_path / name).read_text(), tmp_path / name, "exec"), scope)
+        monkeypatch.setattr(method, "gauss_periods", scope["gauss_periods"], raising=False)
+        monkeypatch.setattr(method, "SERVES", (*method.SERVES, "oscillation"))
+
+    yield extend
+    _forget()
+
+
+def passes_what_every_scene_passes(scene, monkeypatch):
     import test_scenes
 
-    scene, ran = added(survey.scenes, "vertical"), 0
+    ran = 0
     for name, check in vars(test_scenes).items():
         needs = inspect.signature(check).parameters if name.startswith("test_") else {}
         if "scene" in needs:
             with monkeypatch.context() as own:
-                check(
-                    **{k: v for k, v in {"seed": 1, "monkeypatch": own}.items() if k in needs}, scene=scene, options={}
-                )
+                others = {k: v for k, v in {"seed": 1, "monkeypatch": own}.items() if k in needs}
+                check(scene=scene, options={}, **others)
             ran += 1
-    assert ran >= 6
+    return ran >= 6
+
+
+def test_the_scene_of_the_page_passes_what_every_scene_passes(added, monkeypatch):
+    assert passes_what_every_scene_passes(added("survey/scenes/vertical.py"), monkeypatch)
 
 
 def test_what_is_known_of_the_scene_of_the_page(added):
     """At e = 0 the frequency is sqrt K; against DOP853 of scipy at e = 0.6."""
-    import numpy as np
     from scipy.integrate import solve_ivp
 
-    added(survey.scenes, "vertical")
+    added("survey/scenes/vertical.py")
     ds = survey.evaluate("vertical", K=[0.3, 8.0], e=[0.0, 0.6])
     assert (abs(ds.discriminant[:, 0] - 2 * np.cos(2 * np.pi * np.sqrt(ds.K))) <= ds.discriminant_error[:, 0]).all()
     slope = lambda f, y: [y[1], -(1 + 7.0 / (1 + 0.6 * np.cos(f))) * y[0]]  # noqa: E731
@@ -130,9 +166,30 @@ def test_the_method_of_the_page_passes_what_every_method_passes(added, monkeypat
     monkeypatch.syspath_prepend(str(ROOT / "tests/methods"))
     import test_method_conformance as conformance
 
-    method = added(survey.methods, "magnus4")
+    method = added("survey/methods/magnus4.py")
     assert abs(conformance.measured_order(method) - method.ORDER) < 0.15
     assert conformance.bars_hold(method)
+
+
+def test_the_question_of_the_page(added, extended, monkeypatch):
+    """Its scene passes what every scene passes, and its period is a complete elliptic integral."""
+    for name in ("__init__", "period"):
+        added(f"survey/measures/oscillation/{name}.py")
+    added("survey/methods/trapezoid.py")
+    extended(agm)
+    extended(carlson)
+    _forget()
+    assert passes_what_every_scene_passes(added("survey/scenes/duffing.py"), monkeypatch)
+    points = [(1.0, 1.0, 1.5), (2.0, -0.3, 1.5), (0.5, 40.0, 1.5), (1.0, -1.0, 1 - 1e-9)]
+    a, b, amplitude = (xr.DataArray(list(column), dims="n") for column in zip(*points, strict=True))
+    with mp.workdps(40):
+        exact = [4 * mp.ellipk(y * z**2 / (2 * u)) / mp.sqrt(u) for x, y, z in points for u in [x + y * mp.mpf(z) ** 2]]
+        for method in ("auto", "carlson", "trapezoid"):
+            ds = survey.evaluate("duffing", a=a, b=b, A=amplitude, method=method)
+            off = [abs(x - y) for x, y in zip(exact, ds.period.values.tolist(), strict=True)]
+            assert (np.array(off, float) <= ds.period_error).all() and (ds.verdict == 1).all(), method
+            assert (ds.period_error[:3] < 1e-10).all() and ds.period_error[3] < 1e-4, method
+    assert survey.evaluate("duffing", a=1.0, b=-1.0, A=[1.0, 1.1]).verdict.values.tolist() == [-1, 0]
 
 
 def test_the_graph_of_imports_is_drawn_and_every_arrow_points_down(tool, tmp_path):
@@ -198,15 +255,22 @@ def test_notebooks_are_kept_without_outputs(path):
     assert all(not cell["outputs"] and cell["execution_count"] is None for cell in cells if cell["cell_type"] == "code")
 
 
-def test_every_scene_has_its_notebook():
-    assert set(modules.names(survey.scenes)) | {"own_hill", "overnight"} <= {path.stem for path in NOTEBOOKS}
+def test_a_scene_with_its_mathematics_has_its_notebook_and_its_kept_file():
+    """A scene is whole in its own file; published ones have NAME.md, a notebook and a golden file besides."""
+    named = {path.stem for path in (ROOT / "survey/scenes").glob("*.md")}
+    assert named <= set(modules.names(survey.scenes))
+    assert {path.stem for path in NOTEBOOKS} == named | {"own_hill", "overnight"}
+    assert {path.stem for path in (ROOT / "tests/golden").glob("*.toml")} == named
 
 
-def test_every_scene_has_its_mathematics_and_its_page_shows_it(tool):
-    pages = tool("scene_pages").pages()
-    for name in modules.names(survey.scenes):
-        title = (ROOT / f"survey/scenes/{name}.md").read_text().partition("\n")[0].removeprefix("# ")
-        assert tool("scene_pages").escaped(title) in pages[f"scenes/{name}.md"], name
+@pytest.mark.parametrize("name", modules.names(survey.scenes))
+def test_every_scene_has_its_page_with_its_mathematics(tool, name):
+    page = tool("scene_pages").pages()[f"scenes/{name}.md"]
+    path = ROOT / f"survey/scenes/{name}.md"
+    assert path.exists() == (f"{name}.md" in survey.scenes.load(name).__doc__)
+    if path.exists():
+        title = path.read_text().partition("\n")[0].removeprefix("# ")
+        assert tool("scene_pages").escaped(title) in page
 
 
 def test_an_item_of_a_list_keeps_its_lines(tool):

@@ -9,13 +9,13 @@ UNITS = (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9))
 INTRODUCTION = """\
 # How it compares
 
-Time per point on one thread that each method of `survey`, and the best other programs, need for a stated accuracy: the
-largest error relative to 1 + |value|, over reference points whose values are known to 30 and more digits. Each peer is
-put to its best use, which its file in `survey/peers/` tells. Peers give no error bars: `wrong` counts the references
-whose verdict is given wrongly; undecided is not wrong.
+Time per point, on one thread, that each method of `survey` and the best other programs need for a stated accuracy: the
+largest error relative to 1 + |value| over reference points whose values are known to 30 digits or more. Each peer is
+used at its best; its file in `survey/precision/peers/` documents how. Peers give no error bars: `wrong` counts the
+reference points for which the verdict is wrong; undecided is not wrong.
 
-`survey precision SCENE --peers` measures all this again on your machine. On this page every number is read from the
-kept measurements when the page is built; a dash says that no setting that was tried reached the accuracy.
+`survey precision SCENE --peers` repeats all this on your machine. Every number on this page is read from the stored
+measurements when the page is built; a dash means that none of the settings tried reached the accuracy.
 """
 
 
