@@ -63,7 +63,7 @@ def test_the_notebook_example_runs(folder):
 
 def test_the_scene_of_ones_own_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (call,) = re.findall(r'`survey.evaluate\("two_harmonics.py",\n(.*?)\)`', README)
+    (call,) = re.findall(r'`survey.evaluate\("two_harmonics.py",\s(.*?)\)`', README)
     (tmp_path / "two_harmonics.py").write_text(fenced("python")[1])
     ds = survey.evaluate("two_harmonics.py", **eval(f"dict({call})"))
     assert int(ds.verdict) == 1 and ds.attrs["title"].startswith("Mathieu's equation with a second harmonic")

@@ -1,6 +1,8 @@
 """Sphinx's configuration; `build.py` beside this file assembles the pages and calls it. No network is needed."""
 
 import re
+import sys
+from pathlib import Path
 
 import numpy.typing as npt
 from sphinx.util.typing import stringify_annotation
@@ -9,7 +11,9 @@ import survey.api  # so that the API pages show what users call  # noqa: F401
 
 project = "survey"
 author = "the survey founders"
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx_click"]
+sys.path.insert(0, str(Path(__file__).parent))
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx_click", "formulas"]
+html_math_renderer = "drawn"
 html_theme = "furo"
 html_title = "survey"
 html_static_path = ["static"]
@@ -21,7 +25,7 @@ smartquotes = False  # y'' is no quotation
 default_role = "code"
 nitpicky = False
 myst_heading_anchors = 3
-myst_enable_extensions = ["deflist"]
+myst_enable_extensions = ["deflist", "dollarmath"]
 nb_execution_mode = "off"  # nbmake has executed them: see build.py
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True

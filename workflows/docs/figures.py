@@ -10,8 +10,8 @@ RESULTS = ROOT / "results"
 INTRODUCTION = """\
 # Figures, and the commands that make them
 
-Every figure of the README and of this documentation is made by one command, run in the repository's root; those of the
-notebooks are made by the notebooks.
+Every figure of the README and of this documentation is made by one command, run in the root of the repository;
+those of the notebooks are made by the notebooks.
 """
 
 

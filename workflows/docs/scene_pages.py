@@ -31,7 +31,7 @@ def pages():
 def _page(name):
     scene = survey.api.scene(name)
     parts = [f"# {name}", scene["title"] + ".", f"```text\n{scene['about']}\n```"]
-    parts += [*_results(name, survey.api.scenes()), "## In words", f"As `survey scenes {name}` tells it."]
+    parts += [*_results(name, survey.api.scenes()), "## In words", f"The output of `survey scenes {name}`."]
     for heading in LISTS:
         rows = [f"| `{key}` | {escaped(words).replace('|', chr(92) + '|')} |" for key, words in scene[heading].items()]
         parts += ["\n".join([f"| {heading} | |", "|---|---|", *rows])] if rows else []
