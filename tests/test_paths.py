@@ -43,3 +43,9 @@ def test_what_is_named_exists(page):
     paths, modules = named(page.read_text())
     gone = [p for p in paths if not (ROOT / p).exists() and p not in EXTENDED and not MADE.fullmatch(p)]
     assert gone == [] and [module for module in modules if not exists(module)] == []
+
+
+def test_the_tests_mirror_the_packages():
+    """Tests of a package lie in a folder of its name; a file that bears no module's name says what it checks."""
+    folders = {path.parent.relative_to(ROOT / "tests") for path in (ROOT / "tests").rglob("test_*.py")}
+    assert [f for f in sorted(folders) if not ((ROOT / "survey" / f).is_dir() or str(f) == "workflows")] == []

@@ -164,7 +164,7 @@ def test_what_is_known_of_the_scene_of_the_page(added):
 
 def test_the_method_of_the_page_passes_what_every_method_passes(added, monkeypatch):
     monkeypatch.syspath_prepend(str(ROOT / "tests/methods"))
-    import test_method_conformance as conformance
+    import test_hill_conformance as conformance
 
     method = added("survey/methods/magnus4.py")
     assert abs(conformance.measured_order(method) - method.ORDER) < 0.15

@@ -1,6 +1,6 @@
-"""What every method promises, for each one found in its folder: its order, and bars that hold the error.
+"""What every method in the folder promises of Hill's equation: its order, and bars that hold the error.
 
-Family "hill": Mathieu's equation, whose z varies strongly in time.
+The equation is Mathieu's, whose z varies strongly in time.
 """
 
 from types import SimpleNamespace
