@@ -147,6 +147,9 @@ def transcendental(results, squares, wanted, rtol, whole, floats, verdict, late,
                     doubt = min(results[i, 6] * (abs(results[i, 1]) + results[i, 5]), 1.0)
             x, bar = _rotation(sine, sine_bar, cosine, cosine_bar, verdict[i], zeros)
             bar += sqrt(doubt) if verdict[i] != UNSTABLE else 0.0
+            if not whole:  # a zero next to T/2 may be miscounted where the other product's sign does not tell
+                bar += 0.5 * (abs(results[i, 0]) <= results[i, 4] and not sine > sine_bar)
+                bar += 0.5 * (abs(results[i, 2]) <= results[i, 6] and not cosine > cosine_bar)
             floats[ROTATION, i], floats[ROTATION + 1, i] = x, bar
             late[i] |= not bar <= rtol * (1.0 + x)
 
