@@ -11,6 +11,7 @@ only delta_i counts. Steps never depend on the times or places asked for.
 
 import math
 
+from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.equilibria import settled
 from survey.kernels.cylinder.flow import (
     BOUND_DG,
@@ -86,7 +87,7 @@ def expand(begin, p, phi, w, how, T):
 
 @inline
 def trajectory(setting, begin, at, p, phi0, w0, times, tolerance, limit, floats, turnings):
-    """Fill floats[j] = phi, w, bar phi, bar w and turnings[j] at the ascending times[j] >= 0; returns a status."""
+    """Fill floats[j] (PHI to W_BAR) and turnings[j] at the ascending times[j] >= 0; returns a status."""
     T = table()
     how = setting(p, w0, tolerance)
     phi, turns = reduced(phi0)
@@ -106,13 +107,13 @@ def trajectory(setting, begin, at, p, phi0, w0, times, tolerance, limit, floats,
             x, v, _e, _y = at(p, T, dt)
             a, _b, c = carried(p, T, dt, v, saa, sab, sbb)
             bar_phi, bar_w = bar(n, a), bar(n, c)
-            floats[j, 0], floats[j, 1] = x + turns * TWO_PI, v
-            floats[j, 2], floats[j, 3] = bar_phi + 3e-16 * abs(turns) * TWO_PI, bar_w
+            floats[j, rc.PHI], floats[j, rc.W] = x + turns * TWO_PI, v
+            floats[j, rc.PHI_BAR], floats[j, rc.W_BAR] = bar_phi + 3e-16 * abs(turns) * TWO_PI, bar_w
             from_rest = n == 1 and w0 == 0.0  # then w is 0 at the start and nowhere else
             told = unsure < 3 and count >= 0 and (abs(v) > bar_w or from_rest)
             turnings[j] = count + (v * sign < 0.0 and not from_rest) if told else UNTOLD
             if not (bar_phi < TRUST and bar_w < TRUST * (1.0 + abs(v))):
-                floats[j, 0] = floats[j, 1] = floats[j, 2] = floats[j, 3] = math.nan
+                floats[j, rc.PHI] = floats[j, rc.W] = floats[j, rc.PHI_BAR] = floats[j, rc.W_BAR] = math.nan
                 turnings[j] = UNTOLD
                 return NO_CONVERGENCE
             j += 1
@@ -255,8 +256,8 @@ def node_ahead(p, phi, w):
 def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, status):
     """The solution from (phi0, w0 >= 0) at ascending targets >= phi0, forward in time.
 
-    Fills floats[j] = w, t, bar w, bar t at targets[j] with status OK, or phi, t, bar phi, bar t of the turning point
-    before it, or within bar phi of it, with TURNING; EQUILIBRIUM where the solution runs into one first, SEPARATRIX
+    Fills floats[j] (VALUE to TIME_BAR) at targets[j] with status OK, or those of the turning point before it, or
+    within whose bar it lies, with TURNING; EQUILIBRIUM where the solution runs into one first, SEPARATRIX
     where the error bar cannot tell whether it turns. OK is certain: a target that is reached with no certain w is in
     doubt until the solution has left it behind.
     """
@@ -272,12 +273,13 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
         # within rounding of an equilibrium it is not told to which side the solution leaves it
         ending = TURNING if start_sign(p, phi, w0) < 0 else (EQUILIBRIUM if rests(p, phi0, w0) else SEPARATRIX)
         while j < size and targets[j] == phi0:
-            floats[j, 0] = floats[j, 1] = floats[j, 2] = floats[j, 3] = 0.0
+            floats[j, rc.VALUE] = floats[j, rc.TIME] = floats[j, rc.VALUE_BAR] = floats[j, rc.TIME_BAR] = 0.0
             status[j] = OK
             j += 1
         for i in range(j, size):
             status[i] = ending
-            floats[i, 0], floats[i, 1], floats[i, 2], floats[i, 3] = phi0, 0.0, 0.0, 0.0
+            floats[i, rc.VALUE] = phi0
+            floats[i, rc.TIME] = floats[i, rc.VALUE_BAR] = floats[i, rc.TIME_BAR] = 0.0
         return
     while j < size or doubt >= 0:
         if n >= limit:
@@ -304,8 +306,8 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
             a += (3e-16 * abs(targets[j])) ** 2 + (2e-16 * h * v) ** 2
             f, g, _dg = values(p, x)
             fill_crossing(floats, j, n, v, t + (dt + t_low), a, b, c, f, g)
-            usable = bar(n, a) < TRUST and floats[j, 2] < TRUST * (1.0 + abs(v))
-            usable = usable and floats[j, 3] < TRUST * (1.0 + floats[j, 1])
+            usable = bar(n, a) < TRUST and floats[j, rc.VALUE_BAR] < TRUST * (1.0 + abs(v))
+            usable = usable and floats[j, rc.TIME_BAR] < TRUST * (1.0 + floats[j, rc.TIME])
             status[j] = OK if usable else NO_CONVERGENCE
             if doubt < 0 and not certain(floats[j]):
                 doubt = j
@@ -324,8 +326,9 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
             for i in range(doubt if doubt >= 0 else j, size):
                 if i >= j or not certain(floats[i]):
                     status[i] = ending
-                    floats[i, 0], floats[i, 1] = x1 + turns * TWO_PI, t + (reach + t_low)
-                    floats[i, 2], floats[i, 3] = edge + 4e-16 * abs(floats[i, 0]), bar_t * 1.2
+                    floats[i, rc.VALUE], floats[i, rc.TIME] = x1 + turns * TWO_PI, t + (reach + t_low)
+                    floats[i, rc.VALUE_BAR] = edge + 4e-16 * abs(floats[i, rc.VALUE])
+                    floats[i, rc.TIME_BAR] = bar_t * 1.2
             return
         phi, w = x1, v1
         high = t + h
@@ -354,7 +357,7 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
 @inline
 def certain(row):
     """Is w so certain, at a target, that a turning point is further away than the bar of phi?"""
-    return row[2] < 0.1 * row[0]
+    return row[rc.VALUE_BAR] < 0.1 * row[rc.VALUE]
 
 
 @inline
@@ -364,12 +367,14 @@ def fill_crossing(floats, j, n, v, t, a, b, c, f, g):
     Near a turning point w^2 is smooth in phi while w is not; there the bar is that of w^2.
     """
     n += 2  # the initial phi, the target and the time where it is reached err too: no more than four terms
-    floats[j, 0], floats[j, 1] = max(v, 0.0), t
+    floats[j, rc.VALUE], floats[j, rc.TIME] = max(v, 0.0), t
     slope = (f * v + g) / v if v > 0.0 else math.inf
     spread = bar(n, c - 2.0 * slope * b + slope * slope * a) if v > 0.0 else math.inf
     bar_phi, bar_w = bar(n, a), bar(n, c)
     if not spread < 0.1 * v:
         spread = 2.0 * (bar_w + math.sqrt(abs(2.0 * (abs(g) + abs(f) * bar_w) * bar_phi))) + v
-    floats[j, 2] = spread
+    floats[j, rc.VALUE_BAR] = spread
     accel = max(abs(f * v + g), 1e-300)
-    floats[j, 3] = min(bar_phi / v if v > 0.0 else math.inf, spread / accel + bar_w / accel) * 1.2 + 4e-16 * abs(t)
+    floats[j, rc.TIME_BAR] = min(
+        bar_phi / v if v > 0.0 else math.inf, spread / accel + bar_w / accel
+    ) * 1.2 + 4e-16 * abs(t)

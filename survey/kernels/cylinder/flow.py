@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from survey.kernels.cylinder.records import PHI0, START_PHI, START_W, W0
 from survey.kernels.jit import inline, kernel
 
 ORDER = 20  # of the Taylor series in t; near -ln(eps)/2 + 1 = 19 the work per unit of time is least (Jorba & Zou)
@@ -38,13 +39,13 @@ def coefficients(b12, b31, d, c23, s2, s3):
 
 @kernel
 def spread(rows, P, starts):
-    """Fill P with the `coefficients` of rows of eight numbers, and starts with their phi0, w0."""
+    """Fill P with the `coefficients` of rows of GIVEN numbers (see `records`), and starts with their phi0, w0."""
     for i in range(len(rows)):
         for k in range(6):
             P[i, k] = rows[i, k]
         b, c, s = math.hypot(P[i, 0], P[i, 1]), math.hypot(0.5 * P[i, 2], P[i, 3]), math.hypot(P[i, 4], P[i, 5])
         P[i, BOUND_F], P[i, BOUND_G], P[i, BOUND_DG], P[i, BOUND_DDG] = b, c + s, 2.0 * c + s, 4.0 * c + s
-        starts[i, 0], starts[i, 1] = rows[i, 6], rows[i, 7]
+        starts[i, START_PHI], starts[i, START_W] = rows[i, PHI0], rows[i, W0]
 
 
 @kernel

@@ -12,6 +12,7 @@ import math
 
 import numpy as np
 
+from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.along import (
     EQUILIBRIUM,
     NO_CONVERGENCE,
@@ -235,8 +236,8 @@ def trajectory(p, phi0, w0, asked, floats, turnings):
             wide, high = bar(n, a) + abs(v[0]) * late, bar(n, c) + (p[BOUND_F] * abs(v[0]) + p[BOUND_G]) * late
             if not (wide < TRUST and high < TRUST * (1.0 + abs(v[0]))):
                 return NO_CONVERGENCE
-            floats[j, 0], floats[j, 1] = add(x, whole(turns))[0], v[0]
-            floats[j, 2], floats[j, 3] = wide + UNIT * abs(floats[j, 0]), high + UNIT * abs(v[0])
+            floats[j, rc.PHI], floats[j, rc.W] = add(x, whole(turns))[0], v[0]
+            floats[j, rc.PHI_BAR], floats[j, rc.W_BAR] = wide + UNIT * abs(floats[j, rc.PHI]), high + UNIT * abs(v[0])
             from_rest = n == 1 and w0 == 0.0
             if still:
                 turnings[j] = 0
@@ -337,13 +338,15 @@ def abel(p, phi0, w0, targets, floats, status):
     w, t, ellipse, n, started = (w0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.0), 0, w0 > 0.0
     j, size, doubt, ending = 0, len(targets), -1, OK  # doubt: the first target in doubt
     while j < size and targets[j] == phi0:
-        floats[j, 0], floats[j, 1], floats[j, 2], floats[j, 3], status[j] = w0, 0.0, 0.0, 0.0, OK
+        floats[j, rc.VALUE], status[j] = w0, OK
+        floats[j, rc.TIME] = floats[j, rc.VALUE_BAR] = floats[j, rc.TIME_BAR] = 0.0
         j += 1
     sign = side(p, phi, w0)
     if sign <= 0:
         for i in range(j, size):
             status[i] = TURNING if sign < 0 else (EQUILIBRIUM if rests(p, phi0, w0) else SEPARATRIX)
-            floats[i, 0], floats[i, 1], floats[i, 2], floats[i, 3] = phi0, 0.0, 0.0, 0.0
+            floats[i, rc.VALUE] = phi0
+            floats[i, rc.TIME] = floats[i, rc.VALUE_BAR] = floats[i, rc.TIME_BAR] = 0.0
         return
     while j < size or doubt >= 0:
         if n >= LIMIT:
@@ -369,8 +372,8 @@ def abel(p, phi0, w0, targets, floats, status):
             a, b, c = carried(p, T, when[0], there[0], ellipse)
             a += (ROUGH * (abs(targets[j]) + h * there[0])) ** 2
             fill(p, floats[j], n, target, there[0], add(t, when)[0], a, b, c)
-            usable = bar(n, a) < TRUST and floats[j, 2] < TRUST * (1.0 + abs(there[0]))
-            status[j] = OK if usable and floats[j, 3] < TRUST * (1.0 + floats[j, 1]) else NO_CONVERGENCE
+            usable = bar(n, a) < TRUST and floats[j, rc.VALUE_BAR] < TRUST * (1.0 + abs(there[0]))
+            status[j] = OK if usable and floats[j, rc.TIME_BAR] < TRUST * (1.0 + floats[j, rc.TIME]) else NO_CONVERGENCE
             if doubt < 0 and not certain(floats[j]):
                 doubt = j
             j += 1
@@ -389,8 +392,8 @@ def abel(p, phi0, w0, targets, floats, status):
             for i in range(doubt if doubt >= 0 else j, size):
                 if i >= j or not certain(floats[i]):
                     status[i] = ending
-                    floats[i, 0], floats[i, 1] = end, when
-                    floats[i, 2], floats[i, 3] = edge + UNIT * abs(end), bar_t + UNIT * when
+                    floats[i, rc.VALUE], floats[i, rc.TIME] = end, when
+                    floats[i, rc.VALUE_BAR], floats[i, rc.TIME_BAR] = edge + UNIT * abs(end), bar_t + UNIT * when
             return
         phi, w, t = x, v, shifted(t, h)
         if phi[0] > math.pi:
@@ -417,14 +420,14 @@ def abel(p, phi0, w0, targets, floats, status):
 def fill(p, row, n, phi, w, t, a, b, c):
     """w, t and their bars where phi is passed, as `along.fill_crossing`."""
     n += 1  # the target errs too
-    row[0], row[1] = max(w, 0.0), t
+    row[rc.VALUE], row[rc.TIME] = max(w, 0.0), t
     f, g = values(p, phi[0])[0], acceleration(p, phi)[0]
     slope = (f * w + g) / w if w > 0.0 else math.inf
     spread = bar(n, abs(c - 2.0 * slope * b + slope * slope * a)) if w > 0.0 else math.inf
     bar_phi, bar_w = bar(n, a), bar(n, c)
     if not spread < 0.1 * w:
         spread = 2.0 * (bar_w + math.sqrt(abs(2.0 * (abs(g) + abs(f) * bar_w) * bar_phi))) + w
-    row[2] = spread + UNIT * w
+    row[rc.VALUE_BAR] = spread + UNIT * w
     accel = max(abs(f * w + g), 1e-300)
     late = min(bar_phi / w if w > 0.0 else math.inf, spread / accel + bar_w / accel) * 1.2
-    row[3] = late + UNIT * abs(t)
+    row[rc.TIME_BAR] = late + UNIT * abs(t)

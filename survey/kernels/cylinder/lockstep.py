@@ -16,6 +16,7 @@ import math
 
 import numpy as np
 
+from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.along import (
     NO_CONVERGENCE,
     OK,
@@ -287,8 +288,8 @@ def _tell(state, before, fixed, i, floats, turnings):
     wide, high = bar(n, state[_SAA, i]), bar(n, state[_SBB, i])
     if not (wide < TRUST and high < TRUST * (1.0 + abs(v))):
         return False
-    floats[0], floats[1] = (state[_PSI, i] + angle) + turns * TWO_PI, v
-    floats[2], floats[3] = wide + 3e-16 * (abs(turns) * TWO_PI + abs(angle)), high
+    floats[rc.PHI], floats[rc.W] = (state[_PSI, i] + angle) + turns * TWO_PI, v
+    floats[rc.PHI_BAR], floats[rc.W_BAR] = wide + 3e-16 * (abs(turns) * TWO_PI + abs(angle)), high
     from_rest = before[_STEPS, i] == 0.0 and before[_V, i] == 0.0  # then w is 0 at the start and nowhere else
     told = before[_UNSURE, i] < 3.0 and before[_COUNT, i] >= 0.0 and (abs(v) > high or from_rest)
     passed = before[_SIGN, i] * v < 0.0 and not from_rest

@@ -12,7 +12,20 @@ Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equat
 import numpy as np
 
 from survey.kernels.jit import inline
-from survey.kernels.lanes import bars, column, relative
+from survey.kernels.lanes import (
+    DY1,
+    DY1_BAR,
+    DY2,
+    Y1,
+    Y1_BAR,
+    Y1_ZEROS,
+    Y2,
+    Y2_BAR,
+    Y2_ZEROS,
+    bars,
+    column,
+    relative,
+)
 from survey.kernels.math.double import UNIT, add, convolved, div, mul, over, slope, total
 
 ORDER = 34
@@ -135,17 +148,17 @@ def composed(chain, doubt, out):
         zeros2 += 1.0 if (y2[0] < 0.0) != (old2 < 0.0) else 0.0
         sum_ += relative(matrix, 1.0)
     bars(s1, w1, s2, w2, len(chain), sum_, out)
-    out[8], out[9] = zeros1, zeros2
+    out[Y1_ZEROS], out[Y2_ZEROS] = zeros1, zeros2
     return y1, v1, y2, v2
 
 
 @inline
 def rounded(y1, v1, y2, v2, h, out):
     """Keep y1, y1', y2, y2' as float64, and their bars with that rounding."""
-    out[0], out[1], out[2], out[3] = y1[0], div(v1, h)[0], mul(y2, h)[0], v2[0]
-    out[5], out[6] = out[5] / h[0], out[6] * h[0]
+    out[Y1], out[DY1], out[Y2], out[DY2] = y1[0], div(v1, h)[0], mul(y2, h)[0], v2[0]
+    out[DY1_BAR], out[Y2_BAR] = out[DY1_BAR] / h[0], out[Y2_BAR] * h[0]
     for i in range(4):
-        out[4 + i] += HALF_ULP * abs(out[i])
+        out[Y1_BAR + i] += HALF_ULP * abs(out[Y1 + i])
 
 
 @inline

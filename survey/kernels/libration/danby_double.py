@@ -16,6 +16,7 @@ from math import asinh, ceil, sinh, sqrt
 import numpy as np
 
 from survey.kernels.jit import inline, kernel
+from survey.kernels.libration.traces import FACTORS, A, C, D, T
 from survey.kernels.math import double as dd
 from survey.kernels.math.double import UNIT
 
@@ -27,8 +28,9 @@ RATIO = 0.3  # half a step over the distance to the nearest singularity: i, or i
 ROUNDING, PRODUCT = 20.0 * UNIT, 6.0 * UNIT
 MARGIN = 1.01  # for what is of second order in the bars
 X, G, K, M = range(4)
-FACTORS = 5  # A, B, C, D, t
-RESULTS = 3 * FACTORS  # their leading parts, what rounding left of them, and the bounds of their errors
+# Columns A to T of `traces` are leading parts; LOW columns further on follows what rounding left of them, and BARS
+# further on the bounds of their errors.
+LOW, BARS, RESULTS = FACTORS, 2 * FACTORS, 3 * FACTORS
 
 
 @kernel
@@ -213,17 +215,17 @@ def finish(whole, spread, steps, out):
     bars = np.zeros(4)
     row_bars(spread, steps, bars)
     for at in range(FACTORS - 1):
-        i, j = 0 if at in (0, 3) else 2, 0 if at in (0, 2) else 2
+        i, j = 0 if at in (A, D) else 2, 0 if at in (A, C) else 2
         a, b = (whole[0, i, j], whole[1, i, j]), (whole[0, i, j + 1], whole[1, i, j + 1])
         c, d = (whole[0, i + 1, j], whole[1, i + 1, j]), (whole[0, i + 1, j + 1], whole[1, i + 1, j + 1])
         one, other = dd.mul(a, d), dd.mul(b, c)
-        out[at], out[FACTORS + at] = dd.sub(one, other)
+        out[at], out[LOW + at] = dd.sub(one, other)
         bar = bars[i] * (abs(c[0]) + abs(d[0])) + bars[i + 1] * (abs(a[0]) + abs(b[0])) + 2.0 * bars[i] * bars[i + 1]
-        out[2 * FACTORS + at] = bar + PRODUCT * (abs(one[0]) + abs(other[0]))
+        out[BARS + at] = bar + PRODUCT * (abs(one[0]) + abs(other[0]))
     t, bar = (0.0, 0.0), 0.0
     for i in range(2):
         for j in range(2):
             a, b = (whole[0, i, j], whole[1, i, j]), (whole[0, 2 + i, 2 + j], whole[1, 2 + i, 2 + j])
             t = dd.add(t, dd.mul(a, b))
             bar += bars[i] * abs(b[0]) + bars[2 + i] * abs(a[0]) + bars[i] * bars[2 + i] + PRODUCT * abs(a[0] * b[0])
-    out[4], out[FACTORS + 4], out[2 * FACTORS + 4] = t[0], t[1], bar
+    out[T], out[LOW + T], out[BARS + T] = t[0], t[1], bar

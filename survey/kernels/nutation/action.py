@@ -103,14 +103,14 @@ def action(row):
 
 
 @kernel
-def mend(work, told):
-    """In a tile of `lanes`: (S22) for the actions `told` whose terms cancel, small wells' apart."""
+def mend(work, answers):
+    """In a tile of `lanes`: (S22) for those actions among `answers` whose terms cancel, small wells' apart."""
     for i in range(nl.TILE):
-        value, bar, width = told[5 * nl.TILE + i], told[11 * nl.TILE + i], work[nl.WIDTH + i]
-        if work[nl.GOOD + i] != 2.0 or work[nl.ACTION + i] > 0.0 or bar <= ROUGH * abs(value):
+        value, bar, width = answers[nl.ACTION + i], answers[nl.ACTION_BAR + i], work[nl.WIDTH + i]
+        if work[nl.GOOD + i] != 2.0 or work[nl.SMALL_ACTION + i] > 0.0 or bar <= ROUGH * abs(value):
             continue
         blur = (work[nl.BAR_V + i] + work[nl.BAR_W + i]) / width
         roots = (sqrt(work[nl.Q_LOW + i]), sqrt(work[nl.Q_HIGH + i]))
         at_plus, at_minus = (work[nl.V_LOW + i], work[nl.V_HIGH + i]), (work[nl.W_LOW + i], work[nl.W_HIGH + i])
         value, _moved = positive(width, roots, 0.5 * work[nl.ABOVE + i], at_plus, at_minus, (0.0, 0.0, 0.0))
-        told[5 * nl.TILE + i], told[11 * nl.TILE + i] = value, (66.0 * EPS + 4.0 * blur) * value
+        answers[nl.ACTION + i], answers[nl.ACTION_BAR + i] = value, (66.0 * EPS + 4.0 * blur) * value

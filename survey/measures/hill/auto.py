@@ -9,7 +9,8 @@ import numpy as np
 
 from survey import status
 from survey.kernels.hill import taylor_double
-from survey.kernels.hill.answers import DISCRIMINANT, LEAST, RESULTS, UNDECIDED
+from survey.kernels.hill.answers import DISCRIMINANT, LEAST, UNDECIDED
+from survey.kernels.lanes import RESULTS
 from survey.measures.hill import dense, effort
 from survey.measures.hill.answers import NO_SQUARES, Answers
 from survey.methods import dop853, taylor16

@@ -20,6 +20,7 @@ import numpy as np
 
 from survey.kernels.hill import answers as kernels
 from survey.kernels.jit import wait_for_ahead
+from survey.kernels.lanes import RESULTS
 from survey.kernels.math.chebyshev import TERMS, discriminants, expand, restrict, transform
 from survey.measures.hill import effort
 from survey.measures.hill.answers import Answers, Asked
@@ -56,11 +57,11 @@ def compile_ahead(sample, no_rows, variables):
     named = {name for name in kernels.FLOATS if name in variables} | ({"exponent"} if grows else set())
     answers = Answers(1, Asked(1.0, np.array([name in named for name in kernels.FLOATS])))
     if named <= ANSWERS:
-        Answers(1, Asked(1.0, DISCRIMINANT)).judge(np.ones((1, kernels.RESULTS)), None)
+        Answers(1, Asked(1.0, DISCRIMINANT)).judge(np.ones((1, RESULTS)), None)
         _discriminants(answers, np.zeros(1, int), np.ones((1, TERMS)), np.ones(1), np.ones(1))
         if grows:
             kernels.exponents(np.zeros(1, int), 1, 1.0, answers.floats, answers.verdict, answers.late)
-    answers.judge(np.ones((1, kernels.RESULTS)), None)
+    answers.judge(np.ones((1, RESULTS)), None)
 
 
 def solve(problem, method, asked, answers):

@@ -17,7 +17,18 @@ import numpy as np
 
 from survey import measures, status
 from survey.kernels.libration import traces
-from survey.kernels.libration.traces import EPS, KREIN, MINUS_ONE, NONE, PLACES, RESULTS, STABLE, UNDECIDED, UNSTABLE
+from survey.kernels.libration.traces import (
+    EPS,
+    FACTORS,
+    KREIN,
+    MINUS_ONE,
+    NONE,
+    PLACES,
+    RESULTS,
+    STABLE,
+    UNDECIDED,
+    UNSTABLE,
+)
 from survey.measures.libration import danby_double
 from survey.measures.libration.danby_answers import Answers
 from survey.methods import taylor16
@@ -86,7 +97,7 @@ def factors(e, mu, rtol=1e-13):
     """A, B, C, D, t (N, 5) and their bars (N, 5), to what midpoint Taylor can."""
     results = np.empty((e.size, RESULTS))
     _point_by_point(e, *rates(mu), taylor16, rtol, results)
-    return results[:, :5], results[:, 5:]
+    return results[:, :FACTORS], results[:, FACTORS:]
 
 
 def _by_series(e, mu, rtol, answers, left):
@@ -100,10 +111,10 @@ def _by_series(e, mu, rtol, answers, left):
     results = np.empty((rows.size * PLACES, RESULTS))
     nodes = _point_by_point(np.repeat(e[rows], PLACES), d1, d2, taylor16, max(SHARE * rtol, 1e-13), results)
     results = results.reshape(rows.size, PLACES, RESULTS)
-    series = np.ascontiguousarray(np.swapaxes(TO_SERIES @ results[..., :5], 1, 2))
+    series = np.ascontiguousarray(np.swapaxes(TO_SERIES @ results[..., :FACTORS], 1, 2))
     tail = abs(series[..., -2:]).sum(axis=-1)
     with np.errstate(over="ignore"):  # then the points are late
-        bars = LEBESGUE * results[..., 5:].max(axis=1) + tail + 16 * EPS * abs(series).sum(axis=-1)
+        bars = LEBESGUE * results[..., FACTORS:].max(axis=1) + tail + 16 * EPS * abs(series).sum(axis=-1)
     sound = (nodes.status == status.OK).reshape(rows.size, PLACES).all(axis=1)
     answers.late |= left.reshape(-1)
     traces.dense(series[sound], bars[sound], rows[sound], mu, rtol, status.OVERFLOW, *answers.all)
@@ -146,7 +157,7 @@ def _point_by_point(e, d1, d2, method, rtol, results=None):
 
 
 def _bar(results):
-    bar = results[:, 5:].max(axis=1)
+    bar = results[:, FACTORS:].max(axis=1)
     return np.where(np.isfinite(bar), bar, np.inf)
 
 
