@@ -9,13 +9,13 @@ from math import cos, hypot, pi, sin, sqrt
 
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.carlson import rf_whole, rj, rj_spread
+from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.nutation import wells as nu
 from survey.kernels.nutation.action import ROUGH, action
 from survey.kernels.nutation.motion import first_kind, motion
 
 ORDER = 0  # no steps
 SERVES = ("nutation",)
-_EPS = nu.EPS
 _STEPS = 60
 
 
@@ -47,14 +47,14 @@ def _periods_of(row, out):
     down = _advance(row[nu.PLUS], row[nu.LOW_MINUS], row[nu.HIGH_MINUS], width, high, time, s, g, spread)
     noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + row[nu.NOISE_ABOVE]
     out[0], out[1], out[2] = 4.0 * time, up + down, down - up
-    out[4] = (32.0 * _EPS + noise) * out[0]
+    out[4] = (32.0 * ROUNDOFF + noise) * out[0]
     # here, other than in agm, advances know the distances from poles by these alone
     noise += 0.5 * row[nu.NOISE_ENDS]
-    out[5] = out[6] = (48.0 * _EPS + 4.0 * noise) * (abs(up) + abs(down))
+    out[5] = out[6] = (48.0 * ROUNDOFF + 4.0 * noise) * (abs(up) + abs(down))
     square = _second_kind(time, 0.5 * above, g, g)
     parts = out[0] * row[nu.LEVEL], 4.0 * square, row[nu.MINUS] * up, row[nu.PLUS] * down
     out[3] = (parts[0] + parts[1] - parts[2] - parts[3]) / (2.0 * pi)
-    out[7] = (48.0 * _EPS + 4.0 * noise) * (abs(parts[0]) + parts[1] + abs(parts[2]) + abs(parts[3])) / (2.0 * pi)
+    out[7] = (48.0 * ROUNDOFF + 4.0 * noise) * (abs(parts[0]) + parts[1] + abs(parts[2]) + abs(parts[3])) / (2.0 * pi)
     if out[7] > ROUGH * abs(out[3]):
         out[3], out[7] = action(row)
 

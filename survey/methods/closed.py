@@ -12,9 +12,9 @@ import numpy as np
 
 from survey.kernels.cylinder import closed, trigonometric, weierstrass
 from survey.kernels.cylinder.along import EQUILIBRIUM, NO_CONVERGENCE, OK, TRUST, TURNING, finite
-from survey.kernels.cylinder.flow import UNIT
 from survey.kernels.cylinder.weierstrass import BAR_W, BAR_X, COUNT, LANES, W, X
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 ORDER = 0  # no steps
 SERVES = ("cylinder",)
@@ -84,7 +84,7 @@ def _tell(out, phi0, x, w, bar_x, bar_w):
     """Write down one solution at one time; False where the bars are too wide to be bounds."""
     if not (bar_x < TRUST and bar_w < TRUST * (1.0 + abs(w))):
         return False
-    out[0], out[1], out[2], out[3] = phi0 + x, w, bar_x + 2.0 * UNIT * abs(phi0 + x), bar_w
+    out[0], out[1], out[2], out[3] = phi0 + x, w, bar_x + 2.0 * ROUNDOFF_UP * abs(phi0 + x), bar_w
     return True
 
 
@@ -119,7 +119,7 @@ def _trigonometric(data, w0, x, out):
     F, f = data[closed.F0], data[closed.SLOPE]
     w = w0 - 2.0 * s * (F * s - f * math.cos(0.5 * x))
     moved = closed.deviating(data, t, w)
-    bar = closed.MARGIN * (2.0 * data[closed.NOISE] + moved + 4.0 * UNIT * (w0 + abs(x) * math.hypot(F, f)))
+    bar = closed.MARGIN * (2.0 * data[closed.NOISE] + moved + 4.0 * ROUNDOFF_UP * (w0 + abs(x) * math.hypot(F, f)))
     return _kept(out, w, t, bar, bar_t)
 
 
@@ -139,13 +139,13 @@ def _elliptic(kind, side, data, phi0, x, out):
         out[0], out[1], out[2], out[3] = phi0, 0.0, 0.0, 0.0
         return TURNING
     if kind == closed.LIBRATION:
-        edge, right = data[closed.BAR_RIGHT] + 4.0 * UNIT * (abs(phi0) + abs(x)), data[closed.RIGHT]
+        edge, right = data[closed.BAR_RIGHT] + 4.0 * ROUNDOFF_UP * (abs(phi0) + abs(x)), data[closed.RIGHT]
         if x >= right - edge:
             t, bar = closed.flight(data, math.pi, 0.0)
             if not bar < math.inf:
                 return NO_CONVERGENCE
-            out[0], out[1], out[2] = phi0 + right, t, edge + 4.0 * UNIT * (abs(phi0) + right)
-            out[3] = bar + 2.0 * UNIT * t
+            out[0], out[1], out[2] = phi0 + right, t, edge + 4.0 * ROUNDOFF_UP * (abs(phi0) + right)
+            out[3] = bar + 2.0 * ROUNDOFF_UP * t
             return TURNING
         if x > right - 4.0 * edge:
             return NO_CONVERGENCE
@@ -156,5 +156,7 @@ def _elliptic(kind, side, data, phi0, x, out):
     if not square > 4.0 * noise:
         return NO_CONVERGENCE
     w = math.sqrt(square)
-    blur = 2.0 * UNIT * (abs(phi0) + abs(x))
-    return _kept(out, w, t, closed.MARGIN * (0.5 * (noise + abs(slope) * blur) / w + 2.0 * UNIT * w), bar_t + blur / w)
+    blur = 2.0 * ROUNDOFF_UP * (abs(phi0) + abs(x))
+    return _kept(
+        out, w, t, closed.MARGIN * (0.5 * (noise + abs(slope) * blur) / w + 2.0 * ROUNDOFF_UP * w), bar_t + blur / w
+    )

@@ -32,9 +32,10 @@ from survey.kernels.cylinder.equilibria import (
     resting,
     settled,
 )
-from survey.kernels.cylinder.flow import TWO_PI, TWO_PI_LOW, UNIT, reduced, table, values
+from survey.kernels.cylinder.flow import TWO_PI, TWO_PI_LOW, reduced, table, values
 from survey.kernels.cylinder.returns import ABOVE, BELOW, CYCLE_BAR, CYCLE_CLASS, CYCLE_X, INTERVAL, between
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 UNDECIDED, EQUILIBRIUM, SADDLE, ROTATION_PLUS, ROTATION_MINUS, LIBRATION = -1, 0, 1, 2, 3, 4
 SPIN_UP_PLUS, SPIN_UP_MINUS, PERIODIC_ROTATION, PERIODIC_LIBRATION, EQUILIBRIUM_START = 5, 6, 7, 8, 9
@@ -172,7 +173,7 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
     out[0], out[1], out[2], out[3], out[4] = UNDECIDED, -1, UNTOLD, NO_TURNS, OK
     phi0, w0 = start[0], start[1]
     phi, turns = reduced(phi0)
-    w, slip = w0, start[2] + 4.0 * UNIT * (turns != 0.0)
+    w, slip = w0, start[2] + 4.0 * ROUNDOFF_UP * (turns != 0.0)
     sign = start_sign(p, phi, w)
     if w == 0.0:
         row = resting(p, eqs, count, phi0)
@@ -180,7 +181,7 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
             out[0], out[1], out[2], out[3] = EQUILIBRIUM_START, row, 0, offset(phi, eqs[row, ANGLE])[1]
             return
         if sign == 0:  # beside an equilibrium, within rounding
-            row = captured(eqs, count, phi, w, slip + 16.0 * UNIT)
+            row = captured(eqs, count, phi, w, slip + 16.0 * ROUNDOFF_UP)
             if row < 0:
                 out[4] = SEPARATRIX
                 return

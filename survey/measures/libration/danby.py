@@ -17,7 +17,8 @@ import numpy as np
 
 from survey import measures, status
 from survey.kernels.libration import traces
-from survey.kernels.libration.traces import EPS, KREIN, MINUS_ONE, NONE, PLACES, RESULTS, STABLE, UNDECIDED, UNSTABLE
+from survey.kernels.libration.traces import KREIN, MINUS_ONE, NONE, PLACES, RESULTS, STABLE, UNDECIDED, UNSTABLE
+from survey.kernels.math.roundoff import EPS
 from survey.measures.libration import danby_double
 from survey.measures.libration.danby_answers import Answers
 from survey.methods import taylor16

@@ -6,6 +6,7 @@ a (1/C - 1/A) T, the action, and their bars; and from these, at given times, u, 
 
 import numpy as np
 
+from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.nutation import brun, brun_lanes
 from survey.kernels.nutation import wells as nu
 
@@ -70,9 +71,9 @@ def outputs(rows, out, inertia, drift):
     """{name: values, name_error: bars} of wells from `periods`; inertia is A, drift a (1/C - 1/A) to 8 roundings."""
     values, bars, good = out[:, :4], out[:, 4:], np.isfinite(out[:, 0])
     period = inertia * values[:, PERIOD]
-    bar = inertia * bars[:, PERIOD] + 2.0 * nu.EPS * period
+    bar = inertia * bars[:, PERIOD] + 2.0 * ROUNDOFF * period
     spin = values[:, SPIN] + drift * period
-    spin_bar = bars[:, SPIN] + np.abs(drift) * (bar + 8.0 * nu.EPS * period) + nu.EPS * np.abs(spin)
+    spin_bar = bars[:, SPIN] + np.abs(drift) * (bar + 8.0 * ROUNDOFF * period) + ROUNDOFF * np.abs(spin)
     found = {
         "u_min": (rows[:, nu.LOW], rows[:, nu.BAR_LOW]),
         "u_max": (rows[:, nu.HIGH], rows[:, nu.BAR_HIGH]),
@@ -108,20 +109,20 @@ def rates(out, wanted):
             value = TURN / period
             result |= {
                 "nutation_frequency": value,
-                "nutation_frequency_error": value * (bar / (period - bar) + 4.0 * nu.EPS),
+                "nutation_frequency_error": value * (bar / (period - bar) + 4.0 * ROUNDOFF),
             }
         for name in ("precession", "spin"):
             angle, rough = out[name], out[f"{name}_error"]
             if f"{name}_rate" in wanted:
                 value = angle / period
                 result[f"{name}_rate"] = value
-                result[f"{name}_rate_error"] = (rough + np.abs(value) * bar) / (period - bar) + 2.0 * nu.EPS * np.abs(
+                result[f"{name}_rate_error"] = (rough + np.abs(value) * bar) / (period - bar) + 2.0 * ROUNDOFF * np.abs(
                     value
                 )
             if f"{name}_number" in wanted:
                 value = angle / TURN
                 result[f"{name}_number"] = value
-                result[f"{name}_number_error"] = rough / TURN + 3.0 * nu.EPS * np.abs(value)
+                result[f"{name}_number_error"] = rough / TURN + 3.0 * ROUNDOFF * np.abs(value)
     return result
 
 
@@ -132,7 +133,7 @@ def motions(method, rows, kinds, starts, out, times, inertia, drift):
     method.nutation_motions(rows, kinds, starts, out, times / inertia[:, None], here)
     turned = drift[:, None] * times
     phi = here[..., 2] + turned
-    bar = here[..., 5] + 12.0 * nu.EPS * np.abs(turned) + nu.EPS * np.abs(phi)
+    bar = here[..., 5] + 12.0 * ROUNDOFF * np.abs(turned) + ROUNDOFF * np.abs(phi)
     found = {"u": (here[..., 0], here[..., 3]), "psi": (here[..., 1], here[..., 4]), "phi": (phi, bar)}
     good = np.isfinite(here).all(axis=-1)
     return _named(found, good)
@@ -158,7 +159,7 @@ def distance(heights):
     """
     with np.errstate(divide="ignore", invalid="ignore"):  # k = 0 has no separatrix
         value = heights[:, 0] / heights[:, 2]
-        bar = heights[:, 1] / heights[:, 2] + 4.0 * nu.EPS * np.abs(value)
+        bar = heights[:, 1] / heights[:, 2] + 4.0 * ROUNDOFF * np.abs(value)
     near = np.abs(value) < FAR
     return {
         "separatrix_distance": np.where(near, value, np.nan),
