@@ -23,8 +23,9 @@ from survey.kernels.cylinder.along import (
     finite,
     start_sign,
 )
-from survey.kernels.cylinder.flow import LOW, TWO_PI, TWO_PI_LOW, UNIT, longest_step, reduced
+from survey.kernels.cylinder.flow import LOW, TWO_PI, TWO_PI_LOW, longest_step, reduced
 from survey.kernels.jit import kernel
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 ORDER = gyrostat.ORDER
 SERVES = ("cylinder",)
@@ -33,7 +34,7 @@ COST = {"cylinder": 90.0}  # time, relative to the default method
 FLOW_FINEST = 1e-17  # useful truncation error of a step
 FLOW_WORK = 2  # steps, relative to the Taylor method
 _PAIRS = 3  # of components, in each of which a step and the initial state err; `bar` counts two for each step
-_FIRST = 4.0 * UNIT  # rounding of the initial state in the rotated frame
+_FIRST = 4.0 * ROUNDOFF_UP  # rounding of the initial state in the rotated frame
 
 
 @kernel
@@ -53,8 +54,8 @@ def _read(state, squares, n, near, out):
             a += (c * frame[i, 1] - s * frame[i, 2]) * squares[3 + i, 3 + j] * (c * frame[j, 1] - s * frame[j, 2])
             b += frame[i, 0] * squares[i, j] * frame[j, 0]
     out[rc.PHI], out[rc.W] = phi + turns * TWO_PI, w
-    out[rc.PHI_BAR] = bar(_PAIRS * (n + 1), a) + UNIT * (4.0 + 4.0 * abs(turns) * TWO_PI)
-    out[rc.W_BAR] = bar(_PAIRS * (n + 1), b) + UNIT * 4.0 * abs(w)
+    out[rc.PHI_BAR] = bar(_PAIRS * (n + 1), a) + ROUNDOFF_UP * (4.0 + 4.0 * abs(turns) * TWO_PI)
+    out[rc.W_BAR] = bar(_PAIRS * (n + 1), b) + ROUNDOFF_UP * 4.0 * abs(w)
 
 
 @kernel

@@ -25,7 +25,6 @@ from survey.kernels.cylinder.flow import (
     TRUNC_W,
     TWO_PI,
     TWO_PI_LOW,
-    UNIT,
     WEIGHT,
     jacobian,
     longest_step,
@@ -35,6 +34,7 @@ from survey.kernels.cylinder.flow import (
     variation,
 )
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 OK, OVERFLOW, NO_CONVERGENCE, STEP_LIMIT = 0, 2, 3, 4  # as in survey/status.py
 TURNING, EQUILIBRIUM, SEPARATRIX = 16, 17, 18  # as in the STATUS of scenes/gyrostat.py
@@ -47,16 +47,16 @@ UNTOLD = -2  # a count that the error bar cannot tell
 def local_error(p, T, w, dt):
     """Error bars (phi, w) that one step adds: truncation as the method notes it, and rounding.
 
-    The slope w' of each stage is rounded by 4 UNIT rate, and by |dw'/dphi| ulp(phi)/2 since phi is rounded there. Stage
-    i has a share b_i in w, and b_i (1 - c_i) in phi, as simplifying assumption D(1) has it: so signed sums of b_i a_ij
-    count, and the weight is that of the b_i.
+    The slope w' of each stage is rounded by 4 roundoffs of the rate, and by |dw'/dphi| ulp(phi)/2 since phi is rounded
+    there. Stage i has a share b_i in w, and b_i (1 - c_i) in phi, as simplifying assumption D(1) has it: so signed sums
+    of b_i a_ij count, and the weight is that of the b_i.
     """
     weight = T[LAST, WEIGHT]
     many, phi_in_step = max(1.0, weight), abs(T[0, PHI]) + dt * abs(w)
     rate = many * (p[BOUND_F] * abs(w) + p[BOUND_G])
     rate += 0.25 * weight * (p[BOUND_F] * abs(w) + p[BOUND_DG]) * phi_in_step
-    phi = T[LAST, TRUNC_PHI] + UNIT * (4.0 + 3.0 * dt * (many * abs(w) + dt * rate))
-    return phi, T[LAST, TRUNC_W] + UNIT * (1.5 * abs(w) + 4.0 * dt * rate)
+    phi = T[LAST, TRUNC_PHI] + ROUNDOFF_UP * (4.0 + 3.0 * dt * (many * abs(w) + dt * rate))
+    return phi, T[LAST, TRUNC_W] + ROUNDOFF_UP * (1.5 * abs(w) + 4.0 * dt * rate)
 
 
 @kernel
@@ -92,7 +92,7 @@ def trajectory(setting, begin, at, p, phi0, w0, times, tolerance, limit, floats,
     how = setting(p, w0, tolerance)
     phi, turns = reduced(phi0)
     w, t, t_low, n = w0, 0.0, 0.0, 0
-    saa, sab, sbb = (UNIT * 4.0 * (turns != 0.0)) ** 2, 0.0, 0.0
+    saa, sab, sbb = (ROUNDOFF_UP * 4.0 * (turns != 0.0)) ** 2, 0.0, 0.0
     sign, unsure, count = start_sign(p, phi, w), 0, 0
     j, size = 0, len(times)
     while j < size:
@@ -175,7 +175,7 @@ def start_sign(p, phi, w):
     if w != 0.0:
         return 1 if w > 0.0 else -1
     g = values(p, phi)[1]
-    if abs(g) <= 8.0 * UNIT * p[BOUND_G]:
+    if abs(g) <= 8.0 * ROUNDOFF_UP * p[BOUND_G]:
         return 0
     return 1 if g > 0.0 else -1
 
@@ -265,7 +265,7 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
     how = setting(p, w0, tolerance)
     phi, turns = reduced(phi0)
     w, t, t_low, n, started = w0, 0.0, 0.0, 0, w0 > 0.0
-    slip = UNIT * 4.0 * (turns != 0.0)
+    slip = ROUNDOFF_UP * 4.0 * (turns != 0.0)
     saa, sab, sbb = slip * slip, 0.0, 0.0
     j, size, doubt = 0, len(targets), -1  # doubt: the first target in doubt
     ending = OK

@@ -33,9 +33,10 @@ from survey.kernels.cylinder.equilibria import (
     resting,
     settled,
 )
-from survey.kernels.cylinder.flow import TWO_PI, TWO_PI_LOW, UNIT, reduced, table, values
+from survey.kernels.cylinder.flow import TWO_PI, TWO_PI_LOW, reduced, table, values
 from survey.kernels.cylinder.returns import ABOVE, BELOW, CYCLE_BAR, CYCLE_CLASS, CYCLE_X, INTERVAL, between
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 UNDECIDED, EQUILIBRIUM, SADDLE, ROTATION_PLUS, ROTATION_MINUS, LIBRATION = -1, 0, 1, 2, 3, 4
 SPIN_UP_PLUS, SPIN_UP_MINUS, PERIODIC_ROTATION, PERIODIC_LIBRATION, EQUILIBRIUM_START = 5, 6, 7, 8, 9
@@ -174,7 +175,7 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
     out[rc.TURNINGS], out[rc.NET_TURNS], out[rc.STATUS] = UNTOLD, NO_TURNS, OK
     phi0, w0 = start[rc.START_PHI], start[rc.START_W]
     phi, turns = reduced(phi0)
-    w, slip = w0, start[rc.START_PHI_BAR] + 4.0 * UNIT * (turns != 0.0)
+    w, slip = w0, start[rc.START_PHI_BAR] + 4.0 * ROUNDOFF_UP * (turns != 0.0)
     sign = start_sign(p, phi, w)
     if w == 0.0:
         row = resting(p, eqs, count, phi0)
@@ -183,7 +184,7 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
             out[rc.TURNINGS], out[rc.NET_TURNS] = 0, offset(phi, eqs[row, ANGLE])[1]
             return
         if sign == 0:  # beside an equilibrium, within rounding
-            row = captured(eqs, count, phi, w, slip + 16.0 * UNIT)
+            row = captured(eqs, count, phi, w, slip + 16.0 * ROUNDOFF_UP)
             if row < 0:
                 out[rc.STATUS] = SEPARATRIX
                 return

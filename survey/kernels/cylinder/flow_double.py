@@ -45,7 +45,6 @@ from survey.kernels.cylinder.flow import (
     SIN2,
     TWO_PI,
     TWO_PI_LOW,
-    UNIT,
     D,
     jacobian,
     longest_step,
@@ -68,10 +67,11 @@ from survey.kernels.math.double import (
     times,
     two_prod,
 )
+from survey.kernels.math.roundoff import PAIR_ROUNDOFF, ROUNDOFF_UP
 
 ORDER = 30
 TOLERANCE = 1e-30  # truncation of one step, relative to 1 + |w|
-ROUGH = 16.0 * 2.0**-104  # rounding of a sum or a product of the series, relative
+ROUGH = 16.0 * PAIR_ROUNDOFF  # rounding of a sum or a product of the series, relative
 FALL = 1.0 / 50.0  # by more, two terms further on, no series is trusted to fall
 LIMIT = 20_000  # steps; about 0.4 s
 SLOWER = 3.0  # steps may grow by so much: what then needs more than LIMIT is given up at once
@@ -237,7 +237,10 @@ def trajectory(p, phi0, w0, asked, floats, turnings):
             if not (wide < TRUST and high < TRUST * (1.0 + abs(v[0]))):
                 return NO_CONVERGENCE
             floats[j, rc.PHI], floats[j, rc.W] = add(x, whole(turns))[0], v[0]
-            floats[j, rc.PHI_BAR], floats[j, rc.W_BAR] = wide + UNIT * abs(floats[j, rc.PHI]), high + UNIT * abs(v[0])
+            floats[j, rc.PHI_BAR], floats[j, rc.W_BAR] = (
+                wide + ROUNDOFF_UP * abs(floats[j, rc.PHI]),
+                high + ROUNDOFF_UP * abs(v[0]),
+            )
             from_rest = n == 1 and w0 == 0.0
             if still:
                 turnings[j] = 0
@@ -268,7 +271,9 @@ def trajectory(p, phi0, w0, asked, floats, turnings):
         count += w[0] * sign < 0.0
         sign, unsure = (1 if w[0] > 0.0 else -1), 0
         # its angle is that of float64
-        known = ends(p, eqs, size, phi[0], w[0], bar_phi + UNIT * abs(phi[0]), bar_w + UNIT * abs(w[0]), end)
+        known = ends(
+            p, eqs, size, phi[0], w[0], bar_phi + ROUNDOFF_UP * abs(phi[0]), bar_w + ROUNDOFF_UP * abs(w[0]), end
+        )
         since = t
     return STEP_LIMIT
 
@@ -393,7 +398,10 @@ def abel(p, phi0, w0, targets, floats, status):
                 if i >= j or not certain(floats[i]):
                     status[i] = ending
                     floats[i, rc.VALUE], floats[i, rc.TIME] = end, when
-                    floats[i, rc.VALUE_BAR], floats[i, rc.TIME_BAR] = edge + UNIT * abs(end), bar_t + UNIT * when
+                    floats[i, rc.VALUE_BAR], floats[i, rc.TIME_BAR] = (
+                        edge + ROUNDOFF_UP * abs(end),
+                        bar_t + ROUNDOFF_UP * when,
+                    )
             return
         phi, w, t = x, v, shifted(t, h)
         if phi[0] > math.pi:
@@ -427,7 +435,7 @@ def fill(p, row, n, phi, w, t, a, b, c):
     bar_phi, bar_w = bar(n, a), bar(n, c)
     if not spread < 0.1 * w:
         spread = 2.0 * (bar_w + math.sqrt(abs(2.0 * (abs(g) + abs(f) * bar_w) * bar_phi))) + w
-    row[rc.VALUE_BAR] = spread + UNIT * w
+    row[rc.VALUE_BAR] = spread + ROUNDOFF_UP * w
     accel = max(abs(f * w + g), 1e-300)
     late = min(bar_phi / w if w > 0.0 else math.inf, spread / accel + bar_w / accel) * 1.2
-    row[rc.TIME_BAR] = late + UNIT * abs(t)
+    row[rc.TIME_BAR] = late + ROUNDOFF_UP * abs(t)

@@ -39,11 +39,11 @@ from survey.kernels.cylinder.flow import (
     S3,
     TWO_PI,
     TWO_PI_LOW,
-    UNIT,
     D,
     reduced,
 )
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.kernels.unroll import unroll
 
 ORDER = 16
@@ -232,8 +232,8 @@ def _advance(T, state, before, fixed, fate, tolerance):
         last = max(last * d2, _FALL * abs(T[_W + ORDER - 2, i]))
         cut = d13 * max(last * dt, max(previous * d2, _FALL * abs(T[_W + ORDER - 3, i])))
         speed = fixed[_PF, i] * abs(v) + fixed[_PG, i]
-        e = cut * dt * (1.0 / ORDER) + UNIT * (4.0 + 3.0 * dt * (abs(v) + dt * speed))
-        g = cut + UNIT * (1.5 * abs(v) + 8.0 * dt * speed)
+        e = cut * dt * (1.0 / ORDER) + ROUNDOFF_UP * (4.0 + 3.0 * dt * (abs(v) + dt * speed))
+        g = cut + ROUNDOFF_UP * (1.5 * abs(v) + 8.0 * dt * speed)
         saa, sab, sbb = state[_SAA, i], state[_SAB, i], state[_SBB, i]
         state[_SAA, i] = u1 * u1 * saa + 2.0 * u1 * u2 * sab + u2 * u2 * sbb + e * e
         state[_SAB, i] = u1 * z1 * saa + (u1 * z2 + u2 * z1) * sab + u2 * z2 * sbb
@@ -275,7 +275,7 @@ def _enter(p, phi0, w0, state, fixed, i):
     for k in range(_STATE):
         state[k, i] = 0.0
     state[_PSI, i], state[_TURNS, i], state[_V, i] = rest - angle, turns, w0
-    slip = UNIT * 4.0 * (turns != 0.0 or angle != 0.0)
+    slip = ROUNDOFF_UP * 4.0 * (turns != 0.0 or angle != 0.0)
     state[_SAA, i] = slip * slip
     state[_RATE, i] = abs(w0) + math.sqrt(p[BOUND_DG] + p[BOUND_F] * (abs(w0) + 0.25 * p[BOUND_F]))
     state[_SIGN, i] = start_sign(p, rest, w0)

@@ -13,8 +13,9 @@ import numpy as np
 from survey.kernels.cylinder.along import UNTOLD, bar, carried, expand, finite, rests, start_sign
 from survey.kernels.cylinder.equilibria import ANGLE, BAR, DG, FOCUS, KIND, MOST, NODE, STABLE, F, equilibria, offset
 from survey.kernels.cylinder.equilibria import settled as node_settled
-from survey.kernels.cylinder.flow import BOUND_DDG, BOUND_DG, BOUND_F, BOUND_G, TWO_PI, TWO_PI_LOW, UNIT, reduced, table
+from survey.kernels.cylinder.flow import BOUND_DDG, BOUND_DG, BOUND_F, BOUND_G, TWO_PI, TWO_PI_LOW, reduced, table
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 NEVER, START, RATE, DOUBT, DRIFT = range(5)  # of an end: no turning follows; angle, rate and their doubts
 STRAIGHT = 1e-7  # rad: so near to its line the angle is kept, or nearer than the error bars are
@@ -36,8 +37,8 @@ def ends(p, eqs, count, phi, w, bar_phi, bar_w, end):
             continue
         a = 0.5 * row[F]
         square = -row[DG] - a * a
-        doubt = 16.0 * UNIT * p[BOUND_F] + p[BOUND_F] * row[BAR]
-        doubt = 16.0 * UNIT * p[BOUND_DG] + p[BOUND_DDG] * row[BAR] + abs(row[F]) * doubt
+        doubt = 16.0 * ROUNDOFF_UP * p[BOUND_F] + p[BOUND_F] * row[BAR]
+        doubt = 16.0 * ROUNDOFF_UP * p[BOUND_DG] + p[BOUND_DDG] * row[BAR] + abs(row[F]) * doubt
         if not square > 100.0 * doubt:
             continue
         omega = math.sqrt(square)
@@ -50,8 +51,8 @@ def ends(p, eqs, count, phi, w, bar_phi, bar_w, end):
             end[NEVER] = 0.0
             # w = 0 where tan theta = -a/Omega
             end[START], end[RATE] = math.atan2(y, x) - math.atan2(-a, omega), omega
-            end[DOUBT] = off + 1.1 * blur + doubt / square + 8.0 * UNIT
-            end[DRIFT] = doubt / omega + 4.0 * UNIT * omega
+            end[DOUBT] = off + 1.1 * blur + doubt / square + 8.0 * ROUNDOFF_UP
+            end[DRIFT] = doubt / omega + 4.0 * ROUNDOFF_UP * omega
             return True
     return False
 
@@ -61,9 +62,9 @@ def zeros(end, dt):
     """How often w changes sign within dt from where `end` was noted, or UNTOLD."""
     if end[NEVER] > 0.0:
         return 0
-    doubt = (end[DOUBT] + end[DRIFT] * dt + 4.0 * UNIT * end[RATE] * dt) / math.pi
+    doubt = (end[DOUBT] + end[DRIFT] * dt + 4.0 * ROUNDOFF_UP * end[RATE] * dt) / math.pi
     first, last = end[START] / math.pi, (end[START] - end[RATE] * dt) / math.pi
-    doubt += 4.0 * UNIT * abs(last)
+    doubt += 4.0 * ROUNDOFF_UP * abs(last)
     if math.floor(first - doubt) != math.floor(first + doubt) or math.floor(last - doubt) != math.floor(last + doubt):
         return UNTOLD
     return int(math.floor(first) - math.floor(last))
@@ -80,7 +81,7 @@ def counts(setting, begin, at, p, phi0, w0, times, tolerance, limit, out):
     how = setting(p, w0, tolerance)
     phi, turns = reduced(phi0)
     w, t, t_low, n, j, turned, unsure = w0, 0.0, 0.0, 0, 0, 0, 0
-    slip = UNIT * 4.0 * (turns != 0.0)
+    slip = ROUNDOFF_UP * 4.0 * (turns != 0.0)
     saa, sab, sbb = slip * slip, 0.0, 0.0
     sign = start_sign(p, phi, w)
     while j < len(times) and sign != 0 and n < limit:

@@ -9,9 +9,9 @@ import numpy as np
 
 from survey.kernels import lanes
 from survey.kernels.jit import inline, kernel, splice
+from survey.kernels.math.roundoff import EPS
 from survey.kernels.unroll import unroll
 
-EPS = 2.3e-16
 LEAST = 2e-323  # what a few products lose where they underflow
 LARGEST = float(np.finfo(np.float32).max)  # bars are kept as float32
 UNDECIDED, UNSTABLE, STABLE, MARGINAL = -1, 0, 1, 2

@@ -5,8 +5,9 @@ Source: J. C. Mason, D. C. Handscomb, Chebyshev Polynomials (2003), 2.4.1 (Clens
 
 import numpy as np
 
-from survey.kernels.hill.answers import EPS, STABLE, UNDECIDED, UNSTABLE
+from survey.kernels.hill.answers import STABLE, UNDECIDED, UNSTABLE
 from survey.kernels.jit import kernel, splice
+from survey.kernels.math.roundoff import EPS
 
 TILE = 64
 TERMS = 8  # as many as `_sum` spells out

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from survey.kernels.hill.answers import EPS, UNDECIDED
+from survey.kernels.hill.answers import UNDECIDED
 from survey.kernels.hill.cells import AGAIN, ENOUGH, descend
+from survey.kernels.math.roundoff import EPS
 from survey.measures.hill.edges import FACTORS
 
 NODES = 16

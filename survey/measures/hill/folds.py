@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from survey.kernels.math.roundoff import EPS
 from survey.measures.hill.curves import LONGEST
 from survey.measures.hill.edges import FACTORS, close_in, of_kind
 
@@ -23,7 +24,6 @@ TO_SERIES = 2 / NODES * np.cos(np.pi * np.outer(np.arange(NODES), np.arange(NODE
 TO_SERIES[0] /= 2
 ROUNDS = 12
 WIDER = (1, 4, 16)  # panels: times the step at the turn
-EPS = 2.3e-16
 
 
 @dataclass

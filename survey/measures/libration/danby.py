@@ -18,7 +18,6 @@ import numpy as np
 from survey import measures, status
 from survey.kernels.libration import traces
 from survey.kernels.libration.traces import (
-    EPS,
     FACTORS,
     KREIN,
     MINUS_ONE,
@@ -29,6 +28,7 @@ from survey.kernels.libration.traces import (
     UNDECIDED,
     UNSTABLE,
 )
+from survey.kernels.math.roundoff import EPS
 from survey.measures.libration import danby_double
 from survey.measures.libration.danby_answers import Answers
 from survey.methods import taylor16
