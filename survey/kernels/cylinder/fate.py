@@ -6,18 +6,6 @@ along the flow, since an error along an orbit does not change its fate. Nothing 
 
 import math
 
-from survey.kernels.cylinder.along import (
-    NO_CONVERGENCE,
-    OK,
-    SEPARATRIX,
-    STEP_LIMIT,
-    bar,
-    carried,
-    clean_turning,
-    expand,
-    start_sign,
-    time_of_turning,
-)
 from survey.kernels.cylinder.equilibria import (
     ANGLE,
     BAR,
@@ -32,14 +20,28 @@ from survey.kernels.cylinder.equilibria import (
     resting,
     settled,
 )
-from survey.kernels.cylinder.flow import TWO_PI, TWO_PI_LOW, reduced, table, values
+from survey.kernels.cylinder.flow import PHI, TWO_PI, reduced, table, values
 from survey.kernels.cylinder.returns import ABOVE, BELOW, CYCLE_BAR, CYCLE_CLASS, CYCLE_X, INTERVAL, between
+from survey.kernels.cylinder.steps import (
+    NO_CONVERGENCE,
+    OK,
+    SEPARATRIX,
+    STEP_LIMIT,
+    bar,
+    carried,
+    clean_turning,
+    expand,
+    passage,
+    start_sign,
+    time_of_turning,
+    wrapped,
+)
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 UNDECIDED, EQUILIBRIUM, SADDLE, ROTATION_PLUS, ROTATION_MINUS, LIBRATION = -1, 0, 1, 2, 3, 4
 SPIN_UP_PLUS, SPIN_UP_MINUS, PERIODIC_ROTATION, PERIODIC_LIBRATION, EQUILIBRIUM_START = 5, 6, 7, 8, 9
-INFINITE, UNTOLD, NO_TURNS = -1, -2, -(2**31)
+INFINITE, UNDETERMINED, NO_TURNS = -1, -2, -(2**31)
 TRUST = 1e-4
 GENERIC, REVERSIBLE = 0, 3  # strata that are followed; REVERSIBLE is I2, K = L = 0
 
@@ -143,26 +145,6 @@ def section_ahead(phi, w, section, spacing):
 
 
 @inline
-def crossing_time(at, p, T, target, h):
-    """dt in [0, h] where phi = target, w of either sign."""
-    low, high, dt = 0.0, h, 0.5 * h
-    up = at(p, T, h)[0] > T[0, 0]
-    for _ in range(60):
-        x, v, _e, _y = at(p, T, dt)
-        if (x < target) == up:
-            low = dt
-        else:
-            high = dt
-        new = dt - (x - target) / v if v != 0.0 else low
-        if not low <= new <= high:
-            new = 0.5 * (low + high)
-        if abs(new - dt) <= 1e-17 + 1e-16 * h:
-            return new
-        dt = new
-    return dt
-
-
-@inline
 def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, start, tolerance, limit, out):
     """Fill out = verdict, index of the limit, turnings, unwrapped turns of the limit, status.
 
@@ -170,7 +152,7 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
     sizes = numbers of rows of these, then the stratum and whether weak foci attract.
     """
     count, n_plus, n_minus, n_lib, stratum, weak = sizes[0], sizes[1], sizes[2], sizes[3], sizes[4], sizes[5] > 0
-    out[0], out[1], out[2], out[3], out[4] = UNDECIDED, -1, UNTOLD, NO_TURNS, OK
+    out[0], out[1], out[2], out[3], out[4] = UNDECIDED, -1, UNDETERMINED, NO_TURNS, OK
     phi0, w0 = start[0], start[1]
     phi, turns = reduced(phi0)
     w, slip = w0, start[2] + 4.0 * ROUNDOFF_UP * (turns != 0.0)
@@ -186,7 +168,7 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
                 out[4] = SEPARATRIX
                 return
             out[0], out[1], out[3] = EQUILIBRIUM, row, turns + offset(phi, eqs[row, ANGLE])[1]
-            out[2] = INFINITE if eqs[row, KIND] == FOCUS else UNTOLD
+            out[2] = INFINITE if eqs[row, KIND] == FOCUS else UNDETERMINED
             return
     T = table()
     how = setting(p, w0, tolerance)
@@ -210,7 +192,7 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
         passed = (x1 - target) * sign >= 0.0
         if passed:
             turned = False
-            h = crossing_time(at, p, T, target, h)
+            h = passage(at, p, T, target, x1 > T[0, PHI], h)
             x1, w1, _e, _y = at(p, T, h)
         saa, sab, sbb = carried(p, T, h, w1, saa, sab, sbb)
         phi, w = (target if passed else x1), (0.0 if turned else w1)
@@ -284,11 +266,9 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
         elif abs(w) <= 2.0 * bar_w and n > 1 and held < 0:
             out[4] = SEPARATRIX
             return
-        if abs(phi) > math.pi:
-            k = 1.0 if phi > 0.0 else -1.0
-            phi = (phi - k * TWO_PI) - k * TWO_PI_LOW
-            target -= k * TWO_PI
-            turns += k
+        phi, k = wrapped(phi)
+        target -= k * TWO_PI
+        turns += k
         if held < 0:
             held = captured(eqs, count, phi, w, bar_phi + bar_w)
         if held >= 0:

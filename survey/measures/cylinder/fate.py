@@ -15,9 +15,9 @@ from survey.kernels.cylinder import equilibria as eq
 from survey.kernels.cylinder import fate as kf
 from survey.kernels.cylinder import returns as rt
 from survey.kernels.cylinder import taylor_double
-from survey.kernels.cylinder.along import OK, SEPARATRIX, STEP_LIMIT
 from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, coefficients
 from survey.kernels.cylinder.flow_double import energy as energy_beside
+from survey.kernels.cylinder.steps import OK, SEPARATRIX, STEP_LIMIT
 from survey.measures.cylinder.solution import tolerances, trajectories
 
 NO_TURNS = kf.NO_TURNS
@@ -36,7 +36,7 @@ def empty(size, status):
     """The outputs of `solve` for `size` states, filled with what does not apply."""
     floats = ("limit_phi", "limit_w", "multiplier")
     result = {name + end: np.full(size, np.nan) for name in floats for end in ("", "_error")}
-    for name, fill in (("verdict", -1), ("turnings", kf.UNTOLD), ("net_turns", NO_TURNS), ("status", status)):
+    for name, fill in (("verdict", -1), ("turnings", kf.UNDETERMINED), ("net_turns", NO_TURNS), ("status", status)):
         result[name] = np.full(size, fill, dtype=np.int64)
     return result
 
@@ -80,7 +80,7 @@ def _handed_over(method, s, start, tolerance, out):
             if later[0] != kf.UNDECIDED:
                 out[:] = later
                 if later[2] >= 0:
-                    out[2] = later[2] + turned if turned >= 0 else kf.UNTOLD
+                    out[2] = later[2] + turned if turned >= 0 else kf.UNDETERMINED
                 return
         done = last
 
@@ -304,7 +304,7 @@ def _free(s, starts):
         if w == 0.0:
             row[0], row[3], row[5], row[6] = kf.EQUILIBRIUM_START, 0, phi, 0.0
         elif abs(abs(y) - b) <= noise:
-            row[0], row[2], row[4] = kf.UNDECIDED, kf.UNTOLD, SEPARATRIX
+            row[0], row[2], row[4] = kf.UNDECIDED, kf.UNDETERMINED, SEPARATRIX
         elif abs(y) > b:
             row[0] = kf.PERIODIC_ROTATION
         else:  # the next root of y + b cos(phi - axis) ahead
@@ -346,7 +346,7 @@ def _conservative(s, starts):
     out[:, 1] = -1
     out[:, 2] = np.where(rotates, 0, kf.INFINITE)
     out[:, 3] = np.where(rotates, kf.NO_TURNS, 0)
-    out[near, 0], out[near, 2], out[near, 3], out[near, 4] = kf.UNDECIDED, kf.UNTOLD, kf.NO_TURNS, SEPARATRIX
+    out[near, 0], out[near, 2], out[near, 3], out[near, 4] = kf.UNDECIDED, kf.UNDETERMINED, kf.NO_TURNS, SEPARATRIX
     for i in np.flatnonzero(w == 0.0):
         row = eq.resting(s.p, s.equilibria, len(s.equilibria), phi[i])
         if row >= 0:
