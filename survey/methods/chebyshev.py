@@ -13,6 +13,7 @@ import numpy as np
 
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.double import two_sum
+from survey.kernels.math.newton import bracketed
 from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.nutation import records as rc
 from survey.kernels.nutation import wells as nu
@@ -153,21 +154,17 @@ def _integrals(waves, n, x, out):
 
 @inline
 def _when(row, waves, n, time, value, out):
-    """x at which `time` is reached, by Newton's method between brackets; `out` as `_integrals`."""
-    low, high = 0.0, pi
-    x = pi * time / (pi * waves[0, 0])
-    for _ in range(100):
-        _integrals(waves, n, x, out)
-        _integrands(row, x, value)
-        move = (out[0] - time) / value[0]
-        low, high = (low, x) if move > 0.0 else (x, high)
-        new = x - move
-        if not low <= new <= high:
-            new = 0.5 * (low + high)
-        if abs(new - x) <= 4.0 * ROUNDOFF * x:
-            break
-        x = new
-    return x
+    """x at which `time` is reached; `out` as `_integrals`."""
+    first, given = pi * time / (pi * waves[0, 0]), (row, waves, n, time, value, out)
+    return bracketed(_to_time, _integrals, given, first, (0.0, pi), (0.0, 4.0 * ROUNDOFF), 100)[0]
+
+
+@inline
+def _to_time(integrals, given, x):
+    row, waves, n, time, value, out = given
+    integrals(waves, n, x, out)
+    _integrands(row, x, value)
+    return out[0] - time, value[0], not (out[0] - time) / value[0] > 0.0
 
 
 @inline

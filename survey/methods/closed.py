@@ -12,7 +12,7 @@ import numpy as np
 
 from survey.kernels.cylinder import closed, trigonometric, weierstrass
 from survey.kernels.cylinder import records as rc
-from survey.kernels.cylinder.along import EQUILIBRIUM, NO_CONVERGENCE, OK, TRUST, TURNING, finite
+from survey.kernels.cylinder.steps import EQUILIBRIUM, NO_CONVERGENCE, OK, TRUST, TURNING, finite
 from survey.kernels.cylinder.weierstrass import BAR_W, BAR_X, COUNT, LANES, W, X
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
@@ -27,7 +27,7 @@ _NO_FORM = 19  # as in the STATUS of scenes/gyrostat.py
 
 
 def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
-    """See `along.trajectories`; tolerance and limit have no meaning here. Only the forms that apply are compiled."""
+    """See `steps.trajectories`; tolerance and limit have no meaning here. Only the forms that apply are compiled."""
     forms, curves = np.zeros(times.shape, np.int8), np.empty((len(P), 2))
     _sort(P, starts, times, forms, curves, floats, turnings, status)
     for form, solve in ((closed.LIBRATION, _elliptics), (closed.TRIGONOMETRIC, _trigonometrics)):
@@ -96,7 +96,7 @@ def _tell(out, phi0, x, w, bar_x, bar_w):
 
 @kernel
 def flow_abels(P, starts, targets, tolerance, limit, floats, status):
-    """See `along.abels`; tolerance and limit have no meaning here."""
+    """See `steps.abels`; tolerance and limit have no meaning here."""
     data = closed.scratch()
     for i in range(len(P)):
         phi0, w0 = starts[i, 0], starts[i, 1]

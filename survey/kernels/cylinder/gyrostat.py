@@ -249,7 +249,7 @@ def local_error(G, T, dt):
 
 @kernel
 def carry(G, T, V, dt, squares, J, work):
-    """squares <- J squares J^T + diag(d^2) over dt of the current step, as in `along`; J and `work` are scratch."""
+    """squares <- J squares J^T + diag(d^2) over dt of the current step, as in `steps`; J and `work` are scratch."""
     jacobian(V, dt, J)
     for i in range(6):
         for j in range(6):

@@ -5,7 +5,7 @@ turned by a (symmetry S4 of `gyrostat.md`) c23 = 0, and psi = phi - a obeys, wit
 
     psi' = w,  S' = C w,  C' = -S w,  w' = b12 S' + b31 C' - d C S + s2 C - s3 S        (57):
 
-three Cauchy products. S and C are worked out anew for each step. Errors are carried as in `along`, by the
+three Cauchy products. S and C are worked out anew for each step. Errors are carried as in `steps`, by the
 variational equation in its Lienard form (`flow.variation`), to order LOW.
 
 A lane whose next time lies within its step is evaluated there and then goes on from where the step began: so steps
@@ -17,17 +17,6 @@ import math
 import numpy as np
 
 from survey.kernels.cylinder import records as rc
-from survey.kernels.cylinder.along import (
-    NO_CONVERGENCE,
-    OK,
-    OVERFLOW,
-    STEP_LIMIT,
-    TRUST,
-    UNTOLD,
-    bar,
-    finite,
-    start_sign,
-)
 from survey.kernels.cylinder.flow import (
     B12,
     B31,
@@ -41,6 +30,17 @@ from survey.kernels.cylinder.flow import (
     TWO_PI_LOW,
     D,
     reduced,
+)
+from survey.kernels.cylinder.steps import (
+    NO_CONVERGENCE,
+    OK,
+    OVERFLOW,
+    STEP_LIMIT,
+    TRUST,
+    UNDETERMINED,
+    bar,
+    finite,
+    start_sign,
 )
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
@@ -293,7 +293,7 @@ def _tell(state, before, fixed, i, floats, turnings):
     from_rest = before[_STEPS, i] == 0.0 and before[_V, i] == 0.0  # then w is 0 at the start and nowhere else
     told = before[_UNSURE, i] < 3.0 and before[_COUNT, i] >= 0.0 and (abs(v) > high or from_rest)
     passed = before[_SIGN, i] * v < 0.0 and not from_rest
-    turnings[0] = int(before[_COUNT, i]) + passed if told else UNTOLD
+    turnings[0] = int(before[_COUNT, i]) + passed if told else UNDETERMINED
     for k in range(_STATE):
         state[k, i] = before[k, i]
     return True
@@ -343,7 +343,7 @@ def _collect(times, limit, state, before, fixed, fate, row, column, floats, turn
 def trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
     """phi, w, their bars and turnings at the ascending times >= 0 of each row, which end at its first infinity.
 
-    P (rows, 10) from `flow.coefficients`; as `along.trajectories`. Returns the number of steps
+    P (rows, 10) from `flow.coefficients`; as `steps.trajectories`. Returns the number of steps
     of lanes, free ones too.
     """
     work = np.zeros((ROWS, LANES))  # one array: LLVM sees that its rows do not overlap

@@ -17,9 +17,9 @@ import math
 import numpy as np
 
 from survey.kernels.cylinder import flow
-from survey.kernels.cylinder.along import UNTOLD
 from survey.kernels.cylinder.flow import TWO_PI, TWO_PI_LOW, centred
 from survey.kernels.cylinder.lockstep import sine_cosine
+from survey.kernels.cylinder.steps import UNDETERMINED
 from survey.kernels.cylinder.weierstrass import BAR_W, BAR_X, COUNT, LANES, W, X, arctangent
 from survey.kernels.jit import inline
 from survey.kernels.math.double import two_prod
@@ -200,7 +200,7 @@ def _formula(T):
         back = T[W0, i] < 0.0
         T[X, i], T[W, i], T[BAR_X, i], T[BAR_W, i] = -x if back else x, -w if back else w, bar_x, bar_w
         # on the curve itself w keeps its sign
-        T[COUNT, i] = 0.0 if other == 0.0 or w > bar_w else float(UNTOLD)
+        T[COUNT, i] = 0.0 if other == 0.0 or w > bar_w else float(UNDETERMINED)
 
 
 @inline

@@ -21,9 +21,9 @@ import math
 import numpy as np
 
 from survey.kernels.cylinder import flow
-from survey.kernels.cylinder.along import UNTOLD
 from survey.kernels.cylinder.flow import TWO_PI, TWO_PI_LOW, centred
 from survey.kernels.cylinder.lockstep import sine_cosine
+from survey.kernels.cylinder.steps import UNDETERMINED
 from survey.kernels.jit import inline
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
@@ -283,14 +283,14 @@ def _formula(T):
         T[X, i], T[W, i] = T[_SIDE, i] * x, T[_SIDE, i] * w
         T[BAR_X, i], T[BAR_W, i] = math.inf if lost else _SAFE * bar_x, _SAFE * bar_w
         passed = 2.0 * turns + (0.0 if w > 0.0 else half) if swings else 0.0
-        T[COUNT, i] = passed if abs(w) > T[BAR_W, i] else float(UNTOLD)
+        T[COUNT, i] = passed if abs(w) > T[BAR_W, i] else float(UNDETERMINED)
 
 
 @inline
 def solve(T):
     """Rows X to COUNT of T (ROWS, LANES) from rows D to TIME, |PHI| <= pi and off by SLIP, TIME > 0; W0 is changed.
 
-    BAR_X is infinite where the digits are lost. COUNT is UNTOLD where |W| <= BAR_W.
+    BAR_X is infinite where the digits are lost. COUNT is UNDETERMINED where |W| <= BAR_W.
     """
     _energy(T)
     _lattice(T)

@@ -11,13 +11,14 @@ from math import pi, sqrt
 import numpy as np
 
 from survey.kernels.jit import kernel
+from survey.kernels.math.chebyshev import nodes
 from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.nutation import lanes as nl
 from survey.kernels.nutation import wells as nu
 
 ROUGH = 2e-13  # bars of (S14), relative, beyond which the action is a sum
 NODES = 16
-_COSINES = np.cos((np.arange(NODES) + 0.5) * pi / NODES)
+_COSINES = nodes(NODES)
 # (S22): nodes w = STEP n, DOWN <= n <= UP; there c, 1 - c^2, (1 + c)/2, (1 - c)/2, and the weight c s^3
 STEP, DOWN, UP = 0.3125, -256, 320
 NEGLIGIBLE = 1e-19

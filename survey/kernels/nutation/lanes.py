@@ -7,10 +7,9 @@ of steps suffice: otherwise it is left to them. A lane's bits do not depend on i
 
 from math import copysign, pi, sqrt
 
-import numpy as np
-
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math import double as dd
+from survey.kernels.math.chebyshev import nodes
 from survey.kernels.math.roundoff import PAIR_SUM_ROUNDOFF, ROUNDOFF
 
 TILE = 64
@@ -26,7 +25,7 @@ WIDE = 0.1  # wells that are wider are no parabolas
 NEAR, LAST = 3e-5, 1e-17  # the last two means, and the last weight of R
 SLANT, CANCELLED = 0.25, 0.05  # as in methods/agm.py
 NODES = 16
-COSINES = np.cos((np.arange(NODES) + 0.5) * pi / NODES)
+COSINES = nodes(NODES)
 # where the rows of a tile begin: of what is given the last two, b and a
 B, A = 5 * TILE, 6 * TILE
 # pairs: k, L, L + k - a b, L + k + a b, b - a, b + a

@@ -13,9 +13,9 @@ import numpy as np
 from survey.kernels.cylinder import equilibria as eq
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder import returns as rt
-from survey.kernels.cylinder.along import TURNING
 from survey.kernels.cylinder.branches import unstable
 from survey.kernels.cylinder.flow import BOUND_DDG, BOUND_DG, BOUND_F
+from survey.kernels.cylinder.steps import TURNING
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.measures.cylinder import solution
 from survey.measures.cylinder.fate import EXACT, I0, G, followed, remembered, sizes
