@@ -1,1 +1,1 @@
-"""What is asked of a finished survey, one question per file: what `ds.survey` does (see `survey/accessor.py`)."""
+"""What `ds.survey` does (see `survey/accessor.py`): one question asked of a finished survey per file."""

@@ -95,11 +95,12 @@ def check(imports):
 
 
 def meaning(package):
-    """The first sentence of its docstring, without its name."""
+    """The first sentence of its docstring, without its name and what is in brackets."""
     path = ROOT / "survey" / package
     text = (path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text()
     line = ast.get_docstring(ast.parse(text)).partition("\n")[0]
-    words = re.split(r"\.(?: |$)|; | \(", line.removeprefix(f"The {package}: "))[0]
+    line = re.sub(r" \([^)]*\)", "", line.removeprefix(f"The {package}: "))
+    words = re.split(r"\.(?: |$)|; ", line)[0]
     return words[0].upper() + words[1:]
 
 
