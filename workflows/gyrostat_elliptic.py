@@ -1,6 +1,6 @@
 """Formulas of the gyrostat paper for b = 0, (62)-(68), as printed and corrected: residuals for `gyrostat_errata.py`.
 
-The derivatives of u = tan(phi/2) are held against u'^2 = P4(u) / 4, those of w against (57).
+The derivatives of u = tan(phi/2) are checked against u'^2 = P4(u) / 4, those of w against (57).
 """
 
 from errata import number, numbers, worst

@@ -2,7 +2,7 @@
 
     python workflows/gyrostat_errata.py [-o results]
 
-Needs mpmath: pip install -e ".[test]". Residuals to 40 digits at random parameters: motions are held against the
+Needs mpmath: pip install -e ".[test]". Residuals to 40 digits at random parameters: motions are checked against the
 six equations (1)-(6), the formulas of the elliptic case against u'^2 = P4(u) / 4. The corrections are derived in
 survey/scenes/gyrostat.md.
 """
@@ -419,7 +419,7 @@ PAGE = """# The gyrostat paper's printed formulas, tested
 Made by `python workflows/gyrostat_errata.py`. Source: M. E. Lesina, Ya. V. Zinovyeva, *Rotation of a gyrostat in a magnetic
 field with the Barnett-London effect* (2004), as a scanned text: a slip may be the scan's. Every residual was computed by
 this command, in {digits}-digit arithmetic, the worst (corrected, right) or the least (printed) of {trials} random sets of parameters.
-Motions are held against the six equations (1)-(6), the elliptic case against u'^2 = P4(u) / 4; the corrections are derived
+Motions are checked against the six equations (1)-(6), the elliptic case against u'^2 = P4(u) / 4; the corrections are derived
 in `survey/scenes/gyrostat.md`. th = theta0, l = lambda, lower case = over A11.
 
 ## What must be corrected

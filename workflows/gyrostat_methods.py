@@ -3,7 +3,7 @@
     python workflows/gyrostat_methods.py [-o results]
 
 Needs mpmath: pip install -e ".[test]". The truth is the flow (57) in double-double arithmetic (some 31 digits): a Taylor
-series of its own, solved twice with other orders and steps, and held against mpmath's trajectories.
+series of its own, solved twice with other orders and steps, and checked against mpmath's trajectories.
 """
 
 # ruff: noqa: E501  (the page's lines)

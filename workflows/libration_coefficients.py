@@ -1,4 +1,4 @@
-"""The text's figures 8 to 10 drawn anew, with the order 4 it leaves out, and the verdict with the resonances.
+"""Figures 8 to 10 of the source regenerated, with the order 4 that it leaves out, and the verdict with the resonances.
 
     python workflows/libration_coefficients.py [-o results]
 

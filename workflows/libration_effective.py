@@ -88,7 +88,7 @@ PAGE = """# Effective stability of the triangular libration points
 
 Made by `python workflows/libration_effective.py`. The radius rho is the greatest for which motions that start with all
 |z_j| <= rho, in the variables of the normal form (action r_j = |z_j|^2, unit distance, mass and mean motion), keep
-their actions below 2 rho^2 for the stated time, as far as the remainders of the series tell: degrees up to the order
+their actions below 2 rho^2 for the stated time, as far as the remainders of the series show: degrees up to the order
 plus 1, then a geometric tail (`survey/measures/libration/effective_stability.py`). r, of 2, ..., order - 1, is the
 degree to which the Hamiltonian was normalised for it. It is an estimate from truncated series, not a proof; where r is
 the greatest that the order allows, higher orders would give a larger radius. The bars hold rounding only.

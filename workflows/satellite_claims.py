@@ -3,7 +3,7 @@
     python workflows/satellite_claims.py [-o results]
 
 Needs scipy: pip install -e ".[test]". The corrections are derived in survey/scenes/satellite.md; here they and the
-printed ones are held against the rigid body itself: Euler's equations with direction cosines and gravity gradient.
+printed ones are checked against the rigid body itself: Euler's equations with direction cosines and gravity gradient.
 """
 
 # ruff: noqa: E501  (the rows of the page's tables)
@@ -289,7 +289,7 @@ def judged(ds, body):
 PAGE = """# Astakhova's printed formulas, tested
 
 Made by `python workflows/satellite_claims.py`. Source: I. S. Astakhova, *Transformation of satellite equations to Hill's
-equation*. Each printed formula is held against the rigid body itself (Euler's equations with direction cosines and
+equation*. Each printed formula is checked against the rigid body itself (Euler's equations with direction cosines and
 gravity gradient), never against another formula; the corrections are derived in `survey/scenes/satellite.md`.
 
 ## Formulas, at 1000 random states (rms of the error over rms of the value)

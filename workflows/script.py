@@ -1,4 +1,4 @@
-"""What the scripts here share: their command line, and what they say meanwhile."""
+"""What the scripts here share: their command line, and what they report as they run."""
 
 import argparse
 import sys

@@ -1,7 +1,7 @@
 #!/bin/bash
 # A sweep on a cluster with SLURM:   sbatch workflows/slurm.sh WORKFLOW.toml [options of survey run]
 # One scheduler, as many workers as tasks, all started by dask's own commands. Five minutes before the walltime the run
-# stops, its finished blocks safe, and the job is queued again to go on. With TLS: set dask's certificates and
+# stops, its finished blocks safe, and the job is queued again to resume. With TLS: set dask's certificates and
 # DASK_DISTRIBUTED__COMM__DEFAULT_SCHEME=tls in the environment, as workflows/docs/overnight.md shows.
 #SBATCH --job-name=survey
 #SBATCH --ntasks=8
