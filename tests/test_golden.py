@@ -1,6 +1,6 @@
 """Small files of every scene, kept: an accidental change of the layout, of a code, or of a value beyond its bar shows.
 
-What is meant to change is written anew: `survey run NAME.toml --fresh` in `tests/golden`, and the change is told.
+After an intended change, `survey run NAME.toml --fresh` in `tests/golden` regenerates them; the change is recorded.
 """
 
 import subprocess

@@ -1,8 +1,8 @@
-"""The text's figures 8 to 10 drawn anew, with the order 4 it leaves out, and the verdict with the resonances.
+"""The text's figures 8 to 10 regenerated, with the order 4 that it omits, and the verdict with the resonances.
 
     python workflows/libration_coefficients.py [-o results]
 
-Runs `libration_coefficients.toml` beside this file, and draws libration_coefficients.png and libration_verdict.png.
+Runs `libration_coefficients.toml` and draws libration_coefficients.png and libration_verdict.png.
 """
 
 from pathlib import Path
@@ -15,7 +15,7 @@ from matplotlib.patches import Patch
 from script import parser
 
 import survey
-from survey.show.figures import COLOURS
+from survey.show.palette import COLOURS
 
 SURVEY = Path(__file__).with_suffix(".toml")
 LINES = [COLOURS[i] for i in (6, 0, 4, 5, 2, 9)]
@@ -25,7 +25,7 @@ PANELS = (
     ("figure 9: order 6 in the plane, and $D_6$", ("300", "210", "120", "030", "D6"), 1e-1),
     ("figure 10: order 6 across the plane", ("201", "111", "021", "102", "012", "003"), 1e-3),
 )
-VERDICTS = {0: COLOURS[0], 1: COLOURS[1], 2: COLOURS[2]}  # the others take one float64 each
+VERDICTS = {0: COLOURS[0], 1: COLOURS[1], 2: COLOURS[2]}  # each of the others occupies a single float64
 MARKED = ("mu_c", "mu2", "mu_d", "mu1", "mu_R")
 
 
@@ -73,8 +73,8 @@ def draw_verdict(ds, path):
     )
     mu, verdict = ds.mu.values, ds.verdict.values
     names = dict(zip(ds.verdict.flag_values, ds.verdict.flag_meanings.split(), strict=True))
-    look = {"cmap": ListedColormap(list(VERDICTS.values())), "vmin": -0.5, "vmax": 2.5, "shading": "nearest"}
-    strip.pcolormesh(mu, [0.0, 1.0], np.vstack([verdict, verdict]), rasterized=True, **look)
+    style = {"cmap": ListedColormap(list(VERDICTS.values())), "vmin": -0.5, "vmax": 2.5, "shading": "nearest"}
+    strip.pcolormesh(mu, [0.0, 1.0], np.vstack([verdict, verdict]), rasterized=True, **style)
     strip.set(yticks=[], ylim=(0, 1), title="Formal stability of $L_4$ and $L_5$ in the spatial circular problem")
     critical = {value.symbol: float(value.mu) for value in boundaries()}
     for name in MARKED:
@@ -90,11 +90,11 @@ def draw_verdict(ds, path):
         colour = "black" if definite else "grey"
         marks.vlines(float(value.mu), value.order, 9.4, color=colour, lw=0.6, alpha=0.5, ls="-" if definite else ":")
         marks.plot(float(value.mu), value.order, "o", ms=5, color=colour, mfc=colour if definite else "white")
-        left = value.mu > 0.0375  # no room to the right; and in order 7 none above, where (3, 4, 0) stands
+        left = value.mu > 0.0375  # no space to the right, nor above in order 7, where (3, 4, 0) is
         above = definite and not (left and value.order == 7)
-        place = {"xytext": (-4 if left else 4, 4 if above else -10), "ha": "right" if left else "left"}
+        position = {"xytext": (-4 if left else 4, 4 if above else -10), "ha": "right" if left else "left"}
         marks.annotate(value.symbol, (float(value.mu), value.order), textcoords="offset points", fontsize=7.5,
-                       color=colour, **place)  # fmt: skip
+                       color=colour, **position)  # fmt: skip
     marks.set(ylabel="order", ylim=(9.4, 2.4), yticks=range(3, 9))
     marks.set_title(
         "resonances $k_1\\omega_1 - k_2\\omega_2 + k_3 = 0$, $k_3$ even: full if all $k_i \\geq 0$, else hollow",

@@ -1,4 +1,4 @@
-"""What the scripts here share: their command line, and what they say meanwhile."""
+"""What these scripts share: their command line and progress messages."""
 
 import argparse
 import sys
@@ -6,10 +6,10 @@ from pathlib import Path
 
 
 def parser(doc, what):
-    """Parser of a script's command line; its `output`, where `what` goes, is a folder that is made where none is."""
-    words = argparse.ArgumentParser(description=doc.splitlines()[0])
-    words.add_argument("-o", "--output", default="results", metavar="DIR", type=_folder, help=f"folder for {what}")
-    return words
+    """Parser of a script's command line; its `output`, the folder for `what`, is created if necessary."""
+    options = argparse.ArgumentParser(description=doc.splitlines()[0])
+    options.add_argument("-o", "--output", default="results", metavar="DIR", type=_folder, help=f"folder for {what}")
+    return options
 
 
 def _folder(text):
@@ -19,4 +19,5 @@ def _folder(text):
 
 
 def say(line):
+    """Report progress on stderr."""
     print(f"{Path(sys.argv[0]).stem}: {line}", file=sys.stderr)
