@@ -20,6 +20,10 @@ import numpy as np
 from survey.kernels.jit import splice
 from survey.kernels.unroll import changes_sign, unroll
 
+# The columns of a point's results: both solutions and their derivatives at the end, their error bounds, and the
+# numbers of zeros of y1 and of y2 on the way.
+Y1, DY1, Y2, DY2, Y1_BAR, DY1_BAR, Y2_BAR, DY2_BAR, Y1_ZEROS, Y2_ZEROS = range(10)
+RESULTS = 10
 TILE = 64
 VECTOR = 8
 STATE = 13
@@ -148,14 +152,14 @@ def column(matrix, y, v, s, t, w):
 @splice
 def _finish(state, i, steps, out):
     for k in range(4):
-        out[k] = state[k, i]
+        out[Y1 + k] = state[k, i]
     bars(state[4, i], state[6, i], state[7, i], state[9, i], steps, state[12, i], out)
-    out[8], out[9] = state[10, i], state[11, i]
+    out[Y1_ZEROS], out[Y2_ZEROS] = state[10, i], state[11, i]
 
 
 @splice
 def bars(s1, w1, s2, w2, steps, total, out):
     """The four error bounds from the diagonals of the ellipses, the number of steps and M."""
     doubt, terms = np.exp(min(total, WORST)) / SCALE, 2.0 * steps
-    out[4], out[5] = doubt * np.sqrt(terms * s1), doubt * np.sqrt(terms * w1)
-    out[6], out[7] = doubt * np.sqrt(terms * s2), doubt * np.sqrt(terms * w2)
+    out[Y1_BAR], out[DY1_BAR] = doubt * np.sqrt(terms * s1), doubt * np.sqrt(terms * w1)
+    out[Y2_BAR], out[DY2_BAR] = doubt * np.sqrt(terms * s2), doubt * np.sqrt(terms * w2)

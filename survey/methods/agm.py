@@ -10,14 +10,15 @@ from math import copysign, log, pi, sqrt
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math import double as dd
 from survey.kernels.math.elliptic import jacobi
+from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.math.third_kind import mean, third, third_double
+from survey.kernels.nutation import records as rc
 from survey.kernels.nutation import wells as nu
 from survey.kernels.nutation.action import ROUGH, action
 from survey.kernels.nutation.motion import motion
 
 ORDER = 0  # no steps
 SERVES = ("nutation",)
-_EPS = nu.EPS
 _CANCELLED = 0.05  # advances that are a smaller part of their terms are computed in double-double
 _FINE = 2.0**-94
 _CLOSE = 0.1  # poles that are nearer, in units of a well's width, bound rates by nothing
@@ -133,36 +134,37 @@ def _periods_of(row, out):
     )
     low, high = row[nu.NOISE_LOW], row[nu.NOISE_HIGH]
     noise, share = low + high + row[nu.NOISE_ABOVE], _shares(x, y)
-    out[0] = period
-    out[4] = (12.0 * _EPS + 0.5 * share[0] * row[nu.NOISE_ABOVE] + 0.25 * share[1] * (low + high)) * period
+    out[rc.PERIOD] = period
+    out[rc.PERIOD_BAR] = (
+        12.0 * ROUNDOFF + 0.5 * share[0] * row[nu.NOISE_ABOVE] + 0.25 * share[1] * (low + high)
+    ) * period
     total, difference, size = down + up, down - up, size_up + size_down
     roots = root_low, root_high
     blur_psi, blur_phi = _blurred(row, roots, pi * turns_up + up, pi * turns_down + down, period, x, y)
     ends = 4.0 * row[nu.WIDTH] * (row[nu.NOISE_ENDS] + row[nu.NOISE_WIDTH])
-    error, rounding = (24.0 * _EPS + ends) * size, 2.0 * _EPS
+    error, rounding = (24.0 * ROUNDOFF + ends) * size, 2.0 * ROUNDOFF
     bare = abs(total) if turns_up + turns_down == 0.0 else abs(difference)  # without multiples of pi
     if bare < _CANCELLED * size and turns_up * turns_down != 0.0:
         total, difference = _fine_parts(row)
-        error, rounding = (_FINE + ends) * size, 12.0 * _EPS
-    out[1], out[2] = pi * (turns_down + turns_up) + total, pi * (turns_down - turns_up) + difference
-    turned = 2.0 * _EPS * pi
-    out[5] = error + min(4.0 * noise * size, blur_psi) + rounding * abs(total) + turned * abs(turns_down + turns_up)
-    out[6] = (
-        error + min(4.0 * noise * size, blur_phi) + rounding * abs(difference) + turned * abs(turns_down - turns_up)
-    )
+        error, rounding = (_FINE + ends) * size, 12.0 * ROUNDOFF
+    out[rc.PRECESSION], out[rc.SPIN] = pi * (turns_down + turns_up) + total, pi * (turns_down - turns_up) + difference
+    turned = 2.0 * ROUNDOFF * pi
+    turned_psi, turned_phi = turned * abs(turns_down + turns_up), turned * abs(turns_down - turns_up)
+    out[rc.PRECESSION_BAR] = error + min(4.0 * noise * size, blur_psi) + rounding * abs(total) + turned_psi
+    out[rc.SPIN_BAR] = error + min(4.0 * noise * size, blur_phi) + rounding * abs(difference) + turned_phi
     up, down = row[nu.MINUS] * (pi * turns_up + up), row[nu.PLUS] * (pi * turns_down + down)
     rest = 0.5 * (0.5 * above - series)
-    out[3] = (period * (row[nu.LEVEL] + rest) - up - down) / (2.0 * pi)
+    out[rc.ACTION] = (period * (row[nu.LEVEL] + rest) - up - down) / (2.0 * pi)
     size = period * (abs(row[nu.LEVEL]) + abs(rest))
     size += abs(row[nu.MINUS]) * (pi + size_up) + abs(row[nu.PLUS]) * (pi + size_down)
-    out[7] = (24.0 * _EPS + 4.0 * noise) * size / (2.0 * pi)
-    if out[7] > ROUGH * abs(out[3]):
-        out[3], out[7] = action(row)
+    out[rc.ACTION_BAR] = (24.0 * ROUNDOFF + 4.0 * noise) * size / (2.0 * pi)
+    if out[rc.ACTION_BAR] > ROUGH * abs(out[rc.ACTION]):
+        out[rc.ACTION], out[rc.ACTION_BAR] = action(row)
 
 
 @kernel
 def nutation_periods(rows, kinds, tolerance, out):
-    """Fill `out` (n, 8) for the wells `rows` (n, SIZE): values, then bars; a well of another kind is left alone."""
+    """Fill `out` (n, PERIODS) for the wells `rows` (n, SIZE); a well of another kind is left alone."""
     for i in range(len(rows)):
         if kinds[i] >= nu.NUTATION:
             _periods_of(rows[i], out[i])
@@ -180,7 +182,7 @@ def _cosine(z, kc, quarter, pairs, last):
 
 @kernel
 def nutation_motions(rows, kinds, starts, periods, times, out):
-    """Fill `out` (n, m, 6): u, psi, phi less the drift, and bars, at `times` (n, m) in units of A."""
+    """Fill `out` (n, m, MOTION) at `times` (n, m) in units of A."""
     for i in range(len(rows)):
         if kinds[i] >= nu.NUTATION:
             motion(_cosine, rows[i], starts[i], periods[i], times[i], out[i])

@@ -9,13 +9,14 @@ from math import cos, hypot, pi, sin, sqrt
 
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.carlson import rf_whole, rj, rj_spread
+from survey.kernels.math.roundoff import ROUNDOFF
+from survey.kernels.nutation import records as rc
 from survey.kernels.nutation import wells as nu
 from survey.kernels.nutation.action import ROUGH, action
 from survey.kernels.nutation.motion import first_kind, motion
 
 ORDER = 0  # no steps
 SERVES = ("nutation",)
-_EPS = nu.EPS
 _STEPS = 60
 
 
@@ -46,17 +47,18 @@ def _periods_of(row, out):
     up = _advance(row[nu.MINUS], row[nu.HIGH_PLUS], row[nu.LOW_PLUS], width, low, time, s, g, spread)
     down = _advance(row[nu.PLUS], row[nu.LOW_MINUS], row[nu.HIGH_MINUS], width, high, time, s, g, spread)
     noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + row[nu.NOISE_ABOVE]
-    out[0], out[1], out[2] = 4.0 * time, up + down, down - up
-    out[4] = (32.0 * _EPS + noise) * out[0]
+    out[rc.PERIOD], out[rc.PRECESSION], out[rc.SPIN] = 4.0 * time, up + down, down - up
+    out[rc.PERIOD_BAR] = (32.0 * ROUNDOFF + noise) * out[rc.PERIOD]
     # here, other than in agm, advances know the distances from poles by these alone
     noise += 0.5 * row[nu.NOISE_ENDS]
-    out[5] = out[6] = (48.0 * _EPS + 4.0 * noise) * (abs(up) + abs(down))
+    out[rc.PRECESSION_BAR] = out[rc.SPIN_BAR] = (48.0 * ROUNDOFF + 4.0 * noise) * (abs(up) + abs(down))
     square = _second_kind(time, 0.5 * above, g, g)
-    parts = out[0] * row[nu.LEVEL], 4.0 * square, row[nu.MINUS] * up, row[nu.PLUS] * down
-    out[3] = (parts[0] + parts[1] - parts[2] - parts[3]) / (2.0 * pi)
-    out[7] = (48.0 * _EPS + 4.0 * noise) * (abs(parts[0]) + parts[1] + abs(parts[2]) + abs(parts[3])) / (2.0 * pi)
-    if out[7] > ROUGH * abs(out[3]):
-        out[3], out[7] = action(row)
+    parts = out[rc.PERIOD] * row[nu.LEVEL], 4.0 * square, row[nu.MINUS] * up, row[nu.PLUS] * down
+    out[rc.ACTION] = (parts[0] + parts[1] - parts[2] - parts[3]) / (2.0 * pi)
+    size = abs(parts[0]) + parts[1] + abs(parts[2]) + abs(parts[3])
+    out[rc.ACTION_BAR] = (48.0 * ROUNDOFF + 4.0 * noise) * size / (2.0 * pi)
+    if out[rc.ACTION_BAR] > ROUGH * abs(out[rc.ACTION]):
+        out[rc.ACTION], out[rc.ACTION_BAR] = action(row)
 
 
 @kernel

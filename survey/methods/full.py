@@ -11,19 +11,21 @@ import math
 import numpy as np
 
 from survey.kernels.cylinder import gyrostat
-from survey.kernels.cylinder.along import (
+from survey.kernels.cylinder import records as rc
+from survey.kernels.cylinder.flow import LOW, TWO_PI, TWO_PI_LOW, longest_step, reduced
+from survey.kernels.cylinder.steps import (
     NO_CONVERGENCE,
     OK,
     OVERFLOW,
     STEP_LIMIT,
     TRUST,
-    UNTOLD,
+    UNDETERMINED,
     bar,
     finite,
     start_sign,
 )
-from survey.kernels.cylinder.flow import LOW, TWO_PI, TWO_PI_LOW, UNIT, longest_step, reduced
 from survey.kernels.jit import kernel
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 ORDER = gyrostat.ORDER
 SERVES = ("cylinder",)
@@ -32,7 +34,7 @@ COST = {"cylinder": 90.0}  # time, relative to the default method
 FLOW_FINEST = 1e-17  # useful truncation error of a step
 FLOW_WORK = 2  # steps, relative to the Taylor method
 _PAIRS = 3  # of components, in each of which a step and the initial state err; `bar` counts two for each step
-_FIRST = 4.0 * UNIT  # rounding of the initial state in the rotated frame
+_FIRST = 4.0 * ROUNDOFF_UP  # rounding of the initial state in the rotated frame
 
 
 @kernel
@@ -51,18 +53,18 @@ def _read(state, squares, n, near, out):
         for j in range(3):
             a += (c * frame[i, 1] - s * frame[i, 2]) * squares[3 + i, 3 + j] * (c * frame[j, 1] - s * frame[j, 2])
             b += frame[i, 0] * squares[i, j] * frame[j, 0]
-    out[0], out[1] = phi + turns * TWO_PI, w
-    out[2] = bar(_PAIRS * (n + 1), a) + UNIT * (4.0 + 4.0 * abs(turns) * TWO_PI)
-    out[3] = bar(_PAIRS * (n + 1), b) + UNIT * 4.0 * abs(w)
+    out[rc.PHI], out[rc.W] = phi + turns * TWO_PI, w
+    out[rc.PHI_BAR] = bar(_PAIRS * (n + 1), a) + ROUNDOFF_UP * (4.0 + 4.0 * abs(turns) * TWO_PI)
+    out[rc.W_BAR] = bar(_PAIRS * (n + 1), b) + ROUNDOFF_UP * 4.0 * abs(w)
 
 
 @kernel
 def _trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
-    """As `along.trajectory`, by the full equations."""
+    """As `steps.trajectory`, by the full equations."""
     free, G, squares, axis = np.empty(8), np.empty((14, 3)), np.zeros((6, 6)), gyrostat.FRAME[:, 0].copy()
     T, V = np.zeros((gyrostat.LAST + 1, 12)), np.zeros((LOW + 1, 6, 12))
     state, new, J, work = np.empty(6), np.empty(6), np.empty((6, 6)), np.empty((6, 6))
-    here, there = np.empty(4), np.empty((6, 6))
+    here, there = np.empty(rc.STATE), np.empty((6, 6))
     gyrostat.generic(p, w0, free)
     gyrostat.embed(p, free, G)
     phi, before = reduced(phi0)  # before: turns already in phi0
@@ -85,29 +87,29 @@ def _trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
                     there[i, k] = squares[i, k]
             gyrostat.carry(G, T, V, dt, there, J, work)
             _read(new, there, n, phi + gyrostat.angle(T, dt, axis), here)
-            if not (here[2] < TRUST and here[3] < TRUST * (1.0 + abs(here[1]))):
+            if not (here[rc.PHI_BAR] < TRUST and here[rc.W_BAR] < TRUST * (1.0 + abs(here[rc.W]))):
                 return NO_CONVERGENCE
-            floats[j, 0], floats[j, 1] = (here[0] + before * TWO_PI_LOW) + before * TWO_PI, here[1]
-            floats[j, 2], floats[j, 3] = here[2] + 3e-16 * abs(before) * TWO_PI, here[3]
+            floats[j, rc.PHI], floats[j, rc.W] = (here[rc.PHI] + before * TWO_PI_LOW) + before * TWO_PI, here[rc.W]
+            floats[j, rc.PHI_BAR], floats[j, rc.W_BAR] = here[rc.PHI_BAR] + 3e-16 * abs(before) * TWO_PI, here[rc.W_BAR]
             from_rest = n == 1 and w0 == 0.0
-            told = unsure < 3 and count >= 0 and (abs(here[1]) > here[3] or from_rest)
-            turnings[j] = count + (here[1] * sign < 0.0 and not from_rest) if told else UNTOLD
+            told = unsure < 3 and count >= 0 and (abs(here[rc.W]) > here[rc.W_BAR] or from_rest)
+            turnings[j] = count + (here[rc.W] * sign < 0.0 and not from_rest) if told else UNDETERMINED
             j += 1
         gyrostat.at(T, h, new)
         gyrostat.carry(G, T, V, h, squares, J, work)
         _read(new, squares, n, phi + gyrostat.angle(T, h, axis), here)
         state, new = new, state
-        phi, w = here[0], here[1]
+        phi, w = here[rc.PHI], here[rc.W]
         high = t + h
         t_low += h - (high - t)
         t = high
-        if not (here[2] < 1.0 and here[3] < 1.0 + abs(w)):
+        if not (here[rc.PHI_BAR] < 1.0 and here[rc.W_BAR] < 1.0 + abs(w)):
             return NO_CONVERGENCE if math.isfinite(w) else OVERFLOW
-        if abs(w) <= here[3]:
+        if abs(w) <= here[rc.W_BAR]:
             unsure += 1
             continue
         if unsure > 2:
-            count = UNTOLD - limit  # below zero for good
+            count = UNDETERMINED - limit  # below zero for good
         count += w * sign < 0.0
         sign, unsure = (1 if w > 0.0 else -1), 0
     return STEP_LIMIT
@@ -115,7 +117,7 @@ def _trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
 
 @kernel
 def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
-    """See `along.trajectories`."""
+    """See `steps.trajectories`."""
     for i in range(len(P)):
         size = finite(times[i])
         status[i] = _trajectory(P[i], starts[i, 0], starts[i, 1], times[i, :size], tolerance, limit, floats[i],

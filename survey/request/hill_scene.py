@@ -8,7 +8,7 @@ import numpy as np
 
 from survey import status
 from survey.errors import BadInput
-from survey.kernels.hill.answers import EPS
+from survey.kernels.math.roundoff import EPS
 from survey.measures.hill import monodromy, more_digits, motion, user_equation, why
 from survey.scene import Parameter
 

@@ -54,6 +54,7 @@ the system, without an initial state).
 import numpy as np
 
 from survey import methods
+from survey.kernels.cylinder import records as rc
 from survey.measures.cylinder import auto, fate, portrait, solution
 from survey.measures.cylinder.fate import NO_TURNS
 from survey.modules import load
@@ -290,8 +291,8 @@ def _trajectory(point, measure, method, rtol):
     status = np.where(good, status, INVALID_PARAMETERS)
     lost = status != OK
     floats[lost], turnings[lost | (turnings > _MOST_TURNINGS)] = np.nan, -2
-    names = ("phi", "w", "phi_error", "w_error")
-    results = {name: back(floats[..., i]) for i, name in enumerate(names)}
+    columns = {"phi": rc.PHI, "w": rc.W, "phi_error": rc.PHI_BAR, "w_error": rc.W_BAR}
+    results = {name: back(floats[..., at]) for name, at in columns.items()}
     return results | {"turnings": back(turnings), "status": back(status)}
 
 
@@ -303,8 +304,8 @@ def _abel(point, measure, method, rtol, before):
     results = {"status": back(status)}
     for names, code in ((("w", "t"), OK), (("phi_turning", "t_turning"), _TURNING)):
         here = np.where((status == code)[..., None], floats, np.nan)
-        for i, name in enumerate(names):
-            results[name], results[f"{name}_error"] = back(here[..., i]), back(here[..., 2 + i])
+        for name, value, bar in zip(names, (rc.VALUE, rc.TIME), (rc.VALUE_BAR, rc.TIME_BAR), strict=True):
+            results[name], results[f"{name}_error"] = back(here[..., value]), back(here[..., bar])
     return results
 
 

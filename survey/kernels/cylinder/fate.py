@@ -6,18 +6,7 @@ along the flow, since an error along an orbit does not change its fate. Nothing 
 
 import math
 
-from survey.kernels.cylinder.along import (
-    NO_CONVERGENCE,
-    OK,
-    SEPARATRIX,
-    STEP_LIMIT,
-    bar,
-    carried,
-    clean_turning,
-    expand,
-    start_sign,
-    time_of_turning,
-)
+from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.equilibria import (
     ANGLE,
     BAR,
@@ -32,13 +21,28 @@ from survey.kernels.cylinder.equilibria import (
     resting,
     settled,
 )
-from survey.kernels.cylinder.flow import TWO_PI, TWO_PI_LOW, UNIT, reduced, table, values
+from survey.kernels.cylinder.flow import PHI, TWO_PI, reduced, table, values
 from survey.kernels.cylinder.returns import ABOVE, BELOW, CYCLE_BAR, CYCLE_CLASS, CYCLE_X, INTERVAL, between
+from survey.kernels.cylinder.steps import (
+    NO_CONVERGENCE,
+    OK,
+    SEPARATRIX,
+    STEP_LIMIT,
+    bar,
+    carried,
+    clean_turning,
+    expand,
+    passage,
+    start_sign,
+    time_of_turning,
+    wrapped,
+)
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 UNDECIDED, EQUILIBRIUM, SADDLE, ROTATION_PLUS, ROTATION_MINUS, LIBRATION = -1, 0, 1, 2, 3, 4
 SPIN_UP_PLUS, SPIN_UP_MINUS, PERIODIC_ROTATION, PERIODIC_LIBRATION, EQUILIBRIUM_START = 5, 6, 7, 8, 9
-INFINITE, UNTOLD, NO_TURNS = -1, -2, -(2**31)
+INFINITE, UNDETERMINED, NO_TURNS = -1, -2, -(2**31)
 TRUST = 1e-4
 GENERIC, REVERSIBLE = 0, 3  # strata that are followed; REVERSIBLE is I2, K = L = 0
 
@@ -142,54 +146,37 @@ def section_ahead(phi, w, section, spacing):
 
 
 @inline
-def crossing_time(at, p, T, target, h):
-    """dt in [0, h] where phi = target, w of either sign."""
-    low, high, dt = 0.0, h, 0.5 * h
-    up = at(p, T, h)[0] > T[0, 0]
-    for _ in range(60):
-        x, v, _e, _y = at(p, T, dt)
-        if (x < target) == up:
-            low = dt
-        else:
-            high = dt
-        new = dt - (x - target) / v if v != 0.0 else low
-        if not low <= new <= high:
-            new = 0.5 * (low + high)
-        if abs(new - dt) <= 1e-17 + 1e-16 * h:
-            return new
-        dt = new
-    return dt
-
-
-@inline
 def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, start, tolerance, limit, out):
-    """Fill out = verdict, index of the limit, turnings, unwrapped turns of the limit, status.
+    """Fill out (VERDICT to STATUS of `records`) for `start` (START_PHI to START_W_BAR).
 
-    start = phi0, w0 and their bars. The index is a row of eqs (verdicts 0, 9), of plus or minus (2, 3) or of lib (4).
+    LIMIT is a row of eqs (verdicts 0, 9), of plus or minus (2, 3) or of lib (4).
     sizes = numbers of rows of these, then the stratum and whether weak foci attract.
     """
     count, n_plus, n_minus, n_lib, stratum, weak = sizes[0], sizes[1], sizes[2], sizes[3], sizes[4], sizes[5] > 0
-    out[0], out[1], out[2], out[3], out[4] = UNDECIDED, -1, UNTOLD, NO_TURNS, OK
-    phi0, w0 = start[0], start[1]
+    out[rc.VERDICT], out[rc.LIMIT] = UNDECIDED, -1
+    out[rc.TURNINGS], out[rc.NET_TURNS], out[rc.STATUS] = UNDETERMINED, NO_TURNS, OK
+    phi0, w0 = start[rc.START_PHI], start[rc.START_W]
     phi, turns = reduced(phi0)
-    w, slip = w0, start[2] + 4.0 * UNIT * (turns != 0.0)
+    w, slip = w0, start[rc.START_PHI_BAR] + 4.0 * ROUNDOFF_UP * (turns != 0.0)
     sign = start_sign(p, phi, w)
     if w == 0.0:
         row = resting(p, eqs, count, phi0)
         if row >= 0:
-            out[0], out[1], out[2], out[3] = EQUILIBRIUM_START, row, 0, offset(phi, eqs[row, ANGLE])[1]
+            out[rc.VERDICT], out[rc.LIMIT] = EQUILIBRIUM_START, row
+            out[rc.TURNINGS], out[rc.NET_TURNS] = 0, offset(phi, eqs[row, ANGLE])[1]
             return
         if sign == 0:  # beside an equilibrium, within rounding
-            row = captured(eqs, count, phi, w, slip + 16.0 * UNIT)
+            row = captured(eqs, count, phi, w, slip + 16.0 * ROUNDOFF_UP)
             if row < 0:
-                out[4] = SEPARATRIX
+                out[rc.STATUS] = SEPARATRIX
                 return
-            out[0], out[1], out[3] = EQUILIBRIUM, row, turns + offset(phi, eqs[row, ANGLE])[1]
-            out[2] = INFINITE if eqs[row, KIND] == FOCUS else UNTOLD
+            out[rc.VERDICT], out[rc.LIMIT] = EQUILIBRIUM, row
+            out[rc.NET_TURNS] = turns + offset(phi, eqs[row, ANGLE])[1]
+            out[rc.TURNINGS] = INFINITE if eqs[row, KIND] == FOCUS else UNDETERMINED
             return
     T = table()
     how = setting(p, w0, tolerance)
-    saa, sab, sbb, n, turnings = slip * slip, 0.0, start[3] * start[3], 0, 0
+    saa, sab, sbb, n, turnings = slip * slip, 0.0, start[rc.START_W_BAR] * start[rc.START_W_BAR], 0, 0
     before, before_bar = -1.0, 0.0  # last passage of the section without a turning since
     right, right_bar, left = math.nan, 0.0, math.nan  # last turning points, unwrapped from `turns` = base
     spacing = TWO_PI if stratum == GENERIC else math.pi
@@ -200,7 +187,7 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
         n += 1
         x1, w1, _e, _y = at(p, T, h)
         if not (h > 0.0 and math.isfinite(w1)):
-            out[4] = NO_CONVERGENCE
+            out[rc.STATUS] = NO_CONVERGENCE
             return
         turned = w1 * sign <= 0.0
         if turned:
@@ -209,7 +196,7 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
         passed = (x1 - target) * sign >= 0.0
         if passed:
             turned = False
-            h = crossing_time(at, p, T, target, h)
+            h = passage(at, p, T, target, x1 > T[0, PHI], h)
             x1, w1, _e, _y = at(p, T, h)
         saa, sab, sbb = carried(p, T, h, w1, saa, sab, sbb)
         phi, w = (target if passed else x1), (0.0 if turned else w1)
@@ -217,11 +204,11 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
         # the initial phi and w err as those of a step do
         bar_phi, bar_w = bar(n + 1, saa), bar(n + 1, sbb)
         if not (bar_phi < TRUST and bar_w < TRUST * (1.0 + abs(w))):
-            out[4] = SEPARATRIX
+            out[rc.STATUS] = SEPARATRIX
             return
         if turned:
             if not clean_turning(p, phi, bar_phi, bar_w):
-                out[4] = SEPARATRIX
+                out[rc.STATUS] = SEPARATRIX
                 return
             turnings += 1
             sbb, sab, before = 0.0, 0.0, -1.0
@@ -240,23 +227,23 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
                     decided, which = libration_decides(lib, n_lib, row, inside, at_home, bar_phi,
                                                        right + (at_home - unwrapped), right_bar)  # fmt: skip
                     if decided < 0:
-                        out[4] = SEPARATRIX
+                        out[rc.STATUS] = SEPARATRIX
                         return
                     if decided > 0 and which >= 0:
-                        out[0], out[1], out[2] = LIBRATION, which, INFINITE
-                        out[3] = turns - round(shift / TWO_PI)
+                        out[rc.VERDICT], out[rc.LIMIT], out[rc.TURNINGS] = LIBRATION, which, INFINITE
+                        out[rc.NET_TURNS] = turns - round(shift / TWO_PI)
                         return
                     focus = eqs[row, KIND] == FOCUS and (eqs[row, STABLE] < 0.0 or weak)
                     if decided > 0 and inside == 1 and focus:
-                        out[0], out[1], out[2] = EQUILIBRIUM, row, INFINITE
-                        out[3] = turns - round(shift / TWO_PI)
+                        out[rc.VERDICT], out[rc.LIMIT], out[rc.TURNINGS] = EQUILIBRIUM, row, INFINITE
+                        out[rc.NET_TURNS] = turns - round(shift / TWO_PI)
                         return
                 right, right_bar, left = unwrapped, bar_phi, math.nan
         elif passed:
             slope = f + g / w
             own = bar(n + 1, max(sbb - 2.0 * slope * sab + slope * slope * saa, 0.0))
             if not own < 0.1 * abs(w):
-                out[4] = SEPARATRIX
+                out[rc.STATUS] = SEPARATRIX
                 return
             saa, sab, sbb = 0.0, 0.0, max(sbb - 2.0 * slope * sab + slope * slope * saa, 0.0)
             target += sign * spacing
@@ -265,49 +252,47 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
                 if not math.isnan(axis):
                     away = round((here - axis) / math.pi)
                     rotating = away % 2 != 0
-                    out[0] = PERIODIC_ROTATION if rotating else PERIODIC_LIBRATION
-                    out[2], out[3] = (0, NO_TURNS) if rotating else (INFINITE, 0)
+                    out[rc.VERDICT] = PERIODIC_ROTATION if rotating else PERIODIC_LIBRATION
+                    out[rc.TURNINGS], out[rc.NET_TURNS] = (0, NO_TURNS) if rotating else (INFINITE, 0)
                     return
                 axis = here
             else:
                 cycles, size, end = (plus, n_plus, ends[0]) if sign > 0 else (minus, n_minus, ends[1])
                 decided, which = rotation_decides(cycles, size, end, abs(w), own, before, before_bar)
                 if decided < 0:
-                    out[4] = SEPARATRIX
+                    out[rc.STATUS] = SEPARATRIX
                     return
                 if decided > 0:
                     cycle, spin = (ROTATION_PLUS, SPIN_UP_PLUS) if sign > 0 else (ROTATION_MINUS, SPIN_UP_MINUS)
-                    out[0], out[1], out[2] = (cycle if which >= 0 else spin), which, turnings
+                    out[rc.VERDICT], out[rc.LIMIT], out[rc.TURNINGS] = (cycle if which >= 0 else spin), which, turnings
                     return
                 before, before_bar = abs(w), own
         elif abs(w) <= 2.0 * bar_w and n > 1 and held < 0:
-            out[4] = SEPARATRIX
+            out[rc.STATUS] = SEPARATRIX
             return
-        if abs(phi) > math.pi:
-            k = 1.0 if phi > 0.0 else -1.0
-            phi = (phi - k * TWO_PI) - k * TWO_PI_LOW
-            target -= k * TWO_PI
-            turns += k
+        phi, k = wrapped(phi)
+        target -= k * TWO_PI
+        turns += k
         if held < 0:
             held = captured(eqs, count, phi, w, bar_phi + bar_w)
         if held >= 0:
             x, k = offset(phi, eqs[held, ANGLE])
-            out[0], out[1], out[3] = EQUILIBRIUM, held, turns + k
+            out[rc.VERDICT], out[rc.LIMIT], out[rc.NET_TURNS] = EQUILIBRIUM, held, turns + k
             if eqs[held, KIND] != NODE:
-                out[2] = INFINITE
+                out[rc.TURNINGS] = INFINITE
                 return
             if settled(p, eqs[held, F], eqs[held, DG], x, w):
-                out[2] = turnings
+                out[rc.TURNINGS] = turnings
                 return
             if abs(x) + abs(w) < 1e3 * (bar_phi + bar_w + eqs[held, BAR]):
                 return
-    out[4] = STEP_LIMIT if held < 0 else OK
+    out[rc.STATUS] = STEP_LIMIT if held < 0 else OK
 
 
 @inline
 def fates(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out):
-    """`fate` for each row (phi0, w0 and their bars) of starts."""
+    """`fate` for each row of starts."""
     for i in range(len(starts)):
         fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, starts[i], tolerance, limit, out[i])
-        if out[i, 0] != UNDECIDED:
-            out[i, 4] = OK
+        if out[i, rc.VERDICT] != UNDECIDED:
+            out[i, rc.STATUS] = OK

@@ -1,18 +1,17 @@
 """Arithmetic of Hill's question, point by point: how many steps, and what follows from the half-period factors.
 
-Results of a point are ten numbers: y1, y1', y2, y2' at T/2, their error bounds, and the zeros of y1, y2 in (0, T/2).
-Formulas: `survey.measures.hill.monodromy`.
+The results of a point at T/2 are the columns of `kernels.lanes`. Formulas: `survey.measures.hill.monodromy`.
 """
 
 from math import asinh, atan2, isfinite, pi, sqrt
 
 import numpy as np
 
+from survey.kernels import lanes
 from survey.kernels.jit import inline, kernel, splice
+from survey.kernels.math.roundoff import EPS
 from survey.kernels.unroll import unroll
 
-RESULTS = 10
-EPS = 2.3e-16
 LEAST = 2e-323  # what a few products lose where they underflow
 LARGEST = float(np.finfo(np.float32).max)  # bars are kept as float32
 UNDECIDED, UNSTABLE, STABLE, MARGINAL = -1, 0, 1, 2
@@ -109,7 +108,7 @@ def measure(results, squares, rule, wanted, rtol, whole, overflow, floats, verdi
             d, bar = 2.0 if d > 0.0 else -2.0, 0.0
         within = isfinite(d) and bar < LARGEST
         for c in range(4):
-            within &= results[i, 4 + c] < LARGEST
+            within &= results[i, lanes.Y1_BAR + c] < LARGEST
         if not within:
             status[i] = overflow
             for c in range(len(floats)):
@@ -121,10 +120,10 @@ def measure(results, squares, rule, wanted, rtol, whole, overflow, floats, verdi
             floats[DISCRIMINANT, i], floats[DISCRIMINANT + 1, i] = d, bar
             missed |= not bar <= rtol * (1.0 + abs(d))
         for c in range(4):
-            at, bar = FACTORS[c], results[i, 4 + c]
+            at, value, bar = FACTORS[c], results[i, lanes.Y1 + c], results[i, lanes.Y1_BAR + c]
             if wanted[at // 2]:
-                floats[at, i], floats[at + 1, i] = results[i, c], bar
-                missed |= not bar <= rtol * (1.0 + abs(results[i, c]))
+                floats[at, i], floats[at + 1, i] = value, bar
+                missed |= not bar <= rtol * (1.0 + abs(value))
         late[i] = missed
 
 
@@ -140,13 +139,17 @@ def transcendental(results, squares, wanted, rtol, whole, floats, verdict, late,
             growth, bar = -sine if by_sine else -cosine, sine_bar if by_sine else cosine_bar
             late[i] |= _grows(growth, bar, rtol, floats[:, i], verdict[i])
         if wanted[ROTATION // 2]:
-            zeros, doubt = results[i, 8] + results[i, 9], 0.0
+            zeros, doubt = results[i, lanes.Y1_ZEROS] + results[i, lanes.Y2_ZEROS], 0.0
             if whole:  # where y2's last zero may lie on either side of T: sin^2 of the angle is at most -y1' y2
-                zeros = results[i, 9]
-                if abs(results[i, 2]) <= results[i, 6]:
-                    doubt = min(results[i, 6] * (abs(results[i, 1]) + results[i, 5]), 1.0)
+                zeros, bar = results[i, lanes.Y2_ZEROS], results[i, lanes.Y2_BAR]
+                if abs(results[i, lanes.Y2]) <= bar:
+                    doubt = min(bar * (abs(results[i, lanes.DY1]) + results[i, lanes.DY1_BAR]), 1.0)
             x, bar = _rotation(sine, sine_bar, cosine, cosine_bar, verdict[i], zeros)
             bar += sqrt(doubt) if verdict[i] != UNSTABLE else 0.0
+            if not whole:  # a zero next to T/2 may be miscounted where the other product's sign does not tell
+                lost1 = abs(results[i, lanes.Y1]) <= results[i, lanes.Y1_BAR] and not sine > sine_bar
+                lost2 = abs(results[i, lanes.Y2]) <= results[i, lanes.Y2_BAR] and not cosine > cosine_bar
+                bar += 0.5 * lost1 + 0.5 * lost2
             floats[ROTATION, i], floats[ROTATION + 1, i] = x, bar
             late[i] |= not bar <= rtol * (1.0 + x)
 
@@ -168,11 +171,13 @@ def _squares(result, squares, i, whole):
     With `whole` the results are those at T: then (2 - D) / 4 and (2 + D) / 4, D = y1 + y2', and the zeros of y2 in
     (0, T) give the band (that solution's angle advances from 0 to between d pi and (d + 1) pi).
     """
-    sine, sine_bar = _product(-result[1], result[2], result[5], result[6])
-    cosine, cosine_bar = _product(result[0], result[3], result[4], result[7])
+    y1, dy1, y2, dy2 = result[lanes.Y1], result[lanes.DY1], result[lanes.Y2], result[lanes.DY2]
+    y1_bar, dy2_bar = result[lanes.Y1_BAR], result[lanes.DY2_BAR]
+    sine, sine_bar = _product(-dy1, y2, result[lanes.DY1_BAR], result[lanes.Y2_BAR])
+    cosine, cosine_bar = _product(y1, dy2, y1_bar, dy2_bar)
     if whole:
-        trace, size = result[0] + result[3], abs(result[0]) + abs(result[3]) + 2.0
-        bar = 0.25 * (result[4] + result[7] + 2.0 * EPS * size)
+        trace, size = y1 + dy2, abs(y1) + abs(dy2) + 2.0
+        bar = 0.25 * (y1_bar + dy2_bar + 2.0 * EPS * size)
         sine, cosine, sine_bar, cosine_bar = 0.25 * (2.0 - trace), 0.25 * (2.0 + trace), bar, bar
     if len(squares) > 0:
         sine, sine_bar, cosine, cosine_bar = squares[i, 0], squares[i, 1], squares[i, 2], squares[i, 3]

@@ -12,8 +12,22 @@ Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equat
 import numpy as np
 
 from survey.kernels.jit import inline
-from survey.kernels.lanes import bars, column, relative
-from survey.kernels.math.double import UNIT, add, convolved, div, mul, over, slope, total
+from survey.kernels.lanes import (
+    DY1,
+    DY1_BAR,
+    DY2,
+    Y1,
+    Y1_BAR,
+    Y1_ZEROS,
+    Y2,
+    Y2_BAR,
+    Y2_ZEROS,
+    bars,
+    column,
+    relative,
+)
+from survey.kernels.math.double import add, convolved, div, mul, over, slope, total
+from survey.kernels.math.roundoff import PAIR_ROUNDOFF, ROUNDOFF_UP
 
 ORDER = 34
 SERVES = ()  # a last resort, never a user's choice
@@ -24,7 +38,6 @@ STEP = 12
 SOLUTIONS = 3
 # Of a step, relative to its size in the largest norm: sums of products, the reciprocal steps, h.
 ROUNDING = 4.0
-HALF_ULP = 1.2e-16
 
 
 def hill_density():
@@ -67,7 +80,7 @@ def step(z, even, odd, square, reverse, out):
     out[4], out[5] = p21
     out[6], out[7] = p22
     a, b = tail(even), tail(odd)
-    rounding = ROUNDING * UNIT
+    rounding = ROUNDING * PAIR_ROUNDOFF
     out[8] = a + ORDER * b + rounding * (1.0 + size)
     out[9] = b + rounding * (1.0 + size)
     out[10] = ORDER * a + rounding * size
@@ -106,7 +119,7 @@ def hill_walk(start, expand, potential, miss, row, p, span, before, after, work,
                 step(z, even, odd, square, side < 0.0, chain[place])
         for c in range(len(clock)):
             clock[c, 0, 0], clock[c, 1, 0] = total(clock[c])
-    compose(chain[:steps], h, miss(row, clock) + steps * UNIT, out)
+    compose(chain[:steps], h, miss(row, clock) + steps * PAIR_ROUNDOFF, out)
 
 
 @inline
@@ -135,17 +148,17 @@ def composed(chain, doubt, out):
         zeros2 += 1.0 if (y2[0] < 0.0) != (old2 < 0.0) else 0.0
         sum_ += relative(matrix, 1.0)
     bars(s1, w1, s2, w2, len(chain), sum_, out)
-    out[8], out[9] = zeros1, zeros2
+    out[Y1_ZEROS], out[Y2_ZEROS] = zeros1, zeros2
     return y1, v1, y2, v2
 
 
 @inline
 def rounded(y1, v1, y2, v2, h, out):
     """Keep y1, y1', y2, y2' as float64, and their bars with that rounding."""
-    out[0], out[1], out[2], out[3] = y1[0], div(v1, h)[0], mul(y2, h)[0], v2[0]
-    out[5], out[6] = out[5] / h[0], out[6] * h[0]
+    out[Y1], out[DY1], out[Y2], out[DY2] = y1[0], div(v1, h)[0], mul(y2, h)[0], v2[0]
+    out[DY1_BAR], out[Y2_BAR] = out[DY1_BAR] / h[0], out[Y2_BAR] * h[0]
     for i in range(4):
-        out[4 + i] += HALF_ULP * abs(out[i])
+        out[Y1_BAR + i] += ROUNDOFF_UP * abs(out[Y1 + i])
 
 
 @inline

@@ -16,24 +16,23 @@ from itertools import combinations_with_replacement
 import numpy as np
 
 from survey.kernels.jit import inline, splice
+from survey.kernels.libration.traces import A_BAR, B_BAR, C_BAR, D_BAR, T_BAR, A, B, C, D, T
+from survey.kernels.math.roundoff import EPS
 from survey.kernels.unroll import largest, unroll
 
 TILE = 64
 VECTOR = 8
-EPS = 2.3e-16
 ROUNDING = 4.4e-16
 WORST = 300.0
 # Rows of the working table, lanes innermost: the propagator so far (4 x 4), V (upper triangle), the sum of local
 # errors; of each lane d1, d2, e; of each column forward (4), backward (4) and the error of each; a method's own.
 V, SUM, D1, D2, E, COLUMNS, OWN = 16, 26, 27, 28, 29, 30, 70
 COLUMN = 10
-# What a chain gives of each point: A, B, C, D, t and the bound of each.
-RESULTS = 10
 
 
 @splice
 def chain(columns, own, v, h, e, d1, d2, out):
-    """Fill `out` (N, 10) for points (e, d1, d2) (N each), all with the same steps of lengths `h` (steps).
+    """Fill `out` (N, RESULTS) for points (e, d1, d2) (N each), all with the same steps of lengths `h` (steps).
 
     `columns(v, h, work, count)` fills the rows COLUMNS.. of one step for `count` lanes, with `own` rows from OWN on
     for itself; v = 1 + cos f at the nodes of each step (steps, nodes).
@@ -132,19 +131,19 @@ def _by_inverse(f, b):
 
 @splice
 def finish(work, i, steps, out):
-    """A, B, C, D, t of lane i after `steps` steps, and their error bounds."""
+    """Columns of `traces`, A to T_BAR, of lane i after `steps` steps."""
     e0, e1, e2, e3 = bars(work, i, steps)
-    out[0], out[5] = _determinant(work[0, i], work[1, i], work[4, i], work[5, i], e0, e1)
-    out[1], out[6] = _determinant(work[10, i], work[11, i], work[14, i], work[15, i], e2, e3)
-    out[2], out[7] = _determinant(work[8, i], work[9, i], work[12, i], work[13, i], e2, e3)
-    out[3], out[8] = _determinant(work[2, i], work[3, i], work[6, i], work[7, i], e0, e1)
+    out[A], out[A_BAR] = _determinant(work[0, i], work[1, i], work[4, i], work[5, i], e0, e1)
+    out[B], out[B_BAR] = _determinant(work[10, i], work[11, i], work[14, i], work[15, i], e2, e3)
+    out[C], out[C_BAR] = _determinant(work[8, i], work[9, i], work[12, i], work[13, i], e2, e3)
+    out[D], out[D_BAR] = _determinant(work[2, i], work[3, i], work[6, i], work[7, i], e0, e1)
     t, bar = 0.0, 0.0
     for j in range(2):
         a, b, c, d = work[j, i], work[4 + j, i], work[10 + j, i], work[14 + j, i]
         t += a * c + b * d
         bar += e0 * abs(c) + e2 * abs(a) + e0 * e2 + e1 * abs(d) + e3 * abs(b) + e1 * e3
         bar += EPS * 3.0 * (abs(a * c) + abs(b * d))
-    out[4], out[9] = t, bar
+    out[T], out[T_BAR] = t, bar
 
 
 @inline

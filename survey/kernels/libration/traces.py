@@ -14,12 +14,15 @@ from math import isfinite, sqrt
 import numpy as np
 
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math.roundoff import EPS
 
-EPS = 2.3e-16
 LARGEST = float(np.finfo(np.float32).max)  # bars are kept as float32
 UNDECIDED, UNSTABLE, STABLE = -1, 0, 1
 NONE, MINUS_ONE, KREIN = 0, 1, 2
-RESULTS = 10  # A, B, C, D, t and the bound of each
+# The columns of a point's results, each with its error bound; the rows of its answers.
+A, B, C, D, T, A_BAR, B_BAR, C_BAR, D_BAR, T_BAR = range(10)
+RESULTS, FACTORS = 10, 5
+SUM, SUM_BAR, PAIRS, PAIRS_BAR = range(4)  # a, b: the sums of the multipliers, and of the products of two
 PLACES = 24  # of a row's series
 TILE = 64
 
@@ -32,8 +35,8 @@ def measure(results, rtol, overflow, floats, verdict, collision, late, status):
     """
     for i in range(len(results)):
         if status[i] == 0:
-            values = results[i, 0], results[i, 1], results[i, 2], results[i, 3], results[i, 4]
-            bars = results[i, 5], results[i, 6], results[i, 7], results[i, 8], results[i, 9]
+            r = results[i]
+            values, bars = (r[A], r[B], r[C], r[D], r[T]), (r[A_BAR], r[B_BAR], r[C_BAR], r[D_BAR], r[T_BAR])
             _judge(values, bars, i, rtol, overflow, floats, verdict, collision, late, status)
 
 
@@ -41,9 +44,9 @@ def measure(results, rtol, overflow, floats, verdict, collision, late, status):
 def _judge(values, bars, i, rtol, overflow, floats, verdict, collision, late, status):
     """Answer point i from its A, B, C, D, t and their bars."""
     late[i] = False
-    t, t_bar = values[4], bars[4]
-    ab, ab_bar = product(values[0], values[1], bars[0], bars[1])
-    cd, cd_bar = product(values[2], values[3], bars[2], bars[3])
+    t, t_bar = values[T], bars[T]
+    ab, ab_bar = product(values[A], values[B], bars[A], bars[B])
+    cd, cd_bar = product(values[C], values[D], bars[C], bars[D])
     a, a_bar = 4.0 * t - 4.0, 4.0 * t_bar + EPS * (4.0 * abs(t) + 4.0)
     by_ab = ab_bar <= cd_bar
     b = 6.0 - 8.0 * t + 16.0 * ab if by_ab else 8.0 * t - 10.0 + 16.0 * cd
@@ -51,18 +54,18 @@ def _judge(values, bars, i, rtol, overflow, floats, verdict, collision, late, st
     b_bar += EPS * (16.0 * abs(ab if by_ab else cd) + 16.0 * abs(t) + 20.0)
     if not (isfinite(a) and isfinite(b) and a_bar < LARGEST and b_bar < LARGEST):
         status[i] = overflow
-        floats[0, i] = floats[1, i] = floats[2, i] = floats[3, i] = np.nan
+        floats[SUM, i] = floats[SUM_BAR, i] = floats[PAIRS, i] = floats[PAIRS_BAR, i] = np.nan
         verdict[i] = collision[i] = UNDECIDED
         late[i] = True
         return
-    floats[0, i], floats[1, i], floats[2, i], floats[3, i] = a, a_bar, b, b_bar
+    floats[SUM, i], floats[SUM_BAR, i], floats[PAIRS, i], floats[PAIRS_BAR, i] = a, a_bar, b, b_bar
     k, k_bar = discriminant(t, ab, cd, t_bar, ab_bar, cd_bar)
     verdict[i] = decide(t, t - 2.0, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar)
     collision[i] = UNDECIDED
     if verdict[i] == UNSTABLE:
         collision[i] = lost(t, t - 2.0, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar)
     elif verdict[i] == STABLE:
-        definite = (values[1] > 0.0) == (values[3] > 0.0)
+        definite = (values[B] > 0.0) == (values[D] > 0.0)
         collision[i] = MINUS_ONE if definite else nearest(t, k, t_bar, k_bar)
     late[i] = missed(a, a_bar, b, b_bar, rtol) or verdict[i] == UNDECIDED
 
@@ -137,15 +140,15 @@ def dense(series, bars, rows, mu, rtol, overflow, floats, verdict, collision, la
 
     `bars` (rows, 5) hold for the whole row; late stays who misses `rtol` or is undecided.
     """
-    here, x = np.empty((5, TILE)), np.empty(TILE)
+    here, x = np.empty((FACTORS, TILE)), np.empty(TILE)
     for r in range(len(rows)):
-        bar = bars[r, 0], bars[r, 1], bars[r, 2], bars[r, 3], bars[r, 4]
+        bar = bars[r, A], bars[r, B], bars[r, C], bars[r, D], bars[r, T]
         for first in range(0, mu.shape[1], TILE):
             count = min(TILE, mu.shape[1] - first)
             for i in range(count):
                 m = mu[rows[r], first + i]
                 x[i] = 4.0 * sqrt(1.0 - 3.0 * m * (1.0 - m)) - 3.0
-            for j in range(5):
+            for j in range(FACTORS):
                 for i in range(count):  # Clenshaw; PLACES is a constant, so that the inner loop is unrolled
                     ahead = further = 0.0
                     for n in range(PLACES - 1, 0, -1):
@@ -154,5 +157,5 @@ def dense(series, bars, rows, mu, rtol, overflow, floats, verdict, collision, la
             for i in range(count):
                 at = rows[r] * mu.shape[1] + first + i
                 if late[at]:
-                    values = here[0, i], here[1, i], here[2, i], here[3, i], here[4, i]
+                    values = here[A, i], here[B, i], here[C, i], here[D, i], here[T, i]
                     _judge(values, bar, at, rtol, overflow, floats, verdict, collision, late, status)

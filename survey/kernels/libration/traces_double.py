@@ -5,19 +5,38 @@ from math import isfinite
 import numpy as np
 
 from survey.kernels.jit import inline, kernel
-from survey.kernels.libration.traces import KREIN, LARGEST, MINUS_ONE, STABLE, UNDECIDED, UNSTABLE, decide, lost, missed
+from survey.kernels.libration.danby_double import BARS, LOW
+from survey.kernels.libration.traces import (
+    FACTORS,
+    KREIN,
+    LARGEST,
+    MINUS_ONE,
+    PAIRS,
+    PAIRS_BAR,
+    STABLE,
+    SUM,
+    SUM_BAR,
+    UNDECIDED,
+    UNSTABLE,
+    A,
+    B,
+    C,
+    D,
+    T,
+    decide,
+    lost,
+    missed,
+)
 from survey.kernels.math import double as dd
-from survey.kernels.math.double import UNIT
+from survey.kernels.math.roundoff import PAIR_ROUNDOFF, ROUNDOFF_UP
 
-HALF_ULP = 1.2e-16
 MARGIN = 1.01  # for what is of second order in the bars, and for signs told from leading parts
 PLACES = 32  # of a row's series
-FACTORS = 5
 
 
 @kernel
 def measure(results, rtol, overflow, floats, verdict, collision, late, status):
-    """As `traces.measure`, from results (N, 15): A, B, C, D, t, what rounding left of them, their bars."""
+    """As `traces.measure`, from results (N, danby_double.RESULTS)."""
     for i in range(len(results)):
         _judge(results[i], i, rtol, overflow, floats, verdict, collision, late, status)
 
@@ -25,31 +44,31 @@ def measure(results, rtol, overflow, floats, verdict, collision, late, status):
 @inline
 def _judge(r, i, rtol, overflow, floats, verdict, collision, late, status):
     """Answer point i from its results r; late is who is undecided in any way, or misses `rtol`."""
-    t, t_bar = (r[4], r[9]), r[14]
-    ab, ab_bar = product((r[0], r[5]), (r[1], r[6]), r[10], r[11])
-    cd, cd_bar = product((r[2], r[7]), (r[3], r[8]), r[12], r[13])
+    t, t_bar = (r[T], r[LOW + T]), r[BARS + T]
+    ab, ab_bar = product((r[A], r[LOW + A]), (r[B], r[LOW + B]), r[BARS + A], r[BARS + B])
+    cd, cd_bar = product((r[C], r[LOW + C]), (r[D], r[LOW + D]), r[BARS + C], r[BARS + D])
     by_ab = ab_bar <= cd_bar
     a = dd.scaled(dd.shifted(t, -1.0), 4.0)
     b = dd.add(dd.scaled(t, -8.0 if by_ab else 8.0), dd.scaled(ab if by_ab else cd, 16.0))
     b = dd.shifted(b, 6.0 if by_ab else -10.0)
     size = 1.0 + abs(t[0]) + abs(ab[0] if by_ab else cd[0])
-    a_bar = MARGIN * (4.0 * t_bar + 8.0 * UNIT * size) + HALF_ULP * abs(a[0])
-    b_bar = MARGIN * (16.0 * min(ab_bar, cd_bar) + 8.0 * t_bar + 64.0 * UNIT * size) + HALF_ULP * abs(b[0])
+    a_bar = MARGIN * (4.0 * t_bar + 8.0 * PAIR_ROUNDOFF * size) + ROUNDOFF_UP * abs(a[0])
+    b_bar = MARGIN * (16.0 * min(ab_bar, cd_bar) + 8.0 * t_bar + 64.0 * PAIR_ROUNDOFF * size) + ROUNDOFF_UP * abs(b[0])
     verdict[i] = collision[i] = UNDECIDED
     late[i] = True
     if not (isfinite(a[0]) and isfinite(b[0]) and a_bar < LARGEST and b_bar < LARGEST):
         status[i] = overflow
-        floats[0, i] = floats[1, i] = floats[2, i] = floats[3, i] = np.nan
+        floats[SUM, i] = floats[SUM_BAR, i] = floats[PAIRS, i] = floats[PAIRS_BAR, i] = np.nan
         return
     status[i] = 0
-    floats[0, i], floats[1, i], floats[2, i], floats[3, i] = a[0], a_bar, b[0], b_bar
+    floats[SUM, i], floats[SUM_BAR, i], floats[PAIRS, i], floats[PAIRS_BAR, i] = a[0], a_bar, b[0], b_bar
     k, k_bar = discriminant(t, ab, cd, t_bar, ab_bar, cd_bar)
     beyond = dd.shifted(t, -2.0)[0]
     verdict[i] = decide(t[0], beyond, ab[0], cd[0], k[0], t_bar, ab_bar, cd_bar, k_bar)
     if verdict[i] == UNSTABLE:
         collision[i] = lost(t[0], beyond, ab[0], cd[0], k[0], t_bar, ab_bar, cd_bar, k_bar)
     elif verdict[i] == STABLE:
-        collision[i] = MINUS_ONE if (r[1] > 0.0) == (r[3] > 0.0) else nearest(t, k, t_bar, k_bar)
+        collision[i] = MINUS_ONE if (r[B] > 0.0) == (r[D] > 0.0) else nearest(t, k, t_bar, k_bar)
     late[i] = missed(a[0], a_bar, b[0], b_bar, rtol) or verdict[i] == UNDECIDED or collision[i] == UNDECIDED
 
 
@@ -57,7 +76,7 @@ def _judge(r, i, rtol, overflow, floats, verdict, collision, late, status):
 def product(a, b, ea, eb):
     """a b and its error bound; of its sign, where that is certain of both factors, it leaves no doubt."""
     p = dd.mul(a, b)
-    return p, MARGIN * (ea * abs(b[0]) + eb * abs(a[0]) + ea * eb + 2.0 * UNIT * abs(p[0]))
+    return p, MARGIN * (ea * abs(b[0]) + eb * abs(a[0]) + ea * eb + 2.0 * PAIR_ROUNDOFF * abs(p[0]))
 
 
 @inline
@@ -67,7 +86,7 @@ def discriminant(t, ab, cd, t_bar, ab_bar, cd_bar):
     by_ab = abs(t[0]) * t_bar + 2.0 * ab_bar <= abs(other[0]) * t_bar + 2.0 * cd_bar
     root, last, bar = (t, ab, ab_bar) if by_ab else (other, cd, cd_bar)
     square, last = dd.square(root), dd.scaled(last, 4.0)
-    rounding = UNIT * (4.0 * square[0] + 2.0 * abs(last[0]) + (0.0 if by_ab else 4.0 * abs(root[0])))
+    rounding = PAIR_ROUNDOFF * (4.0 * square[0] + 2.0 * abs(last[0]) + (0.0 if by_ab else 4.0 * abs(root[0])))
     return dd.sub(square, last), MARGIN * (2.0 * abs(root[0]) * t_bar + t_bar * t_bar + 4.0 * bar + rounding)
 
 
@@ -76,11 +95,11 @@ def nearest(t, k, t_bar, k_bar):
     """As `traces.nearest`, of k > k_bar."""
     root = dd.sqrt(k)
     low, high = dd.sqrt(dd.shifted(k, -k_bar)), dd.sqrt(dd.shifted(k, k_bar))
-    bar = MARGIN * (t_bar + dd.sub(high, low)[0] + 16.0 * UNIT)
+    bar = MARGIN * (t_bar + dd.sub(high, low)[0] + 16.0 * PAIR_ROUNDOFF)
     one, two = dd.add(dd.shifted(t, -1.0), root), dd.sub(dd.shifted(t, -1.0), root)
     cosine = dd.mul(two, dd.shifted(dd.scaled(dd.square(two), 4.0), -3.0))
     gap = dd.sub(one, cosine)[0]
-    margin = bar * (1.0 + abs(12.0 * two[0] * two[0] - 3.0) + 24.0 * bar) + 64.0 * UNIT
+    margin = bar * (1.0 + abs(12.0 * two[0] * two[0] - 3.0) + 24.0 * bar) + 64.0 * PAIR_ROUNDOFF
     beyond = dd.shifted(two, 0.5)[0]
     if gap > margin and beyond < -bar:
         return MINUS_ONE
@@ -98,15 +117,15 @@ def to_series(results, matrix, series, bars):
         for n in range(PLACES):
             s = (0.0, 0.0)
             for i in range(PLACES):
-                s = dd.add(s, dd.mul((matrix[0, n, i], matrix[1, n, i]), (results[i, j], results[i, FACTORS + j])))
+                s = dd.add(s, dd.mul((matrix[0, n, i], matrix[1, n, i]), (results[i, j], results[i, LOW + j])))
             series[j, 0, n], series[j, 1, n] = s
-            bars[j] = max(bars[j], results[n, 2 * FACTORS + j])
+            bars[j] = max(bars[j], results[n, BARS + j])
 
 
 @kernel
 def dense(series, bars, mu, rtol, overflow, floats, verdict, collision, late, status):
     """Answer all points mu (N) of a row from its series (5, 2, PLACES) in 4 s - 3; the `bars` (5) hold for the row."""
-    r = np.empty(3 * FACTORS)
+    r = np.empty(BARS + FACTORS)
     for i in range(len(mu)):
         square = dd.shifted(dd.times(dd.square(dd.two_sum(0.5, -mu[i])), 3.0), 0.25)
         x = dd.shifted(dd.scaled(dd.sqrt(square), 4.0), -3.0)
@@ -116,6 +135,6 @@ def dense(series, bars, mu, rtol, overflow, floats, verdict, collision, late, st
                 twice = dd.scaled(dd.mul(x, ahead), 2.0 if n else 1.0)
                 last = dd.add((series[j, 0, n], series[j, 1, n]), dd.sub(twice, further))
                 ahead, further = last, ahead
-            r[j], r[FACTORS + j] = ahead
-            r[2 * FACTORS + j] = bars[j]
+            r[j], r[LOW + j] = ahead
+            r[BARS + j] = bars[j]
         _judge(r, i, rtol, overflow, floats, verdict, collision, late, status)

@@ -6,10 +6,11 @@ import numpy as np
 
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math import double as dd
-from survey.kernels.math.quartic import UNIT, slope
+from survey.kernels.math.quartic import slope
+from survey.kernels.math.roundoff import PAIR_SUM_ROUNDOFF, ROUNDOFF
 from survey.kernels.math.sines import sin_cos
+from survey.kernels.nutation import records as rc
 from survey.kernels.nutation.wells import (
-    EPS,
     HIGH,
     HIGH_MINUS,
     HIGH_PLUS,
@@ -61,14 +62,15 @@ def of_state(size_a, size_c, epsilon, theta, p_theta, b, a):
 
 @kernel
 def phase(row, theta, p_theta, start):
-    """start = (u0 - ul)/(uh - ul), 1 - that, the sign of u', the error of u0 in them.
+    """Fill `start`: the columns DONE to START_BAR of `records`.
 
     The smaller part comes from P(u0) = (sin theta p_theta)^2 where that loses fewer digits than the difference does.
     """
     sine, cosine = sin(0.5 * theta), cos(0.5 * theta)
     v, w = 2.0 * sine * sine, 2.0 * cosine * cosine
     width = row[WIDTH]
-    start[0], start[1], start[2], start[3] = 0.0, 1.0, 1.0 if p_theta <= 0.0 else -1.0, 0.0
+    start[rc.DONE], start[rc.LEFT], start[rc.START_BAR] = 0.0, 1.0, 0.0
+    start[rc.DIRECTION] = 1.0 if p_theta <= 0.0 else -1.0
     if not width > 0.0:
         return
     done = min(max((row[LOW_PLUS] - v if v < 1.0 else w - row[LOW_MINUS]) / width, 0.0), 1.0)
@@ -76,20 +78,20 @@ def phase(row, theta, p_theta, start):
     done, left = (done, 1.0 - done) if done < left else (1.0 - left, left)
     bow = row[K] * width * width * left * done
     size = row[Q_LOW] * left + row[Q_HIGH] * done
-    start[3] = 8.0 * EPS * min(v, w)
-    q, moved = size - bow, (abs(row[Q_HIGH] - row[Q_LOW]) + abs(row[K]) * width * width) * start[3] / width
-    rough = 16.0 * EPS * (size + abs(bow)) + moved
+    start[rc.START_BAR] = 8.0 * ROUNDOFF * min(v, w)
+    q, moved = size - bow, (abs(row[Q_HIGH] - row[Q_LOW]) + abs(row[K]) * width * width) * start[rc.START_BAR] / width
+    rough = 16.0 * ROUNDOFF * (size + abs(bow)) + moved
     if q > 4.0 * rough:  # done left = c, done + left = 1
         c = (2.0 * sine * cosine * p_theta / width) ** 2 / q
         root = sqrt(max(1.0 - 4.0 * c, 0.0))
         other = 2.0 * c / (1.0 + root)
-        error = width * other * (16.0 * EPS + rough / q) / max(root, TINY)
-        if width * root < start[3]:  # on which side of the middle?
+        error = width * other * (16.0 * ROUNDOFF + rough / q) / max(root, TINY)
+        if width * root < start[rc.START_BAR]:  # on which side of the middle?
             error += 2.0 * width * root
-        if error < start[3]:
-            start[3] = error
+        if error < start[rc.START_BAR]:
+            start[rc.START_BAR] = error
             done, left = (other, 1.0 - other) if done < left else (1.0 - other, other)
-    start[0], start[1] = done, left
+    start[rc.DONE], start[rc.LEFT] = done, left
 
 
 @kernel
@@ -98,14 +100,16 @@ def measure(row, start, c, u, theta, p_theta):
 
     There P = (sin theta p_theta)^2 = (u - ul)(uh - u) Q, and P' gives ul + uh - 2 u: (uh - ul)^2 by positive terms.
     """
-    k, width, done, left = row[K], row[WIDTH], start[0], start[1]
+    k, width, done, left = row[K], row[WIDTH], start[rc.DONE], start[rc.LEFT]
     q = row[Q_LOW] * left + row[Q_HIGH] * done - k * width * width * left * done
     height = (2.0 * sin(0.5 * theta) * cos(0.5 * theta) * p_theta) ** 2
     offset = (slope(c, u)[0] - height * k * (2.0 * u[0] + row[SUM]) / q) / q
     square = offset * offset + 4.0 * height / q
     terms = abs(c[1][0]) + abs(u[0]) * (4.0 * abs(c[2][0]) + 8.0 * abs(k))
-    bar = UNIT * terms / q + 8.0 * EPS * abs(offset)
-    noise = 16.0 * EPS + row[NOISE_LOW] + row[NOISE_HIGH] + bar * (abs(offset) + bar) / square if square > 0.0 else 1.0
+    bar = PAIR_SUM_ROUNDOFF * terms / q + 8.0 * ROUNDOFF * abs(offset)
+    noise = (
+        16.0 * ROUNDOFF + row[NOISE_LOW] + row[NOISE_HIGH] + bar * (abs(offset) + bar) / square if square > 0.0 else 1.0
+    )
     if noise < row[NOISE_WIDTH]:
         row[WIDTH], row[NOISE_WIDTH] = sqrt(square), noise
 
@@ -114,8 +118,8 @@ def measure(row, start, c, u, theta, p_theta):
 def of_states(points, rows, kinds, count, heights, starts):
     """The well of each initial state (A, C, epsilon, theta0, p_theta0, p_psi, p_phi).
 
-    Fills rows (n, SIZE), kinds (n) (LOST outside the domain), the number of wells (-1 on a separatrix), heights (n, 3):
-    L above the separatrix, its bar, |k|; and starts (n, 4), see `phase`.
+    Fills rows (n, SIZE), kinds (n) (LOST outside the domain), the number of wells (-1 on a separatrix), heights
+    (n, HEIGHT) and starts (n, START), with the columns of `records`.
     """
     both, two = np.empty((2, SIZE)), np.empty(2, np.int64)
     for i in range(len(points)):
@@ -125,8 +129,8 @@ def of_states(points, rows, kinds, count, heights, starts):
             kinds[i] = LOST
             continue
         rough = abs(level[0]) + 2.0 * abs(k[0]) * u[0] * u[0]
-        heights[i, 0], heights[i, 1] = find(a, b, k, level, at_plus, at_minus, rough, both, two)
-        heights[i, 2] = abs(k[0])
+        heights[i, rc.ABOVE], heights[i, rc.ABOVE_BAR] = find(a, b, k, level, at_plus, at_minus, rough, both, two)
+        heights[i, rc.FIELD] = abs(k[0])
         place = 1 if two[1] != NONE and u[0] > 0.5 * (both[0, HIGH] + both[1, LOW]) else 0
         count[i] = (two[0] != NONE) + (two[1] != NONE) if two[0] != SEPARATRIX else -1
         kinds[i] = two[place] if two[place] != NONE else LOST
@@ -134,7 +138,7 @@ def of_states(points, rows, kinds, count, heights, starts):
             rows[i, j] = both[place, j]
         if kinds[i] >= NUTATION:
             phase(rows[i], theta, p_theta, starts[i])
-            if kinds[i] == NUTATION and rows[i, NOISE_WIDTH] > EPS:
+            if kinds[i] == NUTATION and rows[i, NOISE_WIDTH] > ROUNDOFF:
                 measure(rows[i], starts[i], about_equator(a, b, level, k), u, theta, p_theta)
 
 
@@ -147,10 +151,10 @@ def of_integrals(points, sign, rows, kinds, heights):
         product = dd.two_prod(a, b)
         high = dd.two_sum(level, sign)
         pair = level, 0.0
-        heights[i, 0], heights[i, 1] = find(
+        heights[i, rc.ABOVE], heights[i, rc.ABOVE_BAR] = find(
             a, b, k, pair, dd.sub(high, product), dd.add(high, product), 0.0, rows[i], kinds[i]
         )
-        heights[i, 2] = 1.0
+        heights[i, rc.FIELD] = 1.0
 
 
 @kernel
@@ -163,7 +167,7 @@ def heights_of_states(points, heights):
         )
         loose = looseness(a, b, abs(level[0]) + 2.0 * abs(k[0]) * u[0] * u[0])
         found = barrier(a, b, k, about_equator(a, b, level, k), loose, at_plus[0], at_minus[0])
-        heights[i, 0], heights[i, 1], heights[i, 2] = found[0], found[1], abs(k[0])
+        heights[i, rc.ABOVE], heights[i, rc.ABOVE_BAR], heights[i, rc.FIELD] = found[0], found[1], abs(k[0])
 
 
 @kernel
@@ -185,4 +189,4 @@ def heights_of_integrals(points, heights):
         pair, k, high, product = (level, 0.0), (sign, 0.0), dd.two_sum(level, sign), dd.two_prod(a, b)
         at_plus, at_minus = dd.sub(high, product)[0], dd.add(high, product)[0]
         found = barrier(a, b, k, about_equator(a, b, pair, k), looseness(a, b, 0.0), at_plus, at_minus)
-        heights[i, 0], heights[i, 1], heights[i, 2] = found[0], found[1], 1.0
+        heights[i, rc.ABOVE], heights[i, rc.ABOVE_BAR], heights[i, rc.FIELD] = found[0], found[1], 1.0

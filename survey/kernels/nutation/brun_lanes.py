@@ -74,13 +74,13 @@ def enter(points, which, first, work):
 
 
 @kernel
-def leave(work, told, which, first, out, wells, done):
+def leave(work, answers, which, first, out, wells, done):
     start = which[first]
     if together(which, first):
         for j in range(OUTPUTS):
             row = out[j, start : start + TILE]
             for i in range(TILE):
-                row[i] = told[j * TILE + i]
+                row[i] = answers[j * TILE + i]
         number, state = wells[start : start + TILE], done[start : start + TILE]
         for i in range(TILE):
             number[i], state[i] = work[WELLS + i], work[GOOD + i]
@@ -88,7 +88,7 @@ def leave(work, told, which, first, out, wells, done):
     for i in range(min(TILE, len(which) - first)):
         at = which[first + i]
         for j in range(OUTPUTS):
-            out[j, at] = told[j * TILE + i]
+            out[j, at] = answers[j * TILE + i]
         wells[at], done[at] = work[WELLS + i], work[GOOD + i]
 
 
@@ -111,17 +111,17 @@ def solve(work, steps, within, exactly, actions):
 
 
 @kernel
-def tell_states(work, told):
+def answer_states(work, answers):
     for i in range(TILE):
         a, c = work[i], work[TILE + i]
-        finish(work, a, work[A + i] * ((a - c) / (a * c)), i, told)
+        finish(work, a, work[A + i] * ((a - c) / (a * c)), i, answers)
 
 
 @kernel
-def tell_integrals(work, told):
+def answer_integrals(work, answers):
     for i in range(TILE):
         ratio = work[3 * TILE + i]
-        finish(work, 1.0, work[A + i] * ((1.0 - ratio) / ratio), i, told)
+        finish(work, 1.0, work[A + i] * ((1.0 - ratio) / ratio), i, answers)
 
 
 @kernel
@@ -135,23 +135,23 @@ def in_state(done, low, high, which):
 
 
 @splice
-def answer(polynomials, tell, told_u, points, actions, out, wells, done):
-    """Tile after tile: the polynomials of its points, their wells, and what is told of these.
+def answer(polynomials, fill, known_u, points, actions, out, wells, done):
+    """Tile after tile: the polynomials of its points, their wells, and their answers.
 
     All of them go with FEW steps, what these leave with MORE and then with MOST; exactly where that is asked for.
     """
-    work, told = np.zeros(fine.ALL), np.empty(OUTPUTS * TILE)
+    work, answers = np.zeros(fine.ALL), np.empty(OUTPUTS * TILE)
     left = which = np.arange(len(done))
     for n in range(6):
-        steps, exactly = (FEW if told_u else FEW_FROM_POLES, MORE, MOST)[n // 2], n % 2 == 1
+        steps, exactly = (FEW if known_u else FEW_FROM_POLES, MORE, MOST)[n // 2], n % 2 == 1
         for first in range(0, len(which), TILE):
             enter(points, which, first, work)
             polynomials(work)
-            solve(work, steps, told_u and n < 2, exactly, actions)
-            tell(work, told)
+            solve(work, steps, known_u and n < 2, exactly, actions)
+            fill(work, answers)
             if actions:
-                action.mend(work, told)
-            leave(work, told, which, first, out, wells, done)
+                action.mend(work, answers)
+            leave(work, answers, which, first, out, wells, done)
         left = in_state(done, LEFT, CANCELLED, left) if exactly else left
         which = left if exactly else in_state(done, CANCELLED, CANCELLED, left)
 
@@ -162,10 +162,10 @@ def of_states(points, actions, out, wells, done):
 
     actions: accurate ones of small wells.
     """
-    answer(states, tell_states, True, points, actions, out, wells, done)
+    answer(states, answer_states, True, points, actions, out, wells, done)
 
 
 @kernel
 def of_integrals(points, actions, out, wells, done):
     """As `of_states`, at scaled integrals."""
-    answer(integrals, tell_integrals, False, points, actions, out, wells, done)
+    answer(integrals, answer_integrals, False, points, actions, out, wells, done)

@@ -7,23 +7,26 @@ of steps suffice: otherwise it is left to them. A lane's bits do not depend on i
 
 from math import copysign, pi, sqrt
 
-import numpy as np
-
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math import double as dd
-from survey.kernels.math.quartic import UNIT
-from survey.kernels.nutation.wells import EPS
+from survey.kernels.math.chebyshev import nodes
+from survey.kernels.math.roundoff import PAIR_SUM_ROUNDOFF, ROUNDOFF
 
 TILE = 64
-GIVEN, OUTPUTS = 7, 12  # rows of numbers given; u_min, u_max, period, precession, spin, action, then their bars
-RIGHT = 0.125 * EPS  # errors of the set-up, relative
+GIVEN = 7  # rows of what is given
+# The outputs of a nutation, and the rows of a tile that hold them, then their bars.
+NAMES = ("u_min", "u_max", "period", "precession", "spin", "action")
+U_MIN, U_MAX, PERIOD, PRECESSION, SPIN, ACTION = range(0, 6 * TILE, TILE)
+U_MIN_BAR, U_MAX_BAR, PERIOD_BAR, PRECESSION_BAR, SPIN_BAR, ACTION_BAR = range(6 * TILE, 12 * TILE, TILE)
+OUTPUTS = 12
+RIGHT = 0.125 * ROUNDOFF  # errors of the set-up, relative
 BLUR = 0.01  # the error of a well's width, relative
 WIDE = 0.1  # wells that are wider are no parabolas
 NEAR, LAST = 3e-5, 1e-17  # the last two means, and the last weight of R
 SLANT, CANCELLED = 0.25, 0.05  # as in methods/agm.py
 NODES = 16
-COSINES = np.cos((np.arange(NODES) + 0.5) * pi / NODES)
-# places of the rows of a tile: of what is given the last two, b and a
+COSINES = nodes(NODES)
+# where the rows of a tile begin: of what is given the last two, b and a
 B, A = 5 * TILE, 6 * TILE
 # pairs: k, L, L + k - a b, L + k + a b, b - a, b + a
 K, L, PLUS_POLE, MINUS_POLE, MINUS, PLUS = range(7 * TILE, 19 * TILE, 2 * TILE)
@@ -31,8 +34,8 @@ K, L, PLUS_POLE, MINUS_POLE, MINUS, PLUS = range(7 * TILE, 19 * TILE, 2 * TILE)
 V_HIGH, W_LOW, V_LOW, W_HIGH, SUM = range(19 * TILE, 29 * TILE, 2 * TILE)
 # pairs: Q at the turning points, s of (S5), 4 q0 - k S^2
 Q_LOW, Q_HIGH, MIDDLE, BEND = range(29 * TILE, 37 * TILE, 2 * TILE)
-# u at the start, turning points, their distance, s + g, L - (k ul uh + q0)/2, 1 where all is right (when all is told 2,
-# or 1 where it cancels), number of wells
+# u at the start, turning points, their distance, s + g, L - (k ul uh + q0)/2, 1 where all is right
+# (after `finish` 2, or 1 where terms cancel), number of wells
 U, LOW, HIGH, WIDTH, ABOVE, LEVEL, GOOD, WELLS = range(37 * TILE, 45 * TILE, TILE)
 X, Y, WEIGHT, SERIES = range(45 * TILE, 49 * TILE, TILE)  # the mean
 # Both poles: the charts, see `chart`; then the sums R: 1 - e, weight, total, 1 if complementary
@@ -40,7 +43,7 @@ UP, DOWN = 49 * TILE, 54 * TILE
 LINE_UP, LINE_DOWN, INCLINE = range(59 * TILE, 62 * TILE, TILE)  # l of (S11) at the poles, and its slope
 # the sum and the difference of the parts of both poles, with all their digits, and their relative error (0: unknown)
 FINE_TOTAL, FINE_DIFFERENCE, FINE = range(62 * TILE, 65 * TILE, TILE)
-BAR_V, BAR_W, ACTION = range(65 * TILE, 68 * TILE, TILE)  # of the first two pairs; (S15), where it is known
+BAR_V, BAR_W, SMALL_ACTION = range(65 * TILE, 68 * TILE, TILE)  # of the first two pairs; (S15), where it is known
 # the roots of Q at the turning points, P at U
 ROOT_LOW, ROOT_HIGH, HERE = range(68 * TILE, 71 * TILE, TILE)
 ROWS = 71
@@ -67,7 +70,7 @@ def halley(c0, c1, c2, c3, c4, y):
 
 @inline
 def residual(c0, c1, c2, c3, c4, y):
-    """c(y) at a float64, by Horner's rule with the error of each operation: to a few UNIT of the sum of |terms|."""
+    """c(y) at a float64, by Horner's rule with the error of each operation: to a few 2^-98 of the sum of |terms|."""
     s, e = c4
     for high, low in (c3, c2, c1, c0):
         p, q = dd.two_prod(s, y)
@@ -86,8 +89,8 @@ def polished(c0, c1, c2, c3, c4, x):
     inverse = 1.0 / first
     move, size_inverse = residual(c0, c1, c2, c3, c4, x) * inverse, abs(inverse)
     turn = 0.5 * move * second * inverse
-    rest = 4.0 * turn * turn + size_inverse * (8.0 * EPS * steep + 2.0 * move * move * (a3 + 9.0 * a4))
-    bar = 2.0 * UNIT * (size * size_inverse + x) + abs(move) * rest
+    rest = 4.0 * turn * turn + size_inverse * (8.0 * ROUNDOFF * steep + 2.0 * move * move * (a3 + 9.0 * a4))
+    bar = 2.0 * PAIR_SUM_ROUNDOFF * (size * size_inverse + x) + abs(move) * rest
     return dd.quick_two_sum(x, -move * (1.0 + turn)), bar
 
 
@@ -175,8 +178,8 @@ def narrow(work, i):
     c2, c3 = dd.neg(dd.add(pair(work, L, i), dd.times(k, 5.0))), dd.times(k, 4.0)
     c1 = dd.times(pair(work, PLUS_POLE, i), 2.0)
     v, w, start = work[V_HIGH + i], work[W_LOW + i], 1.0 - work[U + i]
-    told = abs(work[U + i]) <= 1.0
-    y = start if told else 0.5 * (v + (2.0 - w))
+    known = abs(work[U + i]) <= 1.0
+    y = start if known else 0.5 * (v + (2.0 - w))
     for _ in range(2):
         first = c1[0] + y * (2.0 * c2[0] + y * (3.0 * c3[0] - y * 4.0 * k[0]))
         second = 2.0 * c2[0] + y * (6.0 * c3[0] - y * 12.0 * k[0])
@@ -188,7 +191,7 @@ def narrow(work, i):
     half = sqrt(slope[0] * slope[0] - 2.0 * height * second)
     lower, upper = (half - slope[0]) / second, (-half - slope[0]) / second
     close = (upper - lower < WIDE) & (half > 0.0) & (second < 0.0)
-    close &= (abs(start - y) < WIDE) if told else (abs(v - y) < WIDE) & (abs(2.0 - w - y) < WIDE)
+    close &= (abs(start - y) < WIDE) if known else (abs(v - y) < WIDE) & (abs(2.0 - w - y) < WIDE)
     put(work, V_HIGH, i, dd.two_sum(y, lower) if close else (v, 0.0))
     put(work, W_LOW, i, dd.sub((2.0, 0.0), dd.two_sum(y, upper)) if close else (w, 0.0))
 
@@ -224,14 +227,14 @@ def settle(work, i):
     level_rest = (level[0] - 0.5 * common[0]) + (level[1] - 0.5 * common[1])
     root_low, root_high = sqrt(far[0]), sqrt(near[0])
     g = root_low * root_high
-    error = 8.0 * (abs(k[0]) * (bar_v + bar_w) + UNIT * (abs(level[0]) + 8.0 * abs(k[0])))
+    error = 8.0 * (abs(k[0]) * (bar_v + bar_w) + PAIR_SUM_ROUNDOFF * (abs(level[0]) + 8.0 * abs(k[0])))
     smooth = middle[0] >= 0.0
     sure = (error < RIGHT * near[0]) & (error < RIGHT * far[0]) & (bar_v + bar_w < BLUR * width)
     sure &= smooth | ((error < RIGHT * abs(bend[0])) & (bar_v + bar_w < RIGHT * width))
     sure &= (bar_v < RIGHT * v[0]) & (bar_w < RIGHT * w[0])
     sure &= (bar_w < RIGHT * v_low[0]) & (bar_v < RIGHT * w_high[0])
     sure &= (work[MINUS + i] != 0.0) & (work[PLUS + i] != 0.0)
-    sure &= width > 4.0 * (bar_v + bar_w + EPS * (abs(low[0]) + abs(high[0])))  # else it is a regular precession
+    sure &= width > 4.0 * (bar_v + bar_w + ROUNDOFF * (abs(low[0]) + abs(high[0])))  # else it is a regular precession
     two = (k[0] > 0.0) & (bend[0] < 0.0)
     aside = (-0.5 * total[0] > high[0]) | (-0.5 * total[0] < low[0])  # Q is least outside the well
     sure &= (k[0] <= 0.0) | (bend[0] > error) | (aside & (bend[0] < -error))
@@ -329,8 +332,8 @@ def advance(gap, near, far, q_far, width, root_near, root_far, incline, bend, pe
 
 
 @inline
-def finish(work, size, drift, i, told):
-    """told = values and bars, of a well of a body with A = `size`; False where they are left to the other kernels."""
+def finish(work, size, drift, i, answers):
+    """Fill `answers` for the well of a body with A = `size`; GOOD stays 0 where it is left to the other kernels."""
     middle, apart = 0.5 * (work[X + i] + work[Y + i]), 0.5 * (work[X + i] - work[Y + i])
     period = 2.0 * pi / (middle - 0.25 * apart * apart / middle)  # the next mean, but for the fourth order
     root_low, root_high, width = work[ROOT_LOW + i], work[ROOT_HIGH + i], work[WIDTH + i]
@@ -353,8 +356,10 @@ def finish(work, size, drift, i, told):
     exactly = fine & cancelled
     total = work[FINE_TOTAL + i] * period if exactly else total
     difference = work[FINE_DIFFERENCE + i] * period if exactly else difference
-    error, rounding = (work[FINE + i] * rough, 12.0 * EPS) if exactly else (25.0 * EPS * rough, 2.0 * EPS)
-    turned = 2.0 * EPS * pi
+    error, rounding = (
+        (work[FINE + i] * rough, 12.0 * ROUNDOFF) if exactly else (25.0 * ROUNDOFF * rough, 2.0 * ROUNDOFF)
+    )
+    turned = 2.0 * ROUNDOFF * pi
     precession, spin = pi * (turns_down + turns_up) + total, pi * (turns_down - turns_up) + difference
     error_precession = error + rounding * abs(total) + turned * abs(turns_down + turns_up)
     error_spin = error + rounding * abs(difference) + turned * abs(turns_down - turns_up)
@@ -363,20 +368,21 @@ def finish(work, size, drift, i, told):
     action = (period * (work[LEVEL + i] + rest) - up - down) / (2.0 * pi)
     rough = period * (abs(work[LEVEL + i]) + abs(rest))
     rough += abs(minus) * (pi + size_up) + abs(plus) * (pi + size_down)
-    error_action = 25.0 * EPS * rough / (2.0 * pi)
-    small = (error_action > 1e-14 * abs(action)) & (work[ACTION + i] > 0.0)
-    action = work[ACTION + i] if small else action
+    error_action = 25.0 * ROUNDOFF * rough / (2.0 * pi)
+    small = (error_action > 1e-14 * abs(action)) & (work[SMALL_ACTION + i] > 0.0)
+    action = work[SMALL_ACTION + i] if small else action
     blur = (work[BAR_V + i] + work[BAR_W + i]) / width
-    error_action = (65.0 * EPS + 2.5 * blur) * action if small else error_action
+    error_action = (65.0 * ROUNDOFF + 2.5 * blur) * action if small else error_action
     period *= size
-    error_period = 15.0 * EPS * period
+    error_period = 15.0 * ROUNDOFF * period
     turned = drift * period
-    told[i], told[TILE + i], told[2 * TILE + i] = work[LOW + i], work[HIGH + i], period
-    told[3 * TILE + i], told[4 * TILE + i], told[5 * TILE + i] = precession, spin + turned, action
-    told[6 * TILE + i] = work[BAR_W + i] + EPS * abs(work[LOW + i])
-    told[7 * TILE + i] = work[BAR_V + i] + EPS * abs(work[HIGH + i])
-    told[8 * TILE + i], told[9 * TILE + i], told[11 * TILE + i] = error_period, error_precession, error_action
-    told[10 * TILE + i] = error_spin + 23.0 * EPS * abs(turned) + EPS * abs(spin + turned)
+    answers[U_MIN + i], answers[U_MAX + i], answers[PERIOD + i] = work[LOW + i], work[HIGH + i], period
+    answers[PRECESSION + i], answers[SPIN + i], answers[ACTION + i] = precession, spin + turned, action
+    answers[U_MIN_BAR + i] = work[BAR_W + i] + ROUNDOFF * abs(work[LOW + i])
+    answers[U_MAX_BAR + i] = work[BAR_V + i] + ROUNDOFF * abs(work[HIGH + i])
+    answers[PERIOD_BAR + i], answers[PRECESSION_BAR + i] = error_period, error_precession
+    answers[ACTION_BAR + i] = error_action
+    answers[SPIN_BAR + i] = error_spin + 23.0 * ROUNDOFF * abs(turned) + ROUNDOFF * abs(spin + turned)
     work[GOOD + i] = 0.0 if not sure else 1.0 if cancelled & (not fine) else 2.0
 
 
@@ -386,7 +392,7 @@ def add_node(work, cosine, i):
     up, down, width = 0.5 * (1.0 + cosine), 0.5 * (1.0 - cosine), work[WIDTH + i]
     q = work[Q_LOW + i] * down + work[Q_HIGH + i] * up - work[K + i] * width * width * up * down
     rest = (work[V_LOW + i] * down + work[V_HIGH + i] * up) * (work[W_LOW + i] * down + work[W_HIGH + i] * up)
-    work[ACTION + i] += up * down * sqrt(q) / rest
+    work[SMALL_ACTION + i] += up * down * sqrt(q) / rest
 
 
 @inline
@@ -397,12 +403,12 @@ def judge(work, i):
     beyond, beside = abs(sqrt(abs(ratio)) - abs(total)), sqrt(total * total + abs(ratio))
     far = 2.0 if k == 0.0 else beyond if ratio < 0.0 else beside
     known = (min(work[V_HIGH + i], work[W_LOW + i]) >= 0.5 * width) & (far >= 1.1 * width)
-    work[ACTION + i] = width * width * work[ACTION + i] / NODES if known else 0.0
+    work[SMALL_ACTION + i] = width * width * work[SMALL_ACTION + i] / NODES if known else 0.0
 
 
 @kernel
 def small_actions(work):
-    """Fill the row ACTION by Gauss-Chebyshev quadrature, see `action.small`."""
+    """Fill the row SMALL_ACTION by Gauss-Chebyshev quadrature, see `action.small`."""
     for j in range(NODES):
         for i in range(TILE):
             add_node(work, COSINES[j], i)
@@ -415,7 +421,7 @@ def begin(work, i, v, w):
     """1 - u and 1 + u of the turning points, in float64 so far, and nothing known beyond."""
     put(work, V_HIGH, i, (v, 0.0))
     put(work, W_LOW, i, (w, 0.0))
-    work[FINE + i], work[ACTION + i] = 0.0, 0.0
+    work[FINE + i], work[SMALL_ACTION + i] = 0.0, 0.0
 
 
 @kernel

@@ -11,9 +11,9 @@ import numpy as np
 from survey.kernels.jit import inline
 from survey.kernels.math.carlson import rf, rj_spread
 from survey.kernels.math.elliptic import MEANS, means
+from survey.kernels.math.roundoff import ROUNDOFF
+from survey.kernels.nutation import records as rc
 from survey.kernels.nutation import wells as nu
-
-EPS = nu.EPS
 
 
 @inline
@@ -81,7 +81,7 @@ def rates(row, at):
 
 @inline
 def motion(cosine, row, start, period, times, out):
-    """u, the angles (less the drift of phi) and bars (m, 6) at `times` (m) in units of A, from the values `period` (8).
+    """Fill `out` (m, MOTION) at `times` (m) in units of A, from the `start` and the `period` (columns of `records`).
 
     cosine(z, kc, quarter, pairs, last) gives (1 + c)/2, (1 - c)/2 and c for z in [0, 2 K].
     """
@@ -90,25 +90,27 @@ def motion(cosine, row, start, period, times, out):
     g = roots[0] * roots[1]
     kc, rate = sqrt(0.5 * nu.above(row, g) / g), sqrt(g)
     last = means(kc, pairs)
-    quarter = 0.25 * period[0] * rate
-    up, down = 0.25 * (period[1] - period[2]), 0.25 * (period[1] + period[2])  # in half a period
-    whole, half = 4.0 * quarter, 0.5 * period[0]
-    done, left = start[0] * roots[1], start[1] * roots[0]
+    quarter = 0.25 * period[rc.PERIOD] * rate
+    # in half a period
+    up = 0.25 * (period[rc.PRECESSION] - period[rc.SPIN])
+    down = 0.25 * (period[rc.PRECESSION] + period[rc.SPIN])
+    whole, half = 4.0 * quarter, 0.5 * period[rc.PERIOD]
+    done, left = start[rc.DONE] * roots[1], start[rc.LEFT] * roots[0]
     low, high = left / (done + left), done / (done + left)
     sine, c = 2.0 * sqrt(low * high), low - high
     z0 = first_kind(sine, c, kc) if c >= 0.0 else 2.0 * quarter - first_kind(sine, -c, kc)
     place(row, low, high, c, roots, kc, at)
     first, second = angles(row, z0 / rate, half, down, at)
-    base_up, base_down = start[2] * first, start[2] * second
-    early = start[3] / max(row[nu.WIDTH] * sqrt(at[3] * at[4]) * at[5], nu.TINY)
+    base_up, base_down = start[rc.DIRECTION] * first, start[rc.DIRECTION] * second
+    early = start[rc.START_BAR] / max(row[nu.WIDTH] * sqrt(at[3] * at[4]) * at[5], nu.TINY)
     first_up, first_down = rates(row, at)  # the phase of the start moves it and what follows alike
-    z0 *= start[2]
-    relative = period[4] / period[0]
+    z0 *= start[rc.DIRECTION]
+    relative = period[rc.PERIOD_BAR] / period[rc.PERIOD]
     for j in range(len(times)):
         z = z0 + rate * times[j]
         n = np.floor(z / whole + 0.5)  # a float: of so many periods that no integer holds them, too
         # the number of periods is taken off in time, where the period is what has been found best
-        z = z0 + rate * (times[j] - n * period[0])
+        z = z0 + rate * (times[j] - n * period[rc.PERIOD])
         side = 1.0 if z >= 0.0 else -1.0
         z = min(abs(z), 2.0 * quarter)
         low, high, c = cosine(z, kc, quarter, pairs, last)
@@ -116,16 +118,16 @@ def motion(cosine, row, start, period, times, out):
         first, second = angles(row, z / rate, half, down, at)
         first, second = side * first - base_up, side * second - base_down
         all_up, all_down = first + 2.0 * n * up, second + 2.0 * n * down
-        late = (relative + 4.0 * EPS) * abs(times[j]) + (16.0 * EPS + relative) * (1.0 + quarter) / rate
+        late = (relative + 4.0 * ROUNDOFF) * abs(times[j]) + (16.0 * ROUNDOFF + relative) * (1.0 + quarter) / rate
         rate_up, rate_down = rates(row, at)
         moved = (abs(rate_up) + abs(rate_down)) * late + (abs(rate_up - first_up) + abs(rate_down - first_down)) * early
         late += early
         speed = row[nu.WIDTH] * sqrt(at[3] * at[4]) * at[5]
         bend = row[nu.WIDTH] * max(row[nu.Q_LOW], row[nu.Q_HIGH]) + 4.0 * abs(row[nu.K]) * row[nu.WIDTH] ** 2
-        rounding = 3.0 * (row[nu.BAR_LOW] + row[nu.BAR_HIGH]) + 8.0 * EPS * row[nu.WIDTH]
-        out[j, 0], out[j, 1], out[j, 2] = at[0], all_up + all_down, all_down - all_up
-        out[j, 3] = speed * late + bend * late * late + rounding
+        rounding = 3.0 * (row[nu.BAR_LOW] + row[nu.BAR_HIGH]) + 8.0 * ROUNDOFF * row[nu.WIDTH]
+        out[j, rc.U], out[j, rc.PSI], out[j, rc.PHI] = at[0], all_up + all_down, all_down - all_up
+        out[j, rc.U_BAR] = speed * late + bend * late * late + rounding
         size = abs(first) + abs(second) + abs(base_up) + abs(base_down) + abs(up) + abs(down)
-        turned = abs(n) * (period[5] + 4.0 * EPS * (abs(up) + abs(down)))
-        out[j, 4] = moved + (24.0 * EPS + 2.0 * relative) * size + turned
-        out[j, 5] = out[j, 4]
+        turned = abs(n) * (period[rc.PRECESSION_BAR] + 4.0 * ROUNDOFF * (abs(up) + abs(down)))
+        out[j, rc.PSI_BAR] = moved + (24.0 * ROUNDOFF + 2.0 * relative) * size + turned
+        out[j, rc.PHI_BAR] = out[j, rc.PSI_BAR]

@@ -11,7 +11,7 @@ wider. dop853, rk4 or full alone serve 5 points of 4776. What still misses rtol 
 import numpy as np
 
 from survey.kernels.cylinder import taylor_double
-from survey.kernels.cylinder.along import EQUILIBRIUM, NO_CONVERGENCE, OK, SEPARATRIX, TURNING, UNTOLD
+from survey.kernels.cylinder.steps import EQUILIBRIUM, NO_CONVERGENCE, OK, SEPARATRIX, TURNING, UNDETERMINED
 from survey.measures.cylinder import solution
 from survey.methods import closed
 
@@ -21,7 +21,7 @@ FINEST = 3e-16  # less than this no float64 can tell
 def trajectories(method, rows, times, rtol):
     """As `cylinder.trajectories`: in closed form, and by `method` where that has no answer or too wide a bar."""
     results = solution.trajectories(closed, rows, times, rtol)
-    missed, untold = solution.missed(results, rtol), results[1] == UNTOLD
+    missed, untold = solution.missed(results, rtol), results[1] == UNDETERMINED
     if untold.any():
         missed |= untold
         results[0][untold] = np.nan
@@ -29,7 +29,7 @@ def trajectories(method, rows, times, rtol):
     if not missed.any():
         return results
     results = _completed(results, missed, lambda some, at: solution.trajectories(method, some, at, rtol), rows, times)
-    left = _left_open(results, rtol) | ((results[1] == UNTOLD) & (results[2] == OK))
+    left = _left_open(results, rtol) | ((results[1] == UNDETERMINED) & (results[2] == OK))
     exact = taylor_double
     return _completed(results, left, lambda some, at: solution.trajectories(exact, some, at, rtol), rows, times)
 
@@ -61,7 +61,7 @@ def _completed(results, missed, solve, rows, places):
     old = [result[some] for result in results]
     take = missed[some] & (solution.badness(others) <= solution.badness(old))
     if len(others) == 3:  # turnings that either tells are certain
-        np.copyto(others[1], old[1], where=others[1] == UNTOLD)
+        np.copyto(others[1], old[1], where=others[1] == UNDETERMINED)
     for result, held, new in zip(results, old, others, strict=True):
         held[take] = new[take]
         result[some] = held

@@ -13,11 +13,12 @@ import numpy as np
 
 from survey.kernels.cylinder import equilibria as eq
 from survey.kernels.cylinder import fate as kf
+from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder import returns as rt
 from survey.kernels.cylinder import taylor_double
-from survey.kernels.cylinder.along import OK, SEPARATRIX, STEP_LIMIT
 from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, coefficients
 from survey.kernels.cylinder.flow_double import energy as energy_beside
+from survey.kernels.cylinder.steps import OK, SEPARATRIX, STEP_LIMIT
 from survey.measures.cylinder.solution import tolerances, trajectories
 
 NO_TURNS = kf.NO_TURNS
@@ -36,7 +37,7 @@ def empty(size, status):
     """The outputs of `solve` for `size` states, filled with what does not apply."""
     floats = ("limit_phi", "limit_w", "multiplier")
     result = {name + end: np.full(size, np.nan) for name in floats for end in ("", "_error")}
-    for name, fill in (("verdict", -1), ("turnings", kf.UNTOLD), ("net_turns", NO_TURNS), ("status", status)):
+    for name, fill in (("verdict", -1), ("turnings", kf.UNDETERMINED), ("net_turns", NO_TURNS), ("status", status)):
         result[name] = np.full(size, fill, dtype=np.int64)
     return result
 
@@ -45,13 +46,14 @@ def solve(method, six, starts, rtol, result, where):
     """Fates at one parameter point, written into `result` (see `empty`) at the indices `where`."""
     s = remembered(method, six)
     out = followed(method, s, starts, rtol)
-    result["verdict"][where], result["turnings"][where], result["status"][where] = out[:, 0], out[:, 2], out[:, 4]
-    result["net_turns"][where] = out[:, 3]
+    columns = {"verdict": rc.VERDICT, "turnings": rc.TURNINGS, "net_turns": rc.NET_TURNS, "status": rc.STATUS}
+    for name, column in columns.items():
+        result[name][where] = out[:, column]
     for i, row in zip(where, out, strict=True):
         _limits(s, row, result, i)
-    middle = np.where(out[:, 3] != NO_TURNS, 0.0, np.nan) + _middles(s, out)
-    turns = np.trunc((middle + 2.0 * math.pi * out[:, 3] - starts[:, 0]) / (2.0 * math.pi))
-    told = np.isfinite(turns) & (out[:, 0] != kf.PERIODIC_LIBRATION)
+    middle = np.where(out[:, rc.NET_TURNS] != NO_TURNS, 0.0, np.nan) + _middles(s, out)
+    turns = np.trunc((middle + 2.0 * math.pi * out[:, rc.NET_TURNS] - starts[:, 0]) / (2.0 * math.pi))
+    told = np.isfinite(turns) & (out[:, rc.VERDICT] != kf.PERIODIC_LIBRATION)
     result["net_turns"][where[told]] = turns[told]
 
 
@@ -60,11 +62,11 @@ def followed(method, s, starts, rtol):
     first, second = tolerances(method, rtol)
     out = fates(method, s, starts, first)
     for code, tolerance in ((STEP_LIMIT, first), (SEPARATRIX, second)):
-        again = out[:, 4] == code
+        again = out[:, rc.STATUS] == code
         if again.any():
             out[again] = fates(method, s, starts[again], tolerance, MORE)
     if s.stratum not in (I0, I1) and starts.shape[1] == 2:  # no better than the bars of a start can its fate be
-        for i in np.flatnonzero(out[:, 4] == SEPARATRIX):
+        for i in np.flatnonzero(out[:, rc.STATUS] == SEPARATRIX):
             _handed_over(method, s, starts[i], first, out[i])
     return out
 
@@ -77,10 +79,10 @@ def _handed_over(method, s, start, tolerance, out):
         floats, turnings, status = trajectories(taylor_double, row, times[None, :last], 0.0)
         for state, turned, code in list(zip(floats[0], turnings[0], status[0], strict=True))[done:]:
             later = fates(method, s, state[None], tolerance)[0] if code == OK else [kf.UNDECIDED]
-            if later[0] != kf.UNDECIDED:
+            if later[rc.VERDICT] != kf.UNDECIDED:
                 out[:] = later
-                if later[2] >= 0:
-                    out[2] = later[2] + turned if turned >= 0 else kf.UNTOLD
+                if later[rc.TURNINGS] >= 0:
+                    out[rc.TURNINGS] = later[rc.TURNINGS] + turned if turned >= 0 else kf.UNDETERMINED
                 return
         done = last
 
@@ -89,20 +91,20 @@ def _middles(s, out):
     """Angle that counts for net_turns: the equilibrium, or the middle of a libration cycle."""
     angles = np.full(len(out), np.nan)
     for i, row in enumerate(out):
-        if row[0] in (kf.EQUILIBRIUM, kf.EQUILIBRIUM_START) and row[1] >= 0:
-            angles[i] = s.equilibria[int(row[1]), eq.ANGLE]
-        elif row[0] == kf.LIBRATION:
-            cycle = s.librations[int(row[1])]
+        if row[rc.VERDICT] in (kf.EQUILIBRIUM, kf.EQUILIBRIUM_START) and row[rc.LIMIT] >= 0:
+            angles[i] = s.equilibria[int(row[rc.LIMIT]), eq.ANGLE]
+        elif row[rc.VERDICT] == kf.LIBRATION:
+            cycle = s.librations[int(row[rc.LIMIT])]
             angles[i] = 0.5 * (cycle[rt.CYCLE_X] + cycle[rt.CYCLE_LEFT])
     return angles
 
 
 def _limits(s, row, result, i):
     """limit_phi, limit_w and multiplier of one fate."""
-    verdict, index = int(row[0]), int(row[1])
+    verdict, index = int(row[rc.VERDICT]), int(row[rc.LIMIT])
     phi = w = cycle = None
     if verdict in (kf.EQUILIBRIUM, kf.EQUILIBRIUM_START):
-        angle, bar = (s.equilibria[index, eq.ANGLE], s.equilibria[index, eq.BAR]) if index >= 0 else row[5:7]
+        angle, bar = (s.equilibria[index, eq.ANGLE], s.equilibria[index, eq.BAR]) if index >= 0 else row[rc.LIMIT_PHI :]
         phi = angle % (2.0 * math.pi), bar
     elif verdict == kf.LIBRATION:
         cycle = s.librations[index]
@@ -272,10 +274,10 @@ def _librations(method, p, eqs):
 
 
 def fates(method, skeleton, starts, tolerance, more=1):
-    """Verdict, row of the limit, turning points, turns of the limit, status: for rows phi0, w0 (and their bars)."""
+    """The fates (VERDICT to STATUS of `records`) of starts phi0, w0 (and their bars)."""
     if skeleton.stratum in (I0, I1):
         return (_free if skeleton.stratum == I0 else _conservative)(skeleton, starts)
-    out = np.zeros((len(starts), 5))
+    out = np.zeros((len(starts), rc.FATE))
     s, starts = skeleton, np.pad(starts, ((0, 0), (0, 4 - starts.shape[1])))
     section = s.section if s.stratum == G else math.atan2(s.p[0], s.p[1])
     sizes = np.array([len(s.equilibria), len(s.plus), len(s.minus), len(s.librations),
@@ -292,27 +294,28 @@ def fates(method, skeleton, starts, tolerance, more=1):
 def _free(s, starts):
     """g = 0: w - F is conserved and phi' = w on a line; every state with w = 0 is an equilibrium.
 
-    The row of the limit is replaced by its unwrapped angle, given in a sixth column, its bar in a seventh.
+    There is no table of limits: LIMIT_PHI is the unwrapped angle that is reached.
     """
     b12, b31 = s.p[:2]
     b, axis = math.hypot(b12, b31), math.atan2(b12, b31)
-    out = np.zeros((len(starts), 7))
+    out = np.zeros((len(starts), rc.FREE_FATE))
     for row, (phi, w) in zip(out, starts, strict=True):
         y = w - b12 * math.sin(phi) - b31 * math.cos(phi)
         noise = 4e-16 * (abs(w) + b * (1.0 + abs(phi)))
         row[:] = kf.EQUILIBRIUM, -1, 0, kf.NO_TURNS, 0, np.nan, np.nan
         if w == 0.0:
-            row[0], row[3], row[5], row[6] = kf.EQUILIBRIUM_START, 0, phi, 0.0
+            row[rc.VERDICT], row[rc.NET_TURNS] = kf.EQUILIBRIUM_START, 0
+            row[rc.LIMIT_PHI], row[rc.LIMIT_PHI_BAR] = phi, 0.0
         elif abs(abs(y) - b) <= noise:
-            row[0], row[2], row[4] = kf.UNDECIDED, kf.UNTOLD, SEPARATRIX
+            row[rc.VERDICT], row[rc.TURNINGS], row[rc.STATUS] = kf.UNDECIDED, kf.UNDETERMINED, SEPARATRIX
         elif abs(y) > b:
-            row[0] = kf.PERIODIC_ROTATION
+            row[rc.VERDICT] = kf.PERIODIC_ROTATION
         else:  # the next root of y + b cos(phi - axis) ahead
             half = math.acos(-y / b)
             ahead = [((axis + side * half - phi) * np.sign(w)) % (2.0 * math.pi) for side in (1, -1)]
-            row[5] = phi + np.sign(w) * min(ahead)
-            row[6] = 2.0 * noise / math.sqrt(b * b - y * y) + 1e-15 * (1.0 + abs(row[5]))
-            row[3] = math.trunc((row[5] - phi) / (2.0 * math.pi))
+            row[rc.LIMIT_PHI] = phi + np.sign(w) * min(ahead)
+            row[rc.LIMIT_PHI_BAR] = 2.0 * noise / math.sqrt(b * b - y * y) + 1e-15 * (1.0 + abs(row[rc.LIMIT_PHI]))
+            row[rc.NET_TURNS] = math.trunc((row[rc.LIMIT_PHI] - phi) / (2.0 * math.pi))
     return out
 
 
@@ -341,12 +344,13 @@ def _conservative(s, starts):
     for i in np.flatnonzero(near):
         above = [_above(s.p, phi[i], w[i], row) for row in rest]
         near[i], rotates[i] = 0 in above, min(above) > 0
-    out = np.zeros((len(starts), 5))
-    out[:, 0] = np.where(rotates, kf.PERIODIC_ROTATION, kf.PERIODIC_LIBRATION)
-    out[:, 1] = -1
-    out[:, 2] = np.where(rotates, 0, kf.INFINITE)
-    out[:, 3] = np.where(rotates, kf.NO_TURNS, 0)
-    out[near, 0], out[near, 2], out[near, 3], out[near, 4] = kf.UNDECIDED, kf.UNTOLD, kf.NO_TURNS, SEPARATRIX
+    out = np.zeros((len(starts), rc.FATE))
+    out[:, rc.VERDICT] = np.where(rotates, kf.PERIODIC_ROTATION, kf.PERIODIC_LIBRATION)
+    out[:, rc.LIMIT] = -1
+    out[:, rc.TURNINGS] = np.where(rotates, 0, kf.INFINITE)
+    out[:, rc.NET_TURNS] = np.where(rotates, kf.NO_TURNS, 0)
+    out[near, rc.VERDICT], out[near, rc.STATUS] = kf.UNDECIDED, SEPARATRIX
+    out[near, rc.TURNINGS], out[near, rc.NET_TURNS] = kf.UNDETERMINED, kf.NO_TURNS
     for i in np.flatnonzero(w == 0.0):
         row = eq.resting(s.p, s.equilibria, len(s.equilibria), phi[i])
         if row >= 0:

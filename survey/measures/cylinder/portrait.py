@@ -11,10 +11,12 @@ from fractions import Fraction
 import numpy as np
 
 from survey.kernels.cylinder import equilibria as eq
+from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder import returns as rt
-from survey.kernels.cylinder.along import TURNING
 from survey.kernels.cylinder.branches import unstable
-from survey.kernels.cylinder.flow import BOUND_DDG, BOUND_DG, BOUND_F, UNIT
+from survey.kernels.cylinder.flow import BOUND_DDG, BOUND_DG, BOUND_F
+from survey.kernels.cylinder.steps import TURNING
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.measures.cylinder import solution
 from survey.measures.cylinder.fate import EXACT, I0, G, followed, remembered, sizes
 from survey.status import NO_CONVERGENCE, OK
@@ -106,7 +108,7 @@ def _verdict(method, s, rtol):
         return UNDECIDED
     starts = np.zeros((2 * eq.MOST, 4))
     starts = starts[: unstable(s.p, s.equilibria, len(s.equilibria), starts)]
-    return STABLE if (followed(method, s, starts, rtol)[:, 0] >= 0).all() else UNDECIDED
+    return STABLE if (followed(method, s, starts, rtol)[:, rc.VERDICT] >= 0).all() else UNDECIDED
 
 
 def _is_exact(p):
@@ -118,7 +120,7 @@ def _is_exact(p):
 def _is_degenerate(s, row):
     """Does the bar of an equilibrium reach g' = 0, or f = 0 where it is no saddle (in stratum G a Hopf point)?"""
     p = s.p
-    if row[eq.KIND] == eq.DEGENERATE or abs(row[eq.DG]) <= p[BOUND_DDG] * row[eq.BAR] + 8.0 * UNIT * p[BOUND_DG]:
+    if row[eq.KIND] == eq.DEGENERATE or abs(row[eq.DG]) <= p[BOUND_DDG] * row[eq.BAR] + 8.0 * ROUNDOFF_UP * p[BOUND_DG]:
         return True
     return s.stratum == G and row[eq.KIND] != eq.SADDLE and row[eq.STABLE] == 0.0
 
@@ -147,7 +149,7 @@ def _rotations(method, cycles, rtol):
     def period(x):
         rows = np.column_stack([six, section, side * np.maximum(x, 0.0)])
         floats, status = solution.abel(method, rows, (section + 2.0 * math.pi * side)[:, None], rtol)
-        return np.where(status[:, 0] == OK, floats[:, 0, 1], np.nan), floats[:, 0, 3]
+        return np.where(status[:, 0] == OK, floats[:, 0, rc.TIME], np.nan), floats[:, 0, rc.TIME_BAR]
 
     return np.column_stack([side * w, bar, *_within(period, w, bar)])
 
@@ -170,11 +172,11 @@ def _librations(method, cycles, rtol):
 
     def period(x):
         one, two = half(x, 1.0), half(x, -1.0)
-        return one[:, 1, 1] + two[:, 1, 1], one[:, 1, 3] + two[:, 1, 3]
+        return one[:, 1, rc.TIME] + two[:, 1, rc.TIME], one[:, 1, rc.TIME_BAR] + two[:, 1, rc.TIME_BAR]
 
     def passage(x):
         back = half(x, -1.0)
-        return -back[:, 0, 0], back[:, 0, 2] + np.abs(rests[:, eq.F]) * rests[:, eq.BAR]
+        return -back[:, 0, rc.VALUE], back[:, 0, rc.VALUE_BAR] + np.abs(rests[:, eq.F]) * rests[:, eq.BAR]
 
     return np.column_stack([*_within(passage, x, bar), *_within(period, x, bar)])
 

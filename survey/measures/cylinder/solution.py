@@ -6,8 +6,9 @@ asked accuracy is solved again with smaller steps, and the better answer is kept
 
 import numpy as np
 
-from survey.kernels.cylinder.along import OK, TURNING, UNTOLD
-from survey.kernels.cylinder.flow import spread
+from survey.kernels.cylinder import records as rc
+from survey.kernels.cylinder.flow import BOUND_DDG, spread
+from survey.kernels.cylinder.steps import OK, TURNING, UNDETERMINED
 
 STEPS = 200_000  # budget of one solution; about 0.1 s with the Taylor method
 SHARE = 1e-3  # of the asked accuracy, for the truncation error of one step
@@ -16,7 +17,7 @@ FINEST = 2e-16  # of a step: below, the truncation is lost in the rounding
 
 
 def reverse(rows):
-    """S1: (b, w, t) -> -(b, w, t). `rows` is six parameters, phi, w in columns."""
+    """S1: (b, w, t) -> -(b, w, t); rows of GIVEN numbers (see `records`)."""
     return rows * np.array([-1, -1, 1, 1, 1, 1, 1, -1.0])
 
 
@@ -38,14 +39,14 @@ def attempts(method, rtol):
 
 
 def split(rows):
-    """Rows of eight numbers as the kernels take them: coefficients and initial states."""
-    P, starts = np.empty((len(rows), 10)), np.empty((len(rows), 2))
+    """Rows of GIVEN numbers (see `records`) as the kernels take them: coefficients and initial states."""
+    P, starts = np.empty((len(rows), BOUND_DDG + 1)), np.empty((len(rows), 2))
     spread(np.ascontiguousarray(rows, dtype=float), P, starts)
     return P, starts
 
 
 def trajectories(method, rows, times, rtol):
-    """phi, w, their bars (last axis), turnings and status at `times` (rows, columns), of either sign.
+    """PHI to W_BAR of `records` (last axis), turnings and status at `times` (rows, columns), of either sign.
 
     turnings counts the sign changes of w between 0 and t; it is -2 where the error bar cannot tell.
     """
@@ -60,7 +61,7 @@ def trajectories(method, rows, times, rtol):
         places = np.where(mine, np.abs(times), np.inf)[picked]
         parts = _in_time(method, reverse(rows[picked]) if back else rows[picked], places, rtol)
         if back:
-            parts[0][..., 1] *= -1.0
+            parts[0][..., rc.W] *= -1.0
         take = mine[picked]
         for whole, part in zip(results, parts, strict=True):
             held = whole[picked]
@@ -71,7 +72,11 @@ def trajectories(method, rows, times, rtol):
 
 def _nothing(shape):
     """floats, turnings and status before anything is known."""
-    return np.full((*shape, 4), np.nan), np.full(shape, UNTOLD, dtype=np.int64), np.zeros(shape, dtype=np.int64)
+    return (
+        np.full((*shape, rc.STATE), np.nan),
+        np.full(shape, UNDETERMINED, dtype=np.int64),
+        np.zeros(shape, dtype=np.int64),
+    )
 
 
 def _in_time(method, rows, places, rtol):
@@ -84,7 +89,7 @@ def _in_time(method, rows, places, rtol):
         floats, turnings, status = _nothing(at.shape)
         ends = np.zeros(len(P), dtype=np.int64)
         method.flow_trajectories(P, starts, at, tolerance, budget, floats, turnings, ends)
-        np.copyto(status, ends[:, None], where=~np.isfinite(floats[..., 0]))  # else OK
+        np.copyto(status, ends[:, None], where=~np.isfinite(floats[..., rc.PHI]))  # else OK
         return floats, turnings, status
 
     asked = np.isfinite(places)
@@ -97,7 +102,7 @@ def _in_time(method, rows, places, rtol):
 def _count(method, rows, places, tolerance, asked, results):
     """Tell the turnings that the steps have not told, as those beside a focus, where w is less than its bar."""
     _floats, turnings, status = results
-    pick = (asked & (turnings == UNTOLD) & (status == OK)).any(axis=1)
+    pick = (asked & (turnings == UNDETERMINED) & (status == OK)).any(axis=1)
     if pick.any():
         P, starts = split(rows[pick])
         told = turnings[pick]
@@ -106,27 +111,27 @@ def _count(method, rows, places, tolerance, asked, results):
 
 
 def abel(method, rows, targets, rtol, before=False):
-    """w, t and their bars, or those of the turning point (status TURNING), at phi = `targets` (rows, columns).
+    """VALUE to TIME_BAR of `records` (last axis) and status at phi = `targets` (rows, columns).
 
     Where w0 = 0 and g != 0 the solution starts at its turning point; it is followed forward in time, or backward if
     `before`; both branches lie to the side of g, and at targets on the other side it has turned at t = 0.
     """
-    back = rows[:, 7] == 0.0 if before else np.zeros(len(rows), bool)
-    floats = np.full((*targets.shape, 4), np.nan)
-    status = np.zeros(targets.shape, dtype=np.int64)
+    back = rows[:, rc.W0] == 0.0 if before else np.zeros(len(rows), bool)
+    floats = np.full((*targets.shape, rc.STATE), np.nan)
+    status, phi0 = np.zeros(targets.shape, dtype=np.int64), rows[:, rc.PHI0, None]
     for side in (1.0, -1.0):
-        ahead = targets >= rows[:, 6:7] if side > 0 else targets < rows[:, 6:7]
+        ahead = targets >= phi0 if side > 0 else targets < phi0
         for past in (False, True):
-            picked = ahead.any(axis=1) & (((rows[:, 7] * side < 0) | back) == past)
+            picked = ahead.any(axis=1) & (((rows[:, rc.W0] * side < 0) | back) == past)
             if not picked.any():
                 continue
             part = reverse(rows[picked]) if past else rows[picked]
             part = mirror(part) if side < 0 else part
-            part[:, 7] = np.abs(part[:, 7])
+            part[:, rc.W0] = np.abs(part[:, rc.W0])
             f, s = _in_phi(method, part, np.where(ahead[picked], side * targets[picked], np.inf), rtol)
             first = np.where(s == TURNING, side, side * (-1.0 if past else 1.0))
-            f[..., 0] *= first
-            f[..., 1] *= -1.0 if past else 1.0
+            f[..., rc.VALUE] *= first
+            f[..., rc.TIME] *= -1.0 if past else 1.0
             f += 0.0  # no negative zeros
             for whole, new in ((floats, f), (status, s)):
                 held = whole[picked]
@@ -141,7 +146,7 @@ def _in_phi(method, rows, targets, rtol):
 
     def run(pick, tolerance):
         P, starts = split(rows[pick])
-        floats = np.full((*targets[pick].shape, 4), np.nan)
+        floats = np.full((*targets[pick].shape, rc.STATE), np.nan)
         status = np.zeros(targets[pick].shape, dtype=np.int64)
         at = np.ascontiguousarray(targets[pick])
         method.flow_abels(P, starts, at, tolerance, budget, floats, status)
@@ -171,14 +176,15 @@ def missed(results, rtol):
     """Where the answer misses the asked accuracy, or there is none."""
     floats, status = results[0], results[-1]
     good = (status == OK) | (status == TURNING)
-    for i in (0, 1):
-        good &= floats[..., 2 + i] <= rtol * (1.0 + np.abs(floats[..., i]))
+    for value, bar in ((rc.PHI, rc.PHI_BAR), (rc.W, rc.W_BAR)):  # VALUE and TIME likewise
+        good &= floats[..., bar] <= rtol * (1.0 + np.abs(floats[..., value]))
     return ~good
 
 
 def badness(results):
     floats, status = results[0], results[-1]
-    worst = np.where(np.isnan(floats[..., 2]), 0.0, np.nanmax(floats[..., 2:], axis=-1, initial=0.0))
+    bars = floats[..., rc.PHI_BAR :]
+    worst = np.where(np.isnan(bars[..., 0]), 0.0, np.nanmax(bars, axis=-1, initial=0.0))
     return worst + np.where((status == OK) | (status == TURNING), 0.0, 1e300)
 
 

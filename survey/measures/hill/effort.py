@@ -9,7 +9,8 @@ import numpy as np
 
 from survey import status
 from survey.kernels import jit
-from survey.kernels.hill.answers import RESULTS, UNTRIED, levels, segments
+from survey.kernels.hill.answers import UNTRIED, levels, segments
+from survey.kernels.lanes import DY2_BAR, RESULTS, Y1_BAR, Y1_ZEROS
 from survey.measures.hill.answers import Answers
 
 # Even, so that a half period's middle falls between steps; four to the octave from 8 on.
@@ -53,7 +54,7 @@ def solve(problem, method, asked, answers, where=None):
     results = np.empty((flat.size, RESULTS))
     run(problem, method, level, results)
     results = results[chosen]
-    own.status[(own.status == status.OK) & np.isnan(results[:, 8])] = status.STEP_LIMIT
+    own.status[(own.status == status.OK) & np.isnan(results[:, Y1_ZEROS])] = status.STEP_LIMIT
     own.judge(results, rule)
     _harder(problem, method, own, rule, chosen, mine, level, results, run, top)
     if where is not None:
@@ -87,7 +88,7 @@ def _harder(problem, method, own, rule, chosen, effort, level, results, run, top
 
 def _bar(results):
     """One figure for the four bars; a point without a finite one has an infinite bar."""
-    bar = results[:, 4:8].max(axis=-1)
+    bar = results[:, Y1_BAR : DY2_BAR + 1].max(axis=-1)
     return np.where(np.isfinite(bar), bar, np.inf)
 
 

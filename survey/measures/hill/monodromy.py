@@ -16,7 +16,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from survey import measures, status
-from survey.kernels.hill.answers import FLOATS, MARGINAL, RESULTS, STABLE, UNDECIDED, UNSTABLE
+from survey.kernels.hill.answers import FLOATS, MARGINAL, STABLE, UNDECIDED, UNSTABLE
+from survey.kernels.lanes import RESULTS
 from survey.kernels.math.double import split_error
 from survey.measures.hill import auto, effort
 from survey.measures.hill.answers import Answers, Asked

@@ -19,8 +19,8 @@ from types import SimpleNamespace
 import numpy as np
 
 from survey.kernels.hill import sampled_double
-from survey.kernels.hill.answers import RESULTS
 from survey.kernels.jit import fresh, inline, kernel
+from survey.kernels.lanes import RESULTS
 from survey.measures.hill import effort, monodromy
 from survey.measures.hill import more_digits as digits
 from survey.methods import dop853
@@ -42,8 +42,8 @@ BY_PHASE = 0.15
 # DOP853 makes no step longer than this share of the distance to a singularity: it would pass a spike unseen.
 STRIDE = 0.5
 CALL_SAMPLES = 4_000_000
-# In double-double: what follows the results of a whole period, and the most steps (20 ms a hundred).
-SQUARES, EXACT_STEPS = 4, 2000
+# The most steps in double-double: 20 ms a hundred.
+EXACT_STEPS = 2000
 # z in float64 and with more digits may differ by so many times the rounding that the bars allow for.
 SAME_Z = 1000
 
@@ -167,7 +167,7 @@ def problem(z, points, edges, period, slack, even, exact=None):
         return out, reached
 
     def exactly(rows, p, low, number):
-        out = np.full((rows.size, RESULTS + (0 if even else SQUARES)), np.nan)
+        out = np.full((rows.size, RESULTS + (0 if even else sampled_double.SQUARES)), np.nan)
         for i in np.flatnonzero(number <= EXACT_STEPS):
             start = steps(rows[i : i + 1], number[i])[0][0]
             with digits.LOCK:

@@ -17,7 +17,19 @@ import numpy as np
 
 from survey import measures, status
 from survey.kernels.libration import traces
-from survey.kernels.libration.traces import EPS, KREIN, MINUS_ONE, NONE, PLACES, RESULTS, STABLE, UNDECIDED, UNSTABLE
+from survey.kernels.libration.traces import (
+    FACTORS,
+    KREIN,
+    MINUS_ONE,
+    NONE,
+    PLACES,
+    RESULTS,
+    STABLE,
+    UNDECIDED,
+    UNSTABLE,
+)
+from survey.kernels.math.chebyshev import angles, lebesgue, nodes, to_coefficients
+from survey.kernels.math.roundoff import EPS
 from survey.measures.libration import danby_double
 from survey.measures.libration.danby_answers import Answers
 from survey.methods import taylor16
@@ -40,10 +52,8 @@ DENSE, SHARE, HARD = 3 * PLACES, 0.05, 0.25
 # Keep a kernel call below about a second: steps, or points of an adaptive method.
 CALL_WORK, WALKS = 3_000_000, 500
 ATTEMPTS = 5  # to meet the accuracy, each with steps 1.7 times as many
-_ANGLES = np.pi * (np.arange(PLACES) + 0.5) / PLACES
-TO_SERIES = 2 / PLACES * np.cos(np.outer(np.arange(PLACES), _ANGLES))
-TO_SERIES[0] /= 2
-LEBESGUE = 1.0 + 2 / np.pi * np.log(PLACES)
+TO_SERIES = to_coefficients(np.cos(np.outer(np.arange(PLACES), angles(PLACES))))
+LEBESGUE = lebesgue(PLACES - 1)
 
 
 def solve(e, mu, method="auto", rtol=1e-10, dense=False):
@@ -86,7 +96,7 @@ def factors(e, mu, rtol=1e-13):
     """A, B, C, D, t (N, 5) and their bars (N, 5), to what midpoint Taylor can."""
     results = np.empty((e.size, RESULTS))
     _point_by_point(e, *rates(mu), taylor16, rtol, results)
-    return results[:, :5], results[:, 5:]
+    return results[:, :FACTORS], results[:, FACTORS:]
 
 
 def _by_series(e, mu, rtol, answers, left):
@@ -95,19 +105,19 @@ def _by_series(e, mu, rtol, answers, left):
     Hard is a row where float64 misses `rtol` at a quarter of the nodes: points of other rows are few in double-double.
     """
     rows = np.flatnonzero(left.any(axis=1))
-    s = 0.75 + 0.25 * np.cos(_ANGLES)
+    s = 0.75 + 0.25 * nodes(PLACES)
     d1, d2 = np.tile(1.5 * (1.0 + s), rows.size), np.tile(1.5 * (1.0 - s), rows.size)
     results = np.empty((rows.size * PLACES, RESULTS))
-    nodes = _point_by_point(np.repeat(e[rows], PLACES), d1, d2, taylor16, max(SHARE * rtol, 1e-13), results)
+    own = _point_by_point(np.repeat(e[rows], PLACES), d1, d2, taylor16, max(SHARE * rtol, 1e-13), results)
     results = results.reshape(rows.size, PLACES, RESULTS)
-    series = np.ascontiguousarray(np.swapaxes(TO_SERIES @ results[..., :5], 1, 2))
+    series = np.ascontiguousarray(np.swapaxes(TO_SERIES @ results[..., :FACTORS], 1, 2))
     tail = abs(series[..., -2:]).sum(axis=-1)
     with np.errstate(over="ignore"):  # then the points are late
-        bars = LEBESGUE * results[..., 5:].max(axis=1) + tail + 16 * EPS * abs(series).sum(axis=-1)
-    sound = (nodes.status == status.OK).reshape(rows.size, PLACES).all(axis=1)
+        bars = LEBESGUE * results[..., FACTORS:].max(axis=1) + tail + 16 * EPS * abs(series).sum(axis=-1)
+    sound = (own.status == status.OK).reshape(rows.size, PLACES).all(axis=1)
     answers.late |= left.reshape(-1)
     traces.dense(series[sound], bars[sound], rows[sound], mu, rtol, status.OVERFLOW, *answers.all)
-    hard = nodes.missed(rtol).reshape(rows.size, PLACES).mean(axis=1) >= HARD
+    hard = own.missed(rtol).reshape(rows.size, PLACES).mean(axis=1) >= HARD
     return answers.late.reshape(mu.shape) & left, rows[hard]
 
 
@@ -146,7 +156,7 @@ def _point_by_point(e, d1, d2, method, rtol, results=None):
 
 
 def _bar(results):
-    bar = results[:, 5:].max(axis=1)
+    bar = results[:, FACTORS:].max(axis=1)
     return np.where(np.isfinite(bar), bar, np.inf)
 
 

@@ -11,15 +11,17 @@ import numpy as np
 
 from survey import status
 from survey.kernels.libration import danby_double, traces_double
+from survey.kernels.libration.traces import FACTORS
 from survey.kernels.libration.traces_double import PLACES
-from survey.kernels.math.double import UNIT
+from survey.kernels.math.chebyshev import lebesgue
+from survey.kernels.math.roundoff import PAIR_ROUNDOFF
 from survey.measures.libration.danby_answers import Answers
 
 POINTS, VALUES = 1000, 50_000  # of a kernel call, to keep it below about a second
-LEBESGUE = 1.0 + 2 / np.pi * np.log(PLACES)
+LEBESGUE = lebesgue(PLACES - 1)
 # Of Clenshaw's sum at the ends of its interval: n rounds |c_n| up to n + 1 times, each with a weight up to n + 1
-CLENSHAW = 4.0 * UNIT * np.arange(1.0, PLACES + 1) ** 3
-TRANSFORM = 16.0 * UNIT * PLACES  # of the sums that make coefficients of values
+CLENSHAW = 4.0 * PAIR_ROUNDOFF * np.arange(1.0, PLACES + 1) ** 3
+TRANSFORM = 16.0 * PAIR_ROUNDOFF * PLACES  # of the sums that make coefficients of values
 DIGITS = 40
 
 
@@ -56,13 +58,13 @@ def _by_series(e, mu, rtol):
     """Answers of points mu of one row."""
     both, matrix = tables()
     results = _results(np.full(PLACES, e), both)
-    series, bars = np.empty((danby_double.FACTORS, 2, PLACES)), np.empty(danby_double.FACTORS)
+    series, bars = np.empty((FACTORS, 2, PLACES)), np.empty(FACTORS)
     traces_double.to_series(results, matrix, series, bars)
     sizes = abs(series[:, 0])
     # what the series leaves out falls faster than by a half from each coefficient to the next
     with np.errstate(over="ignore"):
         bars = LEBESGUE * bars + 4.0 * sizes[:, -2:].sum(axis=1) + (CLENSHAW * sizes).sum(axis=1)
-        bars += TRANSFORM * abs(results[:, : danby_double.FACTORS]).max(axis=0)
+        bars += TRANSFORM * abs(results[:, :FACTORS]).max(axis=0)
     own = Answers(mu.size)
     for first in range(0, mu.size, VALUES):
         part = Answers(mu[first : first + VALUES].size)

@@ -1,17 +1,18 @@
 """Nutations between turning points: period, advances and action of each well, as arrays.
 
-A method fills, for each well (a row of `kernels/nutation/wells.py`), eight numbers: T/A, the precession, the spin less
-a (1/C - 1/A) T, the action, and their bars; and from these, at given times, u, psi and phi with their bars.
+A method fills, for each well (a row of `kernels.nutation.wells`), the periods' columns of `kernels.nutation.records`,
+and from these, at given times, those of a motion.
 """
 
 import numpy as np
 
+from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.nutation import brun, brun_lanes
+from survey.kernels.nutation import records as rc
 from survey.kernels.nutation import wells as nu
+from survey.kernels.nutation.lanes import NAMES, OUTPUTS
 
-PERIOD, PRECESSION, SPIN, ACTION = range(4)
 TURN = 2.0 * np.pi
-NAMES = ("u_min", "u_max", "period", "precession", "spin", "action")
 TRUST = 0.03  # relative errors beyond are no errors of first order
 UNDECIDED = -1
 NO_MOTION = 16  # the status of integrals without a motion
@@ -19,10 +20,10 @@ FAR = 1e38  # distances in units of |k| beyond this say no more than that there 
 
 
 def of_states(points):
-    """rows (n, SIZE), kinds (n), numbers of wells (n), heights (n, 3) and starts (n, 4) of initial states (n, 7)."""
+    """rows (n, SIZE), kinds (n), numbers of wells (n), heights (n, HEIGHT), starts (n, START) of states (n, 7)."""
     n = len(points)
     rows, kinds, count = np.zeros((n, nu.SIZE)), np.zeros(n, np.int64), np.full(n, -1)
-    heights, starts = np.full((n, 3), np.nan), np.zeros((n, 4))
+    heights, starts = np.full((n, rc.HEIGHT), np.nan), np.zeros((n, rc.START))
     brun.of_states(np.ascontiguousarray(points), rows, kinds, count, heights, starts)
     return rows, kinds, count, heights, starts
 
@@ -30,19 +31,19 @@ def of_states(points):
 def of_integrals(points, sign):
     """The same but starts for (l, alpha, beta) (n, 3): rows (n, 2, SIZE), kinds (n, 2)."""
     n = len(points)
-    rows, kinds, heights = np.zeros((n, 2, nu.SIZE)), np.zeros((n, 2), np.int64), np.full((n, 3), np.nan)
+    rows, kinds, heights = np.zeros((n, 2, nu.SIZE)), np.zeros((n, 2), np.int64), np.full((n, rc.HEIGHT), np.nan)
     brun.of_integrals(np.ascontiguousarray(points), float(sign), rows, kinds, heights)
     count = np.where((kinds == nu.SEPARATRIX).any(axis=1), -1, (kinds >= nu.NUTATION).sum(axis=1))
     return rows, kinds, count, heights
 
 
 def in_lanes(kernel, points, actions):
-    """Values and bars (12, n) of `points` (7, n), numbers of wells (n), and which are answered (n): see `brun_lanes`.
+    """Values and bars (OUTPUTS, n) of `points` (7, n), numbers of wells (n), who is answered (n): see `brun_lanes`.
 
     actions: to full accuracy in small wells, too.
     """
     n = points.shape[1]
-    out, wells, done = np.empty((2 * len(NAMES), n)), np.empty(n), np.empty(n)
+    out, wells, done = np.empty((OUTPUTS, n)), np.empty(n), np.empty(n)
     kernel(points, actions, out, wells, done)
     return out, wells, done == brun_lanes.DONE
 
@@ -53,33 +54,33 @@ def named(values):
 
 
 def periods(method, rows, kinds, rtol):
-    """The eight numbers of each well (n, 8), NaN where there is no nutation, and the kinds, LOST where there should be.
+    """Periods (n, PERIODS) of the wells, NaN where there is no nutation, and the kinds, LOST where there should be one.
 
     An error is trusted as one of first order only where it is small.
     """
     rows, kinds = np.ascontiguousarray(rows), np.ascontiguousarray(kinds)
-    out = np.full((len(rows), 8), np.nan)
+    out = np.full((len(rows), rc.PERIODS), np.nan)
     method.nutation_periods(rows, kinds, rtol, out)
     turning = kinds >= nu.NUTATION
-    good = turning & np.isfinite(out).all(axis=1) & (out[:, 4] < TRUST * out[:, PERIOD])
+    good = turning & np.isfinite(out).all(axis=1) & (out[:, rc.PERIOD_BAR] < TRUST * out[:, rc.PERIOD])
     out[~good] = np.nan
     return out, np.where(turning & ~good, nu.LOST, kinds)
 
 
 def outputs(rows, out, inertia, drift):
     """{name: values, name_error: bars} of wells from `periods`; inertia is A, drift a (1/C - 1/A) to 8 roundings."""
-    values, bars, good = out[:, :4], out[:, 4:], np.isfinite(out[:, 0])
-    period = inertia * values[:, PERIOD]
-    bar = inertia * bars[:, PERIOD] + 2.0 * nu.EPS * period
-    spin = values[:, SPIN] + drift * period
-    spin_bar = bars[:, SPIN] + np.abs(drift) * (bar + 8.0 * nu.EPS * period) + nu.EPS * np.abs(spin)
+    good = np.isfinite(out[:, rc.PERIOD])
+    period = inertia * out[:, rc.PERIOD]
+    bar = inertia * out[:, rc.PERIOD_BAR] + 2.0 * ROUNDOFF * period
+    spin = out[:, rc.SPIN] + drift * period
+    spin_bar = out[:, rc.SPIN_BAR] + np.abs(drift) * (bar + 8.0 * ROUNDOFF * period) + ROUNDOFF * np.abs(spin)
     found = {
         "u_min": (rows[:, nu.LOW], rows[:, nu.BAR_LOW]),
         "u_max": (rows[:, nu.HIGH], rows[:, nu.BAR_HIGH]),
         "period": (period, bar),
-        "precession": (values[:, PRECESSION], bars[:, PRECESSION]),
+        "precession": (out[:, rc.PRECESSION], out[:, rc.PRECESSION_BAR]),
         "spin": (spin, spin_bar),
-        "action": (values[:, ACTION], bars[:, ACTION] + _smallest(rows)),
+        "action": (out[:, rc.ACTION], out[:, rc.ACTION_BAR] + _smallest(rows)),
     }
     return _named(found, good)
 
@@ -108,32 +109,36 @@ def rates(out, wanted):
             value = TURN / period
             result |= {
                 "nutation_frequency": value,
-                "nutation_frequency_error": value * (bar / (period - bar) + 4.0 * nu.EPS),
+                "nutation_frequency_error": value * (bar / (period - bar) + 4.0 * ROUNDOFF),
             }
         for name in ("precession", "spin"):
             angle, rough = out[name], out[f"{name}_error"]
             if f"{name}_rate" in wanted:
                 value = angle / period
                 result[f"{name}_rate"] = value
-                result[f"{name}_rate_error"] = (rough + np.abs(value) * bar) / (period - bar) + 2.0 * nu.EPS * np.abs(
+                result[f"{name}_rate_error"] = (rough + np.abs(value) * bar) / (period - bar) + 2.0 * ROUNDOFF * np.abs(
                     value
                 )
             if f"{name}_number" in wanted:
                 value = angle / TURN
                 result[f"{name}_number"] = value
-                result[f"{name}_number_error"] = rough / TURN + 3.0 * nu.EPS * np.abs(value)
+                result[f"{name}_number_error"] = rough / TURN + 3.0 * ROUNDOFF * np.abs(value)
     return result
 
 
 def motions(method, rows, kinds, starts, out, times, inertia, drift):
     """{name: values, name_error: bars} of u, psi and phi at `times` (n, m)."""
-    here = np.full((*times.shape, 6), np.nan)
+    here = np.full((*times.shape, rc.MOTION), np.nan)
     rows, kinds = np.ascontiguousarray(rows), np.ascontiguousarray(kinds)
     method.nutation_motions(rows, kinds, starts, out, times / inertia[:, None], here)
     turned = drift[:, None] * times
-    phi = here[..., 2] + turned
-    bar = here[..., 5] + 12.0 * nu.EPS * np.abs(turned) + nu.EPS * np.abs(phi)
-    found = {"u": (here[..., 0], here[..., 3]), "psi": (here[..., 1], here[..., 4]), "phi": (phi, bar)}
+    phi = here[..., rc.PHI] + turned
+    bar = here[..., rc.PHI_BAR] + 12.0 * ROUNDOFF * np.abs(turned) + ROUNDOFF * np.abs(phi)
+    found = {
+        "u": (here[..., rc.U], here[..., rc.U_BAR]),
+        "psi": (here[..., rc.PSI], here[..., rc.PSI_BAR]),
+        "phi": (phi, bar),
+    }
     good = np.isfinite(here).all(axis=-1)
     return _named(found, good)
 
@@ -145,8 +150,8 @@ def verdicts(rows, kinds):
 
 
 def heights(kernel, points):
-    """Heights (n, 3) of points (7, n): see `kernels/nutation/brun.py`."""
-    found = np.empty((points.shape[1], 3))
+    """Heights (n, HEIGHT) of points (7, n), columns of `kernels.nutation.records`."""
+    found = np.empty((points.shape[1], rc.HEIGHT))
     kernel(points, found)
     return found
 
@@ -157,10 +162,10 @@ def distance(heights):
     An infinite bar is left beside NaN where it is in doubt whether there is one.
     """
     with np.errstate(divide="ignore", invalid="ignore"):  # k = 0 has no separatrix
-        value = heights[:, 0] / heights[:, 2]
-        bar = heights[:, 1] / heights[:, 2] + 4.0 * nu.EPS * np.abs(value)
+        value = heights[:, rc.ABOVE] / heights[:, rc.FIELD]
+        bar = heights[:, rc.ABOVE_BAR] / heights[:, rc.FIELD] + 4.0 * ROUNDOFF * np.abs(value)
     near = np.abs(value) < FAR
     return {
         "separatrix_distance": np.where(near, value, np.nan),
-        "separatrix_distance_error": np.where(near, bar, np.where(np.isinf(heights[:, 1]), np.inf, np.nan)),
+        "separatrix_distance_error": np.where(near, bar, np.where(np.isinf(heights[:, rc.ABOVE_BAR]), np.inf, np.nan)),
     }

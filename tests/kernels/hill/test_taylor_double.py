@@ -6,7 +6,8 @@ from hill_problems import factors, mp_factors
 from mpmath import mp, mpf
 
 import survey
-from survey.kernels.hill.answers import RESULTS, STABLE, UNSTABLE
+from survey.kernels.hill.answers import STABLE, UNSTABLE
+from survey.kernels.lanes import RESULTS
 from survey.scenes import mathieu
 
 FAMILIES = {("prolate", True): "PL", ("prolate", False): "PR", ("oblate", True): "OL", ("oblate", False): "OR"}

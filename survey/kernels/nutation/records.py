@@ -1,0 +1,18 @@
+"""The columns of the rows that kernels and methods of the family "nutation" fill, and its measures read.
+
+Angles are in radians; a name with _BAR is the error bound of the value named before it. The columns of a well
+are those of `wells` beside this file.
+"""
+
+# A nutation: T / A, the precession, the spin less a (1/C - 1/A) T, the action.
+PERIOD, PRECESSION, SPIN, ACTION, PERIOD_BAR, PRECESSION_BAR, SPIN_BAR, ACTION_BAR = range(8)
+PERIODS = 8
+# A motion at a time: u, psi, phi less its drift.
+U, PSI, PHI, U_BAR, PSI_BAR, PHI_BAR = range(6)
+MOTION = 6
+# Where a motion starts: (u0 - ul)/(uh - ul), 1 - that, the sign of u', the error of u0 in them.
+DONE, LEFT, DIRECTION, START_BAR = range(4)
+START = 4
+# A height: L above the separatrix, its bar, |k|.
+ABOVE, ABOVE_BAR, FIELD = range(3)
+HEIGHT = 3
