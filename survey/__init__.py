@@ -1,4 +1,4 @@
-"""Parameter surveys of mechanical systems whose stability decides everything.
+"""Stability maps of mechanical systems: every point with an error bar, and a verdict that respects it.
 
     import survey
     ds = survey.run("workflows/satellite_prolate.toml")          # a workflow file -> netCDF file and dataset
@@ -9,7 +9,7 @@
 
     ds.survey.map()                                              # xarray datasets get an accessor: survey/accessor.py
 
-Importing this package compiles nothing and loads nothing heavy.
+Importing this package compiles nothing and imports nothing heavy.
 """
 
 import sys
@@ -26,7 +26,7 @@ __all__ = sorted([*_HOME, "scenes"])
 
 
 class _AfterXarray:
-    """Makes `ds.survey` known as soon as xarray is imported, by anyone: importing it here would take half a second."""
+    """Registers `ds.survey` as soon as anyone imports xarray: importing it here would take half a second."""
 
     def find_spec(self, name, path=None, target=None):
         if name != "xarray":
@@ -54,7 +54,7 @@ else:
 
 
 def __getattr__(name):
-    if name == "scenes":  # a folder that can be called
+    if name == "scenes":  # a callable package
         return import_module("survey.scenes")
     if name in _HOME:
         return getattr(import_module(_HOME[name]), name)

@@ -1,4 +1,4 @@
-"""`ds.survey`: what a finished survey is asked in a notebook. Importing survey registers it, before or after xarray."""
+"""`ds.survey`: questions to a finished survey, in a notebook. Importing survey registers it, before or after xarray."""
 
 import contextlib
 
@@ -13,9 +13,9 @@ from survey.wording import plain
 class Survey:
     """A survey's dataset: its map, one point, the motion at that point. Answers are xarray or matplotlib objects.
 
-    Works on the datasets of `survey.run`, `survey.open`, `survey.evaluate` and of `xarray.open_dataset`, lazy ones
-    (`chunks={}`) too, of which only what is asked for is loaded. Coordinates are numbers, the nearest point is taken.
-    Raises survey.BadInput, or survey.Damaged where the dataset is none that survey writes, in one line.
+    Works on the datasets of `survey.run`, `survey.open`, `survey.evaluate` and `xarray.open_dataset`, including lazy
+    ones (`chunks={}`), of which only what is needed is loaded. Coordinates are numbers; the nearest point is used.
+    Raises, in one line, survey.BadInput, or survey.Damaged where the dataset is not one that survey writes.
     """
 
     def __init__(self, ds):
@@ -24,32 +24,33 @@ class Survey:
                 "this dataset was not written by survey: it has no status, or no attribute scene "
                 "(arithmetic drops attributes: xr.set_options(keep_attrs=True) keeps them)"
             )
-        schema.check(ds, whole=False)
+        schema.check(ds, complete=False)
         self._ds = ds
 
     def __repr__(self):
         names = [name for name in vars(type(self)) if not name.startswith("_")]
         scene = plain(self._ds.attrs["scene"])
-        return f"a survey of {scene}: ds.survey has {', '.join(names)}; help(ds.survey) tells each"
+        return f"a survey of {scene}: ds.survey has {', '.join(names)}; help(ds.survey) documents them"
 
     def map(self, var=None, ax=None, boundaries=True, style=None, width="single"):
         """Draw the stability map, or the variable `var`; along one axis, its curve and error band.
 
-        Undecided, failed and outside points are marked and counted in the legend, and points that have no answer by
-        nature are grey, under their status; edges of tongues are drawn where the file holds them, unless `boundaries`
-        is False. Draws onto the matplotlib Axes `ax`, by default a new figure's, and returns it
+        Undecided, failed and outside points are marked and counted in the legend; points where the outputs are
+        undefined are grey, listed by their status; edges of tongues are drawn where the file contains them, unless
+        `boundaries` is False. Draws onto the matplotlib Axes `ax`, by default a new figure's, and returns it
         (`ax.figure.savefig("map.pdf")`). `style="paper"`: for print, hatched, without title, a single or double column
-        wide; `survey plot --style paper` also embeds the fonts as journals ask.
+        wide; `survey plot --style paper` also embeds the fonts as journals require.
         """
         from survey.show import figures
+        from survey.show.style import figure_size
 
-        with _looking(style):
-            ax = _new_axes(figures.size(style, width)) if ax is None else ax
+        with _settings(style):
+            ax = _new_axes(figure_size(style, width)) if ax is None else ax
             figures.onto(ax, self._ds, var, boundaries, style)
         return ax
 
     def point(self, **coords):
-        """Everything known of the nearest point: a `survey.analysis.point.Point`, whose `dataset` is the point's."""
+        """Everything known about the nearest point: a `survey.analysis.point.Point`; its `dataset` is the point's."""
         from survey.analysis import point
 
         return point.Point(point.nearest(self._ds, coords).load())
@@ -57,8 +58,8 @@ class Survey:
     def trajectory(self, time=None, figure=None, **coords):
         """Solve the nearest point in time and draw its motion, as its scene defines. Returns the motion, a Dataset.
 
-        `time` is how long, in the scene's independent variable; the scene knows what suits. Draws into the matplotlib
-        Figure or SubFigure `figure`, by default a new one; not at all if it is False.
+        `time`: duration in the scene's independent variable; by default the scene chooses it. Draws into the matplotlib
+        Figure or SubFigure `figure`, by default a new one; does not draw if it is False.
         """
         from survey.analysis import point, trajectory
 
@@ -66,35 +67,35 @@ class Survey:
         if figure is not False:
             from survey.show import portrait
 
-            with _looking(None):
+            with _settings(None):
                 portrait.draw(found, _new_figure() if figure is None else figure)
         return found
 
     def slice(self, **coords):
-        """The survey at the values of some axes that are next to `coords`: of a map, a row that `survey.map()` draws
-        as a curve with its error band. Returns a Dataset, as lazy as this one.
+        """The survey at the values of some axes nearest to `coords`, such as a row of a map, which `survey.map()` draws
+        as a curve with its error band. Returns a Dataset, lazy if this one is.
         """
         from survey.analysis import point
 
-        return point.of_points(self._ds).isel(point.place(self._ds, coords))
+        return point.of_points(self._ds).isel(point.nearest_indices(self._ds, coords))
 
     def boundary(self, kind=None, index=None):
-        """Where the verdict changes, one place after another along the dimension `place`, as a Dataset.
+        """Where the verdict changes: positions along the dimension `place`, as a Dataset.
 
-        Where the file holds it ([boundaries] in the workflow): a coordinate per axis, `position_error`, `kind` (what
-        kind of boundary), `index` (of the tongue) and, if joined, `curve`; of one `kind` or `index` if asked for. Else
-        the middles of the cells that [refine] left undecided, or midpoints between neighbouring points of different
-        verdict, with X_error = half the cell's width or half their distance.
+        If the file contains boundaries ([boundaries] in the workflow): a coordinate per axis, `position_error`, `kind`
+        (of boundary), `index` (of the tongue) and, if joined, `curve`; only those of one `kind` or `index` if given.
+        Else the centres of the cells that [refine] left undecided, or midpoints between neighbouring points of
+        different verdict, with X_error = half the cell's width or half their distance.
         """
         from survey.analysis import boundary
 
         return boundary.find(self._ds, kind, index)
 
     def zoom(self, num=None, output=None, **ranges):
-        """A finer sweep of a part of the map, such as `zoom(k=(0.2, 0.3), num=200)`, the same workflow otherwise.
+        """A finer sweep of a part of the map, such as `zoom(k=(0.2, 0.3), num=200)`, with otherwise the same workflow.
 
-        `num`: values along each axis with a range (by default as many as now; a dict gives one for each). Ranges may
-        reach beyond the map, as far as the parameters' domains allow; a warning says so. Returns the Dataset, in
+        `num`: number of values along each axis with a range (by default as many as now; a dict gives one for each).
+        Ranges may extend beyond the map, within the parameters' domains, with a warning. Returns the Dataset, in
         memory; with `output` it is written to that netCDF file by `survey.run`.
         """
         from survey.analysis import zoom
@@ -102,21 +103,21 @@ class Survey:
         return zoom.sweep(self._ds, ranges, num, output)
 
     def compare(self, other):
-        """This survey less `other` (a Dataset), at the points that both hold exactly.
+        """This survey minus `other` (a Dataset), at exactly common points.
 
-        Of each output X in both: `X_difference`, and `X_excess`, its size over the sum of both error bars (above 1 they
-        contradict one another); `verdict_differs`. The attribute `summary` tells it in a line, `unlike` what was asked
-        differently.
+        For each output X in both: `X_difference`, and `X_excess`, its size over the sum of both error bars (above 1
+        they contradict each other); `verdict_differs`. The attribute `summary` is the result in a line, `unlike` lists
+        what was asked differently.
         """
         from survey.analysis import compare
 
         return compare.find(self._ds, other)
 
     def areas(self):
-        """Area and share of each verdict with error bars, as a Dataset along `area_verdict`; undecided apart.
+        """Area and fraction of the map of each verdict with error bars, as a Dataset along `area_verdict`.
 
-        From the cells that [refine] made; else from the points, where a bar holds all area between neighbours that
-        differ. The attribute `areas` tells it in a line.
+        From the cells of [refine]; else from the points, where the error bar covers all area between neighbours that
+        differ. Undecided is a verdict of its own. The attribute `areas` is the result in a line.
         """
         from survey.analysis import areas
 
@@ -124,15 +125,15 @@ class Survey:
 
 
 @contextlib.contextmanager
-def _looking(style):
-    """matplotlib's settings of a style, for the time of a drawing."""
+def _settings(style):
+    """matplotlib's settings of a style, while something is drawn."""
     import matplotlib
     import matplotlib.pyplot as plt
 
-    from survey.show import figures
+    from survey.show.style import style_named
 
-    plt.draw_if_interactive()  # a notebook's backend, loaded within rc_context, would show no later figure
-    with matplotlib.rc_context(figures.look(style).rc):
+    plt.draw_if_interactive()  # a notebook's backend, loaded within rc_context, would not show later figures
+    with matplotlib.rc_context(style_named(style).rc):
         yield
 
 

@@ -11,19 +11,18 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-import survey.scenes as scene_folder
+import survey.scenes
 from survey import measures, status
 from survey.errors import BadInput
 from survey.file import disk, reading, schema
 from survey.file.labels import count, counts, describe, flag_codes, layout, percent
 from survey.grid import Grid, line
-from survey.request import trust
-from survey.request import user_scene as own
-from survey.request import workflow as workflows
+from survey.request import trust, user_scene
+from survey.request.checks import check_options, check_parameters, check_request, methods_of
 from survey.request.hill_scene import HillScene, is_number
+from survey.request.workflow import check, read
 from survey.scene import Option, Output, Parameter, Request, condition, exists
-from survey.sweep import engine
-from survey.sweep import solve as sweep_solve
+from survey.sweep import engine, solve
 from survey.wording import counted, short, shown
 
 
@@ -43,23 +42,22 @@ def run(
     output : path of the netCDF file, instead of the workflow's.
     workers : number of worker processes; by default threads of this process.
     scheduler : address or scheduler file of a dask.distributed cluster.
-    fresh : drop the finished blocks of an earlier, interrupted run.
+    fresh : delete the finished blocks of an earlier, interrupted run.
     block_timeout : seconds after which a worker process that has not finished its block is replaced (five minutes more
         for its first, to compile); by default 20 times the longest block so far, and at least five minutes.
 
     Returns
     -------
-    xarray.Dataset, the file and its figures being written: in memory and the file closed, or, if it takes more than
-    256 MiB there, lazy (dask arrays) and the file open.
+    xarray.Dataset, after the file and its figures are written: in memory and the file closed, or, if it takes more than
+    256 MiB of memory, lazy (dask arrays) and the file open.
 
     Raises
     ------
     survey.BadInput, survey.Damaged, survey.Stopped (resumable): one line each.
     """
-    read = workflows.read if isinstance(workflow, (str, os.PathLike)) else workflows.check
-    checked = read(workflow, output=output)
+    checked = (read if isinstance(workflow, (str, os.PathLike)) else check)(workflow, output=output)
     if workers is not None and (not isinstance(workers, int) or workers < 1):
-        raise BadInput(f"workers = {shown(workers)}: it must be a whole number from 1 on, or None for threads")
+        raise BadInput(f"workers = {shown(workers)}: it must be a positive integer, or None for threads")
     if block_timeout is not None and not (is_number(block_timeout) and 0 < block_timeout < np.inf):
         raise BadInput(f"block_timeout = {shown(block_timeout)}: it must be a positive number of seconds, or None")
     engine.run(checked, workers, scheduler, fresh, block_timeout=block_timeout)
@@ -71,7 +69,7 @@ def run(
 def draw(ds: xr.Dataset, workflow: Any) -> list[Path]:
     """Draw the workflow's figures beside its output; returns their paths: `OUT.png`, further ones `OUT_NAME.png`.
 
-    In the style for papers they are PDF files.
+    In the style "paper" they are PDF files.
     """
     if not workflow.figures:
         return []
@@ -103,11 +101,11 @@ def evaluate(
     scene : name of a scene, such as "satellite" (`survey.scenes()` lists them, `survey scenes NAME` explains one); the
         path of a file with your own Hill equation (see `survey/request/user_scene.py`); or what `survey.hill` returns.
     method : "auto" or the name of a method.
-    rtol : asked accuracy, |error| <= rtol (1 + |value|); the `X_error` variables say what was reached.
-    variables : names of the outputs wanted; all by default. Errors and status come along.
+    rtol : requested accuracy, |error| <= rtol (1 + |value|); the `X_error` variables hold the error bounds reached.
+    variables : names of the requested outputs; all by default. Errors and status are always included.
     **parameters : the scene's parameters (numbers, sequences, numpy 1-D arrays, DataArrays) and options (strings).
         A number becomes a scalar coordinate, a 1-D array a dimension named after its parameter; DataArrays keep
-        their dimensions, so those that share one are taken point by point and others multiply.
+        their dimensions, so those that share one are paired point by point and others span a grid.
 
     Returns
     -------
@@ -117,7 +115,7 @@ def evaluate(
     Raises
     ------
     survey.BadInput (a ValueError) for an unknown name, a missing parameter, or a lone value outside its domain. A point
-    outside the domain within an array gets `status = invalid_parameters` and costs itself alone.
+    outside the domain within an array gets `status = invalid_parameters`, which affects only that point.
 
     Examples
     --------
@@ -126,35 +124,35 @@ def evaluate(
     >>> ds.verdict.dims
     ('k',)
     """
-    scene, module = own.find(scene)
+    scene, module = user_scene.find(scene)
     names = {option.name for option in module.OPTIONS}
     given = {key: _labelled(key, value) for key, value in parameters.items() if key not in names}
-    options = workflows.check_options(module, {key: parameters[key] for key in parameters if key in names}, given)
-    used = workflows.check_parameters(module, scene, options, given)
+    options = check_options(module, {key: parameters[key] for key in parameters if key in names}, given)
+    used = check_parameters(module, scene, options, given)
     if variables is not None:
-        variables = _several(variables)
-    request = workflows.check_request(module, options, method, rtol, variables)
+        variables = _as_list(variables)
+    request = check_request(module, options, method, rtol, variables)
     given |= {key: xr.DataArray(float(p.default)) for key, p in used.items() if key not in given}
-    _check_lone_values(used, given)
+    _check_single_values(used, given)
     _check_dimensions(module, given)
     if any(array.chunks for array in given.values()):
-        own.check(module)
+        user_scene.check(module)
         return _lazy(module, scene, request, given)
     grid = _grid(used, given)
-    own.check(module, grid)
-    ds = describe(grid, module, scene, request, sweep_solve.compute(grid, module, request))
+    user_scene.check(module, grid)
+    ds = describe(grid, module, scene, request, solve.compute(grid, module, request))
     return count(ds.assign_coords(_own_coordinates(given)))
 
 
 def open(path: str | os.PathLike[str], *, trust_scene: bool = False) -> xr.Dataset:
     """The dataset in the netCDF file `path`: in memory and the file closed; or lazy, if it takes more than 256 MiB.
 
-    Opening a file runs nothing of it. A survey of your own Hill equation names a Python file, which has to run where
-    points are solved (`ds.survey.trajectory`, `zoom`, the reason of a verdict): it does if you have run that very text
-    here before; `trust_scene=True` lets it run in this process.
+    Opening a file runs no code from it. A survey of your own Hill equation names a Python file, which has to run where
+    points are solved (`ds.survey.trajectory`, `zoom`, the reason for a verdict): it does if you have run the same text
+    here before; `trust_scene=True` allows it in this process.
 
-    Raises survey.BadInput if there is no such file or survey did not write it, survey.Damaged if it is incomplete, or
-    holds what no survey does.
+    Raises survey.BadInput if there is no such file or survey did not write it, survey.Damaged if it is incomplete or
+    its contents are not valid.
     """
     ds = reading.load(path)
     if trust_scene:
@@ -164,11 +162,11 @@ def open(path: str | os.PathLike[str], *, trust_scene: bool = False) -> xr.Datas
 
 def scenes() -> dict[str, str]:
     """{name: title} of the scenes."""
-    return scene_folder()  # type: ignore[operator]  # a folder that can be called
+    return survey.scenes()  # a callable package
 
 
-def _several(variables: Any) -> list[Any]:
-    """The names of outputs as a list, also where one is given alone."""
+def _as_list(variables: Any) -> list[Any]:
+    """The names of outputs as a list, even of a single one."""
     try:
         return [variables] if isinstance(variables, str) else list(variables)
     except TypeError:
@@ -183,7 +181,7 @@ def _labelled(key: str, value: Any) -> xr.DataArray:
         array = value if hasattr(value, "dask") else _array(key, value)
         if array.ndim > 1:
             raise BadInput(
-                f"{short(key, 40)}: an array of {array.ndim} dimensions has no names for them; give a DataArray"
+                f"{short(key, 40)}: an array of {array.ndim} dimensions needs names for them; give a DataArray"
             )
         value = xr.DataArray(array, dims=(key,) if array.ndim else ())
     if value.dtype.kind not in "iuf":
@@ -194,7 +192,7 @@ def _labelled(key: str, value: Any) -> xr.DataArray:
 
 
 def _array(key: str, value: Any) -> npt.NDArray[Any]:
-    """The parameter as an array; what is masked is NaN, so that it costs its points alone."""
+    """The parameter as an array; masked values are NaN, which affects only their points."""
     try:
         if np.ma.isMaskedArray(value):
             return np.ma.filled(value.astype(float), np.nan)
@@ -208,7 +206,7 @@ def _not_real(key: str, value: Any) -> BadInput:
 
 
 def _check_dimensions(module: Any, given: dict[str, xr.DataArray]) -> None:
-    """Raise BadInput if coordinates disagree along a shared dimension, or a dimension bears an output's name."""
+    """Raise BadInput if coordinates disagree along a shared dimension, or a dimension has the name of an output."""
     try:
         xr.align(*given.values(), join="exact", copy=False)
     except ValueError as error:
@@ -218,14 +216,11 @@ def _check_dimensions(module: Any, given: dict[str, xr.DataArray]) -> None:
     outputs = {output.name for output in module.OUTPUTS} | {"status", *getattr(module, "DIMENSIONS", ())}
     for key, array in given.items():
         for dim in set(array.dims) & (outputs | {name for name, other in given.items() if not other.ndim}) - {key}:
-            if dim not in outputs:
-                raise BadInput(
-                    f"{key}: its dimension {dim!r} bears the name of a parameter that is one number; rename it"
-                )
-            raise BadInput(f"{key}: its dimension {dim!r} bears the name of an output or of its dimension; rename it")
+            what = "an output or its dimension" if dim in outputs else "a parameter that is a single number"
+            raise BadInput(f"{key}: its dimension {dim!r} clashes with {what}; rename it")
 
 
-def _check_lone_values(used: dict[str, Parameter], given: dict[str, xr.DataArray]) -> None:
+def _check_single_values(used: dict[str, Parameter], given: dict[str, xr.DataArray]) -> None:
     for key, array in given.items():
         if array.ndim == 0 and not array.chunks and not used[key].holds(array.values):
             raise BadInput(f"{key} = {float(array):g} is outside its domain; allowed: {used[key].domain}")
@@ -262,16 +257,16 @@ def _lazy(module: Any, scene: str, request: Request, given: dict[str, xr.DataArr
     }
     request = replace(request, lines={key: line(np.asarray(array)) for key, array in alone.items()})
 
-    def solve(*arrays: Any) -> tuple[Any, ...]:
+    def solve_arrays(*arrays: Any) -> tuple[Any, ...]:
         shape = np.broadcast_shapes(*(array.shape for array in arrays))
         wide = [array.reshape((1,) * (len(shape) - array.ndim) + array.shape) for array in arrays]
-        solved = sweep_solve.solve_point(module, request, dict(zip(names, wide, strict=True)), shape)
+        solved = solve.solve_point(module, request, dict(zip(names, wide, strict=True)), shape)
         return tuple(solved[name] for name in table)
 
     outputs = {o.name: o for o in module.OUTPUTS if exists(o, request.options)}
     extra = [outputs.get(name.removesuffix("_error")) for name in table]
     results = xr.apply_ufunc(
-        solve,
+        solve_arrays,
         *given.values(),
         dask="parallelized",
         output_dtypes=[dtype for dtype, _, _ in table.values()],
@@ -287,28 +282,29 @@ def _lazy(module: Any, scene: str, request: Request, given: dict[str, xr.DataArr
 
 def scene(name: Any) -> dict[str, Any]:
     """Everything a user needs of one scene: equations, parameters, options, outputs, status, methods, sources."""
-    name, module = own.find(name)
+    name, module = user_scene.find(name)
     return {
         "name": name,
         "title": module.TITLE,
         "about": inspect.cleandoc(module.__doc__),
         "parameters": {p.name: _parameter_line(module, p) for p in module.PARAMETERS},
         "options": {
-            o.name: f"{o.long_name}: {' | '.join(o.choices)} (default {o.default}){_beside(o)}" for o in module.OPTIONS
+            o.name: f"{o.long_name}: {' | '.join(o.choices)} (default {o.default}){_option_condition(o)}"
+            for o in module.OPTIONS
         },
         "outputs": {
             o.name: _outputs_line(module, [other for other in module.OUTPUTS if other.name == o.name])
             for o in module.OUTPUTS
         },
         "status": {key: sentence for key, (_, sentence) in status.table(module).items()},
-        "methods": {"auto": "the method of each region, chosen for you (default)"}
-        | {m: _method_line(module, m) for m in workflows.methods_of(module)},
+        "methods": {"auto": "the best method for each region (default)"}
+        | {m: _method_line(module, m) for m in methods_of(module)},
         "references": list(module.REFERENCES),
     }
 
 
 def summary(ds: xr.Dataset) -> dict[str, Any]:
-    """What is in a survey's dataset: axes, fixed numbers, variables, counts, provenance."""
+    """The contents of a survey's dataset: axes, fixed numbers, variables, counts, provenance."""
     axes = {
         dim: f"{counted(ds.sizes[dim], 'value')} from {ds[dim].values[0]!s} to {ds[dim].values[-1]!s}"
         for dim in ds.status.dims
@@ -334,16 +330,16 @@ def summary(ds: xr.Dataset) -> dict[str, Any]:
 
 
 def areas(ds: xr.Dataset) -> dict[str, str]:
-    """{verdict: its area with its error bound, and its share of the map} of a refined map."""
+    """{verdict: its area with its error bound, and its fraction of the map} of a refined map."""
     names = ("area", "area_error", "area_fraction", "area_fraction_error")
     schema.areas(ds)
     rows = zip(flag_codes(ds.area_verdict.attrs), *(ds[name].values for name in names), strict=True)
-    return {name: f"{area:.12g} +- {bar:.2g} ({percent(part, off)})" for name, area, bar, part, off in rows}
+    return {name: f"{area:.12g} +- {bar:.2g} ({percent(part, part_bar)})" for name, area, bar, part, part_bar in rows}
 
 
-def _beside(option: Option) -> str:
-    words = f"; only with {option.only_with}" if option.only_with else ""
-    return words + (f"; not beside {option.said_by}, which says it" if option.said_by else "")
+def _option_condition(option: Option) -> str:
+    text = f"; only with {option.only_with}" if option.only_with else ""
+    return text + (f"; not with {option.replaced_by}, which replaces it" if option.replaced_by else "")
 
 
 def _parameter_line(module: Any, p: Parameter) -> str:
@@ -361,7 +357,7 @@ def _parameter_line(module: Any, p: Parameter) -> str:
 
 
 def _outputs_line(module: Any, same: list[Output]) -> str:
-    """One line for the outputs of a name; those that differ in their dimensions alone are told once."""
+    """One line for the outputs of a name; those that differ only in their dimensions are listed once."""
     texts = list(dict.fromkeys(_output_text(o) for o in same))
     if len(texts) < len(same):
         return texts[0]

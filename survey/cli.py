@@ -1,4 +1,4 @@
-"""The commands. This file prints, and nothing else does: data to stdout, messages and progress to stderr."""
+"""The commands. Only this file prints: data to stdout, messages and progress to stderr."""
 
 import gc
 import json
@@ -14,20 +14,20 @@ from rich.table import Table
 from rich.text import Text
 
 from survey.errors import BadInput, SurveyError, Untrusted
-from survey.wording import counted, plain
+from survey.wording import counted, plain, reason_of
 
 out = Console(highlight=False, soft_wrap=True, emoji=False)
 err = Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
 CELL = 10_000  # characters of an attribute that are shown
-TRUST = "Let the survey's own scene, a Python file, run: only if you have read it, or trust who wrote it."
+TRUST = "Allow the survey's own scene, a Python file, to run: only if you have read it, or trust its author."
 
 
 def main(arguments=None):
     """Run the program and exit: 0 done, 1 points failed, 2 bad input, 3 damaged, 4 stopped, 130/143 interrupted."""
-    gc.set_threshold(100_000)  # measured: collecting takes a tenth of the time in which kernels are compiled
+    gc.set_threshold(100_000)  # measured: otherwise garbage collection takes a tenth of the time of compiling kernels
     try:
-        words = sys.argv[1:] if arguments is None else arguments
-        code = program.main(words or ["--help"], prog_name="survey", standalone_mode=False)
+        arguments = sys.argv[1:] if arguments is None else arguments
+        code = program.main(arguments or ["--help"], prog_name="survey", standalone_mode=False)
     except SurveyError as error:
         code = complain(error, error.exit_code)
     except click.Abort:
@@ -37,16 +37,16 @@ def main(arguments=None):
     except BrokenPipeError:  # the reader of a pipe went away
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 0
-    except OSError as error:  # of a disk, which the line names
-        code = complain(f"{error.filename or 'the program'}: {error.strerror or error}; mend it and try again", 4)
+    except OSError as error:
+        code = complain(f"{error.filename or 'the program'}: {error.strerror or error}; fix this and try again", 4)
     gc.freeze()  # measured: without it, the collections at exit take 0.35 s
     sys.exit(code or 0)
 
 
 def _usage(error):
-    """What is wrong with the command line, and where its usage is told, in one line."""
-    said, context = error.format_message().replace("\n", " ").removesuffix("."), getattr(error, "ctx", None)
-    return f"{said}; see {context.command_path} --help" if context else said
+    """What is wrong with the command line, and where to find its usage, in one line."""
+    message, context = error.format_message().replace("\n", " ").removesuffix("."), getattr(error, "ctx", None)
+    return f"{message}; see {context.command_path} --help" if context else message
 
 
 def complain(message, code):
@@ -58,7 +58,7 @@ def complain(message, code):
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="survey")
 def program():
-    """Stability maps of mechanical systems: every point with its error bar and a verdict that respects it."""
+    """Stability maps of mechanical systems: every point with an error bar, and a verdict that respects it."""
 
 
 @program.command()
@@ -71,28 +71,28 @@ def program():
     "--block-timeout",
     type=click.FloatRange(0, min_open=True),
     metavar="SECONDS",
-    help="Replace a worker that needs longer for a block; by default 20 times the longest so far, 5 minutes at least.",
+    help="Replace a worker that takes longer for a block; by default 20 times the longest so far, at least 5 minutes.",
 )
-@click.option("--fresh", is_flag=True, help="Drop the finished blocks of an earlier, interrupted run.")
+@click.option("--fresh", is_flag=True, help="Delete the finished blocks of an earlier, interrupted run.")
 @click.option("--quiet", is_flag=True, help="No progress and no closing lines.")
 def run(workflow, output, overrides, workers, scheduler, block_timeout, fresh, quiet):
-    """Run, or resume, a sweep; write OUT.nc and the pictures that the workflow asks for."""
-    from survey.request import workflow as workflows
+    """Run, or resume, a sweep; write OUT.nc and the pictures that the workflow requests."""
+    from survey.request.workflow import read
     from survey.sweep import engine
     from survey.sweep.progress import Progress
 
-    checked, finished = workflows.read(workflow, overrides, output), None
-    again = shlex.join(["survey", *(word for word in sys.argv[1:] if word != "--fresh")])
+    checked, finished = read(workflow, overrides, output), None
+    resume_command = shlex.join(["survey", *(word for word in sys.argv[1:] if word != "--fresh")])
     _stop_on_sigterm()
     try:
         with Progress(err, checked, silent=quiet) as progress:
-            finished = engine.run(checked, workers, scheduler, fresh, progress, again, block_timeout)
+            finished = engine.run(checked, workers, scheduler, fresh, progress, resume_command, block_timeout)
             pictures = _draw(checked)
     except KeyboardInterrupt as stop:
         traceback.clear_frames(stop.__traceback__)  # the semaphores they hold would be reported as leaked
-        _end_interrupted(stop.args[0] if stop.args else 130, checked.path, finished, again)
+        _end_interrupted(stop.args[0] if stop.args else 130, checked.path, finished, resume_command)
     if not quiet:
-        _closing(finished, [checked.path, *pictures])
+        _summarise(finished, [checked.path, *pictures])
     return 1 if _failed(finished) else 0
 
 
@@ -100,19 +100,19 @@ def run(workflow, output, overrides, workers, scheduler, block_timeout, fresh, q
 @click.argument("workflow")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Replace a key, such as axes.k.num=40.")
 @click.option("-o", "--output", metavar="OUT.nc", help="The netCDF file, instead of the workflow's output.path.")
-@click.option("--json", "as_json", is_flag=True, help="For a program to read.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def plan(workflow, overrides, output, as_json):
     """Points, blocks, bytes, method and estimated time; no kernel is called."""
-    from survey.request import workflow as workflows
-    from survey.sweep import plan as sweep_plan
+    from survey.request.workflow import read
+    from survey.sweep import plan
 
-    _show(sweep_plan.plan(workflows.read(workflow, overrides, output)), as_json)
+    _show(plan.plan(read(workflow, overrides, output)), as_json)
 
 
 @program.command()
 @click.argument("path", metavar="OUT.nc")
 @click.option("--points", type=click.IntRange(0), default=20, show_default=True, help="Points to solve again.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Which random points.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the random points.")
 @click.option("--trust-scene", is_flag=True, help=TRUST)
 def verify(path, points, seed, trust_scene):
     """Check digest, completeness and counts; solve N random points again by another method."""
@@ -127,21 +127,21 @@ def verify(path, points, seed, trust_scene):
         return 3
     if trust_scene:
         trust.allow(ds.attrs.get("scene_hash", ""))
-    sound = f"{path}: {'sound but for the digest' if complaints else 'sound'}; "
+    result = f"{path}: {'sound except for the digest' if complaints else 'sound'}; "
     try:
-        again = _audit(ds, points, seed)
+        report = _audit(ds, points, seed)
     except BadInput:
-        out.print(plain(f"{sound}no points were solved again"), markup=False)
+        out.print(plain(f"{result}no points were solved again"), markup=False)
         raise
-    for complaint in again["complaints"]:
+    for complaint in report["complaints"]:
         complain(f"{path}: {complaint}", 3)
-    if not again["complaints"]:
-        out.print(plain(sound + _audited(again)), markup=False)
-    return 3 if complaints or again["complaints"] else 0
+    if not report["complaints"]:
+        out.print(plain(result + _audited(report)), markup=False)
+    return 3 if complaints or report["complaints"] else 0
 
 
 def _audit(ds, points, seed):
-    """`audit`; of a survey with a stranger's scene after the user has said in the terminal that it may run."""
+    """`audit`; if the scene is untrusted, after the user has allowed it in the terminal."""
     from survey.analysis.audit import audit
     from survey.request import trust
 
@@ -155,34 +155,34 @@ def _audit(ds, points, seed):
 
 
 def _may_run(untrusted):
-    """Ask in the terminal, where there is one, whether a stranger's scene may run."""
+    """Ask in the terminal, if there is one, whether an untrusted scene may run."""
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
         return False
-    told = f"The scene of this survey is a Python file that you have not run here before: {untrusted.path}"
-    for line in (told, f"sha256 {untrusted.digest}", f"Read it first: {untrusted.reading(untrusted.path)}"):
+    what = f"The scene of this survey is a Python file that you have not run here before: {untrusted.path}"
+    for line in (what, f"sha256 {untrusted.digest}", f"Read it first: {untrusted.reading(untrusted.path)}"):
         err.print(plain(line), markup=False)
-    return click.confirm("It may do all that you may do. Run it?", default=False, err=True)
+    return click.confirm("It can do anything that you can do. Run it?", default=False, err=True)
 
 
-def _audited(again):
+def _audited(report):
     """What an audit without complaints has done."""
-    parts = {"point": again["points"], "edge": again["edges"], "cell": again["cells"]}
-    told = [counted(number, noun) for noun, number in parts.items() if number]
-    silent = f" (no answer at {counted(again['silent'], 'other')})" if again["silent"] else ""
-    if not told:
+    parts = {"point": report["points"], "edge": report["edges"], "cell": report["cells"]}
+    numbers = [counted(number, noun) for noun, number in parts.items() if number]
+    silent = f" (no answer at {counted(report['silent'], 'other')})" if report["silent"] else ""
+    if not numbers:
         return "no points were solved again"
-    return f"{', '.join(told)} solved again by {again['method']}{silent}, all within the error bars"
+    return f"{', '.join(numbers)} solved again by {report['method']}{silent}, all within the error bars"
 
 
 @program.command()
 @click.argument("path", metavar="OUT.nc")
-@click.option("--json", "as_json", is_flag=True, help="For a program to read.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def info(path, as_json):
-    """What is in the file: axes, variables, counts, provenance; and what an unfinished run has left beside it."""
+    """Contents of the file: axes, variables, counts, provenance; and what an unfinished run has left beside it."""
     from survey import api
     from survey.file import unfinished
 
-    left = unfinished.told(path)
+    left = unfinished.summary(path)
     table = api.summary(api.open(path)) if os.path.exists(path) or not left else {}
     if as_json:
         return _show(table | ({"unfinished": left} if left else {}), True)
@@ -196,9 +196,11 @@ def info(path, as_json):
 @click.argument("path", metavar="OUT.nc")
 @click.option("-o", "--output", metavar="OUT.png", help="The picture, .png, .pdf or .svg; by default beside the file.")
 @click.option("--var", metavar="NAME", help="The variable; by default the verdict.")
-@click.option("--style", type=click.Choice(["screen", "paper"]), default="screen", help="For papers: PDF, hatched.")
-@click.option("--width", type=click.Choice(["single", "double"]), default="single", help="Columns, of style paper.")
-@click.option("--at", metavar="NAME=VALUE", multiple=True, help="Draw the plane, row or well there, not the first.")
+@click.option("--style", type=click.Choice(["screen", "paper"]), default="screen", help="paper: PDF, hatched.")
+@click.option(
+    "--width", type=click.Choice(["single", "double"]), default="single", help="Column width, for style paper."
+)
+@click.option("--at", metavar="NAME=VALUE", multiple=True, help="Draw this plane, row or well instead of the first.")
 def plot(path, output, var, style, width, at):
     """Draw the stability map, or the named variable."""
     from pathlib import Path
@@ -208,7 +210,7 @@ def plot(path, output, var, style, width, at):
     from survey.show import figures
 
     if width != "single" and style != "paper":
-        raise BadInput(f"--width {width} is one of --style paper, where columns have widths; give both, or neither")
+        raise BadInput(f"--width {width} applies only to --style paper; give both, or neither")
     ds = plane(api.open(path), dict(part.partition("=")[::2] for part in at))
     suffix = ".pdf" if style == "paper" else ".png"
     target = Path(output or f"{path.removesuffix('.nc')}{f'_{var}' if var else ''}{suffix}")
@@ -217,19 +219,20 @@ def plot(path, output, var, style, width, at):
     except BadInput:
         raise
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise BadInput(f"{target}: cannot draw to it ({reason}); name a .png, .pdf or .svg file with -o") from None
+        raise BadInput(
+            f"{target}: the picture cannot be written ({reason_of(error)}); name a .png, .pdf or .svg file with -o"
+        ) from None
     out.print(plain(str(target)), markup=False)
 
 
 @program.command()
 @click.argument("path", metavar="OUT.nc")
-@click.option("--port", type=click.IntRange(0, 65535), default=5006, show_default=True, help="0 for any that is free.")
-@click.option("--link", default="", help="The address of an earlier view, to see it again.")
+@click.option("--port", type=click.IntRange(0, 65535), default=5006, show_default=True, help="0 for any free port.")
+@click.option("--link", default="", help="The address of an earlier view, to open it again.")
 @click.option("--no-browser", is_flag=True, help="Only print the address.")
 @click.option("--trust-scene", is_flag=True, help=TRUST)
 def view(path, port, link, no_browser, trust_scene):
-    """Show the map in the browser, to this machine alone: zoom, values with error bars, the motion of a point."""
+    """Show the map in the browser, on this machine only: zoom, values with error bars, the motion at a point."""
     from survey.viewer.server import serve
 
     serve(path, port, link, lambda line: err.print(plain(line), markup=False), not no_browser, trust_scene)
@@ -237,9 +240,9 @@ def view(path, port, link, no_browser, trust_scene):
 
 @program.command()
 @click.argument("name", required=False)
-@click.option("--json", "as_json", is_flag=True, help="For a program to read.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def scenes(name, as_json):
-    """List the scenes; or one scene's equations, parameters, outputs and sources."""
+    """List the scenes; or show one scene's equations, parameters, outputs and sources."""
     from survey import api
 
     if name is None:
@@ -252,13 +255,13 @@ def scenes(name, as_json):
 
 @program.command()
 @click.argument("scene")
-@click.option("--peers", is_flag=True, help="Measure the best other programs too, where they are installed.")
-@click.option("-o", "--output", metavar="DIR", default=".", show_default=True, help="Where CSV, JSON and PNG go.")
+@click.option("--peers", is_flag=True, help="Also measure the best other programs, where installed.")
+@click.option("-o", "--output", metavar="DIR", default=".", show_default=True, help="Folder for CSV, JSON and PNG.")
 def precision(scene, peers, output):
     """The work-precision chart: error against time for every method that applies."""
-    from survey import precision as chart
+    from survey.precision import write
 
-    for path in chart.write(scene, output, peers, say=lambda line: err.print(line, markup=False)):
+    for path in write(scene, output, peers, say=lambda line: err.print(line, markup=False)):
         out.print(str(path), markup=False)
 
 
@@ -281,7 +284,7 @@ def _rows(table, prefix=""):
 
 
 def _describe(scene):
-    """A scene for a reader."""
+    """Print everything about a scene."""
     click.echo(f"{scene['name']}: {scene['title']}\n\n{scene['about']}\n")
     for heading in ("parameters", "options", "outputs", "status", "methods", "references"):
         if not scene[heading]:
@@ -289,8 +292,8 @@ def _describe(scene):
         click.echo(f"{heading}:")
         rows = scene[heading] if isinstance(scene[heading], dict) else {item: "" for item in scene[heading]}
         width = max(map(len, rows))
-        for key, words in rows.items():
-            click.echo(f"  {key:<{width}}  {words}".rstrip())
+        for key, text in rows.items():
+            click.echo(f"  {key:<{width}}  {text}".rstrip())
         click.echo()
 
 
@@ -303,9 +306,9 @@ def _draw(workflow):
     return api.draw(api.open(workflow.path), workflow)
 
 
-def _closing(finished, paths):
-    """What was found, where it lies, and what it took."""
-    if finished.before:
+def _summarise(finished, paths):
+    """Print the files written, the counts, and the times."""
+    if finished.already_complete:
         err.print(f"{paths.pop(0)}: already complete; removed what the run that wrote it had left", markup=False)
     for path in paths:
         err.print(f"wrote {path}", markup=False)
@@ -324,32 +327,33 @@ def _closing(finished, paths):
         curves = counted(attributes["curves_lost"], "curve")
         err.print(f"edges: {curves} could not be followed to the map's border (curve_complete = 0)")
     if "edge_left_out" in attributes:
-        err.print(f"edges: not sought for {attributes['edge_left_out']}, where they accumulate", markup=False)
-    took = {"compiled": finished.compiling, "kernels": finished.computing, "file": finished.writing}
-    took |= {"edges and cells": finished.beside} if finished.beside else {}
-    err.print(", ".join(f"{name} {seconds:.1f} s" for name, seconds in took.items()))
+        err.print(f"edges: not searched for {attributes['edge_left_out']}, where they accumulate", markup=False)
+    times = {"compiling": finished.compiling, "kernels": finished.computing, "file": finished.writing}
+    times |= {"edges and cells": finished.edges_and_cells} if finished.edges_and_cells else {}
+    err.print(", ".join(f"{name} {seconds:.1f} s" for name, seconds in times.items()))
 
 
-def _end_interrupted(code, path, finished, again):
-    """Say what is safe and how to go on (`finished`: only the pictures are missing), and end the process at once.
+def _end_interrupted(code, path, finished, resume_command):
+    """Say what is safe and how to resume (`finished`: only the pictures are missing), and end the process at once.
 
-    Threads inside a kernel cannot be interrupted, and need not be waited for.
+    Threads inside a kernel cannot be interrupted, and there is no need to wait for them.
     """
     from survey.file import unfinished
 
-    for impatient in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(impatient, signal.SIG_IGN)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
     done, blocks = unfinished.finished(path)
-    told = f"finished blocks are safe: {done:,} of {blocks:,}" if done else "no block was finished yet"
-    told += f"; go on with: {again}"
+    state = f"finished blocks are safe: {done:,} of {blocks:,}" if done else "no block was finished yet"
+    state += f"; resume with: {resume_command}"
     if finished:
-        told = f"{path} is complete, its pictures are not; draw it with: survey plot {path}"
-    complain(f"interrupted; {told}", code)
+        state = f"{path} is complete, its pictures are not; draw them with: survey plot {path}"
+    complain(f"interrupted; {state}", code)
     sys.stderr.flush()
     os._exit(code)
 
 
 def _failed(finished):
+    """The number of points that failed."""
     from survey import status
 
     failures = [name for name, code in status.CODES.items() if code in status.FAILURES]

@@ -6,16 +6,16 @@ from survey.wording import plain
 
 
 class SurveyError(Exception):
-    """A failure that is told in one line; `exit_code` is what the command returns."""
+    """A failure described in one line; `exit_code` is what the command returns."""
 
     exit_code = 4
 
-    def __init__(self, *said: object) -> None:
-        super().__init__(*(plain(str(part)) for part in said))  # it may name what a stranger wrote
+    def __init__(self, *parts: object) -> None:
+        super().__init__(*(plain(str(part)) for part in parts))  # it may quote an untrusted file
 
 
 class BadInput(SurveyError, ValueError):
-    """The input is refused before any work: the line names the key, the value, what is allowed, what to do."""
+    """The input is refused before any work: the line names the key, the value, what is allowed and what to do."""
 
     exit_code = 2
 
@@ -25,8 +25,8 @@ class Untrusted(BadInput):
 
     def __init__(self, path: str, digest: str, text: str) -> None:
         super().__init__(
-            f"scene = {path!r} is a Python file that you have not run here before, and points are solved only by "
-            f"running it; read it ({self.reading(path)}), and if you trust it, give --trust-scene, or in Python "
+            f"scene = {path!r} is a Python file that you have not run here before, and points can only be solved "
+            f"by running it; read it ({self.reading(path)}), and if you trust it, give --trust-scene, or in Python "
             "survey.open(path, trust_scene=True)"
         )
         self.path, self.digest, self.text = path, digest, text
@@ -36,7 +36,7 @@ class Untrusted(BadInput):
 
     @staticmethod
     def reading(path: str) -> str:
-        """The command that shows the file, its control characters as text."""
+        """The command that shows the file with its control characters escaped."""
         return f"cat -v -- {shlex.quote(path)}"
 
 

@@ -1,4 +1,4 @@
-"""Axes -> exact coordinates -> blocks. A block reaches a scene as its axes, not as a list of points."""
+"""Axes -> exact coordinates -> blocks. A scene receives a block as its axes, not as a list of points."""
 
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
@@ -31,7 +31,7 @@ class Grid:
 
     @property
     def lines(self):
-        """{name: (number, least, greatest)} of the axes that one parameter has for itself."""
+        """{name: (number, least, greatest)} of the axes that belong to a single parameter."""
         alone = {
             name: dims[0]
             for name, (dims, _) in self.parameters.items()
@@ -40,21 +40,21 @@ class Grid:
         return {name: line(self.parameters[name][1]) for name in alone}
 
     def blocks(self, points_per_block):
-        """Slices per dimension, row by row: the first dimensions are cut first, to at most `points_per_block`."""
+        """Blocks, slices per dimension, of at most `points_per_block` points: the first dimensions are cut first."""
         return self._within([slice(0, size) for size in self.shape], points_per_block)
 
     def tiled(self, points_per_block, points_per_region, points_per_tile):
-        """(lengths of a tile, [(region, its blocks)]): no tile belongs to two regions, and no block does.
+        """(lengths of a tile, [(region, its blocks)]): no tile or block belongs to two regions.
 
         Regions and blocks are slices per dimension, of at most so many points where `whole` dimensions allow it.
         """
         region = self._lengths(points_per_region)
         tile = halved(region, points_per_tile)
         cuts = []
-        for size, piece, own in zip(self.shape, region, tile, strict=True):
-            step = piece if piece == size else piece // own * own
+        for size, piece, length in zip(self.shape, region, tile, strict=True):
+            step = piece if piece == size else piece // length * length
             cuts.append([slice(first, min(first + step, size)) for first in range(0, size, step)])
-        return tile, [(place, self._within(place, points_per_block)) for place in product(*cuts)]
+        return tile, [(region, self._within(region, points_per_block)) for region in product(*cuts)]
 
     def _within(self, region, points_per_block):
         """The blocks of a region."""
@@ -75,7 +75,7 @@ class Grid:
         return tuple(lengths.values())
 
     def point(self, block):
-        """{name: array} for `block` (a tuple of slices): every array has one axis per dimension (length 1 or long)."""
+        """{name: array} for `block` (a tuple of slices): every array has one axis per dimension (some of length 1)."""
         where = dict(zip(self.sizes, block, strict=True))
         aligned = {}
         for name, (dims, values) in self.parameters.items():
@@ -94,7 +94,7 @@ def line(values):
 
 
 def halved(lengths, most):
-    """The lengths of a tile: the longest is halved until at most `most` points are left."""
+    """The lengths of a tile: the longest is halved until there are at most `most` points."""
     lengths = list(lengths)
     while prod(lengths) > most:
         longest = lengths.index(max(lengths))
@@ -112,9 +112,9 @@ def _even_cuts(span, piece):
 def coordinates(start, stop, num, spacing="linear"):
     """`num` float64 coordinates from `start` to `stop`, both ends exact; `spacing` is "linear" or "log"."""
     if num == 1 and start != stop:
-        raise BadInput(f"num = 1 leaves no room for stop = {stop:g}; give num >= 2, or a bare number")
+        raise BadInput(f"num = 1 cannot reach stop = {stop:g}; give num >= 2, or a single number")
     if num > 1 and start == stop:
-        raise BadInput(f"start and stop are both {start:g}, with num = {num}; give a bare number, or another stop")
+        raise BadInput(f"start and stop are both {start:g}, with num = {num}; give a single number, or another stop")
     if spacing == "log":
         if not (start > 0 and stop > 0):
             raise BadInput(f"start = {start:g}, stop = {stop:g} with spacing = 'log': both must be positive")
@@ -142,4 +142,4 @@ def check_axis(key, values):
     if same.size:
         raise BadInput(f"{key}: {float(values[same[0]])!r} occurs twice; give each value once")
     if steps.size and not (np.all(steps > 0) or np.all(steps < 0)):
-        raise BadInput(f"{key}: the values go up and down; sort them")
+        raise BadInput(f"{key}: the values are not monotonic; sort them")

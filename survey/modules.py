@@ -1,4 +1,4 @@
-"""Names resolve to modules: a scene or a method is found by its file name, and no list is kept by hand."""
+"""Names resolve to modules: a scene or a method is found by its file name; no list is kept by hand."""
 
 import sys
 from difflib import get_close_matches
@@ -18,18 +18,19 @@ def load(package, name, what):
     """The module `name` of `package`; raises BadInput, naming the nearest, if there is none."""
     if not isinstance(name, str):
         raise BadInput(unknown(what, name, names(package)))
-    whole = f"{package.__name__}.{name}"
-    if str(name).isidentifier() and whole in sys.modules:  # the folder is not read anew for every block
-        return sys.modules[whole]
+    path = f"{package.__name__}.{name}"
+    if str(name).isidentifier() and path in sys.modules:  # the folder is not read again for every block
+        return sys.modules[path]
     known = names(package)
     if name not in known:
         raise BadInput(unknown(what, name, known))
-    return import_module(whole)
+    return import_module(path)
 
 
 def unknown(what, name, known):
-    """One line for an unknown name: what it is, the nearest known one, and all that are allowed."""
-    same = {other.lower(): other for other in known}
-    near = get_close_matches(short(name if isinstance(name, str) else shown(name)).lower(), same, n=1, cutoff=0.5)
-    hint = f"; did you mean {same[near[0]]!r}?" if near else ""
+    """One line for an unknown name: what it should name, the nearest known one, and those that are allowed."""
+    by_lower = {other.lower(): other for other in known}
+    text = short(name if isinstance(name, str) else shown(name)).lower()
+    near = get_close_matches(text, by_lower, n=1, cutoff=0.5)
+    hint = f"; did you mean {by_lower[near[0]]!r}?" if near else ""
     return f"unknown {what} {shown(name)}{hint} (allowed: {listed(known) or 'none'})"

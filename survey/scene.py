@@ -1,4 +1,4 @@
-"""The words in which a scene describes itself: parameters, options, outputs, and what is asked of it."""
+"""What a scene describes itself with: parameters, options, outputs, and what is asked of it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,10 +13,10 @@ import numpy.typing as npt
 class Parameter:
     """A real number of the system: an axis of a survey or one fixed value.
 
-    `symbol` is TeX. `default=None` says that it must be given. `excluded` and the open ends are not part of the domain.
+    `symbol` is TeX. `default=None` means that it must be given. `excluded` and open ends are not part of the domain.
     `instead_of` names the parameter that this one replaces when it is given. `when` holds the option
     values for which the parameter exists ("": where the option does not). An axis of a `whole` parameter is never cut
-    into blocks. One that is `number_option` may also stand among the options, as one number.
+    into blocks. A `number_option` may also be given among the options, as one number.
     """
 
     name: str
@@ -57,7 +57,7 @@ class Parameter:
 class Option:
     """A switch of the scene; the first choice is the default unless `default` says otherwise.
 
-    It exists only with the parameter `only_with`, and not beside the parameter `said_by`, which says the same.
+    It exists only with the parameter `only_with`, and not together with the parameter `replaced_by`.
     """
 
     name: str
@@ -65,7 +65,7 @@ class Option:
     long_name: str
     default: str = ""
     only_with: str = ""
-    said_by: str = ""
+    replaced_by: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "default", self.default or self.choices[0])
@@ -75,8 +75,8 @@ class Option:
 class Output:
     """A result per point. A float comes with `NAME_error`; one with `flags` is an int8 code, else an int32 count.
 
-    `applies` says in a sentence when the output applies; where it does not, a float is NaN and an integer is
-    `fill`. `dims` names extra (padded) dimensions, whose coordinates are the scene's `DIMENSIONS`.
+    `applies` states when the output applies; where it does not, a float is NaN and an integer is `fill`.
+    `dims` names extra (padded) dimensions, whose coordinates are the scene's `DIMENSIONS`.
     """
 
     name: str
@@ -99,7 +99,7 @@ class Output:
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked at every point of a survey: option values, method, accuracy, and the outputs wanted."""
+    """What is asked at every point of a survey: option values, method, accuracy and the requested outputs."""
 
     options: Mapping[str, str]
     method: str = "auto"
@@ -108,9 +108,9 @@ class Request:
     lines: Mapping[str, tuple[int, float, float]] = field(default_factory=dict)
 
     def line(self, name: str) -> tuple[int, float, float] | None:
-        """(number, least, greatest) of the whole axis of the parameter `name`, which no other shares; or None.
+        """(number, least, greatest) of the axis of the parameter `name`, if no other parameter shares it; else None.
 
-        What depends on an axis depends on the whole of it, never on the block: so a block's bits are always the same.
+        What depends on an axis must depend on all of it, never on the block, so that a point's bits never change.
         """
         return self.lines.get(name)
 
@@ -125,18 +125,18 @@ class Trajectory:
     panels: tuple[tuple[str, ...], ...]
 
 
-def told(value: Any, bar: Any) -> str:
-    """A value with its error bar, in few digits."""
+def plus_minus(value: Any, bar: Any) -> str:
+    """`value +- bar`, rounded to a few digits."""
     return f"{float(value):.6g} +- {float(bar):.1g}"
 
 
 def named(answer: Any, name: str) -> str:
-    """`name = value +- bar` of an output that is known of a point."""
-    return f"{name} = {told(answer[name], answer[f'{name}_error'])}"
+    """`name = value +- bar` of an output at a point."""
+    return f"{name} = {plus_minus(answer[name], answer[f'{name}_error'])}"
 
 
 def condition(scene: Any, when: Mapping[str, tuple[str, ...]], own: str = "") -> str:
-    """When `own` exists, in words: `; only with l; only when question = fate | portrait`; or nothing."""
+    """When the parameter `own` exists, in words: `; only with l; only when question = fate | portrait`; or nothing."""
     words, options = [], {option.name: option for option in scene.OPTIONS}
     for name, allowed in when.items():
         beside = options[name].only_with

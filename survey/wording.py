@@ -1,10 +1,10 @@
-"""Words that messages share, and strangers' words made harmless."""
+"""Wording that messages share, and untrusted text made harmless."""
 
 import unicodedata
 
 SHOWN = 60  # characters of a value in a message
-LISTED = 200  # of the names that are allowed
-LINE = 1200  # of a whole message: some name several paths
+LISTED = 200  # of a list of allowed names
+LINE = 1200  # of a message: some name several paths
 
 
 def counted(number, noun):
@@ -13,8 +13,9 @@ def counted(number, noun):
 
 
 def plain(text, most=LINE, lines=False):
-    """The text with all that a terminal would obey, or no reader see, written out, such as \\x1b; its middle cut out
-    where it is longer than `most` characters. Ends of lines are kept if `lines`.
+    """The text with control and invisible characters escaped, such as \\x1b, and the middle of a long one left out.
+
+    `most`: characters that are kept. `lines`: are line breaks kept?
     """
     if len(text) > most:
         half = most // 2
@@ -25,18 +26,25 @@ def plain(text, most=LINE, lines=False):
 
 
 def short(text, most=SHOWN):
-    """The text in one plain line of at most so many characters, its middle left out."""
+    """The text in one plain line of at most `most` characters, the middle of a longer one left out."""
     text = plain(str(text), LINE)
     end = most // 3
     return text if len(text) <= most else f"{text[: most - end - 5]} ... {text[-end:]}"
 
 
 def shown(value, most=SHOWN):
-    """A value as a message shows it: its repr in one short line."""
+    """The repr of a value in one short line, as messages show it."""
     try:
         return short(repr(value), most)
     except Exception:  # an integer of more than 4300 digits, or an object whose repr fails
-        return f"a value of type {type(value).__name__} that is too long to show"
+        return f"a value of type {type(value).__name__} that cannot be shown"
+
+
+def reason_of(error):
+    """Why a file cannot be read or written, in a few words."""
+    if isinstance(error, UnicodeDecodeError):
+        return "it is not UTF-8 text"
+    return getattr(error, "strerror", None) or short(error, 150)
 
 
 def listed(names):

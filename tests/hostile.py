@@ -339,7 +339,7 @@ def page(path):
     for dim in ("inner_width", "inner_height"):
         shown.plot.set_from_json(dim, 200)
     shown.draw()
-    shown.tell()
+    shown.describe()
     shown.choose((0, 0))
     shown.solve()
     shown.show_source()

@@ -291,7 +291,7 @@ def test_a_zoom_is_the_same_workflow_on_a_part(tongues, tmp_path):
 def test_a_zoom_beyond_the_map_is_solved_and_said(mathieu, recwarn):
     inside = mathieu.survey.zoom(a=(-1.0, 5.0), num=3)
     assert not recwarn.list
-    with pytest.warns(UserWarning, match=r"zoom: a = \(4, 7\) reaches beyond the map's -1 to 5; it is solved") as said:
+    with pytest.warns(UserWarning, match=r"zoom: a = \(4, 7\) extends beyond the map's -1 to 5; it is solved") as said:
         beyond = mathieu.survey.zoom(a=(4.0, 7.0), num=4)
     assert said[0].filename == __file__ and "\n" not in str(said[0].message)
     assert float(beyond.a.max()) == 7.0 and int(beyond.status.sum()) == 0 and inside.sizes["a"] == 3
@@ -381,7 +381,7 @@ def test_lazy_files_are_read_in_part(mathieu, tmp_path):
         (lambda s: s.map("y3"), "unknown variable 'y3'"),
         (lambda s: s.map(style="poster"), "unknown style 'poster'"),
         (lambda s: s.map(style="paper", width="triple"), "unknown width 'triple'"),
-        (lambda s: s.boundary(index=2), "no boundary that has one"),
+        (lambda s: s.boundary(index=2), "no boundary in the file has one"),
         (lambda s: s.zoom(), "give a range"),
         (lambda s: s.zoom(a=(2.0, 1.0)), "the lower one first"),
         (lambda s: s.zoom(a=(0.0, 1.0), num=1), "num = 1"),
@@ -389,7 +389,7 @@ def test_lazy_files_are_read_in_part(mathieu, tmp_path):
         (lambda s: s.trajectory(a=1.0, q=0.5, time="20"), "time = '20': give a positive number"),
         (lambda s: s.compare(3), "give the dataset"),
         (lambda s: s.compare(survey.evaluate("mathieu", a=7.5, q=1.0)), "no value of a is in both"),
-        (lambda s: s.compare(survey.evaluate("libration", mu=0.01)), "one is of the scene"),
+        (lambda s: s.compare(survey.evaluate("libration", mu=0.01)), "the scenes differ"),
         (lambda s: s.slice(q=1.0).survey.slice(a=1.0).survey.areas(), "two values or more"),
     ],
 )

@@ -66,7 +66,7 @@ def test_worker_processes_give_the_same_file(program, small):
         (["info", "absent.nc"], "absent.nc: there is no such file"),
         (["verify", "absent.nc"], "absent.nc: there is no such file"),
         (["plot", "absent.nc"], "absent.nc: there is no such file"),
-        (["info", "small.toml"], "small.toml: this is not a netCDF file of survey; name one that survey run wrote"),
+        (["info", "small.toml"], "small.toml: this is not a netCDF file of survey; name one written by survey run"),
         (["verify", "small.toml"], "small.toml: this is not a netCDF file of survey"),
         (["scenes", "gyroscope"], "did you mean 'gyrostat'"),
         (["precision", "gyroscope"], "did you mean 'gyrostat'"),
@@ -94,7 +94,7 @@ def test_the_plan_says_what_its_time_leaves_out(small, new, monkeypatch):
     monkeypatch.setattr(jit, "is_new", lambda: new)
     told = plan.plan(workflow.read(small))["not_estimated"]
     assert "writing the file" in told and "compiling" in told
-    assert ("this machine has none of them yet" in told) == new
+    assert ("none has been compiled on this machine yet" in told) == new
 
 
 def test_plan_counts_what_run_does_and_calls_no_kernel(program, small):
@@ -134,9 +134,9 @@ def test_verify_says_what_it_checks_without_a_digest(program, ran):
     (program.folder / "small.nc.sha256").unlink()
     found = program("verify", "small.nc")
     assert found.returncode == 3 and found.stderr.count("\n") == 1, found.stderr
-    assert "there is no digest small.nc.sha256 beside it" in found.stderr and "(what is checked: " in found.stderr
-    assert "sound but for the digest; 20 points solved again by dop853 and full, all within" in found.stdout
-    accepted = found.stderr.rpartition("take the file as it is: ")[2]
+    assert "there is no digest small.nc.sha256 beside it" in found.stderr and "solved again are checked" in found.stderr
+    assert "sound except for the digest; 20 points solved again by dop853 and full, all within" in found.stdout
+    accepted = found.stderr.rpartition("accept the file as it is: ")[2]
     subprocess.run(accepted, shell=True, cwd=program.folder, check=True)
     found = program("verify", "small.nc", "--points", "1")
     assert (found.returncode, found.stderr) == (0, "") and "small.nc: sound; 1 point solved again by" in found.stdout
@@ -188,7 +188,7 @@ def test_an_interrupted_run_can_be_resumed(program, small, name, code):
         time.sleep(0.005)
     running.send_signal(getattr(signal, name))
     told = running.communicate(timeout=30)[1]
-    assert running.returncode == code and "go on with: survey run small.toml" in told, told
+    assert running.returncode == code and "resume with: survey run small.toml" in told, told
     finished = len(list(blocks.glob("*.block")))
     assert finished and not (program.folder / "small.nc").exists()
     left = json.loads(program("info", "small.nc", "--json").stdout)["unfinished"]

@@ -69,7 +69,7 @@ def test_integers_and_lists_are_taken():
         ({"w0": 10**400}, "w0 = array.*real number"),
         ({"w0": (x for x in (1.0, 2.0))}, "w0 = .*real number"),
         ({"w0": [[1.0], [2.0, 3.0]]}, "w0 = .*real number"),
-        ({"w0": xr.DataArray(W0, dims="b12")}, "dimension 'b12' bears the name of a parameter"),
+        ({"w0": xr.DataArray(W0, dims="b12")}, "dimension 'b12' clashes with a parameter"),
     ],
 )
 def test_bad_input_is_refused_in_one_line(given, words):

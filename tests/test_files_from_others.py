@@ -22,8 +22,9 @@ import survey
 from survey import errors, modules, scenes
 from survey.errors import BadInput, Damaged
 from survey.file import unfinished
-from survey.show import figures
-from survey.viewer import looks
+from survey.show.style import STYLES
+from survey.show.text import formula
+from survey.viewer import widgets
 from survey.wording import plain
 
 HTML = "<script>alert(1)</script><img src=x onerror=alert(1)>"
@@ -148,15 +149,15 @@ def test_the_browser_page_of_a_hostile_file_holds_text_only(folder):
 
 
 def test_latex_is_off_and_what_is_no_formula_is_text():
-    assert all(look.rc["text.usetex"] is False for look in figures.STYLES.values())
+    assert all(style.rc["text.usetex"] is False for style in STYLES.values())
     for symbol in (r"\frac{", r"\input{/etc/passwd}", "$", "a" * 500, r"\frac{a}{" * 50, r"\hspace{1e9}", "\x1b", ""):
-        shown = figures.formula(symbol, "a$b")
+        shown = formula(symbol, "a$b")
         assert shown == r"a\$b", symbol
     for name in modules.names(scenes):
         scene = modules.load(scenes, name, "scene")
         for part in (*scene.PARAMETERS, *scene.OUTPUTS):
             symbol = part.symbol or part.name
-            assert figures.formula(symbol, "") == f"${symbol}$", (name, symbol)
+            assert formula(symbol, "") == f"${symbol}$", (name, symbol)
 
 
 def test_a_figure_on_axes_made_with_latex_on_is_drawn_without(folder):
@@ -173,9 +174,9 @@ def test_a_figure_on_axes_made_with_latex_on_is_drawn_without(folder):
 def test_bokeh_finds_no_tex_in_words():
     long_name = r"$$\href{javascript:alert(1)}{x}$$ \(y\) \[z\]"
     variable = xr.DataArray(0.0, attrs={"long_name": long_name, "symbol": "x", "units": "1"}, name="v")
-    for text in (looks.label(variable), looks.words(long_name), looks.words("$$$$")):
+    for text in (widgets.label(variable), widgets.literal(long_name), widgets.literal("$$$$")):
         assert not re.search(r"\$\$|\\\(|\\\[", text), text
-    assert looks.label(variable.assign_attrs(long_name="a_b")) == r"a\_b, $$x$$"
+    assert widgets.label(variable.assign_attrs(long_name="a_b")) == r"a\_b, $$x$$"
 
 
 def test_plain_text_hides_nothing():
@@ -226,7 +227,7 @@ def test_types_of_another_kind_are_refused(tmp_path):
             file.createVariable("other", make(file), ("x",))
             file.createVariable("status", "i1", ())
             file.setncatts({"scene": "mathieu", "complete": np.int8(1)})
-        with pytest.raises(Damaged, match="the variable other holds neither numbers nor text"):
+        with pytest.raises(Damaged, match="the variable other contains neither numbers nor text"):
             survey.open(path)
 
 
@@ -245,7 +246,7 @@ def test_codes_that_no_flag_names_are_found(folder):
         file["status"][1, 1] = 77
     hostile.digest(path)
     done = subprocess.run([sys.executable, "-m", "survey", "verify", path], capture_output=True, text=True)
-    assert done.returncode == 3 and "status holds codes that its flag_values do not name" in done.stderr
+    assert done.returncode == 3 and "status contains codes that are not among its flag_values" in done.stderr
     assert (
         "77" in survey.open(path).survey.point(a=float(survey.open(path).a[1]), q=float(survey.open(path).q[1])).status
     )
@@ -262,12 +263,12 @@ def test_what_an_unfinished_run_says_is_text_and_its_command_is_no_other_program
     folder = tmp_path / "map.nc.blocks"
     folder.mkdir()
     (folder / "manifest.json").write_text(json.dumps({"blocks": blocks, "points": "\x1b[31m"}))
-    for again in ("rm -rf ~", "survey run x.toml; rm -rf ~", "survey run $(reboot)", 5, "'", ["survey"]):
+    for command in ("rm -rf ~", "survey run x.toml; rm -rf ~", "survey run $(reboot)", 5, "'", ["survey"]):
         (folder / "holder.json").write_text(
-            json.dumps({"again": again, "folder": "/tmp/$(reboot)\x1b", "host": "\x1b"})
+            json.dumps({"resume_command": command, "folder": "/tmp/$(reboot)\x1b", "host": "\x1b"})
         )
         assert list(hostile.command(["info", str(tmp_path / "map.nc")])) == []
-        told = unfinished.told(tmp_path / "map.nc")["resume"]
+        told = unfinished.summary(tmp_path / "map.nc")["resume"]
         command = told.rpartition(" && ")[2]
         words = shlex.split(command)
         assert words[:2] == ["survey", "run"] and command == shlex.join(words) and "rm" not in shlex.split(told)[:1]

@@ -10,7 +10,7 @@ import survey
 import survey.scenes
 from survey import modules, status
 from survey.file.labels import error_bars
-from survey.request import workflow
+from survey.request.checks import methods_of
 from survey.scene import exists
 from survey.sweep import cost
 
@@ -94,7 +94,7 @@ def test_a_scene_describes_itself(scene, options):
         assert parameter.name in scene.__doc__, f"the docstring does not tell of {parameter.name}"
         assert parameter.instead_of in (None, *names)
         assert parameter.default is None or parameter.holds(parameter.default)
-    assert len(workflow.methods_of(scene, options)) >= 3
+    assert len(methods_of(scene, options)) >= 3
 
 
 def extremes(scene, options, seed, points=60):
@@ -171,7 +171,7 @@ def test_the_methods_check_one_another(scene, options, seed):
     if scene.cost(options, {name: np.size(values) for name, values in point.items()}) > 1e-3:
         point = {name: np.ravel(values)[0] for name, values in point.items()}  # the slowest methods take seconds
     auto = evaluate(scene, options, point, rtol=1e-9)
-    for method in workflow.methods_of(scene, options):
+    for method in methods_of(scene, options):
         assert agree(auto, evaluate(scene, options, point, rtol=1e-6, method=method)) == [], method
 
 

@@ -20,7 +20,7 @@ HIGHEST = {1: 1.6, -1: 5.5}  # l
 COLOURS = {"stable": "#7FBCE0", "unstable": "#D55E00", "cusp": "#000000", "upright": "#009E73", "thread": "#CC2288"}
 
 
-def places(y, z, s):
+def coordinates(y, z, s):
     """alpha, beta, l at (y, z)."""
     here = surface(y, z, 0.0, 0.0, s)
     return here["alpha"][0], here["beta"][0], here["l"][0]
@@ -42,10 +42,10 @@ def patch(s, furthest, inner, outer):
     low, high = inner(u), outer(u)
     great = np.sqrt(low + (high - low) * np.linspace(0.0, 1.0, ACROSS) ** 2)
     small = -s * u / np.where(great > 0.0, great, 1.0)
-    yield places(great, small, s)
-    yield places(small, great, s)
-    yield places(-small, -great, s)
-    yield places(-great, -small, s)
+    yield coordinates(great, small, s)
+    yield coordinates(small, great, s)
+    yield coordinates(-small, -great, s)
+    yield coordinates(-great, -small, s)
 
 
 def shaded(mesh, s, name):
@@ -56,14 +56,14 @@ def shaded(mesh, s, name):
 
 
 def draw_sheets(axes, s):
-    """The stable sheet without its front, through which the others are seen."""
-    look = {"linewidth": 0.0, "antialiased": False, "rcount": ALONG, "ccount": ACROSS, "shade": False}
+    """The stable sheet without its front, which would hide the others."""
+    style = {"linewidth": 0.0, "antialiased": False, "rcount": ALONG, "ccount": ACROSS, "shade": False}
     start = cusps if s > 0 else abs
     for mesh in list(patch(s, 1.0, start, lambda u: greater(HIGHEST[s] + 3.0 * s * u**2, u)))[:3]:
-        axes.plot_surface(*mesh, facecolors=shaded(mesh, s, "stable"), **look)
+        axes.plot_surface(*mesh, facecolors=shaded(mesh, s, "stable"), **style)
     if s > 0:
         for mesh in patch(s, 1.0 / 3.0, abs, cusps):
-            axes.plot_surface(*mesh, facecolors=shaded(mesh, s, "unstable"), **look)
+            axes.plot_surface(*mesh, facecolors=shaded(mesh, s, "unstable"), **style)
 
 
 def draw_lines(axes, s):
@@ -72,7 +72,7 @@ def draw_lines(axes, s):
         great = np.sqrt(cusps(u))
         for side in (1.0, -1.0):
             for y, z in ((great, -u / great), (-u / great, great)):
-                axes.plot(*places(side * y, side * z, s), color=COLOURS["cusp"], lw=1.6, zorder=10)
+                axes.plot(*coordinates(side * y, side * z, s), color=COLOURS["cusp"], lw=1.6, zorder=10)
     furthest = np.sqrt(HIGHEST[s] + s)
     p = np.linspace(-furthest, furthest, 401)
     for side in (1.0, -1.0):
@@ -82,8 +82,8 @@ def draw_lines(axes, s):
             axes.plot(slow, side * slow, slow * slow - s, color=COLOURS["thread"], lw=1.8, zorder=12)
 
 
-def panel(figure, place, s, title):
-    axes = figure.add_subplot(1, 2, place, projection="3d", computed_zorder=False)
+def panel(figure, position, s, title):
+    axes = figure.add_subplot(1, 2, position, projection="3d", computed_zorder=False)
     draw_sheets(axes, s)
     draw_lines(axes, s)
     axes.set(xlabel=r"$\alpha$", ylabel=r"$\beta$", zlabel=r"$l$")

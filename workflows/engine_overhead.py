@@ -1,4 +1,4 @@
-"""What the engine adds: a map of ten million points against its kernels and netCDF4 alone, and how soon a map starts.
+"""Overhead of the engine: a map of ten million points against its kernels and netCDF4 alone, and the time to start.
 
 python workflows/engine_overhead.py [-o results] [--variables discriminant,verdict] [--points 2500x4000]
 """
@@ -17,25 +17,24 @@ import netCDF4
 
 from survey.file.labels import now, provenance
 from survey.request import workflow
-from survey.sweep import cost, dispatch
-from survey.sweep import solve as sweep_solve
+from survey.sweep import cost, dispatch, solve
 
 WORKFLOW = Path(__file__).with_name("satellite_prolate.toml")
 REPEATS = 5
-# the program, telling when its first block was solved
+# the program, printing when its first block was solved
 FIRST_BLOCK = """
 import sys, time
-from survey.file import blocks as store
-save = store.Blocks.save
-def told(*given):
+from survey.file.blocks import Blocks
+save = Blocks.save
+def reporting(*arguments):
     print(time.time(), flush=True)
-    store.Blocks.save = save
-    save(*given)
-store.Blocks.save = told
+    Blocks.save = save
+    save(*arguments)
+Blocks.save = reporting
 from survey.cli import main
 main(sys.argv[1:])
 """
-# the program, telling when all that reads a workflow is imported
+# the program, printing when everything that reads a workflow is imported
 READING = """
 import sys, time
 from survey.request import workflow
@@ -64,23 +63,23 @@ def measure(given, target):
     k, rho = given.points.split("x")
     overrides = [f"axes.k.num={k}", f"axes.rho.num={rho}", f"output.variables={given.variables.split(',')}"]
     overrides.append("output.figures=[]")
-    command = ["run", str(WORKFLOW), "-o", str(target), *(w for text in overrides for w in ("--set", text))]
+    command = ["run", str(WORKFLOW), "-o", str(target), *(word for text in overrides for word in ("--set", text))]
     small = [*command, "--set", "axes.k.num=40", "--set", "axes.rho.num=400", "--quiet"]
     checked = workflow.read(WORKFLOW, overrides, target)
     cold, warm = starts(small)
-    whole = [run(command) for _ in range(REPEATS)]
+    measured = [run(command) for _ in range(REPEATS)]
     arrays, packing = read(target)
     runs = {
         "kernels": [kernels(checked) for _ in range(REPEATS)],
         "netCDF4": [netcdf4_alone(arrays, packing, target.with_name("alone.nc")) for _ in range(REPEATS)],
-        "command": [seconds for seconds, _, _ in whole],
-        "since": [seconds - begin for seconds, begin, _ in whole],
+        "command": [seconds for seconds, _, _ in measured],
+        "since": [seconds - begin for seconds, begin, _ in measured],
     }
     times = {name: statistics.median(values) for name, values in runs.items()}
     least = times["kernels"] + times["netCDF4"]
     points = checked.grid.points
     added = max(0.0, times["since"] - least) / points * 1e9
-    peak = max(peak for _, _, peak in whole)
+    peak = max(peak for _, _, peak in measured)
     own = provenance()
     return f"""# What the engine adds
 
@@ -110,7 +109,7 @@ Peak memory of the command: {peak:.0f} MiB; asked: below 1024.
 
 
 def starts(command):
-    """Seconds until the first block is solved, several times: with an empty kernel cache, and with a filled one."""
+    """Repeated seconds until the first block is solved: with an empty kernel cache, and with a filled one."""
     cold, warm = [], []
     for _ in range(REPEATS):
         with tempfile.TemporaryDirectory() as cache:
@@ -133,7 +132,7 @@ def first_block(command, cache):
 
 
 def run(command):
-    """(seconds of the command, seconds of these before it read its workflow, peak MiB)."""
+    """(seconds of the command, how many of them before it read its workflow, peak MiB)."""
     begin = time.time()
     process = subprocess.Popen([sys.executable, "-c", READING, *command, "--quiet"], stdout=subprocess.PIPE, text=True)
     reading = float(process.stdout.readline())
@@ -146,21 +145,21 @@ def run(command):
 
 
 def kernels(checked):
-    """Seconds of solving all blocks, on as many threads as the command takes."""
+    """Seconds to solve all blocks, on as many threads as the command uses."""
     blocks = cost.blocks_of(checked)
 
-    def solve(block):
-        sweep_solve.solve_block(checked.scene, checked.request, checked.grid, block)
+    def solve_one(block):
+        solve.solve_block(checked.scene, checked.request, checked.grid, block)
 
-    solve(blocks[0])
+    solve_one(blocks[0])
     begin = time.perf_counter()
     with ThreadPoolExecutor(dispatch.cpus()) as pool:
-        list(pool.map(solve, blocks))
+        list(pool.map(solve_one, blocks))
     return time.perf_counter() - begin
 
 
 def read(path):
-    """The map's arrays, and how the file packs each."""
+    """The map's arrays, and how each is packed in the file."""
     arrays, packing = {}, {}
     with netCDF4.Dataset(path) as file:
         file.set_auto_maskandscale(False)
@@ -174,7 +173,7 @@ def read(path):
 
 
 def netcdf4_alone(arrays, packing, path):
-    """Seconds of writing the arrays, each at once, to a file of netCDF4's."""
+    """Seconds to write the arrays, each in one piece, with netCDF4."""
     begin = time.perf_counter()
     with netCDF4.Dataset(path, "w") as file:
         for number, size in enumerate(arrays["status"].shape):

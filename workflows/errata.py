@@ -1,4 +1,4 @@
-"""What the pages of errata share: residuals of formulas at random parameters, to many digits, and the page of them."""
+"""What the pages of errata share: residuals of formulas at random parameters with many digits, and the page."""
 
 import random
 
@@ -10,7 +10,7 @@ TRIALS = 5
 
 
 def number(dice):
-    """A random number of size 0.3 to 1.3: none is 0 or 1, or a missing factor would hide."""
+    """A random number of magnitude 0.3 to 1.3: exactly 0 or 1 could hide a missing factor."""
     return dice.choice((-1, 1)) * (mpf(3) + 10 * mpf(dice.random())) / 10
 
 
@@ -23,7 +23,7 @@ def worst(values):
 
 
 def same_dice(printed, *right):
-    """Residuals of the formula as printed and, the worst, of the right ones, with the same random numbers."""
+    """The residual of the printed formula and the largest of the right ones, with the same random numbers."""
 
     def test(dice):
         state, values = dice.getstate(), []
@@ -36,13 +36,13 @@ def same_dice(printed, *right):
 
 
 def trials(function, seed=0):
-    """The values of `function` at TRIALS random parameters, in DIGITS digits."""
+    """The values of `function` at TRIALS random parameters, computed with DIGITS digits."""
     with mp.workdps(DIGITS):
         return [function(random.Random(seed + i)) for i in range(TRIALS)]
 
 
 def erratum(function):
-    """(least residual as printed, worst residual corrected)."""
+    """(least residual of the printed formula, largest of the corrected one)."""
     found = trials(function)
     return float(min(a for a, _ in found)), float(max(b for _, b in found))
 
@@ -58,12 +58,12 @@ def short(value):
 def write(doc, name, page, tables):
     """Write NAME.md: `page` with tables: errata (place, printed, correct, test), right, gaps (place, words, test)."""
     folder = parser(doc, "the page").parse_args().output
-    say("printed against corrected")
+    say("comparing printed and corrected formulas")
     rows = [(place, a, b, *erratum(test)) for place, a, b, test in tables["errata"]]
-    said = {"errata": "\n".join(f"| {place} | {a} | {b} | {x:.1g} | {short(y)} |" for place, a, b, x, y in rows)}
-    say("what is right, and what is missing")
+    filled = {"errata": "\n".join(f"| {place} | {a} | {b} | {x:.1g} | {short(y)} |" for place, a, b, x, y in rows)}
+    say("checking the remaining formulas")
     for key in ("right", "gaps"):
-        said[key] = "\n".join(f"| {place} | {what} | {short(residual(test))} |" for place, what, test in tables[key])
+        filled[key] = "\n".join(f"| {place} | {what} | {short(residual(test))} |" for place, what, test in tables[key])
     path = folder / f"{name}.md"
-    path.write_text(page.format(digits=DIGITS, trials=TRIALS, **said))
+    path.write_text(page.format(digits=DIGITS, trials=TRIALS, **filled))
     print(path)

@@ -14,7 +14,7 @@ from script import parser, say
 import survey
 from survey.kernels.cylinder import gyrostat
 from survey.kernels.cylinder.flow import coefficients
-from survey.show.figures import COLOURS
+from survey.show.palette import COLOURS
 
 SIX = {"b12": 0.7, "b31": -0.4, "d": 1.1, "c23": 0.3, "s2": 0.5, "s3": -0.2}
 START = {"phi0": 1.5, "w0": 0.8}

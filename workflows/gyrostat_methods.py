@@ -96,16 +96,16 @@ def advance(T, dt):
 
 
 @fresh
-def in_time(p, T, places, tolerance, out):
-    """out[j] = phi, its low part, w, its low part at the ascending times places[j] >= 0; NaN beyond LIMIT steps."""
+def in_time(p, T, abscissae, tolerance, out):
+    """out[j] = phi, its low part, w, its low part at the ascending times abscissae[j] >= 0; NaN beyond LIMIT steps."""
     t, j = (0.0, 0.0), 0
     for _ in range(LIMIT):
-        if j == len(places):
+        if j == len(abscissae):
             return
         expand(p, T, T.shape[2] - 1)
         h = reach(p, T, tolerance)
-        while j < len(places):
-            dt = sub((places[j], 0.0), t)
+        while j < len(abscissae):
+            dt = sub((abscissae[j], 0.0), t)
             if dt[0] > h:
                 break
             out[j, 0], out[j, 1] = value(T, PHI, dt)
@@ -127,11 +127,11 @@ def zero(T, q, level, dt):
 
 
 @fresh
-def in_phi(p, T, places, tolerance, out, codes):
-    """out[j] = w, t (pairs) at the ascending angles places[j], for w > 0; or phi, t of the turning point before it."""
+def in_phi(p, T, abscissae, tolerance, out, codes):
+    """out[j] = w, t (pairs) at the ascending angles abscissae[j], for w > 0; or phi, t of the turning point before it."""
     t, j = (0.0, 0.0), 0
     for _ in range(LIMIT):
-        if j == len(places):
+        if j == len(abscissae):
             return
         expand(p, T, T.shape[2] - 1)
         h = (reach(p, T, tolerance), 0.0)
@@ -139,14 +139,14 @@ def in_phi(p, T, places, tolerance, out, codes):
         if turned:
             h = zero(T, W, (0.0, 0.0), (h[0] * T[W, 0, 0] / (T[W, 0, 0] - value(T, W, h)[0]), 0.0))
         end = value(T, PHI, h)
-        while j < len(places) and sub((places[j], 0.0), end)[0] <= 0.0:
-            dt = zero(T, PHI, (places[j], 0.0), (0.0, 0.0))  # phi is concave before a turning point: from below
+        while j < len(abscissae) and sub((abscissae[j], 0.0), end)[0] <= 0.0:
+            dt = zero(T, PHI, (abscissae[j], 0.0), (0.0, 0.0))  # phi is concave before a turning point: from below
             out[j, 0], out[j, 1] = value(T, W, dt)
             out[j, 2], out[j, 3] = add(t, dt)
             codes[j] = OK
             j += 1
         if turned:
-            for i in range(j, len(places)):
+            for i in range(j, len(abscissae)):
                 out[i, 0], out[i, 1] = end
                 out[i, 2], out[i, 3] = add(t, h)
                 codes[i] = TURNING
@@ -165,12 +165,12 @@ def begun(phi0, w0, order):
     return T
 
 
-def truth(rows, places, over_phi, effort=FINE):
-    """Pairs (values, low parts), each (rows, columns, 2), and codes, for rows of eight numbers; places ascend."""
+def truth(rows, abscissae, over_phi, effort=FINE):
+    """Pairs (values, low parts), each (rows, columns, 2), and codes, for rows of eight numbers; abscissae ascend."""
     order, tolerance = effort
-    out = np.full((*places.shape, 4), np.nan)
-    codes = np.zeros(places.shape, dtype=np.int64)
-    for row, at, o, code in zip(rows, np.ascontiguousarray(places), out, codes, strict=True):
+    out = np.full((*abscissae.shape, 4), np.nan)
+    codes = np.zeros(abscissae.shape, dtype=np.int64)
+    for row, at, o, code in zip(rows, np.ascontiguousarray(abscissae), out, codes, strict=True):
         p, T = coefficients(*row[:6]), begun(row[6], row[7], order)
         if over_phi:
             in_phi(p, T, at, tolerance, o, code)
@@ -181,8 +181,8 @@ def truth(rows, places, over_phi, effort=FINE):
 
 def checked(plane):
     """The truth of a plane, by FINE, and how far COARSE is from it: values, low parts, codes, differences."""
-    high, low, codes = truth(plane.rows, plane.places, plane.over_phi)
-    other, rest, others = truth(plane.rows, plane.places, plane.over_phi, COARSE)
+    high, low, codes = truth(plane.rows, plane.abscissae, plane.over_phi)
+    other, rest, others = truth(plane.rows, plane.abscissae, plane.over_phi, COARSE)
     if not (np.isfinite(high).all() and np.array_equal(codes, others)):
         raise RuntimeError(f"{plane.name}: the reference is no reference")
     return high, low, codes, np.abs((high - other) + (low - rest))
@@ -217,8 +217,8 @@ class Plane:
     x: Axis
     y: Axis
     rows: np.ndarray  # (n, 8)
-    places: np.ndarray  # (n, m), ascending along m
-    across: str = ""  # the axis along which places run, if they do
+    abscissae: np.ndarray  # (n, m), ascending along m
+    across: str = ""  # the axis along which abscissae run, if they do
     over_phi: bool = False
 
     @property
@@ -357,12 +357,12 @@ def planes(share=1.0):
 
 
 @dataclass(frozen=True)
-class Judged:
+class Comparison:
     """One method on one plane, arrays in the picture's order (y, x)."""
 
     error: np.ndarray  # largest true error of the two outputs over 1 + |value|; NaN where there is no answer
     ratio: np.ndarray  # largest true error over its bar
-    shaky: np.ndarray  # largest error of the truth over a bar
+    doubtful: np.ndarray  # largest error of the truth over a bar
     missed: np.ndarray  # answered, but its bar misses RTOL
     wrong: np.ndarray  # reached where the solution has turned, or turned beyond the bar where it has not
 
@@ -375,8 +375,8 @@ class Judged:
         return self.answered & ~self.missed
 
 
-def judge(plane, method, true, rtol=RTOL):
-    """Judged, or None where the method does not serve the question."""
+def compared(plane, method, true, rtol=RTOL):
+    """The errors of a method, or None if it does not support the question."""
     served = getattr(modules.load(methods, method, "method"), "WHEN", None) if method != "auto" else None
     if served and plane.question not in served["question"]:
         return None
@@ -391,30 +391,30 @@ def judge(plane, method, true, rtol=RTOL):
             [np.where(turned, ds[f"{name}_turning{end}"].values, old) for name, old in zip(("phi", "t"), olds, strict=True)]
             for end, olds in (("", value), ("_error", bar))
         )  # fmt: skip
-        # the last place lies beyond the turning point
+        # the last abscissa lies beyond the turning point
         high, low, doubt = (np.where(turned[..., None], part[:, -1:], part) for part in (high, low, doubt))
     value, bar = np.stack(value, axis=-1), np.stack(bar, axis=-1)
     error = np.abs((value - high) - low)
     with np.errstate(invalid="ignore", divide="ignore"):
-        ratio, shaky = (np.where(part > 0.0, part / bar, 0.0).max(axis=-1) for part in (error, doubt))
-    early = turned & (codes == OK) & ~(np.abs(value[..., 0] - plane.places) <= bar[..., 0])
+        ratio, doubtful = (np.where(part > 0.0, part / bar, 0.0).max(axis=-1) for part in (error, doubt))
+    early = turned & (codes == OK) & ~(np.abs(value[..., 0] - plane.abscissae) <= bar[..., 0])
     wrong = early | ((status == OK) & (codes == TURNING))
     kept = np.isin(status, (OK, TURNING))
     error = np.where(kept & ~wrong, (error / (1.0 + np.abs(high))).max(axis=-1), np.nan)
     missed = kept & (bar > rtol * (1.0 + np.abs(value))).any(axis=-1)
-    ratio, shaky = (np.where(np.isnan(error), 0.0, part) for part in (ratio, shaky))
-    return Judged(*(plane.picture(part) for part in (error, ratio, shaky, missed, wrong)))
+    ratio, doubtful = (np.where(np.isnan(error), 0.0, part) for part in (ratio, doubtful))
+    return Comparison(*(plane.picture(part) for part in (error, ratio, doubtful, missed, wrong)))
 
 
 def asked(plane, method, rtol):
-    """The answers of `survey.evaluate`, (row, place)."""
+    """The answers of `survey.evaluate`, (row, column)."""
     columns = {
         name: xr.DataArray(values, dims="row")
         for name, values in zip((*NAMES, "phi0", "w0"), plane.rows.T, strict=True)
     }
-    place = {"phi" if plane.over_phi else "t": xr.DataArray(plane.places, dims=("row", "place"))}
-    ds = survey.evaluate("gyrostat", question=plane.question, method=method, rtol=rtol, **columns, **place)
-    return ds.transpose("row", "place")
+    abscissa = {"phi" if plane.over_phi else "t": xr.DataArray(plane.abscissae, dims=("row", "column"))}
+    ds = survey.evaluate("gyrostat", question=plane.question, method=method, rtol=rtol, **columns, **abscissa)
+    return ds.transpose("row", "column")
 
 
 PAGE = """# Where methods fail
@@ -425,7 +425,7 @@ otherwise: d = 1.1, c23 = 0.3, s2 = 0.5, s3 = -0.2.
 
 The truth is (57) in double-double arithmetic by a Taylor series of its own (order {order}), which shares no step, series or
 arithmetic with the methods. It is solved twice, with another order and other steps: the two differ by at most {differ:.0e} of
-1 + |value| (next to separatrices and turning points, where errors grow), and by at most {shaky:.0e} of any error bar below. From the
+1 + |value| (next to separatrices and turning points, where errors grow), and by at most {doubtful:.0e} of any error bar below. From the
 48 trajectories of 30 digits in `survey/reference` it differs by at most {mpmath:.0e}.
 
 Hatched: the method's own error bar misses rtol. Grey: it gives no answer, and says why in `status`. {wrong} of {answers} answers say
@@ -467,32 +467,32 @@ def main():
     given = words.parse_args()
     folder = given.output
     say("planes")
-    maps, true, judged = planes(given.share), {}, {}
+    maps, true, results = planes(given.share), {}, {}
     for name, plane in maps.items():
         say(plane.name)
         true[name] = checked(plane)
-        judged[name] = {method: judge(plane, method, true[name]) for method in METHODS}
-    (folder / "gyrostat_methods.md").write_text(page(maps, true, judged))
-    draw(maps, judged, folder / "gyrostat_methods.png")
+        results[name] = {method: compared(plane, method, true[name]) for method in METHODS}
+    (folder / "gyrostat_methods.md").write_text(page(maps, true, results))
+    draw(maps, results, folder / "gyrostat_methods.png")
     print(folder / "gyrostat_methods.md", folder / "gyrostat_methods.png", sep="\n")
 
 
-def page(maps, true, judged):
+def page(maps, true, results):
     """The page's text."""
-    every = [j for plane in judged.values() for j in plane.values() if j]
+    every = [j for plane in results.values() for j in plane.values() if j]
     return PAGE.format(
         rtol=RTOL, order=FINE[0], mpmath=max(held()),
         differ=max((doubt / (1 + np.abs(high))).max() for high, _low, _codes, doubt in true.values()),
-        shaky=max(j.shaky.max() for j in every), ratio=max(j.ratio.max() for j in every),
+        doubtful=max(j.doubtful.max() for j in every), ratio=max(j.ratio.max() for j in every),
         wrong=sum(int(j.wrong.sum()) for j in every),
         outside=sum(int((j.ratio > 1).sum()) for j in every), answers=f"{sum(int(j.answered.sum()) for j in every):,}",
-        tables="\n".join(table(maps[name], plane) for name, plane in judged.items()), rule=rule(maps, judged),
+        tables="\n".join(table(maps[name], plane) for name, plane in results.items()), rule=rule(maps, results),
     )  # fmt: skip
 
 
-def table(plane, judged):
+def table(plane, results):
     rows = []
-    for method, j in judged.items():
+    for method, j in results.items():
         if j is None or not j.answered.any():
             why = "not its question" if j is None else "no closed form applies"
             rows.append(f"| {method} | {why} | | | | | |")
@@ -505,19 +505,19 @@ def table(plane, judged):
     return TABLE.format(title=plane.name, rows="\n".join(rows))
 
 
-def rule(maps, judged):
+def rule(maps, results):
     """The rule of `auto` with the figures that it is drawn from."""
-    phase, stiffness = judged["phase"], judged["stiff"]
+    phase, stiffness = results["phase"], results["stiff"]
     others = lost = points = 0
-    for plane in judged.values():
+    for plane in results.values():
         served = {method: j for method, j in plane.items() if j}
         rest = np.any([j.met for method, j in served.items() if method in ("dop853", "rk4", "full")], axis=0)
         others += int((rest & ~served["taylor"].met).sum())
         lost += int((np.any([j.met for j in served.values()], axis=0) & ~served["auto"].met).sum())
         points += rest.size
-    both = [(plane["dop853"].error / plane["taylor"].error).ravel() for plane in judged.values()]
+    both = [(plane["dop853"].error / plane["taylor"].error).ravel() for plane in results.values()]
     reached = {
-        (method, k): furthest(maps["roots"], judged["roots"][method], k)
+        (method, k): furthest(maps["roots"], results["roots"][method], k)
         for method in ("closed", "taylor")
         for k in (-1, 0)
     }
@@ -530,14 +530,14 @@ def rule(maps, judged):
     )  # fmt: skip
 
 
-def furthest(plane, judged, line):
+def furthest(plane, results, line):
     """Largest distance to the separatrix at which a method misses rtol, on a line of the picture; 0 if it does not."""
-    speeds = plane.rows[:, 7].reshape(judged.met.shape)[line]
+    speeds = plane.rows[:, 7].reshape(results.met.shape)[line]
     middle = 0.5 * (speeds[len(speeds) // 2 - 1] + speeds[len(speeds) // 2])
-    return np.abs(speeds - middle)[~judged.met[line]].max(initial=0.0)
+    return np.abs(speeds - middle)[~results.met[line]].max(initial=0.0)
 
 
-def draw(maps, judged, path):
+def draw(maps, results, path):
     """A row per plane, a column per method: log10 of the true error."""
     figure, axes = plt.subplots(len(maps), len(METHODS), figsize=(13, 2.15 * len(maps) + 0.8), layout="constrained")
     norm = BoundaryNorm(np.arange(-17, -3), 256, extend="both")
@@ -545,7 +545,7 @@ def draw(maps, judged, path):
         ax.set_title(method, fontsize=11)
     for line, (name, plane) in zip(axes, maps.items(), strict=True):
         for i, (ax, method) in enumerate(zip(line, METHODS, strict=True)):
-            shown = panel(ax, judged[name][method], norm)
+            shown = panel(ax, results[name][method], norm)
             ax.set_xticks(list(plane.x.ticks), list(plane.x.ticks.values()), fontsize=6.5)
             ax.set_yticks(list(plane.y.ticks), [] if i else list(plane.y.ticks.values()), fontsize=6.5)
             ax.set(xlim=(-0.5, plane.x.size - 0.5), ylim=(-0.5, plane.y.size - 0.5))

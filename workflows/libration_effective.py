@@ -13,7 +13,7 @@ from survey.kernels.libration.lie_plan import plan
 from survey.measures.libration import effective_stability
 from survey.measures.libration.normal_form import MU_R
 from survey.methods import lie
-from survey.show.figures import COLOURS
+from survey.show.palette import COLOURS
 
 ORDERS = (6, 8, 10, 12)
 PERIODS = (1e3, 1e6, 1e9)  # of the primaries

@@ -3,7 +3,7 @@
     python workflows/libration_elliptic_boundaries.py [-o results]
 
 On A and B a pair of multipliers meets at -1, on KC two pairs meet on the circle. A and KC are tangent at the tip, where
-all four multipliers are -1: it is sought as the zero of A and t together (`survey/scenes/libration_elliptic.md`, 5).
+all four multipliers are -1: it is found as the common zero of A and t (`survey/scenes/libration_elliptic.md`, 5).
 """
 
 import csv
@@ -21,9 +21,9 @@ from survey.measures.libration import danby
 ROWS = np.round(np.concatenate([np.arange(0, 0.9, 0.01), np.arange(0.9, 0.991, 0.005)]), 3)
 STRIP = np.round(np.concatenate([np.arange(0.296, 0.3141, 0.002), [0.3142, 0.3144, 0.3145]]), 4)
 SHOWN = (0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.31, 0.314, 0.3145, 0.35, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
-LEAST, MOST, SEEN = 1e-9, 0.055, 1000
-WHOLE, NEAR = ((0.0, 0.055), (0.0, 0.98)), ((-2e-5, 5e-5), (0.296, 0.3156))  # mu, or mu less that of A; e
-WORDS = {"A": "a pair meets at -1 (factor A)", "B": "a pair meets at -1 (factor B)", "KC": "two pairs meet (K)"}
+MU_LEAST, MU_MOST, SAMPLES = 1e-9, 0.055, 1000
+FULL, NEAR = ((0.0, 0.055), (0.0, 0.98)), ((-2e-5, 5e-5), (0.296, 0.3156))  # mu, or mu less that of A; e
+LABELS = {"A": "a pair meets at -1 (factor A)", "B": "a pair meets at -1 (factor B)", "KC": "two pairs meet (K)"}
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ def functions(e, mu):
 
 
 def tip():
-    """(mu, e) of the tip and their error bounds: Newton's method for A = t = 0, its last step with the bars."""
+    """(mu, e) of the tip and their error bounds: Newton's method for A = t = 0; the error includes its last step."""
     x = np.array([0.047, 0.3145])
     for _ in range(8):
         value, bar = (np.array(part) for part in both(*x))
@@ -65,11 +65,11 @@ def both(mu, e):
 
 
 def trace(curve, e):
-    """The curve's Points at the eccentricities e: its first zero in mu, closed in by certain signs."""
-    mu = np.geomspace(LEAST, MOST, SEEN)
+    """The curve's Points at the eccentricities e: its first zero in mu, enclosed by certain signs."""
+    mu = np.geomspace(MU_LEAST, MU_MOST, SAMPLES)
     found, rows = [], []
     for i, at in enumerate(e):
-        f = functions(np.full(SEEN, at), mu)[curve][0]
+        f = functions(np.full(SAMPLES, at), mu)[curve][0]
         change = np.flatnonzero(np.sign(f[1:]) != np.sign(f[:-1]))
         if not change.size:
             raise SystemExit(f"libration_elliptic_boundaries: no zero of {curve} at e = {at}")
@@ -78,12 +78,12 @@ def trace(curve, e):
         rows.append(i)
     rows = np.array(rows)
 
-    def look(who, x):
+    def evaluate(who, x):
         points = np.repeat(e[rows[who]], x.shape[1])
         return (part.reshape(x.shape) for part in functions(points, x.reshape(-1))[curve])
 
     found = np.array(found)
-    x, width, sure = close_in(look, found, 1e-6 * found, 2 * np.spacing(found))
+    x, width, sure = close_in(evaluate, found, 1e-6 * found, 2 * np.spacing(found))
     if not sure.all():
         raise SystemExit(f"libration_elliptic_boundaries: {curve} is not certain at e = {e[~sure]}")
     return [Point(curve, *row) for row in zip(e, x, width, strict=True)]
@@ -115,9 +115,9 @@ function that vanishes on the curve has opposite, certain signs at mu - error an
 def row(e, points):
     """A line of the page: the curves at one e."""
     here = {point.curve: point for point in points if point.e == e}
-    words = [f"{here[name].mu:.15f}" if name in here else "" for name in ("B", "A", "KC")]
+    values = [f"{here[name].mu:.15f}" if name in here else "" for name in ("B", "A", "KC")]
     width = f"{here['KC'].mu - here['A'].mu:.15f}" if "A" in here else ""
-    return f"| {e:g} | {' | '.join(words)} | {width} | {upward(max(point.error for point in here.values()))} |"
+    return f"| {e:g} | {' | '.join(values)} | {width} | {upward(max(point.error for point in here.values()))} |"
 
 
 def upward(error):
@@ -131,25 +131,25 @@ def draw(points, end, path):
     import matplotlib.pyplot as plt
     from matplotlib.colors import ListedColormap
 
-    from survey.show.figures import COLOURS, UNDECIDED
+    from survey.show.palette import COLOURS, UNDECIDED
 
     figure, panels = plt.subplots(1, 2, figsize=(9.6, 4.6), layout="constrained")
     near = np.linspace(*NEAR[1], 99)
-    line = np.array([point.mu for point in trace("A", near)])  # beyond the tip it bounds nothing
+    line = np.array([point.mu for point in trace("A", near)])  # beyond the tip it is not a boundary
 
     def map_of(axes, window, base):
         e, x = np.linspace(*window[1], 400), np.linspace(*window[0], 600)
-        mu = xr.DataArray(base(e)[:, None] + x, dims=("row", "place"))
+        mu = xr.DataArray(base(e)[:, None] + x, dims=("row", "column"))
         ds = survey.evaluate("libration_elliptic", mu=mu, e=xr.DataArray(e, dims="row"), variables=["verdict"])
         shown = {"cmap": ListedColormap([UNDECIDED, *COLOURS[:2]]), "vmin": -1.5, "vmax": 1.5, "rasterized": True}
-        axes.pcolormesh(x, e, ds.verdict.transpose("row", "place"), **shown)
+        axes.pcolormesh(x, e, ds.verdict.transpose("row", "column"), **shown)
         for name, style in (("B", "-"), ("A", "--"), ("KC", ":")):
-            own = np.array([(point.mu, point.e) for point in points if point.curve == name and point.e >= e[0]])
-            axes.plot(own[:, 0] - base(own[:, 1]), own[:, 1], style, color="black", lw=1.0, label=WORDS[name])
+            curve = np.array([(point.mu, point.e) for point in points if point.curve == name and point.e >= e[0]])
+            axes.plot(curve[:, 0] - base(curve[:, 1]), curve[:, 1], style, color="black", lw=1.0, label=LABELS[name])
         axes.plot(end[0] - base(end[1]), end[1], "o", color="black", ms=4, label="tip: all four multipliers at -1")
         axes.set(xlim=window[0], ylim=window[1], ylabel="eccentricity e")
 
-    map_of(panels[0], WHOLE, lambda e: 0.0 * e)
+    map_of(panels[0], FULL, lambda e: 0.0 * e)
     map_of(panels[1], NEAR, lambda e: np.interp(e, near, line))
     panels[0].set(xlabel=r"mass ratio $\mu$", title="stable (blue) and unstable (orange)")
     panels[1].set(xlabel=r"$\mu - \mu_A(e)$", title="the strip between A and KC")

@@ -18,7 +18,7 @@ from scipy.special import ellipe, ellipj, ellipk
 from script import parser, say
 
 import survey
-from survey.show.figures import COLOURS
+from survey.show.palette import COLOURS
 
 BODIES = ("prolate", "oblate")
 LEAST_RHO = 3**-0.5  # the thin rod and the flat disc; every other body has a larger |rho|
@@ -142,7 +142,7 @@ def turn(angle, axis):
 
 
 def printed_lagrangian(s, corrected):
-    """L in Euler's angles: as printed (T read as I, theta^2 as theta'^2), or with its brackets put right."""
+    """L in Euler's angles: as printed (T read as I, theta^2 as theta'^2), or with its brackets corrected."""
     theta, dtheta, dphi = euler(s, 1)
     total = s["dx"] + s["w0"]
     flat, spun = dtheta**2 + (total * np.sin(theta)) ** 2, 2 * dphi * total * np.cos(theta) + dphi**2
@@ -259,7 +259,7 @@ def librations(body, size=300):
     """The map of librations, with what the printed and the corrected criterion say of each point."""
     k, rho = (np.arange(size) + 0.5) / size, np.linspace(LEAST_RHO, 3, size)
     ds = survey.evaluate("satellite", k=k, rho=rho, body=body, variables=["verdict", "lyapunov"])
-    return judged(ds, body)
+    return classified(ds, body)
 
 
 def rotations(body, size=300):
@@ -267,10 +267,10 @@ def rotations(body, size=300):
     inverse = xr.DataArray((np.arange(size) + 0.5) / size, dims="inverse")
     ratio = xr.DataArray(np.linspace(-2.2, 0.4, size), dims="r")
     ds = survey.evaluate("satellite", k=1 / inverse, rho=ratio / inverse, body=body, variables=["verdict", "lyapunov"])
-    return judged(ds.assign_coords(inverse=inverse, r=ratio), body)
+    return classified(ds.assign_coords(inverse=inverse, r=ratio), body)
 
 
-def judged(ds, body):
+def classified(ds, body):
     """Add T int z, the least z, and the points that the printed criterion, and the corrected one, call stable."""
     k, rho = xr.broadcast(ds.k, ds.rho)
     total, least, length, literal = (

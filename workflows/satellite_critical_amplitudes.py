@@ -2,8 +2,9 @@
 
     python workflows/satellite_critical_amplitudes.py [-o results]
 
-Both have rho = 1/sqrt(3), the least of any body. The edges are sought along x = -ln |1 - k|, in which they lie evenly
-and lose no digit: librations from rest to 2e-11 rad short of 90 degrees, rotations from k = 1000 to as near k = 1.
+Both have rho = 1/sqrt(3), the least of any body. The edges are searched along x = -ln |1 - k|, where they are evenly
+spaced and lose no digits: librations from rest to 2e-11 rad short of 90 degrees, rotations from k = 1000 to as near
+k = 1.
 """
 
 import csv
@@ -22,7 +23,7 @@ NEAREST = 50.0  # 1 - k = 2e-22; beyond, 12 digits of it are no longer certain
 FASTEST = -np.log(999.0)
 SHORTEST = 1e-6  # rad short of 90 degrees, on the page; the CSV file has all
 RHO_ROUNDING = 3e-16  # of 1 / sqrt(3 |1 - alpha|), relative
-MOVED = 1e-6  # of alpha, to see how the edges move with rho
+MOVED = 1e-6  # of alpha, to measure how the edges move with rho
 CLASSES = list(hill_edges.CLASSES)
 
 
@@ -200,8 +201,8 @@ def growth_line(case, first, last):
     x, value = largest(case, first.x, last.x)
     short = np.exp(-x)
     left = rest(short)
-    place = f"{90 - np.degrees(left):.5f} | {left:.5e}" if case.side > 0 else f"{1 + short:.7f} | {short:.5e}"
-    return f"| {first.index} | {value:.10f} | {place} |"
+    position = f"{90 - np.degrees(left):.5f} | {left:.5e}" if case.side > 0 else f"{1 + short:.7f} | {short:.5e}"
+    return f"| {first.index} | {value:.10f} | {position} |"
 
 
 def upward(error):
@@ -233,9 +234,9 @@ def deviation(found):
     ends = [(case, own[-8:-4], own[-4:]) for case, own in found.items() if len(own) > 8]
     period = np.sqrt(3) * np.pi
     return max(
-        abs(late.x - early.x - period * (1 if case.side > 0 else 2))
+        abs(last.x - first.x - period * (1 if case.side > 0 else 2))
         for case, before, after in ends
-        for early, late in zip(before, after, strict=True)
+        for first, last in zip(before, after, strict=True)
     )
 
 

@@ -21,7 +21,7 @@ FLAGS = (
     "--disable-component-update --disable-sync --disable-dev-shm-usage --window-size=1300,800"
 ).split()
 POINT = 0.86, 1.36  # k and rho: in the widest tongue but two, near its edge
-# true once the page is drawn and nothing is under way
+# true once the page is drawn and nothing is in progress
 IDLE = """
 const models = [...(window.Bokeh?.documents[0]?._all_models.values() ?? [])]
 const image = models.find(model => model.type == "ImageRGBA")
@@ -39,9 +39,9 @@ return [area.left + box.left, area.top + box.top, box.width, box.height,
 
 
 @contextlib.contextmanager
-def served(path, *words):
+def served(path, *options):
     """The address at which the file is served by `survey view`, and the process."""
-    command = [sys.executable, "-m", "survey", "view", str(path), "--no-browser", "--port", "0", *words]
+    command = [sys.executable, "-m", "survey", "view", str(path), "--no-browser", "--port", "0", *options]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     try:
         line = process.stderr.readline()
@@ -55,7 +55,7 @@ def served(path, *words):
 
 
 def missing():
-    """What is missing for a browser, in words; empty if nothing is."""
+    """What is missing for a browser, as text; empty if nothing is."""
     try:
         import selenium  # noqa: F401
     except ImportError:
@@ -66,7 +66,7 @@ def missing():
 
 @contextlib.contextmanager
 def browser():
-    """Headless Chromium, with a profile of its own."""
+    """Headless Chromium with its own profile."""
     from selenium import webdriver
 
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
@@ -96,18 +96,18 @@ def act(driver, x, y, click=False):
     from selenium.webdriver.common.actions.action_builder import ActionBuilder
 
     left, top, width, height, x0, x1, y0, y1 = driver.execute_script(PLOT)
-    place = left + width * (x - x0) / (x1 - x0), top + height * (y1 - y) / (y1 - y0)
+    position = left + width * (x - x0) / (x1 - x0), top + height * (y1 - y) / (y1 - y0)
     moves = ActionBuilder(driver)
-    moves.pointer_action.move_to_location(*map(round, place))
+    moves.pointer_action.move_to_location(*map(round, position))
     moves.perform()
     if click:
         ActionChains(driver).click().perform()
 
 
 def main():
-    words = parser(__doc__, "viewer.png")
-    words.add_argument("path", metavar="OUT.nc", help="the survey that is shown")
-    given = words.parse_args()
+    options = parser(__doc__, "viewer.png")
+    options.add_argument("path", metavar="OUT.nc", help="the survey to show")
+    given = options.parse_args()
     if missing():
         raise SystemExit(f"missing: {missing()}")
     with served(given.path) as (address, _), browser() as driver:

@@ -1,1 +1,1 @@
-"""What `ds.survey` does (see `survey/accessor.py`): one question asked of a finished survey per file."""
+"""What `ds.survey` does (see `survey/accessor.py`): one question to a finished survey per file."""

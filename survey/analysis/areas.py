@@ -1,4 +1,4 @@
-"""How much of a map each verdict takes: from its cells where [refine] made them, else from its points."""
+"""The area of each verdict in a map: from the cells of [refine] if there are any, else from its points."""
 
 from itertools import product
 
@@ -9,22 +9,22 @@ from survey import status
 from survey.errors import BadInput
 from survey.file import schema
 from survey.file.labels import flag_codes, percent, undecided_share
-from survey.request import user_scene as own
+from survey.request import user_scene
 
 NO_ANSWER = -2
 SLAB = 2**20  # points read at once
-COMMENT = ("the area between neighbouring points of one verdict is counted as of that verdict; the bar holds all area "
-           "between neighbours that differ; what lies between points of one verdict is not seen")  # fmt: skip
+COMMENT = ("the area between neighbouring points of one verdict is counted for that verdict; the error bar covers all "
+           "area between neighbours that differ; what lies between points of one verdict is not seen")  # fmt: skip
 
 
 def of_map(ds):
-    """Area and share of each verdict with their bars along the dimension `area_verdict` (see `ds.survey.areas`)."""
+    """Area and fraction of each verdict, with error bars, along `area_verdict` (see `ds.survey.areas`)."""
     if "area" in ds:
         return _of_cells(ds)
     if "verdict" not in ds:
         raise BadInput("this survey has no verdict, so there are no areas of it")
     if not ds.status.dims or min(ds.status.shape) < 2:
-        raise BadInput("areas: every axis needs two values or more; slice the others away")
+        raise BadInput("areas: every axis needs two values or more; remove the others with slice")
     codes = flag_codes(ds.verdict.attrs)
     codes["no_answer"] = NO_ANSWER
     area, least, most = _counted(ds, list(codes.values()))
@@ -33,49 +33,50 @@ def of_map(ds):
     bar = np.where(most > 0, np.maximum(most - area, area - least) + 1e-13 * total, 0.0)
     units = " ".join(u for u in (ds[dim].attrs.get("units", "1") for dim in ds.status.dims) if u != "1") or "1"
     found = _described([list(codes)[i] for i in kept], area[kept], bar[kept], total, units, COMMENT)
-    found.attrs["areas"] += "; from points: what is narrower than their spacing is not seen"
+    found.attrs["areas"] += "; from points: features narrower than their spacing are not seen"
     if len(ds.status.dims) == 2 and _is_hill(ds):
         found.attrs["areas"] += " ([refine] bounds it)"
     return found
 
 
 def _is_hill(ds):
-    """Is the scene of the family that [refine] serves? A user's own is; it need not run to be known as one."""
+    """Does the scene's family support [refine]? That of a user's own scene does, which is known without running it."""
     try:
-        return "scene_hash" in ds.attrs or getattr(own.find(own.of_dataset(ds))[1], "FAMILY", "") == "hill"
+        return (
+            "scene_hash" in ds.attrs or getattr(user_scene.find(user_scene.of_dataset(ds))[1], "FAMILY", "") == "hill"
+        )
     except BadInput:
         return False
 
 
 def _of_cells(ds):
-    """The areas of decided cells; what is left is undecided, all or none of it an area of either verdict."""
+    """The areas of decided cells; the rest is undecided and may belong to either verdict."""
     schema.areas(ds)
     names = list(flag_codes(ds.area_verdict.attrs))
     share = ds.area_fraction.values
     total = float(ds.area.values[share.argmax()] / share.max())
     bar = ds.area_error.values.astype(float)
     values, bars = [*ds.area.values, total * undecided_share(ds)], [*bar, 1e-13 * total]
-    words = "from cells that are decided as wholes; the area of the undecided cells is the others' error bar"
-    return _described([*names, "undecided"], np.array(values), np.array(bars), total, ds.area.attrs["units"], words)
+    comment = "from cells that are decided as a whole; the area of the undecided cells is the others' error bar"
+    return _described([*names, "undecided"], np.array(values), np.array(bars), total, ds.area.attrs["units"], comment)
 
 
 def _counted(ds, codes):
-    """Area (each cell between neighbours shared out by its corners), least and most area of each verdict code."""
+    """Area of each verdict code (each cell between neighbours is divided among its corners), and its least and most."""
     dims = ds.status.dims
     widths = [abs(np.diff(ds[dim].values.astype(float))) for dim in dims]
     rest = int(np.prod(ds.status.shape[1:]))
     step = max(1, SLAB // rest)
     area, least, most = np.zeros((3, len(codes)))
     for first in range(0, len(widths[0]), step):
-        some = {dims[0]: slice(first, first + step + 1)}
-        verdict = ds.verdict.transpose(*dims).isel(some).values
-        state = ds.status.isel(some).values
+        slab = {dims[0]: slice(first, first + step + 1)}
+        verdict = ds.verdict.transpose(*dims).isel(slab).values
+        state = ds.status.isel(slab).values
         verdict = np.where(
             np.isin(state, list(status.UNANSWERED)) | ((state != status.OK) & (verdict < 0)), NO_ANSWER, verdict
         )
-        own = [widths[0][first : first + step], *widths[1:]]
         cell = np.ones(())
-        for width in own:
+        for width in [widths[0][first : first + step], *widths[1:]]:
             cell = cell[..., None] * width
         corners = [verdict[cut] for cut in product(*[(slice(None, -1), slice(1, None))] * len(dims))]
         for i, code in enumerate(codes):
@@ -87,12 +88,12 @@ def _counted(ds, codes):
 
 
 def _described(names, area, bar, total, units, comment):
-    told = ", ".join(f"{n}: {percent(a / total, b / total)}" for n, a, b in zip(names, area, bar, strict=True))
+    line = ", ".join(f"{n}: {percent(a / total, b / total)}" for n, a, b in zip(names, area, bar, strict=True))
     found = {}
-    for name, scale, unit, words in (
+    for name, scale, unit, long_name in (
         ("area", 1.0, units, "area of the map with this verdict"),
-        ("area_fraction", total, "1", "share of the map's area with this verdict"),
+        ("area_fraction", total, "1", "fraction of the map's area with this verdict"),
     ):
-        found[name] = ("area_verdict", area / scale, {"long_name": words, "units": unit})
+        found[name] = ("area_verdict", area / scale, {"long_name": long_name, "units": unit})
         found[f"{name}_error"] = ("area_verdict", bar / scale, {"long_name": f"error bound of {name}", "units": unit})
-    return xr.Dataset(found, {"area_verdict": names}, {"comment": comment, "areas": told})
+    return xr.Dataset(found, {"area_verdict": names}, {"comment": comment, "areas": line})

@@ -1,7 +1,7 @@
 """The spot audit of `survey verify`: random points solved again by the scene's independent methods (its AUDIT).
 
-What no method does differently is evaluated again by the one formula there is: K, L and the equilibria of a gyrostat's
-portrait, the turning points of nutations, the frequencies and resonances at L4, exact rules of marginal points.
+What is the same for all methods is evaluated again by the same formula: K, L and the equilibria of a gyrostat's
+portrait, the turning points of nutations, the frequencies and resonances at L4, exact rules for marginal points.
 """
 
 from functools import partial
@@ -10,46 +10,47 @@ import numpy as np
 import xarray as xr
 
 from survey import status
-from survey.analysis.point import asked
+from survey.analysis.point import options_at
 from survey.api import evaluate
 from survey.errors import Damaged
 from survey.file import schema
 from survey.file.labels import outputs_of
 from survey.measures.hill.edges import FACTORS
 from survey.request import user_scene
-from survey.request import workflow as workflows
+from survey.request.checks import methods_of
 from survey.scene import Request, exists
 
 
 def audit(ds, points, seed=0):
     """Solve random points of `ds` again by other methods at higher accuracy; floats, codes and counts must agree.
 
-    So must edges and cells, each at random places. Returns {"points" that some method answered, "silent": those that
-    none did, "edges", "cells": how many there were, "method", "complaints"}.
+    So must random edges, and cells at random positions. Returns {"points": number that some method answered, "silent":
+    number that none did, "edges", "cells": numbers checked, "method", "complaints"}.
     """
     report = {"points": 0, "silent": 0, "edges": 0, "cells": 0, "method": "", "complaints": []}
     if not points:
         return report
     name = user_scene.of_dataset(ds)
     _, module = user_scene.find(name)
-    options = asked(ds, module)
-    others = [m for m in workflows.methods_of(module, options) if m != ds.attrs["method"]]
+    options = options_at(ds, module)
+    others = [m for m in methods_of(module, options) if m != ds.attrs["method"]]
     used = [m for m in module.AUDIT if m in others] or others[:1]
     report["method"] = " and ".join(used)
     random = np.random.default_rng(seed)
     flat, given = _chosen(ds, module, points, random)
     arrays = {key: xr.DataArray(values, dims="_point") for key, values in given.items()}
     outputs = outputs_of(module, Request(options, variables=frozenset(flat.data_vars)))
-    outputs, report["complaints"] = _alike_stored(flat, outputs, module)
+    outputs, report["complaints"] = _stored_as_declared(flat, outputs, module)
     answered = np.zeros(flat.status.size, bool)
     decided = any(o.name == "verdict" and exists(o, options) for o in module.OUTPUTS)
     rtol, wanted = max(ds.attrs["rtol"] / 100, 1e-13), [o.name for o in outputs]
     for method in used:
-        again = evaluate(name, method=method, rtol=rtol, variables=wanted, **options, **arrays).transpose("_point", ...)
-        answered |= (again.status == status.OK).values | (again.status == flat.status).values
-        for output, wrong, told in _differences(flat, again, outputs, decided):
+        solved = evaluate(name, method=method, rtol=rtol, variables=wanted, **options, **arrays)
+        solved = solved.transpose("_point", ...)
+        answered |= (solved.status == status.OK).values | (solved.status == flat.status).values
+        for output, wrong, describe in _differences(flat, solved, outputs, decided):
             for i in np.flatnonzero(wrong.reshape(len(wrong), -1).any(axis=1)):
-                report["complaints"].append(f"{output} at {_place(given, i)}: {told(i)}, by {method}")
+                report["complaints"].append(f"{output} at {_position(given, i)}: {describe(i)}, by {method}")
     for what, check in (("edge", _edges), ("cell", _cells)):
         if ds.sizes.get(what) and used:
             chosen = np.sort(random.choice(ds.sizes[what], min(points, ds.sizes[what]), replace=False))
@@ -59,8 +60,8 @@ def audit(ds, points, seed=0):
     return report | {"points": int(answered.sum()), "silent": int((~answered).sum())}
 
 
-def _alike_stored(flat, outputs, module):
-    """(outputs that the points hold as the scene gives them, complaints of the others)."""
+def _stored_as_declared(flat, outputs, module):
+    """(outputs that are stored as the scene declares them, complaints about the others)."""
     sizes = {o.name: tuple(len(module.DIMENSIONS[dim]) for dim in o.dims) for o in outputs}
     good = [
         o
@@ -70,48 +71,48 @@ def _alike_stored(flat, outputs, module):
         and flat[o.name].shape[1:] == sizes[o.name]
         and (o.dtype.kind != "f" or f"{o.name}_error" in flat)
     ]
-    return good, [f"{o.name}: it is not stored as this output of {flat.attrs['scene']} is" for o in outputs
+    return good, [f"{o.name}: it is not stored as the scene {flat.attrs['scene']} declares it" for o in outputs
                   if o not in good]  # fmt: skip
 
 
-def _place(given, i):
+def _position(given, i):
     return ", ".join(f"{key} = {values[i].item()!r}" for key, values in given.items())
 
 
-def _solve(name, method, options, rtol, ds, module, variables, places):
-    """The variables at places {axis: values (n)}, other parameters as in `ds`; arrays (n)."""
+def _solve(name, method, options, rtol, ds, module, variables, positions):
+    """The variables at positions {axis: values (n)}, other parameters as in `ds`; arrays (n)."""
     fixed = {p.name: float(ds[p.name]) for p in module.PARAMETERS if p.name in ds.coords and not ds[p.name].dims}
-    arrays = {key: xr.DataArray(values, dims="_point") for key, values in places.items()}
+    arrays = {key: xr.DataArray(values, dims="_point") for key, values in positions.items()}
     return evaluate(name, method=method, rtol=rtol, variables=variables, **options, **(fixed | arrays))
 
 
 def _edges(ds, chosen, solve, _):
-    """Edges at which the factor of their class has one certain sign on both sides."""
+    """Complaints about edges where the factor of their class certainly has the same sign on both sides."""
     schema.edges(ds)
     if not np.isin(ds.edge_class.values, range(len(FACTORS))).all():
-        raise Damaged("edge_class holds codes of no factor at T/2")
+        raise Damaged("edge_class contains codes that belong to no factor at T/2")
     axis, count = ds.attrs["boundaries"], np.atleast_1d(ds.edge_count.values)
-    place = {dim: ds[dim].values[np.repeat(np.arange(count.size), count)[chosen]] for dim in ds.edge_count.dims}
+    point = {dim: ds[dim].values[np.repeat(np.arange(count.size), count)[chosen]] for dim in ds.edge_count.dims}
     x, width = ds.edge_position.values[chosen], ds.edge_position_error.values[chosen]
     of = np.array(FACTORS)[ds.edge_class.values[chosen]]
     signs = []
     for side in (x - width, x + width):
-        out = solve(list(FACTORS), place | {axis: side})
+        out = solve(list(FACTORS), point | {axis: side})
         values, bars = (np.array([float(out[f"{f}{end}"][i]) for i, f in enumerate(of)]) for end in ("", "_error"))
         signs.append(np.where(abs(values) > bars, np.sign(values), 0.0))
     for i in np.flatnonzero(signs[0] * signs[1] > 0):
-        yield f"edge_position at {_place(place | {axis: x}, i)}: {of[i]} has no zero within its error bar"
+        yield f"edge_position at {_position(point | {axis: x}, i)}: {of[i]} has no zero within its error bar"
 
 
 def _cells(ds, chosen, solve, random):
-    """Decided cells with a place that has another verdict."""
+    """Complaints about decided cells that contain a point of the other verdict."""
     schema.cells(ds)
     names, part = ds.attrs["refine"].split(", "), random.uniform(0.0, 1.0, (2, chosen.size))
     ends = [[ds[f"cell_{name}_{end}"].values[chosen] for end in ("low", "high")] for name in names]
-    place = {name: low + (high - low) * p for name, (low, high), p in zip(names, ends, part, strict=True)}
-    verdict, other = ds.cell_verdict.values[chosen], solve(["verdict"], place).verdict.values
+    point = {name: low + (high - low) * p for name, (low, high), p in zip(names, ends, part, strict=True)}
+    verdict, other = ds.cell_verdict.values[chosen], solve(["verdict"], point).verdict.values
     for i in np.flatnonzero((verdict != -1) & np.isin(other, (0, 1)) & (verdict != other)):
-        yield f"cell_verdict at {_place(place, i)}: {verdict[i]}, not {other[i]}"
+        yield f"cell_verdict at {_position(point, i)}: {verdict[i]}, not {other[i]}"
 
 
 def _chosen(ds, module, points, random):
@@ -119,42 +120,42 @@ def _chosen(ds, module, points, random):
     ds = ds if ds.status.dims else ds.expand_dims("_one")
     size = min(points, ds.status.size)
     chosen = np.sort(random.choice(ds.status.size, size, replace=False, shuffle=False))
-    places = np.unravel_index(chosen, ds.status.shape)
+    indices = np.unravel_index(chosen, ds.status.shape)
     ds = ds[[name for name in ds.data_vars if set(ds.status.dims) <= set(ds[name].dims)]]
-    flat = ds.isel({dim: ("_point", place) for dim, place in zip(ds.status.dims, places, strict=True)}).load()
+    flat = ds.isel({dim: ("_point", index) for dim, index in zip(ds.status.dims, indices, strict=True)}).load()
     names = [p.name for p in module.PARAMETERS if p.name in ds.coords]
     given = {key: np.broadcast_to(flat[key].values, size).copy() for key in names}
     return flat.transpose("_point", ...), given
 
 
-def _differences(flat, again, outputs, decided):
-    """(output, where it is wrong: (points, ...), words for point i) for everything that both answers hold.
+def _differences(flat, solved, outputs, decided):
+    """Yield (output, where it is wrong: (points, ...), description of point i) for everything in both answers.
 
-    `decided`: the scene gives verdicts. Counts, and what applies, must agree where both give the same one.
+    `decided`: the scene gives verdicts. Counts, and what applies, must agree where both give the same verdict.
     """
-    invalid = (flat.status == status.INVALID_PARAMETERS).values != (again.status == status.INVALID_PARAMETERS).values
-    yield "status", invalid, lambda i: "one answer says that the parameters are invalid, the other does not"
-    both = (flat.status == again.status).values
-    alike = both & (_alike(flat, again) if "verdict" in flat else not decided)
+    invalid = (flat.status == status.INVALID_PARAMETERS).values != (solved.status == status.INVALID_PARAMETERS).values
+    yield "status", invalid, lambda i: "the parameters are invalid in one answer only"
+    both = (flat.status == solved.status).values
+    same = both & (_same_verdict(flat, solved) if "verdict" in flat else not decided)
     for o in outputs:
-        one, other = flat[o.name].values, again[o.name].values
+        one, other = flat[o.name].values, solved[o.name].values
         wide = (slice(None),) + (None,) * (one.ndim - 1)
         if o.dtype.kind == "f":
-            bar = flat[f"{o.name}_error"].values.astype(float) + again[f"{o.name}_error"].values
+            bar = flat[f"{o.name}_error"].values.astype(float) + solved[f"{o.name}_error"].values
             off = abs(one - other)
             yield (
                 o.name,
                 off > bar,
                 lambda i, off=off, bar=bar: f"off by {np.nanmax(off[i]):.3g}, error bars {np.nanmax(bar[i]):.3g}",
             )
-            yield o.name, (np.isnan(one) != np.isnan(other)) & alike[wide], lambda i: "given by one answer alone"
+            yield o.name, (np.isnan(one) != np.isnan(other)) & same[wide], lambda i: "only one answer gives a value"
             continue
         unknown = o.flags.get("undecided") if o.flags is not None else o.fill
-        sure = both if o.name == "verdict" else alike
+        sure = both if o.name == "verdict" else same
         wrong = (one != other) & (one != unknown) & (other != unknown) & sure[wide]
         yield o.name, wrong, lambda i, one=one, other=other: f"{one[i]}, not {other[i]}"
 
 
-def _alike(flat, again):
+def _same_verdict(flat, solved):
     """Where both verdicts are the same, and decided if the status is ok."""
-    return ((flat.verdict == again.verdict) & ((flat.verdict != -1) | (flat.status != status.OK))).values
+    return ((flat.verdict == solved.verdict) & ((flat.verdict != -1) | (flat.status != status.OK))).values

@@ -1,4 +1,4 @@
-"""Where the verdict changes: edges, curves or cells that the file holds, or what the map's points say, as one table."""
+"""Where the verdict changes: edges, curves or cells in the file, or else neighbouring points, as one table."""
 
 import numpy as np
 import xarray as xr
@@ -10,7 +10,7 @@ from survey.file.labels import flag_codes
 
 
 def find(ds, kind=None, index=None):
-    """Places on the boundary along the dimension `place` (see `ds.survey.boundary`)."""
+    """Positions on the boundary along the dimension `place` (see `ds.survey.boundary`)."""
     if "curve_count" in ds:
         found = _curves(ds)
     elif "edge_count" in ds:
@@ -19,9 +19,9 @@ def find(ds, kind=None, index=None):
         found = _undecided_cells(ds)
     else:
         found = _between_points(ds)
-    for name, asked in (("kind", kind), ("index", index)):
-        if asked is not None and name not in found:
-            raise BadInput(f"{name}: the file holds no boundary that has one; run the workflow with [boundaries]")
+    for name, value in (("kind", kind), ("index", index)):
+        if value is not None and name not in found:
+            raise BadInput(f"{name}: no boundary in the file has one; run the workflow with [boundaries]")
     if kind is not None:
         classes = flag_codes(found.kind.attrs)
         if kind not in classes:
@@ -41,7 +41,7 @@ def _curves(ds):
     for name, source in (("kind", "curve_class"), ("index", "curve_index")):
         if source in ds:
             found[name] = ("place", ds[source].values[which], ds[source].attrs)
-    return _table(ds, found, "curves as the file holds them")
+    return _table(ds, found, "curves from the file")
 
 
 def _edges(ds):
@@ -55,25 +55,27 @@ def _edges(ds):
     found["position_error"] = ("place", ds.edge_position_error.values, ds.edge_position_error.attrs)
     for name, source in (("kind", ds.edge_class), ("index", ds.edge_index)):
         found[name] = ("place", source.values, source.attrs)
-    return _table(ds, found, f"edges of tongues along {axis}, as the file holds them")
+    return _table(ds, found, f"edges of tongues along {axis}, from the file")
 
 
 def _undecided_cells(ds):
-    """The middles of the cells that [refine] left undecided: every boundary lies in one of them."""
+    """The centres of the cells that [refine] left undecided: every boundary lies in one of them."""
     schema.cells(ds)
     left, found = np.flatnonzero(ds.cell_verdict.values == flag_codes(ds.cell_verdict.attrs)["undecided"]), {}
     for dim in ds.attrs["refine"].split(", "):
         low, high = (ds[f"cell_{dim}_{end}"].values[left] for end in ("low", "high"))
-        words = {"long_name": f"error bound of {dim}: half the width of the cell"}
+        label = {"long_name": f"error bound of {dim}: half the width of the cell"}
         found[dim] = ("place", 0.5 * (low + high), ds[dim].attrs)
-        found[f"{dim}_error"] = ("place", 0.5 * (high - low), ds[dim].attrs | words)
-    return _table(ds, found, "middles of the undecided cells, in which every boundary lies; not each of them holds one")
+        found[f"{dim}_error"] = ("place", 0.5 * (high - low), ds[dim].attrs | label)
+    return _table(
+        ds, found, "centres of the undecided cells, in which every boundary lies; not all of them contain one"
+    )
 
 
 def _between_points(ds):
     """Midpoints between neighbours of different verdict; the boundary between two lies within half their distance."""
     if "verdict" not in ds:
-        raise BadInput("this survey has no verdict, so it has no boundary; slice or map one of its outputs")
+        raise BadInput("this survey has no verdict, so it has no boundary; draw one of its outputs with map")
     verdict = ds.verdict.values
     axes = ds.verdict.dims
     parts = [_along(ds, verdict, i) for i in range(len(axes)) if verdict.shape[i] > 1]
@@ -83,14 +85,14 @@ def _between_points(ds):
     found = {}
     for name, values in joined.items():
         dim = name.removesuffix("_error")
-        meaning = ds[dim].attrs if dim in axes else ds.verdict.attrs
-        words = {
-            dim: meaning.get("long_name", dim),
-            f"{dim}_error": f"error bound of {dim}: half the distance of the two neighbours",
-            "below": "verdict of the neighbour at the lower place of the axis",
-            "above": "verdict of the neighbour at the higher place of the axis",
+        attributes = ds[dim].attrs if dim in axes else ds.verdict.attrs
+        labels = {
+            dim: attributes.get("long_name", dim),
+            f"{dim}_error": f"error bound of {dim}: half the distance between the two neighbours",
+            "below": "verdict of the preceding neighbour on the axis",
+            "above": "verdict of the following neighbour on the axis",
         }
-        found[name] = ("place", values, meaning | {"long_name": words[name]})
+        found[name] = ("place", values, attributes | {"long_name": labels[name]})
     return _table(ds, found, "midpoints between neighbouring points of different verdict; what lies between points of "
                              "one verdict is not seen")  # fmt: skip
 
@@ -98,14 +100,13 @@ def _between_points(ds):
 def _along(ds, verdict, i):
     """The midpoints along one axis: {axis: value, axis_error: value, below, above}."""
     low, high = (np.moveaxis(verdict, i, 0)[cut] for cut in (slice(None, -1), slice(1, None)))
-    places = list(np.nonzero(low != high))
-    found = {"below": low[tuple(places)], "above": high[tuple(places)]}
-    first = places.pop(0)
-    places.insert(i, first)
+    indices = list(np.nonzero(low != high))
+    found = {"below": low[tuple(indices)], "above": high[tuple(indices)]}
+    indices.insert(i, indices.pop(0))
     for at, dim in enumerate(ds.verdict.dims):
         values = ds[dim].values.astype(float)
-        here = values[places[at]]
-        after = values[places[at] + 1] if at == i else here
+        here = values[indices[at]]
+        after = values[indices[at] + 1] if at == i else here
         found[dim], found[f"{dim}_error"] = 0.5 * (here + after), 0.5 * abs(after - here)
     return found
 

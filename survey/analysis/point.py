@@ -1,4 +1,4 @@
-"""One point of a survey: finding it, and everything known of it in a form that can be read."""
+"""One point of a survey: finding it, and everything known about it in readable form."""
 
 import html
 from dataclasses import dataclass
@@ -10,50 +10,51 @@ import xarray as xr
 from survey import modules, status
 from survey.errors import BadInput, Damaged, Untrusted
 from survey.file.labels import UNDECIDED, error_bars, fill_of, flag_codes, options_of
-from survey.request import user_scene, workflow
+from survey.request import user_scene
+from survey.request.checks import check_options
 from survey.wording import plain
 
-MOST = 1000  # places of an output that are told
-# What Jupyter and Sphinx leave as it is: dollars in a stranger's text are no TeX.
+MAX_ROWS = 1000  # of one output
+# Classes that Jupyter and Sphinx leave alone: dollars in untrusted text are not TeX.
 NO_FORMULAS = "tex2jax_ignore mathjax_ignore"
-# Attributes that tell of a whole file.
-WHOLE = (
+# Attributes that concern the file, not a point.
+OF_FILE = (
     "points", "accuracy_missed", "status_counts", "verdict_counts", "areas", "boundaries", "refine", "refine_points",
     "complete",
 )  # fmt: skip
 
 
 def nearest(ds, coords):
-    """The dataset at the point next to `coords` (numbers by axis; axes of one value may be left out)."""
-    point = place(ds, coords)
-    missing = [dim for dim in ds.status.dims if dim not in point and ds.sizes[dim] > 1]
+    """The dataset at the point nearest to `coords` (numbers by axis; axes of one value may be left out)."""
+    indices = nearest_indices(ds, coords)
+    missing = [dim for dim in ds.status.dims if dim not in indices and ds.sizes[dim] > 1]
     if missing:
         raise BadInput(f"{missing[0]} is missing: a point needs a number for each of {', '.join(ds.status.dims)}")
-    point |= {dim: 0 for dim in ds.status.dims if dim not in point}
-    return of_points(ds).isel(point)
+    indices |= {dim: 0 for dim in ds.status.dims if dim not in indices}
+    return of_points(ds).isel(indices)
 
 
 def of_points(ds):
     """The variables that have a value per point: no edges, no cells, no counts of the whole map."""
     names = [name for name, v in ds.data_vars.items() if set(ds.status.dims) <= set(v.dims)]
-    some = ds[names]
-    some.attrs = {key: value for key, value in ds.attrs.items() if key not in WHOLE}
-    return some
+    part = ds[names]
+    part.attrs = {key: value for key, value in ds.attrs.items() if key not in OF_FILE}
+    return part
 
 
-def place(ds, coords):
-    """{dimension: place of the nearest value} of numbers by axis; raises BadInput for one that is no axis or too far.
+def nearest_indices(ds, coords):
+    """{dimension: index of the nearest value} for numbers by axis; raises BadInput for an unknown axis or one outside.
 
-    A number may lie beyond an end by half a step, not more.
+    A number may lie beyond an end by up to half a step.
     """
     axes = [dim for dim in ds.status.dims if dim in ds.coords and ds[dim].dtype.kind in "iuf"]
-    places = {}
+    indices = {}
     for name, value in coords.items():
         if name not in axes:
             raise BadInput(modules.unknown("axis", name, axes))
         values = ds[name].values
         if not np.isfinite(values).all():
-            raise Damaged(f"the axis {name} holds what is no finite number")
+            raise Damaged(f"the axis {name} contains values that are not finite")
         if np.ndim(value) or np.asarray(value).dtype.kind not in "iuf" or not np.isfinite(value):
             raise BadInput(f"{name} = {value!r}: give one number, from {values.min():g} to {values.max():g}")
         i = int(np.abs(values - float(value)).argmin())
@@ -61,18 +62,18 @@ def place(ds, coords):
         if abs(values[i] - value) > 0.5 * step * (1 + 1e-9) and not values.min() <= value <= values.max():
             raise BadInput(f"{name} = {value:g} lies outside the map: give a number from {values.min():g} to "
                            f"{values.max():g}")  # fmt: skip
-        places[name] = i
-    return places
+        indices[name] = i
+    return indices
 
 
 def plane(ds, at):
-    """The survey where axes have the values next to `at`, and other dimensions the places of these names.
+    """The survey at the axis values nearest to `at`, and at these labels of other dimensions.
 
-    `at` holds texts. A dimension beyond the two that are drawn is kept, of one place.
+    `at` maps names to text. A dimension beyond the two that are drawn is kept, with length one.
     """
     for name, text in at.items():
         if name in ds.status.dims:
-            i, drawn = place(ds, {name: _number(name, text)})[name], name in ds.status.dims[:2]
+            i, drawn = nearest_indices(ds, {name: _number(name, text)})[name], name in ds.status.dims[:2]
             ds = of_points(ds).isel({name: i}) if drawn else ds.isel({name: [i]})
             continue
         others = [dim for dim in ds.dims if dim in ds.coords and dim not in ds.status.dims]
@@ -93,14 +94,14 @@ def _number(name, text):
 
 
 def meaning(variable):
-    """The word of a flag's code, of a single value."""
+    """The meaning of a single value of a flag variable."""
     words = {code: word for word, code in flag_codes(variable.attrs).items()}
     return words.get(int(variable), str(int(variable)))
 
 
-def asked(ds, scene):
-    """{name: value} of the options in the file, all that the scene has then; raises BadInput for others."""
-    return workflow.check_options(scene, options_of(ds), [p.name for p in scene.PARAMETERS if p.name in ds.coords])
+def options_at(ds, scene):
+    """{name: value} of all options of the scene, as in the file; raises BadInput for unknown ones."""
+    return check_options(scene, options_of(ds), [p.name for p in scene.PARAMETERS if p.name in ds.coords])
 
 
 def parameters(ds):
@@ -110,53 +111,53 @@ def parameters(ds):
 
 @dataclass(frozen=True, repr=False)
 class Point:
-    """Everything known of one point; print it, or let a notebook show it.
+    """Everything known about one point; print it, or show it in a notebook.
 
-    `dataset` holds it as it is in the file: every output, its error bar `X_error`, `status`, and `verdict`.
+    `dataset` is the point as in the file: every output, its error bar `X_error`, `status`, and `verdict`.
     """
 
     dataset: xr.Dataset
 
     @property
     def parameters(self):
-        """{name: value} of all parameters, fixed ones too."""
+        """{name: value} of all parameters, including fixed ones."""
         return parameters(self.dataset)
 
     @property
     def verdict(self):
-        """The verdict in a word; None where the scene has none."""
+        """The verdict as a word; None if the scene has none."""
         return meaning(self.dataset.verdict) if "verdict" in self.dataset else None
 
     @property
     def status(self):
-        """The status in a word."""
+        """The status as a word."""
         return meaning(self.dataset.status)
 
     @property
     def why(self):
-        """What decided the verdict, by which margin against which error bar; or why there is no answer."""
+        """What decided the verdict, by what margin and error bar; or why there is no answer."""
         ds = self.dataset
         if int(ds.status) != status.OK:
             return sentence(ds)
         if "verdict" not in ds:
             return sentence(ds)
         try:
-            judge = getattr(user_scene.find(user_scene.of_dataset(ds))[1], "why", None)
+            explain = getattr(user_scene.find(user_scene.of_dataset(ds))[1], "why", None)
         except Untrusted as untrusted:
             return str(untrusted)
         except BadInput:
-            judge = None
+            explain = None
         try:
-            return judge(values(ds)) if judge else sentence(ds)
+            return explain(values(ds)) if explain else sentence(ds)
         except KeyError as missing:
-            return f"the file does not hold {missing.args[0]}, which decides; let the survey write it"
+            return f"the file does not contain {missing.args[0]}, which decides; add it to output.variables"
         except (ArithmeticError, LookupError, TypeError, ValueError):
-            return "the file's values are not those of this scene"
+            return "the values in the file do not belong to this scene"
 
     def __repr__(self):
         rows = [tuple(map(plain, row)) for row in self._rows()]
-        wide = max((len(f"{name} = {value}") for name, value, about in rows if about), default=0)
-        lines = (f"{name} = {value}".ljust(wide) + f"  {about}" if about else f"{name}: {value}"
+        width = max((len(f"{name} = {value}") for name, value, about in rows if about), default=0)
+        lines = (f"{name} = {value}".ljust(width) + f"  {about}" if about else f"{name}: {value}"
                  for name, value, about in rows)  # fmt: skip
         return "\n".join([plain(self.dataset.attrs.get("title", self.dataset.attrs["scene"])), *lines])
 
@@ -169,16 +170,16 @@ class Point:
         return f"<div class='{NO_FORMULAS}'><table><caption>{title}</caption>{rows}</table></div>"
 
     def _rows(self):
-        """(name, value, what it is) of everything; words have nothing in the third place."""
+        """Yield (name, value, description) of everything; for text the description is empty."""
         ds = self.dataset
         if self.verdict and has_verdict(ds):
             yield "verdict", self.verdict, ""
         yield "why", self.why, ""
         if int(ds.status) == status.OK:
             yield "status", "ok", ""
-        told = [f"{key} = {value}" for key, value in options_of(ds).items()]
-        told += [f"method {ds.attrs.get('method', 'auto')}", f"rtol {ds.attrs.get('rtol', float('nan')):g}"]
-        yield "solved with", ", ".join(told), ""
+        settings = [f"{key} = {value}" for key, value in options_of(ds).items()]
+        settings += [f"method {ds.attrs.get('method', 'auto')}", f"rtol {ds.attrs.get('rtol', float('nan')):g}"]
+        yield "solved with", ", ".join(settings), ""
         for name, value in self.parameters.items():
             yield name, f"{value!r}", _about(ds[name])
         bars = error_bars(ds)
@@ -192,7 +193,7 @@ def _cell(text, columns=1):
 
 
 def values(ds):
-    """{name: value} of everything known of a point, numpy arrays; `verdict` and other flags as words."""
+    """{name: value} of everything known about a point, numpy arrays; `verdict` and other flags as words."""
     return {
         name: meaning(v) if "flag_values" in v.attrs and v.ndim == 0 else v.values
         for name, v in ds.variables.items()
@@ -201,32 +202,32 @@ def values(ds):
 
 
 def has_verdict(ds):
-    """Has the point a verdict, be it undecided? Else its status says why there is no answer."""
+    """Does the point have a verdict, possibly undecided? If not, its status says why there is no answer."""
     return int(ds.status) == status.OK or int(ds.verdict) != UNDECIDED
 
 
 def sentence(ds):
     """What the status says of the point."""
-    said = dict(part.split(": ", 1) for part in ds.status.attrs.get("comment", "").split("; ") if ": " in part)
+    sentences = dict(part.split(": ", 1) for part in ds.status.attrs.get("comment", "").split("; ") if ": " in part)
     word = meaning(ds.status)
-    return f"{word}: {said[word]}" if word in said else word
+    return f"{word}: {sentences[word]}" if word in sentences else word
 
 
 def _outputs(ds, name, variable, has_bar):
-    """The rows of an output: one, or one for each place of its own dimension that has a value."""
+    """Yield the rows of an output: one, or one for each position along its own dimensions that has a value."""
     about = _about(variable)
     if not variable.ndim:
         yield name, reading(ds, name, has_bar), about
         return
-    for place in islice(np.ndindex(variable.shape), MOST):
-        where = dict(zip(variable.dims, place, strict=True))
+    for index in islice(np.ndindex(variable.shape), MAX_ROWS):
+        where = dict(zip(variable.dims, index, strict=True))
         value = reading(ds.isel(where), name, has_bar)
         if value not in ("does not apply", "none"):
             yield f"{name}[{', '.join(str(ds[dim].values[i]) for dim, i in where.items())}]", value, about
 
 
 def reading(ds, name, has_bar):
-    """A value, to the digits that its error bar leaves it."""
+    """A value with as many digits as its error bar justifies."""
     variable = ds[name]
     if "flag_values" in variable.attrs:
         return meaning(variable)

@@ -4,26 +4,26 @@ import numpy as np
 import xarray as xr
 
 from survey import api
-from survey.analysis.point import asked, parameters, values
+from survey.analysis.point import options_at, parameters, values
 from survey.errors import BadInput
 from survey.request import user_scene
 
-SHOWN = 4  # parameters: of more, those that are 0 are left out of the title
+SHOWN = 4  # parameters in a title; if there are more, those that are 0 are left out
 
 
 def solve(point, time=None):
     """The motion at `point` (a dataset of one point), a Dataset whose attribute `panels` says how it is drawn."""
     if time is not None and not (np.asarray(time).dtype.kind in "iuf" and np.ndim(time) == 0 and 0 < time < np.inf):
-        raise BadInput(f"time = {time!r}: give a positive number, how long the motion is followed")
+        raise BadInput(f"time = {time!r}: give a positive number, the duration of the motion")
     name, scene = user_scene.find(user_scene.of_dataset(point))
     make = getattr(scene, "trajectory", None)
     if make is None:
-        raise BadInput(f"the scene {name} has no trajectory; it would be a function of that name in its file")
-    chosen, symbols = asked(point, scene), {p.name: p.symbol for p in scene.PARAMETERS}
+        raise BadInput(f"the scene {name} has no trajectory; its file would have to define that function")
+    options, symbols = options_at(point, scene), {p.name: p.symbol for p in scene.PARAMETERS}
     given = {key: value for key, value in parameters(point).items() if key in symbols}
-    # solved anew: a motion follows from parameters, never from what a file says of it
-    known = api.evaluate(user_scene.of_dataset(point), **given, **chosen)
-    found = make(given, values(known), chosen, time)
+    # solved again: a motion is computed from parameters, never from other values in a file
+    known = api.evaluate(user_scene.of_dataset(point), **given, **options)
+    found = make(given, values(known), options, time)
     about = {"title": point.attrs.get("title", ""), "scene": name, "options": point.attrs.get("options", "")}
     about |= {"parameters": ", ".join(f"{key}={value!r}" for key, value in given.items())}
     shown = [f"${symbols[key]} = {value:.6g}$" for key, value in given.items() if value or len(given) <= SHOWN]

@@ -1,1 +1,1 @@
-"""What is kept: labels, finished blocks, the netCDF file, what an unfinished run has left."""
+"""What is kept: labels, finished blocks, the netCDF file, and what an unfinished run has left."""

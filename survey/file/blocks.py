@@ -1,4 +1,4 @@
-"""The finished blocks of a run: one writer, each block durable as it finishes."""
+"""The finished blocks of a run: one writer, each block durable as soon as it is finished."""
 
 import contextlib
 import hashlib
@@ -23,33 +23,33 @@ FORMAT = 3
 
 
 class Blocks:
-    """The finished blocks of a run in `OUT.nc.blocks/`: one writer, each block durable as it finishes.
+    """The finished blocks of a run in `OUT.nc.blocks/`: one writer, each block durable as soon as it is finished.
 
-    Each block says of which survey it is; the manifest beside them, which is made first and removed last, tells users.
-    Use as a context manager; raises BadInput if another run holds the output, or if the blocks that are there
-    belong to another survey (unless `fresh`), Damaged if it cannot be told to which. For users the folder keeps
-    what `about` tells, the text of the `workflow`, and `again`, the command that goes on.
-    If a run that did not end has left something beside a complete output of the same workflow, `published` is that
-    output's attributes: all that is to be done is to `remove` what was left.
+    Each block is labelled with its survey; the manifest, which is created first and removed last, informs users.
+    Use as a context manager; raises BadInput if another run holds the output, or if the existing blocks belong to
+    another survey (unless `fresh`), Damaged if their survey is unknown. For users, the folder also keeps `about`, the
+    text of the `workflow`, and `resume_command`. If an interrupted run has left something beside a complete output of
+    the same workflow, `published` holds that output's attributes, and all that remains is to `remove` the rest.
     """
 
-    def __init__(self, path, fingerprint, fresh=False, about=None, workflow="", again=None, text=None):
+    def __init__(self, path, fingerprint, fresh=False, about=None, workflow="", resume_command=None, text=None):
         self.folder = unfinished.folder_of(path)
         self.path = Path(path)
         self.fingerprint = {"format": FORMAT, **fingerprint}
         self.identity = _hash(self.fingerprint)
-        # of the output, which is the same however it was cut into blocks
-        self.of_output = _hash({key: self.fingerprint[key] for key in self.fingerprint.keys() - {"format", "blocks"}})
+        # of the output, which does not depend on how it was cut into blocks
+        of_output = self.fingerprint.keys() - {"format", "block_geometry"}
+        self.of_output = _hash({key: self.fingerprint[key] for key in of_output})
         self.fresh = fresh
         self.about, self.workflow, self.text = about or {}, workflow, text
         name = {"host": socket.gethostname(), "pid": os.getpid(), "run": uuid.uuid4().hex}
         self.lock = lock.Lock(f"{path}.lock", name)
-        self.holder = name | {"folder": os.getcwd(), "again": again}
+        self.holder = name | {"folder": os.getcwd(), "resume_command": resume_command}
         self.published = None
 
     def __enter__(self):
         with refused(self.path):
-            left = self._hold()
+            left = self._acquire()
             try:
                 self._prepare(bool(left) or self.folder.exists())
             except BaseException:
@@ -58,42 +58,42 @@ class Blocks:
         return self
 
     def __exit__(self, *_):
-        with contextlib.suppress(OSError):  # what ended the run is told, and the next one takes the lock
+        with contextlib.suppress(OSError):  # the error that ended the run is reported, and the next run takes the lock
             self.lock.release()
 
     def __getstate__(self):
-        # a worker saves blocks, wherever it runs; only the parent holds the lock
+        # workers anywhere save blocks; only the parent process holds the lock
         return self.__dict__ | {"lock": None, "workflow": "", "text": None, "folder": self.folder.absolute()}
 
     def done(self):
         """Numbers of the blocks that are finished."""
         return {int(file.stem) for file in self.folder.glob("*.block") if file.stem.isdecimal()}
 
-    def sound(self):
-        """Numbers of the blocks that are finished and whose checksums hold; the others are removed."""
-        return {number for number in self.done() if self._sound(number)}
+    def intact(self):
+        """Numbers of the finished blocks whose checksums are right; the others are removed."""
+        return {number for number in self.done() if self._is_intact(number)}
 
     def save(self, number, arrays):
-        """Keep the arrays of block `number`; once this returns, a power cut does not lose them."""
+        """Keep the arrays of block `number`; once this returns, they survive a power cut."""
         with refused(self.path):
             write_atomically(self._file(number), lambda file: pack(arrays, file, self._label(number)))
 
     def keep(self, number, arrays):
-        """Save the block where this process reaches the run's folder; else return the bytes that `put` saves there."""
-        if self._reached():
+        """Save the block if this process can reach the run's folder; else return the bytes for `save_packed`."""
+        if self._reaches_folder():
             self.save(number, arrays)
             return None
         file = io.BytesIO()
         pack(arrays, file, self._label(number))
         return file.getvalue()
 
-    def put(self, number, content):
-        """Save a block that `keep` returned elsewhere."""
+    def save_packed(self, number, content):
+        """Save the bytes of a block that `keep` returned in another process."""
         with refused(self.path):
             write_atomically(self._file(number), content)
 
     def once(self, name, make):
-        """The arrays that an earlier run kept under this name, else those of `make()`, kept from now on."""
+        """The arrays that an earlier run has kept under this name, else those of `make()`, which are kept."""
         file, label = self.folder / f"{name}.extra", self._label(name)
         with contextlib.suppress(OSError, ValueError):
             return unpack(file.read_bytes(), label)
@@ -103,44 +103,45 @@ class Blocks:
         return arrays
 
     def load(self, number):
-        """The arrays of block `number`; raises Damaged (and removes the block) if its checksum fails."""
+        """The arrays of block `number`; raises Damaged (and removes the block) if its checksum is wrong."""
         with refused(self.path, "reading a block"):
             try:
                 return self._read(number)
             except (FileNotFoundError, ValueError) as error:
                 self._file(number).unlink(missing_ok=True)
-                told = f"{self._file(number)}: this block is damaged ({error}); run the command again"
-                raise Damaged(told) from None
+                raise Damaged(f"{self._file(number)}: this block is damaged ({error}); run the command again") from None
 
     def refuse_lost_lock(self):
-        """Raise Stopped if the lock names another run: where file systems share no locks, a halted run may lose it."""
+        """Raise Stopped if the lock names another run: without shared locks, a suspended run may lose it."""
         if not self.lock.owned():
-            raise Stopped(f"{self.path}: another run has taken its lock, since this one had halted; wait, or use -o")
+            raise Stopped(f"{self.path}: another run has taken its lock while this one was suspended; wait, or use -o")
 
     def remove(self):
-        """Drop the blocks once the output is complete, and the lock."""
+        """Remove the blocks and the lock, once the output is complete."""
         try:
             clear(self.folder)
             self.lock.release()
         except OSError as error:
-            told = f"what the run kept beside it could not be removed ({error.strerror}: {error.filename})"
-            raise Stopped(f"{self.path} is complete, but {told}; mend it and run the command again") from None
+            raise Stopped(
+                f"{self.path} is complete, but its blocks could not be removed ({error.strerror}: {error.filename}); "
+                "fix this and run the command again"
+            ) from None
 
-    def _reached(self):
-        """Does this process see the very folder that the run's parent holds?"""
+    def _reaches_folder(self):
+        """Does this process see the same folder as the run's parent?"""
         return unfinished.table(self.folder / "holder.json") == self.holder
 
     def _file(self, number):
         return self.folder / f"{number:08d}.block"
 
     def _label(self, name):
-        """What a file in the folder says of itself: of which survey, which part."""
+        """The label of a file in the folder: its survey and its part."""
         return f"{self.identity} {name}"
 
     def _read(self, number):
         return unpack(self._file(number).read_bytes(), self._label(number))
 
-    def _sound(self, number):
+    def _is_intact(self, number):
         try:
             self._read(number)
         except (OSError, ValueError):
@@ -148,8 +149,8 @@ class Blocks:
             return False
         return True
 
-    def _hold(self):
-        """Hold the lock; what it says of a run that has ended without removing it."""
+    def _acquire(self):
+        """Acquire the lock; returns what it names if a run has ended without removing it."""
         try:
             return self.lock.acquire()
         except lock.Held as held:
@@ -162,7 +163,7 @@ class Blocks:
         self._refuse_other_survey(finished)
         if left and not self.fresh and self._complete():
             return
-        if not finished:  # nothing is lost
+        if not finished:  # then nothing is lost
             clear(self.folder)
         self.folder.mkdir(exist_ok=True)
         sync(self.path.parent)
@@ -185,12 +186,12 @@ class Blocks:
             known = self.fingerprint | self.about
             raise BadInput(unfinished.drift(self.path, old, known, changed, self.workflow))
         raise Damaged(
-            f"{manifest} is missing or damaged, and blocks beside it are of another survey; "
-            "--fresh deletes them and starts anew, -o writes another file"
+            f"{manifest} is missing or damaged, and the blocks beside it belong to another survey; "
+            "--fresh deletes them and starts again, -o writes another file"
         )
 
     def _is_foreign(self, file):
-        """Is the file sound and of another survey? (One that is not sound is of no use to any.)"""
+        """Is the file intact and of another survey? (A damaged one is of no use to any.)"""
         try:
             if label_of(file).startswith(f"{self.identity} "):
                 return False
@@ -200,7 +201,7 @@ class Blocks:
         return True
 
     def _complete(self):
-        """Is the output complete and of this very workflow? Then `published` is known, and one digest beside it."""
+        """Is the output complete and of the same workflow? If so, set `published`, and keep one digest beside it."""
         try:
             with open(self.path, "rb") as file:
                 line = f"{hashlib.file_digest(file, 'sha256').hexdigest()}  {self.path.name}\n".encode()
@@ -213,7 +214,7 @@ class Blocks:
         wanted = {"complete": 1, "fingerprint": self.of_output, "workflow": self.text}
         if any(attributes.get(key) != value for key, value in wanted.items()):
             return False
-        if digests != line:  # the run ended between the file and its digest
+        if digests != line:  # the run ended between writing the file and its digest
             self.folder.mkdir(exist_ok=True)
             write_atomically(digest_of(self.path), line, self.folder)
         self.published = attributes
@@ -221,12 +222,12 @@ class Blocks:
 
 
 def _hash(table):
-    """16 hex digits of a table's values."""
+    """Hash (16 hex digits) of a table."""
     return hashlib.sha256(json.dumps(table, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def clear(folder):
-    """Remove a run's folder, its manifest last: whatever ends this half-way, what is left can be told."""
+    """Remove a run's folder, its manifest last, so that what an interruption leaves can be identified."""
     if not folder.exists():
         return
     manifest = folder / "manifest.json"
@@ -240,8 +241,8 @@ def clear(folder):
 
 
 def pack(arrays, file, label=""):
-    """Write the arrays to a binary file: a line with the label and their names, their bytes in multiples of 8, a
-    checksum."""
+    """Write the arrays to a binary file: a line with the label and their names, their bytes padded to multiples of 8,
+    and a checksum."""
     names = {name: (array.dtype.str, array.shape) for name, array in arrays.items()}
     parts = [json.dumps([label, names]).encode() + b"\n"] + [np.ascontiguousarray(array) for array in arrays.values()]
     check = 0
@@ -253,30 +254,30 @@ def pack(arrays, file, label=""):
 
 
 def unpack(content, label=None):
-    """The arrays that `pack` wrote; raises ValueError if a bit is not as it was, or if its label is another one."""
+    """The arrays that `pack` wrote; raises ValueError if a bit has changed, or if the label differs."""
     body = checked(content)
-    place = content.index(b"\n") + 1
-    own, names = json.loads(content[:place])
+    offset = content.index(b"\n") + 1
+    own, names = json.loads(content[:offset])
     if label not in (None, own):
-        raise ValueError("it is of another survey")
+        raise ValueError("it belongs to another survey")
     arrays = {}
     for name, (kind, shape) in names.items():
-        place += -place % 8
-        arrays[name] = np.frombuffer(body, kind, prod(shape), place).reshape(shape)
-        place += arrays[name].nbytes
+        offset += -offset % 8
+        arrays[name] = np.frombuffer(body, kind, prod(shape), offset).reshape(shape)
+        offset += arrays[name].nbytes
     return arrays
 
 
 def checked(content):
-    """What a block of any format holds before its checksum; ValueError if a bit is not as it was."""
+    """What a block of any format contains before its checksum; raises ValueError if a bit has changed."""
     body, check = memoryview(content)[:-8], content[-8:]
     if len(content) < 16 or isal_zlib.crc32(body).to_bytes(8, "little") != check:
-        raise ValueError("its checksum fails")
+        raise ValueError("its checksum is wrong")
     return body
 
 
 def label_of(file):
-    """The label that `pack` gave the file, not checked; empty for one that has none."""
+    """The label that `pack` wrote, not verified; empty if there is none."""
     with open(file, "rb") as opened:
         head = json.loads(opened.readline())
     return head[0] if isinstance(head, list) and head and isinstance(head[0], str) else ""

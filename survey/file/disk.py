@@ -1,4 +1,4 @@
-"""Writing so that a path is absent, old or new at every instant."""
+"""Atomic, durable writing, and errors of the disk as one line."""
 
 import contextlib
 import os
@@ -12,24 +12,24 @@ from survey.errors import Stopped, SurveyError
 
 @contextlib.contextmanager
 def refused(path, what="writing"):
-    """Turn a disk that refuses into one line; a file elsewhere is named in it."""
+    """Turn an error of the disk into a Stopped of one line, which also names a file elsewhere."""
     try:
         yield
     except SurveyError:
         raise
     except OSError as error:
-        told = error.strerror or error
+        reason = error.strerror or error
         if isinstance(error.filename, (str, os.PathLike)) and not str(error.filename).startswith(str(path)):
-            told = f"{told}: {error.filename}"
+            reason = f"{reason}: {error.filename}"
         with contextlib.suppress(OSError):
-            told = f"{told}; {filesize.decimal(shutil.disk_usage(Path(path).parent).free)} are free"
-        raise Stopped(f"{path}: {what} failed ({told}); mend it and run the command again") from None
+            reason = f"{reason}; {filesize.decimal(shutil.disk_usage(Path(path).parent).free)} free"
+        raise Stopped(f"{path}: {what} failed ({reason}); fix this and run the command again") from None
 
 
 def write_atomically(path, content, folder=None):
     """Write bytes, or what `content(file)` writes, so that `path` is absent, old or new at every instant.
 
-    In `folder`, on the same disk, lies what is not yet complete; by default beside it.
+    The incomplete file lies in `folder`, on the same disk; by default beside `path`.
     """
     part = (folder or path.parent) / f".{path.name}.{os.getpid()}.part"
     try:
@@ -39,19 +39,19 @@ def write_atomically(path, content, folder=None):
             os.fsync(file.fileno())
         publish(part, path)
     except BaseException:
-        with contextlib.suppress(OSError):  # what made it fail is told
+        with contextlib.suppress(OSError):  # the first error is the one to report
             part.unlink(missing_ok=True)
         raise
 
 
 def publish(part, path):
-    """Rename a complete file into place and make the rename durable."""
+    """Rename a complete file into place, durably."""
     os.replace(part, path)
     sync(path.parent)
 
 
 def sync(folder):
-    """Make durable what was made, renamed or removed in the folder."""
+    """Make durable what was created, renamed or removed in the folder."""
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -60,5 +60,5 @@ def sync(folder):
 
 
 def digest_of(path):
-    """Where the digest of the file at `path` lies."""
+    """The path of the digest of the file at `path`."""
     return Path(f"{path}.sha256")

@@ -17,16 +17,16 @@ from survey.scene import exists
 
 CONVENTIONS = "CF-1.11, ACDD-1.3"
 UNDECIDED = -1  # of every verdict
-CHUNK = 2**14  # points: what is computed of them stays in the cache
+CHUNK = 2**14  # points whose temporaries fit in the cache
 
 
 def outputs_of(scene, request):
-    """The Outputs that the request asks for, in the scene's order."""
+    """The requested Outputs, in the scene's order."""
     return [o for o in scene.OUTPUTS if o.name in request.variables and exists(o, request.options)]
 
 
 def layout(scene, request):
-    """What is stored per point: {variable: (dtype, fill, extra shape)}: outputs, their errors, and `status`."""
+    """What is stored per point, {variable: (dtype, fill, extra shape)}: outputs, their errors, and `status`."""
     table = {}
     for output in outputs_of(scene, request):
         extra = tuple(len(scene.DIMENSIONS[dim]) for dim in output.dims)
@@ -39,7 +39,7 @@ def layout(scene, request):
 
 
 def round_up(errors):
-    """float64 error bars (not negative) as float32, never smaller than before."""
+    """float64 error bars (not negative) as float32, rounded up."""
     errors = np.asarray(errors, dtype=float)
     with np.errstate(over="ignore"):
         small = errors.astype(np.float32)
@@ -48,30 +48,30 @@ def round_up(errors):
     return small
 
 
-def percent(share, bar):
-    """`34.97 +- 0.58 %`: to two digits of the bar."""
+def percent(fraction, bar):
+    """`34.97 +- 0.58 %`, to two digits of the error bar."""
     digits = int(np.clip(1 - np.floor(np.log10(100 * bar)), 0, 12)) if bar > 0 else 2
-    return f"{100 * share:.{digits}f} +- {100 * bar:.{digits}f} %"
+    return f"{100 * fraction:.{digits}f} +- {100 * bar:.{digits}f} %"
 
 
 def describe(grid, scene, name, request, arrays):
     """The dataset of a survey: `arrays` holds the variables of `layout` in the grid's shape."""
     import xarray as xr
 
-    data = {key: (dims, arrays[key], meaning) for key, (dims, meaning) in variables(grid, scene, request).items()}
+    data = {key: (dims, arrays[key], attrs) for key, (dims, attrs) in variables(grid, scene, request).items()}
     return xr.Dataset(data, coordinates(grid, scene, request), attributes(scene, name, request))
 
 
 def coordinates(grid, scene, request):
     """{name: (dimensions, values, attributes)}: the parameters, then the extra dimensions of the outputs."""
     used = {p.name: p for p in scene.PARAMETERS}
-    coords = {key: (dims, values, _meaning(used[key])) for key, (dims, values) in grid.parameters.items()}
+    coords = {key: (dims, values, _parameter_attributes(used[key])) for key, (dims, values) in grid.parameters.items()}
     extra = dict.fromkeys(dim for output in outputs_of(scene, request) for dim in output.dims)
     return coords | {dim: _index(dim, np.asarray(scene.DIMENSIONS[dim])) for dim in extra}
 
 
 def _index(dim, values):
-    """An extra dimension's coordinate: names, or numbers, which have a unit."""
+    """The coordinate of an extra dimension: names, or numbers, which have a unit."""
     unit = {"units": "1"} if values.dtype.kind in "if" else {}
     return (dim,), values, {"long_name": dim, "symbol": rf"\mathrm{{{dim}}}"} | unit
 
@@ -90,7 +90,7 @@ def variables(grid, scene, request):
 
 
 def attributes(scene, name, request):
-    """The global attributes that say what was asked, of what, and by which code."""
+    """The global attributes: what was asked, of which scene, and which code answered."""
     return {
         "Conventions": CONVENTIONS,
         "title": scene.TITLE,
@@ -109,14 +109,14 @@ def attributes(scene, name, request):
 
 
 class Tally:
-    """Counts by status and verdict, and of points whose bar exceeds the asked accuracy, over pieces of a map.
+    """Counts, over pieces of a map, by status and verdict and of points whose error bar exceeds the requested accuracy.
 
-    `flags` is {"status": its attributes, "verdict": its attributes (where there is one)}. `unanswered` counts, by
+    `flags` is {"status": its attributes, "verdict": its attributes (if there is one)}. `unanswered` counts, by
     status, the points whose verdict is -1 because there is no answer.
     """
 
     def __init__(self, flags, rtol):
-        self.codes = {name: flag_codes(meaning) for name, meaning in flags.items()}
+        self.codes = {name: flag_codes(attrs) for name, attrs in flags.items()}
         self.counts = {name: dict.fromkeys(codes, 0) for name, codes in self.codes.items()}
         self.unanswered = {name: 0 for name, code in self.codes["status"].items() if code != status.OK}
         self.rtol = rtol
@@ -128,10 +128,10 @@ class Tally:
         flat = {name: np.asarray(array).reshape(size, -1) for name, array in arrays.items()}
         bars = [name for name in flat if f"{name}_error" in flat]
         for first in range(0, size, CHUNK):
-            some = slice(first, first + CHUNK)
+            chunk = slice(first, first + CHUNK)
             missed = np.zeros(min(CHUNK, size - first), bool)
             for name in bars:
-                missed |= _above(flat[name][some], flat[f"{name}_error"][some], self.rtol).any(axis=-1)
+                missed |= _exceeds(flat[name][chunk], flat[f"{name}_error"][chunk], self.rtol).any(axis=-1)
             self.missed += int(np.count_nonzero(missed))
         self.points += size
         for name, codes in self.codes.items():
@@ -144,12 +144,12 @@ class Tally:
 
     @property
     def kinds(self):
-        """{"status" and "verdict": {kind: points}}: a point without an answer is of its status, not undecided."""
-        told = {name: dict(number) for name, number in self.counts.items()}
-        if "undecided" in told.get("verdict", ()):
-            told["verdict"]["undecided"] -= sum(self.unanswered.values())
-            told["verdict"] |= {name: n for name, n in self.unanswered.items() if n}
-        return told
+        """{"status", "verdict": {kind: points}}; a point without an answer counts by its status, not as undecided."""
+        kinds = {name: dict(number) for name, number in self.counts.items()}
+        if "undecided" in kinds.get("verdict", ()):
+            kinds["verdict"]["undecided"] -= sum(self.unanswered.values())
+            kinds["verdict"] |= {name: n for name, n in self.unanswered.items() if n}
+        return kinds
 
     @property
     def attributes(self):
@@ -157,8 +157,8 @@ class Tally:
         return {"points": self.points, "accuracy_missed": self.missed} | _counts(self.kinds)
 
     @property
-    def before(self):
-        """The counts as older files tell them, where what has no answer is undecided."""
+    def old_attributes(self):
+        """The counts as older files hold them, where points without an answer count as undecided."""
         return _counts(self.counts)
 
 
@@ -167,66 +167,66 @@ def _counts(table):
 
 
 def counts_in(attributes):
-    """{"status" and "verdict": {kind: points}} of a file's attributes: what `Tally.attributes` wrote."""
-    told = {name: attributes[f"{name}_counts"] for name in ("status", "verdict") if f"{name}_counts" in attributes}
-    pairs = {name: [part.rpartition(": ") for part in text.split(", ")] for name, text in told.items()}
-    return {name: {kind: int(number) for kind, _, number in some} for name, some in pairs.items()}
+    """{"status", "verdict": {kind: points}} from a file's attributes, as `Tally.attributes` wrote them."""
+    texts = {name: attributes[f"{name}_counts"] for name in ("status", "verdict") if f"{name}_counts" in attributes}
+    pairs = {name: [part.rpartition(": ") for part in text.split(", ")] for name, text in texts.items()}
+    return {name: {kind: int(number) for kind, _, number in parts} for name, parts in pairs.items()}
 
 
-def _above(value, bar, rtol):
-    """Where the bar exceeds rtol (1 + |value|)."""
-    asked = np.abs(value)
-    asked += 1
-    asked *= rtol
+def _exceeds(value, bar, rtol):
+    """Where the error bar exceeds rtol (1 + |value|)."""
+    limit = np.abs(value)
+    limit += 1
+    limit *= rtol
     with np.errstate(invalid="ignore"):
-        return bar > asked
+        return bar > limit
 
 
 def tally(ds):
-    """The empty Tally of a survey's dataset."""
+    """An empty Tally for a survey's dataset."""
     return Tally({name: ds[name].attrs for name in ("status", "verdict") if name in ds}, ds.attrs["rtol"])
 
 
 def count(ds):
-    """Add the counts of `Tally` to `ds.attrs`, from its data in memory."""
-    whole = tally(ds)
-    names = ["status", *whole.codes, *error_bars(ds), *(f"{name}_error" for name in error_bars(ds))]
+    """Add the counts of `Tally` to the attributes of `ds`, which is in memory."""
+    total = tally(ds)
+    names = ["status", *total.codes, *error_bars(ds), *(f"{name}_error" for name in error_bars(ds))]
     point = ds.status.dims
-    whole.add({name: ds[name].transpose(*point, ...).values for name in names})
-    ds.attrs |= whole.attributes
+    total.add({name: ds[name].transpose(*point, ...).values for name in names})
+    ds.attrs |= total.attributes
     return ds
 
 
 def counts(ds):
-    """{"verdict" (where there is one) and "status": {kind: number of points}}, as `Tally.kinds`."""
-    whole = tally(ds)
-    whole.add({name: ds[name].transpose(*ds.status.dims).values for name in whole.codes})
-    return {name: whole.kinds[name] for name in ("verdict", "status") if name in whole.codes}
+    """{"verdict" (if there is one), "status": {kind: number of points}}, as `Tally.kinds`."""
+    total = tally(ds)
+    total.add({name: ds[name].transpose(*ds.status.dims).values for name in total.codes})
+    return {name: total.kinds[name] for name in ("verdict", "status") if name in total.codes}
 
 
-def unanswered(ds):
-    """{name: code} of the scene's own statuses: why a point has no answer by nature."""
+def scene_statuses(ds):
+    """{name: code} of the scene's own statuses: why the outputs are undefined at a point."""
     codes = flag_codes(ds.status.attrs) if "flag_values" in ds.status.attrs else {}
     return {name: code for name, code in codes.items() if code >= status.FIRST_OF_SCENE}
 
 
 def undecided_share(ds):
-    """The share of a refined map that its undecided cells take."""
+    """The fraction of a refined map covered by undecided cells."""
     return max(1.0 - float((ds.area_fraction - ds.area_fraction_error).sum()), 0.0)
 
 
-def flag_codes(meaning):
-    """{flag meaning: code} from the attributes of a CF flag variable; raises Damaged where they are none."""
-    return schema.flags(meaning)
+def flag_codes(attributes):
+    """{flag meaning: code} from the attributes of a CF flag variable; raises Damaged if they are not valid."""
+    return schema.flags(attributes)
 
 
 def options_of(ds):
-    """{name: value} of the scene's options; raises Damaged where they are not told."""
+    """{name: value} of the scene's options; raises Damaged where the attribute is not valid."""
     return schema.options(ds.attrs)
 
 
 def error_bars(ds):
-    """Names of the float outputs of `ds`, one value or more per point (those that have an error bar)."""
+    """Names of the float outputs of `ds`, which have an error bar, with one value or more per point."""
     point = set(ds.status.dims)
     return [name for name in ds.data_vars if f"{name}_error" in ds.data_vars and point <= set(ds[name].dims)]
 
@@ -264,8 +264,10 @@ def _commit():
     """(commit, "yes" or "no") of the repository that holds this package, or ("unknown", "unknown")."""
     root = Path(__file__).parents[2]
 
-    def git(*words):
-        return subprocess.run(["git", "-C", root, *words], capture_output=True, text=True, check=True).stdout.strip()
+    def git(*arguments):
+        return subprocess.run(
+            ["git", "-C", root, *arguments], capture_output=True, text=True, check=True
+        ).stdout.strip()
 
     try:
         tracked = git("ls-files", "survey/file/labels.py")
@@ -287,7 +289,7 @@ def _cpu():
         return platform.processor() or platform.machine()
 
 
-def _meaning(parameter):
+def _parameter_attributes(parameter):
     return {
         "long_name": parameter.long_name,
         "units": parameter.units,
@@ -314,9 +316,9 @@ def meaning(output):
 
 
 def fill_of(variable):
-    """The integer that stands where an integer output does not apply; None for an output that has none."""
-    told = re.search(r"(-?\d+) where it does not apply", variable.attrs.get("comment", ""))
-    return int(told[1]) if told else None
+    """The integer that an integer output holds where it does not apply; None for other outputs."""
+    found = re.search(r"(-?\d+) where it does not apply", variable.attrs.get("comment", ""))
+    return int(found[1]) if found else None
 
 
 def flag_attributes(codes):
@@ -327,7 +329,7 @@ def flag_attributes(codes):
 def _status_attributes(scene):
     table = status.table(scene)
     return {
-        "long_name": "why the point has or has not an answer",
+        "long_name": "has the point an answer, and if not, why",
         "coverage_content_type": "qualityInformation",
         "units": "1",
         "symbol": "status",

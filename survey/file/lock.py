@@ -1,7 +1,7 @@
-"""The lock of an output, `OUT.nc.lock`: a file that names the run at work on it, gone when the run has ended.
+"""The lock of an output, `OUT.nc.lock`: a file that names the run writing it, removed when the run ends.
 
-flock tells at once whether a process of this host holds it. Other hosts are told apart by the name in the file, since
-not every network file system shares flock between them: a run there is at work as long as the file's time moves.
+flock shows at once whether a process on this host holds it. Not every network file system shares flock between hosts,
+so a run on another host, which the file names, is active as long as the file's modification time advances.
 """
 
 import contextlib
@@ -13,13 +13,13 @@ import socket
 import threading
 import time
 
-BEAT_SECONDS = 2.0  # so often the holder gives the file a new time
-GONE_SECONDS = 10.0  # a holder on another host that gives it none for so long has ended
-LOOK_SECONDS = 0.2  # a look of `holder` takes less
+BEAT_SECONDS = 2.0  # interval at which the holder updates the file's modification time
+GONE_SECONDS = 10.0  # a holder on another host that has not updated it for so long has ended
+PEEK_SECONDS = 0.2  # more than `holder` takes, which locks the file briefly
 
 
 class Held(Exception):
-    """Another run holds the lock: `holder` is what its file says."""
+    """Another run holds the lock: `holder` is what its file contains."""
 
     def __init__(self, holder):
         super().__init__(f"host {holder.get('host', 'unknown')}, pid {holder.get('pid', 'unknown')}")
@@ -27,16 +27,16 @@ class Held(Exception):
 
 
 class Lock:
-    """The lock of one output; `name` is written to the file: a mapping with the host, the pid and what is one's own."""
+    """The lock of one output; `name`, written to the file, is a mapping with the host, the pid and a unique entry."""
 
     def __init__(self, path, name):
         self.path, self.name = str(path), name
         self.descriptor, self.ended, self.heart = None, threading.Event(), None
 
     def acquire(self):
-        """Hold the lock; returns the name that a run which did not end well has left in it, else {}.
+        """Acquire the lock; returns the name that an interrupted run has left in it, else {}.
 
-        Raises Held at once where a run of this host holds it, and after BEAT_SECONDS where one of another host does.
+        Raises Held at once if a run on this host holds it, and after BEAT_SECONDS if one on another host does.
         """
         self.descriptor, known = self._opened()
         before = {}
@@ -48,7 +48,7 @@ class Lock:
             os.pwrite(self.descriptor, content, 0)
             os.ftruncate(self.descriptor, len(content))
         except BaseException as error:
-            if isinstance(error, Held) or before:  # it is not ours to remove
+            if isinstance(error, Held) or before:  # not ours to remove
                 os.close(self.descriptor)
                 self.descriptor = None
             else:
@@ -66,7 +66,7 @@ class Lock:
         return False
 
     def release(self):
-        """Remove the file and let go of it, if it is held. Raises OSError where it cannot be removed."""
+        """Remove the file and unlock it, if it is held. Raises OSError where it cannot be removed."""
         if self.descriptor is None:
             return
         self.ended.set()
@@ -75,38 +75,38 @@ class Lock:
         descriptor, self.descriptor = self.descriptor, None
         try:
             if self._is_file(descriptor):
-                os.unlink(self.path)  # while it is held: nobody else holds a lock of that name
+                os.unlink(self.path)  # while it is held, so that nobody else can hold a lock of that name
         finally:
             os.close(descriptor)
 
     def _opened(self):
-        """(the open file, which no other process of this host holds; is flock known here?)"""
-        deadline = time.monotonic() + LOOK_SECONDS
+        """(the open file, which no other process on this host has locked; is flock supported here?)"""
+        deadline = time.monotonic() + PEEK_SECONDS
         while True:
             descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
             try:
                 known = _flocked(descriptor, fcntl.LOCK_EX)
-                if self._is_file(descriptor):  # and not one that its holder has removed meanwhile
+                if self._is_file(descriptor):  # and its holder has not removed it meanwhile
                     return descriptor, known
             except BlockingIOError:
                 if time.monotonic() > deadline:
                     held = Held(_name_in(descriptor))
                     os.close(descriptor)
                     raise held from None
-                time.sleep(LOOK_SECONDS / 10)
+                time.sleep(PEEK_SECONDS / 10)
             os.close(descriptor)
 
     def _is_file(self, descriptor):
-        """Is the open file the one that bears the lock's name?"""
+        """Is the open file still the one at the lock's path?"""
         with contextlib.suppress(FileNotFoundError):
             return os.path.samestat(os.fstat(descriptor), os.stat(self.path))
         return False
 
     def _beats(self, before):
-        """Does the file's time move? It is waited for."""
-        words = "%s names host %s, pid %s; waiting up to %d s to see whether it is still at work"
-        told = before.get("host"), before.get("pid"), GONE_SECONDS
-        logging.getLogger("survey").warning(words, self.path, *told)
+        """Does the file's modification time advance? Waits up to GONE_SECONDS."""
+        message = "%s names host %s, pid %s; waiting up to %d s to see whether it is still running"
+        details = before.get("host"), before.get("pid"), GONE_SECONDS
+        logging.getLogger("survey").warning(message, self.path, *details)
         first, deadline = _beat_of(self.path), time.monotonic() + GONE_SECONDS
         while time.monotonic() < deadline:
             time.sleep(BEAT_SECONDS / 8)
@@ -121,7 +121,7 @@ class Lock:
 
 
 def holder(path):
-    """What the lock at `path` says of the run that is at work; None if nobody is. It is not kept from a run."""
+    """What the lock at `path` says of the active run; None if there is none. A run can still acquire it."""
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
     except OSError:
@@ -138,7 +138,7 @@ def holder(path):
 
 
 def _flocked(descriptor, how):
-    """Is the file locked now, or does this file system know no locks? Raises BlockingIOError if another holds it."""
+    """Lock the file; False where the file system has no locks. Raises BlockingIOError if another process holds it."""
     try:
         fcntl.flock(descriptor, how | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -149,7 +149,7 @@ def _flocked(descriptor, how):
 
 
 def _beat_of(path):
-    """The time that the holder last gave the file; opened anew, as network file systems keep what is open."""
+    """The file's modification time; opened again each time, as network file systems cache what is open."""
     with contextlib.suppress(OSError), open(path, "rb") as file:
         return os.fstat(file.fileno()).st_mtime_ns
     return None

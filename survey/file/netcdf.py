@@ -1,7 +1,7 @@
-"""netCDF-4 files written with h5py into a file that is ours: HDF5 never meets a system call that fails.
+"""netCDF-4 files written with h5py through a file object of our own: HDF5 never meets a system call that fails.
 
-Where the disk refuses, HDF5 keeps what it could not write and may end the process at any later call, even as it closes
-the file. So a `Sink` writes for it, keeps the first error to itself, and serves what is not on the disk from memory.
+After a failed write, HDF5 retries what it could not write and may crash the process at any later call, even on closing
+the file. So a `Sink` writes for it, records the first error, and serves what is not on the disk from memory.
 Structure: netCDF-4 format, NetCDF User's Guide, Appendix B (dimensions are HDF5's dimension scales).
 """
 
@@ -11,14 +11,14 @@ import os
 import h5py
 import numpy as np
 
-VERSIONS = ("earliest", "v108")  # of HDF5, whose readers know all that is written: as netCDF's own library does
-# checksummed compression: readable everywhere, and every flipped bit is found
+VERSIONS = ("earliest", "v108")  # of HDF5 whose readers can read the file, as the netCDF library chooses them
+# compression with checksums: readable everywhere, and every flipped bit is detected
 PACKED = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "fletcher32": True}
 BARE = "This is a netCDF dimension but not a netCDF variable.{:10d}"
 
 
 class Sink:
-    """A new file for HDF5 that never refuses: `error` is the first OSError, and what comes after it stays in memory."""
+    """A new file for HDF5 that never fails: `error` is the first OSError; later writes stay in memory."""
 
     def __init__(self, path):
         self.descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o666)
@@ -35,21 +35,21 @@ class Sink:
         content = bytearray(count)
         return bytes(content[: self.readinto(content)])
 
-    def readinto(self, room):
-        room = memoryview(room).cast("B")
-        count = max(0, min(len(room), self.size - self.at))
-        self._keep(self._read, room[:count])
+    def readinto(self, buffer):
+        buffer = memoryview(buffer).cast("B")
+        count = max(0, min(len(buffer), self.size - self.at))
+        self._try(self._read, buffer[:count])
         for at, content in self.unwritten:
             first, end = max(at, self.at), min(at + len(content), self.at + count)
             if first < end:
-                room[first - self.at : end - self.at] = content[first - at : end - at]
+                buffer[first - self.at : end - self.at] = content[first - at : end - at]
         self.at += count
         return count
 
     def write(self, content):
         content = memoryview(content).cast("B")
         if not self.error:
-            self._keep(self._write, content)
+            self._try(self._write, content)
         if self.error:
             self.unwritten.append((self.at, bytes(content)))
         self.at += len(content)
@@ -58,12 +58,12 @@ class Sink:
 
     def truncate(self, size):
         if not self.error:
-            self._keep(os.ftruncate, self.descriptor, size)
+            self._try(os.ftruncate, self.descriptor, size)
         self.size = size
         return size
 
     def flush(self):
-        """Nothing is held back."""
+        """Nothing is buffered."""
 
     def sync(self):
         os.fsync(self.descriptor)
@@ -73,17 +73,17 @@ class Sink:
         if descriptor is not None:
             os.close(descriptor)
 
-    def _keep(self, call, *given):
-        """Do this, and keep the first error that is raised."""
+    def _try(self, call, *arguments):
+        """Call, and record the first error that is raised."""
         try:
-            call(*given)
+            call(*arguments)
         except OSError as error:
             self.error = self.error or error
 
-    def _read(self, room):
+    def _read(self, buffer):
         done = 0
-        while some := os.preadv(self.descriptor, [room[done:]], self.at + done):  # beyond the end are zeros
-            done += some
+        while count := os.preadv(self.descriptor, [buffer[done:]], self.at + done):  # zeros beyond the end
+            done += count
 
     def _write(self, content):
         done = 0
@@ -92,9 +92,9 @@ class Sink:
 
 
 class File:
-    """A new netCDF-4 file at `path`: `define` its variables, `close` it. OSError says that the disk refused.
+    """A new netCDF-4 file at `path`: `define` its variables, then `close` it. Raises OSError where the disk does.
 
-    What is written is complete only once it is closed. `discard` closes it whatever happened.
+    The file is complete only once it is closed. `discard` closes it whatever has happened.
     """
 
     def __init__(self, path):
@@ -114,16 +114,16 @@ class File:
         return self.file[name]
 
     def define(self, name, dims, shape, dtype, attributes, tile=None, values=None):
-        """A new variable, compressed in tiles of these lengths (if any), NaN where floats are not written.
+        """Create a variable, compressed in tiles of these lengths (if any), with floats NaN until they are written.
 
-        The dimensions that the file lacks are made.
+        Dimensions that the file lacks are created.
         """
         dtype = np.dtype(dtype)
-        text = dtype.kind in "UO"  # strings are not packed: HDF5 keeps them elsewhere
+        text = dtype.kind in "UO"  # strings are not compressed: HDF5 stores them elsewhere
         packed = PACKED | {"chunks": tuple(tile)} if tile and np.prod(shape) and not text else {}
         fill = np.nan if dtype.kind == "f" and tile is not None else None
         kind = h5py.string_dtype() if text else dtype
-        with self._told():
+        with self._disk_errors():
             made = self.file.create_dataset(name, shape, kind, fillvalue=fill, track_order=True, **packed)
             if fill is not None:
                 attributes = {"_FillValue": dtype.type(fill)} | attributes
@@ -136,49 +136,49 @@ class File:
 
     def describe(self, attributes):
         """Give the file these attributes."""
-        with self._told():
+        with self._disk_errors():
             for key, value in attributes.items():
                 _attach(self.file, key, value)
 
-    def write(self, put, name, *given):
-        """put(variable, *given) for a variable of the file."""
-        with self._told():
-            put(self.file[name], *given)
+    def write(self, write, name, *arguments):
+        """write(variable, *arguments) for a variable of the file."""
+        with self._disk_errors():
+            write(self.file[name], *arguments)
 
     def close(self):
         """Complete the file, durably."""
-        with self._told():
+        with self._disk_errors():
             self._scale()
             self.file.close()
         self.sink.sync()
         self.sink.close()
 
     def discard(self):
-        """Close what nobody wants any more."""
-        self.sink.error = self.sink.error or OSError("not wanted any more")
-        with contextlib.suppress(Exception):  # nothing of it is of use
+        """Close a file that is not needed any more."""
+        self.sink.error = self.sink.error or OSError("discarded")
+        with contextlib.suppress(Exception):  # nothing in it is of use
             self.file.close()
         with contextlib.suppress(OSError):
             self.sink.close()
 
     def _scale(self):
-        """Make the dimensions, and tell each variable which are its own."""
-        place = {dim: number for number, dim in enumerate(self.dimensions)}
+        """Create the dimension scales, and attach them to the variables."""
+        ids = {dim: number for number, dim in enumerate(self.dimensions)}
         for dim, size in self.dimensions.items():
             bare = dim not in self.variables
             scale = self.file.create_dataset(dim, (size,), ">f4", track_order=True) if bare else self.file[dim]
             scale.make_scale(BARE.format(size) if bare else dim)
-            scale.attrs.create("_Netcdf4Dimid", place[dim], dtype=np.int32)
+            scale.attrs.create("_Netcdf4Dimid", ids[dim], dtype=np.int32)
         for name, dims in self.variables.items():
-            if name in place:  # a scale has no scales
-                self.file[name].attrs.create("_Netcdf4Coordinates", [place[dim] for dim in dims], dtype=np.int32)
+            if name in ids:  # a scale has no scales
+                self.file[name].attrs.create("_Netcdf4Coordinates", [ids[dim] for dim in dims], dtype=np.int32)
                 continue
             for axis, dim in enumerate(dims):
                 self.file[name].dims[axis].attach_scale(self.file[dim])
 
     @contextlib.contextmanager
-    def _told(self):
-        """Raise what the disk has refused meanwhile, rather than what HDF5 makes of it."""
+    def _disk_errors(self):
+        """Raise the error of the disk, rather than what HDF5 makes of it."""
         try:
             yield
         except (OSError, RuntimeError, ValueError, KeyError) as error:
@@ -189,7 +189,7 @@ class File:
 
 
 def _attach(to, name, value):
-    """An attribute as netCDF's library stores it: ASCII text as characters, numbers in one dimension."""
+    """Attach an attribute as the netCDF library stores it: ASCII text as characters, numbers in one dimension."""
     if isinstance(value, str) and value.isascii():
         value = np.bytes_(value.encode()) if value else h5py.Empty("S1")
         to.attrs.create(name, value)

@@ -1,7 +1,7 @@
-"""A map reduced to the cells of a picture, no point lost: maps of 10^8 points and more, read piece by piece.
+"""A map reduced to the cells of a picture without losing a point: maps of 10^8 points and more, read piece by piece.
 
-A cell that holds many points tells of all of them: of a flagged variable, the set of the flags that occur, so that
-one undecided point among thousands is seen; of numbers, the largest magnitude.
+A cell represents all of its points: for a flag variable by the set of the flags that occur, so that one undecided point
+among thousands is seen; for numbers by the value largest in magnitude.
 """
 
 from functools import cached_property
@@ -14,30 +14,30 @@ from survey.file.labels import fill_of, flag_codes
 
 NO_ANSWER = ("outside the domain", "failed")
 UNREAD = "not read yet"
-LATE = ("undecided", *NO_ANSWER, UNREAD)  # these are shown before all others, the last first
+PRECEDENCE = ("undecided", *NO_ANSWER, UNREAD)  # kinds shown in preference to all others, the last above all
 MASKS = np.uint8, np.uint16, np.uint32
 UNIONS = np.bitwise_or, np.maximum  # of masks, of ranks
 PIECE = 2**22  # points that are read at once, at most
-STRIDE = 8  # pieces are read in so many rounds, each of which spans the map
+STRIDE = 8  # rounds in which pieces are read; each round spans the map
 
 
 class Points:
-    """One variable of a survey over two of its axes, and why points have no value: DataArrays, lazy ones too.
+    """One variable of a survey over two of its axes, and its status `state`: DataArrays, possibly lazy.
 
-    `kinds` names what a point may be: the variable's flags, if it has any, and after them why it has no answer, by
-    nature (`own`, {status: code}) or not. Bit i of a mask says that the i-th of them occurs.
+    `kinds` names what a point may be: the variable's flags, if it has any, the scene's own statuses (`statuses`,
+    {name: code}), then the other reasons why it has no value. Bit i of a mask means that the i-th of them occurs.
     """
 
-    def __init__(self, variable, state, own):
+    def __init__(self, variable, state, statuses):
         self.variable, self.status, self.shape = variable, state, variable.shape
         self.flagged = "flag_values" in variable.attrs
         self.flags = flag_codes(variable.attrs) if self.flagged else {}
         self.fill = np.nan if self.flagged or fill_of(variable) is None else fill_of(variable)
-        self.own = own if "undecided" in self.flags else {}
-        self.kinds = [*self.flags, *self.own, *NO_ANSWER, UNREAD]
+        self.statuses = statuses if "undecided" in self.flags else {}
+        self.kinds = [*self.flags, *self.statuses, *NO_ANSWER, UNREAD]
         self.dtype = next((dtype for dtype in MASKS if len(self.kinds) <= np.iinfo(dtype).bits), None)
         if self.dtype is None:
-            raise Damaged(f"{variable.name}: a point may be of {len(self.kinds)} kinds, more than a map can show")
+            raise Damaged(f"{variable.name}: there are {len(self.kinds)} kinds of points, more than a map can show")
         self.bits = {kind: self.dtype(1 << i) for i, kind in enumerate(self.kinds)}
         self._of_code, self._of_status, self._of_open = np.zeros((3, 256), self.dtype)
         for flag, code in self.flags.items():
@@ -45,17 +45,17 @@ class Points:
         for code in status.FAILURES:
             self._of_status[code] = self.bits["failed"]
         self._of_status[status.INVALID_PARAMETERS] = self.bits["outside the domain"]
-        self._of_open[:] = self.bits.get("undecided", 0)  # of points without a verdict, by status
-        for name, code in self.own.items():
+        self._of_open[:] = self.bits.get("undecided", 0)  # for points without a verdict, by status
+        for name, code in self.statuses.items():
             self._of_open[code] = self.bits[name]
 
     def read(self, rows, columns):
-        """(mask, rank) of points; the rank, which stands for a value, is None for a flagged variable."""
+        """(mask, rank) of points; the rank, which encodes a value, is None for a flag variable."""
         state, array = self.status[rows, columns].values, self.variable[rows, columns].values
         mask = self._of_status[state.view(np.uint8)] if state.any() else np.zeros(state.shape, self.dtype)
         if self.flagged:
             flags = self._of_code[array.astype(np.int8, copy=False).view(np.uint8)]
-            if self.own and state.any():
+            if self.statuses and state.any():
                 flags = np.where(flags == self._of_open[0], self._of_open[state.view(np.uint8)], flags)
             return np.where(mask == 0, flags, mask) if state.any() else flags, None
         value = array.astype(np.float32)
@@ -63,13 +63,15 @@ class Points:
         return mask, _ranked(value)
 
     def shown(self, mask):
-        """Which kind each cell shows, as its place in `kinds` (-1: none), and {kind: number of cells that hold it}.
+        """The kind that each cell shows, as its index in `kinds` (-1: none), and {kind: number of cells with it}.
 
-        The rarest of those that it holds, but undecided, outside and failed before all others; the numbers in the
-        order in which each hides those before it.
+        A cell shows the rarest kind that it contains, but undecided, outside and failed in preference to all others.
+        The numbers are in the order in which each kind hides those before it.
         """
         number = {kind: int(np.count_nonzero(mask & bit)) for kind, bit in self.bits.items()}
-        order = sorted(number, key=lambda kind: (LATE.index(kind) + 1 if kind in LATE else 0, -number[kind]))
+        order = sorted(
+            number, key=lambda kind: (PRECEDENCE.index(kind) + 1 if kind in PRECEDENCE else 0, -number[kind])
+        )
         number = {kind: number[kind] for kind in order if number[kind]}
         kind = np.full(mask.shape, -1, np.int8)
         for name in number:
@@ -77,10 +79,10 @@ class Points:
         return kind, number
 
     def cells(self, overview):
-        """(values, statuses) of the cells, as if each were one point: of the kind, or of the value, that it shows."""
+        """(values, statuses) of the cells, as if each were one point with the kind or the value that it shows."""
         kind, _ = self.shown(overview.mask)
-        told = [status.OK] * len(self.flags), self.own.values(), (status.INVALID_PARAMETERS, status.NO_CONVERGENCE)
-        state = np.array([*(code for codes in told for code in codes), status.OK], np.int8)[kind]
+        codes = [*[status.OK] * len(self.flags), *self.statuses.values()]
+        state = np.array([*codes, status.INVALID_PARAMETERS, status.NO_CONVERGENCE, status.OK], np.int8)[kind]
         if not self.flagged:
             return unranked(overview.rank), state
         other = self.flags.get("undecided", min(self.flags.values()))
@@ -89,10 +91,10 @@ class Points:
 
 
 class Overview:
-    """The whole map of `points`, reduced by whole factors to at most `cells` (number along each axis).
+    """All of `points`, reduced by integer factors to at most `cells` (number along each axis).
 
-    Complete after some calls of `read`; until then UNREAD is among the kinds of a cell that is not. `number` counts
-    the points of each kind that are read.
+    It is complete after some calls of `read`; until then the kinds of an incomplete cell include UNREAD. `number`
+    counts the points of each kind that have been read.
     """
 
     def __init__(self, points, cells):
@@ -108,42 +110,42 @@ class Overview:
         rows = min(rows, max(1, PIECE // shape[1]))
         pieces = [slice(first, min(first + rows, shape[0])) for first in range(0, shape[0], rows)]
         self._pieces = [piece for i in range(STRIDE) for piece in pieces[i::STRIDE]][::-1]
-        self._whole = len(pieces)
+        self._total = len(pieces)
 
     @property
     def share(self):
-        """How much of the map is read, from 0 to 1."""
-        return 1.0 - len(self._pieces) / self._whole
+        """The fraction of the map that has been read."""
+        return 1.0 - len(self._pieces) / self._total
 
     def read(self):
-        """Read one more piece, some rows of the file's tiles; False if there was none."""
+        """Read one more piece, some rows of the file's tiles; False if none was left."""
         if not self._pieces:
             return False
         rows = self._pieces.pop()
         mask, rank = self.points.read(rows, slice(None))
-        groups = np.arange(rows.start, rows.stop) // self.factors[0]  # its first may have begun in the rows before
+        groups = np.arange(rows.start, rows.stop) // self.factors[0]  # the first may have begun in earlier rows
         at = np.flatnonzero(np.diff(groups, prepend=-1))
-        own = slice(groups[0], groups[-1] + 1)
+        here = slice(groups[0], groups[-1] + 1)
         for union, into, part in zip(UNIONS, (self.mask, self.rank), (mask, rank), strict=True):
             if part is not None:
-                union(into[own], over(union, part, at, self.starts[1]), out=into[own])
-        self._left[own] -= np.diff(at, append=groups.size)
-        self.mask[own][self._left[own] == 0] &= ~self.points.bits[UNREAD]
+                union(into[here], over(union, part, at, self.starts[1]), out=into[here])
+        self._left[here] -= np.diff(at, append=groups.size)
+        self.mask[here][self._left[here] == 0] &= ~self.points.bits[UNREAD]
         for kind, bit in self.points.bits.items():
-            if np.bitwise_or.reduce(self.mask[own], axis=None) & bit:
+            if np.bitwise_or.reduce(self.mask[here], axis=None) & bit:
                 self.number[kind] += int(np.count_nonzero(mask & bit))
         return True
 
     @cached_property
     def complete(self):
-        """Itself, all of the map read."""
+        """This overview, after reading all of the map."""
         while self.read():
             pass
         return self
 
 
 def over(union, part, x, y):
-    """The union of the blocks of cells that begin at rows x and columns y."""
+    """The union over each block that begins at one of the rows x and columns y."""
     for axis, starts in enumerate((x, y)):
         if not (starts.size == part.shape[axis] == starts[-1] + 1):  # else one point each
             part = union.reduceat(part, starts, axis=axis)
@@ -151,7 +153,7 @@ def over(union, part, x, y):
 
 
 def _ranked(value):
-    """float32 -> uint32 in the order of magnitude, one-to-one, NaN -> 0: the largest is found without its sign."""
+    """float32 -> uint32 in the order of magnitude, one-to-one, NaN -> 0: so the maximum ignores the sign."""
     bits = value.view(np.uint32)
     return np.where(np.isnan(value), np.uint32(0), (bits << 1 | bits >> 31) + np.uint32(1))
 

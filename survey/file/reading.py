@@ -14,7 +14,7 @@ from survey.file.disk import digest_of
 from survey.file.labels import tally
 
 PIECE = 2**20  # points that are read at once where a file has no tiles
-NETCDF = (b"\x89HDF", b"CDF")  # how a netCDF file begins
+NETCDF = (b"\x89HDF", b"CDF")  # first bytes of a netCDF file
 DIGEST = 2**12  # bytes: a line or two
 IN_MEMORY = 2**28  # bytes: a larger file is opened lazily
 
@@ -30,8 +30,8 @@ def attributes_of(path):
 def load(path, chunks="auto"):
     """The complete dataset in `path`: in memory and the file closed if it takes at most IN_MEMORY bytes, else lazy.
 
-    Lazy means dask arrays; with `chunks` None, arrays that read from the file what is indexed, at once.
-    Raises BadInput (no file of survey) or Damaged (one that is incomplete, or whose bits have changed).
+    Lazy means dask arrays; with `chunks` None, arrays that read what is indexed from the file immediately.
+    Raises BadInput (not a file of survey) or Damaged (incomplete, or its bits have changed).
     """
     import netCDF4
 
@@ -49,10 +49,12 @@ def load(path, chunks="auto"):
     except (BadInput, Stopped):
         raise
     except Damaged as error:
-        raise Damaged(error if str(error).startswith(str(path)) else f"{path}: {error}; ask who wrote it") from None
+        raise Damaged(
+            error if str(error).startswith(str(path)) else f"{path}: {error}; ask its author for an intact copy"
+        ) from None
     except PermissionError:
-        raise BadInput(f"{path}: this file must not be read; allow it, such as with chmod u+r") from None
-    except Exception as error:  # a stranger's file may make the libraries that decode it raise anything
+        raise BadInput(f"{path}: permission denied: make it readable, for example with chmod u+r") from None
+    except Exception as error:  # the libraries that decode an untrusted file may raise anything
         raise Damaged(f"{path}: cannot be read ({error}); run the workflow again") from None
 
 
@@ -70,29 +72,29 @@ def _opened(path, chunks=None):
 
 
 def _refuse_absent(path):
-    left = {} if path.exists() else unfinished.told(path)
+    left = {} if path.exists() else unfinished.summary(path)
     if left:
-        raise Damaged(f"{path}: it is not there yet; {unfinished.sentence(left)}")
+        raise Damaged(f"{path}: this file does not exist yet; {unfinished.sentence(left)}")
     if not path.is_file():
         what = "is a folder" if path.is_dir() else "there is no such file"
-        raise BadInput(f"{path}: {what}; name the netCDF file that survey run wrote")
+        raise BadInput(f"{path}: {what}; name a netCDF file written by survey run")
 
 
 def _refuse_changed(path):
-    """Raise Damaged if the digest beside the file is of other bits, BadInput if it has none and is no netCDF file."""
-    beside = digest_of(path)
+    """Raise Damaged if the file does not match its digest, BadInput if it has none and is not a netCDF file."""
+    digest = digest_of(path)
     with open(path, "rb") as file:
-        if beside.exists():
-            if hashlib.file_digest(file, "sha256").hexdigest().encode() not in _head(beside):
+        if digest.exists():
+            if hashlib.file_digest(file, "sha256").hexdigest().encode() not in _head(digest):
                 raise Damaged(
-                    f"{path}: the file's bits differ from the digest in {beside.name}; run the workflow again"
+                    f"{path}: the file's bits differ from the digest in {digest.name}; run the workflow again"
                 )
         elif not file.read(4).startswith(NETCDF):
-            raise BadInput(f"{path}: this is not a netCDF file of survey; name one that survey run wrote")
+            raise BadInput(f"{path}: this is not a netCDF file of survey; name one written by survey run")
 
 
 def _head(path):
-    """What a digest's file says; no more is read, and nothing of what is no file."""
+    """The beginning of a digest's file; nothing if it is not a regular file."""
     if not path.is_file():
         return b""
     with open(path, "rb") as file:
@@ -100,63 +102,63 @@ def _head(path):
 
 
 def _refuse_foreign(path, file):
-    """Raise BadInput if the open netCDF file is not of survey, Damaged if it is not complete."""
+    """Raise BadInput if survey did not write the open netCDF file, Damaged if it is not complete."""
     names = file.ncattrs()
     if "status" not in file.variables or "scene" not in names:
-        raise BadInput(f"{path}: this netCDF file was not written by survey; name one that survey run wrote")
+        raise BadInput(f"{path}: this netCDF file was not written by survey; name one written by survey run")
     if "complete" not in names or not np.array_equal(np.ravel(file.getncattr("complete")), [1]):
         raise Damaged(f"{path}: the file is incomplete; run the workflow again")
 
 
 def undigested(path):
-    """[a sentence that says what is checked nonetheless] where no digest lies beside the file, else []."""
-    path, beside = Path(path), digest_of(path)
-    if beside.exists():
+    """[a sentence on what is checked nevertheless] if there is no digest beside the file, else []."""
+    path, digest = Path(path), digest_of(path)
+    if digest.exists():
         return []
     return [
-        f"{path}: there is no digest {beside.name} beside it, so what another program has changed goes unseen (what is "
-        "checked: the checksums of its data, counts, status, and some points anew); copy the digest here too, or "
-        f"take the file as it is: sha256sum {shlex.quote(str(path))} > {shlex.quote(str(beside))}"
+        f"{path}: there is no digest {digest.name} beside it, so a change by another program would go unnoticed (the "
+        "checksums of its data, counts, status, and some points solved again are checked); copy the digest here too, "
+        f"or accept the file as it is: sha256sum {shlex.quote(str(path))} > {shlex.quote(str(digest))}"
     ]
 
 
 def check(path, ds=None):
-    """Sentences that say what is wrong with the file (none if it is sound): digest, reading, counts, status.
+    """Sentences on what is wrong with the file (none if it is sound): digest, checksums, counts, status.
 
-    `ds` is what `load` gave, if that is known. Raises what `load` raises.
+    `ds` is the dataset of `load`, if it is already open. Raises what `load` raises.
     """
     ds = load(path) if ds is None else ds
     complaints = undigested(path)
-    again, wrong = tally(ds), {}
+    recount, wrong = tally(ds), {}
     for arrays in pieces(ds):
-        again.add(arrays)
+        recount.add(arrays)
         wrong |= dict.fromkeys(_unsound(path, arrays))
-    for key, told in again.attributes.items():
-        said = ds.attrs.get(key)
-        if not any(np.array_equal(said, right) for right in (told, again.before.get(key, told))):
-            complaints.append(f"{path}: {key} says {said!r}, the data say {told!r}")
-    for name, number in again.counts.items():
-        if sum(number.values()) != again.points:
-            complaints.append(f"{path}: {name} holds codes that its flag_values do not name")
-    if again.counts["status"].get("pending"):
+    for key, right in recount.attributes.items():
+        stored = ds.attrs.get(key)
+        if not any(np.array_equal(stored, value) for value in (right, recount.old_attributes.get(key, right))):
+            complaints.append(f"{path}: {key} is {stored!r}, but the data give {right!r}")
+    for name, number in recount.counts.items():
+        if sum(number.values()) != recount.points:
+            complaints.append(f"{path}: {name} contains codes that are not among its flag_values")
+    if recount.counts["status"].get("pending"):
         complaints.append(f"{path}: some points are still pending")
     return complaints + list(wrong)
 
 
 def pieces(ds):
-    """The map's variables, row by row of its tiles: {name: array} each time, the points' dimensions first."""
+    """Yield the map's variables, one row of tiles at a time: {name: array}, the points' dimensions first."""
     point = ds.status.dims
     names = [name for name in ds.data_vars if set(point) <= set(ds[name].dims)]
-    cut = point[:1]
+    first_dim = point[:1]
     rows = max(1, PIECE // max(1, prod(ds.status.shape[1:])))
-    step = (ds.status.encoding.get("chunksizes") or (rows,))[0] if cut else 1
-    for first in range(0, ds.sizes[cut[0]] if cut else 1, step):
-        some = ds[names].isel({dim: slice(first, first + step) for dim in cut})
-        yield {name: some[name].transpose(*point, ...).values for name in names}
+    step = (ds.status.encoding.get("chunksizes") or (rows,))[0] if first_dim else 1
+    for first in range(0, ds.sizes[first_dim[0]] if first_dim else 1, step):
+        part = ds[names].isel({dim: slice(first, first + step) for dim in first_dim})
+        yield {name: part[name].transpose(*point, ...).values for name in names}
 
 
 def _unsound(path, arrays):
-    """What a status of ok, or an error bar, denies."""
+    """Yield what contradicts a status of ok or an error bar."""
     bad = arrays["status"] != status.OK
     for name in arrays:
         if f"{name}_error" not in arrays:

@@ -1,7 +1,7 @@
-"""What a survey's dataset holds: checked when one is opened, for whoever wrote the file may be a stranger.
+"""The structure of a survey's dataset, checked when one is opened, since the file may be untrusted.
 
-Nothing here reads more than attributes, types, dimensions and coordinates; what stands beside a map (edges, curves,
-cells) is checked where it is used.
+Only attributes, types, dimensions and coordinates are read here; edges, curves and cells are checked where they are
+used.
 """
 
 import math
@@ -11,10 +11,10 @@ import numpy as np
 
 from survey.errors import Damaged
 
-# deflate makes nothing smaller than this: a file that is larger than it can be holds values that were never written
+# the largest compression ratio of deflate: a file that declares more holds values that were never written
 RATIO, SPARE = 1032, 2**20
-CHUNK = 2**28  # bytes: no tile of survey takes a hundredth of it
-AXIS = 10**8  # values: a workflow allows no more
+CHUNK = 2**28  # bytes: tiles of survey are a hundred times smaller
+AXIS = 10**8  # values: more than a workflow allows
 VARIABLES, FLAGS = 2000, 28
 REQUIRED = ("scene", "options", "method", "rtol")
 TEXTS = (
@@ -25,47 +25,47 @@ PACKING = ("scale_factor", "add_offset", "missing_value", "_Unsigned")
 ENCODINGS = ("utf-8", "ascii")
 
 
-def check(ds, whole=True):
-    """Raise Damaged, naming the part, where the dataset is none that survey writes.
+def check(ds, complete=True):
+    """Raise Damaged, naming the part, where the dataset is not one that survey writes.
 
-    `whole`, as files are: all attributes are there, the flags of the status too, and each axis has finite numbers.
+    `complete`, as in files: with all attributes and the flags of the status, and finite numbers on each axis.
     """
-    _check_attributes(ds.attrs, REQUIRED if whole else ("scene",))
+    _check_attributes(ds.attrs, REQUIRED if complete else ("scene",))
     _check_points(ds)
     for name, variable in ds.variables.items():
         _check_variable(ds, name, variable)
-    if whole:
+    if complete:
         _flags_of("status", ds.status.attrs)
         _check_axes(ds)
 
 
 def check_declared(file, size):
-    """Raise Damaged where an open netCDF4 file of `size` bytes declares more than it can hold, or other types."""
+    """Raise Damaged where an open netCDF4 file of `size` bytes declares more than it can hold, or unknown types."""
     if len(file.variables) > VARIABLES:
-        raise Damaged(f"it has {len(file.variables):,} variables, and no survey has more than {VARIABLES:,}")
-    whole = 0
+        raise Damaged(f"it has {len(file.variables):,} variables; no survey has more than {VARIABLES:,}")
+    declared = 0
     for name, variable in file.variables.items():
         kind = np.dtype(object) if variable.dtype is str else variable.datatype
         if not isinstance(kind, np.dtype) or kind.kind not in "iufSO":
-            raise Damaged(f"the variable {name} holds neither numbers nor text")
+            raise Damaged(f"the variable {name} contains neither numbers nor text")
         if name in variable.dimensions and variable.size > AXIS:
             raise Damaged(f"the axis {name} has {variable.size:,} values, more than {AXIS:,}")
         _check_packing(name, variable)
-        whole += math.prod(variable.shape) * kind.itemsize
+        declared += math.prod(variable.shape) * kind.itemsize
         chunks = variable.chunking()
         if isinstance(chunks, list) and math.prod(chunks) * kind.itemsize > CHUNK:
             raise Damaged(f"the variable {name} has chunks of {math.prod(chunks) * kind.itemsize:,} bytes")
-    if whole > RATIO * size + SPARE:
-        raise Damaged(f"it declares {whole:,} bytes of values, more than a file of {size:,} bytes can hold")
+    if declared > RATIO * size + SPARE:
+        raise Damaged(f"it declares {declared:,} bytes of values, more than a file of {size:,} bytes can hold")
 
 
 def _check_packing(name, variable):
     attributes = variable.ncattrs()
     for key in PACKING:
         if key in attributes:
-            raise Damaged(f"the variable {name} has the attribute {key}, and values of surveys are stored as they are")
+            raise Damaged(f"the variable {name} has the attribute {key}, but surveys store values as they are")
     if np.size(variable.getncattr("_FillValue") if "_FillValue" in attributes else 0) != 1:
-        raise Damaged(f"the variable {name} has more than one _FillValue, or none that is one")
+        raise Damaged(f"the variable {name} must have a single _FillValue")
     encoding = variable.getncattr("_Encoding") if "_Encoding" in attributes else "utf-8"
     if str(encoding).lower().replace("utf8", "utf-8") not in ENCODINGS:
         raise Damaged(f"{name}._Encoding = {str(encoding)[:60]!r} (allowed: {', '.join(ENCODINGS)})")
@@ -77,12 +77,12 @@ def _check_attributes(given, required):
             raise Damaged(f"the attribute {name} is missing")
     for name in TEXTS:
         if not isinstance(given.get(name, ""), str):
-            raise Damaged(f"the attribute {name} is {_told(given[name])}, and should be a text")
+            raise Damaged(f"the attribute {name} is {_brief(given[name])}; it must be text")
     if not given["scene"]:
         raise Damaged("the attribute scene is empty")
     rtol = given.get("rtol", 0.5)
     if not (isinstance(rtol, (int, float, np.integer, np.floating)) and 0 < rtol < 1):
-        raise Damaged(f"the attribute rtol is {_told(rtol)}, and should be a number between 0 and 1")
+        raise Damaged(f"the attribute rtol is {_brief(rtol)}; it must be a number between 0 and 1")
     options(given)
 
 
@@ -90,20 +90,22 @@ def options(given):
     """{name: value} in the attribute `options`; raises Damaged."""
     pairs = [pair.split("=") for pair in given.get("options", "").split(", ") if pair]
     if any(len(pair) != 2 for pair in pairs):
-        raise Damaged(f"the attribute options is {_told(given['options'])}, and should read name=value, name=value")
+        raise Damaged(
+            f"the attribute options is {_brief(given['options'])}; it must have the form name=value, name=value"
+        )
     return dict(pairs)
 
 
-def flags(meaning):
+def flags(attributes):
     """{flag meaning: code} from the attributes of a CF flag variable; raises Damaged."""
-    words, codes = meaning.get("flag_meanings"), np.atleast_1d(meaning.get("flag_values", ()))
-    names = words.split() if isinstance(words, str) else []
+    meanings, codes = attributes.get("flag_meanings"), np.atleast_1d(attributes.get("flag_values", ()))
+    names = meanings.split() if isinstance(meanings, str) else []
     if not names or codes.dtype.kind not in "iu" or codes.shape != (len(names),):
-        raise Damaged("flag_meanings and flag_values do not name one integer each")
+        raise Damaged("flag_meanings and flag_values must pair each meaning with an integer")
     if len(names) > FLAGS or len(set(names)) < len(names) or np.unique(codes).size < codes.size:
-        raise Damaged(f"flag_meanings and flag_values name something twice, or more than {FLAGS} flags")
+        raise Damaged(f"flag_meanings and flag_values have duplicates, or more than {FLAGS} entries")
     if codes.min() < -128 or codes.max() > 127:
-        raise Damaged("flag_values reach beyond a byte")
+        raise Damaged("flag_values must fit into a byte")
     return dict(zip(names, codes.tolist(), strict=True))
 
 
@@ -117,31 +119,31 @@ def _check_points(ds):
         if name not in ds.data_vars:
             continue
         if ds[name].dtype.kind != "i" or set(ds[name].dims) != set(axes):
-            raise Damaged(f"the variable {name} should hold an integer for each point")
+            raise Damaged(f"the variable {name} must hold an integer for each point")
 
 
 def _check_variable(ds, name, variable):
     if not isinstance(name, str):
-        raise Damaged(f"{name!r} is no name of a variable")
+        raise Damaged(f"{name!r} is not a variable name")
     given = variable.attrs
     for key in ("long_name", "units", "symbol", "comment"):
         if not isinstance(given.get(key, ""), str):
-            raise Damaged(f"{name}.{key} is {_told(given[key])}, and should be a text")
+            raise Damaged(f"{name}.{key} is {_brief(given[key])}; it must be text")
     if "flag_values" in given or "flag_meanings" in given:
         _flags_of(name, given)
     if "flag_values" in given and variable.dtype.kind not in "iu":
-        raise Damaged(f"{name} has flags, and holds no integers")
+        raise Damaged(f"{name} has flags, but does not hold integers")
     of_points = name in ds.data_vars and set(ds.status.dims) <= set(variable.dims)
     if of_points and variable.dtype.kind not in "iuf":
         raise Damaged(f"{name} does not hold a number for each point")
     bar = ds.variables.get(f"{name}_error")
     if bar is not None and (bar.dims != variable.dims or bar.dtype.kind != "f"):
-        raise Damaged(f"{name}_error is no error bar for each value of {name}")
+        raise Damaged(f"{name}_error must hold an error bar for each value of {name}")
 
 
-def _flags_of(name, meaning):
+def _flags_of(name, attributes):
     try:
-        flags(meaning)
+        flags(attributes)
     except Damaged as error:
         raise Damaged(f"{name}: {error}") from None
 
@@ -152,22 +154,22 @@ def _check_axes(ds):
         if axis is None:
             continue
         if axis.dims != (dim,) or axis.dtype.kind not in "iuf":
-            raise Damaged(f"the axis {dim} is no list of numbers")
+            raise Damaged(f"the axis {dim} must be one-dimensional and numeric")
         if not np.isfinite(axis.values).all():
-            raise Damaged(f"the axis {dim} holds what is no finite number")
+            raise Damaged(f"the axis {dim} contains values that are not finite")
 
 
 def edges(ds):
-    """Raise Damaged unless the rows' edges of tongues are whole: `edge_*` along the dimension `edge`."""
+    """Raise Damaged unless the edges of tongues are consistent: `edge_*` along the dimension `edge`."""
     _along(ds, "edge", "edge_position", "edge_position_error", "edge_class", "edge_index")
     _divided(ds, "edge_count", "edge")
     _coded(ds, "edge_class")
     if not set(ds.edge_count.dims) <= set(ds.status.dims) or ds.attrs.get("boundaries") not in ds.status.dims:
-        raise Damaged("edge_count, or the attribute boundaries, does not name axes of the map")
+        raise Damaged("edge_count and the attribute boundaries must refer to axes of the map")
 
 
 def curves(ds):
-    """Raise Damaged unless the boundary curves are whole: `curve_*` along the dimensions `curve` and `curve_point`."""
+    """Raise Damaged unless the boundary curves are consistent: `curve_*` along `curve` and `curve_point`."""
     _along(ds, "curve", "curve_count", "curve_class", *(["curve_index"] if "curve_index" in ds else []))
     _along(ds, "curve_point", *(f"curve_{dim}" for dim in ds.status.dims))
     _divided(ds, "curve_count", "curve_point")
@@ -175,21 +177,21 @@ def curves(ds):
 
 
 def cells(ds):
-    """Raise Damaged unless the cells of a refined map and the areas of its verdicts are whole."""
+    """Raise Damaged unless the cells of a refined map and the areas of its verdicts are consistent."""
     if ds.attrs.get("refine") != ", ".join(ds.status.dims) or len(ds.status.dims) != 2:
-        raise Damaged("the attribute refine does not name the two axes of the map")
+        raise Damaged("the attribute refine must name the two axes of the map")
     _along(ds, "cell", "cell_verdict", *(f"cell_{dim}_{end}" for dim in ds.status.dims for end in ("low", "high")))
     _coded(ds, "cell_verdict")
     if "undecided" not in flags(ds.cell_verdict.attrs) or not ds.sizes["cell"]:
-        raise Damaged("cell_verdict has no flag undecided, or no values")
+        raise Damaged("cell_verdict must have a flag undecided, and values")
     areas(ds)
 
 
 def areas(ds):
-    """Raise Damaged unless each verdict has its area and its share."""
+    """Raise Damaged unless each verdict has its area and its fraction of the map."""
     _along(ds, "area_verdict", "area_verdict", "area", "area_error", "area_fraction", "area_fraction_error")
     if len(flags(ds.area_verdict.attrs)) != ds.sizes["area_verdict"]:
-        raise Damaged("area_verdict does not name a verdict for each area")
+        raise Damaged("area_verdict must name a verdict for each area")
 
 
 def _along(ds, what, *names):
@@ -197,22 +199,22 @@ def _along(ds, what, *names):
     for name in names:
         variable = ds.variables.get(name)
         if variable is None or variable.dims != (what,) or variable.dtype.kind not in "iuf":
-            raise Damaged(f"{name} should hold a number for each {what}")
+            raise Damaged(f"{name} must hold a number for each {what}")
 
 
 def _divided(ds, count, what):
-    """Raise Damaged unless the integers `count` divide the dimension `what` among them."""
+    """Raise Damaged unless the integers `count` partition the dimension `what`."""
     number = ds[count].values if count in ds else np.array([-1])
     if number.dtype.kind not in "iu" or (number < 0).any() or number.sum(dtype=float) != ds.sizes.get(what, 0):
-        raise Damaged(f"{count} does not tell how the values along {what} are divided")
+        raise Damaged(f"{count} must add up to the number of values along {what}")
 
 
 def _coded(ds, name):
     """Raise Damaged unless every value of a flag variable is one of its flags."""
     if not np.isin(ds[name].values, list(flags(ds[name].attrs).values())).all():
-        raise Damaged(f"{name} holds codes that its flag_values do not name")
+        raise Damaged(f"{name} contains codes that are not among its flag_values")
 
 
-def _told(value):
+def _brief(value):
     text = "a table" if isinstance(value, Mapping) else repr(value)
     return text if len(text) <= 60 else f"{text[:56]} ..."

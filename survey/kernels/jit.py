@@ -72,7 +72,9 @@ def is_new():
     return _DIRECTORY is not None and not numba.config.DISABLE_JIT and next(_DIRECTORY.rglob("*.nbi"), None) is None
 
 
-ahead = None  # wait() returns once what compiles for this process, on a new machine, is done (see `sweep.ahead`)
+ahead = (
+    None  # wait() returns once what compiles for this process, on a new machine, is done (see `sweep.compile_ahead`)
+)
 waited = 0.0
 
 

@@ -1,16 +1,16 @@
-"""The work-precision chart: error against the reference values over time per point, for every method and peer.
+"""The work-precision chart: error with respect to reference values against time per point, for every method and peer.
 
-Everything that belongs to one scene lies in the file of its name beside this one:
+Everything specific to a scene is in the file of its name in `cases/`:
 
     ERROR                  the output whose error is charted
     references(work)       [(parameters, options, {output: exact value}, verdict or None), ...] like the work's points,
                            the very same list for works that share it
-    works()                {name of the work: (point, options)}, what is timed; the arrays of `point` broadcast
+    works()                {name of the work: (point, options)}, which is timed; the arrays of `point` broadcast
     system(point, options) the same question as ODEs, for the peers in `survey.precision.peers`
     outcome(ends)          {ERROR: values} from the states (points, n) at the ends of the spans, and "verdict" if any
-    LIMITED                the method whose operations, at the machine's peak rate, are the least time of the chart
+    LIMITED                the method whose operations, at the machine's peak rate, give the least time in the chart
     operations_of(run)     its operations while `run()` solves a work with it (both optional)
-    MOST                   {method: number of points that it is timed on}, for those that need long (optional)
+    MOST                   {method: number of points that it is timed on}, for slow ones (optional)
 """
 
 import csv
@@ -29,22 +29,20 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-import survey.precision.cases as cases
-import survey.precision.peers as programs
-import survey.scenes as scenes
-from survey import modules
+from survey import modules, scenes
 from survey.errors import BadInput
 from survey.file.labels import provenance
 from survey.grid import line
 from survey.measures.hill import dense
-from survey.precision import peak
-from survey.request import workflow
+from survey.precision import cases, flops
+from survey.precision import peers as programs
+from survey.request.checks import check_options, check_parameters, methods_of
 from survey.scene import Request, exists
 
 SETTINGS = tuple(10.0**-n for n in range(4, 14))
 REPEATS = 5
 ENOUGH_SECONDS = 0.5
-# Methods other than auto, which treats a map as a whole, are timed on so many points of it.
+# Points of a map on which methods other than auto, which treats a map as a whole, are timed.
 POINTS = 10_000
 
 
@@ -64,7 +62,7 @@ class Record:
 
 @dataclass
 class Least:
-    """The least time of a method's steps: its operations at the peak rate, multiplied and added apart or fused."""
+    """The least time of a method's steps: its operations at the peak rate, with separate or fused multiply-adds."""
 
     work: str
     method: str
@@ -99,37 +97,37 @@ def write(scene, directory, peers=False, say=lambda line: None):
 
 
 def measure(scene, case, peers=False, say=lambda line: None):
-    """The records of every method (and, if asked, of every peer that is installed) at every setting.
+    """The records of every method (and, if requested, of every installed peer) at every setting.
 
-    A method is left out where it has no answer for a reference of the work (closed forms, where there is none).
+    A method is left out of a work if it has no answer for one of its references (closed forms, where there is none).
     """
     module = scenes.load(scene)
-    methods = ["auto", *workflow.methods_of(module, next(iter(case.works().values()))[1])]
+    methods = ["auto", *methods_of(module, next(iter(case.works().values()))[1])]
     fewer = getattr(case, "MOST", {})
     runs = {(method, ""): (_solver(module, method, case.ERROR), fewer.get(method)) for method in methods}
     absent = missing(peers)
     for name in absent:
-        say(f"{name} is not installed and is missing in the chart: pip install 'survey[bench]'")
+        say(f"{name} is not installed and is missing from the chart: pip install 'survey[bench]'")
     for name in sorted(set(modules.names(programs)) - set(absent)) if peers else ():
         peer = modules.load(programs, name, "peer")
         runs["", name] = _peer(case, peer), peer.POINTS
-    whole = case.works()
-    thinned = {work: (_thinned(point), options) for work, (point, options) in whole.items()}
+    full = case.works()
+    thinned = {work: (_thinned(point), options) for work, (point, options) in full.items()}
     records = []
     for (method, peer), (solve, most) in runs.items():
-        works = whole if peer or method == "auto" else thinned
+        works = full if peer or method == "auto" else thinned
         compile_seconds = _first_call(solve, works, most) if peer else _cold(scene, method)
         for point, options in works.values() if method else ():  # every path is compiled before it is timed
             solve(point, options, SETTINGS[0])
         for setting in SETTINGS:
-            judged = {}
+            errors = {}
             for work, (point, options) in works.items():
                 references = case.references(work)
-                if method == "auto":  # it treats a dense row as a whole: its error is that within such a row
-                    judged, references = {}, [_within(reference, point) for reference in references]
-                if id(references) not in judged:
-                    judged[id(references)] = _against(solve, references, case.ERROR, setting)
-                error, wrong = judged[id(references)]
+                if method == "auto":  # it treats a dense row as a whole: its error is the one within such a row
+                    errors, references = {}, [_within(reference, point) for reference in references]
+                if id(references) not in errors:
+                    errors[id(references)] = _against(solve, references, case.ERROR, setting)
+                error, wrong = errors[id(references)]
                 if np.isnan(error):
                     continue
                 seconds = _per_point(solve, point, options, setting, most)
@@ -139,13 +137,13 @@ def measure(scene, case, peers=False, say=lambda line: None):
 
 
 def missing(peers):
-    """Names of the peers that are asked for and not installed."""
+    """Names of the requested peers that are not installed."""
     return [name for name in modules.names(programs) if peers and not importlib.util.find_spec(name)]
 
 
 def limit(scene, case):
-    """The machine's rates, and the least seconds per point that the operations of one method leave possible."""
-    rates = peak.rates()
+    """The machine's rates, and the least seconds per point that the operations of one method allow."""
+    rates = flops.rates()
     if not hasattr(case, "LIMITED"):
         return {"rates": rates, "least": []}
     solve = _solver(scenes.load(scene), case.LIMITED, case.ERROR)
@@ -160,7 +158,7 @@ def limit(scene, case):
 
 
 def _peer(case, peer):
-    """A function of (point, options, rtol) that has the peer integrate the scene's equations."""
+    """A function of (point, options, rtol) that integrates the scene's equations with the peer."""
 
     def solve(point, options, rtol):
         return case.outcome(peer.integrate(case.system(point, options), rtol))
@@ -169,62 +167,62 @@ def _peer(case, peer):
 
 
 def _lines(point):
-    """The axes that one parameter of a work has for itself, as `Request.lines`."""
+    """The axes that belong to a single parameter of a work, as `Request.lines`."""
     shapes = {name: np.shape(values) for name, values in point.items()}
-    own = {name: [i for i, size in enumerate(shape) if size > 1] for name, shape in shapes.items()}
-    alone = (name for name in own if len(own[name]) == 1 and sum(own[name] == other for other in own.values()) == 1)
+    axes = {name: [i for i, size in enumerate(shape) if size > 1] for name, shape in shapes.items()}
+    alone = (name for name in axes if len(axes[name]) == 1 and list(axes.values()).count(axes[name]) == 1)
     return {name: line(np.ravel(point[name])) for name in alone}
 
 
 def _within(reference, point):
-    """The reference as the first point of a row of the work, where the work has rows."""
+    """The reference as the first point of a row of the work, if the work has rows."""
     parameters, options, exact, verdict = reference
     lines = [name for name in _lines(point) if np.shape(point[name])[-1] > 1]
     if not lines:
         return reference
-    whole = {name: np.array([[value]]) for name, value in parameters.items()}
-    whole |= {name: np.concatenate([whole[name], np.atleast_2d(point[name])], axis=1) for name in lines}
-    return whole, options, exact, verdict
+    row = {name: np.array([[value]]) for name, value in parameters.items()}
+    row |= {name: np.concatenate([row[name], np.atleast_2d(point[name])], axis=1) for name in lines}
+    return row, options, exact, verdict
 
 
 def _solver(module, method, error):
     """A function of (point, options, rtol) that calls the scene for the output `error` and the verdict; see `works`."""
 
     def solve(point, options, rtol):
-        options = workflow.check_options(module, options, point)
-        used = workflow.check_parameters(module, module.TITLE, options, point)
+        options = check_options(module, options, point)
+        used = check_parameters(module, module.TITLE, options, point)
         wanted = frozenset(o.name for o in module.OUTPUTS if exists(o, options) and o.name in (error, "verdict"))
         request = Request(options, method, rtol, wanted, _lines(point))
         ndim = max(np.ndim(values) for values in point.values()) or 1
-        whole = {key: np.asarray(point.get(key, p.default), float) for key, p in used.items()}
-        dense.panels.cache_clear()  # every call pays for its set-up
-        return module.solve({key: v if v.ndim else v.reshape((1,) * ndim) for key, v in whole.items()}, request)
+        arrays = {key: np.asarray(point.get(key, p.default), float) for key, p in used.items()}
+        dense.panels.cache_clear()  # every call includes its set-up
+        return module.solve({key: v if v.ndim else v.reshape((1,) * ndim) for key, v in arrays.items()}, request)
 
     return solve
 
 
 def _cold(scene, method):
     """Compile seconds of the method in a new process with an empty kernel cache."""
-    words = f"from survey import precision; print(precision.first_call({scene!r}, {method!r}))"
+    program = f"from survey import precision; print(precision.first_call({scene!r}, {method!r}))"
     with TemporaryDirectory() as empty:
         environment = os.environ | {"NUMBA_CACHE_DIR": empty}
-        told = subprocess.run(
-            [sys.executable, "-c", words], capture_output=True, text=True, check=True, env=environment
+        done = subprocess.run(
+            [sys.executable, "-c", program], capture_output=True, text=True, check=True, env=environment
         )
-    return float(told.stdout)
+    return float(done.stdout)
 
 
 def first_call(scene, method):
-    """Seconds that the first call of a scene's method takes in this process, less those of the second."""
+    """Seconds of the first call of a scene's method in this process, minus those of the second."""
     case = modules.load(cases, scene, "scene with a precision chart")
     solve = _solver(scenes.load(scene), method, case.ERROR)
     return _first_call(solve, case.works(), getattr(case, "MOST", {}).get(method))
 
 
 def _first_call(solve, works, most=None):
-    """Seconds of the first call less those of the second, on the smallest work."""
+    """Seconds of the first call minus those of the second, on the smallest work."""
     point, options = min(works.values(), key=lambda work: _points(work[0]))
-    point = _share(point, most)
+    point = _sample(point, most)
     times = []
     for _ in range(2):
         start = time.perf_counter()
@@ -250,7 +248,7 @@ def _against(solve, references, name, rtol):
 
 def _per_point(solve, point, options, rtol, most=None):
     """Median seconds per point of a few calls, on at most `most` points of the work."""
-    point = _share(point, most)
+    point = _sample(point, most)
     times, begin = [], time.perf_counter()
     while len(times) < REPEATS and (not times or time.perf_counter() - begin < ENOUGH_SECONDS):
         start = time.perf_counter()
@@ -260,13 +258,13 @@ def _per_point(solve, point, options, rtol, most=None):
 
 
 def _thinned(point):
-    """About POINTS points of a larger map, in whole rows: enough where rows share nothing."""
+    """About POINTS points of a larger map, in complete rows: enough where rows are independent."""
     every = -(-_points(point) // POINTS)
     return {name: values[::every] if np.ndim(values) > 1 else values for name, values in point.items()}
 
 
-def _share(point, most):
-    """At most `most` points of the work, drawn at random."""
+def _sample(point, most):
+    """At most `most` random points of the work."""
     if most is None or _points(point) <= most:
         return point
     names, flat = list(point), [values.ravel() for values in np.broadcast_arrays(*point.values())]

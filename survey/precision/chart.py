@@ -2,60 +2,60 @@
 
 import matplotlib.pyplot as plt
 
-# Okabe and Ito's colours that show as lines
+# Okabe and Ito's colours that are visible as lines
 COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999", "#5D3A9B", "#8C6D31")
 MARKERS = "osD^vP*X<>"
-LEAST_ERROR = 1e-17  # a chart in logarithms has no zero
+LEAST_ERROR = 1e-17  # a logarithmic axis has no zero
 
 
 def draw(records, machine, scene, name, path):
-    """Draw the records of `survey precision`, and the least times in `machine`, to `path`: lower left is better."""
+    """Draw the records of `survey precision`, and the least times in `machine`, to `path`."""
     works = list(dict.fromkeys(record.work for record in records))
     runs = list(dict.fromkeys((record.method, record.peer) for record in records))
     figure, panels = plt.subplots(
         1, len(works), figsize=(4.6 * len(works), 5.6), sharex=True, sharey=True, squeeze=False, layout="constrained"
     )
     for axes, work in zip(panels[0], works, strict=True):
-        own = [record for record in records if record.work == work]
-        _limit(axes, [entry for entry in machine["least"] if entry["work"] == work], own)
+        of_work = [record for record in records if record.work == work]
+        _limit(axes, [entry for entry in machine["least"] if entry["work"] == work], of_work)
         for number, (method, peer) in enumerate(runs):
-            look = {"marker": MARKERS[number % len(MARKERS)], "color": COLOURS[number % len(COLOURS)]}
-            mine = [r for r in own if (r.method, r.peer) == (method, peer)]
-            if mine:  # closed forms do not answer every work
-                _line(axes, mine, look)
+            style = {"marker": MARKERS[number % len(MARKERS)], "color": COLOURS[number % len(COLOURS)]}
+            of_run = [r for r in of_work if (r.method, r.peer) == (method, peer)]
+            if of_run:  # closed forms do not answer every work
+                _line(axes, of_run, style)
         axes.set(title=work, xlabel="time per point on one thread (s)", xscale="log", yscale="log")
         axes.grid(alpha=0.3)
     panels[0, 0].set_ylabel(f"largest error of the {name}, relative to 1 + |value|")
     named = {label: line for axes in panels[0] for line, label in zip(*axes.get_legend_handles_labels(), strict=True)}
-    title = "in brackets: compilation, which no time counts"
+    title = "in brackets: compilation time, not included"
     if machine["missing_peers"]:
         title += f"; not installed: {', '.join(machine['missing_peers'])}"
     figure.legend(
         named.values(), named.keys(), loc="outside lower center", ncols=5, fontsize=8, title=title, title_fontsize=8
     )
     figure.suptitle(
-        f"{scene}: error against time, lower left is better (beside points: wrong verdicts on the references)"
+        f"{scene}: error against time, lower left is better (numbers at points: wrong verdicts on the references)"
     )
     figure.savefig(path, dpi=150)
     plt.close(figure)
 
 
-def _line(axes, own, look):
+def _line(axes, records, style):
     """One method or peer (hollow, dashed), with the number of wrong verdicts beside each point that has any."""
-    method, peer = own[0].method, own[0].peer
-    seconds, errors = [r.seconds_per_point for r in own], [max(r.error, LEAST_ERROR) for r in own]
+    method, peer = records[0].method, records[0].peer
+    seconds, errors = [r.seconds_per_point for r in records], [max(r.error, LEAST_ERROR) for r in records]
     name = f"peer {peer}" if peer else method
-    style = {"ls": "--", "mfc": "white"} if peer else {"lw": 2.5 if method == "auto" else 1.2}
-    axes.plot(seconds, errors, ms=5, label=f"{name} ({own[0].compile_seconds:.1f} s)", **{"lw": 1.2} | style | look)
-    for number, record in enumerate(r for r in own if r.wrong_verdicts):
-        # to the right and to the left in turn, else the figures of neighbours read as one number
-        place = {"xytext": (5, 3), "ha": "left"} if number % 2 == 0 else {"xytext": (-5, -9), "ha": "right"}
+    style |= {"ls": "--", "mfc": "white", "lw": 1.2} if peer else {"lw": 2.5 if method == "auto" else 1.2}
+    axes.plot(seconds, errors, ms=5, label=f"{name} ({records[0].compile_seconds:.1f} s)", **style)
+    for number, record in enumerate(r for r in records if r.wrong_verdicts):
+        # alternately right and left, else the numbers of neighbours would read as one
+        position = {"xytext": (5, 3), "ha": "left"} if number % 2 == 0 else {"xytext": (-5, -9), "ha": "right"}
         axes.annotate(record.wrong_verdicts, (record.seconds_per_point, max(record.error, LEAST_ERROR)),
-                      textcoords="offset points", color=look["color"], fontsize=8, **place)  # fmt: skip
+                      textcoords="offset points", color=style["color"], fontsize=8, **position)  # fmt: skip
 
 
 def _limit(axes, least, records):
-    """The least time of a method's operations, at the errors which that method has there, if it was counted."""
+    """Draw the least time of a method's operations against its errors, if they were counted."""
     if not least:
         return
     errors = {r.setting: max(r.error, LEAST_ERROR) for r in records if r.method == least[0]["method"]}

@@ -1,4 +1,4 @@
-"""The scene that a user's z(u, p) makes: what a module of `survey.scenes` holds, as an object (see `user_scene`)."""
+"""The scene of a user's z(u, p): what a module of `survey.scenes` offers, as an object (see `user_scene`)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
@@ -9,33 +9,31 @@ import numpy as np
 from survey import status
 from survey.errors import BadInput
 from survey.kernels.math.roundoff import EPS
-from survey.measures.hill import monodromy as measure
-from survey.measures.hill import more_digits, motion, user_equation
-from survey.measures.hill import why as hill_why
+from survey.measures.hill import monodromy, more_digits, motion, user_equation, why
 from survey.scene import Parameter
 
-WORDS = {
+LONG_NAMES = {
     "y1": "y1(T), where y1(0) = 1, y1'(0) = 0",
     "y2": "y2(T), where y2(0) = 0, y2'(0) = 1",
     "dy1": "derivative of y1 at T",
     "dy2": "derivative of y2 at T",
 }
 SYMBOLS = {"y1": "y_1(T)", "y2": "y_2(T)", "dy1": "y_1'(T)", "dy2": "y_2'(T)"}
-# Breaks closer than this share of the period to one another or to its ends are one.
+# Breaks closer to each other or to the ends than this fraction of the period count as one.
 SAME = 8 * user_equation.SLACK
-# How the lines of numba's messages begin that do not say what is wrong.
+# Beginnings of those lines of numba's messages that do not say what is wrong.
 CHATTER = ("Failed in", "During", "This error", "There are", "- Of which", "Overload", "File ", "Unknown", "^", "[1]")
-_known = {}  # by hash: a worker process compiles a scene once, however many blocks it gets
-# What two of the common codes mean here.
+_known = {}  # by hash: a worker process compiles a scene once, for all of its blocks
+# Meaning of two of the common codes here.
 STATUS = {
-    "invalid_parameters": "outside the domain, or z or T has no finite value there, or z is not even as EVEN says",
-    "no_convergence": "z is not smooth between its BREAKS: name every place where it jumps or bends",
+    "invalid_parameters": "outside the domain, or z or T is not finite there, or z is not even although EVEN = True",
+    "no_convergence": "z is not smooth between its BREAKS: name every position where it jumps or has a kink",
 }
 
 
 @dataclass(frozen=True, eq=False)
 class HillScene:
-    """What a scene's module holds (see `survey.scenes`), for a user's z; `about` is its docstring."""
+    """What a scene's module offers (see `survey.scenes`), for a user's z; `about` is its docstring."""
 
     z: Callable
     period: float | Callable
@@ -57,31 +55,32 @@ class HillScene:
         object.__setattr__(self, "__doc__", self.about)
 
     def __reduce__(self):
-        return _again, (self.HASH, [getattr(self, field.name) for field in fields(self)])
+        return _restored, (self.HASH, [getattr(self, field.name) for field in fields(self)])
 
     @property
     def OUTPUTS(self):
-        """Those of Hill's question; where z is not even, y1 to dy2 are values at T."""
-        return measure.OUTPUTS if self.EVEN else tuple(_of_whole_period(o) for o in measure.OUTPUTS)
+        """The outputs for Hill's equation; where z is not even, y1 to dy2 are values at T."""
+        return monodromy.OUTPUTS if self.EVEN else tuple(_at_full_period(o) for o in monodromy.OUTPUTS)
 
     @property
-    def _share(self):
+    def _divisor(self):
         """The part of the period that is solved is T over this."""
         return 2 if self.EVEN else 1
 
     @property
     def _sampling(self):
-        return f"samples every T/{self._share * user_equation.PROBES}"
+        return f"samples every T/{self._divisor * user_equation.PROBES}"
 
     @cached_property
     def NOTES(self):
-        """What a file says of how z is known: global attributes."""
-        checked = f"every T/{self._share * user_equation.CHECKED} at the ends and middles of the axes"
+        """How z is known, as global attributes of a file."""
+        checked = f"every T/{self._divisor * user_equation.CHECKED} at the ends and middles of the axes"
         unseen = f"z is known by {self._sampling}, and {checked}; a spike narrower than that may go unseen"
-        digits = f"none: {self._words}" if self._words else "double-double, where float64 leaves a verdict open"
+        obstacle = self._obstacle
+        digits = f"none: {obstacle}" if obstacle else "double-double, where float64 cannot decide a verdict"
         return {
-            "z_resolved_width": 1 / (self._share * user_equation.PROBES),
-            "z_resolution": f"{unseen} unless its place is one of BREAKS (z_resolved_width is a share of T)",
+            "z_resolved_width": 1 / (self._divisor * user_equation.PROBES),
+            "z_resolution": f"{unseen} unless its position is one of BREAKS (z_resolved_width is a fraction of T)",
             "z_more_digits": digits,
         }
 
@@ -90,15 +89,15 @@ class HillScene:
         return 2e-5 if self.EVEN else 3e-5
 
     def solve(self, point, request):
-        """All outputs of a block that the request wants (see `survey.scenes`)."""
+        """The requested outputs of a block (see `survey.scenes`)."""
         shape = np.broadcast_shapes(*(np.shape(values) for values in point.values()))
         columns = [np.broadcast_to(point[p.name], shape).reshape(-1) for p in self.PARAMETERS]
         points = np.stack(columns, axis=1).astype(float)
         period, edges, slack = self._ranges(points)
         edges[~np.isfinite(points).all(axis=1)] = np.nan
-        exact = None if self._words else self._exact
+        exact = None if self._obstacle else self._exact
         problem, rough = self._called(user_equation.problem, self.z, points, edges, period, slack, self.EVEN, exact)
-        out = self._called(measure.solve, problem, request.method, request.rtol, request.variables)
+        out = self._called(monodromy.solve, problem, request.method, request.rtol, request.variables)
         out["status"] = np.where(rough[:, None], status.NO_CONVERGENCE, out["status"]).astype(np.int8)
         out["period"] = np.where(out["status"] == status.OK, period[:, None], np.nan)
         out["period_error"] = (4 if callable(self.period) else 1) * EPS * out["period"]
@@ -106,7 +105,7 @@ class HillScene:
 
     def why(self, answer):
         """Why the point has its verdict (see `survey.scenes`)."""
-        return hill_why.why(answer, self.EVEN)
+        return why.why(answer, self.EVEN)
 
     def trajectory(self, point, answer, options, time=None):
         """Solutions and multipliers of a point (see `survey.scenes`)."""
@@ -121,14 +120,14 @@ class HillScene:
         period = np.array([self._period(p) for p in each])
         period = np.where(period > 0, period, np.nan)
         breaks = [np.atleast_1d(self._value("BREAKS", self.breaks, p)) for p in each]
-        rows = [self._row(own, length) for own, length in zip(breaks, period, strict=True)]
+        rows = [self._row(some, length) for some, length in zip(breaks, period, strict=True)]
         most = max((len(row) for row in rows), default=2)
         edges = np.array([[*row, *[row[-1]] * (most - len(row))] for row in rows]).reshape(len(rows), most)
-        slack = np.array([user_equation.SLACK * (own.size > 0) for own in breaks]) * period
-        number = (len(points), 1)
+        slack = np.array([user_equation.SLACK * (some.size > 0) for some in breaks]) * period
         if each is points:
             return period, edges, slack
-        return np.full(number[0], period[0]), np.tile(edges, number), np.full(number[0], slack[0])
+        number = len(points)
+        return np.full(number, period[0]), np.tile(edges, (number, 1)), np.full(number, slack[0])
 
     def _row(self, breaks, period):
         """0, the breaks inside the part that is solved, and its end."""
@@ -137,20 +136,20 @@ class HillScene:
             return [np.nan, np.nan]
         end = 0.5 * period if self.EVEN else period
         row = [0.0]
-        for place in np.sort(np.concatenate([breaks, period - breaks]) if self.EVEN else breaks):
-            if place - row[-1] > near and end - place > near:
-                row.append(place)
+        for position in np.sort(np.concatenate([breaks, period - breaks]) if self.EVEN else breaks):
+            if position - row[-1] > near and end - position > near:
+                row.append(position)
         return [*row, end]
 
     @cached_property
     def _lifted(self):
-        """z, PERIOD and BREAKS with more digits; numbers as they are."""
+        """z, PERIOD and BREAKS with more digits; numbers unchanged."""
         given = (self.z, self.period, self.breaks)
         return [more_digits.lifted(value) if callable(value) else value for value in given]
 
     @cached_property
-    def _words(self):
-        """Why z cannot be run with more digits; nothing where it can."""
+    def _obstacle(self):
+        """Why z cannot be run with more digits; empty if it can."""
         point = [p.default if p.default is not None else 1.0 for p in self.PARAMETERS]
         try:
             with more_digits.LOCK:
@@ -161,20 +160,20 @@ class HillScene:
         return ""
 
     def _exact(self, point, edges):
-        """z(u) at a point, and the edges of its pieces, with more digits; the edges as float64 knows them are given."""
+        """z(u) at a point, and the edges of its pieces (given as float64), with more digits."""
         mp = more_digits.context()
         z, period, breaks = self._lifted
         p = [mp.mpf(float(value)) for value in point]
-        whole = mp.mpf(period(p) if callable(period) else period)
-        own = breaks(p) if callable(breaks) else list(breaks)
-        own = own if isinstance(own, list) else [own]
-        known = [mp.mpf(u) for u in own] + [whole - u for u in own if self.EVEN]
-        end = whole / 2 if self.EVEN else whole
+        length = mp.mpf(period(p) if callable(period) else period)
+        given = breaks(p) if callable(breaks) else list(breaks)
+        given = given if isinstance(given, list) else [given]
+        known = [mp.mpf(u) for u in given] + [length - u for u in given if self.EVEN]
+        end = length / 2 if self.EVEN else length
         rows = [min(known, key=lambda u, edge=edge: abs(u - edge)) for edge in np.unique(edges)[1:-1].tolist()]
         return lambda u: z(u, p), [mp.mpf(0), *rows, end]
 
     def check(self, points):
-        """Raise BadInput if z cannot be compiled, or is not what the scene says at these points (N, n)."""
+        """Raise BadInput if z cannot be compiled, or contradicts the scene's other entries at these points (N, n)."""
         self._try(points[0] if len(points) else np.ones(len(self.PARAMETERS)))
         if not len(points):
             return
@@ -183,50 +182,54 @@ class HillScene:
         if np.isnan(period).all():
             self._refuse(f"PERIOD is {self._period(points[0]):g} at {where}", "make it positive")
         if np.isnan(edges).all():
-            self._refuse(f"BREAKS lie outside 0 <= u <= T at {where}", "name places within a period")
+            self._refuse(f"BREAKS lie outside 0 <= u <= T at {where}", "name positions within a period")
         mirror = period if self.EVEN else None
         size, _, scale, rough = self._called(user_equation.measured, self.z, points, edges, mirror, slack)
         finite = np.isfinite(size).all(axis=1)
         if not finite.any():
-            self._refuse(f"z has no finite value at {self._where(points[0])}", "mend it, or PARAMETERS' domains")
+            self._refuse(
+                f"z has no finite value at {self._where(points[0])}", "correct it, or the domains of PARAMETERS"
+            )
         for i in np.flatnonzero(finite & rough):
-            remedy = "name the places where it jumps or bends in BREAKS"
+            remedy = "name the positions where it jumps or has a kink in BREAKS"
             self._refuse(f"z is not smooth at {self._where(points[i])}", remedy)
         for i in np.flatnonzero(finite & np.isnan(scale)):
             self._refuse(
                 f"EVEN = True, but z(T - u) is not z(u) at {self._where(points[i])}, T = {period[i]:g}",
-                "set EVEN = False, or mend z or PERIOD",
+                "set EVEN = False, or correct z or PERIOD",
             )
         self._check_spikes(points[finite], edges[finite], slack[finite])
         if not self.EVEN:
             self._check_period(points, period, size.max(axis=1))
 
     def _check_spikes(self, points, edges, slack):
-        """Refuse what a much finer sampling shows of z, but that of a run does not."""
+        """Refuse features of z that a much finer sampling shows, but that of a run does not."""
         one, fine = (
             self._called(user_equation.measured, self.z, points, edges, None, slack, probes)
             for probes in (user_equation.PROBES, user_equation.CHECKED)
         )
         for i in np.flatnonzero((one[1] != fine[1]).any(axis=1) | (one[3] != fine[3])):
             u = np.linspace(0, edges[i, -1], user_equation.CHECKED)
-            place = u[3 + abs(np.diff(user_equation.at(self.z, points[i : i + 1], u[None])[0], 6)).argmax()]
-            seen = f"too narrow to be seen by {self._sampling}"
+            position = u[3 + abs(np.diff(user_equation.at(self.z, points[i : i + 1], u[None])[0], 6)).argmax()]
+            narrow = f"too narrow to be seen by {self._sampling}"
             self._refuse(
-                f"z has a spike near u = {place:.6g} at {self._where(points[i])}, {seen}", "name its place in BREAKS"
+                f"z has a spike near u = {position:.6g} at {self._where(points[i])}, {narrow}",
+                "name its position in BREAKS",
             )
 
     def _check_period(self, points, period, size):
+        """Refuse z(T) that is not z(0), unless z jumps there."""
         ends = user_equation.at(self.z, points, np.stack([0 * period, period], axis=1))
         for i in np.flatnonzero(abs(ends[:, 1] - ends[:, 0]) > user_equation.MIRRORED * size):
             breaks = np.atleast_1d(self._value("BREAKS", self.breaks, points[i]))
             if np.minimum(abs(breaks), abs(breaks - period[i])).min(initial=np.inf) > SAME * period[i]:
                 self._refuse(
                     f"z(T) is not z(0) at {self._where(points[i])}, T = {period[i]:g}",
-                    "mend PERIOD, or name 0 in BREAKS if z jumps there",
+                    "correct PERIOD, or name 0 in BREAKS if z jumps there",
                 )
 
     def _try(self, point):
-        """Raise BadInput unless z(u, p) can be compiled; plain Python says why not, and checks the bounds of p."""
+        """Raise BadInput unless z(u, p) can be compiled; run as Python, it shows why not, and the bounds of p."""
         value = failed = None
         try:
             with np.errstate(all="ignore"):
@@ -236,14 +239,14 @@ class HillScene:
         if isinstance(failed, IndexError):
             n = len(self.PARAMETERS)
             if "only integers" in str(failed):
-                self._refuse("z(u, p) asks for a parameter by its name, and p is an array", "write p[0], p[1], ...")
-            self._refuse(f"z(u, p) reaches beyond an array ({failed})", f"PARAMETERS names {n}: p[0] to p[{n - 1}]")
+                self._refuse("z(u, p) accesses a parameter by name, but p is an array", "write p[0], p[1], ...")
+            self._refuse(f"z(u, p) indexes beyond an array ({failed})", f"PARAMETERS names {n}: p[0] to p[{n - 1}]")
         try:
             user_equation.at(self.z, np.empty((0, len(self.PARAMETERS))), np.empty((0, 1)))
         except user_equation.Raised as error:
             if failed is None and not is_number(value):
                 self._refuse(f"z(u, p) returns {value!r}", "it must return a real number")
-            remedy = "write it with numbers and math functions; functions that it calls need numba.njit"
+            remedy = "use only numbers and math functions; functions that it calls need numba.njit"
             self._refuse(f"numba cannot compile z(u, p) ({reason(failed or error.__cause__)})", remedy)
 
     def _period(self, p):
@@ -253,7 +256,7 @@ class HillScene:
         return float(np.ravel(value)[0])
 
     def _value(self, name, given, p):
-        """A number or numbers, or a function's value at p; NaN where it has none."""
+        """Number(s), or a function's value at p; NaN where that is undefined."""
         if not callable(given):
             return given
         try:
@@ -267,7 +270,7 @@ class HillScene:
         try:
             return function(*arguments)
         except user_equation.Raised as error:
-            self._refuse(f"z(u, p) raises {error.__cause__!r}", "let it return nan there")
+            self._refuse(f"z(u, p) raises {error.__cause__!r}", "make it return nan there")
 
     def _where(self, point):
         return ", ".join(f"{p.name} = {value:g}" for p, value in zip(self.PARAMETERS, point, strict=True))
@@ -276,20 +279,22 @@ class HillScene:
         raise BadInput(f"{self.NAME}: {what}; {remedy}")
 
 
-def _again(digest, values):
-    """The scene with these values, the same object for the same hash: its kernels are compiled once."""
+def _restored(digest, values):
+    """The scene with these values; the same object for the same hash, so that its kernels are compiled once."""
     return _known.setdefault(digest, HillScene(*values))
 
 
-def _of_whole_period(output):
-    """The output where there are no factors at T/2: its values at T."""
+def _at_full_period(output):
+    """The output where there are no factors at T/2: described as a value at T."""
     return (
-        replace(output, long_name=WORDS[output.name], symbol=SYMBOLS[output.name]) if output.name in WORDS else output
+        replace(output, long_name=LONG_NAMES[output.name], symbol=SYMBOLS[output.name])
+        if output.name in LONG_NAMES
+        else output
     )
 
 
 def is_number(value):
-    """Is it a real number, and no truth value?"""
+    """Is it a real number, and not a truth value?"""
     return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
 
 

@@ -1,7 +1,7 @@
-"""Which scenes' files may run: those whose very text this user has run here before, or allows in this process.
+"""Which scene files may run: those whose exact text this user has run here before, or allows in this process.
 
-A file that a survey names is a stranger's until then. Texts are known by their SHA-256; those of former runs stand in
-the user's state folder as empty files, `scenes/HASH`, so that writers need no lock.
+Until then, a file that a survey names is untrusted. Texts are identified by their SHA-256; those of earlier runs are
+recorded in the user's state folder as empty files, `scenes/HASH`, so that writers need no lock.
 """
 
 import os
@@ -21,12 +21,12 @@ def known(digest: str) -> bool:
 
 
 def allow(digest: str) -> None:
-    """Let the text with this hash run in this process."""
+    """Allow the text with this hash to run in this process."""
     _allowed.add(digest)
 
 
 def keep(digest: str) -> None:
-    """Remember that this user has run the text with this hash; where nothing can be written, for this process alone."""
+    """Record that this user has run the text with this hash; if nothing can be written, for this process only."""
     if digest in _kept:
         return
     _kept.add(digest)
@@ -41,7 +41,7 @@ def keep(digest: str) -> None:
 
 
 def _folder() -> Path | None:
-    """Where the hashes stand; None without a home: a path relative to the current folder may be a stranger's."""
+    """The folder of the hashes; None without a home: the current folder may be untrusted."""
     folder = platformdirs.user_state_path("survey") / "scenes"
     return folder if folder.is_absolute() else None
 
@@ -52,7 +52,7 @@ def _is_kept(digest: str) -> bool:
 
 
 def _is_private(path: Path, kind) -> bool:  # type: ignore[no-untyped-def]
-    """Is it of this kind, no link, this user's, and writable by nobody else?"""
+    """Is it of this kind, not a link, owned by this user, and writable by nobody else?"""
     try:
         found = path.lstat()
     except OSError:

@@ -3,24 +3,24 @@
 The file holds
 
     z(u, p)      a function, plain or numba's, for 0 <= u <= T; p is the float64 array of the parameters, in order
-    PARAMETERS   their names, or `survey.scene.Parameter`s, which have a domain, a unit, a default
+    PARAMETERS   their names, or `survey.scene.Parameter`s, which have a domain, a unit and a default
     PERIOD       T, a number or a function of p
-    EVEN         True where z(T - u) = z(u), which halves the work and makes edges certain; False by default
+    EVEN         True if z(T - u) = z(u), which halves the work and makes edges certain; False by default
     BREAKS       where z or a derivative jumps, in [0, T]: number(s), or a function of p; none by default
 
-and, as it likes, a docstring, TITLE and REFERENCES. It is run, as any Python file is: use files that you trust. One
-that only a survey's file names is run if this user has run it here before, or allows it (`trust.py` beside this).
-What it imports is not watched when a run is resumed. z goes on with period T. [boundaries] and [refine]
-take z to be analytic in the parameters.
+and optionally a docstring, TITLE and REFERENCES. It is executed like any Python file: use only files that you trust.
+A file that is named only by a survey runs if this user has run it here before, or allows it (see `trust.py`). Changes
+in what it imports are not noticed when a run is resumed. z is continued with period T. [boundaries] and [refine]
+assume that z is analytic in the parameters.
 
-z is known by samples. Every point has one at least every T/128 (T/256 if EVEN), which the file tells as
-`z_resolved_width`; at the ends and middles of the axes there is one every T/16384 (T/32768), and a spike that only
-these show is refused. What is narrower than both may go unseen; beside BREAKS the samples are as close as they need be.
+z is known by samples. Every point has one at least every T/128 (T/256 if EVEN), stored as `z_resolved_width`; at the
+ends and middles of the axes there is one every T/16384 (T/32768), and a spike that only these show is refused. Features
+narrower than both may go unseen; near BREAKS the samples are as dense as necessary.
 
-Where float64 leaves a verdict open, the point is solved again in double-double, as in built-in scenes: z is run once
-more, as Python, with mpmath's functions in the place of math's and numpy's. Numbers in the code, PERIOD and BREAKS are
-taken as the binary64 numbers that they are (math.pi is not quite pi), and with EVEN z is what it is up to T/2, and its
-mirror image. Where z cannot be run so, the file's `z_more_digits` says why, and float64's answer stays.
+Where float64 cannot decide a verdict, the point is solved again in double-double, as in built-in scenes: z is run once
+more, as Python, with mpmath's functions in place of those of math and numpy. Numbers in the code, PERIOD and BREAKS are
+taken as exact binary64 numbers (math.pi is not quite pi), and if EVEN, z is used up to T/2 and mirrored. Where z cannot
+be run like this, the attribute `z_more_digits` of the file says why, and float64's answer stays.
 """
 
 import hashlib
@@ -38,12 +38,12 @@ import numpy as np
 import numpy.typing as npt
 
 from survey.errors import BadInput, Untrusted
-from survey.measures.hill import monodromy as measure
+from survey.measures.hill import monodromy
 from survey.request import trust
 from survey.request.hill_scene import SAME, HillScene, is_number, reason
 from survey.scene import Parameter
 from survey.scenes import load
-from survey.wording import short, shown
+from survey.wording import reason_of, short, shown
 
 EXAMPLES = {
     "z": "def z(u, p): return p[0] + p[1] * cos(2 * u)",
@@ -51,7 +51,7 @@ EXAMPLES = {
     "PARAMETERS": 'PARAMETERS = ("a", "b"), the names of p[0], p[1]',
 }
 _made: Any = {}  # by hash: what `hill` has made in this process
-MOST = 2**20  # bytes of a scene's file
+MAX_BYTES = 2**20  # of a scene's file
 REFERENCES = ("W. Magnus, S. Winkler, Hill's Equation, Interscience 1966",)
 
 
@@ -74,7 +74,7 @@ def hill(
     even : is z(T - u) = z(u)? It is checked.
     breaks : where z or a derivative jumps, in [0, T]: number(s), or a function of p.
 
-    Raises survey.BadInput in one line that names what is wrong.
+    Raises survey.BadInput with one line that names what is wrong.
 
     Examples
     --------
@@ -96,7 +96,7 @@ def hill(
 
 
 def find(scene: Any, near: str | Path | None = None) -> tuple[str, Any]:
-    """(name, scene) of a scene's name, of a file `*.py` (relative to this folder, or else to `near`), or of `hill`."""
+    """(name, scene) for a scene's name, a file `*.py` (relative to this folder, or else `near`), or `hill`'s scene."""
     if isinstance(scene, HillScene):
         return scene.NAME, scene
     if callable(scene):
@@ -107,31 +107,31 @@ def find(scene: Any, near: str | Path | None = None) -> tuple[str, Any]:
         return scene, load(scene)
     path, text = _read(scene, near)
     found = _from_text(str(path), text)
-    trust.keep(found.HASH)  # whoever names the file wants it run
+    trust.keep(found.HASH)  # naming the file means allowing it
     return str(path), found
 
 
 def check(scene: Any, grid: Any = None) -> None:
-    """Raise BadInput if `scene` is a user's and wrong at the ends and middles of the grid's axes."""
+    """Raise BadInput if `scene` is a user's and is wrong at the ends and middles of the grid's axes."""
     if not isinstance(scene, HillScene):
         return
-    places = [sorted({0, size // 2, size - 1}) for size in grid.sizes.values()] if grid else []
-    points = [grid.point(tuple(slice(i, i + 1) for i in place)) for place in product(*places)] if grid else []
+    along = [sorted({0, size // 2, size - 1}) for size in grid.sizes.values()] if grid else []
+    points = [grid.point(tuple(slice(i, i + 1) for i in index)) for index in product(*along)] if grid else []
     names = [p.name for p in scene.PARAMETERS]
     values = np.array([[float(np.ravel(point[name])[0]) for name in names] for point in points])
     inside = [all(p.holds(v) for p, v in zip(scene.PARAMETERS, row, strict=True)) for row in values]
-    with np.errstate(all="ignore"):  # a value that is none is found as one
+    with np.errstate(all="ignore"):  # values that are not finite are found by the check
         scene.check(values.reshape(-1, len(names))[np.array(inside, bool)])
 
 
 def of_dataset(ds: Any) -> Any:
     """The scene of a survey's dataset, as `find` takes it.
 
-    Raises BadInput if it was a user's and is not as it was, Untrusted if its file has yet to be allowed to run.
+    Raises BadInput if it was a user's and has changed, Untrusted if its file has not been allowed to run.
     """
     name, digest = ds.attrs["scene"], ds.attrs.get("scene_hash")
     if not isinstance(name, str):
-        raise BadInput(f"the attribute scene is {str(name)[:60]!r}, which names no scene")
+        raise BadInput(f"the attribute scene is {str(name)[:60]!r}, which is not the name of a scene")
     if name.endswith(".py"):
         return _from_file(name, digest, Path(ds.encoding.get("source") or "").parent)
     if digest is None:
@@ -139,20 +139,22 @@ def of_dataset(ds: Any) -> Any:
     if isinstance(digest, str) and digest in _made:
         return _made[digest]
     raise BadInput(
-        f"scene = {name!r} was a function given from Python: points cannot be solved again without it; "
-        "give it to survey.hill again first"
+        f"scene = {name!r} was a function in Python: points cannot be solved again without it; "
+        "pass it to survey.hill again first"
     )
 
 
 def _from_file(name: str, digest: Any, near: Path) -> HillScene:
-    """The scene in the file that a dataset names; nothing of it runs before its hash is compared and known."""
+    """The scene in the file that a dataset names; none of it runs before its hash is compared and trusted."""
     try:
         path, text = _read(name, near)
     except BadInput:
-        raise BadInput(f"scene = {name!r}: its file has gone; the attribute scene_text holds what it said") from None
+        raise BadInput(f"scene = {name!r}: its file is missing; the attribute scene_text contains its text") from None
     found = hashlib.sha256(text.encode()).hexdigest()
     if found != digest:
-        raise BadInput(f"scene = {name!r}: its file has changed since; the attribute scene_text holds what it said")
+        raise BadInput(
+            f"scene = {name!r}: its file has changed since; the attribute scene_text contains the original text"
+        )
     if not trust.known(found):
         raise Untrusted(str(path), found, text)
     return _from_text(str(path), text)
@@ -163,23 +165,24 @@ def _read(name: str | os.PathLike[str], near: str | Path | None) -> tuple[Path, 
     paths = [Path(name), *([Path(near) / name] if near is not None else [])]
     try:
         path = next((path for path in paths if path.is_file()), None)
-    except (OSError, ValueError) as error:  # a name that the system does not take
-        reason = getattr(error, "strerror", None) or error
-        raise BadInput(f"scene = {shown(str(name), 120)}: no file can have this name ({reason})") from None
+    except (OSError, ValueError) as error:  # a name that the system does not allow
+        raise BadInput(f"scene = {shown(str(name), 120)}: no file can have this name ({reason_of(error)})") from None
     if path is None:
-        looked = " or ".join(dict.fromkeys(short(path, 120) for path in paths))
+        tried = " or ".join(dict.fromkeys(short(path, 120) for path in paths))
         raise BadInput(
-            f"scene = {shown(str(name), 120)}: there is no file {looked}; name the file of your own Hill equation"
+            f"scene = {shown(str(name), 120)}: there is no file {tried}; name the file of your own Hill equation"
         )
     try:
         with open(path, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK)) as file:
             regular = stat.S_ISREG(os.fstat(file.fileno()).st_mode)
-            content = file.read(MOST + 1) if regular else b""
-        if not regular or len(content) > MOST:
-            raise BadInput(f"{path}: this is no scene: it is no file, or takes more than {MOST:,} bytes")
+            content = file.read(MAX_BYTES + 1) if regular else b""
+        if not regular or len(content) > MAX_BYTES:
+            raise BadInput(
+                f"{path}: this is not a scene: it is not a regular file, or has more than {MAX_BYTES:,} bytes"
+            )
         return path, content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
     except (OSError, UnicodeDecodeError) as error:
-        raise BadInput(f"{path}: cannot read this scene ({getattr(error, 'strerror', None) or error})") from None
+        raise BadInput(f"{path}: cannot read this scene ({reason_of(error)})") from None
 
 
 @lru_cache(maxsize=32)
@@ -190,7 +193,7 @@ def _from_text(name: str, text: str) -> HillScene:
     try:
         exec(compile(text, name, "exec"), module.__dict__)
     except Exception as error:
-        raise BadInput(f"{name}: this is no scene that runs ({type(error).__name__}: {reason(error)})") from None
+        raise BadInput(f"{name}: the scene file failed to run ({type(error).__name__}: {reason(error)})") from None
     for needed in ("z", "PERIOD", "PARAMETERS"):
         if not hasattr(module, needed):
             raise BadInput(f"{name}: {needed} is missing; write {EXAMPLES[needed]}")
@@ -206,8 +209,8 @@ def _hill(
 ) -> HillScene:  # fmt: skip
     """The checked scene; raises BadInput."""
 
-    def refuse(words: str) -> NoReturn:
-        raise BadInput(f"{name}: {words}")
+    def refuse(message: str) -> NoReturn:
+        raise BadInput(f"{name}: {message}")
 
     if not callable(z) or _arguments(z) != 2:
         refuse("z must be a function of two arguments, z(u, p); the parameters are p[0], p[1], ...")
@@ -217,22 +220,25 @@ def _hill(
         p if isinstance(p, Parameter) else Parameter(str(p), str(p), _symbol(str(p))) for p in parameters
     )
     names = [p.name for p in parameters]
-    taken = {o.name for o in measure.OUTPUTS} | {"status", "method", "rtol", "variables", "scene"}
+    taken = {o.name for o in monodromy.OUTPUTS} | {"status", "method", "rtol", "variables", "scene"}
     bad = [n for n in names if not n.isidentifier() or n in taken or names.count(n) > 1]
     if not names or bad:
-        refuse(f"PARAMETERS = {names!r}: name at least one, each once, by a word that is no output's and no keyword's")
+        refuse(
+            f"PARAMETERS = {names!r}: give at least one name, each once, as an identifier that is neither an output "
+            "nor a keyword"
+        )
     if not isinstance(even, (bool, np.bool_)):
-        refuse(f"EVEN = {even!r}: it is True or False")
+        refuse(f"EVEN = {even!r}: it must be True or False")
     if not callable(period) and not (is_number(period) and 0 < period < np.inf):
         refuse(f"PERIOD = {period!r}: it must be a positive number, or a function of p that returns one")
     if not callable(breaks):
         try:
-            breaks = tuple(float(place) for place in np.atleast_1d(breaks))
+            breaks = tuple(float(u) for u in np.atleast_1d(breaks))
         except (TypeError, ValueError):
-            refuse(f"BREAKS = {breaks!r}: number(s) between 0 and the period, or a function of p that returns them")
+            refuse(f"BREAKS = {breaks!r}: it must be number(s) in [0, PERIOD], or a function of p that returns them")
         outside = [b for b in breaks if not 0 <= b <= (np.inf if callable(period) else period * (1 + SAME))]
         if outside:
-            refuse(f"BREAKS: {outside[0]:g} lies outside 0 <= u <= T; name the places within one period")
+            refuse(f"BREAKS: {outside[0]:g} lies outside 0 <= u <= T; name positions within one period")
     about = inspect.cleandoc(about or f"y'' + z(u, p) y = 0, p = ({', '.join(names)}).")
     bits = text.encode() if name.endswith(".py") else _bits((z, period, breaks, parameters, even))
     return HillScene(
@@ -255,9 +261,9 @@ def _arguments(z: Any) -> int:
 
 
 def _names(code: CodeType) -> list[str]:
-    """Names that the code, or a function inside it, looks up."""
+    """Global names that the code, or a function inside it, refers to."""
     inner = [const for const in code.co_consts if inspect.iscode(const)]
-    return [*code.co_names, *(name for own in inner for name in _names(own))]
+    return [*code.co_names, *(name for function in inner for name in _names(function))]
 
 
 def _bits(value: Any, seen: tuple[int, ...] = ()) -> bytes:
@@ -270,12 +276,12 @@ def _bits(value: Any, seen: tuple[int, ...] = ()) -> bytes:
         return b"(" + b",".join(_bits(item, seen) for item in value) + b")"
     code = getattr(value, "__code__", value)
     if inspect.iscode(code):
-        own = [code.co_code, repr(code.co_names).encode(), _bits(code.co_consts, seen)]
+        parts = [code.co_code, repr(code.co_names).encode(), _bits(code.co_consts, seen)]
         if code is not value:
             names = [value.__globals__.get(name) for name in _names(code)]
             cells = [cell.cell_contents for cell in value.__closure__ or ()]
-            own += [_bits([*names, *cells, *(value.__defaults__ or ())], seen)]
-        return b"<" + b";".join(own) + b">"
+            parts += [_bits([*names, *cells, *(value.__defaults__ or ())], seen)]
+        return b"<" + b";".join(parts) + b">"
     if isinstance(value, np.ndarray):
         return value.tobytes()
     return (value.__name__ if inspect.ismodule(value) else repr(value)).encode()

@@ -37,7 +37,7 @@ from survey.measures.nutation import again, digits
 from survey.measures.nutation import wells as nutation
 from survey.measures.rows import Rows
 from survey.modules import load
-from survey.scene import Option, Output, Parameter, Request, Trajectory, named, told
+from survey.scene import Option, Output, Parameter, Request, Trajectory, named, plus_minus
 from survey.status import INVALID_PARAMETERS, NO_CONVERGENCE, OK, OVERFLOW
 
 TITLE = "Rotation of an axisymmetric body in a Newtonian field (Brun's problem)"
@@ -346,4 +346,4 @@ def why(answer):
     if width <= bar and answer["verdict"] == "regular_nutation":
         return f"0 < u_max - u_min < {bar:.1g}, which takes more digits than float64 has; {apart}"
     across = "beyond" if width > bar else "within"
-    return f"u_max - u_min = {told(width, bar)}, {across} the error bars of the turning points; {apart}"
+    return f"u_max - u_min = {plus_minus(width, bar)}, {across} the error bars of the turning points; {apart}"

@@ -58,7 +58,7 @@ from survey.kernels.cylinder import records as rc
 from survey.measures.cylinder import auto, fate, portrait, solution
 from survey.measures.cylinder.fate import NO_TURNS
 from survey.modules import load
-from survey.scene import Option, Output, Parameter, Request, Trajectory, named, told
+from survey.scene import Option, Output, Parameter, Request, Trajectory, named, plus_minus
 from survey.status import INVALID_PARAMETERS, OK
 
 TITLE = "Gyrostat with Barnett-London effect, rotation about axis 1"
@@ -219,7 +219,7 @@ def _why_portrait(answer):
     off = np.abs(answer["cycle_multiplier"] - 1.0)
     if np.isfinite(off).any():
         nearest = np.nanargmin(off)
-        near = told(answer["cycle_multiplier"][nearest], answer["cycle_multiplier_error"][nearest])
+        near = plus_minus(answer["cycle_multiplier"][nearest], answer["cycle_multiplier_error"][nearest])
         margins.append(f"the multiplier nearest to 1 is {near}")
     words = {
         "structurally_stable": "no margin is within its error bar",

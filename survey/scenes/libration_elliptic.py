@@ -36,7 +36,7 @@ import numpy as np
 from survey.measures import linear_motion
 from survey.measures.libration import danby, motion
 from survey.measures.rows import Rows
-from survey.scene import Parameter, Trajectory, told
+from survey.scene import Parameter, Trajectory, plus_minus
 
 TITLE = "Stability of the triangular libration points of the elliptic problem"
 FAMILY = "danby"
@@ -94,6 +94,5 @@ def why(answer):
     said = {"stable": "> 0, and so are the other margins", "unstable": "is not positive"}.get(
         answer["verdict"], "is open"
     )
-    return (
-        f"{least} = {told(value, bar)} {said} (at 0 {meeting}); decided by half-period factors, whose bars are sharper"
-    )
+    deciding = "decided by half-period factors, whose bars are sharper"
+    return f"{least} = {plus_minus(value, bar)} {said} (at 0 {meeting}); {deciding}"

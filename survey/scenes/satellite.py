@@ -59,7 +59,7 @@ PARAMETERS = (
               minimum=0.0, maximum=2.0, excluded=(1.0,), instead_of="rho"),
 )  # fmt: skip
 OPTIONS = (
-    Option("body", ("prolate", "oblate"), "shape of the body: Iz < I or Iz > I", said_by="inertia_ratio"),
+    Option("body", ("prolate", "oblate"), "shape of the body: Iz < I or Iz > I", replaced_by="inertia_ratio"),
     Option("direction", ("1", "-1"), "sense of a rotation: 1 as the orbit, -1 against it", only_with="inertia_ratio"),
 )
 why = hill_why.why

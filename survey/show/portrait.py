@@ -6,7 +6,9 @@ cylinder among its neighbours; `plane x y`, a path; `sphere x y z`, a path on th
 
 import numpy as np
 
-from survey.show.figures import COLOURS, label_of, words, wrap
+from survey.show.layout import wrap
+from survey.show.palette import COLOURS
+from survey.show.text import label_of, literal
 
 LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 GREY = "#999999"
@@ -14,12 +16,12 @@ GREY = "#999999"
 
 def draw(ds, figure):
     """Draw the panels of a trajectory into a matplotlib Figure or SubFigure."""
-    panels = [words.split() for words in ds.attrs["panels"].split("; ")]
+    panels = [panel.split() for panel in ds.attrs["panels"].split("; ")]
     for i, (kind, *names) in enumerate(panels):
-        more = {"projection": "3d"} if kind == "sphere" else {}
-        KINDS[kind](figure.add_subplot(1, len(panels), i + 1, **more), ds, *names)
+        settings = {"projection": "3d"} if kind == "sphere" else {}
+        KINDS[kind](figure.add_subplot(1, len(panels), i + 1, **settings), ds, *names)
     title = figure.suptitle(
-        "\n".join(part for part in (words(ds.attrs["title"]), ds.attrs["where"]) if part), fontsize=10
+        "\n".join(part for part in (literal(ds.attrs["title"]), ds.attrs["where"]) if part), fontsize=10
     )
     wrap(title, figure.bbox.width)
 
@@ -41,26 +43,26 @@ def _multipliers(axes, ds):
     from matplotlib.patches import Circle
 
     axes.add_patch(Circle((0, 0), 1.0, fill=False, color="black", lw=0.8))
-    x, y, off = ds.multiplier_real.values, ds.multiplier_imag.values, ds.multiplier_error.values
-    inside = np.hypot(x, y) - off <= 1.0
-    for px, py, r in zip(x, y, off, strict=True):
+    x, y, bar = ds.multiplier_real.values, ds.multiplier_imag.values, ds.multiplier_error.values
+    inside = np.hypot(x, y) - bar <= 1.0
+    for px, py, r in zip(x, y, bar, strict=True):
         axes.add_patch(Circle((px, py), r, color=LINES[0], alpha=0.3, lw=0))
-    for where, look in ((inside, "o"), (~inside, "D")):
-        axes.plot(x[where], y[where], look, ms=6, mfc=COLOURS[1] if look == "o" else COLOURS[0], mec="black")
+    for where, marker, colour in ((inside, "o", COLOURS[1]), (~inside, "D", COLOURS[0])):
+        axes.plot(x[where], y[where], marker, ms=6, mfc=colour, mec="black")
     axes.axhline(0.0, color=GREY, lw=0.6, zorder=0)
     axes.axvline(0.0, color=GREY, lw=0.6, zorder=0)
     axes.set(xlabel=r"$\mathrm{Re}\,\lambda$", ylabel=r"$\mathrm{Im}\,\lambda$")
     axes.set_aspect("equal", adjustable="datalim")
     far = np.abs([x, y]).max()
-    axes.set_title(f"multipliers, error bars to {off.max():.1g}", fontsize=9)
-    if far > 30:  # one multiplier is far out: no circle would be seen
+    axes.set_title(f"multipliers, error bars up to {bar.max():.1g}", fontsize=9)
+    if far > 30:  # one multiplier is so large that the circle would not be seen
         axes.set(xlim=(-2, 2), ylim=(-2, 2))
-        axes.set_title(f"multipliers (one at {x[np.abs(x).argmax()]:.4g}, outside)", fontsize=9)
+        axes.set_title(f"multipliers (one at {x[np.abs(x).argmax()]:.4g}, not shown)", fontsize=9)
 
 
 def _cylinder(axes, ds, x, y):
     """An orbit on the cylinder, its start marked, among its neighbours."""
-    part = {"t": slice(0, ds.sizes["t"] * 2 // 5)}  # or spirals fill the plane
+    part = {"t": slice(0, ds.sizes["t"] * 2 // 5)}  # longer spirals would fill the plane
     nearby = ds[[f"{x}_nearby", f"{y}_nearby"]].isel(part)
     for orbit, speed in zip(*(v.values for v in nearby.data_vars.values()), strict=True):
         axes.plot(*_wrapped(orbit, speed), lw=0.6, color=GREY)
@@ -100,7 +102,7 @@ def _sphere(axes, ds, x, y, z):
     axes.plot(ds[x], ds[y], ds[z], lw=1.2, color=LINES[0])
     axes.plot(*([float(ds[name][0])] for name in (x, y, z)), "o", color=LINES[1], mec="black", ms=6)
     axes.set_box_aspect((1, 1, 1), zoom=1.4)
-    axes.set(title="path of the axis", xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1))
+    axes.set(title="path of the axis on the unit sphere", xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1))
     axes.set_axis_off()
 
 

@@ -1,57 +1,61 @@
-"""The netCDF file of a run as it grows."""
+"""The netCDF file of a run, assembled from its blocks as they finish."""
 
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from survey.file import disk, output
+from survey.file import disk
 from survey.file.labels import Tally, attributes, command, coordinates, layout, now, variables
+from survey.file.map_file import MapFile
 
 
 class Assembly:
     """The netCDF file of a run as it grows: one thread writes each region once its blocks are finished.
 
-    Use as a context manager around the run; what it does not `finish` leaves no file.
+    Use as a context manager around the run; without `finish` no file is left.
     """
 
     def __init__(self, workflow, kept, tile, regions):
         self.workflow, self.kept = workflow, kept
         self.layout = layout(workflow.scene, workflow.request)
-        self.regions, self.waiting, self.place = [], [], []
+        self.regions, self.unfinished, self.region_of = [], [], []
         for region, blocks in regions:
-            first = len(self.place)
-            self.place += [len(self.regions)] * len(blocks)
+            first = len(self.region_of)
+            self.region_of += [len(self.regions)] * len(blocks)
             self.regions.append((region, first, blocks))
-            self.waiting.append(len(blocks))
+            self.unfinished.append(len(blocks))
         scene, request, grid = workflow.scene, workflow.request, workflow.grid
-        meanings = variables(grid, scene, request)
-        flags = {name: meanings[name][1] for name in ("status", "verdict") if name in meanings}
+        described = variables(grid, scene, request)
+        flags = {name: described[name][1] for name in ("status", "verdict") if name in described}
         self.tally = Tally(flags, request.rtol)
-        self.map = coordinates(grid, scene, request), meanings, self.layout, grid.shape, tile
-        self.output, self.writer, self.writes, self.room = None, ThreadPoolExecutor(1), [], {}
+        self.map = coordinates(grid, scene, request), described, self.layout, grid.shape, tile
+        self.file, self.writer, self.writes, self.buffers = None, ThreadPoolExecutor(1), [], {}
 
     def __enter__(self):
         return self
 
     def __exit__(self, *_):
         self.writer.shutdown(cancel_futures=True)
-        if self.output and not (self.output.cancelled() or self.output.exception()):
-            self.output.result().discard()
+        if self.file and not (self.file.cancelled() or self.file.exception()):
+            self.file.result().discard()
 
-    def has(self, number):
-        """Block `number` is finished. Raises what writing another part has raised."""
-        if not self.output:  # not sooner: it takes a while, in which the first block may be solved
-            self.output = self.writer.submit(output.Output, self.workflow.path, self.kept.folder, *self.map)
-            self.writes.append(self.output)
-        place = self.place[number]
-        self.waiting[place] -= 1
-        if not self.waiting[place]:
-            self.writes.append(self.writer.submit(self._write, *self.regions[place]))
+    def finished(self, number):
+        """Block `number` is finished. Raises what writing an earlier region has raised."""
+        if not self.file:  # not sooner: creating it takes time in which the first block can be solved
+            self.file = self.writer.submit(MapFile, self.workflow.path, self.kept.folder, *self.map)
+            self.writes.append(self.file)
+        region = self.region_of[number]
+        self.unfinished[region] -= 1
+        if not self.unfinished[region]:
+            self.writes.append(self.writer.submit(self._write, *self.regions[region]))
         while self.writes and self.writes[0].done():
             self.writes.pop(0).result()
 
-    def finish(self, further, told):
-        """Wait for the map's variables, write `further` datasets, the counts and the history; publish the file."""
+    def finish(self, further, timings):
+        """Wait for the map's variables, add `further` datasets, counts and history, and publish the file.
+
+        `timings` are attributes too. Returns the attributes of the file.
+        """
         for write in self.writes:
             write.result()
         workflow = self.workflow
@@ -60,23 +64,23 @@ class Assembly:
         written["history"] = f"{now()}: {command()}"
         for ds in further:
             written |= ds.attrs
-        written |= told | {"fingerprint": self.kept.of_output}
+        written |= timings | {"fingerprint": self.kept.of_output}
         self.kept.refuse_lost_lock()
         with disk.refused(workflow.path):
-            self.output.result().publish(written, further)
+            self.file.result().publish(written, further)
         return written | {"complete": 1}
 
     def _write(self, region, first, blocks):
         """Write the region whose blocks are numbered from `first`."""
         shape = tuple(cut.stop - cut.start for cut in region)
-        if self.room.get("status", np.empty(0)).shape != shape:
-            self.room = {name: np.empty(shape + extra, kind) for name, (kind, _, extra) in self.layout.items()}
+        if self.buffers.get("status", np.empty(0)).shape != shape:
+            self.buffers = {name: np.empty(shape + extra, kind) for name, (kind, _, extra) in self.layout.items()}
         for number, block in enumerate(blocks, first):
             inside = tuple(slice(b.start - r.start, b.stop - r.start) for b, r in zip(block, region, strict=True))
             arrays = self.kept.load(number)
             self.tally.add(arrays)
             for name, values in arrays.items():
-                self.room[name][inside] = values
+                self.buffers[name][inside] = values
         with disk.refused(self.workflow.path):
-            for name, values in self.room.items():
-                self.output.result().put(name, values, region)
+            for name, values in self.buffers.items():
+                self.file.result().write(name, values, region)

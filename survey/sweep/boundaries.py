@@ -5,7 +5,7 @@ Contiguous ragged arrays (CF 9.3.3): `edge_count` edges of each row lie one afte
 
 A scene has boundaries where its family has a measure of curves, `measures/FAMILY/curves.py`. One that knows them in
 closed form has `closed`, which gives them, with `refusal`, CLASSES, TITLE and ALONG (see `measures.nutation.curves`).
-The edges of all others are sought as the zeros of Hill's factors.
+The edges of all others are found as the zeros of Hill's factors.
 """
 
 from itertools import pairwise
@@ -17,36 +17,33 @@ import xarray as xr
 from survey import measures
 from survey.file.labels import flag_attributes, meaning
 from survey.grid import logarithmic
-from survey.measures.hill import curves as hill_curves
-from survey.measures.hill import edges as hill_edges
-from survey.measures.hill import folds as hill_folds
-from survey.measures.hill import look
+from survey.measures.hill import curves, edges, folds, look
 from survey.scene import Request
 
 ROWS = 8  # solved together
 COLUMNS = 9  # searched for curves that meet no row
 RTOL = 1e-13
-MARGIN = 1e-3  # of an axis: how near curves come to a value that is no parameter, such as k = 1
+MARGIN = 1e-3  # of an axis: how close curves come to an excluded value, such as k = 1
 
 
 def find(workflow, each=None, once=lambda name, make: make()):
-    """The dataset of the workflow's curves; of Hill's edges, and of their curves where there are two axes.
+    """The dataset of the workflow's curves; for Hill's equation, of edges, and of their curves if there are two axes.
 
-    `each(task, numbers, what)` calls the task for every number, in any order, on threads if it likes;
-    `once(name, make)` gives the arrays of `make()`, or those that an earlier run has kept under this name.
+    `each(task, numbers, what)` calls the task for every number, in any order, possibly on threads;
+    `once(name, make)` returns the arrays of `make()`, or those that an earlier run has kept under this name.
     """
     measure = measures.curves_of(workflow.scene.FAMILY)
     if hasattr(measure, "closed"):
         return xr.Dataset(_closed(workflow, measure), attrs={"boundaries": workflow.boundaries})
-    each = each or hill_curves.in_turn
+    each = each or curves.in_turn
     grid, axis = workflow.grid, workflow.boundaries
     other = [dim for dim in grid.sizes if dim != axis]
     across = next((dim for dim in other if grid.sizes[dim] > 1), None)  # curves need a range
-    edges = _edges(workflow, axis, grid.sizes[other[0]] if other else 1, each, once)
-    found = _rows(workflow, axis, other, edges)
-    about = {"boundaries": axis, "edge_incomplete_rows": int((edges.complete == 0).sum())}
+    of_rows = _edges(workflow, axis, grid.sizes[other[0]] if other else 1, each, once)
+    found = _rows(workflow, axis, other, of_rows)
+    about = {"boundaries": axis, "edge_incomplete_rows": int((of_rows.complete == 0).sum())}
     if across:
-        found |= _curves(workflow, across, axis, edges, each)
+        found |= _curves(workflow, across, axis, of_rows, each)
         about["curves_lost"] = int((found["curve_complete"][1] == 0).sum())
     left_out = [
         f"{name} from {a:.12g} to {b:.12g}"
@@ -59,22 +56,22 @@ def find(workflow, each=None, once=lambda name, make: make()):
 
 
 def plan(workflow, cost):
-    """(what is known before: rows, bytes of an edge, how many there are being found; seconds of one thread, roughly).
+    """({what is known beforehand: rows, bytes per edge}, estimated seconds on one thread).
 
-    `cost` is the scene's figure for a point, in seconds.
+    `cost` is the scene's estimate for a point, in seconds.
     """
     measure = measures.curves_of(workflow.scene.FAMILY)
-    if hasattr(measure, "closed"):  # measured: about a tenth of a second each
+    if hasattr(measure, "closed"):  # measured: about a tenth of a second per map
         size = 8 * (1 + len(workflow.grid.sizes) + 2 * len(measure.ALONG))
         return {"bytes_per_curve_point": size}, 0.1 * prod(list(workflow.grid.sizes.values())[2:])
     sizes = [size for dim, size in workflow.grid.sizes.items() if dim != workflow.boundaries and size > 1]
-    # measured: ten to twenty edges a row; half a thousand points of curves
+    # measured: ten to twenty edges per row; about five hundred points of curves
     seconds = prod(sizes) * (2e-3 + 250 * cost) + (0.2 + 1e4 * cost if sizes else 0.0)
     return {"rows": prod(sizes), "bytes_per_edge": 25, "bytes_per_curve_point": 24 * len(sizes)}, seconds
 
 
 def _closed(workflow, measure):
-    """The variables of curves in closed form: on one map, or on each of those that a third axis makes a stack of."""
+    """The variables of curves in closed form: on one map, or on each map of the stack along a third axis."""
     grid = workflow.grid
     names, fixed = (
         list(grid.sizes),
@@ -83,23 +80,23 @@ def _closed(workflow, measure):
     square, third = _square(workflow, *names[:2]), names[2:]
     planes = [{third[0]: float(value)} for value in grid.parameters[third[0]][1]] if third else [{}]
     found = [measure.closed(square, names[:2], fixed | plane, workflow.request.options) for plane in planes]
-    count, kind, flat, error = (
-        np.concatenate([getattr(curves, name) for curves in found]) for name in ("count", "kind", "places", "error")
+    count, kind, in_plane, error = (
+        np.concatenate([getattr(plane, name) for plane in found]) for name in ("count", "kind", "places", "error")
     )
-    points = [curves.count.sum() for curves in found]
-    places = np.column_stack([flat, *(np.repeat([plane[name] for plane in planes], points) for name in third)])
+    points = [plane.count.sum() for plane in found]
+    positions = np.column_stack([in_plane, *(np.repeat([plane[name] for plane in planes], points) for name in third)])
     kind = _flags(measure.TITLE, measure.CLASSES, kind)
-    variables = _of_curves(workflow, names, count, kind, places, error, "on the curve")
+    variables = _of_curves(workflow, names, count, kind, positions, error, "on the curve")
     for output in measure.ALONG:
-        values, errors = (np.concatenate([curves.along[output.name][i] for curves in found]) for i in (0, 1))
-        told = meaning(output) | {"ancillary_variables": f"curve_{output.name}_error"}
-        variables[f"curve_{output.name}"] = ("curve_point", values, told)
+        values, errors = (np.concatenate([plane.along[output.name][i] for plane in found]) for i in (0, 1))
+        attributes = meaning(output) | {"ancillary_variables": f"curve_{output.name}_error"}
+        variables[f"curve_{output.name}"] = ("curve_point", values, attributes)
         variables[f"curve_{output.name}_error"] = ("curve_point", errors, {
             "long_name": f"error bound of curve_{output.name}", "units": output.units})  # fmt: skip
     return variables
 
 
-def _of_curves(workflow, names, count, kind, places, error, where):
+def _of_curves(workflow, names, count, kind, positions, error, where):
     """The variables that all curves have."""
     variables = {
         "curve_count": ("curve", count.astype(np.int32), {
@@ -107,34 +104,34 @@ def _of_curves(workflow, names, count, kind, places, error, where):
         "curve_class": ("curve", *kind),
         "curve_position_error": ("curve_point", error, {
             "long_name": "error bound of a point's distance from the curve", "units": "1",
-            "comment": "along the normal, on the map's border along that; unit: the range of either axis, "
+            "comment": "along the normal, or along the map's border for points on it; unit: the range of each axis, "
                        "of its logarithm if the axis is logarithmic"}),
     }  # fmt: skip
     for i, name in enumerate(names):
         parameter, named = _named(workflow, name)
-        variables[f"curve_{name}"] = ("curve_point", places[:, i], named | {
+        variables[f"curve_{name}"] = ("curve_point", positions[:, i], named | {
             "long_name": f"{parameter.long_name} {where}", "ancillary_variables": "curve_position_error"})  # fmt: skip
     return variables
 
 
 def _edges(workflow, axis, rows, each, once):
-    """All Edges of all rows, a few rows at a time."""
-    parts, between = [None] * -(-rows // ROWS), _parts(workflow, axis)
+    """The Edges of all rows, found a few rows at a time."""
+    parts, ranges = [None] * -(-rows // ROWS), _parts(workflow, axis)
 
     def make(some):
         solve = _row_solver(workflow, axis, some)
-        own = hill_edges.joined([hill_edges.find(solve, some.size, *ends) for ends in between])
-        own.row += some[0]
-        return vars(own)
+        found = edges.joined([edges.find(solve, some.size, *ends) for ends in ranges])
+        found.row += some[0]
+        return vars(found)
 
     def task(number):
         some = np.arange(number * ROWS, min((number + 1) * ROWS, rows))
         name = f"edges-{axis}-{some[0]}-{some.size}"
-        parts[number] = hill_edges.Edges(**once(name, lambda: make(some)))
+        parts[number] = edges.Edges(**once(name, lambda: make(some)))
 
     each(task, range(len(parts)), "parts of the edges")
     names = ("row", "position", "error", "kind", "index", "complete")
-    return hill_edges.Edges(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+    return edges.Edges(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
 def _row_solver(workflow, axis, rows):
@@ -153,26 +150,26 @@ def _solve(workflow, point, wanted):
         return workflow.scene.solve(point, Request(workflow.request.options, "auto", RTOL, frozenset(wanted)))
 
 
-def _rows(workflow, axis, other, edges):
+def _rows(workflow, axis, other, found):
     """The variables of the rows."""
-    rows = edges.complete.size
+    rows = found.complete.size
     dims, shape = (tuple(other), (rows,)) if other else ((), ())
-    count = np.bincount(edges.row, minlength=rows).astype(np.int32).reshape(shape)
+    count = np.bincount(found.row, minlength=rows).astype(np.int32).reshape(shape)
     parameter, named = _named(workflow, axis)
     position = named | {"long_name": f"{parameter.long_name} at the edge of a tongue"}
     return {
         "edge_count": (dims, count, {
             "long_name": "number of edges of tongues", "units": "1", "sample_dimension": "edge"}),
-        "edge_complete": (dims, edges.complete.astype(np.int8).reshape(shape),
+        "edge_complete": (dims, found.complete.astype(np.int8).reshape(shape),
                           _yes_or_no("are all edges of the row found", "not_shown complete")),
-        "edge_position": ("edge", edges.position, position | {"ancillary_variables": "edge_position_error"}),
-        "edge_position_error": ("edge", edges.error, named | {"long_name": "error bound of edge_position"}),
-        "edge_class": ("edge", *_class(edges.kind)),
-        "edge_index": ("edge", *_index(edges.index)),
+        "edge_position": ("edge", found.position, position | {"ancillary_variables": "edge_position_error"}),
+        "edge_position_error": ("edge", found.error, named | {"long_name": "error bound of edge_position"}),
+        "edge_class": ("edge", *_class(found.kind)),
+        "edge_index": ("edge", *_index(found.index)),
     }  # fmt: skip
 
 
-def _curves(workflow, across, axis, edges, each):
+def _curves(workflow, across, axis, of_rows, each):
     """The variables of the curves on the map of the axes `across` (its rows) and `axis`, and of their folds."""
     square = _square(workflow, across, axis)
     fixed = {name: values for name, (dims, values) in workflow.grid.parameters.items() if not dims}
@@ -181,32 +178,32 @@ def _curves(workflow, across, axis, edges, each):
         return _solve(workflow, fixed | {across: q, axis: p}, wanted)
 
     pieces = [_pieces(workflow, name) for name in (across, axis)]
-    rows = np.asarray(workflow.grid.parameters[across][1])[edges.row]
-    of_rows = square.inside(np.stack([rows, edges.position], axis=1)), edges.kind, edges.index
-    found = [of_rows, *(_of_columns(solve, square, _columns(pieces[1]), *piece) for piece in pieces[0])]
+    rows = np.asarray(workflow.grid.parameters[across][1])[of_rows.row]
+    in_rows = square.inside(np.stack([rows, of_rows.position], axis=1)), of_rows.kind, of_rows.index
+    found = [in_rows, *(_of_columns(solve, square, _columns(pieces[1]), *piece) for piece in pieces[0])]
     seeds = _seeds(*(np.concatenate(values) for values in zip(*found, strict=True)), pieces)
-    curves = hill_curves.trace(solve, square, seeds, each)
-    folds = hill_folds.find(solve, square, curves)
-    names, places = (across, axis), (square.places(curves.x), square.places(folds.x))
+    traced = curves.trace(solve, square, seeds, each)
+    folded = folds.find(solve, square, traced)
+    names, positions = (across, axis), (square.places(traced.x), square.places(folded.x))
     where = "on the edge of a tongue"
-    variables = _of_curves(workflow, names, curves.count, _class(curves.kind), places[0], curves.error, where)
+    variables = _of_curves(workflow, names, traced.count, _class(traced.kind), positions[0], traced.error, where)
     variables |= {
-        "edge_curve": ("edge", curves.of_seed[: edges.row.size].astype(np.int32), {
+        "edge_curve": ("edge", traced.of_seed[: of_rows.row.size].astype(np.int32), {
             "long_name": "curve through the edge, counted from 0", "units": "1"}),
-        "curve_index": ("curve", *_index(curves.index)),
-        "curve_complete": ("curve", curves.complete.astype(np.int8),
+        "curve_index": ("curve", *_index(traced.index)),
+        "curve_complete": ("curve", traced.complete.astype(np.int8),
                            _yes_or_no("is the curve closed, or ended by the map or edge_left_out", "lost complete")),
-        "fold_curve": ("fold", folds.curve.astype(np.int32), {
+        "fold_curve": ("fold", folded.curve.astype(np.int32), {
             "long_name": f"curve that turns back in {across}, counted from 0", "units": "1",
             "instance_dimension": "curve"}),
     }  # fmt: skip
     for i, name in enumerate(names):
         parameter, named = _named(workflow, name)
-        variables[f"fold_{name}"] = ("fold", places[1][:, i], named | {
+        variables[f"fold_{name}"] = ("fold", positions[1][:, i], named | {
             "long_name": f"{parameter.long_name} at the fold of an edge",
             "ancillary_variables": f"fold_{name}_error"})  # fmt: skip
-        ends = square.places(np.stack([folds.x - folds.error, folds.x + folds.error]))[..., i]
-        variables[f"fold_{name}_error"] = ("fold", abs(ends - places[1][:, i]).max(axis=0), named | {
+        ends = square.places(np.stack([folded.x - folded.error, folded.x + folded.error]))[..., i]
+        variables[f"fold_{name}_error"] = ("fold", abs(ends - positions[1][:, i]).max(axis=0), named | {
             "long_name": f"error bound of fold_{name}"})  # fmt: skip
     return variables
 
@@ -218,26 +215,26 @@ def _square(workflow, *names):
 
 
 def _pieces(workflow, name):
-    """Parts (low, high) of an axis, in units of its range, between the values that the parameter leaves out.
+    """Parts (low, high) of an axis, in units of its range, between the values that the parameter excludes.
 
-    Singular there, tongues accumulate: the parts end half way to the map's nearest value, or MARGIN before.
+    Tongues accumulate at these singular values: the parts end half way to the map's nearest value, or MARGIN before.
     """
     line = _square(workflow, name)
     excluded = np.array(next(p for p in workflow.scene.PARAMETERS if p.name == name).excluded)
     known = np.asarray(workflow.grid.parameters[name][1])
     inner = excluded[(excluded > line.low) & (excluded < line.high)]
-    units = [line.inside(v[:, None])[:, 0] for v in (inner, known[~np.isin(known, excluded)])]
-    apart = np.array([max(4 * line.grain, min(MARGIN, 0.5 * abs(units[1] - cut).min())) for cut in units[0]])
-    return list(zip([0.0, *(units[0] + apart)], [*(units[0] - apart), 1.0], strict=True))
+    cuts, values = (line.inside(v[:, None])[:, 0] for v in (inner, known[~np.isin(known, excluded)]))
+    apart = np.array([max(4 * line.grain, min(MARGIN, 0.5 * abs(values - cut).min())) for cut in cuts])
+    return list(zip([0.0, *(cuts + apart)], [*(cuts - apart), 1.0], strict=True))
 
 
 def _parts(workflow, name):
-    """The same parts, by the parameter's values."""
+    """The same parts, in values of the parameter."""
     return _square(workflow, name).places(np.array(_pieces(workflow, name))[..., None])[..., 0].tolist()
 
 
 def _columns(pieces):
-    """Where columns are searched: evenly over the axis, but not between its pieces."""
+    """The columns that are searched: evenly over the axis, but not between its pieces."""
     columns = np.linspace(0, 1, COLUMNS)
     for (_, a), (b, _) in pairwise(pieces):
         columns[(columns > a) & (columns < b)] = a
@@ -245,25 +242,25 @@ def _columns(pieces):
 
 
 def _of_columns(solve, square, columns, low, high):
-    """(places, kind, index) of the edges along the columns, from low to high in the square."""
+    """(positions, kind, index) of the edges along the columns, from low to high in the square."""
 
     def along(column, x, wanted):
-        places = square.places(np.stack(np.broadcast_arrays(x, columns[column][:, None]), axis=-1))
-        out = solve(places[..., 0].reshape(-1, 1), places[..., 1].reshape(-1, 1), wanted)
+        values = square.places(np.stack(np.broadcast_arrays(x, columns[column][:, None]), axis=-1))
+        out = solve(values[..., 0].reshape(-1, 1), values[..., 1].reshape(-1, 1), wanted)
         return {name: values.reshape(x.shape) for name, values in out.items()}
 
-    edges = hill_edges.find(along, columns.size, low, high)
-    return np.stack([edges.position, columns[edges.row]], axis=1), edges.kind, edges.index
+    found = edges.find(along, columns.size, low, high)
+    return np.stack([found.position, columns[found.row]], axis=1), found.kind, found.index
 
 
 def _seeds(x, kind, index, pieces):
-    """Seeds, each in the rectangle of pieces that holds it."""
+    """Seeds, each with the rectangle of pieces that contains it."""
     low, high = np.zeros_like(x), np.ones_like(x)
-    for place, own in enumerate(pieces):
-        lows, highs = np.array(own).T
-        piece = np.clip(np.searchsorted(lows, x[:, place], "right") - 1, 0, None)
-        low[:, place], high[:, place] = lows[piece], highs[piece]
-    return hill_curves.Seeds(x, kind, index, low, high)
+    for dim, ends in enumerate(pieces):
+        lows, highs = np.array(ends).T
+        piece = np.clip(np.searchsorted(lows, x[:, dim], "right") - 1, 0, None)
+        low[:, dim], high[:, dim] = lows[piece], highs[piece]
+    return curves.Seeds(x, kind, index, low, high)
 
 
 def _named(workflow, name):
@@ -273,7 +270,7 @@ def _named(workflow, name):
 
 
 def _class(kind):
-    return _flags("kind of the periodic solution at the edge", hill_edges.CLASSES, kind)
+    return _flags("kind of the periodic solution at the edge", edges.CLASSES, kind)
 
 
 def _flags(title, classes, kind):
@@ -281,8 +278,8 @@ def _flags(title, classes, kind):
 
 
 def _index(index):
-    meaning = {"long_name": "number of the tongue, twice its rotation number", "units": "1", "symbol": "n"}
-    return index.astype(np.int32), meaning
+    attributes = {"long_name": "number of the tongue, twice its rotation number", "units": "1", "symbol": "n"}
+    return index.astype(np.int32), attributes
 
 
 def _yes_or_no(question, answers):

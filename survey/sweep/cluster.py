@@ -1,7 +1,7 @@
-"""Tasks on the workers of a dask cluster, which may die, freeze, or never come. Beside `dispatch`, all that knows dask.
+"""Tasks on workers of a dask cluster, which may die, freeze or never arrive. Only this file and `dispatch` use dask.
 
-A block whose workers die again and again is set aside and called alone at the end, so that a block that was only beside
-it keeps its answer. A worker that finishes nothing for too long is restarted, or let go, and its blocks go elsewhere.
+A block whose workers die repeatedly is set aside and called alone at the end, so that an innocent block on the same
+worker is not blamed. A worker that finishes nothing for too long is restarted or released, its blocks go to others.
 """
 
 import contextlib
@@ -15,12 +15,13 @@ from collections import Counter
 
 from survey.errors import BadInput, Stopped, SurveyError
 from survey.sweep.dispatch import Patience
+from survey.wording import reason_of
 
 SCHEDULER_SECONDS = 10
 WORKERLESS_SECONDS = 60
 RESTART_SECONDS = 10
-TRIES = 3  # workers that may take too long for a block
-STRIKES = 3  # blocks given up, one after another, with none finished in between: then no worker can do any
+TRIES = 3  # workers that may take too long for the same block
+STRIKES = 3  # workers that killed a block in a row, with no block finished in between, before the run stops
 ENCRYPTED = ("tls", "wss")
 
 
@@ -37,7 +38,7 @@ def client_of(address):
     except (OSError, ValueError) as error:
         raise Stopped(_unreachable(where, error)) from None
     for name in [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]:
-        logging.getLogger(name).setLevel(logging.CRITICAL)  # what they would log is told in one line
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what they would log is reported in one line
     return client
 
 
@@ -45,7 +46,9 @@ def _address_in(address):
     """The scheduler's address, as it is or from its file."""
     if not os.path.exists(address):
         if address.endswith(".json"):
-            raise BadInput(f"--scheduler {address}: there is no such scheduler file; dask scheduler writes one")
+            raise BadInput(
+                f"--scheduler {address}: there is no such scheduler file; dask scheduler --scheduler-file writes one"
+            )
         return address
     try:
         with open(address, encoding="utf-8") as file:
@@ -67,14 +70,13 @@ def _security(address):
         security = Security()
         complete = security.get_connection_args("client")["ssl_context"] is not None
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
         raise BadInput(
-            f"the TLS certificates for the dask scheduler at {address} cannot be used ({reason}); set the files of "
-            f"{keys} in dask's configuration"
+            f"the TLS certificates for the dask scheduler at {address} cannot be used ({reason_of(error)}); set the "
+            f"files of {keys} in dask's configuration"
         ) from None
     if not complete:
         raise BadInput(
-            f"the dask scheduler at {address} asks for TLS; set {keys} in dask's configuration, or as "
+            f"the dask scheduler at {address} requires TLS; set {keys} in dask's configuration, or as "
             "DASK_DISTRIBUTED__COMM__TLS__CA_FILE, ...__CLIENT__CERT, ...__CLIENT__KEY"
         )
     return security
@@ -87,15 +89,19 @@ def _unreachable(address, error):
     if "CERTIFICATE" in cause or "TLSV1_ALERT" in cause or "SSLV3_ALERT" in cause or closed:
         expired = "expired" in cause.lower()
         return (
-            f"the dask scheduler at {address} and this program do not accept each other's TLS certificates "
+            f"the dask scheduler at {address} and this program reject each other's TLS certificates "
             f"({cause.partition('] ')[2] or cause}); "
-            + ("renew the one that has expired" if expired else "use certificates of one CA, and its ca-file, on both")
+            + (
+                "renew the one that has expired"
+                if expired
+                else "use certificates from one CA, and its ca-file, on both sides"
+            )
         )
     return f"no dask scheduler answers at {address!r} ({_brief(error)}); start one with dask scheduler"
 
 
 def on_cluster(task, numbers, finished, died, client, patience=None):
-    """Call the task for every number on the cluster's workers (see `dispatch`). Raises Stopped where they cannot."""
+    """Call the task for every number on the cluster's workers (see `dispatch`). Raises Stopped if they fail."""
     done, watch = itertools.count(1), _Watch(client, patience or Patience())
     finished(0)
     aside = []
@@ -111,7 +117,7 @@ def on_cluster(task, numbers, finished, died, client, patience=None):
 
 
 def _results(task, numbers, client, watch):
-    """(number, its result, None) as they are ready; or (number, None, the address of the last worker it killed)."""
+    """Yield (number, result, None) as results arrive; or (number, None, address of the last worker that it killed)."""
     from dask.distributed import KilledWorker
 
     ready = queue.SimpleQueue()
@@ -125,7 +131,7 @@ def _results(task, numbers, client, watch):
     futures = client.map(task, numbers, pure=False, allow_other_workers=False)
     waiting = {future.key: (future, number) for future, number in zip(futures, numbers, strict=True)}
     for future in futures:
-        client.loop.add_callback(fetch, future)  # there: where a result lies on a worker that is stuck, only it waits
+        client.loop.add_callback(fetch, future)  # so only the fetch of a result on a stuck worker waits
     del futures, future
     while waiting:
         with contextlib.suppress(queue.Empty):
@@ -136,67 +142,69 @@ def _results(task, numbers, client, watch):
             if isinstance(error, SurveyError):
                 raise error
             if error and not killed:
-                told = f"the dask cluster at {client.scheduler.address} failed ({_brief(error)})"
-                raise Stopped(f"{told}; start one and run the command again to go on")
+                raise Stopped(
+                    f"the dask cluster at {client.scheduler.address} failed ({_brief(error)}); start one and run the "
+                    "command again to resume"
+                )
             if not killed:
                 watch.finished()
             yield number, result, killed
-        watch.look(waiting)
+        watch.check(waiting)
 
 
 class _Watch:
-    """Looks now and then who is at what: a worker that is stuck is replaced, and a cluster that is gone is told."""
+    """Checks from time to time what the workers are doing: stuck ones are replaced, and a lost cluster is reported."""
 
     def __init__(self, client, patience):
         self.client, self.patience, self.address = client, patience, client.scheduler.address
         now = time.monotonic()
-        self.looked, self.busy, self.staffed, self.warned = now, now, now, now
-        self.held, self.proven, self.late = {}, set(), Counter()
+        self.checked, self.busy, self.staffed, self.warned = now, now, now, now
+        self.held, self.proven, self.missed = {}, set(), Counter()
         self.struck_by, self.had_some = set(), False
 
     @property
     def pause(self):
-        """Seconds between two looks."""
+        """Seconds between two checks."""
         return min(max(self.patience.limit / 10, 0.1), 5.0)
 
     def finished(self):
-        """A block is done: the workers can work."""
+        """A block is finished: the workers are able to work."""
         self.struck_by.clear()
 
     def struck(self, worker):
-        """A block's last chance died with this worker."""
+        """A block has killed this worker as the last of several."""
         self.struck_by.add(worker)
         if len(self.struck_by) >= STRIKES:
             raise Stopped(
-                f"the workers of the dask cluster at {self.address} die again and again and finish no block; "
-                "give them more memory (their logs tell why) and run the command again to go on"
+                f"the workers of the dask cluster at {self.address} keep dying without finishing a block; "
+                "give them more memory (see their logs) and run the command again to resume"
             )
 
-    def look(self, waiting):
-        """What the workers hold of the blocks that are `waiting` ({key: (future, number)})."""
+    def check(self, waiting):
+        """Check what the workers hold of the blocks that are `waiting` ({key: (future, number)})."""
         now = time.monotonic()
-        if not waiting or now - self.looked < self.pause:
+        if not waiting or now - self.checked < self.pause:
             return
-        self.looked = now
+        self.checked = now
         try:
             at_work, finished = (
                 self.client.sync(ask, callback_timeout=SCHEDULER_SECONDS)
                 for ask in (self.client.scheduler.processing, self.client.scheduler.has_what)
             )
         except (OSError, TimeoutError, ValueError):
-            return  # the futures tell of a scheduler that is lost
-        # what is finished but not yet fetched, too: its worker may be stuck since
+            return  # a lost scheduler shows in the futures
+        # also what is finished but not yet fetched: its worker may be stuck by now
         held = {
             worker: frozenset(key for key in (*keys, *finished.get(worker, ())) if key in waiting)
             for worker, keys in at_work.items()
         }
-        late = [worker for worker, keys in held.items() if self._is_late(worker, keys, waiting, now)]
+        stuck = [worker for worker, keys in held.items() if self._is_stuck(worker, keys, waiting, now)]
         self.held = {worker: self.held[worker] for worker in held}
         self._check_staff(held, now)
-        if late:
-            self._replace(late, waiting)
+        if stuck:
+            self._replace(stuck, waiting)
 
-    def _is_late(self, worker, keys, waiting, now):
+    def _is_stuck(self, worker, keys, waiting, now):
         """Has the worker held the same blocks for too long?"""
         before, since = self.held.get(worker, (keys, now))
         if keys != before:
@@ -208,7 +216,7 @@ class _Watch:
         return bool(keys) and now - since > limit
 
     def _check_staff(self, held, now):
-        """Raise Stopped where nobody takes a block; where no worker has come yet, say so: a queue may start some."""
+        """Raise Stopped where no worker takes a block; only warn where none has arrived yet: a queue may start some."""
         patience = max(self.patience.limit, WORKERLESS_SECONDS)
         if any(held.values()) or not held:
             self.busy = now
@@ -218,36 +226,36 @@ class _Watch:
             if now - self.busy > patience:
                 raise Stopped(
                     f"the workers of the dask cluster at {self.address} have taken no block for {now - self.busy:.0f} "
-                    "s; see their logs (a worker short of memory pauses) and run the command again to go on"
+                    "s; see their logs (a worker short of memory pauses) and run the command again to resume"
                 )
             return
-        if self.had_some and now - self.staffed > patience:  # a nanny does not always start another one
+        if self.had_some and now - self.staffed > patience:  # a nanny does not always start another worker
             raise Stopped(
                 f"the dask cluster at {self.address} lost its last worker {now - self.staffed:.0f} s ago; "
-                f"start some (dask worker {self.address}; their logs tell more) and run the command again to go on"
+                f"start some (dask worker {self.address}; see the logs) and run the command again to resume"
             )
         if now - self.warned > WORKERLESS_SECONDS:
             self.warned = now
-            words = "the dask cluster at %s has no workers; waiting for some (dask worker %s starts one)"
-            logging.getLogger("survey").warning(words, self.address, self.address)
+            message = "the dask cluster at %s has no workers; waiting for some (dask worker %s starts one)"
+            logging.getLogger("survey").warning(message, self.address, self.address)
 
-    def _replace(self, late, waiting):
-        """Restart workers that are stuck (those without a nanny are let go): their blocks go to others."""
+    def _replace(self, stuck, waiting):
+        """Restart stuck workers (those without a nanny are released): their blocks go to others."""
         limit = self.patience.limit
-        for key in {key for worker in late for key in self.held[worker][0]}:
+        for key in {key for worker in stuck for key in self.held[worker][0]}:
             number = waiting[key][1]
-            self.late[number] += 1
-            if self.late[number] >= TRIES:
+            self.missed[number] += 1
+            if self.missed[number] >= TRIES:
                 raise Stopped(
-                    f"{TRIES} workers of the dask cluster at {self.address} had a block for over {limit:.0f} s "
-                    "and finished none; run the command again to go on, with a longer --block-timeout if they need it"
+                    f"{TRIES} workers of the dask cluster at {self.address} worked on one block for over {limit:.0f} s "
+                    "without finishing it; run the command again to resume, with a longer --block-timeout if needed"
                 )
-        words = "%d of the workers of %s finished no block for more than %.0f s; their blocks go to others"
-        logging.getLogger("survey").warning(words, len(late), self.address, limit)
+        message = "%d of the workers of %s finished no block for more than %.0f s; their blocks go to others"
+        logging.getLogger("survey").warning(message, len(stuck), self.address, limit)
         with contextlib.suppress(OSError, TimeoutError, ValueError):
             self.client.sync(
                 self.client.scheduler.restart_workers,
-                workers=late,
+                workers=stuck,
                 timeout=RESTART_SECONDS,
                 wait_for_workers=False,
                 on_error="return",
@@ -257,6 +265,6 @@ class _Watch:
 
 
 def _brief(error):
-    """The first line of an error; of a lost connection not where it was lost."""
+    """The first line of an error, but for a lost connection only its kind."""
     name = type(error).__name__
     return name if name in ("CommClosedError", "CancelledError", "FutureCancelledError") else str(error).split("\n")[0]

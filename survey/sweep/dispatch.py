@@ -1,7 +1,7 @@
-"""Tasks through dask: on threads of this machine or on processes of it (on a cluster: `cluster`).
+"""Tasks through dask, on threads or processes of this machine (on a cluster: `cluster`).
 
-A task is called once for each number (or what else can be hashed and sorted); `finished(done, result)` hears of each as
-it ends, and of (0, None) before. `died(number)` is called instead where it kills its worker, and DEATHS times again.
+A task is called once for each number (or other hashable, sortable value). `finished(done, result)` is called as each
+ends, and with (0, None) before. For a task that kills its worker DEATHS times, `died(number)` provides the result.
 """
 
 import contextlib
@@ -23,10 +23,10 @@ from dask.callbacks import Callback
 from survey.errors import Stopped, SurveyError
 
 DEATHS = 3
-# A worker is stuck, and replaced, once a block takes so many times the longest one so far, and so many seconds at
-# least; in its first block it may compile, which takes up to a minute where nothing else is at work.
+# A worker is considered stuck, and is replaced, once a block takes this many times as long as the longest one so far,
+# and at least this many seconds; during its first block it may compile, which takes up to a minute on an idle machine.
 PATIENCE, PATIENCE_SECONDS, COMPILE_SECONDS = 20, 300.0, 300.0
-LEAVE_SECONDS = 10.0  # in which worker processes end that have nothing left to do
+LEAVE_SECONDS = 10.0  # that idle worker processes get to end
 
 
 def cpus():
@@ -35,13 +35,13 @@ def cpus():
 
 
 class Patience:
-    """How long a worker may take for a block: `seconds`, or by how long others took, whose times `took` tells."""
+    """How long a worker may take for a block: `seconds`, or derived from the times that others `took`."""
 
     def __init__(self, seconds=None):
         self.seconds, self.longest = seconds, 0.0
 
     def took(self, seconds):
-        """A block has taken so many seconds; None: it tells nothing."""
+        """A block has taken so many seconds; None if that is unknown."""
         self.longest = max(self.longest, seconds or 0.0)
 
     @property
@@ -50,7 +50,7 @@ class Patience:
 
     @property
     def first(self):
-        """The same for a worker's first block, before which it compiles."""
+        """The limit for a worker's first block, for which it compiles."""
         return self.limit + COMPILE_SECONDS
 
 
@@ -58,15 +58,15 @@ def on_threads(task, numbers, finished=lambda done, result=None: None, threads=N
     """Call the task for every number on threads of this process."""
     done = itertools.count(1)
     finished(0)
-    # the function itself: by its name, dask imports all of distributed before
+    # the function itself: given its name, dask would import all of distributed
     _compute(task, numbers, lambda number, result: finished(next(done), result), dask.threaded.get, threads or cpus())
 
 
 def on_processes(task, numbers, finished, died, workers, patience=None):
-    """Call the task for every number on worker processes, which may die or freeze: what they were at is done again.
+    """Call the task for every number on worker processes; tasks of a worker that dies or freezes are called again.
 
-    Which task killed its worker is told apart by calling those that were under way again, one by one. Raises Stopped
-    for a task that takes longer than the patience then, too.
+    The tasks that were running when a worker died are repeated one by one, which shows the one that killed it. Raises
+    Stopped for a task that exceeds the time limit then, too.
     """
     done, ended, patience = itertools.count(1), set(), patience or Patience()
     finished(0)
@@ -76,7 +76,7 @@ def on_processes(task, numbers, finished, died, workers, patience=None):
         finished(next(done), result)
 
     def attempt(some, workers, alone=False):
-        """The numbers that were under way when a worker died."""
+        """Call the tasks; returns the numbers that were running when a worker died."""
         watch = _Watch(patience, workers)
         try:
             with _pool(workers) as pool, watch:
@@ -86,7 +86,7 @@ def on_processes(task, numbers, finished, died, workers, patience=None):
         except BrokenProcessPool:
             if watch.stuck and alone:
                 raise Stopped(
-                    f"a block took more than {patience.limit:.0f} s, twice; run the command again to go on, with a "
+                    f"a block took more than {patience.limit:.0f} s, twice; run the command again to resume, with a "
                     "longer --block-timeout if blocks take long"
                 ) from None
             return sorted(set(watch.begun) - ended)
@@ -101,7 +101,7 @@ def on_processes(task, numbers, finished, died, workers, patience=None):
 
 
 class _Signed:
-    """The task; its result comes with the process that did it."""
+    """The task; its result comes with the process that computed it."""
 
     def __init__(self, task):
         self.task = task
@@ -111,7 +111,7 @@ class _Signed:
 
 
 class _Watch:
-    """Kills the worker processes of this thread once one of them is stuck with a task, so that they count as dead."""
+    """Kills the worker processes of this thread once one of them is stuck, so that they count as dead."""
 
     def __init__(self, patience, workers):
         self.patience, self.workers = patience, workers
@@ -119,7 +119,7 @@ class _Watch:
         self.starter, self.over = threading.get_ident(), threading.Event()
 
     def __enter__(self):
-        threading.Thread(target=self._look, daemon=True).start()
+        threading.Thread(target=self._watch, daemon=True).start()
         return self
 
     def __exit__(self, *_):
@@ -139,9 +139,9 @@ class _Watch:
 
         return call
 
-    def _look(self):
+    def _watch(self):
         while not self.over.wait(min(max(self.patience.limit / 10, 0.1), 5.0)):
-            # each has compiled what it needs, or else one of them may be at that
+            # unless each has compiled what it needs, one may still be compiling
             limit = self.patience.limit if len(self.proven) >= self.workers else self.patience.first
             if time.monotonic() - min(self.begun.copy().values(), default=time.monotonic()) > limit:
                 self.stuck = True
@@ -158,9 +158,9 @@ def _kill(starter):
 
 @contextlib.contextmanager
 def _pool(workers):
-    """Worker processes; an error or an interruption kills them: nobody waits for what they are at."""
-    resource_tracker.ensure_running()  # else the first worker's start would, and unblock the signal
-    leave = threading.Timer(LEAVE_SECONDS, _kill, [threading.get_ident()])  # one that is frozen does not go by itself
+    """Worker processes; an error or an interruption kills them, whatever they are doing."""
+    resource_tracker.ensure_running()  # otherwise the first worker's start would, and unblock the signal
+    leave = threading.Timer(LEAVE_SECONDS, _kill, [threading.get_ident()])  # a frozen one does not end by itself
     leave.daemon = True
     try:
         with ProcessPoolExecutor(workers, _Spawning(), _serve) as pool:
@@ -175,7 +175,7 @@ def _pool(workers):
 
 
 class _Worker(multiprocessing.context.SpawnProcess):
-    """A process that is started as a whole, and never hears the terminal's interrupt: either would print tracebacks."""
+    """A process whose start is not interrupted and that ignores Ctrl-C: either would print tracebacks."""
 
     def start(self):
         self.starter = threading.get_ident()
@@ -189,18 +189,18 @@ class _Worker(multiprocessing.context.SpawnProcess):
 
 @contextlib.contextmanager
 def _deferred(*signals):
-    """What these signals do is done at the end of the block. (Python hears them on the main thread alone.)"""
+    """Defer the handling of these signals to the end of the block. (Python handles signals on the main thread only.)"""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    heard = []
-    before = {number: signal.signal(number, lambda number, _: heard.append(number)) for number in signals}
+    received = []
+    before = {number: signal.signal(number, lambda number, _: received.append(number)) for number in signals}
     try:
         yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler or signal.SIG_DFL)
-        for number in heard[:1]:
+        for number in received[:1]:
             signal.raise_signal(number)
 
 
@@ -209,7 +209,7 @@ class _Spawning(multiprocessing.context.SpawnContext):
 
 
 def _serve():
-    """A worker process goes when its parent is gone."""
+    """End this worker process when its parent has ended."""
     threading.Thread(target=_follow, args=(multiprocessing.parent_process(),), daemon=True).start()
 
 
@@ -219,8 +219,8 @@ def _follow(parent):
 
 
 def _compute(task, numbers, ended, get, workers, begun=lambda number: None, **more):
-    """dask's own loop; it takes equals in the order of their names, the last first."""
-    keys = {f"task-{-place % 10**9:09d}": number for place, number in enumerate(numbers, 1)}
+    """Run the tasks with dask's scheduler, which takes tasks of equal priority in reverse order of their names."""
+    keys = {f"task-{-position % 10**9:09d}": number for position, number in enumerate(numbers, 1)}
     call = dask.delayed(task, pure=False, traverse=False)
     callback = Callback(
         pretask=lambda key, *_: begun(keys[key]), posttask=lambda key, result, *_: ended(keys[key], result)
@@ -230,7 +230,7 @@ def _compute(task, numbers, ended, get, workers, begun=lambda number: None, **mo
             calls = [call(number, dask_key_name=key) for key, number in keys.items()]
             dask.compute(*calls, scheduler=get, num_workers=workers, chunksize=1, optimize_graph=False, **more)
     except OSError as error:
-        raise Stopped(f"the run stopped ({error}); run the command again to go on") from None
+        raise Stopped(f"the run stopped ({error}); run the command again to resume") from None
     except Exception as error:
         if isinstance(error, SurveyError):
             raise getattr(error, "exception", error) from None  # dask adds a worker's traceback to the message

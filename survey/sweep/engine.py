@@ -1,4 +1,4 @@
-"""Blocks -> dataset: what is solved where and when, what is kept, what the file gets."""
+"""A run: blocks are solved, kept, and assembled into the netCDF file."""
 
 import contextlib
 import os
@@ -12,39 +12,38 @@ import numpy as np
 import tomli_w
 
 from survey import status
-from survey.file import blocks as file_blocks
 from survey.file import disk
+from survey.file.blocks import Blocks
 from survey.file.labels import counts_in, layout
 from survey.kernels.jit import compile_seconds
-from survey.sweep import cluster, dispatch
-from survey.sweep.ahead import compiling_ahead
+from survey.sweep import cluster, dispatch, edges_and_cells
 from survey.sweep.assembly import Assembly
+from survey.sweep.compile_ahead import compiling_ahead
 from survey.sweep.cost import regions_of
-from survey.sweep.extras import extras
 from survey.sweep.fingerprint import code_version, compilers, fingerprint, refuse_other_code
 from survey.sweep.plan import refuse_too_large
-from survey.sweep.remaining import Remaining
 from survey.sweep.solve import solve_block
+from survey.sweep.time_left import TimeLeft
 
-SAMPLES = 16  # blocks from all over the map that are solved first
+SAMPLES = 16  # blocks, spread over the map, that are solved first
 
 
 @dataclass(frozen=True)
 class Finished:
-    """What a run has written: the file's attributes, the counts, and seconds of wall time (they do not overlap)."""
+    """The result of a run: the file's attributes, the counts, and seconds of wall time that do not overlap."""
 
     attributes: dict[str, Any]
     counts: dict[str, dict[str, int]]
     compiling: float
     computing: float
-    beside: float  # edges, cells
+    edges_and_cells: float
     writing: float
-    before: bool = False  # was the file complete already?
+    already_complete: bool = False
 
 
 class Solved(NamedTuple):
-    """What a worker tells of a block: its process, the seconds it has compiled in all, those of this block; and the
-    block itself where the worker cannot write it beside the output."""
+    """A worker's report on a block: its process, the seconds it has spent compiling in total and solving this block,
+    and the block itself where the worker cannot write it beside the output."""
 
     number: int
     process: str
@@ -54,7 +53,7 @@ class Solved(NamedTuple):
 
 
 def numbered(number, block):
-    """A block as a Job takes it: (number, ((start, stop), ...)), which is small and can be hashed."""
+    """A block as a Job takes it: (number, ((start, stop), ...)), which is small and hashable."""
     return number, tuple((cut.start, cut.stop) for cut in block)
 
 
@@ -62,13 +61,13 @@ def numbered(number, block):
 class Job:
     """All that a worker needs; called with a numbered block, it solves and keeps it.
 
-    It is sent with each block, so it does not hold them all.
+    It is sent with every block, so it must not hold all of them.
     """
 
     scene: Any
     request: Any
     grid: Any
-    kept: file_blocks.Blocks
+    kept: Blocks
     code: dict[str, str]
 
     def __call__(self, block):
@@ -82,7 +81,7 @@ class Job:
         return Solved(number, _process(), compiled, max(seconds, 0.0), content)
 
     def died(self, block):
-        """Keep a block with the status of points whose worker died again and again."""
+        """Keep a block whose workers died repeatedly, with status worker_died."""
         number, ends = block
         shape = tuple(stop - start for start, stop in ends)
         table = layout(self.scene, self.request)
@@ -92,12 +91,12 @@ class Job:
         return Solved(number, "", 0.0, None)
 
 
-def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, again=None, block_timeout=None):
-    """Run or resume the survey and write its netCDF file; returns what was Finished.
+def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, resume_command=None, block_timeout=None):
+    """Run or resume the survey and write its netCDF file; returns a Finished.
 
-    A part of the file is written as soon as the blocks of its region are there, while others are computed.
-    `progress(done, total, reused, what, left)` is called as blocks finish, and as parts of the boundaries do;
-    `left()` estimates the seconds that are left. `again` is the command that goes on after an interruption.
+    A region of the file is written as soon as its blocks are finished, while others are computed.
+    `progress(done, total, reused, what, left)` is called as blocks and parts of the boundaries finish; `left()`
+    estimates the seconds left. `resume_command` resumes the run after an interruption.
     `block_timeout`: seconds after which a worker process that has finished no block is replaced.
     Raises BadInput, Damaged or Stopped.
     """
@@ -106,37 +105,37 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, agai
     client = cluster.client_of(scheduler) if scheduler else contextlib.nullcontext()
     tile, regions = regions_of(workflow)
     blocks = [block for _, blocks in regions for block in blocks]
-    about = {"points": workflow.grid.points, "code": code_version() | compilers()}
-    kept = file_blocks.Blocks(
-        workflow.path, fingerprint(workflow), fresh, about, _findable(workflow), again, workflow.text
+    about = {"points": workflow.grid.points, "blocks": len(blocks), "code": code_version() | compilers()}
+    kept = Blocks(
+        workflow.path, fingerprint(workflow), fresh, about, _findable(workflow), resume_command, workflow.text
     )
     with disk.refused(workflow.path, "the run"), client, kept:
         if kept.published:
             kept.remove()
             return Finished(kept.published, counts_in(kept.published), 0.0, 0.0, 0.0, 0.0, True)
-        reused = kept.sound()
+        reused = kept.intact()
         job = Job(workflow.scene, workflow.request, workflow.grid, kept, code_version())
-        left = Remaining(workflow.grid.shape, blocks, reused)
+        left = TimeLeft(workflow.grid.shape, blocks, reused)
         compiled, patience = {}, dispatch.Patience(block_timeout)
 
-        here = len(reused) < len(blocks) and not (workers or scheduler)
-        ahead = compiling_ahead(workflow.scene, workflow.request) if here else contextlib.nullcontext()
+        compiles_here = len(reused) < len(blocks) and not (workers or scheduler)
+        ahead = compiling_ahead(workflow.scene, workflow.request) if compiles_here else contextlib.nullcontext()
         with ahead, Assembly(workflow, kept, tile, regions) as assembly:
 
             def finished(done, solved=None):
                 if solved:
                     compiled[solved.process] = solved.compiling
                     if solved.content is not None:
-                        kept.put(solved.number, solved.content)
+                        kept.save_packed(solved.number, solved.content)
                     left.took(solved.number, solved.seconds)
                     patience.took(solved.seconds)
-                    assembly.has(solved.number)
+                    assembly.finished(solved.number)
                 if progress:
                     progress(len(reused) + done, len(blocks), len(reused), left=left)
 
             before, began = compile_seconds(), time.perf_counter()
             for number in sorted(reused):
-                assembly.has(number)
+                assembly.finished(number)
             todo = _spread([number for number in range(len(blocks)) if number not in reused])
             todo = [numbered(number, blocks[number]) for number in todo]
             if scheduler:
@@ -150,33 +149,34 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, agai
                 compiled[_process()] -= before
             compiling = max(compiled.values(), default=0.0)  # processes compile side by side
             before = compile_seconds()
-            further = extras(workflow, kept.once, progress)
-            more = compile_seconds() - before
-            compiling, beside = compiling + more, time.perf_counter() - computed - more
-            told = {
+            further = edges_and_cells.find(workflow, kept.once, progress)
+            compiling_further = compile_seconds() - before
+            compiling += compiling_further
+            finding = time.perf_counter() - computed - compiling_further
+            timings = {
                 "wall_time_s": round(time.perf_counter() - started, 3),
                 "compile_time_s": round(compiling, 3),
                 "blocks_reused": len(reused),
             }
-            written = assembly.finish(further, told)
+            written = assembly.finish(further, timings)
         kept.remove()
-    writing = time.perf_counter() - computed - beside - more
-    computing = max(0.0, computed - began - (compiling - more))
-    return Finished(written, assembly.tally.counts, compiling, computing, beside if further else 0.0, writing)
+    writing = time.perf_counter() - computed - finding - compiling_further
+    computing = max(0.0, computed - began - (compiling - compiling_further))
+    return Finished(written, assembly.tally.counts, compiling, computing, finding if further else 0.0, writing)
 
 
 def _findable(workflow):
-    """The workflow's text, a scene that is a file named as it is found from here, not from beside the workflow."""
+    """The workflow's text, with the path of a scene's file relative to the current folder, not to the workflow."""
     table = tomllib.loads(workflow.text)
     return workflow.text if table["scene"] == workflow.name else tomli_w.dumps(table | {"scene": workflow.name})
 
 
 def _spread(numbers):
-    """The numbers in order, but first some from all over the map, so that the time it takes can be told soon."""
+    """The numbers in order, but first some spread over the map, so that the time left can soon be estimated."""
     first = numbers[:: max(1, len(numbers) // SAMPLES)] if len(numbers) > 4 * SAMPLES else []
     return first + sorted(set(numbers) - set(first))
 
 
 def _process():
-    """What names this process among those of all hosts."""
+    """A name for this process that is unique among hosts."""
     return f"{socket.gethostname()} {os.getpid()}"

@@ -1,4 +1,4 @@
-"""What must be unchanged for finished blocks to be used again, and by the workers."""
+"""What must be unchanged for finished blocks to be reused, and the same on every worker."""
 
 import hashlib
 import json
@@ -10,17 +10,17 @@ import numpy as np
 
 from survey.errors import Stopped
 from survey.kernels import jit
-from survey.sweep.cost import blocks_of
+from survey.sweep.cost import block_geometry
 
 
 @cache
 def code_version():
-    """What names the code that solves blocks: it must be the same on every worker, the processor need not."""
+    """What identifies the code that solves blocks: it must be the same on every worker, but not the processor."""
     return {"survey": version("survey"), "sources": jit.SOURCE_HASH}
 
 
 def compilers():
-    """What else makes the code another one."""
+    """Versions of the compilers, on which the bits depend too."""
     return {name: version(name) for name in ("numba", "llvmlite")}
 
 
@@ -30,13 +30,13 @@ def refuse_other_code(code):
     for what, value in code.items():
         if own[what] != value:
             raise Stopped(
-                f"the worker on {socket.gethostname()} has other code ({what}: {own[what]}, this run: {value}); "
-                "install the same survey, numba and llvmlite there and run the command again to go on"
+                f"the worker on {socket.gethostname()} runs different code ({what}: {own[what]}, this run: {value}); "
+                "install the same survey, numba and llvmlite there and run the command again to resume"
             )
 
 
 def fingerprint(workflow):
-    """What must be unchanged for finished blocks to be used again."""
+    """What must be unchanged for finished blocks to be reused: {key: plain data}."""
     digest = hashlib.sha256()
     for name, (dims, values) in workflow.grid.parameters.items():
         digest.update(f"{name}{dims}{np.shape(values)}".encode() + np.asarray(values).tobytes())
@@ -48,7 +48,7 @@ def fingerprint(workflow):
         "method": request.method,
         "rtol": request.rtol,
         "variables": sorted(request.variables),
-        "blocks": len(blocks_of(workflow)),
+        "block_geometry": block_geometry(workflow),
         "kernels": jit.SOURCE_HASH,
         "scene_hash": getattr(workflow.scene, "HASH", ""),
     }

@@ -1,4 +1,4 @@
-"""Progress and ETA on stderr: a bar on a terminal, a line now and then in a log."""
+"""Progress and ETA on stderr: a bar on a terminal, occasional lines in a log."""
 
 import time
 from datetime import timedelta
@@ -9,11 +9,11 @@ from rich.progress import Progress as Bar
 from survey.wording import counted
 
 LOG_SECONDS = 60
-SHOWN_SECONDS = 0.2
+BAR_SECONDS = 0.2
 
 
 class Progress:
-    """Called with (done, in all, reused, what of), once with nothing done for each `what`; a context manager."""
+    """A context manager, called with (done, total, reused, what); for each `what` first with done = reused."""
 
     def __init__(self, console, workflow, silent=False):
         self.console, self.workflow, self.silent = console, workflow, silent
@@ -37,14 +37,14 @@ class Progress:
             self.bar.stop()
 
     def __call__(self, done, total, reused, what="blocks", left=None):
-        """`left()` estimates the seconds that are left; without it, what is done tells how fast the rest will be."""
+        """`left()` estimates the seconds left; without it they are extrapolated from what is done."""
         if self.silent:
             return
         if done == reused:
             self._begin(total, reused, what)
         elapsed = time.monotonic() - self.started
         if self.bar:
-            if time.monotonic() - self.logged > SHOWN_SECONDS or done == total:
+            if time.monotonic() - self.logged > BAR_SECONDS or done == total:
                 self.logged = time.monotonic()
                 eta = _clock(_left(done, total, reused, elapsed, left))
                 self.bar.update(self.task, completed=done, eta=eta)
@@ -52,8 +52,8 @@ class Progress:
             self.logged = time.monotonic()
             eta = _left(done, total, reused, elapsed, left)
             first, space, rest = what.partition(" ")
-            words = counted(total, first.removesuffix("s")) + space + rest
-            self._line(f"{done:,} of {words}, {elapsed:.0f} s elapsed, ETA {eta:.0f} s")
+            of = counted(total, first.removesuffix("s")) + space + rest
+            self._line(f"{done:,} of {of}, {elapsed:.0f} s elapsed, ETA {eta:.0f} s")
         if done == total and what == "blocks":
             self._line(f"computed {done - reused:,}, reused {reused:,} of {counted(total, 'block')}")
 
@@ -66,9 +66,9 @@ class Progress:
             self._line(f"{points} in {counted(total, 'block')}, {reused:,} already done")
 
     def refining(self, settled, points, left):
-        """Told as cells are refined: the part of the map that is settled, points solved, seconds for the known rest.
+        """Called as cells are refined, with the fraction of the map that is settled, the points solved, and seconds.
 
-        What these parts leave open is found out as they are done, so the rest may be longer.
+        `left`: seconds for the cells known to be open; those may leave further ones open, so more may be needed.
         """
         if self.silent:
             return
@@ -77,7 +77,7 @@ class Progress:
             eta = f"{_clock(left)} or more"
             self.bar.update(self.task, description=f"{self.workflow.name}: {text}", what="cells", eta=eta)
         elif settled == 1:
-            self._line(f"cells: all decided or as narrow as asked, {counted(points, 'point')} solved")
+            self._line(f"cells: all decided or at the requested width, {counted(points, 'point')} solved")
         elif time.monotonic() - self.logged > LOG_SECONDS:
             self.logged = time.monotonic()
             self._line(f"{text}, ETA {left:.0f} s or more")

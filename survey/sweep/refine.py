@@ -1,6 +1,6 @@
-"""The map on whole cells, as small as needed where the verdict changes, and the area of each verdict.
+"""The map as cells that are decided as a whole, small where the verdict changes, and the area of each verdict.
 
-Cells are halved until they are decided or as wide as [refine] says, and become variables along the dimension `cell`.
+Cells are halved until they are decided or have the width of [refine]; they are variables along the dimension `cell`.
 """
 
 import math
@@ -12,67 +12,66 @@ import xarray as xr
 
 from survey.errors import BadInput
 from survey.file.labels import flag_attributes, percent, round_up
-from survey.measures.hill import cells as hill_cells
-from survey.measures.hill import monodromy
+from survey.measures.hill import cells, monodromy
 from survey.measures.hill.edges import FACTORS
 from survey.scene import Request
 
 LABELS = ("unstable", "stable")
-ROUNDING = 1e-13  # of the sum of areas, relative to the whole
+ROUNDING = 1e-13  # of the sum of areas, relative to the map's
 
 
-def find(workflow, each, once=lambda name, make: make(), tell=None):
+def find(workflow, each, once=lambda name, make: make(), report=None):
     """The dataset of the workflow's cells and areas.
 
-    `each(task, numbers, finished)` as `dispatch.on_threads`; `once(name, make)` gives the arrays of `make()`, or those
-    that an earlier run has kept under this name. `tell(settled, points, left)` hears which part of the map is settled,
-    how many points were solved for it, and the seconds that the parts known to be open will take.
+    `each(task, numbers, finished)` as `dispatch.on_threads`; `once(name, make)` returns the arrays of `make()`, or
+    those that an earlier run has kept under this name. `report(settled, points, left)` is called with the settled
+    fraction of the map, the number of points solved, and the seconds that the parts known to be open will take.
     """
     panels = _panels(workflow)
-    points, found, whole = 0, [], _area(panels)
+    points, found, total = 0, [], _area(panels)
     for x, y in panels:
-        share, done = _area([(x, y)]) / whole, _area(panels[: len(found)]) / whole
-        told = [done, points]
+        share, done = _area([(x, y)]) / total, _area(panels[: len(found)]) / total
+        state = [done, points]
 
-        def settled(part, solved, share=share, done=done, before=points, told=told):
-            told[:] = done + share * part, before + solved
+        def settled(part, solved, share=share, done=done, before=points, state=state):
+            state[:] = done + share * part, before + solved
 
         name = f"cells-{len(found)}-{x.depth}-{y.depth}"
-        parts = _in_parts(name, each, once, lambda left, told=told: tell and tell(*told, left))
+        parts = _in_parts(name, each, once, lambda left, state=state: report and report(*state, left))
         try:
-            cells = hill_cells.find(_solver(workflow, x, y), x, y, parts, settled)
+            panel = cells.find(_solver(workflow, x, y), x, y, parts, settled)
         except OverflowError as error:
-            raise BadInput(f"refine.width: the map has {error}; take a greater width, or a smaller map") from None
-        found.append(cells)
-        points += cells.points
-    if tell:
-        tell(1.0, points, 0.0)
+            raise BadInput(f"refine.width: the map has {error}; use a greater width, or a smaller map") from None
+        found.append(panel)
+        points += panel.points
+    if report:
+        report(1.0, points, 0.0)
     return _describe(workflow, found, points)
 
 
 def plan(workflow, cost):
-    """(what is known before: how many cells there are at most, and on most maps; seconds of one thread, roughly).
+    """({number of cells: at most, and on most maps}, estimated seconds on one thread).
 
-    `cost` is the scene's figure for a point, in seconds.
+    `cost` is the scene's estimate for a point, in seconds.
     """
     panels = _panels(workflow)
-    most = min(sum(1 << x.depth + y.depth for x, y in panels), hill_cells.MOST)
-    # measured: some twenty curves' widths of cells; along a value that a parameter excludes, each cell is solved
+    most = min(sum(1 << x.depth + y.depth for x, y in panels), cells.MOST)
+    # measured: cells along some twenty curves; along a value that a parameter excludes, each cell is solved
     usual = min(sum(20 << max(x.depth, y.depth) for x, y in panels), most)
     blocks = sum(16 + 2 * ((1 << y.depth) * _cut(workflow, 0, x) + (1 << x.depth) * _cut(workflow, 1, y))
                  for x, y in panels)  # fmt: skip
-    seconds = 3e-6 * usual + blocks * hill_cells.PLACES.size**2 * 20 * cost
+    seconds = 3e-6 * usual + blocks * cells.PLACES.size**2 * 20 * cost
     return {"most": most, "bytes_at_most": 33 * most, "usually": usual}, seconds
 
 
 def _cut(workflow, at, axis):
-    """How many ends of a panel's side are values that its parameter excludes."""
+    """How many ends of a panel's side are excluded values of its parameter."""
     name = list(workflow.refine)[at]
     return len({axis.low, axis.high} & set(next(p.excluded for p in workflow.scene.PARAMETERS if p.name == name)))
 
 
-def _in_parts(name, each, once, tell):
-    """`each` of `cells.find`, called once a level: what a part finds is kept as soon as it is there."""
+def _in_parts(name, each, once, report):
+    """`each` of `cells.find`, called once per level: the result of a part is kept as soon as it is found."""
     levels = count()
 
     def parts(task, items):
@@ -84,7 +83,7 @@ def _in_parts(name, each, once, tell):
 
         def finished(done, _=None):
             if done:
-                tell((time.perf_counter() - began) / done * (len(items) - done))
+                report((time.perf_counter() - began) / done * (len(items) - done))
 
         each(part, range(len(items)), finished)
         return leaves
@@ -103,7 +102,7 @@ def _panels(workflow):
 
 
 def _sides(workflow, name, width, log):
-    """The Axis between each two neighbours of the ends and the excluded values."""
+    """An Axis between every two neighbours among the ends and the excluded values."""
     values = workflow.grid.parameters[name][1]
     low, high = float(values.min()), float(values.max())
     excluded = next(p.excluded for p in workflow.scene.PARAMETERS if p.name == name)
@@ -113,14 +112,14 @@ def _sides(workflow, name, width, log):
         return math.log(b / a) if log else b - a
 
     return [
-        hill_cells.Axis(a, b, max(0, math.ceil(math.log2(length(a, b) / (width * length(low, high))) - 1e-9)), log)
+        cells.Axis(a, b, max(0, math.ceil(math.log2(length(a, b) / (width * length(low, high))) - 1e-9)), log)
         for a, b in pairwise(cuts)
     ]
 
 
 def _solver(workflow, x, y):
     """What `cells.find` asks of the scene; NaN outside the parameters' domains."""
-    rtol = hill_cells.accuracy(max(x.depth, y.depth))
+    rtol = cells.accuracy(max(x.depth, y.depth))
     request = Request(workflow.request.options, "auto", rtol, frozenset(FACTORS))
     fixed = {name: np.full((1, 1, 1), values) for name, (dims, values) in workflow.grid.parameters.items() if not dims}
     axes = [next(p for p in workflow.scene.PARAMETERS if p.name == name) for name in workflow.refine]
@@ -137,20 +136,20 @@ def _describe(workflow, found, points):
     """Variables and attributes."""
     names = list(workflow.refine)
     parameters = [next(p for p in workflow.scene.PARAMETERS if p.name == name) for name in names]
-    box = np.concatenate([cells.box for cells in found])
-    verdict = np.concatenate([cells.verdict for cells in found])
+    box = np.concatenate([panel.box for panel in found])
+    verdict = np.concatenate([panel.verdict for panel in found])
     variables = {}
     for at, p in enumerate(parameters):
         for side, end in enumerate(("low", "high")):
-            meaning = {"long_name": f"{end} end of the cell in {p.long_name}", "units": p.units, "symbol": p.symbol}
-            variables[f"cell_{p.name}_{end}"] = ("cell", box[:, 2 * at + side], meaning)
+            attributes = {"long_name": f"{end} end of the cell in {p.long_name}", "units": p.units, "symbol": p.symbol}
+            variables[f"cell_{p.name}_{end}"] = ("cell", box[:, 2 * at + side], attributes)
     flags = {key: code for key, code in monodromy.VERDICTS.items() if key != "marginal"}
     variables["cell_verdict"] = ("cell", verdict, {
         "long_name": "stability everywhere in the cell", "units": "1",
-        "comment": "undecided: an edge of a tongue may lie in it, or the verdict could not be shown",
+        "comment": "undecided: an edge of a tongue may lie in it, or the verdict could not be proved",
         **flag_attributes(flags)})  # fmt: skip
-    total = sum(cells.total for cells in found)
-    least = np.array([sum(getattr(cells, name) for cells in found) for name in LABELS])
+    total = sum(panel.total for panel in found)
+    least = np.array([sum(getattr(panel, name) for panel in found) for name in LABELS])
     bar = 0.5 * max(0.0, total - least.sum())
     area, error = least + bar, bar + ROUNDING * total
     units = " ".join(p.units for p in parameters if p.units != "1") or "1"

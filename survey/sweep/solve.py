@@ -1,4 +1,4 @@
-"""One block of a grid solved: the variables that are stored, in their types."""
+"""Solving one block of a grid: the variables that are stored, in their types."""
 
 from dataclasses import replace
 
@@ -32,7 +32,7 @@ def solve_point(scene, request, point, shape):
 
 
 def stored(scene, request, solved, shape):
-    """What a scene solved, in the types of the file and the block's shape; `overflow` where these cannot hold a bar."""
+    """A scene's results in the file's types and the block's shape; status `overflow` where a bar does not fit."""
     arrays, table = {}, layout(scene, request)
     for name, (dtype, _, extra) in table.items():
         values = round_up(solved[name]) if name.endswith("_error") else np.asarray(solved[name])

@@ -1,4 +1,4 @@
-"""The page in the browser: the map, what lies under the pointer, and the chosen point with its motion."""
+"""The page in the browser: the map, the point under the pointer, and the chosen point with its motion."""
 
 import html
 import time
@@ -14,18 +14,18 @@ from matplotlib.figure import Figure
 
 from survey.errors import BadInput, SurveyError, Untrusted
 from survey.request import trust
-from survey.show import figures
-from survey.viewer import looks, raster
+from survey.show import boundaries
+from survey.viewer import raster, widgets
 
-SIDE, WIDTH = 510, 470  # width in pixels of what stands beside the map, and of its parts
-SOON = 30  # ms: changes that follow each other faster are answered once
-MOMENT = 0.4  # seconds: the map is read for so long before it is drawn again, while it is read
-GROWTH = 1.5  # and by so much more of it: a picture costs time, too
-RINGS = 100  # pixels with undecided or failed points: if they are fewer, each is ringed
+SIDE, WIDTH = 510, 470  # width in pixels of the column beside the map, and of its parts
+SOON = 30  # ms: changes that follow each other faster are handled together
+MOMENT = 0.4  # seconds of reading a large map between two pictures of it
+GROWTH = 1.5  # factor by which more must have been read for a new picture, as drawing takes time too
+RINGS = 100  # pixels with undecided or failed points: if there are fewer, each is ringed
 RED = "#D40000"
-CURVE_POINTS = 300_000  # edges of more points are thinned
-STRANGE = "no motion: the scene of this survey is a Python file that you have not run here before. Read it first."
-CLICK = "Click a point of the map to see its motion and everything known of it."
+CURVE_POINTS = 300_000  # curves with more points are thinned
+UNTRUSTED = "no motion: the scene of this survey is a Python file that you have not run here before. Read it first."
+CLICK = "Click a point of the map to see its motion and everything known about it."
 # the model's name carries the link into the address bar
 KEEP_LINK = "window.history.replaceState(null, '', '?' + cb_obj.name)"
 
@@ -35,7 +35,7 @@ class Page:
 
     def __init__(self, shown, document):
         self.map, self.document, self.waiting, self.pointer = shown, document, set(), None
-        self.share = 0.0  # of the map, when it was drawn last
+        self.share = 0.0  # of the map that had been read when it was last drawn
         self.caption = _text(styles={"color": "#555555"})
         self.view = self._from_link(document.session_context.request.arguments)
         self._plot()
@@ -48,12 +48,12 @@ class Page:
             self.choose(self.view.point)
 
     def _from_link(self, arguments):
-        told = [f"{key}={values[0].decode()}" for key, values in arguments.items() if not key.startswith("bokeh-")]
+        query = [f"{key}={values[0].decode()}" for key, values in arguments.items() if not key.startswith("bokeh-")]
         try:
             self.complaint = ""
-            return self.map.read("&".join(told))
+            return self.map.read("&".join(query))
         except BadInput as error:
-            self.complaint = f"the link is not followed: {error}; "
+            self.complaint = f"the link cannot be opened: {error}; "
             return self.map.read("")
 
     def _plot(self):
@@ -69,18 +69,18 @@ class Page:
             background_fill_color=raster.BACKGROUND, sizing_mode="stretch_both", min_width=300, min_height=300,
             stylesheets=[":host(:focus) {outline: none}"],
         )  # fmt: skip
-        plot.xaxis.axis_label, plot.yaxis.axis_label = (looks.label(self.map.ds[dim]) for dim in self.map.dims)
+        plot.xaxis.axis_label, plot.yaxis.axis_label = (widgets.label(self.map.ds[dim]) for dim in self.map.dims)
         plot.grid.visible, plot.toolbar.logo = False, None
-        place = {"x": [], "y": []}
-        self.image = plot.image_rgba(source=place | {"image": [], "dw": [], "dh": []}, **looks.IMAGE).data_source
-        found = figures.curves_of(self.map.ds) if "curve_count" in self.map.ds else ()
-        self.curves = {name: looks.curve(plot, name) for name in found}
-        look = {"size": 9, "line_color": RED, "line_width": 2, "fill_color": "colour"}
-        self.rings = plot.scatter("x", "y", source=place | {"colour": []}, **look).data_source
-        look = {"size": 20, "marker": "circle_x", "line_color": "white", **looks.HOLLOW}
-        self.chosen = plot.scatter("x", "y", source=dict(place), **look).data_source
-        plot.scatter("x", "y", source=self.chosen, **look | {"line_color": "black", "line_width": 1})
-        self.near = Label(**looks.LABEL)
+        empty = {"x": [], "y": []}
+        self.image = plot.image_rgba(source=empty | {"image": [], "dw": [], "dh": []}, **widgets.IMAGE).data_source
+        found = boundaries.curves_of(self.map.ds) if "curve_count" in self.map.ds else ()
+        self.curves = {name: widgets.curve(plot, name) for name in found}
+        style = {"size": 9, "line_color": RED, "line_width": 2, "fill_color": "colour"}
+        self.rings = plot.scatter("x", "y", source=empty | {"colour": []}, **style).data_source
+        style = {"size": 20, "marker": "circle_x", "line_color": "white", **widgets.HOLLOW}
+        self.chosen = plot.scatter("x", "y", source=dict(empty), **style).data_source
+        plot.scatter("x", "y", source=self.chosen, **style | {"line_color": "black", "line_width": 1})
+        self.near = Label(**widgets.LABEL)
         self.bar = ColorBar(color_mapper=LinearColorMapper(Viridis256), visible=False)
         plot.add_layout(self.near)
         plot.add_layout(self.bar, "right")
@@ -97,17 +97,17 @@ class Page:
         plot.js_on_change("name", CustomJS(code=KEEP_LINK))
 
     def _fill(self):
-        """Show the boundaries of the plane that is seen."""
+        """Show the boundaries in the plane that is drawn."""
         if not self.curves:
             return
         others = {dim: at for dim, at in self.view.others.items() if dim in self.map.ds[self.view.name].dims}
-        ds = figures.in_plane(self.map.ds, self.map.ds[self.view.name].isel(others))
+        ds = boundaries.in_plane(self.map.ds, self.map.ds[self.view.name].isel(others))
         x, y = (ds[f"curve_{dim}"].values for dim in self.map.dims)
-        thin, found = max(1, x.size // CURVE_POINTS), figures.curves_of(ds)
+        thin, found = max(1, x.size // CURVE_POINTS), boundaries.curves_of(ds)
         for name, curve in self.curves.items():
-            parts = [slice(own.start, own.stop, thin) for own in found.get(name, [])]
-            points = [x[own] for own in parts], [y[own] for own in parts]
-            if "marker" in figures.CURVES[name][1]:
+            parts = [slice(part.start, part.stop, thin) for part in found.get(name, [])]
+            points = [x[part] for part in parts], [y[part] for part in parts]
+            if "marker" in boundaries.CURVES[name][1]:
                 points = [np.concatenate([*values, []]) for values in points]
             curve.data_source.data = dict(zip("xy", points, strict=True))
 
@@ -115,17 +115,17 @@ class Page:
         ds, view = self.map.ds, self.view
         self.variable = Select(title="variable", value=view.name, options=self.map.names, width=WIDTH)
         _on(self.variable, ("value",), self.changed)
-        told = "; ".join(dict.fromkeys(figures.CURVES[name][0] for name in self.curves)).replace("\n", " ")
-        self.edges = Checkbox(label=told, active=view.boundaries, visible=bool(self.curves))
+        label = "; ".join(dict.fromkeys(boundaries.CURVES[name][0] for name in self.curves)).replace("\n", " ")
+        self.edges = Checkbox(label=label, active=view.boundaries, visible=bool(self.curves))
         _on(self.edges, ("active",), self.changed)
         self.sliders = {
             dim: Slider(
-                title=looks.words(dim),
+                title=widgets.literal(dim),
                 start=0,
                 end=ds.sizes[dim] - 1,
                 value=at,
                 width=WIDTH,
-                format=looks.labels(ds[dim].values),
+                format=widgets.labels(ds[dim].values),
             )
             for dim, at in view.others.items()
             if ds.sizes[dim] > 1
@@ -136,18 +136,20 @@ class Page:
             _on(slider, ("value_throttled",), lambda: self.choose(self.view.point))
         title = f"<b>{html.escape(self.map.title)}</b><br>{html.escape(self.map.options)}"
         self.legend, self.motion, self.known, self.source = (_text() for _ in range(4))
-        self.motion.text, self.strange = CLICK, None
-        self.read = Button(label="Show the text of its file", visible=False)
-        self.run = Button(label="I have read it: run it, until survey view ends", button_type="warning", visible=False)
+        self.motion.text, self.untrusted = CLICK, None
+        self.read = Button(label="Show the file", visible=False)
+        self.run = Button(
+            label="I have read it: allow it to run until survey view ends", button_type="warning", visible=False
+        )
         self.read.on_event(events.ButtonClick, lambda _: self.show_source())
         self.run.on_event(events.ButtonClick, lambda _: self.trust())
-        told = [self.legend, self.caption, self.motion, self.read, self.source, self.run, self.known]
-        parts = [_text(text=title), self.variable, *self.sliders.values(), self.edges, *told]
-        look = {"overflow-x": "hidden", "overflow-y": "auto", "padding-left": "10px"}
-        self.side = column(*parts, width=SIDE, sizing_mode="stretch_height", styles=look)
+        texts = [self.legend, self.caption, self.motion, self.read, self.source, self.run, self.known]
+        parts = [_text(text=title), self.variable, *self.sliders.values(), self.edges, *texts]
+        style = {"overflow-x": "hidden", "overflow-y": "auto", "padding-left": "10px"}
+        self.side = column(*parts, width=SIDE, sizing_mode="stretch_height", styles=style)
 
     def soon(self, function):
-        """Call the method once, shortly, however often it is asked for until then."""
+        """Call the method once, shortly, however often this is requested until then."""
         if function.__name__ in self.waiting:
             return
         self.waiting.add(function.__name__)
@@ -159,7 +161,7 @@ class Page:
         self.document.add_timeout_callback(call, SOON)
 
     def changed(self):
-        """Take over what the user has chosen, tell it in the link, and draw it."""
+        """Apply what the user has chosen, update the link, and draw it."""
         view, plot, ds = self.view, self.plot, self.map.ds
         view.name, view.boundaries = self.variable.value, self.edges.active
         view.window = [(ends.start, ends.end) for ends in (plot.x_range, plot.y_range)]
@@ -170,14 +172,14 @@ class Page:
             curve.visible = view.boundaries
         plot.name = self.map.link(view)
         self.soon(self.draw)
-        self.soon(self.tell)
+        self.soon(self.describe)
 
     def draw(self):
-        """Draw the window of the map that is seen, its legend, and what a pixel stands for; more of it is read then."""
+        """Draw the visible window of the map and its legend, explain the pixels, and go on reading if necessary."""
         layer = self.map.layer(self.view)
         try:
             sizes = self.plot.inner_width, self.plot.inner_height
-        except UnsetValueError:  # the browser has not told it yet
+        except UnsetValueError:  # the browser has not sent it yet
             return
         xs, ys = (
             axis.pixels(*window, size)
@@ -191,15 +193,15 @@ class Page:
         self.image.data = {"x": [left], "y": [low], "dw": [right - left], "dh": [high - low], "image": [image]}
         self._ring(mask, layer, kinds, xs, ys)
         self._legend(layer, kinds, value is not None and (np.isnan(value) & (mask == 0)).any())
-        words = self.complaint
+        caption = self.complaint
         if max(xs.points, ys.points) > 1:
             shows = "its rarest kind" if layer.flagged else "the value largest in magnitude"
-            words += f"a pixel stands for up to {xs.points} × {ys.points} points and shows {shows}"
+            caption += f"a pixel represents up to {xs.points} × {ys.points} points and shows {shows}"
         if layer.waits(xs, ys):
             self.share = layer.overview.share
-            words = f"an overview, {self.share:.0%} of {layer.variable.size:,} points read; {words} ..."
+            caption = f"an overview, {self.share:.0%} of {layer.variable.size:,} points read; {caption} ..."
             self.soon(self.refine)
-        self.caption.update(text=html.escape(words), visible=bool(words))
+        self.caption.update(text=html.escape(caption), visible=bool(caption))
 
     def refine(self):
         """Read some more of the map, and draw it again."""
@@ -211,59 +213,59 @@ class Page:
     def _ring(self, mask, layer, kinds, xs, ys):
         """Ring the pixels with undecided or failed points, where these are few."""
         few = [kind for kind in ("undecided", "failed") if 0 < kinds.get(kind, 0) <= RINGS]
-        places = [(*np.nonzero(mask & layer.bits[kind]), layer.colours[kind]) for kind in few]
+        marked = [(*np.nonzero(mask & layer.bits[kind]), layer.colours[kind]) for kind in few]
         self.rings.data = {
-            "x": [x for _, j, _ in places for x in xs.middles[j]],
-            "y": [y for i, _, _ in places for y in ys.middles[i]],
-            "colour": [colour for i, _, colour in places for _ in i],
+            "x": [x for _, j, _ in marked for x in xs.middles[j]],
+            "y": [y for i, _, _ in marked for y in ys.middles[i]],
+            "colour": [colour for i, _, colour in marked for _ in i],
         }
 
     def _legend(self, layer, kinds, empty):
-        """The kinds that are seen, with their share of the whole map; or the colour bar. Are some pixels `empty`?"""
+        """Show the visible kinds with their share of the map, or the colour bar. `empty`: have some pixels no value?"""
         ds, name = self.map.ds, self.view.name
         shares = self.map.shares(name)
         entries = [(kind, colour, shares.get(kind, "")) for kind, colour in layer.colours.items() if kind in kinds]
         entries += [("does not apply", raster.NOT_APPLY, "")] if empty else []
-        self.legend.update(text=looks.legend(entries), visible=bool(entries))
+        self.legend.update(text=widgets.legend(entries), visible=bool(entries))
         self.bar.visible = not layer.flagged
         if not layer.flagged:
             self.bar.color_mapper.update(low=layer.limits[0], high=layer.limits[1])
-            self.bar.title = looks.label(ds[name], tex=False)
+            self.bar.title = widgets.label(ds[name], tex=False)
 
     def _moved(self, event):
         if event.x is not None:
             self.pointer = event.x, event.y
-            self.soon(self.tell)
+            self.soon(self.describe)
 
     def _left(self, _):
         self.pointer, self.near.visible = None, False
 
-    def tell(self):
-        """Show what is known of the point under the pointer, on that side of it where there is room."""
-        point = self._place(*self.pointer) if self.pointer else None
+    def describe(self):
+        """Show what is known about the point under the pointer, on the side where there is space."""
+        point = self._nearest(*self.pointer) if self.pointer else None
         if point is None:
             self.near.visible = False
             return
-        (x, y), words = self.pointer, "\n".join(map(looks.words, self.map.under(self.view, point)))
+        (x, y), text = self.pointer, "\n".join(map(widgets.words, self.map.under(self.view, point)))
         left, low = (
             np.mean(axis.scaled(np.array(window))) < axis.scaled(at)
             for axis, window, at in zip(self.map.axes, self.view.window, (x, y), strict=True)
         )
         self.near.update(
-            x=x, y=y, text=words, visible=True, anchor=f"{'top' if low else 'bottom'}_{'right' if left else 'left'}",
+            x=x, y=y, text=text, visible=True, anchor=f"{'top' if low else 'bottom'}_{'right' if left else 'left'}",
             x_offset=-12 if left else 12, y_offset=-12 if low else 12,
         )  # fmt: skip
 
-    def _place(self, x, y):
-        """Places of the point in whose cell the position lies, or None."""
+    def _nearest(self, x, y):
+        """Indices of the point in whose cell the position lies, or None."""
         point = tuple(axis.nearest(at) for axis, at in zip(self.map.axes, (x, y), strict=True))
         return None if None in point else point
 
     def _tapped(self, event):
-        self.choose(self._place(event.x, event.y))
+        self.choose(self._nearest(event.x, event.y))
 
     def choose(self, point):
-        """Choose a point, if it is one; its motion follows."""
+        """Choose a point (None: ignored) and solve it in time."""
         if point is None:
             return
         self.view.point = point
@@ -275,44 +277,44 @@ class Page:
         self.soon(self.solve)
 
     def solve(self):
-        """Show the motion of the chosen point, and everything that is known of it."""
+        """Show the motion at the chosen point, and everything known about it."""
         coords = self.map.coords(self.view)
-        answers = self.map.ds.survey
+        survey = self.map.ds.survey
         try:
             drawn = Figure(figsize=(6.8, 3.6), layout="constrained")
-            answers.trajectory(figure=drawn, **coords)
-            self.motion.text = looks.picture(drawn)
+            survey.trajectory(figure=drawn, **coords)
+            self.motion.text = widgets.picture(drawn)
         except Untrusted as untrusted:
             self._ask(untrusted)
-            self.motion.text = STRANGE
+            self.motion.text = UNTRUSTED
         except SurveyError as error:
             self.motion.text = f"no motion: {html.escape(str(error))}"
-        self.known.text = answers.point(**coords)._repr_html_()
+        self.known.text = survey.point(**coords)._repr_html_()
 
-    def _ask(self, strange):
-        """Offer to read the file of a stranger's scene (an Untrusted), or nothing (None)."""
-        self.strange, self.source.text = strange, ""
-        self.read.visible, self.run.visible = strange is not None, False
+    def _ask(self, untrusted):
+        """Offer to read the file of an untrusted scene (an Untrusted), or nothing (None)."""
+        self.untrusted, self.source.text = untrusted, ""
+        self.read.visible, self.run.visible = untrusted is not None, False
 
     def show_source(self):
-        """Show the file of a stranger's scene, and offer to run it."""
-        if self.strange:
-            self.source.text = looks.text_of(self.strange.path, self.strange.digest, self.strange.text)
+        """Show the file of an untrusted scene, and offer to run it."""
+        if self.untrusted:
+            self.source.text = widgets.text_of(self.untrusted.path, self.untrusted.digest, self.untrusted.text)
             self.read.visible, self.run.visible = False, True
 
     def trust(self):
-        """Let the very text that is shown run, and solve the point."""
-        if self.strange and self.run.visible:
-            trust.allow(self.strange.digest)
+        """Allow exactly the text that is shown to run, and solve the point."""
+        if self.untrusted and self.run.visible:
+            trust.allow(self.untrusted.digest)
             self.choose(self.view.point)
 
 
-def _text(**look):
-    """A piece of HTML beside the map, in which dollars are no TeX."""
-    return Div(width=WIDTH, disable_math=True, **look)
+def _text(**properties):
+    """A piece of HTML beside the map, in which dollars are not TeX."""
+    return Div(width=WIDTH, disable_math=True, **properties)
 
 
 def _on(model, properties, call):
-    """Call when one of the model's properties has changed."""
+    """Call the function whenever one of the model's properties changes."""
     for name in properties:
         model.on_change(name, lambda attr, old, new: call())

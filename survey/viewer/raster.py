@@ -1,7 +1,6 @@
-"""A window of a map -> the pixels of a screen, reading no more than it must: maps of 10^8 points and more.
+"""A window of a map -> the pixels of a screen, reading only what is needed: maps of 10^8 points and more.
 
-A pixel that holds many points tells of all of them, as in `survey.file.overview`; one that holds none shows the
-nearest.
+A pixel with many points represents all of them, as in `survey.file.overview`; one without any shows the nearest.
 """
 
 from dataclasses import dataclass
@@ -10,24 +9,25 @@ from functools import cached_property, lru_cache
 import numpy as np
 from matplotlib import colormaps
 
-from survey.file.labels import flag_codes, unanswered
+from survey.file.labels import flag_codes, scene_statuses
 from survey.file.overview import NO_ANSWER, UNIONS, UNREAD, Overview, Points, over, unranked
 from survey.grid import logarithmic
-from survey.show.figures import colours_of, greys_of, limits
+from survey.show.maps import colour_limits
+from survey.show.palette import colours_of, greys_of
 
 DIRECT = 2**22  # points: a smaller window is read from the file, a larger one from the overview
 OVERVIEW = 4096  # cells along an axis of the overview, at most
-LIMITS = 512  # cells along an axis from which the colours' limits are taken
+LIMITS = 512  # cells along an axis from which the colour limits are computed
 WHITE, UNKNOWN, NOT_APPLY, LINE = "#FFFFFF", "#444444", "#DDDDDD", "#777777"
 BACKGROUND = "#F4F4F4"
 HATCH = 6  # pixels from line to line
 viridis = colormaps["viridis"]
 
 
-class Axis:
-    """One axis of the map: its increasing coordinates, on the scale in which they are drawn.
+class MapAxis:
+    """One axis of the map: its increasing coordinates, on the scale on which they are drawn.
 
-    `values` (n,), `log`: is the scale logarithmic; `cells` (n + 1,): where each point's cell ends, on the scale.
+    `values` (n,); `log`: is the scale logarithmic; `cells` (n + 1,): ends of the points' cells, on the scale.
     """
 
     def __init__(self, values):
@@ -52,19 +52,19 @@ class Axis:
         return tuple(float(end) for end in self.unscaled(self.cells[[0, -1]]))
 
     @property
-    def told(self):
-        """Its range, for a message."""
+    def range(self):
+        """Its range as text."""
         return f"{self.values[0]:g} to {self.values[-1]:g}"
 
     def nearest(self, value):
-        """Place of the point in whose cell `value` lies; None outside the map."""
+        """Index of the point in whose cell `value` lies; None outside the map."""
         if self.log and value <= 0:
             return None
-        place = int(np.searchsorted(self.cells, self.scaled(value), side="right")) - 1
-        return place if 0 <= place < self.values.size else None
+        index = int(np.searchsorted(self.cells, self.scaled(value), side="right")) - 1
+        return index if 0 <= index < self.values.size else None
 
     def pixels(self, low, high, number):
-        """The window [low, high] within the map as `Pixels` of a screen with `number` in it; None if all is outside."""
+        """The part of the window [low, high] on the map as `Pixels`, the window having `number`; None if outside."""
         if self.log:
             low, high = max(low, self.ends[0]), max(high, self.ends[0])
         low, high = self.scaled(low), self.scaled(high)
@@ -84,10 +84,10 @@ class Axis:
 class Pixels:
     """Pixels along an axis: pixel i, from edges[i] to edges[i + 1] on the scale, shows the points from starts[i].
 
-    They go to the next start, or the last to `stop`.
+    Its points end before the next start, those of the last pixel before `stop`.
     """
 
-    axis: Axis
+    axis: MapAxis
     edges: np.ndarray
     starts: np.ndarray
     stop: int
@@ -104,46 +104,48 @@ class Pixels:
 
     @property
     def middles(self):
-        """The coordinates of their middles."""
+        """The coordinates of their centres."""
         return self.axis.unscaled(0.5 * (self.edges[1:] + self.edges[:-1]))
 
     @property
     def points(self):
-        """How many points a pixel shows, at most."""
+        """The largest number of points that a pixel shows."""
         return int(np.diff(self.starts, append=self.stop).max())
 
 
 class Layer(Points):
-    """One variable of a survey over two of its axes, for drawing; `place` is {other dimension: place in it}.
+    """One variable of a survey over two of its axes, for drawing; `others` is {other dimension: index}.
 
     `colours` is {kind: colour} of what a point may be.
     """
 
-    def __init__(self, ds, name, dims, place):
-        own, state = ({dim: at for dim, at in place.items() if dim in ds[key].dims} for key in (name, "status"))
-        values, states = ds[name].isel(own).transpose(*dims), ds.status.isel(state).transpose(*dims)
-        super().__init__(values, states, unanswered(ds))
+    def __init__(self, ds, name, dims, others):
+        values, states = (
+            ds[key].isel({dim: at for dim, at in others.items() if dim in ds[key].dims}).transpose(*dims)
+            for key in (name, "status")
+        )
+        super().__init__(values, states, scene_statuses(ds))
         palette = colours_of(self.flags) | greys_of(ds, self.flags)
-        self.colours = {kind: palette.get(kind, UNKNOWN) for kind in (*self.flags, *self.own)}
+        self.colours = {kind: palette.get(kind, UNKNOWN) for kind in (*self.flags, *self.statuses)}
         self.colours |= dict.fromkeys(NO_ANSWER, WHITE) | {UNREAD: BACKGROUND}
         self._limits = lru_cache(maxsize=1)(self._limits)
 
     @cached_property
     def overview(self):
-        """The whole map, reduced: a large one as far as `read` was called of it."""
+        """The reduced map; that of a large one is complete only after calls of its `read`."""
         overview = Overview(self, (OVERVIEW, OVERVIEW))
         return overview if self.variable.size > DIRECT else overview.complete
 
     def waits(self, xs, ys):
-        """Does this window, or its colours, need more of the overview than is read?"""
+        """Does this window, or do its colours, need more of the overview than has been read?"""
         return (_large(xs, ys) or not self.flagged) and self.overview.share < 1
 
     def pixels(self, xs, ys):
-        """(mask, value), each (len(ys), len(xs)): kinds that occur in each pixel; value None for a flagged variable."""
+        """(mask, value), each (len(ys), len(xs)): the kinds that occur in each pixel; value None for flags."""
         if _large(xs, ys):
             fx, fy = self.overview.factors
-            own = slice(xs.span.start // fx, -(-xs.stop // fx)), slice(ys.span.start // fy, -(-ys.stop // fy))
-            parts = [part if part is None else part[own] for part in (self.overview.mask, self.overview.rank)]
+            window = slice(xs.span.start // fx, -(-xs.stop // fx)), slice(ys.span.start // fy, -(-ys.stop // fy))
+            parts = [part if part is None else part[window] for part in (self.overview.mask, self.overview.rank)]
         else:
             fx, fy, parts = 1, 1, self.read(xs.span, ys.span)
         starts = [pixels.starts // f - pixels.span.start // f for pixels, f in ((xs, fx), (ys, fy))]
@@ -154,7 +156,7 @@ class Layer(Points):
 
     @property
     def limits(self):
-        """The values between which the whole map, as far as it is read, is coloured."""
+        """The colour limits of the map, as far as it has been read."""
         return self._limits(self.overview.share)
 
     def _limits(self, share):
@@ -163,10 +165,10 @@ class Layer(Points):
         shown = np.ma.masked_invalid(unranked(over(np.maximum, rank, *starts)))
         if shown.mask.all():
             return 0.0, 1.0
-        found = limits(shown) or {"vmin": shown.min(), "vmax": shown.max()}
+        found = colour_limits(shown) or {"vmin": shown.min(), "vmax": shown.max()}
         low, high = (float(found[key]) for key in ("vmin", "vmax"))
-        spare = 0.0 if high > low else 0.5 * abs(low) or 0.5  # one value: in the middle
-        return low - spare, high + spare
+        margin = 0.0 if high > low else 0.5 * abs(low) or 0.5  # a single value: in the middle
+        return low - margin, high + margin
 
 
 def _large(xs, ys):
@@ -175,11 +177,11 @@ def _large(xs, ys):
 
 
 class CellLayer(Layer):
-    """The verdicts of a refined map: of its cells, each of which is decided as a whole, and not of its points."""
+    """The verdicts of a refined map: those of its cells, each decided as a whole, not of its points."""
 
-    def __init__(self, ds, name, dims, place):
-        super().__init__(ds, name, dims, place)
-        axes = [Axis(ds[dim].values) for dim in dims]
+    def __init__(self, ds, name, dims, others):
+        super().__init__(ds, name, dims, others)
+        axes = [MapAxis(ds[dim].values) for dim in dims]
         self.ends = [
             [axis.scaled(ds[f"cell_{dim}_{end}"].values) for end in ("low", "high")]
             for axis, dim in zip(axes, dims, strict=True)
@@ -188,30 +190,30 @@ class CellLayer(Layer):
         self.flags = flag_codes(ds.cell_verdict.attrs)
 
     def pixels(self, xs, ys):
-        """(mask, None): the kinds of the cells that reach into each pixel; points count where they failed."""
+        """(mask, None): the kinds of the cells that overlap each pixel; of points only where they failed."""
         mask = super().pixels(xs, ys)[0] & sum(self.bits[kind] for kind in (*NO_ANSWER, UNREAD))
         x, y = (_covered(*ends, pixels.edges) for ends, pixels in zip(self.ends, (xs, ys), strict=True))
         seen = (x[0] < x[1]) & (y[0] < y[1])
         for flag, code in self.flags.items():
-            own = seen & (self.codes == code)
-            # each cell adds 1 to its rectangle of pixels: differences at the corners, summed along both axes
+            here = seen & (self.codes == code)
+            # each cell adds 1 to its rectangle of pixels: by differences at the corners, summed along both axes
             corners = np.zeros((ys.starts.size + 1, xs.starts.size + 1), np.int32)
             for i, j, sign in ((0, 0, 1), (0, 1, -1), (1, 0, -1), (1, 1, 1)):
-                np.add.at(corners, (y[i][own], x[j][own]), sign)
+                np.add.at(corners, (y[i][here], x[j][here]), sign)
             mask[corners.cumsum(axis=0).cumsum(axis=1)[:-1, :-1] > 0] |= self.bits[flag]
         return mask, None
 
 
 def _covered(low, high, edges):
-    """The pixels that the intervals reach into: the first, and the one after the last (the same if there is none)."""
-    place = [(end - edges[0]) / (edges[1] - edges[0]) for end in (low, high)]
-    first, stop = np.floor(place[0]), np.ceil(place[1])
+    """The pixels that the intervals overlap: the first, and the one after the last (equal if there is none)."""
+    position = [(end - edges[0]) / (edges[1] - edges[0]) for end in (low, high)]
+    first, stop = np.floor(position[0]), np.ceil(position[1])
     return tuple(np.clip(end, 0, edges.size - 1).astype(int) for end in (first, stop))
 
 
 def paint(mask, value, layer):
-    """(colours, {kind: number of pixels that hold it}): (rows, columns) of uint32 RGBA, each pixel's kind or value."""
-    image = np.zeros((*mask.shape, 4), np.uint8)  # where nothing is known, nothing is drawn
+    """(colours, {kind: number of pixels with it}): uint32 RGBA (rows, columns) of each pixel's kind or value."""
+    image = np.zeros((*mask.shape, 4), np.uint8)  # transparent where nothing is known
     if value is not None:
         low, high = layer.limits
         image[...] = viridis((value - low) / (high - low), bytes=True)

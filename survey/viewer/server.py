@@ -1,6 +1,6 @@
-"""The server behind `survey view`: on loopback, and nothing without the token.
+"""The server behind `survey view`: on the loopback interface, and only for whoever has the token.
 
-The token stands before everything else in the address, so that a request without it finds neither page nor socket.
+The token comes first in the path of the address, so that a request without it finds neither page nor socket.
 """
 
 import asyncio
@@ -35,9 +35,9 @@ HOST = "127.0.0.1"  # loopback: no other machine reaches it
 def serve(path, port, link="", say=print, browser=False, trust_scene=False):
     """Serve the survey in the file `path` to this machine, until interrupted (Ctrl-C).
 
-    `link` is the address of an earlier view, or what follows its question mark: that view is opened, in the user's
-    browser too if `browser`. `say` is told the lines for the user. `trust_scene`: a stranger's scene may run. Raises
-    BadInput, Damaged.
+    `link` is the address of an earlier view, or its query; that view is opened, also in the user's browser if
+    `browser`. `say` is called with lines for the user. `trust_scene`: an untrusted scene may run. Raises BadInput,
+    Damaged.
     """
     shown = Map(path)
     if trust_scene:
@@ -48,22 +48,22 @@ def serve(path, port, link="", say=print, browser=False, trust_scene=False):
     async def run():
         server, address = start(shown, port)
         say(f"{path}: {counted(shown.ds.status.size, 'point')} at {address}{query}")
-        say("Only this machine can reach it, and only with the token in that address. Ctrl-C ends it.")
+        say("Only this machine can reach it, and only with the token in that address. Ctrl-C stops it.")
         at = urlsplit(address).port
-        say(f"From elsewhere: ssh -L {at}:{HOST}:{at} THIS_MACHINE, and open the same address there.")
+        say(f"From another machine: ssh -L {at}:{HOST}:{at} THIS_MACHINE, and open the same address there.")
         with _redirect(address + query) if browser else nullcontext() as page:
             if browser:
                 webbrowser.open(page)
             try:
                 await asyncio.Event().wait()
             finally:
-                logging.disable()  # of what is cut off in the middle there is nothing to tell
+                logging.disable()  # whatever is interrupted now need not be reported
                 server.stop()
 
     try:
         asyncio.run(run())
     except KeyboardInterrupt:
-        say("ended")
+        say("stopped")
 
 
 def start(shown, port):
@@ -77,16 +77,16 @@ def start(shown, port):
             default_handler_class=Refused,
         )  # fmt: skip
     except OSError as error:
-        raise BadInput(f"--port {port}: {error.strerror}; choose another, or 0 for any that is free") from None
+        raise BadInput(f"--port {port}: {error.strerror}; choose another, or 0 for any free port") from None
     server.start()
     return server, f"http://{HOST}:{port}/{token}/"
 
 
 @contextmanager
 def _redirect(address):
-    """The address of a file that only this user can read and that leads to `address`.
+    """The address of a file, readable only by this user, that redirects to `address`.
 
-    A browser is given it instead, since everyone on this machine can read the arguments of its processes.
+    The browser is given this one, since everyone on this machine can read the arguments of its processes.
     """
     with tempfile.NamedTemporaryFile("w", suffix=".html") as file:
         file.write(f'<meta http-equiv="refresh" content="0; url={html.escape(address)}">')
@@ -95,7 +95,7 @@ def _redirect(address):
 
 
 def _free():
-    """A port that nobody uses."""
+    """A free port."""
     with socket.socket() as probe:
         probe.bind((HOST, 0))
         return probe.getsockname()[1]

@@ -1,4 +1,4 @@
-"""A survey's file and a view of it: the link that tells the view, and what is known of a point in a few lines."""
+"""A survey's file and a view of it: the link to a view, and what is known about a point in a few lines."""
 
 import re
 import textwrap
@@ -12,19 +12,19 @@ import numpy as np
 from survey import modules, status
 from survey.analysis.point import has_verdict, meaning, reading, sentence
 from survey.errors import BadInput, Damaged
-from survey.file import reading as file_reading
 from survey.file import schema
 from survey.file.labels import flag_codes, percent
+from survey.file.reading import load
 from survey.viewer import raster
 from survey.wording import plain
 
-FAR = 1e300  # no sum or difference of coordinates overflows
-LINES = 6  # outputs told of the point under the pointer
+FAR = 1e300  # below this, no sum or difference of coordinates overflows
+LINES = 6  # outputs shown for the point under the pointer
 
 
 @dataclass
 class View:
-    """A variable, the window [(x low, high), (y low, high)], places in the other dimensions, and the chosen point's."""
+    """A variable, the window [(x low, high), (y low, high)], indices along other dimensions, the chosen point."""
 
     name: str
     boundaries: bool = True
@@ -34,77 +34,79 @@ class View:
 
 
 class Map:
-    """A survey's file, lazy if it is large, and its two axes; raises BadInput or Damaged for a file that has no map."""
+    """A survey's file, lazy if it is large, and its two axes; raises BadInput or Damaged for a file without a map."""
 
     def __init__(self, path):
-        ds = file_reading.load(path, chunks=None)
+        ds = load(path, chunks=None)
         _check(path, ds)
         if len(ds.status.dims) < 2:
-            raise BadInput(f"{path}: this survey has no two axes, so there is no map to view; draw it with survey plot")
+            raise BadInput(
+                f"{path}: this survey has fewer than two axes, so there is no map to view; draw it with survey plot"
+            )
         self.dims = ds.status.dims[:2]
         down = [dim for dim in self.dims if ds[dim].values[0] > ds[dim].values[-1]]
         self.ds = ds.isel({dim: slice(None, None, -1) for dim in down})
-        self.axes = [raster.Axis(self.ds[dim].values) for dim in self.dims]
-        own = set(ds.status.dims)
-        self.names = [name for name, v in ds.data_vars.items() if own <= set(v.dims) and not name.endswith("_error")]
+        self.axes = [raster.MapAxis(self.ds[dim].values) for dim in self.dims]
+        dims = set(ds.status.dims)
+        self.names = [name for name, v in ds.data_vars.items() if dims <= set(v.dims) and not name.endswith("_error")]
         self.title, self.options = plain(ds.attrs.get("title", "")), plain(ds.attrs["options"])
-        # dimensions beside the two: of the survey, and of some outputs
+        # further dimensions: of the survey, and of some outputs
         self.others = list(dict.fromkeys(dim for name in self.names for dim in ds[name].dims if dim not in self.dims))
         self._layers = lru_cache(maxsize=8)(self._layer)
 
     def layer(self, view):
-        """The view's variable, ready to be drawn; the last few are kept."""
-        return self._layers(view.name, tuple((dim, view.others[dim]) for dim in self.of(view.name)))
+        """The view's variable, ready to be drawn; the last few are cached."""
+        return self._layers(view.name, tuple((dim, view.others[dim]) for dim in self.further_dims(view.name)))
 
-    def of(self, name):
-        """The dimensions of a variable beside the map's two."""
+    def further_dims(self, name):
+        """The dimensions of a variable other than the map's two."""
         return [dim for dim in self.others if dim in self.ds[name].dims]
 
-    def _layer(self, name, place):
+    def _layer(self, name, others):
         cells = name == "verdict" and "cell_verdict" in self.ds
-        return (raster.CellLayer if cells else raster.Layer)(self.ds, name, self.dims, dict(place))
+        return (raster.CellLayer if cells else raster.Layer)(self.ds, name, self.dims, dict(others))
 
     def read(self, query):
-        """The View that a link's query tells; raises BadInput where it tells none of this map."""
-        told = dict(parse_qsl(query))
+        """The View of a link's query; raises BadInput if it is not one of this map."""
+        given = dict(parse_qsl(query))
         allowed = ["var", "boundaries", "x", "y", "point", *(f"at_{dim}" for dim in self.others)]
-        for key in told:
+        for key in given:
             if key not in allowed:
                 raise BadInput(modules.unknown("key of the link", key, allowed))
-        view = View(told.get("var", "verdict" if "verdict" in self.names else self.names[0]))
+        view = View(given.get("var", "verdict" if "verdict" in self.names else self.names[0]))
         if view.name not in self.names:
             raise BadInput(modules.unknown("variable", view.name, self.names))
-        view.boundaries = told.get("boundaries") != "0"
+        view.boundaries = given.get("boundaries") != "0"
         for at, axis in zip("xy", self.axes, strict=True):
-            view.window.append(_numbers(at, told[at], 2) if at in told else axis.ends)
+            view.window.append(_numbers(at, given[at], 2) if at in given else axis.ends)
             if not view.window[-1][0] < view.window[-1][1] or axis.pixels(*view.window[-1], 1) is None:
-                raise BadInput(f"{at} = {told[at]}: give low,high of a range that meets the map's, {axis.told}")
-        if "point" in told:
-            numbers = _numbers("point", told["point"], 2)
+                raise BadInput(f"{at} = {given[at]}: give low,high of a range that overlaps the map's, {axis.range}")
+        if "point" in given:
+            numbers = _numbers("point", given["point"], 2)
             view.point = tuple(axis.nearest(value) for axis, value in zip(self.axes, numbers, strict=True))
             if None in view.point:
                 raise BadInput(
-                    f"point = {told['point']}: it lies outside the map, {' by '.join(a.told for a in self.axes)}"
+                    f"point = {given['point']}: it lies outside the map, {' by '.join(a.range for a in self.axes)}"
                 )
         for dim in self.others:
-            (value,) = _numbers(f"at_{dim}", told.get(f"at_{dim}", "0"), 1)
+            (value,) = _numbers(f"at_{dim}", given.get(f"at_{dim}", "0"), 1)
             if value not in range(self.ds.sizes[dim]):
-                raise BadInput(f"at_{dim} = {value:g}: it must be a place in that axis, 0 to {self.ds.sizes[dim] - 1}")
+                raise BadInput(f"at_{dim} = {value:g}: it must be an index of that axis, 0 to {self.ds.sizes[dim] - 1}")
             view.others[dim] = int(value)
         return view
 
     def link(self, view):
         """The query that `read` reads."""
-        told = {"var": view.name}
-        told |= {at: ",".join(repr(float(end)) for end in ends) for at, ends in zip("xy", view.window, strict=True)}
-        told |= {} if view.boundaries else {"boundaries": 0}
-        told |= {f"at_{dim}": at for dim, at in view.others.items() if at}
+        query = {"var": view.name}
+        query |= {at: ",".join(repr(float(end)) for end in ends) for at, ends in zip("xy", view.window, strict=True)}
+        query |= {} if view.boundaries else {"boundaries": 0}
+        query |= {f"at_{dim}": at for dim, at in view.others.items() if at}
         if view.point is not None:
-            told["point"] = ",".join(repr(value) for value in self.position(view.point))
-        return urlencode(told, safe=",")
+            query["point"] = ",".join(repr(value) for value in self.position(view.point))
+        return urlencode(query, safe=",")
 
     def shares(self, name):
-        """{flag: how much of the whole map bears it, in words}."""
+        """{flag: its share of the map, as text}."""
         ds = self.ds
         if name == "verdict" and "area_fraction" in ds:
             schema.areas(ds)
@@ -112,21 +114,21 @@ class Map:
                 flag_codes(ds.area_verdict.attrs), ds.area_fraction.values, ds.area_fraction_error.values, strict=True
             )
             return {flag: f" ({percent(share, bar)})".replace("+-", "±") for flag, share, bar in shares}
-        told = [str(ds.attrs.get(f"{counted}_counts", "")) for counted in ("status", name)]
-        counts = (part.rpartition(": ") for part in ", ".join(told).split(", "))
+        texts = [str(ds.attrs.get(f"{key}_counts", "")) for key in ("status", name)]
+        counts = (part.rpartition(": ") for part in ", ".join(texts).split(", "))
         return {flag: f" ({int(number):,} in all)" for flag, _, number in counts if re.fullmatch("[0-9]{1,18}", number)}
 
     def position(self, point):
-        """The coordinates (x, y) of a point's places."""
+        """The coordinates (x, y) of a point's indices."""
         return tuple(float(axis.values[at]) for axis, at in zip(self.axes, point, strict=True))
 
     def coords(self, view):
         """{axis: value} of the chosen point, for the survey's accessor."""
-        place = dict(zip(self.dims, view.point, strict=True)) | view.others
-        return {dim: float(self.ds[dim].values[place[dim]]) for dim in self.ds.status.dims}
+        indices = dict(zip(self.dims, view.point, strict=True)) | view.others
+        return {dim: float(self.ds[dim].values[indices[dim]]) for dim in self.ds.status.dims}
 
     def under(self, view, point):
-        """What is known of the point at these two places, in lines; the view's variable first."""
+        """Yield lines about the point at these two indices, the view's variable first."""
         ds = self.ds
         names = dict.fromkeys([view.name, *(["verdict"] if "verdict" in ds else []), *self.names])
         names = [name for name in names if name != "status"][:LINES]
@@ -144,7 +146,7 @@ class Map:
             yield f"{name}: {value.replace('_', ' ')}" if "flag_values" in here[name].attrs else f"{name} = {value}"
 
     def _cell(self, *position):
-        """The verdict of the cell that holds the point of a refined map."""
+        """Yield the verdict of the cell of a refined map that contains the point."""
         inside, ds = True, self.ds
         for dim, value in zip(self.dims, position, strict=True):
             inside &= (ds[f"cell_{dim}_low"].values <= value) & (value <= ds[f"cell_{dim}_high"].values)
@@ -152,29 +154,29 @@ class Map:
 
 
 def _check(path, ds):
-    """Raise Damaged unless the cells are whole and the first two axes go up or down: else no point is found on them."""
+    """Raise Damaged unless the cells are consistent and the first two axes monotonic: else points cannot be located."""
     if "cell_verdict" in ds:
         schema.cells(ds)
     for dim in ds.status.dims[:2]:
         values = ds[dim].values.astype(float)
         if abs(values).max() > FAR:
-            raise Damaged(f"{path}: the axis {dim} reaches beyond {FAR:g}, so there is no map to view")
+            raise Damaged(f"{path}: the axis {dim} extends beyond {FAR:g}, so there is no map to view")
         steps = np.diff(values)
         if not ((steps > 0).all() or (steps < 0).all()):
-            raise Damaged(f"{path}: the values of the axis {dim} go up and down, so there is no map to view")
+            raise Damaged(f"{path}: the values of the axis {dim} are not monotonic, so there is no map to view")
 
 
 def short(value):
-    """A coordinate, number or label, for a reader."""
+    """A coordinate, number or label, as short text."""
     return f"{value:.8g}" if value.dtype.kind == "f" else plain(str(value), 80)
 
 
-def _numbers(key, words, number):
-    """The finite numbers in `words`, separated by commas."""
+def _numbers(key, text, number):
+    """The finite numbers in `text`, separated by commas."""
     try:
-        found = tuple(float(word) for word in words.split(","))
+        found = tuple(float(word) for word in text.split(","))
     except ValueError:
         found = ()
     if len(found) != number or not all(map(isfinite, found)):
-        raise BadInput(f"{key} = {words}: it must be {number} number{'s, separated by a comma' * (number > 1)}")
+        raise BadInput(f"{key} = {text}: it must be {number} number{'s, separated by a comma' * (number > 1)}")
     return found

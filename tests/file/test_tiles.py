@@ -83,10 +83,10 @@ def test_values_that_do_not_fill_whole_tiles_are_refused(tmp_path):
     path = written(tmp_path / "x.nc", values, (4, 3), True)
     with h5py.File(path, "r+") as file:
         for where in [(slice(0, 6),), (slice(2, 8),), (slice(0, 4), slice(0, 2))]:
-            with pytest.raises(ValueError, match=r"x: values .* do not fill whole tiles"):
+            with pytest.raises(ValueError, match=r"x: values .* do not fill complete tiles"):
                 tiles.write(file["x"], values[where], where)
         for given in (values[:6], np.zeros((12, 3)), values[0]):
-            with pytest.raises(ValueError, match=r"x: values .* do not fill whole tiles"):
+            with pytest.raises(ValueError, match=r"x: values .* do not fill complete tiles"):
                 tiles.write(file["x"], given, ())
     np.testing.assert_array_equal(read(path), values)
 

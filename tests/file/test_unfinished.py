@@ -9,8 +9,7 @@ import pytest
 
 import survey
 from survey.errors import BadInput, Damaged
-from survey.file import blocks as file_blocks
-from survey.file import reading, unfinished
+from survey.file import blocks, reading, unfinished
 from survey.request import workflow
 from survey.sweep import cost, engine, fingerprint, plan
 
@@ -42,40 +41,42 @@ def refusal(small, *overrides):
 
 
 def test_what_is_left_is_told(left, small):
-    told = unfinished.told("small.nc")
+    told = unfinished.summary("small.nc")
     assert (told["blocks_done"], told["blocks"], told["points_done"], told["points"]) == (3, 6, 12, 24)
     assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ", told["last_written"])
     assert told["resume"] == "survey run small.nc.blocks/workflow.toml -o small.nc"
-    with pytest.raises(Damaged, match=r"not there yet; .* 3 of 6 blocks \(12 of 24 points\).* go on with: survey run"):
+    with pytest.raises(
+        Damaged, match=r"does not exist yet; .* 3 of 6 blocks \(12 of 24 points\).* resume with: survey run"
+    ):
         survey.open("small.nc")
     again = workflow.read(left / "workflow.toml", output="small.nc")  # the command that was told
     seen = []
     engine.run(again, progress=lambda done, total, reused, **_: seen.append((done, total, reused)))
-    assert seen[0] == (3, 6, 3) and reading.check("small.nc") == [] and unfinished.told("small.nc") == {}
+    assert seen[0] == (3, 6, 3) and reading.check("small.nc") == [] and unfinished.summary("small.nc") == {}
 
 
 def test_the_command_that_began_is_told_with_its_folder(left, small, tmp_path, monkeypatch):
     holder = json.loads((left / "holder.json").read_text())
-    (left / "holder.json").write_text(json.dumps(holder | {"again": "survey run small.toml --workers 2"}))
-    assert unfinished.told("small.nc")["resume"] == "survey run small.toml --workers 2"
+    (left / "holder.json").write_text(json.dumps(holder | {"resume_command": "survey run small.toml --workers 2"}))
+    assert unfinished.summary("small.nc")["resume"] == "survey run small.toml --workers 2"
     monkeypatch.chdir("/")
-    assert unfinished.told(tmp_path / "small.nc")["resume"] == f"cd {tmp_path} && survey run small.toml --workers 2"
+    assert unfinished.summary(tmp_path / "small.nc")["resume"] == f"cd {tmp_path} && survey run small.toml --workers 2"
 
 
 def test_a_run_at_work_is_told_and_not_disturbed(left, small):
     checked = workflow.read(small)
-    with file_blocks.Blocks(checked.path, fingerprint.fingerprint(checked)) as kept:
-        told = unfinished.told("small.nc")
+    with blocks.Blocks(checked.path, fingerprint.fingerprint(checked)) as kept:
+        told = unfinished.summary("small.nc")
         assert f"pid {kept.holder['pid']}" in told["at_work"] and "resume" not in told
-        assert unfinished.sentence(told).endswith("is at work on it")
+        assert unfinished.sentence(told).endswith("is writing it")
 
 
 def test_drift_names_the_keys_and_the_ways_on(left, small):
     told = refusal(small, "solver.rtol=1e-6")
     assert told == (
-        "small.nc.blocks holds 3 finished blocks of another workflow (solver.rtol 1e-09 -> 1e-06); go back to that "
-        "workflow (survey run small.nc.blocks/workflow.toml -o small.nc), or write another file with -o, or start anew "
-        "with --fresh, which deletes 3 finished blocks"
+        "small.nc.blocks contains 3 finished blocks from another workflow (solver.rtol 1e-09 -> 1e-06); go back to "
+        "that workflow (survey run small.nc.blocks/workflow.toml -o small.nc), or write another file with -o, or start "
+        "again with --fresh, which deletes 3 finished blocks"
     )
     told = refusal(small, "axes.w0.num=7", "axes.t=1.5", "title='other'")
     assert "(axes.t {'start': 0.0, 'stop': 3.0, 'num': 4} -> 1.5, axes.w0.num 6 -> 7)" in told
@@ -90,11 +91,13 @@ def test_other_code_is_told_plainly(left, small):
     manifest["code"]["survey"], manifest["kernels"] = "0.0.9", "old"
     (left / "manifest.json").write_text(json.dumps(manifest))
     for file in left.glob("*.block"):
-        arrays = file_blocks.unpack(file.read_bytes())
+        arrays = blocks.unpack(file.read_bytes())
         with open(file, "wb") as opened:
-            file_blocks.pack(arrays, opened, "of that version")
+            blocks.pack(arrays, opened, "of that version")
     now = manifest["code"] | {"survey": fingerprint.version("survey")}
-    assert f"blocks of another version of the code (survey 0.0.9 -> {now['survey']}); go back to that" in refusal(small)
+    assert f"blocks from another version of the code (survey 0.0.9 -> {now['survey']}); go back to that" in refusal(
+        small
+    )
     told = refusal(small, "solver.rtol=1e-6")
     assert "-> 1e-06)" in told and "go back to that version and that workflow" in told
 
@@ -125,7 +128,7 @@ def test_blocks_of_an_older_format_are_kept_and_told(left, small):
         body = file.read_bytes()[:-8].split(b"\n", 1)[1]
         head = b'{"w": ["<f8", [4]], "status": ["|i1", [4]], "w_error": ["<f4", [4]]}\n'
         file.write_bytes(head + body + zlib.crc32(head + body).to_bytes(8, "little"))
-    assert "small.nc.blocks holds 3 finished blocks of another version of the code (format)" in refusal(small)
+    assert "small.nc.blocks contains 3 finished blocks from another version of the code (format)" in refusal(small)
     assert len(list(left.glob("*.block"))) == 3
 
 
@@ -155,7 +158,7 @@ def test_the_kept_workflow_finds_a_scene_that_lay_beside_it(tmp_path, monkeypatc
     monkeypatch.setattr(engine.dispatch, "on_threads", stop)
     with pytest.raises(KeyboardInterrupt):
         engine.run(workflow.read(away / "own.toml"))
-    assert "of another workflow (axes.a.values [1.0, 2.0] -> [1.5])" in refusal(
+    assert "from another workflow (axes.a.values [1.0, 2.0] -> [1.5])" in refusal(
         away / "own.toml", "axes.a.values=[1.5]"
     )
     kept = workflow.read("own.nc.blocks/workflow.toml", output="own.nc")

@@ -245,5 +245,5 @@ def test_auto_falls_back_near_a_separatrix():
 
 
 def test_no_fate_in_closed_form():
-    with pytest.raises(survey.BadInput, match="'closed' does not serve question = fate"):
+    with pytest.raises(survey.BadInput, match="'closed' does not support question = fate"):
         survey.evaluate("gyrostat", b12=0.3, d=1.0, w0=1.0, method="closed")

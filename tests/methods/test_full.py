@@ -167,7 +167,7 @@ def test_where_the_set_is_unstable_rounding_grows_as_measured():
 
 
 def test_another_question_is_refused():
-    with pytest.raises(survey.BadInput, match="'full' does not serve question = fate"):
+    with pytest.raises(survey.BadInput, match="'full' does not support question = fate"):
         survey.evaluate("gyrostat", b12=0.1, method="full")
 
 

@@ -63,7 +63,7 @@ def test_every_command_takes_it(program, folder):
     assert changed.returncode == 2 and "its file has changed since" in changed.stderr
     (folder / "below/mine.py").unlink()
     gone = program("verify", "mine.nc")
-    assert gone.returncode == 2 and "its file has gone" in gone.stderr and gone.stderr.count("\n") == 1
+    assert gone.returncode == 2 and "its file is missing" in gone.stderr and gone.stderr.count("\n") == 1
     assert program("plot", "mine.nc").returncode == 0
 
 
@@ -121,11 +121,11 @@ def test_a_function_from_python_runs_in_other_processes(tmp_path, monkeypatch):
     assert "return lambda u, p" in one.attrs["scene_text"]
     assert user_scene.of_dataset(one).HASH == one.attrs["scene_hash"]
     monkeypatch.setattr(user_scene, "_made", {})  # as in another session
-    with pytest.raises(BadInput, match="was a function given from Python"):
+    with pytest.raises(BadInput, match="was a function in Python"):
         user_scene.of_dataset(survey.open(tmp_path / "one.nc"))
 
 
-@pytest.mark.parametrize("workers", [None, 1])  # each worker compiles z anew
+@pytest.mark.parametrize("workers", [None, 1])  # each worker compiles z again
 def test_what_z_raises_in_the_middle_of_a_run_is_one_line(workers, tmp_path):
     def z(u, p):
         if 0.2 < p[0] < 0.3:
@@ -133,7 +133,9 @@ def test_what_z_raises_in_the_middle_of_a_run_is_one_line(workers, tmp_path):
         return p[0]
 
     axes = {"a": {"start": 0.0, "stop": 1.0, "num": 50}, "q": 1.0}
-    with pytest.raises(BadInput, match=r"hill\(z\): z\(u, p\) raises ValueError\('no'\); let it return nan") as refusal:
+    with pytest.raises(
+        BadInput, match=r"hill\(z\): z\(u, p\) raises ValueError\('no'\); make it return nan"
+    ) as refusal:
         survey.run({"scene": scene(z), "axes": axes}, output=tmp_path / "o.nc", workers=workers)
     assert "\n" not in str(refusal.value)
 
@@ -166,18 +168,18 @@ BAD = [
     ("PERIOD = pi", "PERIOD = 3.0", r"EVEN = True, but z\(T - u\) is not z\(u\) at a = 1, q = 0.5, T = 3"),
     ("PERIOD = pi\nEVEN = True", "PERIOD = 3.0", r"z\(T\) is not z\(0\)"),
     ("cos(2 * u)", "cos(2 * u - 0.3)", r"EVEN = True, but z\(T - u\) is not z\(u\).*set EVEN = False"),
-    ("EVEN = True", "EVEN = 'yes'", "EVEN = 'yes': it is True or False"),
-    ("cos(2 * u)", "abs(cos(2 * u))", "z is not smooth at a = 1, q = 0.5; name the places"),
+    ("EVEN = True", "EVEN = 'yes'", "EVEN = 'yes': it must be True or False"),
+    ("cos(2 * u)", "abs(cos(2 * u))", "z is not smooth at a = 1, q = 0.5; name the positions"),
     ("p[0]", "(-p[0] - u) ** 0.5", "z has no finite value at a = 1, q = 0.5"),
     ("p[0]", "p[2]", r"PARAMETERS names 2: p\[0\] to p\[1\]"),
     ("p[0]", "unknown(u)", r"cannot compile z\(u, p\) \(name 'unknown' is not defined\)"),
     ("return p[0]", "return 'a'\n    p[0]", r"z\(u, p\) returns 'a'; it must return a real number"),
     ("return", "if p[0] > 0: raise ValueError('no')\n    return", r"z\(u, p\) raises ValueError\('no'\)"),
     ("z(u, p)", "z(u, a, q)", "z must be a function of two arguments"),
-    ("def z(u, p):", "def z(u, p)", "no scene that runs .SyntaxError"),
-    ("from math", "from maths", "no scene that runs .ModuleNotFoundError"),
+    ("def z(u, p):", "def z(u, p)", "the scene file failed to run .SyntaxError"),
+    ("from math", "from maths", "the scene file failed to run .ModuleNotFoundError"),
     ('"a", "q"', '"a", "a"', "PARAMETERS = .*each once"),
-    ('"a", "q"', '"a", "y1"', "PARAMETERS = .*no output's"),
+    ('"a", "q"', '"a", "y1"', "PARAMETERS = .*neither an output"),
     ("EVEN = True", "BREAKS = (1.0, 4.0)", "BREAKS: 4 lies outside 0 <= u <= T"),
     ("EVEN = True", "BREAKS = lambda p: 7.0", "BREAKS lie outside 0 <= u <= T at a = 1"),
 ]

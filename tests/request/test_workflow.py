@@ -55,7 +55,7 @@ def test_defaults_are_filled_in():
         (["refine.widht=0.1"], ["unknown key refine.widht; did you mean 'width'?"]),
         (["boundaries.axs=rho"], ["unknown key boundaries.axs; did you mean 'axis'?"]),
         (["output.variabls=['y1']"], ["unknown key output.variabls; did you mean 'variables'?"]),
-        (["output.figures=[verdict]"], ["output.figures = '[verdict]': it must be a list", "quoted"]),
+        (["output.figures=[verdict]"], ["output.figures = '[verdict]': it must be a list", "with quotes"]),
         (["axes.k=1.0"], ["axes.k is 1", "k != 1"]),
         (["axes.k=-0.5"], ["axes.k is -0.5", "0 <= k"]),
         (["axes.k.start=-0.5"], ["axes.k has an end -0.5", "0 <= k"]),
@@ -86,9 +86,9 @@ def test_defaults_are_filled_in():
         (["axes"], ["--set 'axes'", "KEY=VALUE"]),
         (["axes..k=3"], ["--set 'axes..k=3'", "empty part"]),
         (["axes.k=[0.1, 0.2]"], ["axes.k is a list", "values = [...]"]),
-        (["axes.rho.num=3"], ["axes.rho.values stands beside", "values alone"]),
+        (["axes.rho.num=3"], ["axes.rho.values cannot be combined", "values alone"]),
         (["axes.k.stop=0.1"], ["axes.k", "both 0.1"]),
-        (["axes.k.num=1"], ["axes.k", "num = 1", "bare number"]),
+        (["axes.k.num=1"], ["axes.k", "num = 1", "single number"]),
         (["axes.k.num=1000000000"], ["axes.k.num = 1000000000", "10000000"]),
         (["axes.body=1.0"], ["axes.body is an option", "[options]"]),
         (["options.k=0.5"], ["options.k is a parameter", "[axes]"]),
@@ -104,7 +104,7 @@ def test_defaults_are_filled_in():
         (["x" * 5000 + "=1"], ["unknown key xxx", "xxx ... xxx"]),
         (
             ["output.path=" + "n" * 5000 + ".nc"],
-            ["output.path", "nnn ... nnn", "no file can be made there (File name too long)"],
+            ["output.path", "nnn ... nnn", "no file can be created there (File name too long)"],
         ),
         (["output.path=" + "n" * 240 + ".nc"], ["output.path", "too long for the files beside it"]),
         (["output.path=a\u0000.nc"], ["output.path = 'a\\x00.nc'", "cannot be printed"]),
@@ -193,5 +193,5 @@ def test_listed_values_and_numbers_arrive_exactly(k, rho):
 
 
 def test_a_parameter_in_the_way_is_named():
-    with pytest.raises(BadInput, match=r"^axes.theta0 does not go with axes.l, which is given too"):
+    with pytest.raises(BadInput, match=r"^axes.theta0 cannot be combined with axes.l, which is also given"):
         workflow.check({"scene": "brun", "axes": {"l": 1.0, "theta0": 1.0}})

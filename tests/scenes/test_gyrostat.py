@@ -92,7 +92,7 @@ def test_a_point_outside_the_domain_costs_itself_alone(name):
 
 
 def test_portraits_over_parameters():
-    """The same bits in any block, places beyond the cycles are empty, a point outside the domain costs itself alone."""
+    """The same bits in any block, places beyond the cycles are empty, a point outside its domain affects no other."""
     s2, d = np.array([[-1.0], [0.5], [np.nan], [1.2]]), np.array([[-2.0, 0.4, 1.1]])
     whole = solve("portrait", s2=s2, d=d)
     assert whole["cycle_w"].shape == (4, 3, 8) and whole["equilibrium_phi"].shape == (4, 3, 4)

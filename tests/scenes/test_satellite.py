@@ -340,9 +340,9 @@ def test_bars_hold_the_rounding_of_the_inertia_ratio():
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"inertia_ratio": 0.5, "body": "prolate"}, "body and inertia_ratio say the same"),
-        ({"inertia_ratio": 0.5, "rho": 1.0}, "inertia_ratio and rho say the same"),
-        ({"rho": 0.5, "direction": -1}, "direction goes only with the parameter inertia_ratio"),
+        ({"inertia_ratio": 0.5, "body": "prolate"}, "body and inertia_ratio specify the same"),
+        ({"inertia_ratio": 0.5, "rho": 1.0}, "inertia_ratio and rho specify the same"),
+        ({"rho": 0.5, "direction": -1}, "direction requires the parameter inertia_ratio"),
         ({"inertia_ratio": 1.0}, "inertia_ratio != 1"),
     ],
 )

@@ -11,7 +11,7 @@ from matplotlib.colors import to_hex, to_rgb
 import survey
 from survey import status
 from survey.errors import BadInput
-from survey.show import figures
+from survey.show import figures, maps, marks, palette
 
 
 @pytest.fixture
@@ -60,7 +60,7 @@ def test_a_map_wholly_outside_the_domain(toy, style):
 
 @pytest.fixture
 def bare(toy):
-    """The toy map where 50 points have no answer by nature, as the scene says."""
+    """The toy map where 50 points are undefined, as the scene says."""
     flags = {"flag_values": np.array([0, 1, 4, 16], np.int8),
              "flag_meanings": "ok invalid_parameters step_limit no_motion"}  # fmt: skip
     toy["status"] = (toy.status.dims, toy.status.values, flags)
@@ -69,7 +69,7 @@ def bare(toy):
 
 
 @pytest.mark.parametrize("style", ["screen", "paper"])
-def test_no_answer_by_nature_is_grey_and_told_by_its_status(bare, style):
+def test_undefined_points_are_grey_and_listed_by_their_status(bare, style):
     figure = figures.draw(bare, style=style)
     legend = figure.legends[0]
     labels = [text.get_text() for text in legend.get_texts()]
@@ -77,25 +77,25 @@ def test_no_answer_by_nature_is_grey_and_told_by_its_status(bare, style):
                 "outside the domain (1)"]  # fmt: skip
     assert labels == (expected if style == "screen" else [label.partition(" (")[0] for label in expected])
     patch, mesh = legend.legend_handles[2], figure.axes[0].collections[0]
-    assert to_hex(patch.get_facecolor()).upper() == figures.GREYS[0] and not patch.get_hatch()
+    assert to_hex(patch.get_facecolor()).upper() == palette.GREYS[0] and not patch.get_hatch()
     drawn = mesh.cmap(mesh.norm(mesh.get_array().reshape(50, 40)))[5, [10, 12]]
-    assert [to_hex(colour).upper() for colour in drawn] == [figures.GREYS[0], figures.COLOURS[1]]
+    assert [to_hex(colour).upper() for colour in drawn] == [palette.GREYS[0], palette.COLOURS[1]]
     plt.close(figure)
 
 
-def test_no_answer_by_nature_is_grey_in_a_large_map_too(bare, monkeypatch):
-    monkeypatch.setattr(figures, "WHOLE", 20)
-    monkeypatch.setattr(figures, "CELLS", 20)
+def test_undefined_points_are_grey_in_a_large_map_too(bare, monkeypatch):
+    monkeypatch.setattr(maps, "MAX_DRAWN", 20)
+    monkeypatch.setattr(maps, "MAX_CELLS", 20)
     figure = figures.draw(bare)
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert "no motion (50)" in labels and "undecided (1)" in labels
     mesh = figure.axes[0].collections[0]
     drawn = mesh.cmap(mesh.norm(mesh.get_array()))[2]
-    assert to_hex(drawn[5]).upper() == figures.GREYS[0] and to_hex(drawn[12]).upper() == figures.COLOURS[1]
+    assert to_hex(drawn[5]).upper() == palette.GREYS[0] and to_hex(drawn[12]).upper() == palette.COLOURS[1]
     plt.close(figure)
 
 
-def test_a_row_tells_no_answer_by_nature_apart(bare):
+def test_a_row_shows_undefined_points_apart(bare):
     figure = figures.draw(bare.isel(rho=0))
     axes = figure.axes[0]
     names = [label.get_text() for label in axes.get_yticklabels()]
@@ -105,8 +105,8 @@ def test_a_row_tells_no_answer_by_nature_apart(bare):
 
 
 def test_a_large_map_is_reduced_for_the_picture_and_counted_in_full(toy, monkeypatch):
-    monkeypatch.setattr(figures, "WHOLE", 20)
-    monkeypatch.setattr(figures, "CELLS", 20)
+    monkeypatch.setattr(maps, "MAX_DRAWN", 20)
+    monkeypatch.setattr(maps, "MAX_CELLS", 20)
     figure = figures.draw(toy)
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels == ["unstable (499)", "stable (1,399)", "undecided (1)", "failed (100)", "outside the domain (1)"]
@@ -121,9 +121,9 @@ def test_the_colours_differ_for_the_colour_blind_and_in_grey():
     def apart(values):
         return min(abs(a - b) for i, a in enumerate(values) for b in values[:i])
 
-    assert apart(grey(*figures.COLOURS[:2], figures.UNDECIDED)) > 0.25
-    assert apart(grey(figures.COLOURS[1], figures.UNDECIDED, figures.GREYS[0], "white")) > 0.15  # not hatched in print
-    assert apart(grey(*figures.GREYS)) > 0.1 and not set(figures.GREYS) & set(figures.COLOURS)
+    assert apart(grey(*palette.COLOURS[:2], palette.UNDECIDED)) > 0.25
+    assert apart(grey(palette.COLOURS[1], palette.UNDECIDED, palette.GREYS[0], "white")) > 0.15  # not hatched in print
+    assert apart(grey(*palette.GREYS)) > 0.1 and not set(palette.GREYS) & set(palette.COLOURS)
 
 
 @pytest.mark.parametrize("name", ["w", "turnings", "status"])
@@ -180,7 +180,7 @@ def test_hatching_follows_the_edges_of_cells(toy):
     axes = Figure().subplots()
     one = toy.isel(k=slice(0, 3), rho=slice(0, 3))
     where = np.array([[False, False, False], [False, True, False], [False, False, False]])
-    figures._hatched(axes, one.k, one.rho, where, "////")
+    marks.hatched(axes, one.k, one.rho, where, "////")
     (path,) = axes.collections[0].get_paths()
     middles = [0.5 * (v[1:] + v[:-1]) for v in (one.k.values, one.rho.values)]
     for corner in np.unique(path.vertices.round(12), axis=0):

@@ -126,7 +126,7 @@ def test_rows_through_a_value_where_tongues_accumulate(tmp_path, capsys):
     )
     with pytest.raises(SystemExit, match="0"):
         main(["run", str(tmp_path / "through.toml"), "-o", str(tmp_path / "through.nc")])
-    assert "edges: not sought for inertia_ratio from 0.998 to 1.002, where they accumulate" in capsys.readouterr().err
+    assert "edges: not searched for inertia_ratio from 0.998 to 1.002, where they accumulate" in capsys.readouterr().err
     ds = xr.load_dataset(tmp_path / "through.nc")
     assert ds.attrs["edge_left_out"] == "inertia_ratio from 0.998 to 1.002" and ds.edge_complete.values.all()
     row = np.repeat([0, 1], ds.edge_count.values)
@@ -222,7 +222,7 @@ def test_a_row_of_its_own(tmp_path):
     [
         (
             {"axes": WORKFLOW["axes"] | {"rho": {"values": [0.5]}}},
-            "boundaries: the axis rho has one value, and edges need a range",
+            "boundaries: the axis rho has one value, but edges need a range",
         ),
         ({"boundaries": {"axis": "rhoo"}}, r"boundaries.axis: unknown axis 'rhoo'; did you mean 'rho'"),
         ({"boundaries": {"axes": "rho"}}, r"unknown key boundaries.axes; did you mean 'axis'"),

@@ -15,8 +15,8 @@ import xarray as xr
 
 import survey
 from survey.errors import Stopped
-from survey.file import blocks as file_blocks
 from survey.file import reading
+from survey.file.blocks import Blocks
 from survey.request import workflow
 from survey.sweep import cost, engine, fingerprint
 
@@ -135,13 +135,13 @@ def test_a_cluster_with_tls(small, tmp_path, surveyed):
             (
                 {},
                 2,
-                "asks for TLS; set distributed.comm.tls: ca-file, client.cert and client.key in dask's configuration",
+                "requires TLS; set distributed.comm.tls: ca-file, client.cert and client.key in dask's configuration",
             ),
-            ({ca: tls[ca]}, 2, "asks for TLS; set"),
+            ({ca: tls[ca]}, 2, "requires TLS; set"),
             (tls | {ca: str(tmp_path / "absent.pem")}, 2, "cannot be used (No such file or directory)"),
             (tls | {ca: str(small)}, 2, "cannot be used ("),
-            (tls | {ca: other[ca]}, 4, "do not accept each other's TLS certificates (certificate verify failed"),
-            (other | {ca: tls[ca]}, 4, "do not accept each other's TLS certificates ("),
+            (tls | {ca: other[ca]}, 4, "reject each other's TLS certificates (certificate verify failed"),
+            (other | {ca: tls[ca]}, 4, "reject each other's TLS certificates ("),
         ):
             running = start(small.parent, file, "--quiet", **more)
             told = running.communicate(timeout=60)[1]
@@ -177,7 +177,7 @@ def test_an_expired_certificate_is_told_in_one_line(small, tmp_path):
 
 def test_blocks_travel_where_no_folder_is_shared(small, tmp_path):
     checked = workflow.read(small, output=tmp_path / "o.nc")
-    with file_blocks.Blocks(checked.path, fingerprint.fingerprint(checked)) as kept:
+    with Blocks(checked.path, fingerprint.fingerprint(checked)) as kept:
         blocks = cost.blocks_of(checked)
         job = engine.Job(checked.scene, checked.request, checked.grid, kept, fingerprint.code_version())
         first = engine.numbered(0, blocks[0])
@@ -189,8 +189,8 @@ def test_blocks_travel_where_no_folder_is_shared(small, tmp_path):
         os.rename(tmp_path / "elsewhere", kept.folder)
         whole = (kept.folder / "00000000.block").read_bytes()
         assert content == whole
-        kept.put(0, content)
-        assert kept.sound() == {0}
+        kept.save_packed(0, content)
+        assert kept.intact() == {0}
 
 
 def test_workers_that_see_another_disk_send_their_blocks(scheduler, small, surveyed):
@@ -217,7 +217,7 @@ def test_a_cluster_with_an_edited_survey_is_refused(scheduler, small):
     processes.append(worker(file, PYTHONPATH=str(file.parent / "other")))
     running = start(small.parent, file, "--quiet")
     told = running.communicate(timeout=180)[1]
-    assert running.returncode == 4 and told.count("\n") == 1 and "has other code (sources: " in told, told
+    assert running.returncode == 4 and told.count("\n") == 1 and "runs different code (sources: " in told, told
 
 
 def test_a_worker_with_other_code_is_refused(small, tmp_path):
@@ -225,7 +225,9 @@ def test_a_worker_with_other_code_is_refused(small, tmp_path):
     job = engine.Job(
         checked.scene, checked.request, checked.grid, None, fingerprint.code_version() | {"sources": "other"}
     )
-    with pytest.raises(Stopped, match=r"has other code \(sources: \w+, this run: other\); install the same survey"):
+    with pytest.raises(
+        Stopped, match=r"runs different code \(sources: \w+, this run: other\); install the same survey"
+    ):
         job(engine.numbered(0, cost.blocks_of(checked)[0]))
 
 

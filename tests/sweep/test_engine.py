@@ -6,11 +6,10 @@ import pytest
 import xarray as xr
 
 import survey
-from survey.file import labels as dataset
-from survey.file import output as file_output
-from survey.file import reading
+from survey.file import labels, reading
+from survey.file.map_file import MapFile
 from survey.request import workflow
-from survey.sweep import cost, engine, remaining, solve
+from survey.sweep import cost, engine, solve, time_left
 
 CUTS = [(1, 2**20, 2**16), (5, 2**20, 2**16), (4, 8, 4), (3, 6, 2), (24, 1, 1)]
 
@@ -19,7 +18,7 @@ CUTS = [(1, 2**20, 2**16), (5, 2**20, 2**16), (4, 8, 4), (3, 6, 2), (24, 1, 1)]
 def test_any_cut_gives_the_same_file(small, surveyed, tmp_path, monkeypatch, block, region, tile):
     monkeypatch.setattr(cost, "BLOCK_POINTS", block)
     monkeypatch.setattr(cost, "REGION_POINTS", region)
-    monkeypatch.setattr(file_output, "TILE_POINTS", tile)
+    monkeypatch.setattr(cost, "TILE_POINTS", tile)
     survey.run(small, output=tmp_path / "cut.nc")
     whole, cut = (xr.load_dataset(path) for path in (surveyed, tmp_path / "cut.nc"))
     for ds in (whole, cut):
@@ -33,7 +32,7 @@ def test_any_cut_gives_the_same_file(small, surveyed, tmp_path, monkeypatch, blo
 def test_the_file_says_what_xarray_would_have_written(small, surveyed, tmp_path):
     checked = workflow.read(small)
     arrays = solve.compute(checked.grid, checked.scene, checked.request)
-    ds = dataset.describe(checked.grid, checked.scene, checked.name, checked.request, arrays)
+    ds = labels.describe(checked.grid, checked.scene, checked.name, checked.request, arrays)
     ds.to_netcdf(tmp_path / "other.nc", encoding={name: {"_FillValue": None} for name in ds.coords})
     with netCDF4.Dataset(surveyed) as ours, netCDF4.Dataset(tmp_path / "other.nc") as other:
         assert set(ours.variables) == set(other.variables) and set(ours.dimensions) == set(other.dimensions)
@@ -54,12 +53,12 @@ def test_labels_of_an_extra_dimension_are_kept(tmp_path):
     coordinates = {"x": (("x",), np.arange(3.0), {"units": "1"}), "order": (("order",), labels, {"long_name": "order"})}
     layout = {"c": (np.dtype(float), np.nan, (2,)), "status": (np.dtype("int8"), 0, ())}
     variables = {"c": (("x", "order"), {"units": "1"}), "status": (("x",), {"units": "1"})}
-    output = file_output.Output(tmp_path / "o.nc", tmp_path, coordinates, variables, layout, (3,), (2,))
+    output = MapFile(tmp_path / "o.nc", tmp_path, coordinates, variables, layout, (3,), (2,))
     for part in (slice(0, 2), slice(2, 3)):
-        output.put("c", values[part], (part,))
-    output.put("status", np.zeros(3, np.int8))
+        output.write("c", values[part], (part,))
+    output.write("status", np.zeros(3, np.int8))
     with pytest.raises(OSError, match="absent"):  # as where HDF5 cannot read what it wrote
-        output.put("absent", values)
+        output.write("absent", values)
     output.publish({})
     ds = xr.load_dataset(tmp_path / "o.nc")
     assert ds.order.values.tolist() == ["200", "110"] and ds.c.dims == ("x", "order")
@@ -68,7 +67,7 @@ def test_labels_of_an_extra_dimension_are_kept(tmp_path):
 
 def test_counts_are_those_of_the_whole(small, tmp_path, monkeypatch):
     monkeypatch.setattr(cost, "BLOCK_POINTS", 4)
-    monkeypatch.setattr(dataset, "CHUNK", 3)
+    monkeypatch.setattr(labels, "CHUNK", 3)
     checked = workflow.read(small, ["solver.rtol=1e-17", "axes.t.stop=300.0"], tmp_path / "o.nc")
     finished = engine.run(checked)
     ds = survey.open(checked.path)
@@ -100,10 +99,10 @@ def test_what_compiling_kernels_and_file_took_is_told_apart(surveyed, small, tmp
 def test_what_is_left_follows_the_cost_of_each_region(monkeypatch):
     """Blocks of the left half take 1 s, those of the right 9 s: known once one of each is done."""
     blocks = [(slice(0, 4), slice(10 * i, 10 * i + 10)) for i in range(10)]
-    left = remaining.Remaining((4, 100), blocks, reused={9})
+    left = time_left.TimeLeft((4, 100), blocks, reused={9})
     assert left() == 0.0
     clock = iter([41.0, 49.0, 49.0, 49.0])  # the first 40 s were spent on compiling
-    monkeypatch.setattr(remaining.time, "perf_counter", lambda: next(clock))
+    monkeypatch.setattr(time_left.time, "perf_counter", lambda: next(clock))
     left.took(0, 1.0)
     left.took(7, 9.0)
     left.took(8, 8.0)  # 18 seconds of work in nine: two workers

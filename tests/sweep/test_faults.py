@@ -41,7 +41,7 @@ import dask.multiprocessing, dask.threaded, psutil
 from survey import cli
 from survey.file import labels, lock, netcdf, tiles
 from survey.request import workflow
-from survey.sweep import boundaries, cost, dispatch, engine, extras, progress, refine, solve
+from survey.sweep import boundaries, cost, dispatch, edges_and_cells, engine, progress, refine, solve
 cost.BLOCK_POINTS = 8
 labels.provenance()
 on_threads = dispatch.on_threads
@@ -49,7 +49,7 @@ dispatch.on_threads = lambda task, numbers, finished=lambda *_: None, threads=No
 for path in sys.argv[2:]:
     read = workflow.read(path)
     solve.compute(read.grid, read.scene, read.request)
-    extras.extras(read, lambda name, make: make())
+    edges_and_cells.find(read, lambda name, make: make())
 dispatch.on_threads = on_threads
 for line in sys.stdin:
     given = json.loads(line)

@@ -9,7 +9,7 @@ from survey.sweep import progress
 
 
 def test_the_bar_tells_more_than_a_day(monkeypatch):
-    monkeypatch.setattr(progress, "SHOWN_SECONDS", -1.0)
+    monkeypatch.setattr(progress, "BAR_SECONDS", -1.0)
     console = Console(file=io.StringIO(), force_terminal=True, width=120, highlight=False)
     workflow = types.SimpleNamespace(name="gyrostat", grid=types.SimpleNamespace(points=1))
     with progress.Progress(console, workflow) as bar:

@@ -21,7 +21,7 @@ import survey.methods
 import survey.scenes
 from survey import cli, measures, modules, status
 from survey.methods import agm, carlson
-from survey.request import workflow
+from survey.request import schema, workflow
 
 DOCS = ROOT / "workflows/docs"
 PAGES = sorted(DOCS.glob("*.md"))
@@ -75,10 +75,10 @@ def test_the_workflows_of_a_page_are_accepted(page, folder):
         assert workflow.check(tomllib.loads(text)).scene
 
 
-def test_every_key_of_a_workflow_is_told():
+def test_every_key_of_a_workflow_is_documented():
     page = (DOCS / "workflow_file.md").read_text()
-    tables = [workflow.File, workflow.Spread, workflow.Listed, workflow.Solver, workflow.Output]
-    keys = {key for table in [*tables, workflow.Boundaries, workflow.Refine] for key in table.model_fields}
+    tables = [schema.File, schema.Spread, schema.Listed, schema.SolverTable, schema.OutputTable]
+    keys = {key for table in [*tables, schema.BoundariesTable, schema.RefineTable] for key in table.model_fields}
     told = "".join(re.findall(r"^\| `(.*?)` \|", page, re.MULTILINE))
     assert [key for key in keys if key not in told] == []
 

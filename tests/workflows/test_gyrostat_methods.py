@@ -35,15 +35,15 @@ def test_the_reference_has_the_digits_it_says(true):
         assert abs(w - mp.sqrt(2 * mp.cos(1) - 1)) < 1e-29
 
 
-def replace_rows(plane, rows, places, **more):
-    return replace(plane, rows=np.array(rows, float), places=np.array(places, float), **more)
+def replace_rows(plane, rows, abscissae, **more):
+    return replace(plane, rows=np.array(rows, float), abscissae=np.array(abscissae, float), **more)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_every_error_lies_within_its_bar(maps, true, method):
     for name, plane in maps.items():
-        j = workflow.judge(plane, method, true[name])
-        assert not j.wrong.any() and j.ratio.max() < 1 and j.shaky.max() < 1e-3, name  # bars of double-double, too
+        j = workflow.compared(plane, method, true[name])
+        assert not j.wrong.any() and j.ratio.max() < 1 and j.doubtful.max() < 1e-3, name  # bars of double-double, too
         assert (j.error[j.met] < workflow.RTOL).all()
 
 
@@ -54,40 +54,40 @@ def test_beside_turning_points_of_random_systems():
     ends, _low, codes = workflow.truth(rows, rows[:, 6:7] + 30.0, True)
     some = codes[:, 0] == workflow.TURNING
     _axis, offsets = workflow.two_sided("", np.arange(-16.0, -0.5, 0.5))
-    places = np.sort(np.maximum(ends[some, :, 0] + offsets, rows[some, 6:7]), axis=1)
+    abscissae = np.sort(np.maximum(ends[some, :, 0] + offsets, rows[some, 6:7]), axis=1)
     across = workflow.plain("", offsets), workflow.plain("", np.arange(some.sum()))
-    plane = workflow.Plane("", *across, rows[some], places, "x", over_phi=True)
+    plane = workflow.Plane("", *across, rows[some], abscissae, "x", over_phi=True)
     true = workflow.checked(plane)
     for method in ("taylor", "dop853"):
-        j = workflow.judge(plane, method, true)
+        j = workflow.compared(plane, method, true)
         assert some.sum() > 50 and j.answered.all() and not j.wrong.any() and j.ratio.max() < 1
 
 
 def test_a_wrong_answer_would_be_seen(maps, true):
     plane = maps["phase"]
     high, low, codes, doubt = true["phase"]
-    j = workflow.judge(plane, "taylor", (high, low + 1e-9, codes, doubt))
+    j = workflow.compared(plane, "taylor", (high, low + 1e-9, codes, doubt))
     assert (j.ratio > 1).mean() > 0.9
     plane, (high, low, codes, doubt) = maps["turning"], true["turning"]
-    j = workflow.judge(plane, "taylor", (high, low, workflow.TURNING - codes, doubt))
+    j = workflow.compared(plane, "taylor", (high, low, workflow.TURNING - codes, doubt))
     assert j.wrong.mean() > 0.3
 
 
 def test_the_rule_of_auto(maps, true):
     """What is read off the page: `auto` meets the accuracy wherever the closed form or the Taylor series does."""
     for name, plane in maps.items():
-        closed, taylor, auto = (workflow.judge(plane, method, true[name]) for method in ("closed", "taylor", "auto"))
+        closed, taylor, auto = (workflow.compared(plane, method, true[name]) for method in ("closed", "taylor", "auto"))
         assert not ((closed.met | taylor.met) & ~auto.met).any(), name
-    phase = [workflow.judge(maps["phase"], method, true["phase"]) for method in ("closed", "taylor")]
+    phase = [workflow.compared(maps["phase"], method, true["phase"]) for method in ("closed", "taylor")]
     assert np.nanmedian(phase[0].error) < np.nanmedian(phase[1].error)
 
 
 def test_the_page_and_the_picture(maps, true, tmp_path):
-    judged = {}
+    results = {}
     for name, plane in maps.items():
-        one = workflow.judge(plane, "taylor", true[name])
-        judged[name] = dict.fromkeys(workflow.METHODS, one) | {"full": None if plane.over_phi else one}
-    text = workflow.page(maps, true, judged)
+        one = workflow.compared(plane, "taylor", true[name])
+        results[name] = dict.fromkeys(workflow.METHODS, one) | {"full": None if plane.over_phi else one}
+    text = workflow.page(maps, true, results)
     assert "## The rule of `auto`" in text and text.count("| taylor |") == len(maps) and "nan" not in text
-    workflow.draw(maps, judged, tmp_path / "out.png")
+    workflow.draw(maps, results, tmp_path / "out.png")
     assert (tmp_path / "out.png").stat().st_size > 50_000

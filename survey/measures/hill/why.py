@@ -1,6 +1,6 @@
 """Why a point of Hill's equation has its verdict, in a sentence: which factor decided, against which error bar."""
 
-from survey.scene import told
+from survey.scene import plus_minus
 
 RULE = "an exact rule decides here (no unstable side, or |D| = 2), whatever the error bars"
 
@@ -15,7 +15,7 @@ def why(answer, even=True):
         return _by_trace(answer)
     factors = {name: _product(answer, *name) for name in (("dy1", "y2"), ("y1", "dy2"))}
     (p, p_bar), (q, q_bar) = factors.values()
-    above, below = f"y1' y2 = {told(p, p_bar)}", f"y1 y2' = {told(q, q_bar)}"
+    above, below = f"y1' y2 = {plus_minus(p, p_bar)}", f"y1 y2' = {plus_minus(q, q_bar)}"
     if answer["verdict"] == "unstable":
         if p > p_bar:
             return f"{above} > 0 at T/2, {_times(p, p_bar)} its error bar: D = 2 + 4 y1' y2 > 2"
@@ -39,7 +39,7 @@ def _by_trace(answer):
         side = f"{_times(off, bar)} its error bar: " + ("|D| > 2" if abs(d) > 2 else "|D| < 2")
     else:
         side = "less than its error bar: the factors at T/2, more digits of D or an exact rule decide"
-    return f"D = {told(d, bar)}, {off:.2g} from |D| = 2, {side}"
+    return f"D = {plus_minus(d, bar)}, {off:.2g} from |D| = 2, {side}"
 
 
 def _product(answer, one, other):

@@ -9,7 +9,7 @@ import numpy as np
 
 from survey.kernels.cylinder import lockstep
 from survey.methods import taylor
-from survey.precision.peak import Counted
+from survey.precision.flops import Counted
 from survey.precision.peers import System
 
 ERROR = "phi"

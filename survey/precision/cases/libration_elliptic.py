@@ -10,7 +10,7 @@ import numpy as np
 from survey.kernels.libration import danby as lanes
 from survey.measures.libration import danby
 from survey.methods import taylor16
-from survey.precision.peak import Counted
+from survey.precision.flops import Counted
 from survey.precision.peers import System
 
 ERROR = "b"

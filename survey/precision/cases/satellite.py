@@ -10,7 +10,7 @@ import numpy as np
 from survey.kernels import lanes
 from survey.measures.hill import monodromy
 from survey.methods import taylor16
-from survey.precision.peak import operations
+from survey.precision.flops import operations
 from survey.precision.peers import System
 from survey.scenes.satellite import Motion, moduli
 

@@ -1,4 +1,4 @@
-"""What one core can do: its measured rates of multiplications and additions, and the operations of a formula."""
+"""Floating-point operations: the measured peak rates of one core, and the number of operations of a formula."""
 
 import time
 
@@ -6,11 +6,11 @@ import numba
 import numpy as np
 
 LANES, ROUNDS, REPEATS = 64, 3000, 5
-CHAINS, DEPTH = 12, 16  # measured: with fewer, the latency of an operation shows
+CHAINS, DEPTH = 12, 16  # measured: fewer are limited by the latency of an operation
 
 
 def rates():
-    """Pairs of a multiplication and an addition per nanosecond: apart, as survey's kernels do them, and fused."""
+    """Multiply-add pairs per nanosecond: separate, as in survey's kernels, and fused."""
     return {"multiply_add_per_ns": _rate(), "fused_multiply_add_per_ns": _rate(fastmath={"contract"})}
 
 
@@ -54,7 +54,7 @@ def _burner(flags):
 class Counted:
     """A number that counts the operations it takes part in; signs, magnitudes and comparisons are free."""
 
-    __array_ufunc__ = None  # numpy's scalars leave the operation to us
+    __array_ufunc__ = None  # numpy's scalars leave the operation to this class
     operations = 0
 
     def _count(self, other=None):
@@ -62,7 +62,7 @@ class Counted:
         return self
 
     def _times(self, other):
-        return self if isinstance(other, float) and other == 1.0 else self._count()  # the compiler drops it
+        return self if isinstance(other, float) and other == 1.0 else self._count()  # the compiler removes it
 
     __add__ = __radd__ = __sub__ = __rsub__ = __truediv__ = __rtruediv__ = _count
     __mul__ = __rmul__ = _times

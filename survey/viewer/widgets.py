@@ -1,4 +1,4 @@
-"""How things look in the page: pieces of HTML, and bokeh's models."""
+"""Pieces of the page: HTML, and models of bokeh."""
 
 import html
 import io
@@ -7,7 +7,8 @@ from base64 import b64encode
 
 from bokeh.models import CustomJSTickFormatter
 
-from survey.show import figures
+from survey.show.boundaries import CURVES
+from survey.show.text import MAX_TEXT, formula
 from survey.viewer import raster
 from survey.viewer.shown import short
 from survey.wording import plain
@@ -24,21 +25,21 @@ MARKERS = {"D": "diamond", "o": "circle"}
 
 
 def curve(plot, name):
-    """A renderer of the boundaries of a class, with the looks of `survey.show.figures`."""
-    _, look = figures.CURVES[name]
-    if "marker" in look:
-        style = {"marker": MARKERS[look["marker"]], "size": 1.6 * look["ms"], "line_color": look["mec"]}
-        return plot.scatter("x", "y", source={"x": [], "y": []}, fill_color=look["mfc"], **style)
-    dash = "solid" if look["ls"] == "-" else list(look["ls"][1])
-    style = {"line_dash": dash, "line_width": 1.5 * look["lw"], "line_color": look["color"]}
+    """A renderer of the boundaries of a class, drawn as in `survey.show.boundaries`."""
+    _, line = CURVES[name]
+    if "marker" in line:
+        style = {"marker": MARKERS[line["marker"]], "size": 1.6 * line["ms"], "line_color": line["mec"]}
+        return plot.scatter("x", "y", source={"x": [], "y": []}, fill_color=line["mfc"], **style)
+    dash = "solid" if line["ls"] == "-" else list(line["ls"][1])
+    style = {"line_dash": dash, "line_width": 1.5 * line["lw"], "line_color": line["color"]}
     return plot.multi_line("x", "y", source={"x": [], "y": []}, **style)
 
 
 def legend(entries):
-    """HTML of (kind, colour, words after it)."""
+    """HTML of entries (kind, colour, text after it)."""
     return "".join(
         f"<span style='{ENTRY}'><span style='{SWATCH};background:{_swatch(kind, colour)}'></span>"
-        f"{html.escape(words(kind.replace('_', ' ')))}{after}</span> "
+        f"{html.escape(literal(kind.replace('_', ' ')))}{after}</span> "
         for kind, colour, after in entries
     )
 
@@ -58,26 +59,26 @@ def picture(drawn):
 
 
 def labels(values):
-    """A slider's formatter, from places to the values there."""
+    """A slider's formatter, from positions to the values there."""
     return CustomJSTickFormatter(args={"values": [short(value) for value in values]}, code="return values[tick]")
 
 
-def words(text):
-    """A file's text for bokeh: nothing in it is TeX, which bokeh finds between $$, \\( and \\[."""
-    return re.sub(r"([$\\])(?=[$(\[])", r"\1 ", plain(str(text), figures.SAID))
+def literal(text):
+    """Text from a file for bokeh: nothing in it is TeX, which bokeh finds between $$, \\( and \\[."""
+    return re.sub(r"([$\\])(?=[$(\[])", r"\1 ", plain(str(text), MAX_TEXT))
 
 
 def text_of(path, digest, text):
-    """HTML of a scene's file for a reader who is to decide whether it may run: nothing of it is hidden."""
-    look = "max-height:360px;overflow:auto;background:#f4f4f4;border:1px solid #888;padding:6px;white-space:pre-wrap"
-    told = html.escape(plain(text, len(text), lines=True))
-    return f"<b>{html.escape(plain(path))}</b><br>sha256 {digest}<pre style='{look}'>{told}</pre>"
+    """HTML of a scene's file, for a reader who must decide whether it may run: nothing is hidden."""
+    style = "max-height:360px;overflow:auto;background:#f4f4f4;border:1px solid #888;padding:6px;white-space:pre-wrap"
+    content = html.escape(plain(text, len(text), lines=True))
+    return f"<b>{html.escape(plain(path))}</b><br>sha256 {digest}<pre style='{style}'>{content}</pre>"
 
 
 def label(variable, tex=True):
     """`long name, symbol (unit)`."""
-    symbol, units = variable.attrs.get("symbol", ""), words(variable.attrs.get("units", "1"))
-    text = words(variable.attrs.get("long_name", variable.name))
-    if symbol and tex and not re.search(r"[\\${}^~]", text + units) and figures.formula(symbol, "") == f"${symbol}$":
-        text = re.sub(r"([_%&#])", r"\\\1", text) + f", $${symbol}$$"  # TeX reads the words, too
+    symbol, units = variable.attrs.get("symbol", ""), literal(variable.attrs.get("units", "1"))
+    text = literal(variable.attrs.get("long_name", variable.name))
+    if symbol and tex and not re.search(r"[\\${}^~]", text + units) and formula(symbol, "") == f"${symbol}$":
+        text = re.sub(r"([_%&#])", r"\\\1", text) + f", $${symbol}$$"  # TeX reads the text, too
     return text + ("" if units in ("1", "") else f" ({units})")

@@ -11,8 +11,7 @@ import xarray as xr
 import survey
 from survey import status
 from survey.errors import BadInput, Damaged, Stopped
-from survey.file import blocks as file_blocks
-from survey.file import labels, netcdf, output, reading
+from survey.file import blocks, labels, map_file, netcdf, reading
 from survey.request import workflow
 from survey.sweep import cost, engine, fingerprint, solve
 
@@ -112,11 +111,11 @@ def test_finished_blocks_are_used_again_and_give_the_same_bits(small, tmp_path, 
     monkeypatch.setattr(cost, "BLOCK_POINTS", 4)
     whole = survey.run(small, output=tmp_path / "whole.nc")
     checked = workflow.read(small, output=tmp_path / "again.nc")
-    blocks = cost.blocks_of(checked)
-    assert len(blocks) == 6
-    with file_blocks.Blocks(checked.path, fingerprint.fingerprint(checked)) as kept:
+    cuts = cost.blocks_of(checked)
+    assert len(cuts) == 6
+    with blocks.Blocks(checked.path, fingerprint.fingerprint(checked)) as kept:
         for number in (1, 3, 4):
-            kept.save(number, solve.solve_block(checked.scene, checked.request, checked.grid, blocks[number]))
+            kept.save(number, solve.solve_block(checked.scene, checked.request, checked.grid, cuts[number]))
         _flip(kept._file(3))
     seen = []
     engine.run(checked, progress=lambda done, total, reused, **_: seen.append((done, total, reused)))
@@ -133,7 +132,7 @@ def _flip(file):
 
 def test_a_damaged_block_is_found_and_dropped(small, tmp_path):
     checked = workflow.read(small, output=tmp_path / "o.nc")
-    with file_blocks.Blocks(checked.path, fingerprint.fingerprint(checked)) as kept:
+    with blocks.Blocks(checked.path, fingerprint.fingerprint(checked)) as kept:
         kept.save(0, {"w": np.arange(100.0)})
         _flip(kept._file(0))
         with pytest.raises(Damaged, match="run the command again"):
@@ -142,7 +141,7 @@ def test_a_damaged_block_is_found_and_dropped(small, tmp_path):
 
 
 def _hold(path, ready, leave):
-    with file_blocks.Blocks(path, {}):
+    with blocks.Blocks(path, {}):
         ready.set()
         leave.wait(30)
 
@@ -153,11 +152,11 @@ def test_a_second_writer_is_told_who_holds_the_output_and_a_killed_holder_frees_
     holder = context.Process(target=_hold, args=(tmp_path / "o.nc", ready, leave))
     holder.start()
     assert ready.wait(60)
-    with pytest.raises(BadInput, match=f"pid {holder.pid}"), file_blocks.Blocks(tmp_path / "o.nc", {}):
+    with pytest.raises(BadInput, match=f"pid {holder.pid}"), blocks.Blocks(tmp_path / "o.nc", {}):
         pass
     holder.kill()
     holder.join()
-    with file_blocks.Blocks(tmp_path / "o.nc", {}):
+    with blocks.Blocks(tmp_path / "o.nc", {}):
         pass
 
 
@@ -166,7 +165,7 @@ def test_a_complete_output_wins_over_what_its_run_has_left(small, tmp_path):
     path = tmp_path / "o.nc"
     first = survey.run(small, output=path).attrs["date_created"]
     checked = workflow.read(small, output=path)
-    with file_blocks.Blocks(path, fingerprint.fingerprint(checked)) as kept:
+    with blocks.Blocks(path, fingerprint.fingerprint(checked)) as kept:
         kept.save(0, {"status": np.zeros(2, np.int8)})
     (kept.folder / "manifest.json").unlink()
     (tmp_path / "o.nc.lock").write_text('{"host": "gone", "pid"')
@@ -175,7 +174,7 @@ def test_a_complete_output_wins_over_what_its_run_has_left(small, tmp_path):
     assert survey.run(small, output=path).attrs["date_created"] == first
     assert {file.name for file in tmp_path.glob("o.nc*")} == {"o.nc", "o.nc.sha256"}
     assert beside.read_text().count("\n") == 1 and reading.check(path) == []
-    with file_blocks.Blocks(path, fingerprint.fingerprint(checked)) as kept:
+    with blocks.Blocks(path, fingerprint.fingerprint(checked)) as kept:
         kept.save(0, {"status": np.zeros(2, np.int8)})
     survey.run(small, output=path, fresh=True)
     assert survey.open(path).attrs["date_created"] >= first and not kept.folder.exists()
@@ -186,21 +185,21 @@ def test_a_complete_output_of_another_workflow_does_not(small, tmp_path, monkeyp
     path = tmp_path / "o.nc"
     survey.run(small, output=path)
     checked = workflow.read(small, ["title='other'"], path)
-    with file_blocks.Blocks(path, fingerprint.fingerprint(checked)) as kept:
+    with blocks.Blocks(path, fingerprint.fingerprint(checked)) as kept:
         kept.save(0, solve.solve_block(checked.scene, checked.request, checked.grid, cost.blocks_of(checked)[0]))
     engine.run(checked)
     assert survey.open(path).attrs["title"] == "other" and survey.open(path).attrs["blocks_reused"] == 1
 
 
 def test_a_block_under_another_number_or_of_another_survey_is_not_taken(tmp_path):
-    with file_blocks.Blocks(tmp_path / "o.nc", {"rtol": 1}) as kept:
+    with blocks.Blocks(tmp_path / "o.nc", {"rtol": 1}) as kept:
         kept.save(0, {"w": np.arange(3.0)})
         (kept.folder / "00000001.block").write_bytes(kept._file(0).read_bytes())
-        with file_blocks.Blocks(tmp_path / "other.nc", {"rtol": 2}) as other:
+        with blocks.Blocks(tmp_path / "other.nc", {"rtol": 2}) as other:
             other.save(2, {"w": np.arange(3.0)})
         (kept.folder / "00000002.block").write_bytes(other._file(2).read_bytes())
         (kept.folder / "notes.block").write_text("of the user")
-        assert kept.sound() == {0}
+        assert kept.intact() == {0}
 
 
 def test_a_clean_up_that_fails_is_told_and_done_by_the_next_run(small, tmp_path, monkeypatch):
@@ -210,7 +209,7 @@ def test_a_clean_up_that_fails_is_told_and_done_by_the_next_run(small, tmp_path,
         raise OSError(5, "Input/output error", str(folder))
 
     monkeypatch.setattr(os, "rmdir", refuse)
-    with pytest.raises(Stopped, match=r"o\.nc is complete, but .* \(Input/output error: .*o\.nc\.blocks\); mend it"):
+    with pytest.raises(Stopped, match=r"o\.nc is complete, but .* \(Input/output error: .*o\.nc\.blocks\); fix this"):
         survey.run(small, output=path)
     monkeypatch.setattr(os, "rmdir", rmdir)
     assert not (tmp_path / "o.nc.lock").exists()
@@ -229,8 +228,8 @@ ARRAYS = {
 
 def test_a_block_comes_back_bit_for_bit():
     file = io.BytesIO()
-    file_blocks.pack(ARRAYS, file)
-    again = file_blocks.unpack(file.getvalue())
+    blocks.pack(ARRAYS, file)
+    again = blocks.unpack(file.getvalue())
     assert list(again) == list(ARRAYS)
     for name, array in ARRAYS.items():
         np.testing.assert_array_equal(again[name], array, strict=True)
@@ -238,14 +237,14 @@ def test_a_block_comes_back_bit_for_bit():
 
 def test_every_flipped_bit_and_every_cut_of_a_block_is_found():
     file = io.BytesIO()
-    file_blocks.pack(ARRAYS, file)
+    blocks.pack(ARRAYS, file)
     content = file.getvalue()
     for place in range(len(content)):
         flipped = bytearray(content)
         flipped[place] ^= 1 << place % 8
         for bad in (bytes(flipped), content[:place]):
             with pytest.raises(ValueError, match="checksum"):
-                file_blocks.unpack(bad)
+                blocks.unpack(bad)
 
 
 @pytest.mark.parametrize(
@@ -271,7 +270,7 @@ def test_a_disk_that_refuses_leaves_the_old_file(copy, small, monkeypatch, where
     assert survey.run(small, output=copy).status.size == 24  # the lock is free, and what is there is of use
 
 
-CALLS = [(os, "fsync"), (os, "replace"), (file_blocks, "pack"), (output.Output, "put"), (netcdf.File, "define")]
+CALLS = [(os, "fsync"), (os, "replace"), (blocks, "pack"), (map_file.MapFile, "write"), (netcdf.File, "define")]
 
 
 @pytest.mark.parametrize(("where", "name"), CALLS, ids=lambda value: getattr(value, "__name__", value))

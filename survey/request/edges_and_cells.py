@@ -1,0 +1,95 @@
+"""The tables [boundaries] and [refine], checked against the scene and the axes."""
+
+import numpy as np
+
+from survey import measures, modules
+from survey.errors import BadInput
+from survey.request.schema import Spread
+from survey.wording import short
+
+MIN_FRACTION = 1e-6  # width of a cell as a fraction of its axis
+
+
+def check_boundaries(scene, name, table, given):
+    """The axis along which edges are searched, the last one by default; None where no boundaries are requested."""
+    if table is None:
+        return None
+    axes = [key for key, values in given.items() if np.ndim(values)]
+    measure = measures.curves_of(scene.FAMILY)
+    if measure is None:
+        raise BadInput(f"boundaries: no boundary curves are known for the scene {name}; leave the table out")
+    if hasattr(measure, "closed"):
+        return _check_closed(measure, name, table, {key: given[key].size for key in axes})
+    _check_even(scene, name, "boundaries")
+    if not 1 <= len(axes) <= 2:
+        raise BadInput(f"boundaries: they are drawn on one axis or two, and there are {len(axes)}; fix the others")
+    if table.axis is not None and table.axis not in axes:
+        raise BadInput(f"boundaries.axis: {modules.unknown('axis', table.axis, axes)}")
+    axis = table.axis or axes[-1]
+    if given[axis].size < 2:
+        raise BadInput(f"boundaries: the axis {axis} has one value, but edges need a range; give two or more")
+    return axis
+
+
+def _check_closed(measure, name, table, sizes):
+    """The last of the axes {name: number of values}; raises BadInput where the measure knows no curves on these."""
+    axes = list(sizes)
+    refusal = measure.refusal(axes)
+    if refusal:
+        raise BadInput(f"boundaries: of {name} {refusal}; change the axes, or leave the table out")
+    if table.axis is not None:
+        raise BadInput(f"boundaries.axis: the curves of {name} have closed forms and no axis is searched; leave it out")
+    for key in axes[:2]:
+        if sizes[key] < 2:
+            raise BadInput(f"boundaries: the axis {key} has one value, but curves need a range; give two or more")
+    return axes[-1]
+
+
+def _check_even(scene, name, table):
+    """Raise BadInput where there are no factors at T/2, whose zeros are the edges."""
+    if not getattr(scene, "EVEN", True):
+        raise BadInput(f"{table}: the z of {name} is not even, so it has no half-period factors; leave the table out")
+
+
+def check_refine(scene, name, file, given):
+    """{axis: (width of the smallest cells as a fraction of the axis, is it logarithmic?)}; None if not requested.
+
+    On a logarithmic axis the fraction is of its logarithm, and a width per axis is a ratio less 1.
+    """
+    if file.refine is None:
+        return None
+    axes = {key: values for key, values in given.items() if np.ndim(values)}
+    if scene.FAMILY != "hill":
+        raise BadInput(f"refine: [refine] is not supported for the scene {name}; leave the table out")
+    _check_even(scene, name, "refine")
+    if len(axes) != 2 or min(values.size for values in axes.values()) < 2:
+        raise BadInput("refine: cells need exactly two axes of two values or more; fix the other parameters")
+    widths = _check_width_table(file.refine.width, axes)
+    return {key: _fraction(widths, key, values, file.axes[key]) for key, values in axes.items()}
+
+
+def _check_width_table(widths, axes):
+    """The widths as they are; raises BadInput unless a table of them names each axis and nothing else."""
+    if isinstance(widths, dict):
+        for key in widths:
+            if key not in axes:
+                raise BadInput(f"refine.width.{short(key, 40)}: {modules.unknown('axis', key, list(axes))}")
+        for key in axes:
+            if key not in widths:
+                raise BadInput(f"refine.width.{key} is missing; give a width for each axis, or one number for both")
+    return widths
+
+
+def _fraction(widths, key, values, axis):
+    """(width as a fraction of the axis, is that logarithmic?) from one fraction or from widths in the axes' units."""
+    log = isinstance(axis, Spread) and axis.spacing == "log"
+    where, width, most = "refine.width", widths, 1.0
+    if isinstance(widths, dict):
+        most = values.max() / values.min() - 1 if log else np.ptp(values)
+        where, width = f"{where}.{key}", widths[key]
+    if not 0 < width < most:
+        raise BadInput(f"{where} = {width:g}: it must lie between 0 and {most:g}, such as {1e-3 * most:.1g}")
+    fraction = np.log1p(width) / np.log1p(most) if log and isinstance(widths, dict) else width / most
+    if fraction < MIN_FRACTION:
+        raise BadInput(f"{where} = {width:g}: such cells are too many; use at least a millionth of the axis")
+    return float(fraction), log

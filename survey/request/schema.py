@@ -1,0 +1,117 @@
+"""What a workflow file may hold: its tables and keys as pydantic models, and what is wrong with one in a line."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
+
+from survey import modules
+from survey.wording import short, shown
+
+MAX_VALUES = 10**7  # on one axis
+Number = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class Spread(Table):
+    start: Number
+    stop: Number
+    num: Annotated[int, Field(ge=1, le=MAX_VALUES)]
+    spacing: Literal["linear", "log"] = "linear"
+
+
+class Listed(Table):
+    values: list[Number]
+
+
+def _axis_kind(value):
+    if isinstance(value, dict):
+        return "values" if set(value) == {"values"} else "spread"
+    return "number"
+
+
+AxisEntry = Annotated[
+    Annotated[Number, Tag("number")] | Annotated[Spread, Tag("spread")] | Annotated[Listed, Tag("values")],
+    Discriminator(_axis_kind),
+]
+
+
+class SolverTable(Table):
+    method: str = "auto"
+    rtol: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False)] = 1e-10
+
+
+class OutputTable(Table):
+    path: str | None = None
+    figures: list[str] = []
+    variables: list[str] | None = None
+    style: Literal["screen", "paper"] = "screen"
+
+
+class BoundariesTable(Table):
+    axis: str | None = None
+
+
+class RefineTable(Table):
+    width: Annotated[
+        Annotated[Number, Tag("number")] | Annotated[dict[str, Number], Tag("table")],
+        Discriminator(lambda value: "table" if isinstance(value, dict) else "number"),
+    ]
+
+
+class File(Table):
+    title: str = ""
+    scene: str
+    options: dict[str, Any] = {}
+    axes: dict[str, AxisEntry]
+    solver: SolverTable = SolverTable()
+    output: OutputTable = OutputTable()
+    boundaries: BoundariesTable | None = None
+    refine: RefineTable | None = None
+
+
+TABLES = {
+    "solver": SolverTable,
+    "output": OutputTable,
+    "axes": Spread,
+    "boundaries": BoundariesTable,
+    "refine": RefineTable,
+}
+
+
+def complaint(error):
+    """The first complaint of a pydantic ValidationError as one line: key, value, what is allowed.
+
+    An unknown key comes before a missing one.
+    """
+    extra = "extra_forbidden"
+    first = min(
+        error.errors(), key=lambda one: (one["type"] != extra, one["type"] == extra and one["loc"][-1] == "values")
+    )
+    tag = 2 if first["loc"][0] in ("axes", "refine") else None  # pydantic names the kind of axis after the axis
+    key = ".".join(short(part, 40) for i, part in enumerate(first["loc"]) if i != tag)
+    more = "" if error.error_count() == 1 else f" (and {error.error_count() - 1} more)"
+    if first["type"] == extra and first["loc"][-1] == "values":
+        return f"{key} cannot be combined with other keys; give either values alone, or start, stop and num"
+    if first["type"] == extra:
+        return f"unknown key {key}{_nearest(first['loc'])}{more}"
+    if first["type"] == "missing":
+        return f"{key} is missing; add it to the workflow{more}"
+    if key.startswith("axes.") and isinstance(first["input"], list):
+        return f"{key} is a list; write {key.removeprefix('axes.')} = {{ values = [...] }}{more}"
+    if first["type"] == "list_type":
+        example = "[0.1, 0.2]" if key.startswith("axes.") else '["NAME"]'
+        return (
+            f"{key} = {shown(first['input'])}: it must be a list, such as --set '{key}={example}' (with quotes){more}"
+        )
+    message = first["msg"].partition(" or instance of")[0].replace("dictionary", "table")
+    return f"{key} = {shown(first['input'])}: {message[0].lower()}{message[1:]}{more}"
+
+
+def _nearest(location):
+    """The keys that are allowed beside an unknown one, the nearest first."""
+    table = TABLES.get(location[0], File) if len(location) > 1 else File
+    known = list(table.model_fields) + (["values"] if table is Spread else [])
+    return modules.unknown("", str(location[-1]), known).removeprefix(f"unknown  {shown(str(location[-1]))}")

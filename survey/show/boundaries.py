@@ -1,0 +1,64 @@
+"""The boundaries drawn over a map: edges of tongues and curves in closed form, by class."""
+
+import numpy as np
+from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
+
+from survey.file import schema
+from survey.file.labels import flag_codes
+from survey.show.marks import widened
+
+_EDGES = "edges: even dark, odd grey;\nperiodic solid, antiperiodic dashed"
+_RIM = withStroke(linewidth=2.0, foreground="#444444")
+_POINT = {"ls": "none", "mec": "#000000", "mew": 0.8}
+# boundaries by class: label in the legend, and properties of matplotlib's line
+CURVES = {
+    "even_periodic": (_EDGES, {"color": "#000000", "ls": "-", "lw": 0.8}),
+    "odd_periodic": (_EDGES, {"color": "#707070", "ls": "-", "lw": 0.8}),
+    "even_antiperiodic": (_EDGES, {"color": "#000000", "ls": (0, (5, 2)), "lw": 0.8}),
+    "odd_antiperiodic": (_EDGES, {"color": "#707070", "ls": (0, (5, 2)), "lw": 0.8}),
+    "pole_passage": ("pole passages", {"color": "#FFFFFF", "ls": (0, (4, 2)), "lw": 1.0, "path_effects": [_RIM]}),
+    "stable_precession": ("stable regular precessions", {"color": "#000000", "ls": "-", "lw": 1.2}),
+    "separatrix": ("separatrices", {"color": "#D55E00", "ls": "-", "lw": 1.4}),
+    "cusp": ("cusps", {"marker": "D", "ms": 5, "mfc": "#FFFFFF"} | _POINT),
+    "stable_upright": ("stable upright rotations", {"marker": "o", "ms": 5, "mfc": "#000000"} | _POINT),
+    "unstable_upright": ("unstable upright rotations", {"marker": "o", "ms": 6, "mfc": "#D55E00"} | _POINT),
+}
+
+
+def in_plane(ds, variable):
+    """The curves in the plane that is drawn, where a third axis makes a stack of planes."""
+    fixed = [c for c in variable.coords.values() if c.ndim == 0 and c.name in ds.dims and f"curve_{c.name}" in ds]
+    if not fixed:
+        return ds
+    here = np.repeat(True, ds.sizes["curve_point"])
+    for coordinate in fixed:
+        here &= ds[f"curve_{coordinate.name}"].values == float(coordinate)
+    firsts = np.cumsum(ds.curve_count.values) - ds.curve_count.values
+    return ds.isel(curve_point=here, curve=here[firsts])
+
+
+def curves_of(ds):
+    """{class: slices of its curves in `curve_point`}, in the order in which they are drawn; raises Damaged."""
+    schema.curves(ds)
+    names = {code: name for name, code in flag_codes(ds.curve_class.attrs).items()}
+    kinds, ends = ds.curve_class.values, np.cumsum(ds.curve_count.values)
+    found = {}
+    for kind, last, number in zip(kinds, ends, ds.curve_count.values, strict=True):
+        found.setdefault(names[kind], []).append(slice(int(last - number), int(last)))
+    return {name: found[name] for name in CURVES if name in found}
+
+
+def draw_boundaries(axes, ds, x, y):
+    """Draw the boundaries over the map, points above lines; returns their legend handles."""
+    handles = {}
+    for name, parts in curves_of(ds).items():
+        label, properties = CURVES[name]
+        zorder = 3 if "marker" in properties else 2
+        for part in parts:
+            points = (ds[f"curve_{axis.name}"].values[part] for axis in (x, y))
+            axes.plot(*points, clip_on=zorder < 3, zorder=zorder, **properties)
+        handles.setdefault(label, Line2D([], [], label=label, **properties))
+    if "cell_verdict" not in ds:
+        axes.set(xlim=widened(x.values)[[0, -1]], ylim=widened(y.values)[[0, -1]])
+    return list(handles.values())

@@ -1,0 +1,117 @@
+"""A variable over two axes: a colour per verdict or flag, or a colour bar."""
+
+import numpy as np
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+
+from survey import status
+from survey.file.labels import flag_codes, scene_statuses
+from survey.file.overview import Overview, Points
+from survey.grid import logarithmic
+from survey.show.boundaries import draw_boundaries, in_plane
+from survey.show.cells import draw_cells
+from survey.show.layout import add_legend
+from survey.show.marks import hatched, marks, marks_without_answer
+from survey.show.palette import UNDECIDED, hatch_of, kinds_of
+from survey.show.style import style_named
+from survey.show.text import label_of, spaced
+
+MAX_DRAWN = 2000  # points along an axis: in a picture of a larger map a cell stands for several points
+MAX_CELLS = 1000  # along an axis of such a picture: each costs a hundred bytes
+CELLS_PER_PIXEL = 0.8  # of the axes, before legend and labels take their share
+
+
+def draw_map(axes, ds, variable, state, boundaries, paper):
+    """Draw a variable over its two axes, `state` being the status; with colour bar, boundaries and legend."""
+    scales = ["log" if logarithmic(variable[dim].values) else "linear" for dim in variable.dims]
+    ticks = MaxNLocator(integer=True) if variable.dtype.kind == "i" else None
+    variable, state, number = _shown(axes, ds, variable, state, style_named("paper" if paper else None).dpi)
+    x, y = (variable[dim] for dim in variable.dims)
+    failed = np.isin(state.values, list(status.FAILURES))
+    outside = state.values == status.INVALID_PARAMETERS
+    if variable.name == "verdict" and "cell_verdict" in ds:
+        handles = draw_cells(axes, ds, x, y, failed, number, paper)
+    elif "flag_values" in variable.attrs:
+        handles = _verdicts(axes, x, y, ds, variable, state, number, paper)
+        handles += marks_without_answer(axes, x, y, failed, outside, number, paper)
+    else:
+        shown = np.ma.masked_invalid(np.where(failed | outside, np.nan, variable.values.astype(float)))
+        drawn = axes.pcolormesh(
+            x, y, shown.T, cmap="viridis", shading="nearest", rasterized=True, **colour_limits(shown)
+        )
+        if not shown.mask.all():
+            axes.figure.colorbar(drawn, ax=axes, label=label_of(variable), ticks=ticks)
+        axes.set_facecolor("#dddddd")
+        handles = marks_without_answer(axes, x, y, failed, outside, number, paper)
+        handles += [Patch(color="#dddddd", label="does not apply")] if (shown.mask & ~(failed | outside)).any() else []
+    if boundaries and "curve_count" in ds:
+        handles += draw_boundaries(axes, in_plane(ds, variable), x, y)
+    if handles:
+        add_legend(axes, handles)
+    axes.set(xlabel=label_of(x), ylabel=label_of(y))
+    for setting, scale in zip((axes.set_xscale, axes.set_yscale), scales, strict=True):
+        if scale == "log":
+            setting(scale)
+
+
+def _shown(axes, ds, variable, state, dpi):
+    """(variable, status, {}) in memory; for a large map those of the picture's cells, and {kind: number of points}."""
+    if max(variable.shape) <= MAX_DRAWN:
+        return variable.compute(), state.compute(), {}
+    box, points = axes.get_window_extent(), Points(variable, state, scene_statuses(ds))
+    pixels = np.array([box.width, box.height]) * dpi / axes.figure.dpi
+    overview = Overview(points, np.clip(CELLS_PER_PIXEL * pixels, 1, MAX_CELLS).astype(int)).complete
+    values, states = points.cells(overview)
+    for dim, starts in zip(variable.dims, overview.starts, strict=True):
+        ends = np.append(starts[1:], variable.sizes[dim]) - 1
+        middles = 0.5 * (variable[dim].values[starts] + variable[dim].values[ends])
+        variable, state = (
+            v.isel({dim: starts}).assign_coords({dim: (dim, middles, v[dim].attrs)}) for v in (variable, state)
+        )
+    return variable.copy(data=values), state.copy(data=states), overview.number
+
+
+def _verdicts(axes, x, y, ds, variable, state, number, paper):
+    """Draw a colour per kind, rare points ringed; what failed or lies outside stays white. Returns legend handles."""
+    shown, table, palette = kinds_of(ds, variable, state)
+    flags = flag_codes(variable.attrs)
+    codes = sorted(table.values())
+    names = {code: name for name, code in table.items()}
+    cmap = ListedColormap([palette[names[code]] for code in codes])
+    edges = np.append(np.array(codes) - 0.5, codes[-1] + 0.5)
+    settings = {"cmap": cmap, "norm": BoundaryNorm(edges, cmap.N), "shading": "nearest", "rasterized": True}
+    axes.pcolormesh(x, y, shown.T, **settings)
+    number = number or {name: int((shown == code).filled(False).sum()) for name, code in table.items()}
+    handles = [
+        Patch(
+            facecolor=palette[names[code]],
+            edgecolor="black",
+            linewidth=0.5,
+            hatch=hatch_of(flags, names[code]) if paper else None,
+            label=spaced(names[code]) if paper else _counted(names[code], number),
+        )
+        for code in codes
+        if number[names[code]] and names[code] != "undecided"
+    ]
+    if paper:
+        for code in codes:
+            if number[names[code]] and hatch_of(flags, names[code]):
+                hatched(axes, x, y, (shown == code).filled(False), hatch_of(flags, names[code]))
+    undecided = (shown == table.get("undecided", -1)).filled(False)
+    return handles + marks(axes, x, y, undecided, "undecided", number, paper, UNDECIDED)
+
+
+def colour_limits(shown):
+    """Colour limits that a few outliers, or many zeros, do not spoil."""
+    values = shown.compressed()
+    values = values[values != 0] if (values == 0).any() and (values >= 0).all() else values
+    if values.size == 0:
+        return {}
+    low, high = np.percentile(values, [1, 99])
+    low = 0.0 if shown.min() == 0 else low
+    return {"vmin": low, "vmax": high} if high > low else {}
+
+
+def _counted(name, number):
+    return f"{spaced(name)} ({number[name]:,})"

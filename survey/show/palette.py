@@ -1,0 +1,46 @@
+"""Colours, greys and hatchings of what a point may be: its verdict or flag, or why it has no answer."""
+
+import numpy as np
+
+from survey import status
+from survey.file.labels import flag_codes, scene_statuses
+
+# after Okabe and Ito, safe for the colour-blind, the first two far apart in grey print too;
+# black is kept for undecided, white with hatching for failed
+COLOURS = ("#D55E00", "#A6D8F5", "#E69F00", "#F0E442", "#009E73", "#CC79A7", "#0072B2", "#999999", "#B8E0D2", "#5D3A9B")
+UNDECIDED = "#000000"
+# where the outputs are undefined, by the scene's own statuses: in print between unstable, stable and black
+GREYS = ("#808080", "#B3B3B3", "#5E5E5E")
+HATCHES = ("//////", "", "....", "\\\\\\\\", "xxxx", "----", "||||", "++++", "oo", "**")  # of the COLOURS, in papers
+
+
+def kinds_of(ds, variable, state):
+    """(codes, {kind: code}, {kind: colour}) of a flag variable; masked where the point failed or lies outside.
+
+    The kinds are its flags, followed by the scene's own statuses, under which points are undefined, not undecided.
+    """
+    table, shown = flag_codes(variable.attrs), variable.values.astype(np.int32)
+    colours = dict.fromkeys(table, "#444444") | colours_of(table) | greys_of(ds, table)
+    for name, code in ((name, scene_statuses(ds)[name]) for name in greys_of(ds, table)):
+        table[name] = max(table.values()) + 1
+        shown[(variable.values == table["undecided"]) & (state.values == code)] = table[name]
+    return np.ma.masked_array(shown, np.isin(state.values, list(status.UNANSWERED))), table, colours
+
+
+def colours_of(table):
+    """A colour per meaning; "ok" takes that of stable."""
+    meant = [name for name in table if name not in ("undecided", "ok")]
+    first = [c for c in COLOURS if "ok" not in table or c != COLOURS[1]]
+    return {"undecided": UNDECIDED, "ok": COLOURS[1]} | dict(zip(meant, first, strict=False))
+
+
+def greys_of(ds, table):
+    """{status: grey} of the scene's own statuses, where the flag variable can be undecided."""
+    names = [name for name in scene_statuses(ds) if "undecided" in table]
+    return {name: GREYS[i % len(GREYS)] for i, name in enumerate(names)}
+
+
+def hatch_of(table, name):
+    """The hatching of a meaning in papers; none for undecided, which is black, nor for undefined, which is grey."""
+    meant = [other for other in table if other != "undecided"]
+    return HATCHES[meant.index(name) % len(HATCHES)] if name in meant and "ok" not in table else ""

@@ -1,0 +1,78 @@
+"""Text from a file for matplotlib: taken literally, or as a formula that it can draw; labels and titles."""
+
+import textwrap
+from functools import lru_cache
+
+import numpy as np
+from matplotlib.mathtext import MathTextParser
+
+from survey.wording import plain
+
+MAX_TEXT, MAX_FORMULA = 300, 120  # characters of a text and of a formula in a file
+MAX_DEPTH = 6  # of nested braces in a formula
+WITH_LENGTHS = ("\\hspace", "\\genfrac")  # TeX that takes lengths, which may be miles
+
+
+def literal(text, most=MAX_TEXT):
+    """Text from a file for matplotlib: no formulas, nothing invisible, and not endless."""
+    return plain(str(text), most).replace("$", r"\$")
+
+
+def formula(symbol, name):
+    """`symbol` as a formula, if it is TeX that matplotlib can draw; else the name as text."""
+    return f"${symbol}$" if _is_formula(symbol) else literal(name)
+
+
+@lru_cache(maxsize=512)
+def _is_formula(symbol):
+    if not 0 < len(symbol) <= MAX_FORMULA or "$" in symbol or not symbol.isprintable() or _depth(symbol) > MAX_DEPTH:
+        return False
+    if any(command in symbol for command in WITH_LENGTHS):
+        return False
+    try:
+        MathTextParser("path").parse(f"${symbol}$")
+    except (ValueError, RecursionError):
+        return False
+    return True
+
+
+def _depth(symbol):
+    """How deep braces are nested."""
+    depth = np.cumsum([(c == "{") - (c == "}") for c in symbol])
+    return int(depth.max(initial=0))
+
+
+def label_of(variable):
+    """`long name, symbol (unit)`."""
+    symbol, units = variable.attrs.get("symbol", ""), variable.attrs.get("units", "1")
+    text = literal(variable.attrs.get("long_name", variable.name))
+    shown = _is_formula(symbol) and "flag_values" not in variable.attrs
+    text = (
+        "$$" if text == symbol else f"{text}, $$" if shown else text
+    )  # TeX is longer than what it shows: inserted last
+    text += "" if units in ("1", "") else f" ({literal(units)})"
+    wrapped = textwrap.fill(text, 40, break_long_words=False)
+    return wrapped.replace("$$", f"${symbol}$") if shown else wrapped
+
+
+def title_of(ds, variable):
+    """The survey's title, what is drawn, and the numbers that are fixed and not zero."""
+    lines = [literal(ds.attrs.get("title", "")), literal(variable.attrs.get("long_name", variable.name))]
+    fixed = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "fi"]
+    fixed = [c for c in fixed if c.name in ds.dims or float(c) != 0]
+    position = {name: f" (1 of {ds.sizes[name]})" for name in variable.coords if ds.sizes.get(name, 1) > 1}
+    numbers = [f"{_equal(c)}{position.get(c.name, '')}" for c in fixed]
+    labels = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "UO"]
+    numbers = ", ".join(numbers + [f"{literal(c.name)} {literal(c.item())}{position.get(c.name, '')}" for c in labels])
+    lines[1] += f" ({literal(ds.attrs['options'])})" if ds.attrs.get("options") else ""
+    return "\n".join([*lines, numbers] if numbers else lines)
+
+
+def _equal(coordinate):
+    """`symbol = number` of a fixed parameter."""
+    symbol, number = coordinate.attrs.get("symbol") or coordinate.name, f"{float(coordinate):.6g}"
+    return f"${symbol} = {number}$" if _is_formula(symbol) else f"{literal(coordinate.name)} = {number}"
+
+
+def spaced(name):
+    return literal(name.replace("_", " ").strip())
