@@ -8,16 +8,16 @@ Where each promise is tested, here if no file is named; (slow): its long form, (
  3 resume is invisible   the same; test_engine: test_any_cut_gives_the_same_file (beside)
  4 one bad point         test_a_bad_point_costs_itself_alone; test_evaluate (beside)
  5 no silent NaN         test_a_bad_point_costs_itself_alone; test_cli: test_failed_points_exit_1
- 6 drift is refused      test_drift_and_a_second_writer_are_refused; test_durability (beside)
- 7 one writer            test_drift_and_a_second_writer_are_refused; test_durability: a killed holder; test_lock
- 8 damage is found       test_a_flipped_bit_of_a_block_is_mended; test_cli: test_verify_finds_...; test_durability:
+ 6 drift is refused      test_drift_and_a_second_writer_are_refused; test_blocks (beside)
+ 7 one writer            test_drift_and_a_second_writer_are_refused; test_blocks: a killed holder; test_lock
+ 8 damage is found       test_a_flipped_bit_of_a_block_is_mended; test_cli: test_verify_finds_...; test_blocks:
                          every bit of a block (beside); test_audit: wrong values under sound sums (beside)
  9 bounded memory        test_memory_is_bounded_by_blocks_not_by_the_map: 10^6 points, 10^8 (slow)
 10 prompt stop           test_workers_stop_promptly_with_the_run; test_an_interrupt_from_the_terminal_...;
                          test_dispatch: an interruption (beside); test_cli: test_an_interrupted_run_can_be_resumed;
                          test_cluster: test_the_batch_script_stops_before_the_walltime_and_is_queued_again
 11 disk faults           test_a_full_disk_..., test_a_file_size_limit_...; test_faults: an error at each call that
-                         reaches the disk (slow), at one of each kind, a read-only disk; test_durability: each (beside)
+                         reaches the disk (slow), at one of each kind, a read-only disk; test_blocks: each (beside)
 12 dying workers         test_a_killed_worker_is_replaced; test_dispatch: tasks that kill (beside); test_cluster: a lost
                          scheduler, workers on another disk, a worker with other code
 13 no stale code         test_an_edit_of_what_a_kernel_calls_takes_effect_in_the_next_process;
