@@ -31,9 +31,9 @@ def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, stat
     forms, curves = np.zeros(times.shape, np.int8), np.empty((len(P), 2))
     _sort(P, starts, times, forms, curves, floats, turnings, status)
     for form, solve in ((closed.LIBRATION, _elliptics), (closed.TRIGONOMETRIC, _trigonometrics)):
-        places = np.flatnonzero(forms == form)
-        if places.size > 0:
-            solve(places, P, starts, curves, times, floats, turnings)
+        indices = np.flatnonzero(forms == form)
+        if indices.size > 0:
+            solve(indices, P, starts, curves, times, floats, turnings)
 
 
 @kernel
@@ -51,25 +51,25 @@ def _sort(P, starts, times, forms, curves, floats, turnings, status):
 
 
 @kernel
-def _elliptics(places, P, starts, curves, times, floats, turnings):
+def _elliptics(indices, P, starts, curves, times, floats, turnings):
     """b = 0."""
     T = weierstrass.lanes()
-    _solve(weierstrass.enter, weierstrass.solve, T, places, P, starts, curves, times, floats, turnings)
+    _solve(weierstrass.enter, weierstrass.solve, T, indices, P, starts, curves, times, floats, turnings)
 
 
 @kernel
-def _trigonometrics(places, P, starts, curves, times, floats, turnings):
+def _trigonometrics(indices, P, starts, curves, times, floats, turnings):
     """g = 0 and (61)."""
     T = trigonometric.lanes()
-    _solve(trigonometric.enter, trigonometric.solve, T, places, P, starts, curves, times, floats, turnings)
+    _solve(trigonometric.enter, trigonometric.solve, T, indices, P, starts, curves, times, floats, turnings)
 
 
 @inline
-def _solve(enter, solve, T, places, P, starts, curves, times, floats, turnings):
-    """The solutions at `places` of the flattened `times`, as many at once as there are lanes."""
+def _solve(enter, solve, T, indices, P, starts, curves, times, floats, turnings):
+    """The solutions at `indices` of the flattened `times`, as many at once as there are lanes."""
     columns = times.shape[1]
-    for first in range(0, len(places), LANES):
-        some = places[first : first + LANES]
+    for first in range(0, len(indices), LANES):
+        some = indices[first : first + LANES]
         for k in range(len(some)):
             i, j = some[k] // columns, some[k] % columns
             enter(T, k, P[i], starts[i, 0], starts[i, 1], times[i, j], curves[i])

@@ -73,8 +73,8 @@ def hill_step(z, h, slopes):
     p22, d22 = _sums(1.0, h, slopes[3], doubt)
     # one entry's estimate may vanish by symmetry (constant z): all four speak for each, in the scale of the phase
     rate = max(np.sqrt(size), 1.0 / h)
-    level = max(max(d11, d22), max(d12 * rate, d21 / rate))
-    return p11, p12, p21, p22, level, level / rate, level * rate
+    estimate = max(max(d11, d22), max(d12 * rate, d21 / rate))
+    return p11, p12, p21, p22, estimate, estimate / rate, estimate * rate
 
 
 @inline
@@ -108,17 +108,17 @@ def hill_walk_pieces(potential, p, row, table, edges, slack, longest, tolerance,
     """
     z, slopes = np.empty(STAGES), np.empty((4, STAGES))
     longest = min(longest, 0.25 * (edges[-1] - edges[0]))  # else a coefficient whose average rules escapes the estimate
-    place, t, steps, h = 1, edges[0], 0, min(longest, 0.1)
+    piece, t, steps, h = 1, edges[0], 0, min(longest, 0.1)
     y1, v1, s1, t1, w1 = 1.0, 0.0, 0.0, 0.0, 0.0
     y2, v2, s2, t2, w2 = 0.0, 1.0, 0.0, 0.0, 0.0
     zeros1, zeros2, total = 0.0, 0.0, 0.0
     for _ in range(_STEP_LIMIT):
-        final = t + 1.01 * h >= edges[place]
+        final = t + 1.01 * h >= edges[piece]
         if final:
-            h = edges[place] - t
+            h = edges[piece] - t
         size, terms = 0.0, 0.0
         for i in range(STAGES):
-            inside = min(max(t + C[i] * h, edges[place - 1] + slack), edges[place] - slack)
+            inside = min(max(t + C[i] * h, edges[piece - 1] + slack), edges[piece] - slack)
             z[i], scale = potential(inside, p, row, table)
             size, terms = max(size, abs(z[i])), max(terms, scale)
         wave = np.sqrt(size) + 1e-3
@@ -135,9 +135,9 @@ def hill_walk_pieces(potential, p, row, table, edges, slack, longest, tolerance,
             zeros2 += 1.0 if (y2 < 0.0) != (old2 < 0.0) else 0.0
             total += relative(matrix, h)
             steps += 1
-            t = edges[place] if final else t + h
-            place += 1 if final else 0
-            if place == len(edges):
+            t = edges[piece] if final else t + h
+            piece += 1 if final else 0
+            if piece == len(edges):
                 out[lanes.Y1], out[lanes.DY1], out[lanes.Y2], out[lanes.DY2] = y1, v1, y2, v2
                 lanes.bars(s1, w1, s2, w2, steps, total, out)
                 out[lanes.Y1_ZEROS], out[lanes.Y2_ZEROS] = zeros1, zeros2
@@ -222,15 +222,15 @@ def flow_abels(P, starts, targets, tolerance, limit, floats, status):
 
 
 @kernel
-def flow_image(kind, p, eqs, count, place, x, tolerance, node):
+def flow_image(kind, p, eqs, count, anchor, x, tolerance, node):
     """See `returns.image`."""
-    returns.image(flow_setting, flow_begin, flow_at, kind, p, eqs, count, place, x, tolerance, node)
+    returns.image(flow_setting, flow_begin, flow_at, kind, p, eqs, count, anchor, x, tolerance, node)
 
 
 @kernel
-def flow_cycles(kind, p, eqs, count, place, interval, xs, tolerance, cycles, found, edges):
+def flow_cycles(kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges):
     """See `returns.fixed_points`."""
-    return returns.fixed_points(flow_image, kind, p, eqs, count, place, interval, xs, tolerance, cycles, found, edges)
+    return returns.fixed_points(flow_image, kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges)
 
 
 @kernel

@@ -71,15 +71,15 @@ def flow_abels(P, starts, targets, tolerance, limit, floats, status):
 
 
 @kernel
-def flow_image(kind, p, eqs, count, place, x, tolerance, node):
+def flow_image(kind, p, eqs, count, anchor, x, tolerance, node):
     """See `returns.image`."""
-    returns.image(flow_setting, flow_begin, flow_at, kind, p, eqs, count, place, x, tolerance, node)
+    returns.image(flow_setting, flow_begin, flow_at, kind, p, eqs, count, anchor, x, tolerance, node)
 
 
 @kernel
-def flow_cycles(kind, p, eqs, count, place, interval, xs, tolerance, cycles, found, edges):
+def flow_cycles(kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges):
     """See `returns.fixed_points`."""
-    return returns.fixed_points(flow_image, kind, p, eqs, count, place, interval, xs, tolerance, cycles, found, edges)
+    return returns.fixed_points(flow_image, kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges)
 
 
 @kernel

@@ -27,7 +27,7 @@ NONE, TRIGONOMETRIC, LIBRATION, ROTATION, LOST = 0, 1, 2, 3, 4
 SIZE = 32
 SAME = 64.0 * ROUNDOFF_UP  # how far, relative, parameters may miss the conditions of (61); the miss goes into the bars
 
-# places in data
+# indices into data
 W0, A1, B1, A2, B2, ROUGH = range(6)  # g(phi0 + x) = A1 cos x + B1 sin x + A2 cos 2x + B2 sin 2x
 F0, SLOPE, SQUARE, NOISE, OFFSET, MISS, GAIN, MU, OTHER = range(6, 15)  # kind 1
 LEFT, RIGHT, BAR_LEFT, BAR_RIGHT, RATIO = range(6, 11)  # kind 2
@@ -263,8 +263,8 @@ def start_libration(data):
 @inline
 def phase_bar(data, theta):
     """Bound of the error of theta - theta0, as time."""
-    whole = theta + data[THETA0]
-    relative = 0.25 * data[RHO] * theta + 0.5 * data[RHO_M] * whole + 12.0 * ROUNDOFF_UP * (whole + 1.0)
+    angle = theta + data[THETA0]
+    relative = 0.25 * data[RHO] * theta + 0.5 * data[RHO_M] * angle + 12.0 * ROUNDOFF_UP * (angle + 1.0)
     return (relative + data[SLACK]) / data[OMEGA]
 
 

@@ -5,7 +5,7 @@ turned by a (symmetry S4 of `gyrostat.md`) c23 = 0, and psi = phi - a obeys, wit
 
     psi' = w,  S' = C w,  C' = -S w,  w' = b12 S' + b31 C' - d C S + s2 C - s3 S        (57):
 
-three Cauchy products. S and C are worked out anew for each step. Errors are carried as in `steps`, by the
+three Cauchy products. Each step computes S and C afresh. Errors are carried as in `steps`, by the
 variational equation in its Lienard form (`flow.variation`), to order LOW.
 
 A lane whose next time lies within its step is evaluated there and then goes on from where the step began: so steps
@@ -291,9 +291,9 @@ def _tell(state, before, fixed, i, floats, turnings):
     floats[rc.PHI], floats[rc.W] = (state[_PSI, i] + angle) + turns * TWO_PI, v
     floats[rc.PHI_BAR], floats[rc.W_BAR] = wide + 3e-16 * (abs(turns) * TWO_PI + abs(angle)), high
     from_rest = before[_STEPS, i] == 0.0 and before[_V, i] == 0.0  # then w is 0 at the start and nowhere else
-    told = before[_UNSURE, i] < 3.0 and before[_COUNT, i] >= 0.0 and (abs(v) > high or from_rest)
+    sure = before[_UNSURE, i] < 3.0 and before[_COUNT, i] >= 0.0 and (abs(v) > high or from_rest)
     passed = before[_SIGN, i] * v < 0.0 and not from_rest
-    turnings[0] = int(before[_COUNT, i]) + passed if told else UNDETERMINED
+    turnings[0] = int(before[_COUNT, i]) + passed if sure else UNDETERMINED
     for k in range(_STATE):
         state[k, i] = before[k, i]
     return True

@@ -300,7 +300,7 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
     j, size, doubt = 0, len(targets), -1  # doubt: the first target in doubt
     ending = OK
     if w0 == 0.0 and start_sign(p, phi, w0) <= 0:
-        # within rounding of an equilibrium it is not told to which side the solution leaves it
+        # within rounding of an equilibrium the side on which the solution leaves it is open
         ending = TURNING if start_sign(p, phi, w0) < 0 else (EQUILIBRIUM if rests(p, phi0, w0) else SEPARATRIX)
         while j < size and targets[j] == phi0:
             floats[j, rc.VALUE] = floats[j, rc.TIME] = floats[j, rc.VALUE_BAR] = floats[j, rc.TIME_BAR] = 0.0

@@ -1,7 +1,7 @@
 """Taylor series of order 30 in double-double arithmetic, for flows on the cylinder: what float64 leaves open.
 
 About 30 digits, 20 to 40 microseconds a step. The measure asks it for points that miss the asked accuracy, whose
-turning points are not told, or whose fate float64 leaves open, as next to separatrices. Compiled when first asked.
+turning points stay uncounted, or whose fate float64 leaves open, as next to separatrices. Compiled when first asked.
 
 Source: see `kernels.cylinder.flow_double`.
 """

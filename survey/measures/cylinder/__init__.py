@@ -27,11 +27,11 @@ METHODS = {
         ),
         "flow_image": Function(
             "one return map at x, see `kernels.cylinder.returns.image`",
-            ("kind", "p", "eqs", "count", "place", "x", "tolerance", "node"),
+            ("kind", "p", "eqs", "count", "anchor", "x", "tolerance", "node"),
         ),
         "flow_cycles": Function(
             "fixed points of a return map, see `kernels.cylinder.returns.fixed_points`",
-            ("kind", "p", "eqs", "count", "place", "interval", "xs", "tolerance", "cycles", "found", "edges"),
+            ("kind", "p", "eqs", "count", "anchor", "interval", "xs", "tolerance", "cycles", "found", "edges"),
         ),
         "flow_fates": Function(
             "fates of initial states, see `kernels.cylinder.fate.fates`",
