@@ -32,7 +32,8 @@ from survey.kernels.jit import inline, kernel
 from survey.kernels.lanes import column, relative
 from survey.kernels.libration import danby
 from survey.kernels.libration.danby import COLUMN, COLUMNS
-from survey.kernels.math.dop853 import E3, E5, STAGES, A, B, C
+from survey.kernels.math.dop853 import E3, E5, STAGES, A, B, C, combined
+from survey.kernels.math.runge_kutta import fundamental
 
 ORDER = 8
 SERVES = ("cylinder", "danby", "hill")
@@ -53,28 +54,27 @@ _OTHER = 0.3
 
 @inline
 def hill_step(z, h, slopes):
-    """P and its local truncation bounds over one step, from z at the nodes; `slopes` (4, STAGES) is scratch."""
-    for i in range(STAGES):
-        for c in range(2):
-            y, v = 1.0 - c, 0.0 + c
-            for j in range(i):
-                y += h * A[i, j] * slopes[2 * c, j]
-                v += h * A[i, j] * slopes[2 * c + 1, j]
-            slopes[2 * c, i] = v
-            slopes[2 * c + 1, i] = -z[i] * y
+    """P and its local truncation bounds over one step, from z at the nodes; `slopes` (STAGES + 1, 4) is scratch."""
+    fundamental(A, STAGES, _hill_slope, z, 2, h, slopes[STAGES], slopes)
     size = 0.0
     for i in range(STAGES):
         size = max(size, abs(z[i]))
     # an error of order h^9 is (h sqrt z)^3 of the estimate of order h^6
     doubt = _DOUBT * (h * np.sqrt(size)) ** 3
-    p11, d11 = _sums(1.0, h, slopes[0], doubt)
-    p21, d21 = _sums(0.0, h, slopes[1], doubt)
-    p12, d12 = _sums(0.0, h, slopes[2], doubt)
-    p22, d22 = _sums(1.0, h, slopes[3], doubt)
+    p11, d11 = _sums(1.0, h, slopes[:, 0], doubt)
+    p21, d21 = _sums(0.0, h, slopes[:, 1], doubt)
+    p12, d12 = _sums(0.0, h, slopes[:, 2], doubt)
+    p22, d22 = _sums(1.0, h, slopes[:, 3], doubt)
     # one entry's estimate may vanish by symmetry (constant z): all four speak for each, in the scale of the phase
     rate = max(np.sqrt(size), 1.0 / h)
     estimate = max(max(d11, d22), max(d12 * rate, d21 / rate))
     return p11, p12, p21, p22, estimate, estimate / rate, estimate * rate
+
+
+@inline
+def _hill_slope(z, i, state, out):
+    for c in range(2):
+        out[2 * c], out[2 * c + 1] = state[2 * c + 1], -z[i] * state[2 * c]
 
 
 @inline
@@ -85,8 +85,7 @@ def _sums(start, h, slopes, doubt):
         value += B[j] * slopes[j]
         fifth += E5[j] * slopes[j]
         third += E3[j] * slopes[j]
-    scale = np.sqrt(fifth * fifth + 0.01 * third * third)
-    return start + h * value, abs(h) * (fifth * fifth / (scale + 1e-300) + doubt * abs(fifth))
+    return start + h * value, abs(h) * (combined(fifth, third) + doubt * abs(fifth))
 
 
 @inline
@@ -106,7 +105,7 @@ def hill_walk_pieces(potential, p, row, table, edges, slack, longest, tolerance,
 
     No step is longer than `longest`. `potential` is asked no nearer to an edge than `slack`: on the side that is meant.
     """
-    z, slopes = np.empty(STAGES), np.empty((4, STAGES))
+    z, slopes = np.empty(STAGES), np.empty((STAGES + 1, 4))
     longest = min(longest, 0.25 * (edges[-1] - edges[0]))  # else a coefficient whose average rules escapes the estimate
     piece, t, steps, h = 1, edges[0], 0, min(longest, 0.1)
     y1, v1, s1, t1, w1 = 1.0, 0.0, 0.0, 0.0, 0.0
@@ -183,8 +182,7 @@ def _flow_estimate(T, h, row, doubt):
     for i in range(STAGES):
         e5 += E5[i] * T[_FIRST + i, row]
         e3 += E3[i] * T[_FIRST + i, row]
-    size = math.sqrt(e5 * e5 + 0.01 * e3 * e3)
-    return abs(h) * (e5 * e5 / (size + 1e-300) + doubt * abs(e5))
+    return abs(h) * (combined(e5, e3) + doubt * abs(e5))
 
 
 @kernel
@@ -242,9 +240,10 @@ def flow_fates(p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance
 
 
 @inline
-def _danby_slope(e, d1, d2, angle, state, out):
+def _danby_slope(given, i, state, out):
     """Slopes in the eccentric anomaly: df = sqrt(1 - e^2) / (1 - e cos E) dE, r df = dE / sqrt(1 - e^2)."""
-    small, scale = math.sin(0.5 * angle), math.sqrt((1.0 - e) * (1.0 + e))
+    e, d1, d2, angle, h = given
+    small, scale = math.sin(0.5 * (angle + C[i] * h)), math.sqrt((1.0 - e) * (1.0 + e))
     turn = scale / ((1.0 - e) + 2.0 * e * small * small)
     for c in range(4):
         x, q, p, m = state[4 * c], state[4 * c + 1], state[4 * c + 2], state[4 * c + 3]
@@ -256,13 +255,7 @@ def _danby_slope(e, d1, d2, angle, state, out):
 @kernel
 def _danby_step(e, d1, d2, angle, h, slopes, state, work):
     """Columns of the step's propagator and their errors into `work`; returns the largest error."""
-    for i in range(STAGES):
-        for k in range(16):
-            value = 1.0 if k % 5 == 0 else 0.0
-            for j in range(i):
-                value += h * A[i, j] * slopes[j, k]
-            state[k] = value
-        _danby_slope(e, d1, d2, angle + C[i] * h, state, slopes[i])
+    fundamental(A, STAGES, _danby_slope, (e, d1, d2, angle, h), 4, h, state, slopes)
     worst = 0.0
     for c in range(4):
         one = COLUMNS + COLUMN * c
@@ -275,8 +268,7 @@ def _danby_step(e, d1, d2, angle, h, slopes, state, work):
                 fifth += E5[j] * slope
                 third += E3[j] * slope
             # an error of order h^9 is h^3 of the estimate of order h^6
-            local = abs(h) * (fifth * fifth / (math.sqrt(fifth * fifth + 0.01 * third * third) + 1e-300))
-            error = max(error, local + abs(h) ** 4 * _DOUBT * abs(fifth))
+            error = max(error, abs(h) * combined(fifth, third) + abs(h) ** 4 * _DOUBT * abs(fifth))
             size += abs(value)
             work[one + i, 0], work[one + 4 + i, 0] = value, 1.0 if i == c else 0.0
         worst = max(worst, error)
