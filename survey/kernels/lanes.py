@@ -100,7 +100,7 @@ def scatter(row, step, width, samples, c2, h, p, order, starts, out):
 
 @splice
 def _padded(count):
-    """So many lanes fill the machine's vectors; those beyond `count` repeat the last."""
+    """The number of lanes that fills the machine's vectors; those beyond `count` repeat the last."""
     return (count + VECTOR - 1) // VECTOR * VECTOR
 
 

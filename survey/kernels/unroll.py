@@ -63,7 +63,7 @@ class _Number:
 
 
 class _Unknown:
-    """Stands for every argument where only the number of results is asked."""
+    """Stands for every argument where only the number of results is needed."""
 
     def _same(self, *_):
         return self

@@ -1,6 +1,6 @@
 """Gauss-Chebyshev quadrature of nutations between their turning points, u = middle + half width cos x.
 
-The nearest singularities (the other roots of P, the poles) tell how many nodes are needed. Domain: away from
+The nearest singularities (the other roots of P, the poles) determine how many nodes are needed. Domain: away from
 separatrices and near passages of poles, where it needs many nodes; `no_convergence` beyond MOST, and in time beyond
 LONGEST. The independent check.
 

@@ -38,7 +38,7 @@ def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, stat
 
 @kernel
 def _sort(P, starts, times, forms, curves, floats, turnings, status):
-    """Fill `forms` (as times) with the closed form that is to be evaluated there, curves with its mu and 1 - mu."""
+    """Fill `forms` (as times) with the closed form to evaluate there, curves with its mu and 1 - mu."""
     for i in range(len(P)):
         kind, curves[i, 0], curves[i, 1] = closed.applies(P[i], starts[i, 0], starts[i, 1])
         status[i] = _NO_FORM if kind == closed.NONE else NO_CONVERGENCE
@@ -46,7 +46,7 @@ def _sort(P, starts, times, forms, curves, floats, turnings, status):
             if times[i, j] != 0.0:
                 forms[i, j] = kind
                 continue
-            _tell(floats[i, j], starts[i, 0], 0.0, starts[i, 1], 0.0, 0.0)
+            _store(floats[i, j], starts[i, 0], 0.0, starts[i, 1], 0.0, 0.0)
             turnings[i, j] = 0
 
 
@@ -76,13 +76,13 @@ def _solve(enter, solve, T, indices, P, starts, curves, times, floats, turnings)
         solve(T)
         for k in range(len(some)):
             i, j = some[k] // columns, some[k] % columns
-            if _tell(floats[i, j], starts[i, 0], T[X, k], T[W, k], T[BAR_X, k], T[BAR_W, k]):
+            if _store(floats[i, j], starts[i, 0], T[X, k], T[W, k], T[BAR_X, k], T[BAR_W, k]):
                 turnings[i, j] = int(T[COUNT, k])
 
 
 @inline
-def _tell(out, phi0, x, w, bar_x, bar_w):
-    """Write down one solution at one time; False where the bars are too wide to be bounds."""
+def _store(out, phi0, x, w, bar_x, bar_w):
+    """Store one solution at one time; False where the bars are too wide to be bounds."""
     if not (bar_x < TRUST and bar_w < TRUST * (1.0 + abs(w))):
         return False
     out[rc.PHI], out[rc.W], out[rc.PHI_BAR], out[rc.W_BAR] = (

@@ -65,7 +65,7 @@ def hill_step(z, h, slopes):
     p21, d21 = _sums(0.0, h, slopes[:, 1], doubt)
     p12, d12 = _sums(0.0, h, slopes[:, 2], doubt)
     p22, d22 = _sums(1.0, h, slopes[:, 3], doubt)
-    # one entry's estimate may vanish by symmetry (constant z): all four speak for each, in the scale of the phase
+    # one entry's estimate may vanish by symmetry (constant z): each takes the largest of all, in the scale of the phase
     rate = max(np.sqrt(size), 1.0 / h)
     estimate = max(max(d11, d22), max(d12 * rate, d21 / rate))
     return p11, p12, p21, p22, estimate, estimate / rate, estimate * rate
@@ -103,7 +103,7 @@ def hill_walk(potential, p, row, table, span, tolerance, out):
 def hill_walk_pieces(potential, p, row, table, edges, slack, longest, tolerance, out):
     """As `hill_walk`, from the first to the last of `edges`; z may jump at those between, where a step ends.
 
-    No step is longer than `longest`. `potential` is asked no nearer to an edge than `slack`: on the side that is meant.
+    No step is longer than `longest`. `potential` is evaluated no nearer to an edge than `slack`, so on the right side.
     """
     z, slopes = np.empty(STAGES), np.empty((STAGES + 1, 4))
     longest = min(longest, 0.25 * (edges[-1] - edges[0]))  # else a coefficient whose average rules escapes the estimate
@@ -122,7 +122,7 @@ def hill_walk_pieces(potential, p, row, table, edges, slack, longest, tolerance,
             size, terms = max(size, abs(z[i])), max(terms, scale)
         wave = np.sqrt(size) + 1e-3
         p11, p12, p21, p22, d11, d12, d21 = hill_step(z, h, slopes)
-        error = d11  # all four entries speak in it
+        error = d11  # the largest of all four entries
         if error <= tolerance and h * wave <= 1.01 * _LONGEST:
             # The stages pass through sums of size 60 that cancel; t itself is rounded.
             r11, r12, r21 = rounding(terms, 8.0 * h)
@@ -150,7 +150,7 @@ def hill_walk_pieces(potential, p, row, table, edges, slack, longest, tolerance,
 
 @inline
 def flow_setting(p, w, tolerance):
-    """What steers the steps: the tolerance of one step."""
+    """What controls the steps: the tolerance of one step."""
     return tolerance
 
 
@@ -195,7 +195,7 @@ def flow_begin(p, phi, w, tolerance, T):
         _x, w1, _e, _y = flow_at(p, T, h)
         doubt, speed = 8.0 * _DOUBT * (h * rate) ** 3, max(rate, 1.0 / h)
         dphi, dw = _flow_estimate(T, h, PHI, doubt), _flow_estimate(T, h, W, doubt)
-        # where the motion starts at rest, one of the two may vanish by symmetry: each speaks for both, less loudly
+        # where the motion starts at rest, one of them may vanish by symmetry: each bounds the other, with less weight
         dphi, dw = max(dphi, _OTHER * dw / speed), max(dw, _OTHER * dphi * speed)
         error = max(dphi, dw / (1.0 + abs(w))) / tolerance
         factor = min(max(0.9 * (error + 1e-30) ** -0.125, 0.2), 4.0)

@@ -1,9 +1,8 @@
 """The six equations (1)-(6) of a gyrostat whose invariant set is the scene, in a rotated body frame: an audit.
 
-Builds A, B, C, s, lambda from the reduced parameters, what these leave free being generic
-(`kernels/cylinder/gyrostat.py`),
-and knows nothing of the set: its bars hold the growth of deviations from it. Taylor series of order 20. Domain:
-trajectories whose set is not strongly unstable.
+Builds A, B, C, s, lambda from the reduced parameters, with generic values for what these leave free
+(`kernels/cylinder/gyrostat.py`), and makes no use of the set: its bars include the growth of deviations from it. Taylor
+series of order 20. Domain: trajectories whose set is not strongly unstable.
 """
 
 import math

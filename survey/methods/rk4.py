@@ -1,4 +1,4 @@
-"""The classical Runge-Kutta method, order 4: the yardstick. Each step is two half steps, checked by one full step.
+"""The classical Runge-Kutta method, order 4, for comparison. Each step is two half steps, checked by one full step.
 
 Domain: any continuous z; thousands of steps for 1e-10. The error of the two half steps is estimated as their
 difference from the full step divided by 2^4 - 1 (Richardson).

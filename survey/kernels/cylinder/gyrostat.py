@@ -140,7 +140,7 @@ def begin(G, state, tolerance, T, V):
     for i in range(3):
         size = max(size, abs(state[i]))
     for n in range(ORDER - 3, ORDER + 1):
-        # where the last terms happen to vanish, as from rest, those two before them are asked, less strictly
+        # where the last terms happen to vanish, as from rest, the two before them count too, less strictly
         term = 1e-300
         for i in range(6):
             term = max(term, abs(T[n, i]) * (1.0 / size if i < 3 else 1.0))

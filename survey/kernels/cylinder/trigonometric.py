@@ -25,7 +25,7 @@ from survey.kernels.jit import inline
 from survey.kernels.math.double import two_prod
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
-# Rows of the work array behind what comes out: what is asked, and what the stages hand on.
+# Rows of the work array after the results: the inputs, and what one stage leaves for the next.
 B12, B31, D, C23, S2, S3, MU, OTHER, PHI, SLIP, W0, TIME = range(5, 17)
 _F, _SLOPE, _NOISE, _OFFSET, _MISS, _GAIN, _SQUARE, _PHASE, _TURNS, _DECAY = range(17, 27)
 ROWS = 27

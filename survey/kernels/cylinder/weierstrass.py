@@ -31,7 +31,7 @@ LANES = 32
 _LEVELS = 7  # of the means: enough for 1e-6 <= b1/a1 <= 1e6
 _HALLEY = 5
 
-# Rows of the work array: what comes out, what is asked, what the stages hand on, and the means.
+# Rows of the work array: the results, the inputs, what one stage leaves for the next, and the means.
 X, W, BAR_X, BAR_W, COUNT = range(5)
 D, C23, S2, S3, PHI, SLIP, W0, TIME = range(5, 13)
 _SIDE, _M, _P, _Q, _R, _O, _D_M, _D_1, _D_2, _BEND = range(13, 23)
@@ -194,7 +194,7 @@ def _branch(half, plus, lower, v, C, curved, steep):
     """The sign that makes (N, D) a positive multiple of (sin x/2, cos x/2) on the whole of a libration.
 
     N and D vanish together, and so change it, where v = +-sqrt(C) in that half of the period in which the solution does
-    not pass x = pi. `plus` is B v + C0 at sqrt(C), which tells the half; `curved` - `steep` has the sign of the
+    not pass x = pi. `plus` is B v + C0 at sqrt(C), which decides the half; `curved` - `steep` has the sign of the
     product with that at -sqrt(C).
     """
     between = half if plus >= 0.0 else -half

@@ -27,7 +27,7 @@ SQUARES = 4
 
 def missing(before, last, size):
     """What an interpolant misses, from the sizes of its last four Chebyshev coefficients, pair by pair, and of z."""
-    # rounding may leave nothing of two coefficients, but no more is known of them than that
+    # rounding may cancel two coefficients altogether, and then only their rounding is known
     return 3 * last * (last / (before + PAIR_ROUNDOFF * size + 1e-300) + 0.02)
 
 

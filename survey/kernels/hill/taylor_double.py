@@ -1,4 +1,4 @@
-"""Taylor series of order 34 in double-double arithmetic, for points whose verdict float64 cannot tell: 30 digits.
+"""Taylor series of order 34 in double-double arithmetic, for points whose verdict float64 leaves open: 30 digits.
 
 z(t) is a polynomial in a "clock", functions with their own differential equations (cos 2t; sin x, cos x and x' of a
 pendulum), whose series give that of z. The clock starts where it is known exactly and its errors do not grow, and

@@ -41,7 +41,7 @@ def chain(columns, own, v, h, e, d1, d2, out):
     work = np.empty((OWN + own, TILE))
     for first in range(0, size, TILE):
         count = min(TILE, size - first)
-        # so many lanes fill the machine's vectors; those beyond `count` repeat the last
+        # lanes that fill the machine's vectors; those beyond `count` repeat the last
         padded = (count + VECTOR - 1) // VECTOR * VECTOR
         start(work, padded)
         for i in range(padded):

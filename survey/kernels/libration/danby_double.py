@@ -208,7 +208,8 @@ def advance(step, off, whole, spread):
 def row_bars(spread, steps, bars):
     """Fill `bars` with the error bounds of the entries of each row after `steps` steps."""
     for i in range(4):
-        bars[i] = MARGIN * sqrt((4.0 * steps - 3.0) * spread[i, i])  # of so many terms, as in `kernels.libration.danby`
+        # 4 steps - 3 terms, as in `kernels.libration.danby`
+        bars[i] = MARGIN * sqrt((4.0 * steps - 3.0) * spread[i, i])
 
 
 @inline

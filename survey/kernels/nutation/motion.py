@@ -103,13 +103,13 @@ def motion(cosine, row, start, period, times, out):
     first, second = angles(row, z0 / rate, half, down, at)
     base_up, base_down = start[rc.DIRECTION] * first, start[rc.DIRECTION] * second
     start_delay = start[rc.START_BAR] / max(row[nu.WIDTH] * sqrt(at[3] * at[4]) * at[5], nu.TINY)
-    first_up, first_down = rates(row, at)  # the phase of the start moves it and what follows alike
+    first_up, first_down = rates(row, at)  # an error of the initial phase shifts the start and what follows equally
     z0 *= start[rc.DIRECTION]
     relative = period[rc.PERIOD_BAR] / period[rc.PERIOD]
     for j in range(len(times)):
         z = z0 + rate * times[j]
-        n = np.floor(z / turn + 0.5)  # a float: of so many periods that no integer holds them, too
-        # the number of periods is taken off in time, where the period is what has been found best
+        n = np.floor(z / turn + 0.5)  # a float, since the number of periods may exceed any integer type
+        # whole periods are subtracted in time, where the period is known best
         z = z0 + rate * (times[j] - n * period[rc.PERIOD])
         side = 1.0 if z >= 0.0 else -1.0
         z = min(abs(z), 2.0 * quarter)

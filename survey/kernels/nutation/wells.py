@@ -123,7 +123,7 @@ def lowest(square, product, k, most):
 def peak(c, y, at):
     """(point, P, bound of its error) of the greatest P near y, which matters where it is next to nothing.
 
-    At a pole (y = 0) that the motion may reach P is 0, and half its slope `at` speaks instead.
+    At a pole (y = 0) that the motion may reach P is 0, and half its slope `at` is used instead.
     """
     if y == 0.0:
         return y, at, 4.0 * PAIR_SUM_ROUNDOFF * (abs(c[4][0]) + abs(c[2][0]))

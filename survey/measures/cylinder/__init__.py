@@ -37,7 +37,7 @@ METHODS = {
             "fates of initial states, see `kernels.cylinder.fate.fates`",
             ("p", "section", "ends", "sizes", "eqs", "plus", "minus", "lib", "starts", "tolerance", "limit", "out"),
         ),
-        "flow_setting": Function("what steers the steps of one solution", None),
+        "flow_setting": Function("what controls the steps of one solution", None),
         "flow_begin": Function("expand at (phi, w); returns the step", None),
         "flow_at": Function("(phi, w, integral of f, integral of g) at dt after the start of the step", None),
     }
