@@ -146,6 +146,10 @@ def transcendental(results, squares, wanted, rtol, whole, floats, verdict, late,
                     doubt = min(bar * (abs(results[i, lanes.DY1]) + results[i, lanes.DY1_BAR]), 1.0)
             x, bar = _rotation(sine, sine_bar, cosine, cosine_bar, verdict[i], zeros)
             bar += sqrt(doubt) if verdict[i] != UNSTABLE else 0.0
+            if not whole:  # a zero next to T/2 may be miscounted where the other product's sign does not tell
+                lost1 = abs(results[i, lanes.Y1]) <= results[i, lanes.Y1_BAR] and not sine > sine_bar
+                lost2 = abs(results[i, lanes.Y2]) <= results[i, lanes.Y2_BAR] and not cosine > cosine_bar
+                bar += 0.5 * lost1 + 0.5 * lost2
             floats[ROTATION, i], floats[ROTATION + 1, i] = x, bar
             late[i] |= not bar <= rtol * (1.0 + x)
 
