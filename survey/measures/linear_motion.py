@@ -1,8 +1,8 @@
 """Motions of linear equations Y' = A(t) Y between their known multipliers: for pictures, with an error bar each.
 
-Gauss collocation with three nodes, order 6; each step is taken whole and in two halves, whose difference tells the
-local error d. It is carried to the end by the linearised flow: beside each column of Y goes the matrix V of its error
-ellipse, as in `survey.kernels.lanes`: V <- P V P' + diag(d^2), |error_i| <= sqrt(m n V_ii) after n steps of m
+Gauss collocation with three nodes, order 6; each step is taken at once and in two halves, whose difference estimates
+the local error d. It is carried to the end by the linearised flow: beside each column of Y goes the matrix V of its
+error ellipse, as in `survey.kernels.lanes`: V <- P V P' + diag(d^2), |error_i| <= sqrt(m n V_ii) after n steps of m
 equations.
 
 Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.7, table 7.4.
@@ -20,7 +20,7 @@ _INNER = np.array([
     [5 / 36 + _ROOT / 24, 2 / 9, 5 / 36 - _ROOT / 24],
     [5 / 36 + _ROOT / 30, 2 / 9 + _ROOT / 15, 5 / 36],
 ])  # fmt: skip
-# Where in each step the coefficients are asked for: in its two halves, and as a whole.
+# Where in each step the coefficients are asked for: in its two halves, then in the full step.
 NODES = np.concatenate([0.5 * GAUSS, 0.5 + 0.5 * GAUSS, GAUSS])
 
 
@@ -35,7 +35,7 @@ def fundamental(matrices, lengths, periods, scale=1.0, terms=None):
     halves = [_step(matrices[:, 3 * i : 3 * i + 3], 0.5 * h) for i in range(2)]
     steps, units = halves[1] @ halves[0], np.divide.outer(scale * np.ones(n), scale * np.ones(n))
     off = abs(steps - _step(matrices[:, 6:], h)) / units
-    # an entry's difference may vanish by symmetry: the largest speaks for all
+    # an entry's difference may vanish by symmetry: the largest stands for all
     local = SAFETY * off.max(axis=(1, 2), keepdims=True) * units + EPS * (4 * np.eye(n) + 12 * h * terms)
     y, bars = _chain(steps, local, units, periods)
     ends = np.cumsum(lengths.astype(np.longdouble))

@@ -16,7 +16,7 @@ from math import asinh, ceil, sinh, sqrt
 import numpy as np
 
 from survey.kernels.jit import inline, kernel
-from survey.kernels.libration.traces import FACTORS, A, C, D, T
+from survey.kernels.libration.traces import INVARIANTS, A, C, D, T
 from survey.kernels.math import double as dd
 from survey.kernels.math.double import UNIT
 
@@ -30,7 +30,7 @@ MARGIN = 1.01  # for what is of second order in the bars
 X, G, K, M = range(4)
 # Columns A to T of `traces` are leading parts; LOW columns further on follows what rounding left of them, and BARS
 # further on the bounds of their errors.
-LOW, BARS, RESULTS = FACTORS, 2 * FACTORS, 3 * FACTORS
+LOW, BARS, RESULTS = INVARIANTS, 2 * INVARIANTS, 3 * INVARIANTS
 
 
 @kernel
@@ -214,7 +214,7 @@ def finish(whole, spread, steps, out):
     """A, B, C, D, t and the bounds of their errors: A = det P, B = det T, C = det Q, D = det S, t = tr T'P."""
     bars = np.zeros(4)
     row_bars(spread, steps, bars)
-    for at in range(FACTORS - 1):
+    for at in range(INVARIANTS - 1):
         i, j = 0 if at in (A, D) else 2, 0 if at in (A, C) else 2
         a, b = (whole[0, i, j], whole[1, i, j]), (whole[0, i, j + 1], whole[1, i, j + 1])
         c, d = (whole[0, i + 1, j], whole[1, i + 1, j]), (whole[0, i + 1, j + 1], whole[1, i + 1, j + 1])

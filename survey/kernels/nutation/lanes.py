@@ -396,7 +396,7 @@ def add_node(work, cosine, i):
 
 
 @inline
-def judge(work, i):
+def conclude(work, i):
     """The action, or 0 where singularities are too near for so few nodes."""
     k, width, total = work[K + i], work[WIDTH + i], work[SUM + i]
     ratio = 0.25 * work[BEND + i] / k
@@ -413,7 +413,7 @@ def small_actions(work):
         for i in range(TILE):
             add_node(work, COSINES[j], i)
     for i in range(TILE):
-        judge(work, i)
+        conclude(work, i)
 
 
 @inline

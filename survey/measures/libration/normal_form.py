@@ -20,11 +20,11 @@ from survey.kernels.libration.coefficients import LABELS
 from survey.methods import rational, rational_double
 from survey.status import INVALID_PARAMETERS, OK, OVERFLOW
 
-LADDER = (rational, rational_double)  # method "auto": the second where the first leaves something open
+AUTO = (rational, rational_double)  # the second where the first leaves something open
 UNDECIDED, UNSTABLE, ORDER_4, ORDER_6, RESONANT, BOUNDARY = range(-1, 5)
 COMBINED = ("a20", "a11", "a02", "D4", "D6")
 FLOATS = ("omega1", "omega2", *COMBINED, "M_ray", "resonance_distance")
-HIGHEST = 8  # order of the resonances looked at
+HIGHEST = 8  # the greatest order of the resonances considered
 ROUNDINGS = 16  # in a sum of products here
 
 
@@ -45,13 +45,13 @@ def solve(mu, method, rtol):
     `method` is the name of a method, or "auto": closed forms in float64, and in double-double where `rtol` is missed or
     the verdict is left open.
     """
-    first, *finer = LADDER if method == "auto" else (measures.method(method),)
+    first, *finer = AUTO if method == "auto" else (measures.method(method),)
     answer = answers(mu, first)
     for other in finer:
-        again = missed(answer, rtol) | ((answer["verdict"] == UNDECIDED) & (answer["status"] != INVALID_PARAMETERS))
-        if again.any():
-            for name, values in answers(mu[again], other).items():
-                answer[name][again] = values
+        open_ = missed(answer, rtol) | ((answer["verdict"] == UNDECIDED) & (answer["status"] != INVALID_PARAMETERS))
+        if open_.any():
+            for name, values in answers(mu[open_], other).items():
+                answer[name][open_] = values
     return answer
 
 

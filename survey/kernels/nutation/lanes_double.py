@@ -157,7 +157,7 @@ def end(work):
 
 
 @splice
-def fine(work, means):
+def fill(work, means):
     """Fill the rows FINE of `work` (ALL), where so many means suffice float64."""
     begin(work)
     go(work, means + FURTHER)
