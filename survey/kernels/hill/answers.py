@@ -146,9 +146,11 @@ def transcendental(results, squares, wanted, rtol, full_period, floats, verdict,
                     doubt = min(bar * (abs(results[i, lanes.DY1]) + results[i, lanes.DY1_BAR]), 1.0)
             x, bar = _rotation(sine, sine_bar, cosine, cosine_bar, verdict[i], zeros)
             bar += sqrt(doubt) if verdict[i] != UNSTABLE else 0.0
-            if not whole:  # a zero next to T/2 may be miscounted where the other product's sign does not tell
-                bar += 0.5 * (abs(results[i, 0]) <= results[i, 4] and not sine > sine_bar)
-                bar += 0.5 * (abs(results[i, 2]) <= results[i, 6] and not cosine > cosine_bar)
+            if not full_period:  # a zero next to T/2 may be miscounted where the other product's sign leaves it open
+                beside_y1 = abs(results[i, lanes.Y1]) <= results[i, lanes.Y1_BAR]
+                beside_y2 = abs(results[i, lanes.Y2]) <= results[i, lanes.Y2_BAR]
+                bar += 0.5 * (beside_y1 and not sine > sine_bar)
+                bar += 0.5 * (beside_y2 and not cosine > cosine_bar)
             floats[ROTATION, i], floats[ROTATION + 1, i] = x, bar
             missed[i] |= not bar <= rtol * (1.0 + x)
 
