@@ -25,7 +25,7 @@ NODES = np.concatenate([0.5 * GAUSS, 0.5 + 0.5 * GAUSS, GAUSS])
 
 
 def fundamental(matrices, lengths, periods, scale=1.0, terms=None):
-    """t, Y at the ends of all steps of so many periods, and its bars (steps * periods + 1, n, n); Y = 1 at t = 0.
+    """t, Y at the ends of all steps of so many periods, and its bounds (steps * periods + 1, n, n); Y = 1 at t = 0.
 
     `matrices` (steps, 9, n, n) holds A at the NODES of each step of one period, `lengths` (steps) how long they are.
     `scale` (n) holds the sizes of Y's components, `terms` (steps, n, n) what the rounding of A is relative to (or |A|).
@@ -54,7 +54,7 @@ def _step(a, h):
 
 
 def _chain(steps, local, units, periods):
-    """Products of the steps from the first on, period after period, and their bars, from the `local` ones."""
+    """Products of the steps from the first on, period after period, and their error bounds, from the `local` ones."""
     number, n = len(steps) * periods, steps.shape[-1]
     y, squares = np.empty((2, number + 1, n, n))
     y[0], squares[0], ellipses = np.eye(n), 0.0, np.zeros((n, n, n))  # an ellipse for each column
@@ -73,7 +73,7 @@ def _chain(steps, local, units, periods):
 
 
 def of_trace(trace, bar):
-    """The pair of multipliers l, 1/l with l + 1/l = `trace` (complex, known to `bar`), |l| >= 1, and their bars.
+    """The pair of multipliers l, 1/l with l + 1/l = `trace` (complex, known to `bar`), |l| >= 1, and their bounds.
 
     |sqrt(x + d) - sqrt(x)| <= min(sqrt |d|, |d / sqrt x|), x = trace^2 / 4 - 1 (to first order where x is complex).
     """
@@ -91,7 +91,7 @@ def mirrored(nodes):
 
 
 def value(dim, name, symbol, words, values, bars):
-    """A variable along the time `dim`, and its error bar, as `Trajectory.data` holds them."""
+    """A variable along the time `dim`, and its error bound, as `Trajectory.data` holds them."""
     return {
         name: (dim, values, {"long_name": words, "symbol": symbol, "units": "1"}),
         f"{name}_error": (dim, bars, {"long_name": f"error bound of {name}", "units": "1"}),
@@ -99,7 +99,7 @@ def value(dim, name, symbol, words, values, bars):
 
 
 def described(multipliers, bars):
-    """The variables of multipliers and their bars, along the dimension `multiplier`."""
+    """The variables of multipliers and their error bounds, along the dimension `multiplier`."""
     parts = {"real": np.real(multipliers), "imag": np.imag(multipliers), "error": bars}
     words = {"real": "real part of the multiplier", "imag": "imaginary part of the multiplier",
              "error": "error bound of the multiplier, the radius of a disc"}  # fmt: skip

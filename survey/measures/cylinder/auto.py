@@ -20,7 +20,7 @@ FINEST = 3e-16  # no float64 can be known better
 
 
 def trajectories(method, rows, times, rtol):
-    """As `cylinder.trajectories`: in closed form, and by `method` where that has no answer or too wide a bar."""
+    """As `cylinder.trajectories`: in closed form, and by `method` where that has no answer or too wide a bound."""
     results = solution.trajectories(closed, rows, times, rtol)
     missed, uncounted = solution.missed(results, rtol), results[1] == UNTOLD
     if uncounted.any():

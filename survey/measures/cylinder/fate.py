@@ -249,7 +249,7 @@ def _rotations(method, six, eqs, section, K, L):
 def _far_cycle(p, section, K, L, scale):
     """The large cycle w(0) ~ -L/(pi K) where the return map does not show it (D = pi K/w^2 + ..., below rounding).
 
-    The expansion leaves a shift of the size of the velocities of the system, which the bar covers.
+    The expansion leaves a shift of the size of the velocities of the system, which the error bound covers.
     """
     b12, b31 = p[0], p[1]
     w = -L / (math.pi * K) - 2.0 * b31 + b12 * math.sin(section) + b31 * math.cos(section) - b31
@@ -274,7 +274,7 @@ def _librations(method, p, eqs):
 
 
 def fates(method, skeleton, starts, tolerance, more=1):
-    """The fates (VERDICT to STATUS of `records`) of starts phi0, w0 (and their bars)."""
+    """The fates (VERDICT to STATUS of `records`) of starts phi0, w0 (and their error bounds)."""
     if skeleton.stratum in (I0, I1):
         return (_free if skeleton.stratum == I0 else _conservative)(skeleton, starts)
     out = np.zeros((len(starts), rc.FATE))
@@ -320,7 +320,7 @@ def _free(s, starts):
 
 
 def _above(p, phi, w, row):
-    """Sign of the energy less that of the equilibrium `row`, in double-double; 0 where its bar reaches 0."""
+    """Sign of the energy less that of the equilibrium `row`, in double-double; 0 where its error bound reaches 0."""
     gap, bar = energy_beside(p, phi, w, row[eq.ANGLE])
     bar += 0.5 * p[BOUND_DG] * row[eq.BAR] ** 2  # V' = 0 at the equilibrium
     return 0 if abs(gap) <= bar else math.copysign(1.0, gap)

@@ -88,7 +88,7 @@ def _rests(s, result, i):
 
 
 def _type(row):
-    """1 saddle, 2 to 7 node or focus: attracting, weak (f = 0 within the bar), repelling; 8 degenerate."""
+    """1 saddle, 2 to 7 node or focus: attracting, weak (f = 0 within the error bound), repelling; 8 degenerate."""
     kind = int(row[eq.KIND])
     if kind in (eq.NODE, eq.FOCUS):
         return 3 + int(row[eq.STABLE]) + 3 * (kind == eq.FOCUS)
@@ -96,7 +96,7 @@ def _type(row):
 
 
 def _verdict(method, s, rtol):
-    """Is the point structurally stable, by the error bars?"""
+    """Is the point structurally stable, by the error bounds?"""
     scale = s.p[BOUND_F] + math.sqrt(s.p[BOUND_DG])
     degenerate = s.stratum != G or (s.K == 0.0 and not _is_exact(s.p))
     degenerate = degenerate or any(not _hyperbolic(row) for row in s.librations)
@@ -118,7 +118,7 @@ def _is_exact(p):
 
 
 def _is_degenerate(s, row):
-    """Does the bar of an equilibrium reach g' = 0, or f = 0 where it is no saddle (in stratum G a Hopf point)?"""
+    """Does the bound of an equilibrium reach g' = 0, or f = 0 where it is no saddle (in stratum G a Hopf point)?"""
     p = s.p
     if row[eq.KIND] == eq.DEGENERATE or abs(row[eq.DG]) <= p[BOUND_DDG] * row[eq.BAR] + 8.0 * UNIT * p[BOUND_DG]:
         return True
@@ -126,7 +126,7 @@ def _is_degenerate(s, row):
 
 
 def _hyperbolic(row):
-    """Does the bar of a cycle's multiplier keep off 1?"""
+    """Does the error bound of a cycle's multiplier keep off 1?"""
     return row[rt.CYCLE_CLASS] >= 0.0 and abs(row[rt.MULTIPLIER] - 1.0) > row[rt.MULTIPLIER_BAR]
 
 
@@ -140,7 +140,7 @@ def _far(row, K, scale):
 
 
 def _rotations(method, cycles, rtol):
-    """|w|, bar, period, bar of rotation cycles, in columns: w on the section, the period by one turn from there."""
+    """|w|, its bound, period, its bound of rotation cycles, in columns: w on the section, the period by one turn."""
     w, bar = np.array([[row[rt.CYCLE_X], row[rt.CYCLE_BAR]] for _, _, _, row, _, _ in cycles]).T
     side = np.array([1.0 if kind == ROTATION_PLUS else -1.0 for _, _, kind, _, _, _ in cycles])
     section = np.array([s.section for _, _, _, _, s, _ in cycles])
@@ -155,7 +155,7 @@ def _rotations(method, cycles, rtol):
 
 
 def _librations(method, cycles, rtol):
-    """w > 0 at the equilibrium to the left of the right turning point, bar, period, bar, in columns.
+    """w > 0 at the equilibrium to the left of the right turning point, error bound, period, error bound, in columns.
 
     From the right turning point the cycle is followed to the left one forward in time, and backward (S1: b -> -b).
     """
@@ -182,7 +182,7 @@ def _librations(method, cycles, rtol):
 
 
 def _within(function, x, bar):
-    """Value and bar of `function` (x -> value, bar) at x known within `bar`."""
+    """Value and error bound of `function` (x -> value, error bound) at x known within `bar`."""
     (value, own), low, high = function(x), function(x - bar)[0], function(x + bar)[0]
     return value, 1.2 * np.maximum(np.abs(low - value), np.abs(high - value)) + 2.0 * own
 

@@ -2,7 +2,7 @@
 that it leaves undecided in double-double arithmetic, or by the adaptive DOP853 where a problem has no such kernel. So
 are the few whose D, if asked for, depends on an ulp of the parameters, where rtol is below what float64 can reach.
 
-Measured (`survey precision satellite`): midpoint Taylor is the fastest at every accuracy and has the sharpest bars.
+Measured (`survey precision satellite`): midpoint Taylor is the fastest at every accuracy and has the sharpest bounds.
 """
 
 import numpy as np

@@ -1,9 +1,9 @@
 """The verdict of a Hill problem everywhere in cells of a plane of two parameters, so that no tongue is missed.
 
-The half-period factors are analytic in the parameters, so on blocks small enough each is its tensor Chebyshev
-series to within a bar: the nodes' own bars times the Lebesgue constants, the series' tails, and rounding. A series that
-misses the factor between its nodes has that in its tails. Where a series no longer serves, the halves of its block are
-solved; all other halving is done on the series alone (`survey.kernels.hill.cells`).
+The half-period factors are analytic in the parameters, so on blocks small enough each is its tensor Chebyshev series to
+within a bound: the bounds at its nodes times the Lebesgue constants, the tails of the series, and rounding. A series
+that misses the factor between its nodes has that in its tails. Where a series no longer serves, the halves of its block
+are solved; all other halving is done on the series alone (`survey.kernels.hill.cells`).
 
 Sources: W. Magnus, S. Winkler, Hill's Equation (1966), theorem 1.1; L. N. Trefethen, Approximation Theory and
 Approximation Practice (2013), chapters 3, 8, 15.

@@ -5,7 +5,7 @@ of some columns) as seeds, both ways along F = 0: predictor by tangent and curva
 F, its gradient and second derivatives from nine neighbouring points; all curves step together. A step is taken if the
 corrector is short against it, the curve turns little, and F keeps its positive side (neighbouring zeros of F have
 opposite ones); else it is halved. Curves end at the border of the map, where they close, or are lost where F has a
-double point. At last every point is closed in on by certain signs of F.
+double point. At last every point is bracketed by certain signs of F.
 
 Positions are those of `survey.measures.square`.
 A closed curve that meets neither a row nor a column that was searched has no seed, and is not found.
@@ -27,8 +27,8 @@ TURN = np.cos(2 * BEND)  # a step that turns more is taken again
 OFF = 0.05  # of a step: how long the corrector may be
 STEPS = 10_000
 NEAR = 0.02  # of a step: how far a seed may lie from the curve that goes through it
-WIDE = 1e-7  # the first half width of a point, before it is closed in
-CHUNK = 256  # points closed in together
+WIDE = 1e-7  # half the width of the first bracket of a point
+CHUNK = 256  # points bracketed together
 
 
 @dataclass
@@ -97,7 +97,7 @@ def _in_chunks(each, task, number, what):
 
 @dataclass
 class Path:
-    """Points of a curve in order: positions, tangents, lines along which they are closed in on.
+    """Points of a curve in order: positions, tangents, lines on which they are bracketed.
 
     `complete`: the curve is closed, or both its ends lie on borders.
     """
@@ -234,7 +234,7 @@ def _on(path, x, towards):
 
 
 def _close_all_in(solve, square, paths, starts, seeds, of_seed, each):
-    """The Curves of the paths, each point closed in on its line and counted by its rotation number."""
+    """The Curves of the paths, each point bracketed on its line and counted by its rotation number."""
     count = np.array([len(path.x) for path in paths], int)
     whose = np.repeat(np.arange(len(paths)), count)
     x, along, line = (np.concatenate([getattr(p, name) for p in paths] or [np.zeros((0, 2))])

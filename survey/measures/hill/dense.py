@@ -5,9 +5,9 @@ p -> -p exchanges y1 and y2', D is a series in p^2 and its nodes those of one ha
 D's coefficients are series across it, solved at its nodes; a panel of rows on which they do not converge is halved,
 and what is left over is served row by row.
 
-D's bar: the nodes' own bars times the Lebesgue constants, the tails of the series, and rounding. Points whose verdict
-or accuracy it leaves open count as `missed`, and are solved one by one from their factors. All depends on the row and
-on the axes of the map, never on the block.
+The error bound of D: those at the nodes times the Lebesgue constants, the tails of the series, and rounding. Points
+whose verdict or accuracy it leaves open count as `missed`, and are solved one by one from their factors. All depends on
+the row and on the axes of the map, never on the block.
 
 Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 4, 8 and 15.
 """
@@ -150,7 +150,7 @@ def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
 
 @lru_cache(maxsize=64)
 def panels(row_axis, method, rtol, axis):
-    """[(low, high, D's series, its bar)] of the panels of rows on which D converges: the same for all blocks of a map.
+    """[(low, high, series of D, its bound)] of the panels of rows on which D converges, the same for all blocks.
 
     The axis of rows is halved until D has converged to `rtol`, as long as all that is solved for it pays.
     """
@@ -170,7 +170,7 @@ def panels(row_axis, method, rtol, axis):
 
 
 def _surface(row_axis, method, rtol, middle, radius, axis, budget):
-    """((coefficients of T_j in s, by T_k in p; bar), or None where `rtol` is not met; rows solved, within `budget`)."""
+    """((coefficients of T_j in s by T_k in p, bound), or None where `rtol` is not met; rows solved, in `budget`)."""
     ends = row_axis.at(middle + radius * np.array([-1.0, 1.0]))
     size = np.sqrt((ends.bound * np.abs([1.0, axis.radius, axis.radius**2])).sum(axis=1))
     at = int(_enough(np.abs(np.diff(ends.span * size)), rtol)[0])  # half the change of D's phase
@@ -210,9 +210,9 @@ def _enough(kind, rtol):
 
 
 def _series(problem, method, rtol, rows, n, axis):
-    """D at nodes (rows, n; n/2 if even), its coefficients (of T_k(2 (p/radius)^2 - 1) if even), and its bar (rows).
+    """D at nodes (rows, n; n/2 if even), its coefficients (of T_k(2 (p/radius)^2 - 1) if even), and its bound (rows).
 
-    Nodes are solved to `rtol` or as well as can be; a bar is not finite where there is none.
+    Nodes are solved to `rtol` or as well as can be; an error bound is not finite where there is none.
     """
     x = _nodes(n)[: n // 2] if axis.even else _nodes(n)
     nodes = problem.at(rows, np.broadcast_to(axis.middle + axis.radius * x, (rows.size, x.size)).copy())

@@ -3,9 +3,10 @@
     y1 = 0   even antiperiodic      y2' = 0  odd antiperiodic      y1' = 0  even periodic      y2 = 0  odd periodic
 
 The factors are analytic in every parameter, so on panels short enough each is its Chebyshev series to rounding, and
-the eigenvalues of the series' colleague matrix are all its zeros, double ones too. Each is then closed in by signs of
-the factor itself, certain against its bar. A row is complete when, between its edges and at its ends, every factor has
-the sign that the list says, and the rotation number counts the same tongues; else its panels are halved.
+the eigenvalues of the series' colleague matrix are all its zeros, double ones too. Each is then bracketed by signs of
+the factor itself that are certain against its error bound. A row is complete when, between its edges and at its ends,
+every factor has the sign that the list implies, and the rotation number counts the same tongues; else its panels are
+halved.
 
 Sources: W. Magnus, S. Winkler, Hill's Equation (1966), theorem 1.1; J. P. Boyd, SIAM J. Numer. Anal. 40 (2002) 1666.
 """
@@ -51,7 +52,7 @@ class Edges:
 def find(solve, rows, low, high, panels=4):
     """All edges between `low` and `high` on each of `rows` rows.
 
-    `solve(row, x, wanted)` gives the outputs `wanted`, with their bars, at x (m, n), one row number for each of m.
+    `solve(row, x, wanted)` gives the outputs `wanted`, with their bounds, at x (m, n), one row number for each of m.
     """
     found, left = [], np.arange(rows)
     complete = np.zeros(rows, np.bool_)
@@ -143,7 +144,7 @@ def _close_in(solve, row, kind, x, radius, low, high):
 
 
 def of_kind(out, kind):
-    """The factor, and its bar, that belongs to each row's kind."""
+    """The factor, and its error bound, that belongs to each row's kind."""
     rows = np.arange(kind.size)
     return (np.stack([out[name + end] for name in FACTORS])[kind, rows] for end in ("", "_error"))
 

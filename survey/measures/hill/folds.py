@@ -1,8 +1,8 @@
 """Folds of edge curves: points where F = 0 and dF/dp = 0, so that two edges of a row meet and vanish.
 
 On a short panel of p about a curve's turn, F(q, .) is its Chebyshev series to rounding. Its stationary value g(q) there
-is analytic with a simple zero at the fold, which is closed in by certain signs of g. Its p is where the
-series' derivative vanishes; its error bar is that of the derivative (Bernstein's inequality) over the second one.
+is analytic with a simple zero at the fold, which is bracketed by certain signs of g. Its p is where the derivative of
+the series vanishes; its error bound is that of the derivative (Bernstein's inequality) over the second derivative.
 
 Sources: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 3 and 15;
 P. Borwein, T. Erdelyi, Polynomials and Polynomial Inequalities (1995), section 5.1.
@@ -48,7 +48,7 @@ def find(solve, square, curves):
     kind = curves.kind[whose[at]]
 
     def stationary(who, q, start, wider=1):
-        """(p, value, its bar, bar of p) where F(q, .) is stationary near p = start (m), on each panel; q is (m, n)."""
+        """(p, value, its bound, bound of p) where F(q, .) is stationary near p = start (m), on each panel; q (m, n)."""
         half = np.minimum(wider * radius[who], 0.5)
         middle = np.clip(start, half, 1 - half)
         p = (middle[:, None] + half[:, None] * X)[:, None]
@@ -77,7 +77,7 @@ def find(solve, square, curves):
 
 
 def _stationary(f, bar, x):
-    """Where the series through f (..., NODES) is stationary near x: (x, value, its bar, bar of x), x in [-1, 1]."""
+    """Where the series through f (..., NODES) is stationary near x: (x, value, its bound, bound of x), x in [-1, 1]."""
     series = f @ TO_SERIES.T
     bar = LEBESGUE * bar.max(axis=-1) + 2 * abs(series[..., -2:]).sum(axis=-1) + 4 * EPS * abs(series).sum(axis=-1)
     columns = np.moveaxis(series, -1, 0)

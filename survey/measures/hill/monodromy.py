@@ -160,7 +160,7 @@ def solve(problem, method, rtol, wanted=()):
 
 
 def overflow(out, where):
-    """Take back the answers of the points `where` a value or bar lies beyond the range of floats; changes `out`."""
+    """Take back the answers of the points `where` a value or bound lies beyond the range of floats; changes `out`."""
     if where.any():
         failed = (out["status"] == status.OK) & where
         out["status"] = np.where(failed, status.OVERFLOW, out["status"]).astype(np.int8)

@@ -6,7 +6,7 @@ z is sampled at Chebyshev points on each piece between its breaks. From the coef
             geometrically, the highest frequency that matters where z is entire
     noise   what does not fall: the rounding of z and of u, and what is too fine to be resolved
 
-The noise enters the bars: z is handed on as (z - B) + B, so that its rounding counts relative to B >= max |z|, and
+The noise enters the bounds: z is handed on as (z - B) + B, so that its rounding counts relative to B >= max |z|, and
 B is as large as the noise asks. All depends on the point alone.
 
 Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 3, 7 and 8.

@@ -42,7 +42,7 @@ def _by_trace(answer):
 
 
 def _product(answer, one, other):
-    """The product of two factors and its bar."""
+    """The product of two factors and its error bound."""
     (x, dx), (y, dy) = ((float(answer[name]), float(answer[f"{name}_error"])) for name in (one, other))
     return x * y, abs(x) * dy + abs(y) * dx + dx * dy
 

@@ -59,7 +59,7 @@ LEBESGUE = 1.0 + 2 / np.pi * np.log(PLACES)
 
 
 def solve(e, mu, method="auto", rtol=1e-10, dense=False):
-    """The outputs for rows e (R) of points mu (R, L), all (R, L): a, b, their bars, verdict, collision, status.
+    """The outputs for rows e (R) of points mu (R, L), all (R, L): a, b, their bounds, verdict, collision, status.
 
     `dense`: the rows are long enough for series (see DENSE), wherever they are cut.
     """
@@ -95,7 +95,7 @@ def rates(mu):
 
 
 def factors(e, mu, rtol=1e-13):
-    """A, B, C, D, t (N, 5) and their bars (N, 5), to what midpoint Taylor can."""
+    """A, B, C, D, t (N, 5) and their error bounds (N, 5), to what midpoint Taylor can."""
     results = np.empty((e.size, RESULTS))
     _point_by_point(e, *rates(mu), taylor16, rtol, results)
     return results[:, :INVARIANTS], results[:, INVARIANTS:]

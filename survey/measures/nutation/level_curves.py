@@ -7,7 +7,7 @@ On such a map there is no closed form. Its curves are zeros of functions that ar
     pole passage        p_psi -+ p_phi, where the motion reaches the pole u = +-1
 
 with b = p_psi, a = p_phi. They are searched for on LINES lines of the map each way by marching squares, and every
-point is closed in on along its line by certain signs. A closed curve narrower than a LINES-th of the map may be missed,
+point is bracketed on its line by certain signs. A closed curve narrower than a LINES-th of the map may be missed,
 and a curve may end as much before the cusp where its saddle ends. No curve shows where a well begins in which the
 motion is not. A precession is stable where its squared frequency (S18) is positive, else it is the saddle itself.
 
@@ -24,7 +24,7 @@ from survey.measures.nutation import wells
 
 STATE = ("A", "C", "epsilon", "theta0", "p_theta0", "p_psi", "p_phi")
 LINES, HALVINGS = 513, 30
-SURE = 1e-9  # half the width of what every point is closed in
+SURE = 1e-9  # half the width of what brackets a point
 
 
 def traced(square, axes, fixed):
@@ -51,7 +51,7 @@ def states(square, axes, fixed, x):
 
 
 def separatrix(columns):
-    """L above the separatrix over |k|, and its bar; NaN where there is none."""
+    """L above the separatrix over |k|, and its error bound; NaN where there is none."""
     out = wells.distance(wells.heights(brun.heights_of_states, columns))
     a, c, _, theta, _, b, spin = columns
     outside = (c > 2.0 * a) | ((theta == 0.0) & (b != spin))
@@ -59,7 +59,7 @@ def separatrix(columns):
 
 
 def precession(columns):
-    """(b - a u)(a - b u) + k u (1 - u^2)^2, and its bar; NaN at the poles, where it has other zeros."""
+    """(b - a u)(a - b u) + k u (1 - u^2)^2, and its error bound; NaN at the poles, where it has other zeros."""
     size, c, epsilon, theta, _, b, a = columns
     u, sine = np.cos(theta), np.sin(theta)
     k, square = epsilon * size * (size - c), sine * sine
@@ -132,7 +132,7 @@ def _reaching(function, x, error, columns):
 
 
 def along(function, columns):
-    """{name: (values, bars)} of the regular precession that each state (7, m) of a curve belongs to; none at poles."""
+    """{name: (values, bounds)} of the precession to which each state (7, m) of a curve belongs; none at poles."""
     if function in (upper_pole, lower_pole):
         return {}
     size, c, epsilon, theta, _, b, a = columns
@@ -152,7 +152,7 @@ def along(function, columns):
 
 
 def _rate(own, other, u, off, v, root):
-    """(own - other u) / ((1 - u^2) sqrt|k|) and its bar: psi' or the reduced phi', times A / sqrt|k|."""
+    """(own - other u) / ((1 - u^2) sqrt|k|) and its error bound: psi' or the reduced phi', times A / sqrt|k|."""
     rate = (own - other * u) / (v * root)
     bar = (4.0 * EPS * (abs(own) + abs(other * u)) + abs(other) * off) / (v * root)
     return rate, bar + abs(rate) * (2.0 * abs(u) * off / v + 8.0 * EPS)

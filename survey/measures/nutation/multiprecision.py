@@ -31,7 +31,7 @@ class NoMotion(Exception):
 
 
 def of_state(size_a, size_c, epsilon, theta, p_theta, b, a):
-    """Of an initial state: does it pass a pole, the number of wells, [{name: value, name_error: bar}] of its own.
+    """Of an initial state: does it pass a pole, the number of wells, [{name: value, name_error: bound}] of its own.
 
     None where it stays open.
     """
@@ -74,7 +74,7 @@ def _agree(before, now):
 
 
 def _rounded(before, now):
-    """{name: float64, name_error: its bar}: half an ulp, and what fewer digits make of it."""
+    """{name: float64, name_error: its error bound}: half an ulp, and what fewer digits make of it."""
     found = {}
     for name, exact in now.items():
         value, apart = float(exact), float(abs(exact - before[name]))

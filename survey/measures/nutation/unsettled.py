@@ -1,4 +1,4 @@
-"""Which nutations are solved again with more digits (`multiprecision`): open verdicts, and bars that miss rtol."""
+"""Which nutations are solved again with more digits (`multiprecision`): open verdicts, and bounds that miss rtol."""
 
 import numpy as np
 
@@ -34,7 +34,7 @@ def settle(out, points, solver, valid, request, known=False):
 
 
 def _open(out, request):
-    """Where a verdict is open, or a bar of an output that is asked for misses rtol."""
+    """Where a verdict is open, or an error bound of an output that is asked for misses rtol."""
     status, verdict = out["status"], out["verdict"]
     found = (status == NO_CONVERGENCE) | (status == OVERFLOW)
     found |= (status == OK) & (verdict != nu.NUTATION) & (verdict != nu.PASSAGE)
