@@ -10,7 +10,8 @@ Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equat
 
 import numpy as np
 
-EPS = 2.3e-16
+from survey.kernels.math.roundoff import EPS
+
 SAFETY = 4 / 63  # of the difference, of order 6, between a step and its halves
 _ROOT = np.sqrt(15.0)
 GAUSS = 0.5 + np.array([-0.1, 0.0, 0.1]) * _ROOT

@@ -8,7 +8,7 @@ import numpy as np
 
 from survey import status
 from survey.errors import BadInput
-from survey.kernels.hill.answers import EPS
+from survey.kernels.math.roundoff import EPS
 from survey.measures.hill import monodromy as measure
 from survey.measures.hill import motion, multiprecision, user_equation
 from survey.measures.hill import why as hill_why

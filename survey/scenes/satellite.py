@@ -28,10 +28,11 @@ from survey.kernels.hill.answers import LARGEST, NO_RULE, NO_UNSTABLE_SIDE, ON_E
 from survey.kernels.hill.satellite import potential, sample, tabulate
 from survey.kernels.jit import kernel
 from survey.kernels.math.elliptic import MEANS
+from survey.kernels.math.roundoff import EPS
 from survey.measures.hill import dense, monodromy
 from survey.measures.hill import motion as hill_motion
 from survey.measures.hill import why as hill_why
-from survey.measures.hill.satellite import EPS, Motion, moduli, rates
+from survey.measures.hill.satellite import Motion, moduli, rates
 from survey.measures.rows import Rows
 from survey.methods import dop853
 from survey.scene import Option, Output, Parameter

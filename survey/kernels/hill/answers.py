@@ -9,9 +9,9 @@ import numpy as np
 
 from survey.kernels import lanes
 from survey.kernels.jit import inline, kernel, splice
+from survey.kernels.math.roundoff import EPS
 from survey.kernels.unroll import unroll
 
-EPS = 2.3e-16
 LEAST = 2e-323  # what a few products lose where they underflow
 LARGEST = float(np.finfo(np.float32).max)  # bars are kept as float32
 UNDECIDED, UNSTABLE, STABLE, MARGINAL = -1, 0, 1, 2
@@ -147,10 +147,9 @@ def transcendental(results, squares, wanted, rtol, full_period, floats, verdict,
             x, bar = _rotation(sine, sine_bar, cosine, cosine_bar, verdict[i], zeros)
             bar += sqrt(doubt) if verdict[i] != UNSTABLE else 0.0
             if not full_period:  # a zero next to T/2 may be miscounted where the other product's sign leaves it open
-                beside_y1 = abs(results[i, lanes.Y1]) <= results[i, lanes.Y1_BAR]
-                beside_y2 = abs(results[i, lanes.Y2]) <= results[i, lanes.Y2_BAR]
-                bar += 0.5 * (beside_y1 and not sine > sine_bar)
-                bar += 0.5 * (beside_y2 and not cosine > cosine_bar)
+                lost1 = abs(results[i, lanes.Y1]) <= results[i, lanes.Y1_BAR] and not sine > sine_bar
+                lost2 = abs(results[i, lanes.Y2]) <= results[i, lanes.Y2_BAR] and not cosine > cosine_bar
+                bar += 0.5 * lost1 + 0.5 * lost2
             floats[ROTATION, i], floats[ROTATION + 1, i] = x, bar
             missed[i] |= not bar <= rtol * (1.0 + x)
 

@@ -10,8 +10,9 @@ I. E. Sutherland, G. W. Hodgman, Comm. ACM 17 (1974) 32 (polygons).
 
 import numpy as np
 
-from survey.kernels.hill.answers import EPS, STABLE, UNDECIDED, UNSTABLE
+from survey.kernels.hill.answers import STABLE, UNDECIDED, UNSTABLE
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math.roundoff import EPS
 
 UNSOLVED = 3  # no verdict: a cell whose factors must be solved first
 # A series serves a block if its tail, at the last cells, is at most this share of what a factor varies there.

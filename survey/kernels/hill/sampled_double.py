@@ -10,10 +10,11 @@ Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013),
 
 import numpy as np
 
-from survey.kernels.hill.taylor_double import HALF_ULP, STEP, composed, rounded, step, workspace
+from survey.kernels.hill.taylor_double import STEP, composed, rounded, step, workspace
 from survey.kernels.jit import kernel
 from survey.kernels.lanes import DY2_BAR, RESULTS, Y1_BAR
-from survey.kernels.math.double import UNIT, add, div, mul
+from survey.kernels.math.double import add, div, mul
+from survey.kernels.math.roundoff import PAIR_ROUNDOFF, ROUNDOFF_UP
 
 ORDER = 34
 SERVES = ()  # a last resort, never a user's choice
@@ -27,7 +28,7 @@ SQUARES = 4
 def missing(before, last, size):
     """What an interpolant misses, from the sizes of its last four Chebyshev coefficients, pair by pair, and of z."""
     # rounding may leave nothing of two coefficients, but no more is known of them than that
-    return 3 * last * (last / (before + UNIT * size + 1e-300) + 0.02)
+    return 3 * last * (last / (before + PAIR_ROUNDOFF * size + 1e-300) + 0.02)
 
 
 @kernel
@@ -57,9 +58,9 @@ def solve(series, misses, lengths, full_period, out):
         c[11] = 0.0
     y1, v1, y2, v2 = composed(chain, 0.0, out)
     if full_period:
-        bar, trace = out[Y1_BAR] + out[DY2_BAR] + UNIT * (abs(y1[0]) + abs(v2[0]) + 2.0), add(y1, v2)
+        bar, trace = out[Y1_BAR] + out[DY2_BAR] + PAIR_ROUNDOFF * (abs(y1[0]) + abs(v2[0]) + 2.0), add(y1, v2)
         out[SINE] = 0.25 * add((2.0, 0.0), (-trace[0], -trace[1]))[0]
         out[COSINE] = 0.25 * add((2.0, 0.0), trace)[0]
-        out[SINE_BAR] = 0.25 * bar + HALF_ULP * abs(out[SINE])
-        out[COSINE_BAR] = 0.25 * bar + HALF_ULP * abs(out[COSINE])
+        out[SINE_BAR] = 0.25 * bar + ROUNDOFF_UP * abs(out[SINE])
+        out[COSINE_BAR] = 0.25 * bar + ROUNDOFF_UP * abs(out[COSINE])
     rounded(y1, v1, y2, v2, unit, out)

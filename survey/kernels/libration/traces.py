@@ -14,8 +14,8 @@ from math import isfinite, sqrt
 import numpy as np
 
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math.roundoff import EPS
 
-EPS = 2.3e-16
 LARGEST = float(np.finfo(np.float32).max)  # bars are kept as float32
 UNDECIDED, UNSTABLE, STABLE = -1, 0, 1
 NONE, MINUS_ONE, KREIN = 0, 1, 2

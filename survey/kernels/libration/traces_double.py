@@ -28,9 +28,8 @@ from survey.kernels.libration.traces import (
     lost,
 )
 from survey.kernels.math import double as dd
-from survey.kernels.math.double import UNIT
+from survey.kernels.math.roundoff import PAIR_ROUNDOFF, ROUNDOFF_UP
 
-HALF_ULP = 1.2e-16
 MARGIN = 1.01  # for what is of second order in the bars, and for signs told from leading parts
 PLACES = 32  # of a row's series
 
@@ -53,8 +52,8 @@ def _settle(r, i, rtol, overflow, floats, verdict, collision, missed, status):
     b = dd.add(dd.scaled(t, -8.0 if by_ab else 8.0), dd.scaled(ab if by_ab else cd, 16.0))
     b = dd.shifted(b, 6.0 if by_ab else -10.0)
     size = 1.0 + abs(t[0]) + abs(ab[0] if by_ab else cd[0])
-    a_bar = MARGIN * (4.0 * t_bar + 8.0 * UNIT * size) + HALF_ULP * abs(a[0])
-    b_bar = MARGIN * (16.0 * min(ab_bar, cd_bar) + 8.0 * t_bar + 64.0 * UNIT * size) + HALF_ULP * abs(b[0])
+    a_bar = MARGIN * (4.0 * t_bar + 8.0 * PAIR_ROUNDOFF * size) + ROUNDOFF_UP * abs(a[0])
+    b_bar = MARGIN * (16.0 * min(ab_bar, cd_bar) + 8.0 * t_bar + 64.0 * PAIR_ROUNDOFF * size) + ROUNDOFF_UP * abs(b[0])
     verdict[i] = collision[i] = UNDECIDED
     missed[i] = True
     if not (isfinite(a[0]) and isfinite(b[0]) and a_bar < LARGEST and b_bar < LARGEST):
@@ -77,7 +76,7 @@ def _settle(r, i, rtol, overflow, floats, verdict, collision, missed, status):
 def product(a, b, ea, eb):
     """a b and its error bound; of its sign, where that is certain of both factors, it leaves no doubt."""
     p = dd.mul(a, b)
-    return p, MARGIN * (ea * abs(b[0]) + eb * abs(a[0]) + ea * eb + 2.0 * UNIT * abs(p[0]))
+    return p, MARGIN * (ea * abs(b[0]) + eb * abs(a[0]) + ea * eb + 2.0 * PAIR_ROUNDOFF * abs(p[0]))
 
 
 @inline
@@ -87,7 +86,7 @@ def discriminant(t, ab, cd, t_bar, ab_bar, cd_bar):
     by_ab = abs(t[0]) * t_bar + 2.0 * ab_bar <= abs(other[0]) * t_bar + 2.0 * cd_bar
     root, last, bar = (t, ab, ab_bar) if by_ab else (other, cd, cd_bar)
     square, last = dd.square(root), dd.scaled(last, 4.0)
-    rounding = UNIT * (4.0 * square[0] + 2.0 * abs(last[0]) + (0.0 if by_ab else 4.0 * abs(root[0])))
+    rounding = PAIR_ROUNDOFF * (4.0 * square[0] + 2.0 * abs(last[0]) + (0.0 if by_ab else 4.0 * abs(root[0])))
     return dd.sub(square, last), MARGIN * (2.0 * abs(root[0]) * t_bar + t_bar * t_bar + 4.0 * bar + rounding)
 
 
@@ -96,11 +95,11 @@ def nearest(t, k, t_bar, k_bar):
     """As `traces.nearest`, of k > k_bar."""
     root = dd.sqrt(k)
     low, high = dd.sqrt(dd.shifted(k, -k_bar)), dd.sqrt(dd.shifted(k, k_bar))
-    bar = MARGIN * (t_bar + dd.sub(high, low)[0] + 16.0 * UNIT)
+    bar = MARGIN * (t_bar + dd.sub(high, low)[0] + 16.0 * PAIR_ROUNDOFF)
     one, two = dd.add(dd.shifted(t, -1.0), root), dd.sub(dd.shifted(t, -1.0), root)
     cosine = dd.mul(two, dd.shifted(dd.scaled(dd.square(two), 4.0), -3.0))
     gap = dd.sub(one, cosine)[0]
-    margin = bar * (1.0 + abs(12.0 * two[0] * two[0] - 3.0) + 24.0 * bar) + 64.0 * UNIT
+    margin = bar * (1.0 + abs(12.0 * two[0] * two[0] - 3.0) + 24.0 * bar) + 64.0 * PAIR_ROUNDOFF
     beyond = dd.shifted(two, 0.5)[0]
     if gap > margin and beyond < -bar:
         return MINUS_ONE

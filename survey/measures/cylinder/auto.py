@@ -12,7 +12,7 @@ arithmetic.
 import numpy as np
 
 from survey.kernels.cylinder import taylor_double
-from survey.kernels.cylinder.along import EQUILIBRIUM, NO_CONVERGENCE, OK, SEPARATRIX, TURNING, UNTOLD
+from survey.kernels.cylinder.steps import EQUILIBRIUM, NO_CONVERGENCE, OK, SEPARATRIX, TURNING, UNDETERMINED
 from survey.measures.cylinder import solution
 from survey.methods import closed
 
@@ -22,7 +22,7 @@ FINEST = 3e-16  # no float64 can be known better
 def trajectories(method, rows, times, rtol):
     """As `cylinder.trajectories`: in closed form, and by `method` where that has no answer or too wide a bound."""
     results = solution.trajectories(closed, rows, times, rtol)
-    missed, uncounted = solution.missed(results, rtol), results[1] == UNTOLD
+    missed, uncounted = solution.missed(results, rtol), results[1] == UNDETERMINED
     if uncounted.any():
         missed |= uncounted
         results[0][uncounted] = np.nan
@@ -30,7 +30,7 @@ def trajectories(method, rows, times, rtol):
     if not missed.any():
         return results
     results = _completed(results, missed, lambda some, at: solution.trajectories(method, some, at, rtol), rows, times)
-    left = _left_open(results, rtol) | ((results[1] == UNTOLD) & (results[2] == OK))
+    left = _left_open(results, rtol) | ((results[1] == UNDETERMINED) & (results[2] == OK))
     exact = taylor_double
     return _completed(results, left, lambda some, at: solution.trajectories(exact, some, at, rtol), rows, times)
 
@@ -62,7 +62,7 @@ def _completed(results, missed, solve, rows, columns):
     old = [result[some] for result in results]
     take = missed[some] & (solution.badness(others) <= solution.badness(old))
     if len(others) == 3:  # turnings that either knows are certain
-        np.copyto(others[1], old[1], where=others[1] == UNTOLD)
+        np.copyto(others[1], old[1], where=others[1] == UNDETERMINED)
     for result, held, new in zip(results, old, others, strict=True):
         held[take] = new[take]
         result[some] = held

@@ -16,9 +16,9 @@ from survey.kernels.cylinder import fate as kf
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder import returns as rt
 from survey.kernels.cylinder import taylor_double
-from survey.kernels.cylinder.along import OK, SEPARATRIX, STEP_LIMIT
 from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, coefficients
 from survey.kernels.cylinder.flow_double import energy as energy_beside
+from survey.kernels.cylinder.steps import OK, SEPARATRIX, STEP_LIMIT
 from survey.measures.cylinder.solution import tolerances, trajectories
 
 NO_TURNS = kf.NO_TURNS
@@ -37,7 +37,7 @@ def empty(size, status):
     """The outputs of `solve` for `size` states, filled with what does not apply."""
     floats = ("limit_phi", "limit_w", "multiplier")
     result = {name + end: np.full(size, np.nan) for name in floats for end in ("", "_error")}
-    for name, fill in (("verdict", -1), ("turnings", kf.UNTOLD), ("net_turns", NO_TURNS), ("status", status)):
+    for name, fill in (("verdict", -1), ("turnings", kf.UNDETERMINED), ("net_turns", NO_TURNS), ("status", status)):
         result[name] = np.full(size, fill, dtype=np.int64)
     return result
 
@@ -82,7 +82,7 @@ def _handed_over(method, s, start, tolerance, out):
             if later[rc.VERDICT] != kf.UNDECIDED:
                 out[:] = later
                 if later[rc.TURNINGS] >= 0:
-                    out[rc.TURNINGS] = later[rc.TURNINGS] + turned if turned >= 0 else kf.UNTOLD
+                    out[rc.TURNINGS] = later[rc.TURNINGS] + turned if turned >= 0 else kf.UNDETERMINED
                 return
         done = last
 
@@ -307,7 +307,7 @@ def _free(s, starts):
             row[rc.VERDICT], row[rc.NET_TURNS] = kf.EQUILIBRIUM_START, 0
             row[rc.LIMIT_PHI], row[rc.LIMIT_PHI_BAR] = phi, 0.0
         elif abs(abs(y) - b) <= noise:
-            row[rc.VERDICT], row[rc.TURNINGS], row[rc.STATUS] = kf.UNDECIDED, kf.UNTOLD, SEPARATRIX
+            row[rc.VERDICT], row[rc.TURNINGS], row[rc.STATUS] = kf.UNDECIDED, kf.UNDETERMINED, SEPARATRIX
         elif abs(y) > b:
             row[rc.VERDICT] = kf.PERIODIC_ROTATION
         else:  # the next root of y + b cos(phi - axis) ahead
@@ -350,7 +350,7 @@ def _conservative(s, starts):
     out[:, rc.TURNINGS] = np.where(rotates, 0, kf.INFINITE)
     out[:, rc.NET_TURNS] = np.where(rotates, kf.NO_TURNS, 0)
     out[near, rc.VERDICT], out[near, rc.STATUS] = kf.UNDECIDED, SEPARATRIX
-    out[near, rc.TURNINGS], out[near, rc.NET_TURNS] = kf.UNTOLD, kf.NO_TURNS
+    out[near, rc.TURNINGS], out[near, rc.NET_TURNS] = kf.UNDETERMINED, kf.NO_TURNS
     for i in np.flatnonzero(w == 0.0):
         row = eq.resting(s.p, s.equilibria, len(s.equilibria), phi[i])
         if row >= 0:

@@ -13,9 +13,10 @@ import numpy as np
 from survey.kernels.cylinder import equilibria as eq
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder import returns as rt
-from survey.kernels.cylinder.along import TURNING
 from survey.kernels.cylinder.branches import unstable
-from survey.kernels.cylinder.flow import BOUND_DDG, BOUND_DG, BOUND_F, UNIT
+from survey.kernels.cylinder.flow import BOUND_DDG, BOUND_DG, BOUND_F
+from survey.kernels.cylinder.steps import TURNING
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.measures.cylinder import solution
 from survey.measures.cylinder.fate import EXACT, I0, G, followed, remembered, sizes
 from survey.status import NO_CONVERGENCE, OK
@@ -120,7 +121,7 @@ def _is_exact(p):
 def _is_degenerate(s, row):
     """Does the bound of an equilibrium reach g' = 0, or f = 0 where it is no saddle (in stratum G a Hopf point)?"""
     p = s.p
-    if row[eq.KIND] == eq.DEGENERATE or abs(row[eq.DG]) <= p[BOUND_DDG] * row[eq.BAR] + 8.0 * UNIT * p[BOUND_DG]:
+    if row[eq.KIND] == eq.DEGENERATE or abs(row[eq.DG]) <= p[BOUND_DDG] * row[eq.BAR] + 8.0 * ROUNDOFF_UP * p[BOUND_DG]:
         return True
     return s.stratum == G and row[eq.KIND] != eq.SADDLE and row[eq.STABLE] == 0.0
 

@@ -7,8 +7,8 @@ asked accuracy is solved again with smaller steps, and the better answer is kept
 import numpy as np
 
 from survey.kernels.cylinder import records as rc
-from survey.kernels.cylinder.along import OK, TURNING, UNTOLD
 from survey.kernels.cylinder.flow import BOUND_DDG, spread
+from survey.kernels.cylinder.steps import OK, TURNING, UNDETERMINED
 
 STEPS = 200_000  # budget of one solution; about 0.1 s with the Taylor method
 SHARE = 1e-3  # of the asked accuracy, for the truncation error of one step
@@ -48,7 +48,7 @@ def split(rows):
 def trajectories(method, rows, times, rtol):
     """PHI to W_BAR of `records` (last axis), turnings and status at `times` (rows, columns), of either sign.
 
-    turnings counts the sign changes of w between 0 and t; it is UNTOLD where the error bound leaves it open.
+    turnings counts the sign changes of w between 0 and t; it is UNDETERMINED where the error bound leaves it open.
     """
     past = times < 0
     if not past.any():
@@ -72,7 +72,11 @@ def trajectories(method, rows, times, rtol):
 
 def _nothing(shape):
     """floats, turnings and status before anything is known."""
-    return np.full((*shape, rc.STATE), np.nan), np.full(shape, UNTOLD, dtype=np.int64), np.zeros(shape, dtype=np.int64)
+    return (
+        np.full((*shape, rc.STATE), np.nan),
+        np.full(shape, UNDETERMINED, dtype=np.int64),
+        np.zeros(shape, dtype=np.int64),
+    )
 
 
 def _in_time(method, rows, times, rtol):
@@ -96,9 +100,9 @@ def _in_time(method, rows, times, rtol):
 
 
 def _count(method, rows, times, tolerance, asked, results):
-    """Count the turnings that the steps left UNTOLD, as beside a focus, where w is less than its error bound."""
+    """Count the turnings that the steps left UNDETERMINED, as beside a focus, where w is less than its error bound."""
     _floats, turnings, status = results
-    pick = (asked & (turnings == UNTOLD) & (status == OK)).any(axis=1)
+    pick = (asked & (turnings == UNDETERMINED) & (status == OK)).any(axis=1)
     if pick.any():
         P, starts = split(rows[pick])
         counted = turnings[pick]

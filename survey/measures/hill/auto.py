@@ -11,11 +11,11 @@ from survey import status
 from survey.kernels.hill import taylor_double
 from survey.kernels.hill.answers import DISCRIMINANT, LEAST, UNDECIDED
 from survey.kernels.lanes import RESULTS
+from survey.kernels.math.roundoff import EPS
 from survey.measures.hill import dense, pointwise
 from survey.measures.hill.answers import NO_SQUARES, Answers
 from survey.methods import dop853, taylor16
 
-EPS = 2.3e-16
 # A discriminant with a wider bar, relative to 1 + |D|, is ill conditioned, if so few steps (0.2 s a hundred points) do.
 ILL, FEW_STEPS = 1e-11, 500
 # Keep a call of the double-double kernel below about a second.

@@ -14,8 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from survey.kernels.hill.answers import EPS, STABLE, UNDECIDED, UNSTABLE
+from survey.kernels.hill.answers import STABLE, UNDECIDED, UNSTABLE
 from survey.kernels.hill.cells import ENOUGH, UNSOLVED, descend
+from survey.kernels.math.chebyshev import lebesgue, nodes, tail, to_coefficients
+from survey.kernels.math.roundoff import EPS
 from survey.measures.hill.edges import FACTORS
 from survey.measures.tasks import in_turn
 
@@ -27,11 +29,11 @@ START = 2  # halvings of the first blocks
 BATCH = 16  # blocks of one task
 MOST = 10_000_000  # cells
 
-X = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
+X = nodes(NODES)
 POINTS = np.append(X, CHECK)
 POLYNOMIALS = chebyshev.chebvander(POINTS, NODES - 1)
-TRANSFORM = 2 / NODES * POLYNOMIALS[:NODES].T / (1.0 + (np.arange(NODES) == 0))[:, None]
-LEBESGUE = 2 / np.pi * np.log(NODES + 1) + 1  # Trefethen, theorem 15.2
+TRANSFORM = to_coefficients(POLYNOMIALS[:NODES].T)
+LEBESGUE = lebesgue(NODES)
 DEGREE = np.arange(NODES)
 
 
@@ -143,7 +145,7 @@ def _series(solve, x, y, blocks):
     rounding_x = 4 + DEGREE + DEGREE**2 * (1 + abs(middle_x) / radius_x)[:, None, None]
     rounding_y = 4 + DEGREE + DEGREE**2 * (1 + abs(middle_y) / radius_y)[:, None, None]
     noise = LEBESGUE**2 * bars + EPS * ((by_x * rounding_x).sum(axis=2) + (by_y * rounding_y).sum(axis=2))
-    tails = [np.maximum(_tail(by_x), 4 * (missed_x - noise)), np.maximum(_tail(by_y), 4 * (missed_y - noise))]
+    tails = [np.maximum(2 * tail(by_x), 4 * (missed_x - noise)), np.maximum(2 * tail(by_y), 4 * (missed_y - noise))]
     return series, np.stack([*tails, noise], axis=2)
 
 
@@ -152,14 +154,6 @@ def _spans(side, blocks):
     part = 0.5 ** blocks[:, 0]
     low, high = side.at(blocks[:, 1] * part), side.at((blocks[:, 1] + 1) * part)
     return 0.5 * (low + high), 0.5 * (high - low)
-
-
-def _tail(sizes):
-    """What lies beyond the last degree (last axis of `sizes`), twice for what is folded back, at the rate of fall."""
-    last, before = sizes[..., -4:].max(axis=-1), sizes[..., -8:-4].max(axis=-1)
-    with np.errstate(invalid="ignore"):
-        rate = np.clip(last / (before + 1e-300), 0.1, 0.9)
-    return 8 * last / (1 - rate)
 
 
 def _gathered(x, y, depth, leaves, points):

@@ -14,14 +14,15 @@ Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013),
 
 import threading
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import lru_cache
 
 import numpy as np
 
 from survey.kernels.hill import answers as kernels
+from survey.kernels.hill.series import TERMS, discriminants
 from survey.kernels.jit import wait_for_ahead
 from survey.kernels.lanes import RESULTS
-from survey.kernels.math.chebyshev import TERMS, discriminants, expand, restrict, transform
+from survey.kernels.math import chebyshev
 from survey.measures.hill import pointwise
 from survey.measures.hill.answers import Answers, Asked
 
@@ -142,7 +143,7 @@ def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
         rows, own = chosen[inside], np.empty((np.count_nonzero(inside), series.shape[1]))
         if rows.size:
             x = (position[inside] - 0.5 * (low + high)) / (0.5 * (high - low))
-            restrict(series, x, np.empty((2, own.shape[1])), own)
+            chebyshev.restrict(series, x, np.empty((2, own.shape[1])), own)
             _answer(problem, asked, answers, rows, own, np.full(rows.size, bar), axis, open_points)
         left &= ~inside
     return chosen[left]
@@ -178,10 +179,10 @@ def _surface(row_axis, method, rtol, middle, radius, axis, budget):
     while at < DEGREES.size and degree < axis.most and spent + DEGREES[at] <= budget:
         n, before = int(DEGREES[at]), doubt
         spent += n
-        nodes = row_axis.at(middle + radius * _nodes(n))
+        nodes = row_axis.at(middle + radius * chebyshev.symmetric_nodes(n))
         values, series, bars = _series(nodes, method, 0.0, np.arange(n), int(DEGREES[degree]), axis)
-        surface, tail = transform(series, _transform(n), (4 + abs(middle) + radius) / radius)
-        doubt = tail + _lebesgue(n) * bars.max()
+        surface, tail = chebyshev.transform(series, chebyshev.by_columns(n), (4 + abs(middle) + radius) / radius)
+        doubt = tail + chebyshev.lebesgue(n) * bars.max()
         if _served(values, doubt, rtol).mean() >= MOST:
             return (surface, doubt), spent
         if not doubt < 0.5 * before:
@@ -214,37 +215,18 @@ def _series(problem, method, rtol, rows, n, axis):
 
     Nodes are solved to `rtol` or as well as can be; an error bound is not finite where there is none.
     """
-    x = _nodes(n)[: n // 2] if axis.even else _nodes(n)
+    x = chebyshev.symmetric_nodes(n)
+    x = x[: n // 2] if axis.even else x
     nodes = problem.at(rows, np.broadcast_to(axis.middle + axis.radius * x, (rows.size, x.size)).copy())
     finer = Asked(max(rtol, BEST), DISCRIMINANT, together=True)
     own = Answers(nodes.p.size, finer)
     pointwise.solve(nodes, method, finer, own)
     values, bars = (own.floats[c].reshape(nodes.p.shape) for c in (kernels.DISCRIMINANT, kernels.DISCRIMINANT + 1))
-    series, doubts = expand(values, _transform(x.size), (abs(axis.middle) + axis.radius) / axis.radius)
-    return values, series, doubts + _lebesgue(x.size) * bars.max(axis=1)
+    ulps = (abs(axis.middle) + axis.radius) / axis.radius
+    series, doubts = chebyshev.expand(values, chebyshev.by_columns(x.size), ulps)
+    return values, series, doubts + chebyshev.lebesgue(x.size) * bars.max(axis=1)
 
 
 def _served(values, bar, rtol):
     """Where D is known to `rtol` (relative where it is large) if it is `values` within `bar`."""
     return bar <= rtol * (1 + abs(values))
-
-
-def _lebesgue(n):
-    """Lebesgue constant of n Chebyshev nodes: Trefethen, theorem 15.2."""
-    return 2 / np.pi * np.log(n + 1) + 1
-
-
-@cache
-def _nodes(n):
-    """n Chebyshev nodes of the first kind, from 1 to -1, symmetric to the last bit."""
-    x = np.sin(np.pi * (n - 1 - 2 * np.arange(n)) / (2 * n))
-    return np.concatenate([x[: n // 2], [0.0] * (n % 2), -x[: n // 2][::-1]])
-
-
-@cache
-def _transform(n):
-    """Values at the nodes -> coefficients, by columns."""
-    k = np.arange(n)
-    matrix = 2 / n * np.cos(np.pi * k * (2 * np.arange(n)[:, None] + 1) / (2 * n))
-    matrix[:, 0] /= 2
-    return matrix

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from survey.kernels.hill.answers import STABLE, UNSTABLE
+from survey.kernels.math.chebyshev import cosines, nodes, to_coefficients
 from survey.scene import Output
 
 FACTORS = ("y1", "dy2", "dy1", "y2")
@@ -84,13 +85,11 @@ def _candidates(solve, rows, low, high, panels):
     ends = np.linspace(low, high, panels + 1)
     row = np.repeat(rows, panels)
     left, right = np.tile(ends[:-1], rows.size), np.tile(ends[1:], rows.size)
-    nodes = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
-    matrix = 2 / NODES * np.cos(np.pi * np.outer(np.arange(NODES), np.arange(NODES) + 0.5) / NODES)
-    matrix[0] /= 2
+    x, matrix = nodes(NODES), to_coefficients(cosines(NODES))
     found = [(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))]
     for depth in range(DEEPEST):
         middle, radius = 0.5 * (left + right), 0.5 * (right - left)
-        out = solve(row, middle[:, None] + radius[:, None] * nodes, FACTORS)
+        out = solve(row, middle[:, None] + radius[:, None] * x, FACTORS)
         series = np.stack([out[name] for name in FACTORS]) @ matrix.T
         noise = np.stack([out[f"{name}_error"] for name in FACTORS]).max(axis=2)
         size, tail = abs(series).max(axis=2), abs(series[:, :, -3:]).max(axis=2)

@@ -13,17 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from survey.kernels.math.chebyshev import cosines, lebesgue, nodes, to_coefficients
+from survey.kernels.math.roundoff import EPS
 from survey.measures.hill.curves import LONGEST
 from survey.measures.hill.edges import FACTORS, close_in, of_kind
 
 NODES = 16
-LEBESGUE = 2 / np.pi * np.log(NODES + 1) + 1
-X = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
-TO_SERIES = 2 / NODES * np.cos(np.pi * np.outer(np.arange(NODES), np.arange(NODES) + 0.5) / NODES)
-TO_SERIES[0] /= 2
+LEBESGUE = lebesgue(NODES)
+X = nodes(NODES)
+TO_SERIES = to_coefficients(cosines(NODES))
 ROUNDS = 12
 WIDER = (1, 4, 16)  # panels: times the step at the turn
-EPS = 2.3e-16
 
 
 @dataclass

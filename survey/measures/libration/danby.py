@@ -17,7 +17,6 @@ import numpy as np
 from survey import measures, status
 from survey.kernels.libration import traces
 from survey.kernels.libration.traces import (
-    EPS,
     INVARIANTS,
     KREIN,
     MINUS_ONE,
@@ -28,6 +27,8 @@ from survey.kernels.libration.traces import (
     UNDECIDED,
     UNSTABLE,
 )
+from survey.kernels.math.chebyshev import angles, lebesgue, nodes, to_coefficients
+from survey.kernels.math.roundoff import EPS
 from survey.measures.answers import Ladder
 from survey.measures.libration import danby_double
 from survey.measures.libration.answers import Answers
@@ -52,10 +53,8 @@ FINEST = 1e-14
 DENSE, SHARE, HARD = 3 * PLACES, 0.05, 0.25
 # Keep a kernel call below about a second: steps, or points of an adaptive method.
 CALL_WORK, WALKS = 3_000_000, 500
-_ANGLES = np.pi * (np.arange(PLACES) + 0.5) / PLACES
-TO_SERIES = 2 / PLACES * np.cos(np.outer(np.arange(PLACES), _ANGLES))
-TO_SERIES[0] /= 2
-LEBESGUE = 1.0 + 2 / np.pi * np.log(PLACES)
+TO_SERIES = to_coefficients(np.cos(np.outer(np.arange(PLACES), angles(PLACES))))
+LEBESGUE = lebesgue(PLACES - 1)
 
 
 def solve(e, mu, method="auto", rtol=1e-10, dense=False):
@@ -107,19 +106,19 @@ def _by_series(e, mu, rtol, answers, left):
     Hard is a row where float64 misses `rtol` at a quarter of the nodes: points of other rows are few in double-double.
     """
     rows = np.flatnonzero(left.any(axis=1))
-    s = 0.75 + 0.25 * np.cos(_ANGLES)
+    s = 0.75 + 0.25 * nodes(PLACES)
     d1, d2 = np.tile(1.5 * (1.0 + s), rows.size), np.tile(1.5 * (1.0 - s), rows.size)
     results = np.empty((rows.size * PLACES, RESULTS))
-    nodes = _point_by_point(np.repeat(e[rows], PLACES), d1, d2, taylor16, max(SHARE * rtol, 1e-13), results)
+    own = _point_by_point(np.repeat(e[rows], PLACES), d1, d2, taylor16, max(SHARE * rtol, 1e-13), results)
     results = results.reshape(rows.size, PLACES, RESULTS)
     series = np.ascontiguousarray(np.swapaxes(TO_SERIES @ results[..., :INVARIANTS], 1, 2))
     tail = abs(series[..., -2:]).sum(axis=-1)
     with np.errstate(over="ignore"):  # then the points miss what was asked
         bars = LEBESGUE * results[..., INVARIANTS:].max(axis=1) + tail + 16 * EPS * abs(series).sum(axis=-1)
-    sound = (nodes.status == status.OK).reshape(rows.size, PLACES).all(axis=1)
+    sound = (own.status == status.OK).reshape(rows.size, PLACES).all(axis=1)
     answers.missed |= left.reshape(-1)
     traces.dense(series[sound], bars[sound], rows[sound], mu, rtol, status.OVERFLOW, *answers.all)
-    hard = nodes.inaccurate(rtol).reshape(rows.size, PLACES).mean(axis=1) >= HARD
+    hard = own.inaccurate(rtol).reshape(rows.size, PLACES).mean(axis=1) >= HARD
     return answers.missed.reshape(mu.shape) & left, rows[hard]
 
 

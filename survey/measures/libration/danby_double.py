@@ -13,14 +13,15 @@ from survey import status
 from survey.kernels.libration import danby_double, traces_double
 from survey.kernels.libration.traces import INVARIANTS
 from survey.kernels.libration.traces_double import PLACES
-from survey.kernels.math.double import UNIT
+from survey.kernels.math.chebyshev import lebesgue
+from survey.kernels.math.roundoff import PAIR_ROUNDOFF
 from survey.measures.libration.answers import Answers
 
 POINTS, VALUES = 1000, 50_000  # of a kernel call, to keep it below about a second
-LEBESGUE = 1.0 + 2 / np.pi * np.log(PLACES)
+LEBESGUE = lebesgue(PLACES - 1)
 # Of Clenshaw's sum at the ends of its interval: n rounds |c_n| up to n + 1 times, each with a weight up to n + 1
-CLENSHAW = 4.0 * UNIT * np.arange(1.0, PLACES + 1) ** 3
-TRANSFORM = 16.0 * UNIT * PLACES  # of the sums that make coefficients of values
+CLENSHAW = 4.0 * PAIR_ROUNDOFF * np.arange(1.0, PLACES + 1) ** 3
+TRANSFORM = 16.0 * PAIR_ROUNDOFF * PLACES  # of the sums that make coefficients of values
 DIGITS = 40
 
 

@@ -15,8 +15,9 @@ from math import gcd
 import numpy as np
 
 from survey import measures
-from survey.kernels.libration.closed_forms import MARGIN, MU_1, MU_2, MU_R, UNIT, linear
+from survey.kernels.libration.closed_forms import MARGIN, MU_1, MU_2, MU_R, linear
 from survey.kernels.libration.coefficients import LABELS
+from survey.kernels.math.roundoff import ROUNDOFF
 from survey.methods import rational, rational_double
 from survey.status import INVALID_PARAMETERS, OK, OVERFLOW
 
@@ -62,7 +63,7 @@ def answers(mu, method):
     c, combined = forms(method, mu, omega)
     ray = on_ray(c, combined, omega)
     values = np.vstack([omega, combined[0], ray[0], distance[0]])
-    bars = np.vstack([UNIT * omega, combined[1], ray[1], distance[1]])
+    bars = np.vstack([ROUNDOFF * omega, combined[1], ray[1], distance[1]])
     stable = np.isfinite(omega[0])
     lost = stable & ~(np.isfinite(c).all(axis=(0, 1)) & np.isfinite(combined).all(axis=(0, 1)))
     values[:, lost], bars[:, lost] = np.nan, np.nan
@@ -108,7 +109,9 @@ def _sum(terms, c, bars):
     """The sum of weight * coefficient, and its error bound."""
     size = sum(abs(weight * c[row]) for row, weight in terms.items())
     bar = sum(abs(weight) * bars[row] for row, weight in terms.items())
-    return np.stack([sum(weight * c[row] for row, weight in terms.items()), MARGIN * (bar + ROUNDINGS * UNIT * size)])
+    return np.stack(
+        [sum(weight * c[row] for row, weight in terms.items()), MARGIN * (bar + ROUNDINGS * ROUNDOFF * size)]
+    )
 
 
 def on_ray(c, combined, omega):
@@ -129,11 +132,11 @@ def _inside(c, combined, w1, w2):
     dsquare = 2.0 * abs(a11) * da11 + 4.0 * (abs(a20) * da02 + abs(a02) * da20)
     root = np.sqrt(square)
     divisor = root - a11
-    droot = 0.5 * (dsquare + 8.0 * UNIT * (a11 * a11 + abs(4.0 * a20 * a02))) / root
+    droot = 0.5 * (dsquare + 8.0 * ROUNDOFF * (a11 * a11 + abs(4.0 * a20 * a02))) / root
     alpha = 2.0 * a02 / divisor
-    dalpha = alpha * (da02 / a02 + (droot + da11) / divisor + 8.0 * UNIT)
+    dalpha = alpha * (da02 / a02 + (droot + da11) / divisor + 8.0 * ROUNDOFF)
     beta = w2 - alpha * w1
-    dbeta = w1 * dalpha + 4.0 * UNIT * (w2 + alpha * w1)
+    dbeta = w1 * dalpha + 4.0 * ROUNDOFF * (w2 + alpha * w1)
     return _cubic(*c, alpha, beta, dalpha, dbeta)
 
 
@@ -150,7 +153,7 @@ def _cubic(c, bars, alpha, beta, dalpha, dbeta):
         size = size + abs(c[row] * power)
         along_alpha = along_alpha + (i * c[row] * alpha ** (i - 1) * beta**k if i else 0.0)
         along_beta = along_beta + (k * c[row] * alpha**i * beta ** (k - 1) if k else 0.0)
-    bar = bar + abs(along_alpha) * dalpha + abs(along_beta) * dbeta + ROUNDINGS * UNIT * size
+    bar = bar + abs(along_alpha) * dalpha + abs(along_beta) * dbeta + ROUNDINGS * ROUNDOFF * size
     return np.stack([value, MARGIN * bar])
 
 

@@ -16,7 +16,8 @@ from itertools import pairwise, product
 
 import numpy as np
 
-from survey.kernels.nutation.wells import EPS, TINY
+from survey.kernels.math.roundoff import ROUNDOFF
+from survey.kernels.nutation.wells import TINY
 from survey.measures.nutation import level_curves
 from survey.measures.nutation.regular_precessions import parts, surface
 from survey.scene import Output
@@ -188,11 +189,11 @@ def _uprights(third, value, s, square, axes):
         a, b = (p, side * p) if third == "alpha" else (side * p, p)
         square_p = (value + s if third == "l" else p * p) + 4.0 * s
         here = _nowhere(1) | {
-            "l": (np.array([value if third == "l" else p * p - s]), np.array([2.0 * EPS * (p * p + 1.0)])),
-            "alpha": (np.array([a]), np.array([2.0 * EPS * abs(p) * (third == "l")])),
-            "beta": (np.array([b]), np.array([2.0 * EPS * abs(p) * (third == "l")])),
+            "l": (np.array([value if third == "l" else p * p - s]), np.array([2.0 * ROUNDOFF * (p * p + 1.0)])),
+            "alpha": (np.array([a]), np.array([2.0 * ROUNDOFF * abs(p) * (third == "l")])),
+            "beta": (np.array([b]), np.array([2.0 * ROUNDOFF * abs(p) * (third == "l")])),
             "u": (np.array([side]), np.zeros(1)),
-            "nutation_square": (np.array([square_p]), np.array([4.0 * EPS * (p * p + 4.0)])),
+            "nutation_square": (np.array([square_p]), np.array([4.0 * ROUNDOFF * (p * p + 4.0)])),
         }
         if _on_map(here, square, axes)[0]:
             found.append((UPRIGHT if square_p >= 0.0 else THREAD, here))
@@ -222,7 +223,7 @@ def _passages(third, value, s, square, axes):
             ends = np.array([max(low["l"], value * value - s), high["l"]])
             other = "beta" if third == "alpha" else "alpha"
             here = {"l": ends, third: np.full(2, value), other: np.full(2, side * value)}
-        here = _nowhere(2) | {name: (v, 2.0 * EPS * (abs(v) + 1.0)) for name, v in here.items()}
+        here = _nowhere(2) | {name: (v, 2.0 * ROUNDOFF * (abs(v) + 1.0)) for name, v in here.items()}
         if ends[0] < ends[1] and _on_map(here, square, axes).all():
             found.append((PASSAGE, here))
     return found

@@ -17,8 +17,9 @@ Positions are those of `survey.measures.square`.
 import contourpy
 import numpy as np
 
+from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.nutation import brun
-from survey.kernels.nutation.wells import EPS, HIGH, LOW, PASSAGE
+from survey.kernels.nutation.wells import HIGH, LOW, PASSAGE
 from survey.measures.hill.edges import close_in
 from survey.measures.nutation import wells
 
@@ -64,18 +65,22 @@ def precession(columns):
     u, sine = np.cos(theta), np.sin(theta)
     k, square = epsilon * size * (size - c), sine * sine
     one, two, three = b - a * u, a - b * u, k * u * square * square
-    bar = 8.0 * EPS * ((abs(b) + abs(a * u)) * abs(two) + (abs(a) + abs(b * u)) * abs(one) + abs(k) * square * square)
+    bar = (
+        8.0
+        * ROUNDOFF
+        * ((abs(b) + abs(a * u)) * abs(two) + (abs(a) + abs(b * u)) * abs(one) + abs(k) * square * square)
+    )
     return np.where((square > 0.0) & (c <= 2.0 * size) & (k != 0.0), one * two + three, np.nan), bar
 
 
 def upper_pole(columns):
     """p_psi - p_phi."""
-    return columns[5] - columns[6], EPS * abs(columns[5] - columns[6])
+    return columns[5] - columns[6], ROUNDOFF * abs(columns[5] - columns[6])
 
 
 def lower_pole(columns):
     """p_psi + p_phi."""
-    return columns[5] + columns[6], EPS * abs(columns[5] + columns[6])
+    return columns[5] + columns[6], ROUNDOFF * abs(columns[5] + columns[6])
 
 
 def _lines(function, grain):
@@ -137,7 +142,7 @@ def along(function, columns):
         return {}
     size, c, epsilon, theta, _, b, a = columns
     k = epsilon * size * (size - c)
-    u, off = np.cos(theta), EPS * np.ones(theta.size)
+    u, off = np.cos(theta), ROUNDOFF * np.ones(theta.size)
     if function is separatrix:
         u, off = np.empty((2, theta.size))
         brun.saddles_of_states(np.ascontiguousarray(columns), u, off)
@@ -145,7 +150,7 @@ def along(function, columns):
     y, y_bar = _rate(b, a, u, off, v, root)
     z, z_bar = _rate(a, b, u, off, v, root)
     square = y * y + z * z - np.sign(k) * (1.0 - 3.0 * u * u)
-    bar = 2.0 * (abs(y) * y_bar + abs(z) * z_bar) + 6.0 * abs(u) * off + 8.0 * EPS * (y * y + z * z + 4.0)
+    bar = 2.0 * (abs(y) * y_bar + abs(z) * z_bar) + 6.0 * abs(u) * off + 8.0 * ROUNDOFF * (y * y + z * z + 4.0)
     return {
         "u": (u, off), "precession_rate": (y, y_bar), "reduced_spin_rate": (z, z_bar), "nutation_square": (square, bar),
     }  # fmt: skip
@@ -154,5 +159,5 @@ def along(function, columns):
 def _rate(own, other, u, off, v, root):
     """(own - other u) / ((1 - u^2) sqrt|k|) and its error bound: psi' or the reduced phi', times A / sqrt|k|."""
     rate = (own - other * u) / (v * root)
-    bar = (4.0 * EPS * (abs(own) + abs(other * u)) + abs(other) * off) / (v * root)
-    return rate, bar + abs(rate) * (2.0 * abs(u) * off / v + 8.0 * EPS)
+    bar = (4.0 * ROUNDOFF * (abs(own) + abs(other * u)) + abs(other) * off) / (v * root)
+    return rate, bar + abs(rate) * (2.0 * abs(u) * off / v + 8.0 * ROUNDOFF)

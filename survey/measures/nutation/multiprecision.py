@@ -12,10 +12,11 @@ from decimal import MAX_EMAX, MIN_EMIN, Context, Decimal, DivisionByZero, Invali
 from functools import cache
 from itertools import pairwise
 
+from survey.kernels.math.roundoff import ROUNDOFF
+
 FIRST, MOST = 50, 400  # digits
 SURE = 3  # a third of the digits at least are right where a sign is trusted
 CLOSE = Decimal("1e-20")  # relative to 1 + |value|, of answers that agree
-EPS = 2.0**-53
 LEAST = 5e-324
 HALF, ONE, TWO, FOUR = Decimal("0.5"), Decimal(1), Decimal(2), Decimal(4)
 CUSP = Decimal("0.15")  # saddles need |a b| < 4 k / 27
@@ -78,7 +79,7 @@ def _rounded(before, now):
     found = {}
     for name, exact in now.items():
         value, apart = float(exact), float(abs(exact - before[name]))
-        found |= {name: value, f"{name}_error": EPS * abs(value) + 2.0 * apart + LEAST}
+        found |= {name: value, f"{name}_error": ROUNDOFF * abs(value) + 2.0 * apart + LEAST}
     return found
 
 

@@ -6,6 +6,7 @@ and from these, at given times, those of a motion.
 
 import numpy as np
 
+from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.nutation import brun, brun_lanes
 from survey.kernels.nutation import records as rc
 from survey.kernels.nutation import wells as nu
@@ -70,9 +71,9 @@ def outputs(rows, out, inertia, drift):
     """{name: values, name_error: bounds} of wells from `periods`; inertia is A, drift a (1/C - 1/A) to 8 roundings."""
     good = np.isfinite(out[:, rc.PERIOD])
     period = inertia * out[:, rc.PERIOD]
-    bar = inertia * out[:, rc.PERIOD_BAR] + 2.0 * nu.EPS * period
+    bar = inertia * out[:, rc.PERIOD_BAR] + 2.0 * ROUNDOFF * period
     spin = out[:, rc.SPIN] + drift * period
-    spin_bar = out[:, rc.SPIN_BAR] + np.abs(drift) * (bar + 8.0 * nu.EPS * period) + nu.EPS * np.abs(spin)
+    spin_bar = out[:, rc.SPIN_BAR] + np.abs(drift) * (bar + 8.0 * ROUNDOFF * period) + ROUNDOFF * np.abs(spin)
     found = {
         "u_min": (rows[:, nu.LOW], rows[:, nu.BAR_LOW]),
         "u_max": (rows[:, nu.HIGH], rows[:, nu.BAR_HIGH]),
@@ -108,20 +109,20 @@ def rates(out, wanted):
             value = TURN / period
             result |= {
                 "nutation_frequency": value,
-                "nutation_frequency_error": value * (bar / (period - bar) + 4.0 * nu.EPS),
+                "nutation_frequency_error": value * (bar / (period - bar) + 4.0 * ROUNDOFF),
             }
         for name in ("precession", "spin"):
             angle, rough = out[name], out[f"{name}_error"]
             if f"{name}_rate" in wanted:
                 value = angle / period
                 result[f"{name}_rate"] = value
-                result[f"{name}_rate_error"] = (rough + np.abs(value) * bar) / (period - bar) + 2.0 * nu.EPS * np.abs(
+                result[f"{name}_rate_error"] = (rough + np.abs(value) * bar) / (period - bar) + 2.0 * ROUNDOFF * np.abs(
                     value
                 )
             if f"{name}_number" in wanted:
                 value = angle / TURN
                 result[f"{name}_number"] = value
-                result[f"{name}_number_error"] = rough / TURN + 3.0 * nu.EPS * np.abs(value)
+                result[f"{name}_number_error"] = rough / TURN + 3.0 * ROUNDOFF * np.abs(value)
     return result
 
 
@@ -132,7 +133,7 @@ def motions(method, rows, kinds, starts, out, times, inertia, drift):
     method.nutation_motions(rows, kinds, starts, out, times / inertia[:, None], here)
     turned = drift[:, None] * times
     phi = here[..., rc.PHI] + turned
-    bar = here[..., rc.PHI_BAR] + 12.0 * nu.EPS * np.abs(turned) + nu.EPS * np.abs(phi)
+    bar = here[..., rc.PHI_BAR] + 12.0 * ROUNDOFF * np.abs(turned) + ROUNDOFF * np.abs(phi)
     found = {
         "u": (here[..., rc.U], here[..., rc.U_BAR]),
         "psi": (here[..., rc.PSI], here[..., rc.PSI_BAR]),
@@ -162,7 +163,7 @@ def distance(heights):
     """
     with np.errstate(divide="ignore", invalid="ignore"):  # k = 0 has no separatrix
         value = heights[:, rc.ABOVE] / heights[:, rc.FIELD]
-        bar = heights[:, rc.ABOVE_BAR] / heights[:, rc.FIELD] + 4.0 * nu.EPS * np.abs(value)
+        bar = heights[:, rc.ABOVE_BAR] / heights[:, rc.FIELD] + 4.0 * ROUNDOFF * np.abs(value)
     near = np.abs(value) < FAR
     return {
         "separatrix_distance": np.where(near, value, np.nan),
