@@ -18,7 +18,7 @@ METHODS = {
         "FLOW_FINEST": Value("the least tolerance of one step that is of use", float, needed=True),
         "FLOW_WORK": Value("how many steps it takes where Taylor's method of order 20 takes one", int, needed=True),
         "flow_trajectories": Function(
-            "fill floats (rows, n, STATE: PHI to W_BAR), turnings (rows, n; UNDETERMINED where unknown) and status (rows) "
+            "fill floats (rows, n, STATE: PHI to W_BAR), turnings (rows, n; UNDETERMINED if unknown) and status (rows) "
             "at ascending times (rows, n) >= 0, a row of which may end in infinities",
             ("P", "starts", "times", "tolerance", "limit", "floats", "turnings", "status"),
             needed=True,
