@@ -63,7 +63,7 @@ def chain(e, both, out):
                 prepare(left, right, dd.two_sum(1.0, side * e[i]), dd.two_sum(1.0, -side * e[i]), both[i], constants)
                 for c in range(4):
                     column(c, constants, series, errors, ends, doubt)
-                composed(ends, doubt, step, off)
+                propagator(ends, doubt, step, off)
                 advance(step, off, composed, spread)
             steps += number
         finish(composed, spread, steps, out[i])
@@ -166,7 +166,7 @@ def sums(series, errors, last, c, ends, doubt):
 
 
 @inline
-def composed(ends, doubt, step, off):
+def propagator(ends, doubt, step, off):
     """`step` = F B^-1 with F and B to the ends 1 and -1, and a bound of each entry's error.
 
     Entry (n, j) of the inverse of (P, S; Q, T), (T', -S'; -Q', P'), is +-B(j + 2, n + 2), indices modulo 4.
