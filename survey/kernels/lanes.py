@@ -28,7 +28,7 @@ TILE = 64
 VECTOR = 8
 STATE = 13
 WORST = 300.0
-ROUNDING = 1.8e-15
+ROUNDING = 1.8e-15  # of the products that carry an error ellipse, relative
 SCALE = 2.0**350  # bars of 1e-259 to 1e48 have squares within the range of float64
 LEAST = 2.3e-308
 

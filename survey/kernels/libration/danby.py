@@ -22,7 +22,7 @@ from survey.kernels.unroll import largest, unroll
 
 TILE = 64
 VECTOR = 8
-ROUNDING = 4.4e-16
+ROUNDING = 4.4e-16  # of an entry of one step, about four roundings
 WORST = 300.0
 # Rows of the working table, lanes innermost: the propagator so far (4 x 4), V (upper triangle), the sum of local
 # errors; of each lane d1, d2, e; of each column forward (4), backward (4) and the error of each; a method's own.
