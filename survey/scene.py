@@ -15,8 +15,8 @@ class Parameter:
 
     `symbol` is TeX. `default=None` means that it must be given. `excluded` and open ends are not part of the domain.
     `instead_of` names the parameter that this one replaces when it is given. `when` holds the option
-    values for which the parameter exists ("": where the option does not). An axis of a `whole` parameter is never cut
-    into blocks. A `number_option` may also be given among the options, as one number.
+    values for which the parameter exists ("": where the option does not). An axis of an `uncut` parameter is never cut
+    into blocks. One that is `number_option` may also stand among the options, as one number.
     """
 
     name: str
@@ -31,7 +31,7 @@ class Parameter:
     excluded: tuple[float, ...] = ()
     instead_of: str | None = None
     when: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    whole: bool = False
+    uncut: bool = False
     number_option: bool = False
 
     def holds(self, values: npt.ArrayLike) -> npt.NDArray[np.bool_]:
@@ -57,7 +57,7 @@ class Parameter:
 class Option:
     """A switch of the scene; the first choice is the default unless `default` says otherwise.
 
-    It exists only with the parameter `only_with`, and not together with the parameter `replaced_by`.
+    It exists only with the parameter `only_with`, and not beside the parameter `replaced_by`, which says the same.
     """
 
     name: str
@@ -108,9 +108,9 @@ class Request:
     lines: Mapping[str, tuple[int, float, float]] = field(default_factory=dict)
 
     def line(self, name: str) -> tuple[int, float, float] | None:
-        """(number, least, greatest) of the axis of the parameter `name`, if no other parameter shares it; else None.
+        """(number, least, greatest) of the full axis of the parameter `name`, which no other shares; or None.
 
-        What depends on an axis must depend on all of it, never on the block, so that a point's bits never change.
+        What depends on an axis depends on all of it, never on the block, so that the bits do not depend on blocks.
         """
         return self.lines.get(name)
 
@@ -126,12 +126,12 @@ class Trajectory:
 
 
 def plus_minus(value: Any, bar: Any) -> str:
-    """`value +- bar`, rounded to a few digits."""
+    """A value with its error bar, in few digits."""
     return f"{float(value):.6g} +- {float(bar):.1g}"
 
 
 def named(answer: Any, name: str) -> str:
-    """`name = value +- bar` of an output at a point."""
+    """`name = value +- bar` of an output that is known of a point."""
     return f"{name} = {plus_minus(answer[name], answer[f'{name}_error'])}"
 
 

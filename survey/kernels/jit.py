@@ -52,7 +52,7 @@ KERNEL_HASH = kernel_hash()
 
 
 def _cache_directory():
-    """A writable directory for compiled kernels, or None (a read-only home compiles anew in each process)."""
+    """A writable directory for compiled kernels, or None (a read-only home compiles again in each process)."""
     base = os.environ.get("NUMBA_CACHE_DIR") or platformdirs.user_cache_dir("survey")
     path = Path(base) / KERNEL_HASH
     try:
@@ -108,7 +108,7 @@ def kernel(function):
 
 
 def fresh(function):
-    """Compile `function`, which calls a user's, anew in each process: kept on disk it could go stale."""
+    """Compile `function`, which calls a user's, again in each process: kept on disk it could go stale."""
     return numba.njit(**_FLAGS)(function)
 
 

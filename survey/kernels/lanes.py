@@ -28,7 +28,7 @@ TILE = 64
 VECTOR = 8
 STATE = 13
 WORST = 300.0
-ROUNDING = 1.8e-15
+ROUNDING = 1.8e-15  # of the products that carry an error ellipse, relative
 SCALE = 2.0**350  # bars of 1e-259 to 1e48 have squares within the range of float64
 LEAST = 2.3e-308
 
@@ -58,12 +58,12 @@ def chain(row, step, width, samples, c2, h, p, order, starts, ends, out):
                 coefficients[n, i] = together[i, n]
         for first in range(starts[r], ends[r], TILE):
             count = min(TILE, ends[r] - first)
-            whole = _whole(count)
-            for i in range(whole):
+            padded = _padded(count)
+            for i in range(padded):
                 lanes[i] = p[order[first + min(i, count - 1)]]
-            _start(state, whole)
+            _start(state, padded)
             for n in range(steps):
-                for i in range(whole):
+                for i in range(padded):
                     _advance(step(coefficients[n], c2, lanes[i], h[r, n]), h[r, n], state, i)
             for i in range(count):
                 _finish(state, i, steps, out[order[first + i]])
@@ -79,11 +79,11 @@ def scatter(row, step, width, samples, c2, h, p, order, starts, out):
     coefficients, by_lane = work[STATE + 2 :], np.empty((2, nodes, TILE))
     for first in range(0, len(starts), TILE):
         count = min(TILE, len(starts) - first)
-        whole = _whole(count)
+        padded = _padded(count)
         for i in range(TILE):
             r = first + min(i, count - 1)
             lanes[i] = p[order[starts[r]]]
-        _start(state, whole)
+        _start(state, padded)
         for n in range(steps):
             for i in range(TILE):
                 r = first + min(i, count - 1)
@@ -92,15 +92,15 @@ def scatter(row, step, width, samples, c2, h, p, order, starts, out):
                     for k in range(nodes):
                         by_lane[c, k, i] = samples[r, n, c, k]
             row(by_lane, lengths, coefficients)
-            for i in range(whole):
+            for i in range(padded):
                 _advance(step(coefficients[:, i], c2, lanes[i], lengths[i]), lengths[i], state, i)
         for i in range(count):
             _finish(state, i, steps, out[order[starts[first + i]]])
 
 
 @splice
-def _whole(count):
-    """So many lanes fill the machine's vectors; those beyond `count` repeat the last."""
+def _padded(count):
+    """The number of lanes that fills the machine's vectors; those beyond `count` repeat the last."""
     return (count + VECTOR - 1) // VECTOR * VECTOR
 
 

@@ -63,7 +63,7 @@ class _Number:
 
 
 class _Unknown:
-    """Stands for every argument where only the number of results is asked."""
+    """Stands for every argument where only the number of results is needed."""
 
     def _same(self, *_):
         return self
@@ -76,22 +76,22 @@ class _Unknown:
 
 
 class _Array:
-    """An array of float64; places in it are whole numbers, or whole numbers that a kernel will compute."""
+    """An array of float64; its indices are integers, or integers that a kernel will compute."""
 
     def __init__(self, context, builder, kind, value):
         self.context, self.builder, self.kind = context, builder, kind
         self.array = make_array(kind)(context, builder, value)
 
-    def _pointer(self, place):
-        places = place if isinstance(place, tuple) else (place,)
-        indices = [ir.Constant(ir.IntType(64), p) if isinstance(p, int) else p for p in places]
+    def _pointer(self, index):
+        indices = index if isinstance(index, tuple) else (index,)
+        indices = [ir.Constant(ir.IntType(64), i) if isinstance(i, int) else i for i in indices]
         return cgutils.get_item_pointer(self.context, self.builder, self.kind, self.array, indices)
 
-    def __getitem__(self, place):
-        return _Number(self.builder, self.builder.load(self._pointer(place)))
+    def __getitem__(self, index):
+        return _Number(self.builder, self.builder.load(self._pointer(index)))
 
-    def __setitem__(self, place, number):
-        self.builder.store(_value(number), self._pointer(place))
+    def __setitem__(self, index, number):
+        self.builder.store(_value(number), self._pointer(index))
 
 
 def _value(x):
@@ -124,7 +124,7 @@ def _chosen(plain, emit, a, b):
 
 
 def unroll(function):
-    """Make `function` of floats, whole numbers, arrays and tuples of floats callable by kernels (see above).
+    """Make `function` of floats, integers, arrays and tuples of floats callable by kernels (see above).
 
     It returns a float, a tuple of floats, or nothing, and may call other such functions.
     """
@@ -156,7 +156,7 @@ def unroll(function):
 
 
 def _kind(kind):
-    """The type that an argument is taken as: numbers as float64 or as places."""
+    """The type that an argument is taken as: numbers as float64 or as indices."""
     if isinstance(kind, types.Float):
         return types.float64
     if isinstance(kind, types.Integer):

@@ -97,7 +97,7 @@ def _rates(row, to_plus, to_minus):
 
 @inline
 def _blurred(row, roots, up, down, period, x, y):
-    """What errors of Q at the turning points and of s + g make of precession and spin (S23); of advances up, down."""
+    """Errors of precession and spin (S23) due to those of Q at the turning points and of s + g; advances up, down."""
     share, low, high, above = _shares(x, y), row[nu.NOISE_LOW], row[nu.NOISE_HIGH], row[nu.NOISE_ABOVE]
     full, rest, time = abs(up) + abs(down), min(x, y) / max(x, y), 0.5 * period
     if x < y:  # the motion is slow where Q is least
@@ -126,7 +126,7 @@ def _periods_of(row, out):
     period = 2.0 * pi / middle
     incline = 2.0 * k * row[nu.SUM] / (root_low + root_high)
     bend = 0.5 * k * row[nu.BEND] / above
-    plus = row[nu.MINUS], row[nu.HIGH_PLUS], row[nu.LOW_PLUS]  # what the pole u = 1 asks for
+    plus = row[nu.MINUS], row[nu.HIGH_PLUS], row[nu.LOW_PLUS]  # for the pole u = 1
     minus = row[nu.PLUS], row[nu.LOW_MINUS], row[nu.HIGH_MINUS]
     turns_up, up, size_up = _advance(*plus, width, root_high, root_low, incline, row[nu.Q_PLUS], bend, period, x, y)
     turns_down, down, size_down = _advance(
@@ -164,7 +164,7 @@ def _periods_of(row, out):
 
 @kernel
 def nutation_periods(rows, kinds, tolerance, out):
-    """Fill `out` (n, PERIODS) for the wells `rows` (n, SIZE); a well of another kind is left alone."""
+    """Fill `out` (n, PERIODS) for the wells `rows` (n, SIZE); wells of other kinds are skipped."""
     for i in range(len(rows)):
         if kinds[i] >= nu.NUTATION:
             _periods_of(rows[i], out[i])

@@ -49,7 +49,7 @@ def _periods_of(row, out):
     noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + row[nu.NOISE_ABOVE]
     out[rc.PERIOD], out[rc.PRECESSION], out[rc.SPIN] = 4.0 * time, up + down, down - up
     out[rc.PERIOD_BAR] = (32.0 * ROUNDOFF + noise) * out[rc.PERIOD]
-    # here, other than in agm, advances know the distances from poles by these alone
+    # here, unlike in agm, the distances from poles enter the advances through these alone
     noise += 0.5 * row[nu.NOISE_ENDS]
     out[rc.PRECESSION_BAR] = out[rc.SPIN_BAR] = (48.0 * ROUNDOFF + 4.0 * noise) * (abs(up) + abs(down))
     square = _second_kind(time, 0.5 * above, g, g)

@@ -1,6 +1,6 @@
 """Gauss-Chebyshev quadrature of nutations between their turning points, u = middle + half width cos x.
 
-The nearest singularities (the other roots of P, the poles) tell how many nodes are needed. Domain: away from
+The nearest singularities (the other roots of P, the poles) determine how many nodes are needed. Domain: away from
 separatrices and near passages of poles, where it needs many nodes; `no_convergence` beyond MOST, and in time beyond
 LONGEST. The independent check.
 
@@ -85,27 +85,27 @@ def _sums(row, n, out):
 
 
 @inline
-def _periods_of(row, n, speed, half, whole, out):
+def _periods_of(row, n, speed, coarse, fine, out):
     """See `agm.periods_of`; the error of n nodes follows from the difference to half of them."""
-    _sums(row, n // 2, half)
-    _sums(row, n, whole)
-    noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + 16.0 * ROUNDOFF * whole[4]
+    _sums(row, n // 2, coarse)
+    _sums(row, n, fine)
+    noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + 16.0 * ROUNDOFF * fine[4]
     seen, missed = exp(-speed * n), exp(-2.0 * speed * n)
     for i in range(4):
-        half[i] = 10.0 * (abs(whole[i] - half[i]) * seen + abs(whole[i]) * missed) + noise * abs(whole[i])
-    half[1] += row[nu.NOISE_ENDS] * abs(whole[1])
-    half[2] += row[nu.NOISE_ENDS] * abs(whole[2])
-    half[3] += 2.5 * row[nu.NOISE_WIDTH] * whole[3]
-    out[rc.PERIOD], out[rc.ACTION] = whole[0], whole[3]
-    out[rc.PRECESSION], out[rc.SPIN] = whole[1] + whole[2], whole[2] - whole[1]
-    out[rc.PERIOD_BAR], out[rc.ACTION_BAR] = half[0], half[3]
-    out[rc.PRECESSION_BAR] = out[rc.SPIN_BAR] = half[1] + half[2]
+        coarse[i] = 10.0 * (abs(fine[i] - coarse[i]) * seen + abs(fine[i]) * missed) + noise * abs(fine[i])
+    coarse[1] += row[nu.NOISE_ENDS] * abs(fine[1])
+    coarse[2] += row[nu.NOISE_ENDS] * abs(fine[2])
+    coarse[3] += 2.5 * row[nu.NOISE_WIDTH] * fine[3]
+    out[rc.PERIOD], out[rc.ACTION] = fine[0], fine[3]
+    out[rc.PRECESSION], out[rc.SPIN] = fine[1] + fine[2], fine[2] - fine[1]
+    out[rc.PERIOD_BAR], out[rc.ACTION_BAR] = coarse[0], coarse[3]
+    out[rc.PRECESSION_BAR] = out[rc.SPIN_BAR] = coarse[1] + coarse[2]
 
 
 @kernel
 def nutation_periods(rows, kinds, tolerance, out):
     """See `agm.nutation_periods`."""
-    half, whole = np.empty(5), np.empty(5)
+    coarse, fine = np.empty(5), np.empty(5)
     for i in range(len(rows)):
         if kinds[i] >= nu.NUTATION:
             speed = _rate(rows[i])
@@ -113,7 +113,7 @@ def nutation_periods(rows, kinds, tolerance, out):
             while 2.0 * n * speed < _FULL and n <= _MOST:
                 n *= 2
             if n <= _MOST:
-                _periods_of(rows[i], n, speed, half, whole, out[i])
+                _periods_of(rows[i], n, speed, coarse, fine, out[i])
 
 
 @inline
@@ -177,7 +177,7 @@ def _motion(row, start, n, noise, times, waves, out):
     x = 2.0 * atan2(sqrt(start[rc.DONE]), sqrt(start[rc.LEFT]))
     _integrals(waves, n, x, here)
     _integrands(row, x, value)
-    early = start[rc.START_BAR] * value[0] / max(row[nu.WIDTH] * abs(sin(0.5 * x) * cos(0.5 * x)), nu.TINY)
+    start_delay = start[rc.START_BAR] * value[0] / max(row[nu.WIDTH] * abs(sin(0.5 * x) * cos(0.5 * x)), nu.TINY)
     first_up, first_down = value[1] / value[0], value[2] / value[0]
     side = start[rc.DIRECTION]
     first, base_up, base_down = side * here[0], side * here[1], side * here[2]
@@ -189,18 +189,19 @@ def _motion(row, start, n, noise, times, waves, out):
         _integrands(row, x, value)
         up = side * here[1] - base_up + 2.0 * pi * turns * waves[1, 0]
         down = side * here[2] - base_down + 2.0 * pi * turns * waves[2, 0]
-        late = 2.0 * noise * (abs(times[j]) + half)
+        delay = 2.0 * noise * (abs(times[j]) + half)
         wide, bend = (
             row[nu.WIDTH],
             row[nu.WIDTH] * (row[nu.Q_LOW] + row[nu.Q_HIGH] + 4.0 * abs(row[nu.K]) * row[nu.WIDTH]),
         )
         speed = wide * abs(sin(0.5 * x) * cos(0.5 * x)) / value[0]
         rate_up, rate_down = value[1] / value[0], value[2] / value[0]
-        moved = (abs(rate_up) + abs(rate_down)) * late + (abs(rate_up - first_up) + abs(rate_down - first_down)) * early
-        late += early
+        change = abs(rate_up - first_up) + abs(rate_down - first_down)
+        moved = (abs(rate_up) + abs(rate_down)) * delay + change * start_delay
+        delay += start_delay
         out[j, rc.U], out[j, rc.PSI], out[j, rc.PHI] = value[3], up + down, down - up
         rounding = 3.0 * (row[nu.BAR_LOW] + row[nu.BAR_HIGH])
-        out[j, rc.U_BAR] = speed * late + bend * late * late + rounding + 8.0 * ROUNDOFF * wide
+        out[j, rc.U_BAR] = speed * delay + bend * delay * delay + rounding + 8.0 * ROUNDOFF * wide
         out[j, rc.PSI_BAR] = out[j, rc.PHI_BAR] = moved + 2.0 * noise * (1.0 + abs(turns)) * 2.0 * size
 
 

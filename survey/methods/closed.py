@@ -31,14 +31,14 @@ def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, stat
     forms, curves = np.zeros(times.shape, np.int8), np.empty((len(P), 2))
     _sort(P, starts, times, forms, curves, floats, turnings, status)
     for form, solve in ((closed.LIBRATION, _elliptics), (closed.TRIGONOMETRIC, _trigonometrics)):
-        places = np.flatnonzero(forms == form)
-        if places.size > 0:
-            solve(places, P, starts, curves, times, floats, turnings)
+        indices = np.flatnonzero(forms == form)
+        if indices.size > 0:
+            solve(indices, P, starts, curves, times, floats, turnings)
 
 
 @kernel
 def _sort(P, starts, times, forms, curves, floats, turnings, status):
-    """Fill `forms` (as times) with the closed form that is to be evaluated there, curves with its mu and 1 - mu."""
+    """Fill `forms` (as times) with the closed form to evaluate there, curves with its mu and 1 - mu."""
     for i in range(len(P)):
         kind, curves[i, 0], curves[i, 1] = closed.applies(P[i], starts[i, 0], starts[i, 1])
         status[i] = _NO_FORM if kind == closed.NONE else NO_CONVERGENCE
@@ -46,43 +46,43 @@ def _sort(P, starts, times, forms, curves, floats, turnings, status):
             if times[i, j] != 0.0:
                 forms[i, j] = kind
                 continue
-            _tell(floats[i, j], starts[i, 0], 0.0, starts[i, 1], 0.0, 0.0)
+            _store(floats[i, j], starts[i, 0], 0.0, starts[i, 1], 0.0, 0.0)
             turnings[i, j] = 0
 
 
 @kernel
-def _elliptics(places, P, starts, curves, times, floats, turnings):
+def _elliptics(indices, P, starts, curves, times, floats, turnings):
     """b = 0."""
     T = weierstrass.lanes()
-    _solve(weierstrass.enter, weierstrass.solve, T, places, P, starts, curves, times, floats, turnings)
+    _solve(weierstrass.enter, weierstrass.solve, T, indices, P, starts, curves, times, floats, turnings)
 
 
 @kernel
-def _trigonometrics(places, P, starts, curves, times, floats, turnings):
+def _trigonometrics(indices, P, starts, curves, times, floats, turnings):
     """g = 0 and (61)."""
     T = trigonometric.lanes()
-    _solve(trigonometric.enter, trigonometric.solve, T, places, P, starts, curves, times, floats, turnings)
+    _solve(trigonometric.enter, trigonometric.solve, T, indices, P, starts, curves, times, floats, turnings)
 
 
 @inline
-def _solve(enter, solve, T, places, P, starts, curves, times, floats, turnings):
-    """The solutions at `places` of the flattened `times`, as many at once as there are lanes."""
+def _solve(enter, solve, T, indices, P, starts, curves, times, floats, turnings):
+    """The solutions at `indices` of the flattened `times`, as many at once as there are lanes."""
     columns = times.shape[1]
-    for first in range(0, len(places), LANES):
-        some = places[first : first + LANES]
+    for first in range(0, len(indices), LANES):
+        some = indices[first : first + LANES]
         for k in range(len(some)):
             i, j = some[k] // columns, some[k] % columns
             enter(T, k, P[i], starts[i, 0], starts[i, 1], times[i, j], curves[i])
         solve(T)
         for k in range(len(some)):
             i, j = some[k] // columns, some[k] % columns
-            if _tell(floats[i, j], starts[i, 0], T[X, k], T[W, k], T[BAR_X, k], T[BAR_W, k]):
+            if _store(floats[i, j], starts[i, 0], T[X, k], T[W, k], T[BAR_X, k], T[BAR_W, k]):
                 turnings[i, j] = int(T[COUNT, k])
 
 
 @inline
-def _tell(out, phi0, x, w, bar_x, bar_w):
-    """Write down one solution at one time; False where the bars are too wide to be bounds."""
+def _store(out, phi0, x, w, bar_x, bar_w):
+    """Store one solution at one time; False where the bars are too wide to be bounds."""
     if not (bar_x < TRUST and bar_w < TRUST * (1.0 + abs(w))):
         return False
     out[rc.PHI], out[rc.W], out[rc.PHI_BAR], out[rc.W_BAR] = (

@@ -32,7 +32,8 @@ from survey.kernels.jit import inline, kernel
 from survey.kernels.lanes import column, relative
 from survey.kernels.libration import danby
 from survey.kernels.libration.danby import COLUMN, COLUMNS
-from survey.kernels.math.dop853 import E3, E5, STAGES, A, B, C
+from survey.kernels.math.dop853 import E3, E5, STAGES, A, B, C, combined
+from survey.kernels.math.runge_kutta import fundamental
 
 ORDER = 8
 SERVES = ("cylinder", "danby", "hill")
@@ -53,28 +54,27 @@ _OTHER = 0.3
 
 @inline
 def hill_step(z, h, slopes):
-    """P and its local truncation bounds over one step, from z at the nodes; `slopes` (4, STAGES) is scratch."""
-    for i in range(STAGES):
-        for c in range(2):
-            y, v = 1.0 - c, 0.0 + c
-            for j in range(i):
-                y += h * A[i, j] * slopes[2 * c, j]
-                v += h * A[i, j] * slopes[2 * c + 1, j]
-            slopes[2 * c, i] = v
-            slopes[2 * c + 1, i] = -z[i] * y
+    """P and its local truncation bounds over one step, from z at the nodes; `slopes` (STAGES + 1, 4) is scratch."""
+    fundamental(A, STAGES, _hill_slope, z, 2, h, slopes[STAGES], slopes)
     size = 0.0
     for i in range(STAGES):
         size = max(size, abs(z[i]))
     # an error of order h^9 is (h sqrt z)^3 of the estimate of order h^6
     doubt = _DOUBT * (h * np.sqrt(size)) ** 3
-    p11, d11 = _sums(1.0, h, slopes[0], doubt)
-    p21, d21 = _sums(0.0, h, slopes[1], doubt)
-    p12, d12 = _sums(0.0, h, slopes[2], doubt)
-    p22, d22 = _sums(1.0, h, slopes[3], doubt)
-    # one entry's estimate may vanish by symmetry (constant z): all four speak for each, in the scale of the phase
+    p11, d11 = _sums(1.0, h, slopes[:, 0], doubt)
+    p21, d21 = _sums(0.0, h, slopes[:, 1], doubt)
+    p12, d12 = _sums(0.0, h, slopes[:, 2], doubt)
+    p22, d22 = _sums(1.0, h, slopes[:, 3], doubt)
+    # one entry's estimate may vanish by symmetry (constant z): each takes the largest of all, in the scale of the phase
     rate = max(np.sqrt(size), 1.0 / h)
-    level = max(max(d11, d22), max(d12 * rate, d21 / rate))
-    return p11, p12, p21, p22, level, level / rate, level * rate
+    estimate = max(max(d11, d22), max(d12 * rate, d21 / rate))
+    return p11, p12, p21, p22, estimate, estimate / rate, estimate * rate
+
+
+@inline
+def _hill_slope(z, i, state, out):
+    for c in range(2):
+        out[2 * c], out[2 * c + 1] = state[2 * c + 1], -z[i] * state[2 * c]
 
 
 @inline
@@ -85,8 +85,7 @@ def _sums(start, h, slopes, doubt):
         value += B[j] * slopes[j]
         fifth += E5[j] * slopes[j]
         third += E3[j] * slopes[j]
-    scale = np.sqrt(fifth * fifth + 0.01 * third * third)
-    return start + h * value, abs(h) * (fifth * fifth / (scale + 1e-300) + doubt * abs(fifth))
+    return start + h * value, abs(h) * (combined(fifth, third) + doubt * abs(fifth))
 
 
 @inline
@@ -104,26 +103,26 @@ def hill_walk(potential, p, row, table, span, tolerance, out):
 def hill_walk_pieces(potential, p, row, table, edges, slack, longest, tolerance, out):
     """As `hill_walk`, from the first to the last of `edges`; z may jump at those between, where a step ends.
 
-    No step is longer than `longest`. `potential` is asked no nearer to an edge than `slack`: on the side that is meant.
+    No step is longer than `longest`. `potential` is evaluated no nearer to an edge than `slack`, so on the right side.
     """
-    z, slopes = np.empty(STAGES), np.empty((4, STAGES))
+    z, slopes = np.empty(STAGES), np.empty((STAGES + 1, 4))
     longest = min(longest, 0.25 * (edges[-1] - edges[0]))  # else a coefficient whose average rules escapes the estimate
-    place, t, steps, h = 1, edges[0], 0, min(longest, 0.1)
+    piece, t, steps, h = 1, edges[0], 0, min(longest, 0.1)
     y1, v1, s1, t1, w1 = 1.0, 0.0, 0.0, 0.0, 0.0
     y2, v2, s2, t2, w2 = 0.0, 1.0, 0.0, 0.0, 0.0
     zeros1, zeros2, total = 0.0, 0.0, 0.0
     for _ in range(_STEP_LIMIT):
-        final = t + 1.01 * h >= edges[place]
+        final = t + 1.01 * h >= edges[piece]
         if final:
-            h = edges[place] - t
+            h = edges[piece] - t
         size, terms = 0.0, 0.0
         for i in range(STAGES):
-            inside = min(max(t + C[i] * h, edges[place - 1] + slack), edges[place] - slack)
+            inside = min(max(t + C[i] * h, edges[piece - 1] + slack), edges[piece] - slack)
             z[i], scale = potential(inside, p, row, table)
             size, terms = max(size, abs(z[i])), max(terms, scale)
         wave = np.sqrt(size) + 1e-3
         p11, p12, p21, p22, d11, d12, d21 = hill_step(z, h, slopes)
-        error = d11  # all four entries speak in it
+        error = d11  # the largest of all four entries
         if error <= tolerance and h * wave <= 1.01 * _LONGEST:
             # The stages pass through sums of size 60 that cancel; t itself is rounded.
             r11, r12, r21 = rounding(terms, h)
@@ -135,9 +134,9 @@ def hill_walk_pieces(potential, p, row, table, edges, slack, longest, tolerance,
             zeros2 += 1.0 if (y2 < 0.0) != (old2 < 0.0) else 0.0
             total += relative(matrix, h)
             steps += 1
-            t = edges[place] if final else t + h
-            place += 1 if final else 0
-            if place == len(edges):
+            t = edges[piece] if final else t + h
+            piece += 1 if final else 0
+            if piece == len(edges):
                 out[lanes.Y1], out[lanes.DY1], out[lanes.Y2], out[lanes.DY2] = y1, v1, y2, v2
                 lanes.bars(s1, w1, s2, w2, steps, total, out)
                 out[lanes.Y1_ZEROS], out[lanes.Y2_ZEROS] = zeros1, zeros2
@@ -151,7 +150,7 @@ def hill_walk_pieces(potential, p, row, table, edges, slack, longest, tolerance,
 
 @inline
 def flow_setting(p, w, tolerance):
-    """What steers the steps: the tolerance of one step."""
+    """What controls the steps: the tolerance of one step."""
     return tolerance
 
 
@@ -183,8 +182,7 @@ def _flow_estimate(T, h, row, doubt):
     for i in range(STAGES):
         e5 += E5[i] * T[_FIRST + i, row]
         e3 += E3[i] * T[_FIRST + i, row]
-    size = math.sqrt(e5 * e5 + 0.01 * e3 * e3)
-    return abs(h) * (e5 * e5 / (size + 1e-300) + doubt * abs(e5))
+    return abs(h) * (combined(e5, e3) + doubt * abs(e5))
 
 
 @kernel
@@ -197,7 +195,7 @@ def flow_begin(p, phi, w, tolerance, T):
         _x, w1, _e, _y = flow_at(p, T, h)
         doubt, speed = 8.0 * _DOUBT * (h * rate) ** 3, max(rate, 1.0 / h)
         dphi, dw = _flow_estimate(T, h, PHI, doubt), _flow_estimate(T, h, W, doubt)
-        # where the motion starts at rest, one of the two may vanish by symmetry: each speaks for both, less loudly
+        # where the motion starts at rest, one of them may vanish by symmetry: each bounds the other, with less weight
         dphi, dw = max(dphi, _OTHER * dw / speed), max(dw, _OTHER * dphi * speed)
         error = max(dphi, dw / (1.0 + abs(w))) / tolerance
         factor = min(max(0.9 * (error + 1e-30) ** -0.125, 0.2), 4.0)
@@ -222,15 +220,15 @@ def flow_abels(P, starts, targets, tolerance, limit, floats, status):
 
 
 @kernel
-def flow_image(kind, p, eqs, count, place, x, tolerance, node):
+def flow_image(kind, p, eqs, count, anchor, x, tolerance, node):
     """See `returns.image`."""
-    returns.image(flow_setting, flow_begin, flow_at, kind, p, eqs, count, place, x, tolerance, node)
+    returns.image(flow_setting, flow_begin, flow_at, kind, p, eqs, count, anchor, x, tolerance, node)
 
 
 @kernel
-def flow_cycles(kind, p, eqs, count, place, interval, xs, tolerance, cycles, found, edges):
+def flow_cycles(kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges):
     """See `returns.fixed_points`."""
-    return returns.fixed_points(flow_image, kind, p, eqs, count, place, interval, xs, tolerance, cycles, found, edges)
+    return returns.fixed_points(flow_image, kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges)
 
 
 @kernel
@@ -242,9 +240,10 @@ def flow_fates(p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance
 
 
 @inline
-def _danby_slope(e, d1, d2, angle, state, out):
+def _danby_slope(given, i, state, out):
     """Slopes in the eccentric anomaly: df = sqrt(1 - e^2) / (1 - e cos E) dE, r df = dE / sqrt(1 - e^2)."""
-    small, scale = math.sin(0.5 * angle), math.sqrt((1.0 - e) * (1.0 + e))
+    e, d1, d2, angle, h = given
+    small, scale = math.sin(0.5 * (angle + C[i] * h)), math.sqrt((1.0 - e) * (1.0 + e))
     turn = scale / ((1.0 - e) + 2.0 * e * small * small)
     for c in range(4):
         x, q, p, m = state[4 * c], state[4 * c + 1], state[4 * c + 2], state[4 * c + 3]
@@ -256,13 +255,7 @@ def _danby_slope(e, d1, d2, angle, state, out):
 @kernel
 def _danby_step(e, d1, d2, angle, h, slopes, state, work):
     """Columns of the step's propagator and their errors into `work`; returns the largest error."""
-    for i in range(STAGES):
-        for k in range(16):
-            value = 1.0 if k % 5 == 0 else 0.0
-            for j in range(i):
-                value += h * A[i, j] * slopes[j, k]
-            state[k] = value
-        _danby_slope(e, d1, d2, angle + C[i] * h, state, slopes[i])
+    fundamental(A, STAGES, _danby_slope, (e, d1, d2, angle, h), 4, h, state, slopes)
     worst = 0.0
     for c in range(4):
         one = COLUMNS + COLUMN * c
@@ -275,8 +268,7 @@ def _danby_step(e, d1, d2, angle, h, slopes, state, work):
                 fifth += E5[j] * slope
                 third += E3[j] * slope
             # an error of order h^9 is h^3 of the estimate of order h^6
-            local = abs(h) * (fifth * fifth / (math.sqrt(fifth * fifth + 0.01 * third * third) + 1e-300))
-            error = max(error, local + abs(h) ** 4 * _DOUBT * abs(fifth))
+            error = max(error, abs(h) * combined(fifth, third) + abs(h) ** 4 * _DOUBT * abs(fifth))
             size += abs(value)
             work[one + i, 0], work[one + 4 + i, 0] = value, 1.0 if i == c else 0.0
         worst = max(worst, error)

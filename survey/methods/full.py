@@ -1,9 +1,8 @@
 """The six equations (1)-(6) of a gyrostat whose invariant set is the scene, in a rotated body frame: an audit.
 
-Builds A, B, C, s, lambda from the reduced parameters, what these leave free being generic
-(`kernels/cylinder/gyrostat.py`),
-and knows nothing of the set: its bars hold the growth of deviations from it. Taylor series of order 20. Domain:
-trajectories whose set is not strongly unstable.
+Builds A, B, C, s, lambda from the reduced parameters, with generic values for what these leave free
+(`kernels/cylinder/gyrostat.py`), and makes no use of the set: its bars include the growth of deviations from it. Taylor
+series of order 20. Domain: trajectories whose set is not strongly unstable.
 """
 
 import math
@@ -92,8 +91,8 @@ def _trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
             floats[j, rc.PHI], floats[j, rc.W] = (here[rc.PHI] + before * TWO_PI_LOW) + before * TWO_PI, here[rc.W]
             floats[j, rc.PHI_BAR], floats[j, rc.W_BAR] = here[rc.PHI_BAR] + 3e-16 * abs(before) * TWO_PI, here[rc.W_BAR]
             from_rest = n == 1 and w0 == 0.0
-            told = unsure < 3 and count >= 0 and (abs(here[rc.W]) > here[rc.W_BAR] or from_rest)
-            turnings[j] = count + (here[rc.W] * sign < 0.0 and not from_rest) if told else UNDETERMINED
+            sure = unsure < 3 and count >= 0 and (abs(here[rc.W]) > here[rc.W_BAR] or from_rest)
+            turnings[j] = count + (here[rc.W] * sign < 0.0 and not from_rest) if sure else UNDETERMINED
             j += 1
         gyrostat.at(T, h, new)
         gyrostat.carry(G, T, V, h, squares, J, work)

@@ -21,7 +21,7 @@ FLOW_WORK = 1  # steps, relative to this method
 
 @inline
 def flow_setting(p, w, tolerance):
-    """What steers the steps: the tolerance of one step."""
+    """What controls the steps: the tolerance of one step."""
     return tolerance
 
 
@@ -32,7 +32,7 @@ def flow_begin(p, phi, w, tolerance, T):
     scale = 1.0 / (1.0 + abs(w))
     h = math.inf
     for n in range(_ORDER - 3, _ORDER + 1):
-        # a last term that happens to vanish tells nothing, so those two before it are asked, less strictly
+        # a last term that happens to vanish proves nothing, so the two before it count too, less strictly
         share = 1.0 if n > _ORDER - 2 else _FALL
         term = share * max(abs(T[n, PHI]), scale * abs(T[n, W])) + 1e-300
         h = min(h, (tolerance / term) ** (1.0 / n))
@@ -71,15 +71,15 @@ def flow_abels(P, starts, targets, tolerance, limit, floats, status):
 
 
 @kernel
-def flow_image(kind, p, eqs, count, place, x, tolerance, node):
+def flow_image(kind, p, eqs, count, anchor, x, tolerance, node):
     """See `returns.image`."""
-    returns.image(flow_setting, flow_begin, flow_at, kind, p, eqs, count, place, x, tolerance, node)
+    returns.image(flow_setting, flow_begin, flow_at, kind, p, eqs, count, anchor, x, tolerance, node)
 
 
 @kernel
-def flow_cycles(kind, p, eqs, count, place, interval, xs, tolerance, cycles, found, edges):
+def flow_cycles(kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges):
     """See `returns.fixed_points`."""
-    return returns.fixed_points(flow_image, kind, p, eqs, count, place, interval, xs, tolerance, cycles, found, edges)
+    return returns.fixed_points(flow_image, kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges)
 
 
 @kernel

@@ -37,7 +37,7 @@ _TO_POWERS = np.stack([_TO_POWERS[parity::2, parity::2] for parity in (0, 1)])
 WIDTH = _DEGREE + 4
 _TAIL, _SIZE, _ALIAS = _DEGREE + 1, _DEGREE + 2, _DEGREE + 3
 _SLOWEST = 0.02  # a faster fall than this of two Legendre coefficients to the next two is not trusted
-_ROUNDING = 4.4e-16
+_ROUNDING = 4.4e-16  # of an entry of one step, about four roundings
 _ENDS = OWN + WIDTH
 
 

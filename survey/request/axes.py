@@ -63,5 +63,5 @@ def grid_of(parameters, given):
         sizes={key: values.size for key, values in axes.items()},
         parameters={key: ((key,), values) for key, values in axes.items()}
         | {key: ((), np.float64(value)) for key, value in fixed.items()},
-        whole=frozenset(key for key in axes if parameters[key].whole),
+        uncut=frozenset(key for key in axes if parameters[key].uncut),
     )

@@ -15,7 +15,7 @@ def check_boundaries(scene, name, table, given):
     if table is None:
         return None
     axes = [key for key, values in given.items() if np.ndim(values)]
-    measure = measures.curves_of(scene.FAMILY)
+    measure = measures.question(scene.FAMILY, "curves")
     if measure is None:
         raise BadInput(f"boundaries: no boundary curves are known for the scene {name}; leave the table out")
     if hasattr(measure, "closed"):
@@ -59,7 +59,7 @@ def check_refine(scene, name, file, given):
     if file.refine is None:
         return None
     axes = {key: values for key, values in given.items() if np.ndim(values)}
-    if scene.FAMILY != "hill":
+    if measures.question(scene.FAMILY, "cells") is None:
         raise BadInput(f"refine: [refine] is not supported for the scene {name}; leave the table out")
     _check_even(scene, name, "refine")
     if len(axes) != 2 or min(values.size for values in axes.values()) < 2:

@@ -9,7 +9,7 @@ import numpy as np
 from survey import status
 from survey.errors import BadInput
 from survey.kernels.math.roundoff import EPS
-from survey.measures.hill import monodromy, more_digits, motion, user_equation, why
+from survey.measures.hill import monodromy, motion, multiprecision, user_equation, why
 from survey.scene import Parameter
 
 LONG_NAMES = {
@@ -145,23 +145,23 @@ class HillScene:
     def _lifted(self):
         """z, PERIOD and BREAKS with more digits; numbers unchanged."""
         given = (self.z, self.period, self.breaks)
-        return [more_digits.lifted(value) if callable(value) else value for value in given]
+        return [multiprecision.lifted(value) if callable(value) else value for value in given]
 
     @cached_property
     def _obstacle(self):
         """Why z cannot be run with more digits; empty if it can."""
         point = [p.default if p.default is not None else 1.0 for p in self.PARAMETERS]
         try:
-            with more_digits.LOCK:
+            with multiprecision.LOCK:
                 z, _ = self._exact(point, np.zeros(1))
-                z(more_digits.context().mpf(0.25))
-        except more_digits.Unsupported as error:
+                z(multiprecision.context().mpf(0.25))
+        except multiprecision.Unsupported as error:
             return str(error)
         return ""
 
     def _exact(self, point, edges):
         """z(u) at a point, and the edges of its pieces (given as float64), with more digits."""
-        mp = more_digits.context()
+        mp = multiprecision.context()
         z, period, breaks = self._lifted
         p = [mp.mpf(float(value)) for value in point]
         length = mp.mpf(period(p) if callable(period) else period)

@@ -91,8 +91,8 @@ def why(answer):
     }
     least = min(margins, key=lambda name: margins[name][0])
     value, bar, meeting = margins[least]
-    said = {"stable": "> 0, and so are the other margins", "unstable": "is not positive"}.get(
+    sign = {"stable": "> 0, and so are the other margins", "unstable": "is not positive"}.get(
         answer["verdict"], "is open"
     )
-    deciding = "decided by half-period factors, whose bars are sharper"
-    return f"{least} = {plus_minus(value, bar)} {said} (at 0 {meeting}); {deciding}"
+    margin = f"{least} = {plus_minus(value, bar)} {sign} (at 0 {meeting})"
+    return f"{margin}; decided by half-period factors, whose bars are sharper"

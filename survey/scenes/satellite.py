@@ -149,16 +149,16 @@ def _ends(request):
 
 
 def _at(s, oblate, rotates):
-    """The rows at places s of the axis: nodes of series, never solved in double-double, as k is not exact."""
+    """The rows at positions s of the axis: nodes of series, never solved in double-double, as k is not exact."""
     k, kc = np.sqrt(-np.expm1(-s)), np.exp(-s / 2)
     k = 1 / k if rotates else k
     return _problem(Motion(k, kc, k, np.full_like(k, motion.K), oblate), np.zeros((s.size, 0)))
 
 
-def _across(row, ends):
+def _row_axis(row, ends):
     rotates = bool(row.rotates.any())
     key = "satellite", row.oblate, rotates
-    return monodromy.Across(key, *ends, at=lambda places: _at(places, row.oblate, rotates))
+    return monodromy.RowAxis(key, *ends, at=lambda s: _at(s, row.oblate, rotates))
 
 
 def _problem(row, rho, low=None, line=None, ends=None):
@@ -178,8 +178,8 @@ def _problem(row, rho, low=None, line=None, ends=None):
         constant=constant,
         line=line,
         even=~row.rotates,
-        across=_across(row, ends) if ends else None,
-        places=-2 * np.log(row.kc) if ends else None,
+        row_axis=_row_axis(row, ends) if ends else None,
+        positions=-2 * np.log(row.kc) if ends else None,
     )
 
 

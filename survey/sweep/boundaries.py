@@ -3,9 +3,9 @@
 Contiguous ragged arrays (CF 9.3.3): `edge_count` edges of each row lie one after another along `edge`, and
 `curve_count` points of each curve along `curve_point`.
 
-A scene has boundaries where its family has a measure of curves, `measures/FAMILY/curves.py`. One that knows them in
-closed form has `closed`, which gives them, with `refusal`, CLASSES, TITLE and ALONG (see `measures.nutation.curves`).
-The edges of all others are found as the zeros of Hill's factors.
+A scene has boundaries where its family has a module `curves` (see QUESTIONS of `survey.measures`). One that knows its
+curves without a search has `closed`; of the others `edges` finds the edges of each row, `curves` follows them over the
+map, and `folds` finds where they turn back.
 """
 
 from itertools import pairwise
@@ -17,7 +17,8 @@ import xarray as xr
 from survey import measures
 from survey.file.labels import flag_attributes, meaning
 from survey.grid import logarithmic
-from survey.measures.hill import curves, edges, folds, look
+from survey.measures.square import Square
+from survey.measures.tasks import in_turn
 from survey.scene import Request
 
 ROWS = 8  # solved together
@@ -26,24 +27,23 @@ RTOL = 1e-13
 MARGIN = 1e-3  # of an axis: how close curves come to an excluded value, such as k = 1
 
 
-def find(workflow, each=None, once=lambda name, make: make()):
-    """The dataset of the workflow's curves; for Hill's equation, of edges, and of their curves if there are two axes.
+def find(workflow, each=in_turn, once=lambda name, make: make()):
+    """The dataset of the workflow's curves; of its edges, and of their curves where there are two axes.
 
-    `each(task, numbers, what)` calls the task for every number, in any order, possibly on threads;
-    `once(name, make)` returns the arrays of `make()`, or those that an earlier run has kept under this name.
+    `each`: see `survey.measures.tasks`; `once(name, make)` gives the arrays of `make()`, or those that an
+    earlier run has kept under this name.
     """
-    measure = measures.curves_of(workflow.scene.FAMILY)
+    measure = _measure(workflow, "curves")
     if hasattr(measure, "closed"):
         return xr.Dataset(_closed(workflow, measure), attrs={"boundaries": workflow.boundaries})
-    each = each or curves.in_turn
     grid, axis = workflow.grid, workflow.boundaries
     other = [dim for dim in grid.sizes if dim != axis]
     across = next((dim for dim in other if grid.sizes[dim] > 1), None)  # curves need a range
-    of_rows = _edges(workflow, axis, grid.sizes[other[0]] if other else 1, each, once)
-    found = _rows(workflow, axis, other, of_rows)
-    about = {"boundaries": axis, "edge_incomplete_rows": int((of_rows.complete == 0).sum())}
+    edges = _edges(workflow, axis, grid.sizes[other[0]] if other else 1, each, once)
+    found = _rows(workflow, axis, other, edges)
+    about = {"boundaries": axis, "edge_incomplete_rows": int((edges.complete == 0).sum())}
     if across:
-        found |= _curves(workflow, across, axis, of_rows, each)
+        found |= _curves(workflow, across, axis, edges, each)
         about["curves_lost"] = int((found["curve_complete"][1] == 0).sum())
     left_out = [
         f"{name} from {a:.12g} to {b:.12g}"
@@ -60,7 +60,7 @@ def plan(workflow, cost):
 
     `cost` is the scene's estimate for a point, in seconds.
     """
-    measure = measures.curves_of(workflow.scene.FAMILY)
+    measure = _measure(workflow, "curves")
     if hasattr(measure, "closed"):  # measured: about a tenth of a second per map
         size = 8 * (1 + len(workflow.grid.sizes) + 2 * len(measure.ALONG))
         return {"bytes_per_curve_point": size}, 0.1 * prod(list(workflow.grid.sizes.values())[2:])
@@ -68,6 +68,11 @@ def plan(workflow, cost):
     # measured: ten to twenty edges per row; about five hundred points of curves
     seconds = prod(sizes) * (2e-3 + 250 * cost) + (0.2 + 1e4 * cost if sizes else 0.0)
     return {"rows": prod(sizes), "bytes_per_edge": 25, "bytes_per_curve_point": 24 * len(sizes)}, seconds
+
+
+def _measure(workflow, question):
+    """The module of the scene's family that answers this question."""
+    return measures.question(workflow.scene.FAMILY, question)
 
 
 def _closed(workflow, measure):
@@ -80,24 +85,24 @@ def _closed(workflow, measure):
     square, third = _square(workflow, *names[:2]), names[2:]
     planes = [{third[0]: float(value)} for value in grid.parameters[third[0]][1]] if third else [{}]
     found = [measure.closed(square, names[:2], fixed | plane, workflow.request.options) for plane in planes]
-    count, kind, in_plane, error = (
-        np.concatenate([getattr(plane, name) for plane in found]) for name in ("count", "kind", "places", "error")
+    count, kind, flat, error = (
+        np.concatenate([getattr(curves, name) for curves in found]) for name in ("count", "kind", "parameters", "error")
     )
-    points = [plane.count.sum() for plane in found]
-    positions = np.column_stack([in_plane, *(np.repeat([plane[name] for plane in planes], points) for name in third)])
+    points = [curves.count.sum() for curves in found]
+    values = np.column_stack([flat, *(np.repeat([plane[name] for plane in planes], points) for name in third)])
     kind = _flags(measure.TITLE, measure.CLASSES, kind)
-    variables = _of_curves(workflow, names, count, kind, positions, error, "on the curve")
+    variables = _of_curves(workflow, names, count, kind, values, error, "on the curve")
     for output in measure.ALONG:
-        values, errors = (np.concatenate([plane.along[output.name][i] for plane in found]) for i in (0, 1))
-        attributes = meaning(output) | {"ancillary_variables": f"curve_{output.name}_error"}
-        variables[f"curve_{output.name}"] = ("curve_point", values, attributes)
+        along, errors = (np.concatenate([curves.along[output.name][i] for curves in found]) for i in (0, 1))
+        about = meaning(output) | {"ancillary_variables": f"curve_{output.name}_error"}
+        variables[f"curve_{output.name}"] = ("curve_point", along, about)
         variables[f"curve_{output.name}_error"] = ("curve_point", errors, {
             "long_name": f"error bound of curve_{output.name}", "units": output.units})  # fmt: skip
     return variables
 
 
-def _of_curves(workflow, names, count, kind, positions, error, where):
-    """The variables that all curves have."""
+def _of_curves(workflow, names, count, kind, values, error, where):
+    """The variables that all curves have; `values` (m, names): the parameters at their points."""
     variables = {
         "curve_count": ("curve", count.astype(np.int32), {
             "long_name": "number of points of the curve", "units": "1", "sample_dimension": "curve_point"}),
@@ -109,29 +114,29 @@ def _of_curves(workflow, names, count, kind, positions, error, where):
     }  # fmt: skip
     for i, name in enumerate(names):
         parameter, named = _named(workflow, name)
-        variables[f"curve_{name}"] = ("curve_point", positions[:, i], named | {
+        variables[f"curve_{name}"] = ("curve_point", values[:, i], named | {
             "long_name": f"{parameter.long_name} {where}", "ancillary_variables": "curve_position_error"})  # fmt: skip
     return variables
 
 
 def _edges(workflow, axis, rows, each, once):
     """The Edges of all rows, found a few rows at a time."""
-    parts, ranges = [None] * -(-rows // ROWS), _parts(workflow, axis)
+    measure, between = _measure(workflow, "edges"), _parts(workflow, axis)
 
     def make(some):
         solve = _row_solver(workflow, axis, some)
-        found = edges.joined([edges.find(solve, some.size, *ends) for ends in ranges])
-        found.row += some[0]
-        return vars(found)
+        own = measure.joined([measure.find(solve, some.size, *ends) for ends in between])
+        own.row += some[0]
+        return vars(own)
 
     def task(number):
         some = np.arange(number * ROWS, min((number + 1) * ROWS, rows))
         name = f"edges-{axis}-{some[0]}-{some.size}"
-        parts[number] = edges.Edges(**once(name, lambda: make(some)))
+        return once(name, lambda: make(some))
 
-    each(task, range(len(parts)), "parts of the edges")
+    parts = [measure.Edges(**part) for part in each(task, range(-(-rows // ROWS)), "parts of the edges")]
     names = ("row", "position", "error", "kind", "index", "complete")
-    return edges.Edges(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+    return measure.Edges(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
 def _row_solver(workflow, axis, rows):
@@ -150,26 +155,26 @@ def _solve(workflow, point, wanted):
         return workflow.scene.solve(point, Request(workflow.request.options, "auto", RTOL, frozenset(wanted)))
 
 
-def _rows(workflow, axis, other, found):
+def _rows(workflow, axis, other, edges):
     """The variables of the rows."""
-    rows = found.complete.size
+    rows = edges.complete.size
     dims, shape = (tuple(other), (rows,)) if other else ((), ())
-    count = np.bincount(found.row, minlength=rows).astype(np.int32).reshape(shape)
+    count = np.bincount(edges.row, minlength=rows).astype(np.int32).reshape(shape)
     parameter, named = _named(workflow, axis)
     position = named | {"long_name": f"{parameter.long_name} at the edge of a tongue"}
     return {
         "edge_count": (dims, count, {
             "long_name": "number of edges of tongues", "units": "1", "sample_dimension": "edge"}),
-        "edge_complete": (dims, found.complete.astype(np.int8).reshape(shape),
+        "edge_complete": (dims, edges.complete.astype(np.int8).reshape(shape),
                           _yes_or_no("are all edges of the row found", "not_shown complete")),
-        "edge_position": ("edge", found.position, position | {"ancillary_variables": "edge_position_error"}),
-        "edge_position_error": ("edge", found.error, named | {"long_name": "error bound of edge_position"}),
-        "edge_class": ("edge", *_class(found.kind)),
-        "edge_index": ("edge", *_index(found.index)),
+        "edge_position": ("edge", edges.position, position | {"ancillary_variables": "edge_position_error"}),
+        "edge_position_error": ("edge", edges.error, named | {"long_name": "error bound of edge_position"}),
+        "edge_class": ("edge", *_class(workflow, edges.kind)),
+        "edge_index": ("edge", *_index(edges.index)),
     }  # fmt: skip
 
 
-def _curves(workflow, across, axis, of_rows, each):
+def _curves(workflow, across, axis, edges, each):
     """The variables of the curves on the map of the axes `across` (its rows) and `axis`, and of their folds."""
     square = _square(workflow, across, axis)
     fixed = {name: values for name, (dims, values) in workflow.grid.parameters.items() if not dims}
@@ -178,32 +183,34 @@ def _curves(workflow, across, axis, of_rows, each):
         return _solve(workflow, fixed | {across: q, axis: p}, wanted)
 
     pieces = [_pieces(workflow, name) for name in (across, axis)]
-    rows = np.asarray(workflow.grid.parameters[across][1])[of_rows.row]
-    in_rows = square.inside(np.stack([rows, of_rows.position], axis=1)), of_rows.kind, of_rows.index
-    found = [in_rows, *(_of_columns(solve, square, _columns(pieces[1]), *piece) for piece in pieces[0])]
-    seeds = _seeds(*(np.concatenate(values) for values in zip(*found, strict=True)), pieces)
-    traced = curves.trace(solve, square, seeds, each)
-    folded = folds.find(solve, square, traced)
-    names, positions = (across, axis), (square.places(traced.x), square.places(folded.x))
+    rows = np.asarray(workflow.grid.parameters[across][1])[edges.row]
+    of_rows = square.positions(np.stack([rows, edges.position], axis=1)), edges.kind, edges.index
+    searched = _measure(workflow, "edges"), solve, square, _columns(pieces[1])
+    found = [of_rows, *(_of_columns(*searched, *piece) for piece in pieces[0])]
+    measure = _measure(workflow, "curves")
+    seeds = measure.Seeds(*_with_rectangles(*(np.concatenate(v) for v in zip(*found, strict=True)), pieces))
+    curves = measure.trace(solve, square, seeds, each)
+    folds = _measure(workflow, "folds").find(solve, square, curves)
+    names, on_curves, at_folds = (across, axis), square.parameters(curves.x), square.parameters(folds.x)
     where = "on the edge of a tongue"
-    variables = _of_curves(workflow, names, traced.count, _class(traced.kind), positions[0], traced.error, where)
+    variables = _of_curves(workflow, names, curves.count, _class(workflow, curves.kind), on_curves, curves.error, where)
     variables |= {
-        "edge_curve": ("edge", traced.of_seed[: of_rows.row.size].astype(np.int32), {
+        "edge_curve": ("edge", curves.of_seed[: edges.row.size].astype(np.int32), {
             "long_name": "curve through the edge, counted from 0", "units": "1"}),
-        "curve_index": ("curve", *_index(traced.index)),
-        "curve_complete": ("curve", traced.complete.astype(np.int8),
+        "curve_index": ("curve", *_index(curves.index)),
+        "curve_complete": ("curve", curves.complete.astype(np.int8),
                            _yes_or_no("is the curve closed, or ended by the map or edge_left_out", "lost complete")),
-        "fold_curve": ("fold", folded.curve.astype(np.int32), {
+        "fold_curve": ("fold", folds.curve.astype(np.int32), {
             "long_name": f"curve that turns back in {across}, counted from 0", "units": "1",
             "instance_dimension": "curve"}),
     }  # fmt: skip
     for i, name in enumerate(names):
         parameter, named = _named(workflow, name)
-        variables[f"fold_{name}"] = ("fold", positions[1][:, i], named | {
+        variables[f"fold_{name}"] = ("fold", at_folds[:, i], named | {
             "long_name": f"{parameter.long_name} at the fold of an edge",
             "ancillary_variables": f"fold_{name}_error"})  # fmt: skip
-        ends = square.places(np.stack([folded.x - folded.error, folded.x + folded.error]))[..., i]
-        variables[f"fold_{name}_error"] = ("fold", abs(ends - positions[1][:, i]).max(axis=0), named | {
+        ends = square.parameters(np.stack([folds.x - folds.error, folds.x + folds.error]))[..., i]
+        variables[f"fold_{name}_error"] = ("fold", abs(ends - at_folds[:, i]).max(axis=0), named | {
             "long_name": f"error bound of fold_{name}"})  # fmt: skip
     return variables
 
@@ -211,7 +218,7 @@ def _curves(workflow, across, axis, of_rows, each):
 def _square(workflow, *names):
     values = [np.asarray(workflow.grid.parameters[name][1]) for name in names]
     low, high = (np.array([end(v) for v in values]) for end in (np.min, np.max))
-    return look.Square(low, high, np.array([logarithmic(v) for v in values]))
+    return Square(low, high, np.array([logarithmic(v) for v in values]))
 
 
 def _pieces(workflow, name):
@@ -223,14 +230,14 @@ def _pieces(workflow, name):
     excluded = np.array(next(p for p in workflow.scene.PARAMETERS if p.name == name).excluded)
     known = np.asarray(workflow.grid.parameters[name][1])
     inner = excluded[(excluded > line.low) & (excluded < line.high)]
-    cuts, values = (line.inside(v[:, None])[:, 0] for v in (inner, known[~np.isin(known, excluded)]))
-    apart = np.array([max(4 * line.grain, min(MARGIN, 0.5 * abs(values - cut).min())) for cut in cuts])
-    return list(zip([0.0, *(cuts + apart)], [*(cuts - apart), 1.0], strict=True))
+    units = [line.positions(v[:, None])[:, 0] for v in (inner, known[~np.isin(known, excluded)])]
+    apart = np.array([max(4 * line.grain, min(MARGIN, 0.5 * abs(units[1] - cut).min())) for cut in units[0]])
+    return list(zip([0.0, *(units[0] + apart)], [*(units[0] - apart), 1.0], strict=True))
 
 
 def _parts(workflow, name):
     """The same parts, in values of the parameter."""
-    return _square(workflow, name).places(np.array(_pieces(workflow, name))[..., None])[..., 0].tolist()
+    return _square(workflow, name).parameters(np.array(_pieces(workflow, name))[..., None])[..., 0].tolist()
 
 
 def _columns(pieces):
@@ -241,26 +248,26 @@ def _columns(pieces):
     return columns
 
 
-def _of_columns(solve, square, columns, low, high):
+def _of_columns(measure, solve, square, columns, low, high):
     """(positions, kind, index) of the edges along the columns, from low to high in the square."""
 
     def along(column, x, wanted):
-        values = square.places(np.stack(np.broadcast_arrays(x, columns[column][:, None]), axis=-1))
-        out = solve(values[..., 0].reshape(-1, 1), values[..., 1].reshape(-1, 1), wanted)
+        here = square.parameters(np.stack(np.broadcast_arrays(x, columns[column][:, None]), axis=-1))
+        out = solve(here[..., 0].reshape(-1, 1), here[..., 1].reshape(-1, 1), wanted)
         return {name: values.reshape(x.shape) for name, values in out.items()}
 
-    found = edges.find(along, columns.size, low, high)
-    return np.stack([found.position, columns[found.row]], axis=1), found.kind, found.index
+    edges = measure.find(along, columns.size, low, high)
+    return np.stack([edges.position, columns[edges.row]], axis=1), edges.kind, edges.index
 
 
-def _seeds(x, kind, index, pieces):
-    """Seeds, each with the rectangle of pieces that contains it."""
+def _with_rectangles(x, kind, index, pieces):
+    """(x, kind, index, low, high): each position x with the ends of the rectangle of pieces that holds it."""
     low, high = np.zeros_like(x), np.ones_like(x)
-    for dim, ends in enumerate(pieces):
-        lows, highs = np.array(ends).T
+    for dim, own in enumerate(pieces):
+        lows, highs = np.array(own).T
         piece = np.clip(np.searchsorted(lows, x[:, dim], "right") - 1, 0, None)
         low[:, dim], high[:, dim] = lows[piece], highs[piece]
-    return curves.Seeds(x, kind, index, low, high)
+    return x, kind, index, low, high
 
 
 def _named(workflow, name):
@@ -269,8 +276,8 @@ def _named(workflow, name):
     return parameter, {"units": parameter.units, "symbol": parameter.symbol}
 
 
-def _class(kind):
-    return _flags("kind of the periodic solution at the edge", edges.CLASSES, kind)
+def _class(workflow, kind):
+    return _flags("kind of the periodic solution at the edge", _measure(workflow, "edges").CLASSES, kind)
 
 
 def _flags(title, classes, kind):
@@ -278,8 +285,8 @@ def _flags(title, classes, kind):
 
 
 def _index(index):
-    attributes = {"long_name": "number of the tongue, twice its rotation number", "units": "1", "symbol": "n"}
-    return index.astype(np.int32), attributes
+    meaning = {"long_name": "number of the tongue, twice its rotation number", "units": "1", "symbol": "n"}
+    return index.astype(np.int32), meaning
 
 
 def _yes_or_no(question, answers):

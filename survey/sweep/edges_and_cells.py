@@ -7,15 +7,29 @@ def find(workflow, once, progress=None):
     """The datasets that [boundaries] and [refine] add to the file, their attributes included; `once` as in `Blocks`."""
     found, parts = [], requested(workflow)
     if "edges" in parts:
-
-        def each(task, numbers, what):
-            report = (lambda done, _=None: progress(done, len(numbers), 0, what)) if progress else (lambda *_: None)
-            dispatch.on_threads(task, numbers, report)
-
-        found.append(parts["edges"].find(workflow, each, once))
+        found.append(parts["edges"].find(workflow, _on_threads(progress), once))
     if "cells" in parts:
-        found.append(parts["cells"].find(workflow, dispatch.on_threads, once, getattr(progress, "refining", None)))
+        found.append(parts["cells"].find(workflow, _on_threads(), once, getattr(progress, "refining", None)))
     return found
+
+
+def _on_threads(progress=None):
+    """`each` of `survey.measures.tasks` on threads of this process; `progress` hears of every task that ends."""
+
+    def each(task, items, what):
+        results = [None] * len(items)
+
+        def solve(number):
+            results[number] = task(items[number])
+
+        def report(done, _=None):
+            if progress:
+                progress(done, len(items), 0, what)
+
+        dispatch.on_threads(solve, range(len(items)), report)
+        return results
+
+    return each
 
 
 def requested(workflow):

@@ -10,6 +10,7 @@ import pytest
 
 from survey import methods, modules
 from survey.kernels.cylinder import flow
+from survey.kernels.math import runge_kutta
 from survey.measures.cylinder import solution
 
 FOUND = [modules.load(methods, name, "method") for name in modules.names(methods)]
@@ -45,7 +46,9 @@ def wide_end(method, span, steps):
     series = widened(flow.series)
     inner = {"values": values}
     if hasattr(method, "_flow_classical"):
-        inner["_flow_classical"] = widened(method._flow_classical, values=values)
+        slope = widened(method._flow_slope, values=values)
+        step = widened(runge_kutta.classical)
+        inner["_flow_classical"] = widened(method._flow_classical, classical=step, _flow_slope=slope)
     at, T = widened(method.flow_at, **inner), np.full((flow.LAST + 1, flow.ROWS), mp.mpf(0), dtype=object)
     p, (phi, w), h = [mp.mpf(str(x)) for x in SIX], (mp.mpf("1.5"), mp.mpf("0.8")), mp.mpf(span) / steps
     for _ in range(steps):

@@ -14,7 +14,7 @@ import survey.methods
 from survey import modules
 from survey.kernels.jit import inline, kernel
 from survey.kernels.lanes import chain
-from survey.measures.hill import effort
+from survey.measures.hill import pointwise
 from survey.methods import magnus6, rk4, taylor16
 
 HILL = [n for n in modules.names(survey.methods) if "hill" in modules.load(survey.methods, n, "method").SERVES]
@@ -39,7 +39,7 @@ def step(method, start, h, parts=1):
     times = start + (np.arange(parts)[:, None] + np.array(method.NODES)) * (h / parts)
     samples[0, :, 0] = -2 * np.cos(2 * times)
     if getattr(method, "ADAPTIVE", False):
-        a, b, c, d, *_ = method.hill_step(samples[0, 0, 0] + 1.0, h, np.empty((4, 12)))
+        a, b, c, d, *_ = method.hill_step(samples[0, 0, 0] + 1.0, h, np.empty((13, 4)))
         return np.array([a, c, b, d])
     out = np.empty((1, 10))
     method.hill_chain(samples, 0.0, np.full((1, parts), h / parts), np.ones(1), ZERO, ZERO, ZERO + 1, out)
@@ -70,11 +70,11 @@ def test_the_reference_of_the_order_is_right():
 
 
 def bars_hold(method):
-    """With q = 5, over four periods: at every effort, each true error lies within its bar."""
+    """With q = 5, over four periods: on every rung, each true error lies within its bar."""
     held = []
     frequency = np.sqrt(np.max(PROBLEM.bound[0, 0] + PROBLEM.p))
-    for steps in effort.LADDER[4:33]:
-        if frequency * PROBLEM.span[0] / steps > effort.LONGEST:
+    for steps in pointwise.STEPS.rungs[4:33]:
+        if frequency * PROBLEM.span[0] / steps > pointwise.LONGEST:
             continue
         out = fixed(method, int(steps))
         held.append(np.all(abs(out[:, :4] - EXACT[:, :4]) <= out[:, 4:8] + EXACT[:, 4:8]))

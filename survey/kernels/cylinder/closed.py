@@ -1,4 +1,4 @@
-"""Solutions in closed form of the flow on the cylinder where g = 0 or alike; where b = 0, the time at an angle.
+"""Solutions in closed form of the flow on the cylinder where g = 0 or w = mu F + n; where b = 0, the time at an angle.
 
 Trigonometric, kind 1: w = mu F(phi) + n is an invariant curve, g = (mu - 1) f (mu F + n); mu = 1 is g = 0 (50), other
 mu are (61). With u = tan(x/2), x = phi - phi0, du/dt is quadratic in u: one formula in Delta^2 = n^2 - (mu b)^2.
@@ -27,7 +27,7 @@ NONE, TRIGONOMETRIC, LIBRATION, ROTATION, LOST = 0, 1, 2, 3, 4
 SIZE = 32
 SAME = 64.0 * ROUNDOFF_UP  # how far, relative, parameters may miss the conditions of (61); the miss goes into the bars
 
-# places in data
+# indices into data
 W0, A1, B1, A2, B2, ROUGH = range(6)  # g(phi0 + x) = A1 cos x + B1 sin x + A2 cos 2x + B2 sin 2x
 F0, SLOPE, SQUARE, NOISE, OFFSET, MISS, GAIN, MU, OTHER = range(6, 15)  # kind 1
 LEFT, RIGHT, BAR_LEFT, BAR_RIGHT, RATIO = range(6, 11)  # kind 2
@@ -134,7 +134,7 @@ def applies(p, phi0, w0):
 
 @kernel
 def start(p, phi0, w0, data):
-    """Fill data for the solution from (phi0, w0); returns (kind, side): x and w are to be multiplied by side."""
+    """Fill data for the solution from (phi0, w0); returns (kind, side): multiply x and w by side."""
     kind, mu, other = applies(p, phi0, w0)
     side = 1.0 if w0 >= 0.0 else -1.0
     if kind == TRIGONOMETRIC:
@@ -181,7 +181,7 @@ def deviating(data, t, w):
 
 @inline
 def trigonometric_reach(data, x):
-    """(t, bar t) at which phi0 + x, x >= 0, is reached; inf beyond an equilibrium, NaN where rounding cannot tell."""
+    """(t, bar t) at which phi0 + x, x >= 0, is reached; inf beyond an equilibrium, NaN if rounding leaves it open."""
     w0, f, square = data[W0], data[SLOPE], data[SQUARE]
     if data[F0] == 0.0 and f == 0.0:
         t = x / w0
@@ -263,8 +263,8 @@ def start_libration(data):
 @inline
 def phase_bar(data, theta):
     """Bound of the error of theta - theta0, as time."""
-    whole = theta + data[THETA0]
-    relative = 0.25 * data[RHO] * theta + 0.5 * data[RHO_M] * whole + 12.0 * ROUNDOFF_UP * (whole + 1.0)
+    angle = theta + data[THETA0]
+    relative = 0.25 * data[RHO] * theta + 0.5 * data[RHO_M] * angle + 12.0 * ROUNDOFF_UP * (angle + 1.0)
     return (relative + data[SLACK]) / data[OMEGA]
 
 

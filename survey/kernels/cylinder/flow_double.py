@@ -165,7 +165,7 @@ def begin(p, phi, w, A, T):
     variation(p, T)
     h = longest_step(p, w[0])
     for n in range(ORDER - 3, ORDER + 1):
-        # as in `taylor`: a last term that happens to vanish tells nothing
+        # as in `taylor`: a last term that happens to vanish proves nothing
         share = 1.0 if n > ORDER - 2 else FALL
         term = share * max(abs(A[_W, 0, n - 1]) / n, abs(A[_W, 0, n]) / (1.0 + abs(w[0]))) + 1e-300
         h = min(h, (TOLERANCE / term) ** (1.0 / n))
@@ -222,7 +222,7 @@ def trajectory(p, phi0, w0, asked, floats, turnings):
     phi, turns = centred((phi0, 0.0))
     w, t, ellipse = (w0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.0)
     sign, count, j, unsure = side(p, phi, w0), 0, 0, 0
-    known, since = False, (0.0, 0.0)  # `end` tells the turnings after that time
+    known, since = False, (0.0, 0.0)  # `end` gives the turnings after that time
     still = rests(p, phi0, w0)
     for n in range(1, LIMIT):
         h = begin(p, phi, w, A, T)

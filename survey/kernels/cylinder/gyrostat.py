@@ -140,7 +140,7 @@ def begin(G, state, tolerance, T, V):
     for i in range(3):
         size = max(size, abs(state[i]))
     for n in range(ORDER - 3, ORDER + 1):
-        # where the last terms happen to vanish, as from rest, those two before them are asked, less strictly
+        # where the last terms happen to vanish, as from rest, the two before them count too, less strictly
         term = 1e-300
         for i in range(6):
             term = max(term, abs(T[n, i]) * (1.0 / size if i < 3 else 1.0))
@@ -270,14 +270,14 @@ def carry(G, T, V, dt, squares, J, work):
 def states(G, first, times, tolerance, limit, out, tangent):
     """States at the ascending times >= 0 in out[j], and in tangent[j] their derivatives by the first; steps or -1."""
     T, V, J = np.zeros((LAST + 1, 12)), np.zeros((LOW + 1, 6, 12)), np.zeros((6, 6))
-    state, whole = first.copy(), np.eye(6)
+    state, propagator = first.copy(), np.eye(6)
     t, j = 0.0, 0
     for step in range(limit):
         h = begin(G, state, tolerance, T, V)
         while j < len(times) and times[j] - t < h:
             at(T, times[j] - t, out[j])
             jacobian(V, times[j] - t, J)
-            _product(J, whole, tangent[j])
+            _product(J, propagator, tangent[j])
             j += 1
         if j == len(times):
             return step + 1
@@ -286,8 +286,8 @@ def states(G, first, times, tolerance, limit, out, tangent):
         at(T, h, state)
         jacobian(V, h, J)
         work = np.empty((6, 6))
-        _product(J, whole, work)
-        whole = work
+        _product(J, propagator, work)
+        propagator = work
         t += h
     return -1
 

@@ -5,11 +5,11 @@ turned by a (symmetry S4 of `gyrostat.md`) c23 = 0, and psi = phi - a obeys, wit
 
     psi' = w,  S' = C w,  C' = -S w,  w' = b12 S' + b31 C' - d C S + s2 C - s3 S        (57):
 
-three Cauchy products. S and C are worked out anew for each step. Errors are carried as in `steps`, by the
+three Cauchy products. Each step computes S and C afresh. Errors are carried as in `steps`, by the
 variational equation in its Lienard form (`flow.variation`), to order LOW.
 
-A lane whose next time lies within its step is evaluated there and then goes on from where the step began: so steps
-never depend on the times asked for, and no solution on its neighbours. A lane that has finished takes the next row.
+A lane whose next time lies within its step is evaluated there and then continues from where the step began: so steps
+never depend on the requested times, and no solution on its neighbours. A lane that has finished takes the next row.
 """
 
 import math
@@ -58,13 +58,13 @@ _TABLE = _DG + LOW + 1
 # Rows of the state that a step changes, ...
 (_PSI, _TURNS, _V, _T, _T_LOW, _RATE, _SAA, _SAB, _SBB, _STEPS, _SIGN, _UNSURE, _COUNT) = range(13)
 _STATE = 13
-# ... and of what it does not: the coefficients, their bounds, the next time asked for, a.
+# ... and of what it does not: the coefficients, their bounds, the next requested time, a.
 (_P12, _P31, _PD, _P2, _P3, _PF, _PG, _PDG, _NEXT, _TURN) = range(10)
 _FIXED = 10
 ROWS = _TABLE + 2 * _STATE + _FIXED + 1
 
 _GOING, _AT, _LOST = 0.0, 1.0, 2.0  # what a step has made of a lane
-# Steps shorter than this have a share of the tolerance only: so many short steps add up to what few long ones do.
+# Shorter steps have only a share of the tolerance, so that many short ones add up to what a few long ones do.
 _SHORT = 1.0 / 8.0
 _COARSEST = 1e-11  # per step: above, the terms that follow the last two may be no smaller than these
 _FALL = 1.0 / 50.0  # by more, two terms further on, no series is trusted to fall
@@ -203,7 +203,7 @@ def _advance(T, state, before, fixed, fate, tolerance):
             before[k, i] = state[k, i]
     for i in range(LANES):
         w, last, previous = state[_V, i], abs(T[_W + ORDER, i]), abs(T[_W + ORDER - 1, i])
-        # a term that vanishes, as every second does where the motion starts at rest, tells nothing: two more are asked
+        # a term that vanishes, as every second does where the motion starts at rest, proves nothing: two more count
         fall = _FALL * state[_RATE, i] * state[_RATE, i]
         size = max(last, fall * abs(T[_W + ORDER - 2, i]))
         size = max(size, max(previous, fall * abs(T[_W + ORDER - 3, i])) * state[_RATE, i])
@@ -291,9 +291,9 @@ def _tell(state, before, fixed, i, floats, turnings):
     floats[rc.PHI], floats[rc.W] = (state[_PSI, i] + angle) + turns * TWO_PI, v
     floats[rc.PHI_BAR], floats[rc.W_BAR] = wide + 3e-16 * (abs(turns) * TWO_PI + abs(angle)), high
     from_rest = before[_STEPS, i] == 0.0 and before[_V, i] == 0.0  # then w is 0 at the start and nowhere else
-    told = before[_UNSURE, i] < 3.0 and before[_COUNT, i] >= 0.0 and (abs(v) > high or from_rest)
+    sure = before[_UNSURE, i] < 3.0 and before[_COUNT, i] >= 0.0 and (abs(v) > high or from_rest)
     passed = before[_SIGN, i] * v < 0.0 and not from_rest
-    turnings[0] = int(before[_COUNT, i]) + passed if told else UNDETERMINED
+    turnings[0] = int(before[_COUNT, i]) + passed if sure else UNDETERMINED
     for k in range(_STATE):
         state[k, i] = before[k, i]
     return True

@@ -109,16 +109,16 @@ def between(eqs, count, low, high):
 
 
 @inline
-def image(setting, begin, at, kind, p, eqs, count, place, x, tolerance, node):
-    """The map of `kind` at x: place is the section (rotations) or the right end of the interval (librations)."""
+def image(setting, begin, at, kind, p, eqs, count, anchor, x, tolerance, node):
+    """The map of `kind` at x: anchor is the section (rotations) or the right end of the interval (librations)."""
     if kind == ROTATION:
-        rotation(setting, begin, at, p, eqs, count, place, x, tolerance, node)
+        rotation(setting, begin, at, p, eqs, count, anchor, x, tolerance, node)
     else:
-        libration(setting, begin, at, p, eqs, count, place, x, tolerance, node)
+        libration(setting, begin, at, p, eqs, count, anchor, x, tolerance, node)
 
 
 @splice
-def fixed_points(image_of, kind, p, eqs, count, place, interval, xs, tolerance, cycles, found, edges):
+def fixed_points(image_of, kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges):
     """All fixed points on the lattice xs (ascending), appended to `cycles`; returns their number.
 
     Borders of a class are bisected, so that a fixed point beside one is not lost; where D has no change of sign but
@@ -126,7 +126,7 @@ def fixed_points(image_of, kind, p, eqs, count, place, interval, xs, tolerance, 
     and its bar at the last node and at the first, the number of nodes without an answer.
     """
     nodes = np.zeros((MOST_NODES, 7))
-    size = scan(image_of, kind, p, eqs, count, place, xs, tolerance, nodes)
+    size = scan(image_of, kind, p, eqs, count, anchor, xs, tolerance, nodes)
     edges[0], edges[1], edges[2], edges[3] = math.nan, math.nan, nodes[size - 1, CHANGE], nodes[size - 1, ERROR]
     edges[4], edges[5], edges[6] = nodes[0, CHANGE], nodes[0, ERROR], 1.0 * (nodes[0, CLASS] == UNKNOWN)
     m = np.zeros(7)
@@ -137,8 +137,8 @@ def fixed_points(image_of, kind, p, eqs, count, place, interval, xs, tolerance, 
             edges[0], edges[1] = b[X], b[X] + b[CHANGE]
         if a[CLASS] <= 0.0 or a[CLASS] != b[CLASS] or found + 2 > len(cycles) or b[X] <= a[X]:
             continue
-        put(m, b)
-        if differ(a, b) or followed_down(image_of, kind, p, eqs, count, place, a, b, tolerance, m):
+        copy(m, b)
+        if differ(a, b) or followed_down(image_of, kind, p, eqs, count, anchor, a, b, tolerance, m):
             touching = not differ(a, b) and not differ(a, m)
             if touching:  # touches 0 within the error bar: one cycle or two or none
                 write_cycle(a, b, m, interval, steepness(kind, p, m[X]), cycles[found])
@@ -149,48 +149,48 @@ def fixed_points(image_of, kind, p, eqs, count, place, interval, xs, tolerance, 
             for half in range(2):
                 low, high = (a, m) if half == 0 else (m, b)
                 if high[X] > low[X] and differ(low, high):
-                    solved(image_of, kind, p, eqs, count, place, interval, low, high, tolerance, cycles[found])
+                    solved(image_of, kind, p, eqs, count, anchor, interval, low, high, tolerance, cycles[found])
                     found += 1
     return found
 
 
 @kernel
-def put(target, source):
+def copy(target, source):
     """Copy a node (an element-wise loop compiles ten times faster than an assignment of slices)."""
     for i in range(len(source)):
         target[i] = source[i]
 
 
 @splice
-def scan(image_of, kind, p, eqs, count, place, xs, tolerance, nodes):
+def scan(image_of, kind, p, eqs, count, anchor, xs, tolerance, nodes):
     """Fill `nodes` with the images of xs, and more beside every border of a class; returns their number."""
     a, c, d = np.zeros(7), np.zeros(7), np.zeros(7)
     grain = 1e-15 * (xs[-1] - xs[0])
-    image_of(kind, p, eqs, count, place, xs[0], tolerance, nodes[0])
+    image_of(kind, p, eqs, count, anchor, xs[0], tolerance, nodes[0])
     size, i, x, step = 1, 1, xs[0], 0.0
     while i < len(xs):
         near = step > 0.0 and x + step < xs[i]  # geometric steps away from a border
-        image_of(kind, p, eqs, count, place, x + step if near else xs[i], tolerance, c)
-        put(a, nodes[size - 1])
+        image_of(kind, p, eqs, count, anchor, x + step if near else xs[i], tolerance, c)
+        copy(a, nodes[size - 1])
         crossed = c[CLASS] != a[CLASS]
         while crossed and c[X] - a[X] > 2e-15 * abs(c[X]) + grain:
             middle = 0.5 * (a[X] + c[X])
             if not a[X] < middle < c[X]:
                 break
-            image_of(kind, p, eqs, count, place, middle, tolerance, d)
+            image_of(kind, p, eqs, count, anchor, middle, tolerance, d)
             if d[CLASS] == nodes[size - 1, CLASS]:
-                put(a, d)
+                copy(a, d)
             else:
-                put(c, d)
+                copy(c, d)
         if crossed and size + 2 < len(nodes):
-            put(nodes[size], a)
-            put(nodes[size + 1], c)
+            copy(nodes[size], a)
+            copy(nodes[size + 1], c)
             size, x, step = size + 2, c[X], 16.0 * (2e-15 * abs(c[X]) + grain)
             if c[X] >= xs[i]:
                 i += 1
         else:
             if size < len(nodes):
-                put(nodes[size], c)
+                copy(nodes[size], c)
                 size += 1
             step *= 10.0
             i += not near
@@ -204,11 +204,11 @@ def differ(a, b):
 
 
 @splice
-def followed_down(image_of, kind, p, eqs, count, place, a, b, tolerance, m):
+def followed_down(image_of, kind, p, eqs, count, anchor, a, b, tolerance, m):
     """Follow a dip of |D| between a and b; True when D crosses 0 or touches it at the node m."""
     left, right = np.empty(7), np.empty(7)
-    put(left, a)
-    put(right, b)
+    copy(left, a)
+    copy(right, b)
     sign = 1.0 if a[CHANGE] > 0.0 else -1.0
     for _ in range(40):
         da, db = sign * (left[SLOPE] - 1.0), sign * (right[SLOPE] - 1.0)
@@ -218,27 +218,27 @@ def followed_down(image_of, kind, p, eqs, count, place, a, b, tolerance, m):
         low = (sign * left[CHANGE] * db - sign * right[CHANGE] * da + da * db * (right[X] - left[X])) / (db - da)
         if low > 0.0:
             return False
-        image_of(kind, p, eqs, count, place, 0.5 * (left[X] + right[X]), tolerance, m)
+        image_of(kind, p, eqs, count, anchor, 0.5 * (left[X] + right[X]), tolerance, m)
         if m[CLASS] != a[CLASS]:
             return False
         if sign * m[CHANGE] <= 0.0 or right[X] - left[X] < 1e-9 * abs(right[X]):
             return sign * m[CHANGE] <= 2.0 * m[ERROR]
         if sign * (m[SLOPE] - 1.0) < 0.0:
-            put(left, m)
+            copy(left, m)
         else:
-            put(right, m)
+            copy(right, m)
     return False
 
 
 @splice
-def solved(image_of, kind, p, eqs, count, place, interval, a, b, tolerance, row):
+def solved(image_of, kind, p, eqs, count, anchor, interval, a, b, tolerance, row):
     """The fixed point between a and b, where D changes sign: Newton's method kept inside a bracket."""
     low, high, m = a[X], b[X], np.zeros(7)
     rising = b[CHANGE] > 0.0
     share = a[CHANGE] / (a[CHANGE] - b[CHANGE])
     x = low + min(max(share, 0.02), 0.98) * (high - low)
     for _ in range(60):
-        image_of(kind, p, eqs, count, place, x, tolerance, m)
+        image_of(kind, p, eqs, count, anchor, x, tolerance, m)
         if m[CLASS] != a[CLASS]:
             break
         if (m[CHANGE] > 0.0) == rising:

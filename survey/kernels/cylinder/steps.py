@@ -1,12 +1,12 @@
 """Steps along a solution, which carry their error: its values at given times, and at given angles (Abel equation (57)).
 
-A method gives three functions: `setting` (what steers its steps), `begin` (start a step: its size, its truncation
+A method gives three functions: `setting` (what controls its steps), `begin` (start a step: its size, its truncation
 error noted in T) and `at` (the solution inside the step). The rest is common.
 
 The error of (phi, w) after n steps is, to first order, the sum of J_nk delta_k over the steps, |delta_k| <= d_k
 componentwise. S <- J S J^T + diag(d^2) holds the sum of squares, and by Cauchy and Schwarz |error_i| <=
 sqrt(2 n S_ii), for any correlation of the delta_k: an error of the initial phi is one term more, but of the last step
-only delta_i counts. Steps never depend on the times or angles asked for.
+only delta_i counts. Steps never depend on the requested times or angles.
 """
 
 import math
@@ -104,7 +104,7 @@ def wrapped(phi):
 
 @inline
 def unturned(target, turns):
-    """The unwrapped angle `target` as seen from an angle that so many turns were taken out of."""
+    """The unwrapped angle `target`, less the turns taken out of the current one."""
     return (target - turns * TWO_PI) - turns * TWO_PI_LOW
 
 
@@ -288,7 +288,7 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
 
     Fills floats[j] (VALUE to TIME_BAR) at targets[j] with status OK, or those of the turning point before it, or
     within whose bar it lies, with TURNING; EQUILIBRIUM where the solution runs into one first, SEPARATRIX
-    where the error bar cannot tell whether it turns. OK is certain: a target that is reached with no certain w is in
+    where the error bar leaves open whether it turns. OK is certain: a target that is reached with no certain w is in
     doubt until the solution has left it behind.
     """
     T = table()
@@ -300,7 +300,7 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
     j, size, doubt = 0, len(targets), -1  # doubt: the first target in doubt
     ending = OK
     if w0 == 0.0 and start_sign(p, phi, w0) <= 0:
-        # within rounding of an equilibrium it is not told to which side the solution leaves it
+        # within rounding of an equilibrium the side on which the solution leaves it is open
         ending = TURNING if start_sign(p, phi, w0) < 0 else (EQUILIBRIUM if rests(p, phi0, w0) else SEPARATRIX)
         while j < size and targets[j] == phi0:
             floats[j, rc.VALUE] = floats[j, rc.TIME] = floats[j, rc.VALUE_BAR] = floats[j, rc.TIME_BAR] = 0.0
@@ -389,7 +389,7 @@ def fill_crossing(floats, j, n, v, t, a, b, c, f, g):
 
     Near a turning point w^2 is smooth in phi while w is not; there the bar is that of w^2.
     """
-    n += 2  # the initial phi, the target and the time where it is reached err too: no more than four terms
+    n += 2  # the initial phi, the target and the time at which it is reached have errors too: at most four terms
     floats[j, rc.VALUE], floats[j, rc.TIME] = max(v, 0.0), t
     slope = (f * v + g) / v if v > 0.0 else math.inf
     spread = bar(n, c - 2.0 * slope * b + slope * slope * a) if v > 0.0 else math.inf

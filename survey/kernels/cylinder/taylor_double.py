@@ -1,7 +1,7 @@
 """Taylor series of order 30 in double-double arithmetic, for flows on the cylinder: what float64 leaves open.
 
-About 30 digits, 20 to 40 microseconds a step. The measure asks it for points that miss the asked accuracy, whose
-turning points are not told, or whose fate float64 leaves open, as next to separatrices. Compiled when first asked.
+About 30 digits, 20 to 40 microseconds a step. The measure uses it for points that miss the requested accuracy, whose
+turning points stay uncounted, or whose fate float64 leaves open, as next to separatrices. Compiled on first use.
 
 Source: see `kernels.cylinder.flow_double`.
 """
@@ -16,14 +16,17 @@ FLOW_WORK = 1
 
 
 def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
-    """See `steps.trajectories`; tolerance and limit have no meaning here. One call a row, to be stopped in time."""
+    """See `steps.trajectories`; tolerance and limit have no meaning here.
+
+    One call per row, so that a run can be interrupted.
+    """
     for i in range(len(P)):
         asked = times[i, : finite(times[i])]
         status[i] = flow_double.trajectory(P[i], starts[i, 0], starts[i, 1], asked, floats[i], turnings[i])
 
 
 def flow_abels(P, starts, targets, tolerance, limit, floats, status):
-    """See `steps.abels`; likewise."""
+    """See `steps.abels`, and `flow_trajectories`."""
     for i in range(len(P)):
         asked = targets[i, : finite(targets[i])]
         flow_double.abel(P[i], starts[i, 0], starts[i, 1], asked, floats[i], status[i])

@@ -25,7 +25,7 @@ from survey.kernels.jit import inline
 from survey.kernels.math.double import two_prod
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
-# Rows of the work array behind what comes out: what is asked, and what the stages hand on.
+# Rows of the work array after the results: the inputs, and what one stage leaves for the next.
 B12, B31, D, C23, S2, S3, MU, OTHER, PHI, SLIP, W0, TIME = range(5, 17)
 _F, _SLOPE, _NOISE, _OFFSET, _MISS, _GAIN, _SQUARE, _PHASE, _TURNS, _DECAY = range(17, 27)
 ROWS = 27
@@ -125,11 +125,11 @@ def _phase(T):
     for i in range(LANES):
         w0, F, f, t = abs(T[W0, i]), T[_F, i], T[_SLOPE, i], T[TIME, i]
         square = (w0 - 2.0 * F) * w0 - f * f
-        whole = math.sqrt(abs(square)) * t
-        turns = (whole * (0.5 / math.pi) + _NEAREST) - _NEAREST if square > 0.0 else 0.0
-        phase = (0.5 * whole - turns * math.pi) - turns * _PI_LOW
+        angle = math.sqrt(abs(square)) * t
+        turns = (angle * (0.5 / math.pi) + _NEAREST) - _NEAREST if square > 0.0 else 0.0
+        phase = (0.5 * angle - turns * math.pi) - turns * _PI_LOW
         T[_SQUARE, i], T[_TURNS, i], T[_PHASE, i] = square, turns, phase if square > 0.0 else 0.0
-        T[_DECAY, i] = min(whole, _MOST) if square < 0.0 else 0.0
+        T[_DECAY, i] = min(angle, _MOST) if square < 0.0 else 0.0
 
 
 @inline

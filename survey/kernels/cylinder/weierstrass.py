@@ -10,7 +10,7 @@ wp = e1 + xi, e1 the greatest real root of 4 e^3 - g2 e - g3, and xi lies on y^2
 lead to it from (M cot M t)^2, and all their terms are positive, for real and for complex e2, e3. The period is pi/M.
 
 One lane is one solution at one time; no lane calls libm. Every error bar is carried forward with its value: "d_" is
-a bound of an error, "e_" of a relative one. `late` is an error in time, it counts with w and w'.
+a bound of an error, "e_" of a relative one. `delay` is an error in time; it acts through w and w'.
 
 Sources: E. T. Whittaker, G. N. Watson, A Course of Modern Analysis, 20.6; DLMF 23.10, 23.22(ii); J.-B. Bost, J.-F.
 Mestre, Gaz. Math. 38 (1988) 36-64 (isogenies); `scenes/gyrostat.md`, section 2, (62)-(68).
@@ -31,12 +31,12 @@ LANES = 32
 _LEVELS = 7  # of the means: enough for 1e-6 <= b1/a1 <= 1e6
 _HALLEY = 5
 
-# Rows of the work array: what comes out, what is asked, what the stages hand on, and the means.
+# Rows of the work array: the results, the inputs, what one stage leaves for the next, and the means.
 X, W, BAR_X, BAR_W, COUNT = range(5)
 D, C23, S2, S3, PHI, SLIP, W0, TIME = range(5, 13)
 _SIDE, _M, _P, _Q, _R, _O, _D_M, _D_1, _D_2, _BEND = range(13, 23)
 _E1, _D_E1, _H2, _E_H, _Q4, _D_Q4 = range(23, 29)
-_LATE, _TURNS, _PHASE, _XI_P, _XI_Q, _Y = range(29, 35)
+_DELAY, _TURNS, _PHASE, _XI_P, _XI_Q, _Y = range(29, 35)
 _LOST, _E_A, _E_B, _BY_SHAPE = range(35, 39)
 _MEAN_A, _MEAN_B, _BY_A, _BY_B = (39 + i * (_LEVELS + 1) for i in range(4))
 ROWS = _BY_B + _LEVELS + 1
@@ -159,8 +159,8 @@ def _phase(T):
         phase = (theta - turns * math.pi) - turns * _PI_LOW
         s, c = sine_cosine(phase)
         e_mean = 0.5 * ((1.0 + by_shape) * T[_E_A, i] + (1.0 - by_shape) * T[_E_B, i]) + 12.0 * ROUNDOFF_UP
-        late = t * (e_mean + 4.0 * ROUNDOFF_UP) + 2.0 * ROUNDOFF_UP / mean
-        T[_LATE, i] = late if abs(a - b) <= 1e-15 * a else math.inf
+        delay = t * (e_mean + 4.0 * ROUNDOFF_UP) + 2.0 * ROUNDOFF_UP / mean
+        T[_DELAY, i] = delay if abs(a - b) <= 1e-15 * a else math.inf
         T[_TURNS, i], T[_PHASE, i], T[_BY_SHAPE, i] = turns, phase, 2.0 * by_shape
         T[_XI_P, i], T[_XI_Q, i], T[_Y, i] = c * c, s * s, s * c
 
@@ -194,7 +194,7 @@ def _branch(half, plus, lower, v, C, curved, steep):
     """The sign that makes (N, D) a positive multiple of (sin x/2, cos x/2) on the whole of a libration.
 
     N and D vanish together, and so change it, where v = +-sqrt(C) in that half of the period in which the solution does
-    not pass x = pi. `plus` is B v + C0 at sqrt(C), which tells the half; `curved` - `steep` has the sign of the
+    not pass x = pi. `plus` is B v + C0 at sqrt(C), which decides the half; `curved` - `steep` has the sign of the
     product with that at -sqrt(C).
     """
     between = half if plus >= 0.0 else -half
@@ -209,7 +209,7 @@ def _formula(T):
         w0, m, p, q, r, o = T[W0, i], T[_M, i], T[_P, i], T[_Q, i], T[_R, i], T[_O, i]
         d_m, d_1, d_2, bend = T[_D_M, i], T[_D_1, i], T[_D_2, i], T[_BEND, i]
         e1, d_e1, H2, e_h, q4, d_q4 = T[_E1, i], T[_D_E1, i], T[_H2, i], T[_E_H, i], T[_Q4, i], T[_D_Q4, i]
-        late, turns, phase, by_shape = T[_LATE, i], T[_TURNS, i], T[_PHASE, i], 0.5 * T[_BY_SHAPE, i]
+        delay, turns, phase, by_shape = T[_DELAY, i], T[_TURNS, i], T[_PHASE, i], 0.5 * T[_BY_SHAPE, i]
         e = abs(1.0 + by_shape) * T[_E_A, i] + abs(1.0 - by_shape) * T[_E_B, i] + 40.0 * ROUNDOFF_UP
         mean = 0.5 * (T[_MEAN_A + _LEVELS, i] + T[_MEAN_B + _LEVELS, i])
         size, unit = 1.0 / (T[_XI_P, i] + T[_XI_Q, i]), mean * mean
@@ -277,8 +277,8 @@ def _formula(T):
         sign = sign if plain or other * lower >= 0.0 else -sign
         sign = sign if swings else (1.0 if y1 * phase >= 0.0 else -1.0)
         x = 2.0 * arctangent(sign * y1, sign * y2) + (0.0 if swings else turns * TWO_PI)
-        bar_x = abs(w) * late + bend * late * late + fixed + 4.0 * ROUNDOFF_UP * abs(x)
-        bar_w = slope * late + bend * late * (abs(w) * late + bend * late * late) + d_w
+        bar_x = abs(w) * delay + bend * delay * delay + fixed + 4.0 * ROUNDOFF_UP * abs(x)
+        bar_w = slope * delay + bend * delay * (abs(w) * delay + bend * delay * delay) + d_w
         lost = T[_LOST, i] != 0.0 or not (known and norm > _LEAST)
         T[X, i], T[W, i] = T[_SIDE, i] * x, T[_SIDE, i] * w
         T[BAR_X, i], T[BAR_W, i] = math.inf if lost else _SAFE * bar_x, _SAFE * bar_w

@@ -33,7 +33,7 @@ STRAIGHT = 1e-7  # rad: so near to its line the angle is kept, or nearer than th
 
 @kernel
 def ends(p, eqs, count, phi, w, bar_phi, bar_w, end):
-    """Is it certain how the solution turns from (phi, w) on? Then `end` says it."""
+    """Is it certain how the solution turns from (phi, w) on? Then fill `end` with it."""
     for i in range(count):
         row = eqs[i]
         if not (row[STABLE] < 0.0 and (row[KIND] == NODE or row[KIND] == FOCUS)):

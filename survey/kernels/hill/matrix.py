@@ -2,7 +2,7 @@
 
 from survey.kernels.jit import inline
 
-ROUNDING = 2.2e-16
+ROUNDING = 2.2e-16  # about two roundings; `rounding` takes it twice
 
 
 @inline
@@ -30,16 +30,16 @@ def rounding(size, h):
 
 
 @inline
-def doubled(first, second, whole, order, size, h):
-    """P of two half steps `first`, `second`, with Richardson's estimate against the `whole` step."""
+def doubled(first, second, full, order, size, h):
+    """P of two half steps `first`, `second`, with Richardson's estimate against the `full` step."""
     a1, b1, c1, d1 = first
     a2, b2, c2, d2 = second
     a, b, c, d = a2 * a1 + b2 * c1, a2 * b1 + b2 * d1, c2 * a1 + d2 * c1, c2 * b1 + d2 * d1
-    whole_a, whole_b, whole_c, whole_d = whole
+    full_a, full_b, full_c, full_d = full
     r11, r12, r21 = rounding(size, h)
     safety = 2.0 / (2.0**order - 1.0)
-    e11 = safety * (abs(a - whole_a) + abs(d - whole_d)) + r11
-    return a, b, c, d, e11, safety * abs(b - whole_b) + r12, safety * abs(c - whole_c) + r21
+    e11 = safety * (abs(a - full_a) + abs(d - full_d)) + r11
+    return a, b, c, d, e11, safety * abs(b - full_b) + r12, safety * abs(c - full_c) + r21
 
 
 @inline

@@ -2,7 +2,7 @@
 
 A row is `rows[r]` = (k, k', half period, oblate, given, which): for rotations k > 1 and k' is the complement of 1/k;
 `given` is the parameter of this row that is known exactly, and `which` says which one it is.
-Notes (scenes/satellite.md), section 1: z = (rho + w)^2 + g with g = dn^2 (PL), -k^2 sn^2 (OL), cn^2 (PR),
+`scenes/satellite.md`, section 1: z = (rho + w)^2 + g with g = dn^2 (PL), -k^2 sn^2 (OL), cn^2 (PR),
 -sn^2 (OR): no cancelling constant.
 """
 
@@ -110,7 +110,7 @@ def potential(u, rho, row, table):
 
 @inline
 def tabulate(row, table):
-    """What `potential` needs of a row, once: the means of 1 and k', and in the last place their number."""
+    """What `potential` needs of a row, once: the means of 1 and k', and as the last entry their number."""
     table[0, MEANS] = means(row[1], table)
 
 
@@ -190,8 +190,8 @@ def coefficient(side, exact, rho, clock, z):
         # w^2 + sin^2 x is constant, so g' = (w^2)'
         z[0, n], z[1, n] = dd.add(shift, (2.0 * clock[SQUARE, 0, n], 2.0 * clock[SQUARE, 1, n]))
     shifted = dd.add(rho, (sign * clock[W, 0, 0], sign * clock[W, 1, 0]))
-    place = SIN if oblate else COS
-    g = (clock[place, 0, 0], clock[place, 1, 0])
+    row = SIN if oblate else COS
+    g = (clock[row, 0, 0], clock[row, 1, 0])
     g = dd.mul(g, g)
     z[0, 0], z[1, 0] = dd.add(dd.mul(shifted, shifted), dd.neg(g) if oblate else g)
     return 2.0 * (abs(rho[0]) + exact[0]) * exact[0] + 2.0

@@ -1,4 +1,4 @@
-"""Taylor series of order 34 in double-double arithmetic, for points whose verdict float64 cannot tell: 30 digits.
+"""Taylor series of order 34 in double-double arithmetic, for points whose verdict float64 leaves open: 30 digits.
 
 z(t) is a polynomial in a "clock", functions with their own differential equations (cos 2t; sin x, cos x and x' of a
 pendulum), whose series give that of z. The clock starts where it is known exactly and its errors do not grow, and
@@ -114,9 +114,9 @@ def hill_walk(start, expand, potential, miss, row, p, span, before, after, work,
         expand(row, h, clock)
         for side in (1.0, -1.0):
             if j < (after if side > 0.0 else before):
-                place = before + j if side > 0.0 else before - 1 - j
-                chain[place, 11] = potential(side, row, p, clock, z) * square[0]
-                step(z, even, odd, square, side < 0.0, chain[place])
+                index = before + j if side > 0.0 else before - 1 - j
+                chain[index, 11] = potential(side, row, p, clock, z) * square[0]
+                step(z, even, odd, square, side < 0.0, chain[index])
         for c in range(len(clock)):
             clock[c, 0, 0], clock[c, 1, 0] = total(clock[c])
     compose(chain[:steps], h, miss(row, clock) + steps * PAIR_ROUNDOFF, out)

@@ -36,7 +36,7 @@ def gap(mu, critical):
 
 
 @inline
-def put(f, which, number):
+def store(f, which, number):
     f[0, which], f[1, which] = number
 
 
@@ -52,18 +52,18 @@ def factors(mu, f):
     u = dd.times(dd.add(one, s), 0.5)
     v = dd.div(x, u)  # the small root
     five, ten = dd.sub(one, dd.times(u, 5.0)), dd.sub(one, dd.times(u, 10.0))
-    put(f, W1, dd.sqrt(u))
-    put(f, W2, dd.sqrt(v))
-    put(f, U, u)
-    put(f, V, v)
-    put(f, S, s)
-    put(f, FIVE_U, five)
-    put(f, FIVE_V, dd.div(dd.times(gap(mu, MU_1), 168.75), five))  # (1 - 5u)(1 - 5v) = 25x - 4
-    put(f, TEN_U, ten)
-    put(f, TEN_V, dd.div(dd.times(gap(mu, MU_2), 675.0), ten))  # (1 - 10u)(1 - 10v) = 100x - 9
-    put(f, FOUR_U, dd.sub((4.0, 0.0), u))
-    put(f, FOUR_V, dd.sub((4.0, 0.0), v))
-    put(f, NINE, dd.sub((9.0, 0.0), dd.times(x, 4.0)))
+    store(f, W1, dd.sqrt(u))
+    store(f, W2, dd.sqrt(v))
+    store(f, U, u)
+    store(f, V, v)
+    store(f, S, s)
+    store(f, FIVE_U, five)
+    store(f, FIVE_V, dd.div(dd.times(gap(mu, MU_1), 168.75), five))  # (1 - 5u)(1 - 5v) = 25x - 4
+    store(f, TEN_U, ten)
+    store(f, TEN_V, dd.div(dd.times(gap(mu, MU_2), 675.0), ten))  # (1 - 10u)(1 - 10v) = 100x - 9
+    store(f, FOUR_U, dd.sub((4.0, 0.0), u))
+    store(f, FOUR_V, dd.sub((4.0, 0.0), v))
+    store(f, NINE, dd.sub((9.0, 0.0), dd.times(x, 4.0)))
     return True
 
 
@@ -137,15 +137,15 @@ def product(k, f):
     """k . omega = (k1 + k3) - k1 (1 - omega1) - k2 omega2 and its error bar; 1 - omega1 = v / (1 + omega1)."""
     first = dd.times(dd.div((f[0, V], f[1, V]), dd.shifted((f[0, W1], f[1, W1]), 1.0)), -k[0])
     second = dd.times((f[0, W2], f[1, W2]), -k[1])
-    whole = k[0] + k[2]
-    total = dd.shifted(dd.add(first, second), whole)
-    size = abs(whole) + abs(first[0]) + abs(second[0])
+    integer = k[0] + k[2]
+    total = dd.shifted(dd.add(first, second), integer)
+    size = abs(integer) + abs(first[0]) + abs(second[0])
     return total[0], MARGIN * (ROUNDOFF * abs(total[0]) + WIDE * size)
 
 
 @kernel
 def linear(mu, vectors, frequencies, nearest, distance):
-    """omega1, omega2 (rows of `frequencies`), the place among `vectors` of the nearest resonance, |k . omega|, its bar.
+    """omega1, omega2 (rows of `frequencies`), the index among `vectors` of the nearest resonance, |k . omega|, its bar.
 
     The last two are rows of `distance`. NaN and -1 outside 0 < mu < mu_R. Of equals the first counts.
     """

@@ -1,7 +1,7 @@
 """Danby's problem in lanes: the monodromy of the elliptic triangular points over half a period, and its factors.
 
 In the true anomaly f, with r(f) = 1 / (1 + e cos f), rotated axes and the state (x, q, p, m) = (xi, eta' + xi,
-xi' - eta, -eta) (the scene's notes, section 2):
+xi' - eta, -eta) (`scenes/libration_elliptic.md`, section 2):
 
     x' = p - m      m' = x - q      q' = -x' - d2 r m      p' = -m' + d1 r x
 
@@ -22,7 +22,7 @@ from survey.kernels.unroll import largest, unroll
 
 TILE = 64
 VECTOR = 8
-ROUNDING = 4.4e-16
+ROUNDING = 4.4e-16  # of an entry of one step, about four roundings
 WORST = 300.0
 # Rows of the working table, lanes innermost: the propagator so far (4 x 4), V (upper triangle), the sum of local
 # errors; of each lane d1, d2, e; of each column forward (4), backward (4) and the error of each; a method's own.
@@ -41,15 +41,15 @@ def chain(columns, own, v, h, e, d1, d2, out):
     work = np.empty((OWN + own, TILE))
     for first in range(0, size, TILE):
         count = min(TILE, size - first)
-        # so many lanes fill the machine's vectors; those beyond `count` repeat the last
-        whole = (count + VECTOR - 1) // VECTOR * VECTOR
-        start(work, whole)
-        for i in range(whole):
+        # lanes that fill the machine's vectors; those beyond `count` repeat the last
+        padded = (count + VECTOR - 1) // VECTOR * VECTOR
+        start(work, padded)
+        for i in range(padded):
             at = first + min(i, count - 1)
             work[D1, i], work[D2, i], work[E, i] = d1[at], d2[at], e[at]
         for n in range(steps):
-            columns(v[n], h[n], work, whole)
-            for i in range(whole):
+            columns(v[n], h[n], work, padded)
+            for i in range(padded):
                 advance(work, i)
         for i in range(count):
             finish(work, i, steps, out[first + i])
@@ -81,7 +81,7 @@ def copy(work, first, column, count):
 def advance(work, i):
     """One step of lane i."""
     # forward and backward by rows: their columns 0, 1 start in X, 2, 3 in Y
-    step = [[work[COLUMNS + COLUMN * c + place, i] for c in range(4)] for place in range(COLUMN)]
+    step = [[work[COLUMNS + COLUMN * c + k, i] for c in range(4)] for k in range(COLUMN)]
     forward, backward, (forward_error, backward_error) = step[:4], step[4:8], step[8:]
     g = [_by_inverse(row, backward) for row in forward]
     # |error of G|_ij <= y_j + x_i: through F, and through the inverse of B
@@ -99,13 +99,13 @@ def advance(work, i):
         rounding = [largest(rounding[k], _dot(_magnitudes(g[k]), sizes)) for k in range(4)]
     local = [by_y + by_x * x[k] + ROUNDING * rounding[k] for k in range(4)]
     work[SUM, i] = work[SUM, i] + largest(largest(y[0], y[1]), largest(y[2], y[3]))
-    places = {(j, k): at for at, (j, k) in enumerate(combinations_with_replacement(range(4), 2), V)}
-    v = [[work[places[min(j, k), max(j, k)], i] for k in range(4)] for j in range(4)]
+    rows = {(j, k): at for at, (j, k) in enumerate(combinations_with_replacement(range(4), 2), V)}
+    v = [[work[rows[min(j, k), max(j, k)], i] for k in range(4)] for j in range(4)]
     for j in range(4):
         row = [_dot(g[j], v[k]) for k in range(4)]
         for k in range(j, 4):
             propagated = _dot(row, g[k])
-            work[places[j, k], i] = propagated + local[j] * local[j] if j == k else propagated
+            work[rows[j, k], i] = propagated + local[j] * local[j] if j == k else propagated
 
 
 def _dot(a, b):

@@ -16,7 +16,7 @@ from math import asinh, ceil, sinh, sqrt
 import numpy as np
 
 from survey.kernels.jit import inline, kernel
-from survey.kernels.libration.traces import FACTORS, A, C, D, T
+from survey.kernels.libration.traces import INVARIANTS, A, C, D, T
 from survey.kernels.math import double as dd
 from survey.kernels.math.roundoff import PAIR_ROUNDOFF
 
@@ -30,7 +30,7 @@ MARGIN = 1.01  # for what is of second order in the bars
 X, G, K, M = range(4)
 # Columns A to T of `traces` are leading parts; LOW columns further on follows what rounding left of them, and BARS
 # further on the bounds of their errors.
-LOW, BARS, RESULTS = FACTORS, 2 * FACTORS, 3 * FACTORS
+LOW, BARS, RESULTS = INVARIANTS, 2 * INVARIANTS, 3 * INVARIANTS
 
 
 @kernel
@@ -48,29 +48,29 @@ def chain(e, both, out):
     """Fill `out` (N, RESULTS) for points e (N) with their rates `both` (N, 4)."""
     series, errors = np.zeros((4, 2, ORDERS + 2)), np.zeros((4, ORDERS + 2))
     ends, doubt = np.zeros((2, 2, 4, 4)), np.zeros((2, 4, 4))
-    step, whole = np.zeros((2, 4, 4)), np.zeros((2, 4, 4))
+    step, composed = np.zeros((2, 4, 4)), np.zeros((2, 4, 4))
     off, constants = np.zeros((4, 4)), np.zeros((2, 3, 4))
     for i in range(len(e)):
-        whole[:], spread, steps = 0.0, np.zeros((4, 4)), 0
+        composed[:], spread, steps = 0.0, np.zeros((4, 4)), 0
         for j in range(4):
-            whole[0, j, j] = 1.0
+            composed[0, j, j] = 1.0
         for part in range(2):
             side = 1.0 - 2.0 * part
             near = sqrt((1.0 - e[i]) / (1.0 + e[i])) if part else 1.0
             number = ceil(asinh(1.0 / near) / (2.0 * RATIO))
             for n in range(number):
-                left, right = place(n, number, near, part), place(n + 1, number, near, part)
+                left, right = step_end(n, number, near, part), step_end(n + 1, number, near, part)
                 prepare(left, right, dd.two_sum(1.0, side * e[i]), dd.two_sum(1.0, -side * e[i]), both[i], constants)
                 for c in range(4):
                     column(c, constants, series, errors, ends, doubt)
                 propagator(ends, doubt, step, off)
-                advance(step, off, whole, spread)
+                advance(step, off, composed, spread)
             steps += number
-        finish(whole, spread, steps, out[i])
+        finish(composed, spread, steps, out[i])
 
 
 @inline
-def place(n, number, near, part):
+def step_end(n, number, near, part):
     """The n-th end u of the steps, even in asinh(u / near): from 0 to 1, and in the second part from -1 to 0."""
     n = number - n if part else n
     u = 1.0 if n == number else near * sinh(asinh(1.0 / near) * n / number)
@@ -85,18 +85,18 @@ def prepare(left, right, b0, b2, both, constants):
     a0, c0 = dd.shifted(square, 1.0), dd.add(b0, dd.mul(b2, square))
     turn, by_r = dd.scaled(dd.div(half, a0), 2.0), dd.scaled(dd.div(half, c0), 2.0)
     for i in (X, M):
-        put(constants, 0, i, turn)
-        put(constants, 1, i, dd.div(linear, a0))
-        put(constants, 2, i, dd.div(last, a0))
+        store(constants, 0, i, turn)
+        store(constants, 1, i, dd.div(linear, a0))
+        store(constants, 2, i, dd.div(last, a0))
     for i in (G, K):
         rate = (both[0], both[1]) if i == K else (-both[2], -both[3])
-        put(constants, 0, i, dd.mul(by_r, rate))
-        put(constants, 1, i, dd.div(dd.mul(b2, linear), c0))
-        put(constants, 2, i, dd.div(dd.mul(b2, last), c0))
+        store(constants, 0, i, dd.mul(by_r, rate))
+        store(constants, 1, i, dd.div(dd.mul(b2, linear), c0))
+        store(constants, 2, i, dd.div(dd.mul(b2, last), c0))
 
 
 @inline
-def put(constants, row, i, number):
+def store(constants, row, i, number):
     constants[0, row, i], constants[1, row, i] = number
 
 
@@ -104,7 +104,7 @@ def put(constants, row, i, number):
 def column(c, constants, series, errors, ends, doubt):
     """Column c of the propagators from a step's middle to its ends (1, -1), and bounds of its errors.
 
-    Place n + 1 of a series is its n-th coefficient, place 0 that of -1.
+    Entry n + 1 of a series is its n-th coefficient, entry 0 that of -1.
     """
     series[:, :, 1], errors[:, 1] = 0.0, 0.0
     series[X, 0, 1], series[G, 0, 1] = 1.0 * (c == 0), 1.0 * (c < 2)
@@ -169,7 +169,7 @@ def sums(series, errors, last, c, ends, doubt):
 def propagator(ends, doubt, step, off):
     """`step` = F B^-1 with F and B to the ends 1 and -1, and a bound of each entry's error.
 
-    Entry (n, j) of the inverse of (P, S; Q, T), (T', -S'; -Q', P'), is +-B(j + 2, n + 2), places modulo 4.
+    Entry (n, j) of the inverse of (P, S; Q, T), (T', -S'; -Q', P'), is +-B(j + 2, n + 2), indices modulo 4.
     """
     for i in range(4):
         for j in range(4):
@@ -183,9 +183,9 @@ def propagator(ends, doubt, step, off):
 
 
 @inline
-def advance(step, off, whole, spread):
-    """whole <- step whole, and V <- G V G' + diag(d^2) with d the largest new error of a row."""
-    old, carried, local = whole.copy(), np.zeros((4, 4)), np.zeros(4)
+def advance(step, off, composed, spread):
+    """composed <- step composed, and V <- G V G' + diag(d^2) with d the largest new error of a row."""
+    old, carried, local = composed.copy(), np.zeros((4, 4)), np.zeros(4)
     for i in range(4):
         for j in range(4):
             s, bound = (0.0, 0.0), 0.0
@@ -194,7 +194,7 @@ def advance(step, off, whole, spread):
                 s = dd.add(s, dd.mul(g, w))
                 bound += (off[i, n] + PRODUCT * abs(g[0])) * abs(w[0])
                 carried[i, j] += g[0] * spread[n, j]
-            whole[0, i, j], whole[1, i, j] = s
+            composed[0, i, j], composed[1, i, j] = s
             local[i] = max(local[i], bound)
     for i in range(4):
         for j in range(4):
@@ -208,18 +208,22 @@ def advance(step, off, whole, spread):
 def row_bars(spread, steps, bars):
     """Fill `bars` with the error bounds of the entries of each row after `steps` steps."""
     for i in range(4):
-        bars[i] = MARGIN * sqrt((4.0 * steps - 3.0) * spread[i, i])  # of so many terms, as in `kernels.libration.danby`
+        # 4 steps - 3 terms, as in `kernels.libration.danby`
+        bars[i] = MARGIN * sqrt((4.0 * steps - 3.0) * spread[i, i])
 
 
 @inline
-def finish(whole, spread, steps, out):
+def finish(composed, spread, steps, out):
     """A, B, C, D, t and the bounds of their errors: A = det P, B = det T, C = det Q, D = det S, t = tr T'P."""
     bars = np.zeros(4)
     row_bars(spread, steps, bars)
-    for at in range(FACTORS - 1):
+    for at in range(INVARIANTS - 1):
         i, j = 0 if at in (A, D) else 2, 0 if at in (A, C) else 2
-        a, b = (whole[0, i, j], whole[1, i, j]), (whole[0, i, j + 1], whole[1, i, j + 1])
-        c, d = (whole[0, i + 1, j], whole[1, i + 1, j]), (whole[0, i + 1, j + 1], whole[1, i + 1, j + 1])
+        a, b = (composed[0, i, j], composed[1, i, j]), (composed[0, i, j + 1], composed[1, i, j + 1])
+        c, d = (
+            (composed[0, i + 1, j], composed[1, i + 1, j]),
+            (composed[0, i + 1, j + 1], composed[1, i + 1, j + 1]),
+        )
         one, other = dd.mul(a, d), dd.mul(b, c)
         out[at], out[LOW + at] = dd.sub(one, other)
         bar = bars[i] * (abs(c[0]) + abs(d[0])) + bars[i + 1] * (abs(a[0]) + abs(b[0])) + 2.0 * bars[i] * bars[i + 1]
@@ -227,7 +231,10 @@ def finish(whole, spread, steps, out):
     t, bar = (0.0, 0.0), 0.0
     for i in range(2):
         for j in range(2):
-            a, b = (whole[0, i, j], whole[1, i, j]), (whole[0, 2 + i, 2 + j], whole[1, 2 + i, 2 + j])
+            a, b = (
+                (composed[0, i, j], composed[1, i, j]),
+                (composed[0, 2 + i, 2 + j], composed[1, 2 + i, 2 + j]),
+            )
             t = dd.add(t, dd.mul(a, b))
             bar += bars[i] * abs(b[0]) + bars[2 + i] * abs(a[0]) + bars[i] * bars[2 + i] + PRODUCT * abs(a[0] * b[0])
     out[T], out[LOW + T], out[BARS + T] = t[0], t[1], bar

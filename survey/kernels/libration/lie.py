@@ -28,7 +28,7 @@ NARROW = 1e-12  # a divisor below it is not divided by
 
 
 @kernel
-def normal_forms(code, places, numbers, harmonics, diagonal, rows, mu, values, norms):
+def normal_forms(code, indices, numbers, harmonics, diagonal, rows, mu, values, norms):
     """values (3, M, N): real and imaginary parts and bars of the M diagonal coefficients.
 
     norms (measured, 2, 3, N): values and bars. NaN where mu lies outside (0, mu_R) or next to mu_R, and in what a
@@ -39,7 +39,7 @@ def normal_forms(code, places, numbers, harmonics, diagonal, rows, mu, values, n
         count = min(LANES, len(mu) - first)
         for i in range(LANES):
             start(mu[first + min(i, count - 1)], i, harmonics, big, divisors)
-        run(code, places, numbers, divisors, big, norms, first, count)
+        run(code, indices, numbers, divisors, big, norms, first, count)
         for d in range(len(diagonal)):
             for i in range(count):
                 values[0, d, first + i] = big[diagonal[d], RE + i]
@@ -95,17 +95,17 @@ def start(mu, i, harmonics, big, divisors):
 
 
 @kernel
-def run(code, places, numbers, divisors, big, norms, lane, count):
+def run(code, indices, numbers, divisors, big, norms, lane, count):
     for c in range(len(code)):
         operation, first, last = code[c, 0], code[c, 4], code[c, 5]
         target, source, factor = np.uint64(code[c, 1]), np.uint64(code[c, 2]), np.uint64(code[c, 3])
         if operation == MULTIPLY:
             for t in range(first, last):
-                _multiply(big[target + places[0, t]], big[source + places[1, t]], big[factor + places[2, t]],
+                _multiply(big[target + indices[0, t]], big[source + indices[1, t]], big[factor + indices[2, t]],
                           numbers[0, t], numbers[1, t])  # fmt: skip
         elif operation == LINEAR:
             for t in range(first, last):
-                _linear(big[places[0, t]], big[places[1, t]], numbers[0, t])
+                _linear(big[indices[0, t]], big[indices[1, t]], numbers[0, t])
         elif operation == CLEAR:
             for r in range(last):
                 row = big[target + np.uint64(r)]
@@ -116,9 +116,11 @@ def run(code, places, numbers, divisors, big, norms, lane, count):
                 _finish(big[target + np.uint64(r)])
         elif operation == DIVIDE:
             for t in range(first, last):
-                _divide(big[target + places[0, t]], big[source + places[1, t]], divisors[places[2, t]], numbers[0, t])
+                _divide(
+                    big[target + indices[0, t]], big[source + indices[1, t]], divisors[indices[2, t]], numbers[0, t]
+                )
         else:
-            _measure(big, source, places, first, last, norms[target, :, :, lane : lane + count])
+            _measure(big, source, indices, first, last, norms[target, :, :, lane : lane + count])
 
 
 @inline

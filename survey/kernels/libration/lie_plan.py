@@ -28,7 +28,7 @@ class Plan(NamedTuple):
     """What the kernel runs: arrays."""
 
     code: np.ndarray  # (n, 6): operation; rows of target, source and factor; first and last of the terms
-    places: np.ndarray  # (3, T) of the terms
+    indices: np.ndarray  # (3, T) of the terms
     numbers: np.ndarray  # (2, T)
     harmonics: np.ndarray  # (m, 3) of the divisors
     diagonal: np.ndarray  # rows of the normal form's coefficients
@@ -42,7 +42,7 @@ class Draft:
 
     rows: int = WORK
     code: list = field(default_factory=list)
-    places: list = field(default_factory=list)
+    indices: list = field(default_factory=list)
     numbers: list = field(default_factory=list)
     terms: int = 0
     divisors: np.ndarray | None = None
@@ -53,15 +53,15 @@ class Draft:
         self.rows += count
         return self.rows - count
 
-    def hold(self, places, numbers, name=None):
+    def hold(self, indices, numbers, name=None):
         """First and last of these terms, which are kept once under their name."""
         if name is None or name not in self.kept:
-            first, self.terms = self.terms, self.terms + len(places[0])
-            self.places.append(np.array(places, np.int64).reshape(3, -1))
+            first, self.terms = self.terms, self.terms + len(indices[0])
+            self.indices.append(np.array(indices, np.int64).reshape(3, -1))
             self.numbers.append(np.array(numbers, float).reshape(2, -1))
             self.kept[name] = first
         first = self.kept[name]
-        return first, first + len(places[0])
+        return first, first + len(indices[0])
 
     def add(self, operation, target=0, source=0, factor=0, first=0, last=0):
         self.code.append((operation, target, source, factor, first, last))
@@ -80,9 +80,9 @@ class Draft:
             self.add(LINEAR, 0, 0, 0, first, last)
 
     def plan(self, diagonal):
-        places, numbers = (np.concatenate(part, axis=1) for part in (self.places, self.numbers))
+        indices, numbers = (np.concatenate(part, axis=1) for part in (self.indices, self.numbers))
         code, harmonics = np.array(self.code, np.int64), self.divisors.astype(float)
-        return Plan(code, places.astype(np.uint64), numbers, harmonics, diagonal, self.rows, self.measured)
+        return Plan(code, indices.astype(np.uint64), numbers, harmonics, diagonal, self.rows, self.measured)
 
 
 def chain(stage, degree):
@@ -147,12 +147,12 @@ def rows(degree, cutoff):
 
 
 def divide(out, stage, chi, source):
-    """chi / i = F / (Omega . k), at all places with k != 0."""
+    """chi / i = F / (Omega . k), for all monomials with k != 0."""
     m = monomials(stage)
-    places = np.flatnonzero(norm(m.harmonic) > 0)
-    own = m.harmonic[places] * m.sign[places, None]
+    indices = np.flatnonzero(norm(m.harmonic) > 0)
+    own = m.harmonic[indices] * m.sign[indices, None]
     at = (out.divisors[None] == own[:, None]).all(axis=2).argmax(axis=1)
-    first, last = out.hold((places, m.row[places], at), (m.sign[places], m.sign[places]))
+    first, last = out.hold((indices, m.row[indices], at), (m.sign[indices], m.sign[indices]))
     out.add(DIVIDE, chi, source, 0, first, last)
 
 

@@ -69,7 +69,7 @@ def monomials(degree, planar=False):
 @cache
 def products(degree, factor, planar=True):
     """Terms (out, f, g, C, sign of f) of the product of polynomials of two degrees; f, out are representatives' rows,
-    g is a place among all monomials: out += C f g, where f is conjugated if its sign is -1."""
+    g is an index among all monomials: out += C f g, where f is conjugated if its sign is -1."""
     f, g = monomials(degree, planar), monomials(factor, planar)
     together = f.exponents[:, None] + g.exponents[None]
     return _terms(monomials(degree + factor, planar), f, together, np.ones(together.shape[:2], np.int64))
@@ -79,7 +79,7 @@ def products(degree, factor, planar=True):
 def brackets(degree, factor):
     """As `products`: terms of the Poisson bracket {f, i g} = -sum over j of f_zj g_zbarj - f_zbarj g_zj.
 
-    {z_j, zbar_j} = i. Of g only the places with k != 0 are used.
+    {z_j, zbar_j} = i. Of g only the monomials with k != 0 are used.
     """
     f, g = monomials(degree), monomials(factor)
     parts = []
@@ -95,10 +95,10 @@ def brackets(degree, factor):
 
 
 def _terms(out, f, exponents, number):
-    """Columns (out row, f row, g place, C, sign) of the pairs with number != 0 whose product is a representative."""
+    """Columns (out row, f row, g index, C, sign) of the pairs with number != 0 whose product is a representative."""
     i, j = np.nonzero(number)
-    place = out.find(exponents[i, j])
-    kept = out.sign[place] > 0
-    i, j, place = i[kept], j[kept], place[kept]
-    terms = np.stack([out.row[place], f.row[i], j, number[i, j], f.sign[i]])
+    index = out.find(exponents[i, j])
+    kept = out.sign[index] > 0
+    i, j, index = i[kept], j[kept], index[kept]
+    terms = np.stack([out.row[index], f.row[i], j, number[i, j], f.sign[i]])
     return terms[:, np.argsort(terms[0], kind="stable")]

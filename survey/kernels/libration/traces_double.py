@@ -7,7 +7,7 @@ import numpy as np
 from survey.kernels.jit import inline, kernel
 from survey.kernels.libration.danby_double import BARS, LOW
 from survey.kernels.libration.traces import (
-    FACTORS,
+    INVARIANTS,
     KREIN,
     LARGEST,
     MINUS_ONE,
@@ -24,8 +24,8 @@ from survey.kernels.libration.traces import (
     D,
     T,
     decide,
+    inaccurate,
     lost,
-    missed,
 )
 from survey.kernels.math import double as dd
 from survey.kernels.math.roundoff import PAIR_ROUNDOFF, ROUNDOFF_UP
@@ -35,15 +35,15 @@ PLACES = 32  # of a row's series
 
 
 @kernel
-def measure(results, rtol, overflow, floats, verdict, collision, late, status):
+def measure(results, rtol, overflow, floats, verdict, collision, missed, status):
     """As `traces.measure`, from results (N, danby_double.RESULTS)."""
     for i in range(len(results)):
-        _judge(results[i], i, rtol, overflow, floats, verdict, collision, late, status)
+        _settle(results[i], i, rtol, overflow, floats, verdict, collision, missed, status)
 
 
 @inline
-def _judge(r, i, rtol, overflow, floats, verdict, collision, late, status):
-    """Answer point i from its results r; late is who is undecided in any way, or misses `rtol`."""
+def _settle(r, i, rtol, overflow, floats, verdict, collision, missed, status):
+    """Answer point i from its results r; `missed` if it is undecided in any way, or misses `rtol`."""
     t, t_bar = (r[T], r[LOW + T]), r[BARS + T]
     ab, ab_bar = product((r[A], r[LOW + A]), (r[B], r[LOW + B]), r[BARS + A], r[BARS + B])
     cd, cd_bar = product((r[C], r[LOW + C]), (r[D], r[LOW + D]), r[BARS + C], r[BARS + D])
@@ -55,7 +55,7 @@ def _judge(r, i, rtol, overflow, floats, verdict, collision, late, status):
     a_bar = MARGIN * (4.0 * t_bar + 8.0 * PAIR_ROUNDOFF * size) + ROUNDOFF_UP * abs(a[0])
     b_bar = MARGIN * (16.0 * min(ab_bar, cd_bar) + 8.0 * t_bar + 64.0 * PAIR_ROUNDOFF * size) + ROUNDOFF_UP * abs(b[0])
     verdict[i] = collision[i] = UNDECIDED
-    late[i] = True
+    missed[i] = True
     if not (isfinite(a[0]) and isfinite(b[0]) and a_bar < LARGEST and b_bar < LARGEST):
         status[i] = overflow
         floats[SUM, i] = floats[SUM_BAR, i] = floats[PAIRS, i] = floats[PAIRS_BAR, i] = np.nan
@@ -69,7 +69,7 @@ def _judge(r, i, rtol, overflow, floats, verdict, collision, late, status):
         collision[i] = lost(t[0], beyond, ab[0], cd[0], k[0], t_bar, ab_bar, cd_bar, k_bar)
     elif verdict[i] == STABLE:
         collision[i] = MINUS_ONE if (r[B] > 0.0) == (r[D] > 0.0) else nearest(t, k, t_bar, k_bar)
-    late[i] = missed(a[0], a_bar, b[0], b_bar, rtol) or verdict[i] == UNDECIDED or collision[i] == UNDECIDED
+    missed[i] = inaccurate(a[0], a_bar, b[0], b_bar, rtol) or verdict[i] == UNDECIDED or collision[i] == UNDECIDED
 
 
 @inline
@@ -112,7 +112,7 @@ def to_series(results, matrix, series, bars):
 
     `matrix` (2, PLACES, PLACES) makes coefficients of values, row by coefficient.
     """
-    for j in range(FACTORS):
+    for j in range(INVARIANTS):
         bars[j] = 0.0
         for n in range(PLACES):
             s = (0.0, 0.0)
@@ -123,18 +123,18 @@ def to_series(results, matrix, series, bars):
 
 
 @kernel
-def dense(series, bars, mu, rtol, overflow, floats, verdict, collision, late, status):
+def dense(series, bars, mu, rtol, overflow, floats, verdict, collision, missed, status):
     """Answer all points mu (N) of a row from its series (5, 2, PLACES) in 4 s - 3; the `bars` (5) hold for the row."""
-    r = np.empty(BARS + FACTORS)
+    r = np.empty(BARS + INVARIANTS)
     for i in range(len(mu)):
         square = dd.shifted(dd.times(dd.square(dd.two_sum(0.5, -mu[i])), 3.0), 0.25)
         x = dd.shifted(dd.scaled(dd.sqrt(square), 4.0), -3.0)
-        for j in range(FACTORS):
-            ahead, further = (0.0, 0.0), (0.0, 0.0)
+        for j in range(INVARIANTS):
+            one, two = (0.0, 0.0), (0.0, 0.0)
             for n in range(PLACES - 1, -1, -1):  # Clenshaw
-                twice = dd.scaled(dd.mul(x, ahead), 2.0 if n else 1.0)
-                last = dd.add((series[j, 0, n], series[j, 1, n]), dd.sub(twice, further))
-                ahead, further = last, ahead
-            r[j], r[LOW + j] = ahead
+                twice = dd.scaled(dd.mul(x, one), 2.0 if n else 1.0)
+                last = dd.add((series[j, 0, n], series[j, 1, n]), dd.sub(twice, two))
+                one, two = last, one
+            r[j], r[LOW + j] = one
             r[BARS + j] = bars[j]
-        _judge(r, i, rtol, overflow, floats, verdict, collision, late, status)
+        _settle(r, i, rtol, overflow, floats, verdict, collision, missed, status)

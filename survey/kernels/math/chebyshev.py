@@ -82,7 +82,7 @@ def tail(sizes):
 
 
 def _doubt(sizes, ulps):
-    """`tail` and rounding of such series (R, n), whose argument on [-1, 1] is known to so many ulp.
+    """`tail` and rounding of such series (R, n), whose argument on [-1, 1] is known to within `ulps` ulp.
 
     Rounding is that of the transform, of Clenshaw's recurrence, and of the argument, where T_k' <= k^2.
     """

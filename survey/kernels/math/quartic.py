@@ -1,4 +1,4 @@
-"""A quartic in double-double, (c0, .., c4) as pairs: its value, and its root between two places."""
+"""A quartic in double-double, (c0, .., c4) as pairs: its value, and its root between two points."""
 
 from math import sqrt
 
@@ -54,19 +54,19 @@ def slope(c, y):
 
 
 @inline
-def near(level, first, second, side, room):
-    """How far from a place the parabola there has its zero on that side, as a part of `room`; 1 where it has none."""
+def near(height, first, second, side, room):
+    """How far from a point the parabola there has its zero on that side, as a part of `room`; 1 where it has none."""
     first *= side
-    below = level <= 0.0
-    level, first, second = (-level, -first, -second) if below else (level, first, second)
-    square = first * first - 2.0 * second * level
-    if square < 0.0 or room == 0.0 or level == 0.0:
+    below = height <= 0.0
+    height, first, second = (-height, -first, -second) if below else (height, first, second)
+    square = first * first - 2.0 * second * height
+    if square < 0.0 or room == 0.0 or height == 0.0:
         return 1.0
     root = sqrt(square)
     if first > 0.0:
         x = -(first + root) / second if second < 0.0 else room
     else:
-        x = 2.0 * level / (root - first) if root > first else room
+        x = 2.0 * height / (root - first) if root > first else room
     return min(abs(x) / room, 1.0)
 
 

@@ -131,11 +131,11 @@ def of_states(points, rows, kinds, count, heights, starts):
         rough = abs(level[0]) + 2.0 * abs(k[0]) * u[0] * u[0]
         heights[i, rc.ABOVE], heights[i, rc.ABOVE_BAR] = find(a, b, k, level, at_plus, at_minus, rough, both, two)
         heights[i, rc.FIELD] = abs(k[0])
-        place = 1 if two[1] != NONE and u[0] > 0.5 * (both[0, HIGH] + both[1, LOW]) else 0
+        well = 1 if two[1] != NONE and u[0] > 0.5 * (both[0, HIGH] + both[1, LOW]) else 0
         count[i] = (two[0] != NONE) + (two[1] != NONE) if two[0] != SEPARATRIX else -1
-        kinds[i] = two[place] if two[place] != NONE else LOST
+        kinds[i] = two[well] if two[well] != NONE else LOST
         for j in range(SIZE):
-            rows[i, j] = both[place, j]
+            rows[i, j] = both[well, j]
         if kinds[i] >= NUTATION:
             phase(rows[i], theta, p_theta, starts[i])
             if kinds[i] == NUTATION and rows[i, NOISE_WIDTH] > ROUNDOFF:

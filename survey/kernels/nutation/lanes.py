@@ -100,7 +100,7 @@ def pair(work, row, i):
 
 
 @inline
-def put(work, row, i, value):
+def store(work, row, i, value):
     work[row + i], work[row + TILE + i] = value
 
 
@@ -192,8 +192,8 @@ def narrow(work, i):
     lower, upper = (half - slope[0]) / second, (-half - slope[0]) / second
     close = (upper - lower < WIDE) & (half > 0.0) & (second < 0.0)
     close &= (abs(start - y) < WIDE) if known else (abs(v - y) < WIDE) & (abs(2.0 - w - y) < WIDE)
-    put(work, V_HIGH, i, dd.two_sum(y, lower) if close else (v, 0.0))
-    put(work, W_LOW, i, dd.sub((2.0, 0.0), dd.two_sum(y, upper)) if close else (w, 0.0))
+    store(work, V_HIGH, i, dd.two_sum(y, lower) if close else (v, 0.0))
+    store(work, W_LOW, i, dd.sub((2.0, 0.0), dd.two_sum(y, upper)) if close else (w, 0.0))
 
 
 @inline
@@ -204,8 +204,8 @@ def polish(work, i):
     at_plus, at_minus = dd.times(pair(work, PLUS_POLE, i), 2.0), dd.times(pair(work, MINUS_POLE, i), 2.0)
     v, bar_v = polished(dd.neg(dd.mul(minus, minus)), at_plus, c2, c3, c4, work[V_HIGH + i])
     w, bar_w = polished(dd.neg(dd.mul(plus, plus)), at_minus, c2, c3, c4, work[W_LOW + i])
-    put(work, V_HIGH, i, v)
-    put(work, W_LOW, i, w)
+    store(work, V_HIGH, i, v)
+    store(work, W_LOW, i, w)
     work[BAR_V + i], work[BAR_W + i] = bar_v, bar_w
 
 
@@ -242,13 +242,13 @@ def settle(work, i):
     work[GOOD + i] = 1.0 if sure else 0.0
     work[ABOVE + i] = middle[0] + g if smooth else 0.25 * k[0] * width * width * bend[0] / (g - middle[0])
     work[LOW + i], work[HIGH + i], work[WIDTH + i], work[LEVEL + i] = low[0], high[0], width, level_rest
-    put(work, V_LOW, i, v_low)
-    put(work, W_HIGH, i, w_high)
-    put(work, SUM, i, total)
-    put(work, Q_LOW, i, far)
-    put(work, Q_HIGH, i, near)
-    put(work, MIDDLE, i, middle)
-    put(work, BEND, i, bend)
+    store(work, V_LOW, i, v_low)
+    store(work, W_HIGH, i, w_high)
+    store(work, SUM, i, total)
+    store(work, Q_LOW, i, far)
+    store(work, Q_HIGH, i, near)
+    store(work, MIDDLE, i, middle)
+    store(work, BEND, i, bend)
     work[ROOT_LOW + i], work[ROOT_HIGH + i] = root_low, root_high
 
 
@@ -287,7 +287,7 @@ def prepare(work, i):
 
 
 @inline
-def whole(work, row, i):
+def last_sum(work, row, i):
     """The sum R with one more term, and the size of what is left out."""
     rest, weight = work[row + i], work[row + TILE + i]
     total = work[row + 2 * TILE + i] + (weight * rest if work[row + 3 * TILE + i] == 1.0 else weight)
@@ -339,7 +339,7 @@ def finish(work, size, drift, i, answers):
     root_low, root_high, width = work[ROOT_LOW + i], work[ROOT_HIGH + i], work[WIDTH + i]
     incline, bend = work[INCLINE + i], 0.5 * work[K + i] * work[BEND + i] / work[ABOVE + i]
     minus, plus = work[MINUS + i], work[PLUS + i]
-    (ratio_up, last_up), (ratio_down, last_down) = whole(work, UP, i), whole(work, DOWN, i)
+    (ratio_up, last_up), (ratio_down, last_down) = last_sum(work, UP, i), last_sum(work, DOWN, i)
     turns_up, up, size_up = advance(minus, work[V_HIGH + i], work[V_LOW + i], work[Q_LOW + i], width, root_high,
                                     root_low, incline, bend, period, work[LINE_UP + i],
                                     ratio_up)  # fmt: skip
@@ -396,7 +396,7 @@ def add_node(work, cosine, i):
 
 
 @inline
-def judge(work, i):
+def conclude(work, i):
     """The action, or 0 where singularities are too near for so few nodes."""
     k, width, total = work[K + i], work[WIDTH + i], work[SUM + i]
     ratio = 0.25 * work[BEND + i] / k
@@ -413,14 +413,14 @@ def small_actions(work):
         for i in range(TILE):
             add_node(work, COSINES[j], i)
     for i in range(TILE):
-        judge(work, i)
+        conclude(work, i)
 
 
 @inline
 def begin(work, i, v, w):
     """1 - u and 1 + u of the turning points, in float64 so far, and nothing known beyond."""
-    put(work, V_HIGH, i, (v, 0.0))
-    put(work, W_LOW, i, (w, 0.0))
+    store(work, V_HIGH, i, (v, 0.0))
+    store(work, W_LOW, i, (w, 0.0))
     work[FINE + i], work[SMALL_ACTION + i] = 0.0, 0.0
 
 

@@ -38,7 +38,7 @@ def since(far, near, middle, spread, ratio, rest, q_origin, root, width):
 
 
 @inline
-def place(row, low, high, c, roots, kc, out):
+def locate(row, low, high, c, roots, kc, out):
     """From (1 + c)/2, (1 - c)/2 and c, each with all its digits.
 
     out = u, 1 - u, 1 + u, (u - ul)/(uh - ul), 1 - that, sqrt Q(u) = g dn/(wl + wh), X0 + s of (S16) from ul and uh.
@@ -94,39 +94,40 @@ def motion(cosine, row, start, period, times, out):
     # in half a period
     up = 0.25 * (period[rc.PRECESSION] - period[rc.SPIN])
     down = 0.25 * (period[rc.PRECESSION] + period[rc.SPIN])
-    whole, half = 4.0 * quarter, 0.5 * period[rc.PERIOD]
+    turn, half = 4.0 * quarter, 0.5 * period[rc.PERIOD]
     done, left = start[rc.DONE] * roots[1], start[rc.LEFT] * roots[0]
     low, high = left / (done + left), done / (done + left)
     sine, c = 2.0 * sqrt(low * high), low - high
     z0 = first_kind(sine, c, kc) if c >= 0.0 else 2.0 * quarter - first_kind(sine, -c, kc)
-    place(row, low, high, c, roots, kc, at)
+    locate(row, low, high, c, roots, kc, at)
     first, second = angles(row, z0 / rate, half, down, at)
     base_up, base_down = start[rc.DIRECTION] * first, start[rc.DIRECTION] * second
-    early = start[rc.START_BAR] / max(row[nu.WIDTH] * sqrt(at[3] * at[4]) * at[5], nu.TINY)
-    first_up, first_down = rates(row, at)  # the phase of the start moves it and what follows alike
+    start_delay = start[rc.START_BAR] / max(row[nu.WIDTH] * sqrt(at[3] * at[4]) * at[5], nu.TINY)
+    first_up, first_down = rates(row, at)  # an error of the initial phase shifts the start and what follows equally
     z0 *= start[rc.DIRECTION]
     relative = period[rc.PERIOD_BAR] / period[rc.PERIOD]
     for j in range(len(times)):
         z = z0 + rate * times[j]
-        n = np.floor(z / whole + 0.5)  # a float: of so many periods that no integer holds them, too
-        # the number of periods is taken off in time, where the period is what has been found best
+        n = np.floor(z / turn + 0.5)  # a float, since the number of periods may exceed any integer type
+        # whole periods are subtracted in time, where the period is known best
         z = z0 + rate * (times[j] - n * period[rc.PERIOD])
         side = 1.0 if z >= 0.0 else -1.0
         z = min(abs(z), 2.0 * quarter)
         low, high, c = cosine(z, kc, quarter, pairs, last)
-        place(row, low, high, c, roots, kc, at)
+        locate(row, low, high, c, roots, kc, at)
         first, second = angles(row, z / rate, half, down, at)
         first, second = side * first - base_up, side * second - base_down
         all_up, all_down = first + 2.0 * n * up, second + 2.0 * n * down
-        late = (relative + 4.0 * ROUNDOFF) * abs(times[j]) + (16.0 * ROUNDOFF + relative) * (1.0 + quarter) / rate
+        delay = (relative + 4.0 * ROUNDOFF) * abs(times[j]) + (16.0 * ROUNDOFF + relative) * (1.0 + quarter) / rate
         rate_up, rate_down = rates(row, at)
-        moved = (abs(rate_up) + abs(rate_down)) * late + (abs(rate_up - first_up) + abs(rate_down - first_down)) * early
-        late += early
+        change = abs(rate_up - first_up) + abs(rate_down - first_down)
+        moved = (abs(rate_up) + abs(rate_down)) * delay + change * start_delay
+        delay += start_delay
         speed = row[nu.WIDTH] * sqrt(at[3] * at[4]) * at[5]
         bend = row[nu.WIDTH] * max(row[nu.Q_LOW], row[nu.Q_HIGH]) + 4.0 * abs(row[nu.K]) * row[nu.WIDTH] ** 2
         rounding = 3.0 * (row[nu.BAR_LOW] + row[nu.BAR_HIGH]) + 8.0 * ROUNDOFF * row[nu.WIDTH]
         out[j, rc.U], out[j, rc.PSI], out[j, rc.PHI] = at[0], all_up + all_down, all_down - all_up
-        out[j, rc.U_BAR] = speed * late + bend * late * late + rounding
+        out[j, rc.U_BAR] = speed * delay + bend * delay * delay + rounding
         size = abs(first) + abs(second) + abs(base_up) + abs(base_down) + abs(up) + abs(down)
         turned = abs(n) * (period[rc.PRECESSION_BAR] + 4.0 * ROUNDOFF * (abs(up) + abs(down)))
         out[j, rc.PSI_BAR] = moved + (24.0 * ROUNDOFF + 2.0 * relative) * size + turned

@@ -12,7 +12,7 @@ from survey.kernels.math import double as dd
 from survey.kernels.math.quartic import ROUGH, root, roughly, slope, slopes, value
 from survey.kernels.math.roundoff import PAIR_SUM_ROUNDOFF, ROUNDOFF
 
-# places in a row: turning points (1 - u and 1 + u of each), Q there and at the poles, b - a and b + a, the rest of P
+# columns of a row: turning points (1 - u and 1 + u of each), Q there and at the poles, b - a and b + a, the rest of P
 LOW, HIGH, LOW_PLUS, LOW_MINUS, HIGH_PLUS, HIGH_MINUS, WIDTH, SUM = range(8)
 Q_LOW, Q_HIGH, Q_PLUS, Q_MINUS, BEND, MIDDLE = range(8, 14)  # BEND: 4 q0 - k S^2; MIDDLE: s of (S5)
 K, L, MINUS, PLUS, LEVEL = range(14, 19)  # k, L, b - a, b + a, L - (k ul uh + q0)/2
@@ -121,9 +121,9 @@ def lowest(square, product, k, most):
 
 @kernel
 def peak(c, y, at):
-    """(place, P, bound of its error) of the greatest P near y, which matters where it is next to nothing.
+    """(point, P, bound of its error) of the greatest P near y, which matters where it is next to nothing.
 
-    At a pole (y = 0) that the motion may reach P is 0, and half its slope `at` speaks instead.
+    At a pole (y = 0) that the motion may reach P is 0, and half its slope `at` is used instead.
     """
     if y == 0.0:
         return y, at, 4.0 * PAIR_SUM_ROUNDOFF * (abs(c[4][0]) + abs(c[2][0]))
@@ -177,14 +177,14 @@ def hill_at_pole(gap, product, k, at):
 
 
 @inline
-def put(row, place, pair):
-    row[place], row[place + REST] = pair
+def store(row, column, pair):
+    row[column], row[column + REST] = pair
 
 
 @inline
-def pair(row, place):
+def pair(row, column):
     """A number of the row with all its digits."""
-    return row[place], row[place + REST]
+    return row[column], row[column + REST]
 
 
 @kernel
@@ -201,20 +201,20 @@ def fill(gaps, k, level, ats, equatorial, loose, right, left, row):
     q0 = dd.add(dd.sub(level, k), dd.mul(k, dd.sub(square, product)))
     width = dd.sub(vl, v)[0] if vl[0] < 1.0 else dd.sub(wh, w)[0]
     row[LOW], row[HIGH], row[WIDTH] = ul[0], uh[0], max(width, 0.0)
-    put(row, SUM, total)
-    put(row, LOW_PLUS, vl)
-    put(row, LOW_MINUS, w)
-    put(row, HIGH_PLUS, v)
-    put(row, HIGH_MINUS, wh)
+    store(row, SUM, total)
+    store(row, LOW_PLUS, vl)
+    store(row, LOW_MINUS, w)
+    store(row, HIGH_PLUS, v)
+    store(row, HIGH_MINUS, wh)
     row[BAR_HIGH], row[BAR_LOW] = bar_v + ROUNDOFF * abs(uh[0]), bar_w + ROUNDOFF * abs(ul[0])
     row[NOISE_WIDTH] = (bar_v + bar_w) / max(width, TINY)
-    put(row, K, k)
-    put(row, L, level)
-    put(row, MINUS, minus)
-    put(row, PLUS, plus)
+    store(row, K, k)
+    store(row, L, level)
+    store(row, MINUS, minus)
+    store(row, PLUS, plus)
     bow = dd.mul(k, square)
-    put(row, MIDDLE, dd.add(dd.sub(level, k), dd.times(bow, 1.5)))
-    put(row, BEND, dd.sub(dd.times(q0, 4.0), bow))
+    store(row, MIDDLE, dd.add(dd.sub(level, k), dd.times(bow, 1.5)))
+    store(row, BEND, dd.sub(dd.times(q0, 4.0), bow))
     row[LEVEL] = dd.sub(level, dd.times(dd.add(dd.mul(k, product), q0), 0.5))[0]
     # Q about the poles: P's slope there is 2 (L + k -+ a b)
     tilt_plus = dd.neg(dd.mul(k, dd.add(two, total)))
@@ -226,8 +226,8 @@ def fill(gaps, k, level, ats, equatorial, loose, right, left, row):
         q_plus = dd.div(dd.add(dd.times(ats[0], 2.0), dd.mul(dd.mul(v, vl), tilt_plus)), from_plus)
     if from_minus[0] > 0.0:
         q_minus = dd.div(dd.add(dd.times(ats[1], 2.0), dd.mul(dd.mul(w, wh), tilt_minus)), from_minus)
-    put(row, Q_HIGH, beside(q_plus, tilt_plus, k, v) if uh[0] >= 0.0 else beside(q_minus, tilt_minus, k, wh))
-    put(row, Q_LOW, beside(q_plus, tilt_plus, k, vl) if ul[0] >= 0.0 else beside(q_minus, tilt_minus, k, w))
+    store(row, Q_HIGH, beside(q_plus, tilt_plus, k, v) if uh[0] >= 0.0 else beside(q_minus, tilt_minus, k, wh))
+    store(row, Q_LOW, beside(q_plus, tilt_plus, k, vl) if ul[0] >= 0.0 else beside(q_minus, tilt_minus, k, w))
     row[Q_PLUS] = q_plus[0] if minus[0] == 0.0 else minus[0] * minus[0] / (v[0] * vl[0])
     row[Q_MINUS] = q_minus[0] if plus[0] == 0.0 else plus[0] * plus[0] / (w[0] * wh[0])
     # errors: of Q, what the pole's slope and the turning points leave
@@ -253,12 +253,12 @@ def fill(gaps, k, level, ats, equatorial, loose, right, left, row):
 
 
 @inline
-def direct(k, rest, square, u, bar, row, place, error):
+def direct(k, rest, square, u, bar, row, column, error):
     """Q at a turning point as L - k + k (S^2 + 2 u^2), where that is better known than from the pole."""
     value = dd.add(rest, dd.mul(k, dd.add(square, dd.times(dd.mul(u, u), 2.0))))
     noise = 8.0 * (abs(k[0]) * bar + PAIR_SUM_ROUNDOFF * (abs(rest[0]) + 8.0 * abs(k[0])))
     if noise < row[error] * value[0]:
-        put(row, place, value)
+        store(row, column, value)
         row[error] = noise / value[0]
 
 
@@ -269,7 +269,7 @@ def beside(q, tilt, k, y):
 
 
 @kernel
-def beside_saddle(equatorial, u, bar, side, row, place, error):
+def beside_saddle(equatorial, u, bar, side, row, column, error):
     """Q where digits of it were lost: P'/(uh - ul) at a turning point beside a saddle, from P about the equator."""
     if row[error] < LOST_DIGITS or abs(u[0]) > 0.5 or row[WIDTH] < 1e-3:
         return
@@ -277,7 +277,7 @@ def beside_saddle(equatorial, u, bar, side, row, place, error):
     _first, second = slopes(equatorial, u[0])
     terms = abs(equatorial[1][0]) + abs(u[0]) * (2.0 * abs(equatorial[2][0]) + 4.0 * abs(equatorial[4][0]) * u[0] ** 2)
     if side * steep[0] > 0.0:
-        put(row, place, dd.over(steep, side * row[WIDTH]))
+        store(row, column, dd.over(steep, side * row[WIDTH]))
         row[error] = (4.0 * PAIR_SUM_ROUNDOFF * terms + abs(second) * bar) / abs(steep[0]) + 2.0 * ROUNDOFF
 
 
@@ -330,7 +330,7 @@ def at_lowest(equatorial, loose, k, total, ul, uh, bar_w, bar_v, bar, row):
         (PAIR_SUM_ROUNDOFF * size + loose) / product[0] + abs(q[0]) * noise + k[0] * abs(off[0]) * (bar_w + bar_v)
     )
     if error < bar:
-        put(row, BEND, better)
+        store(row, BEND, better)
     return min(error, bar)
 
 
@@ -355,7 +355,7 @@ def barrier(a, b, k, equatorial, loose, at_plus, at_minus):
     if rise > 0.0:
         height, size = value(equatorial, (between, 0.0))
         rough = roughness(between, a, b, size_k)
-        bar = 4.0 * (PAIR_SUM_ROUNDOFF * size + loose) + rough**2 / rise  # the saddle's place is as good as F there
+        bar = 4.0 * (PAIR_SUM_ROUNDOFF * size + loose) + rough**2 / rise  # the saddle's u is as good as F there
         return height[0] / ((1.0 - between) * (1.0 + between)), bar, between, rise
     distance, bar = nan, 0.0
     if size_k < 0.0:
@@ -408,25 +408,25 @@ def find(a, b, k, level, at_plus, at_minus, rough, rows, kinds):
         w = lowest(plus * plus, -product, size_k, 1.0 + min(between, 0.0))
         w, bottom, murmur = peak(antipolar, w, at_minus[0])
     if rise > 0.0 and distance < 0.0:
-        place = 0
+        n = 0
         if bottom > murmur:
             left = beyond(plus, at_minus[0], w, 2.0 - w, antipolar, polar, -1.0)
             right = inner(equatorial, loose, w - 1.0, between)
             fill(gaps, k, level, ats, equatorial, loose, right, left, rows[0])
             kinds[0] = PASSAGE if left[0][0] == 0.0 else NUTATION
-            place = 1
+            n = 1
         elif bottom >= -murmur:
             still(gaps, k, level, ats, equatorial, loose, w, murmur, antipolar, False, rows[0])
-            kinds[0], place = PRECESSION, 1
+            kinds[0], n = PRECESSION, 1
         if top > hum:
             right = beyond(minus, at_plus[0], v, 2.0 - v, polar, antipolar, -1.0)
             from_plus, from_minus, bar_u = inner(equatorial, loose, 1.0 - v, between)
             left = from_minus, from_plus, bar_u
-            fill(gaps, k, level, ats, equatorial, loose, right, left, rows[place])
-            kinds[place] = PASSAGE if right[0][0] == 0.0 else NUTATION
+            fill(gaps, k, level, ats, equatorial, loose, right, left, rows[n])
+            kinds[n] = PASSAGE if right[0][0] == 0.0 else NUTATION
         elif top >= -hum:
-            still(gaps, k, level, ats, equatorial, loose, v, hum, polar, True, rows[place])
-            kinds[place] = PRECESSION
+            still(gaps, k, level, ats, equatorial, loose, v, hum, polar, True, rows[n])
+            kinds[n] = PRECESSION
     elif max(top - hum, bottom - murmur) > 0.0:
         equator = equatorial[0][0]
         v, w = (v if v >= 0.0 else 2.0 - w), (w if w >= 0.0 else 2.0 - v)

@@ -26,7 +26,7 @@ from survey.kernels.nutation.lanes import (
     K,
     L,
     pair,
-    put,
+    store,
 )
 
 FURTHER = 2  # means that double-double takes more than float64
@@ -44,9 +44,9 @@ def enter(work, row, low_row, over, under, i):
     """The start of a sum R (S12) for p^2/(x y) = over/under."""
     low = over[0] < under[0]
     less = over[0] if low else under[0], over[1] if low else under[1]
-    put(work, row + REST, i, dd.ratio(dd.scaled(less, 2.0), dd.loose(over, under)))
-    put(work, row + WEIGHT, i, (1.0, 0.0))
-    put(work, row + TOTAL, i, (0.0, 0.0))
+    store(work, row + REST, i, dd.ratio(dd.scaled(less, 2.0), dd.loose(over, under)))
+    store(work, row + WEIGHT, i, (1.0, 0.0))
+    store(work, row + TOTAL, i, (0.0, 0.0))
     work[low_row + i] = 1.0 if low else 0.0
 
 
@@ -65,20 +65,20 @@ def prepare(work, i):
     xy = dd.mul(x, y)
     gap, v, other = pair(work, MINUS, i), pair(work, V_HIGH, i), pair(work, V_LOW, i)
     line = dd.loose(high, dd.mul(incline, v))
-    put(work, LINE_UP, i, line)
+    store(work, LINE_UP, i, line)
     under = dd.mul(dd.mul(dd.mul(v, other), dd.square(line)), xy)
     enter(work, UP, LOW_UP, dd.mul(dd.square(gap), g), under, i)
     gap, w, other = pair(work, PLUS, i), pair(work, W_LOW, i), pair(work, W_HIGH, i)
     line = dd.loose(low, dd.neg(dd.mul(incline, w)))
-    put(work, LINE_DOWN, i, line)
+    store(work, LINE_DOWN, i, line)
     under = dd.mul(dd.mul(dd.mul(w, other), dd.square(line)), xy)
     enter(work, DOWN, LOW_DOWN, dd.mul(dd.square(gap), g), under, i)
-    put(work, X, i, x)
-    put(work, Y, i, y)
-    put(work, HIGH, i, high)
-    put(work, LOW, i, low)
-    put(work, INCLINE, i, incline)
-    put(work, BOW, i, dd.scaled(dd.ratio(dd.mul(k, bend), above), 0.5))
+    store(work, X, i, x)
+    store(work, Y, i, y)
+    store(work, HIGH, i, high)
+    store(work, LOW, i, low)
+    store(work, INCLINE, i, incline)
+    store(work, BOW, i, dd.scaled(dd.ratio(dd.mul(k, bend), above), 0.5))
 
 
 @inline
@@ -88,10 +88,10 @@ def go_on(work, row, low_row, middle, root, i):
     lower, e = dd.neg(rest), dd.shifted(dd.neg(rest), 1.0)
     term = dd.mul(weight, rest)
     low = work[low_row + i] == 1.0
-    put(work, row + TOTAL, i, dd.loose(total, (term[0] if low else weight[0], term[1] if low else weight[1])))
-    put(work, row + WEIGHT, i, dd.scaled(dd.mul(weight, e), 0.5))
+    store(work, row + TOTAL, i, dd.loose(total, (term[0] if low else weight[0], term[1] if low else weight[1])))
+    store(work, row + WEIGHT, i, dd.scaled(dd.mul(weight, e), 0.5))
     part = dd.mul(middle, dd.mul(dd.shifted(lower, 2.0), rest))
-    put(work, row + REST, i, dd.ratio(dd.scaled(part, 2.0), dd.loose(root, part)))
+    store(work, row + REST, i, dd.ratio(dd.scaled(part, 2.0), dd.loose(root, part)))
 
 
 @inline
@@ -100,8 +100,8 @@ def take_mean(work, i):
     middle, root = dd.scaled(dd.loose(x, y), 0.5), dd.positive_root(dd.mul(x, y))
     go_on(work, UP, LOW_UP, middle, root, i)
     go_on(work, DOWN, LOW_DOWN, middle, root, i)
-    put(work, X, i, middle)
-    put(work, Y, i, root)
+    store(work, X, i, middle)
+    store(work, Y, i, root)
 
 
 @inline
@@ -157,7 +157,7 @@ def end(work):
 
 
 @splice
-def fine(work, means):
+def fill(work, means):
     """Fill the rows FINE of `work` (ALL), where so many means suffice float64."""
     begin(work)
     go(work, means + FURTHER)

@@ -1,10 +1,9 @@
 """Nutations in decimal arithmetic with as many digits as a point takes: the few that double-double leaves open.
 
-The set-up of `kernels/nutation/wells.py` is double-double already, so where its bars are too wide (1e-26 from
-separatrices)
-only more digits help. Each point is solved with twice the digits until the answers agree: the difference bounds the
-error of the last one. No subtraction is avoided; digits make up for it. What stays open after MOST lies on a
-separatrix or a regular precession, as far as can be told. A point takes about a millisecond.
+The set-up of `kernels.nutation.wells` is double-double already, so where its error bounds are too wide (1e-26 from
+separatrices) only more digits help. Each point is solved with twice the digits until the answers agree; their
+difference bounds the error of the last one. No subtraction is avoided; digits make up for it. What stays open after
+MOST lies on a separatrix or a regular precession, as far as can be decided. A point takes about a millisecond.
 
 Formulas (S1)-(S14) of `scenes/brun.md`; the quartic by Ferrari's resolvent.
 """
@@ -25,7 +24,7 @@ FAR = Decimal("1e38")  # as in `nutation.distance`
 
 
 class Unclear(ArithmeticError):
-    """These digits do not tell."""
+    """These digits do not decide."""
 
 
 class NoMotion(Exception):
@@ -33,7 +32,7 @@ class NoMotion(Exception):
 
 
 def of_state(size_a, size_c, epsilon, theta, p_theta, b, a):
-    """Of an initial state: does it pass a pole, the number of wells, [{name: value, name_error: bar}] of its own.
+    """Of an initial state: does it pass a pole, the number of wells, [{name: value, name_error: bound}] of its own.
 
     None where it stays open.
     """
@@ -59,7 +58,7 @@ def _settled(solve):
                 now = None
             if now is not None and before is not None and _agree(before, now):
                 passes, number, found = now
-                return passes, number, [_told(*pair) for pair in zip(before[2], found, strict=True)]
+                return passes, number, [_rounded(*pair) for pair in zip(before[2], found, strict=True)]
         before, digits = now, 2 * digits
     return None
 
@@ -75,8 +74,8 @@ def _agree(before, now):
     )
 
 
-def _told(before, now):
-    """{name: float64, name_error: its bar}: half an ulp, and what fewer digits make of it."""
+def _rounded(before, now):
+    """{name: float64, name_error: its error bound}: half an ulp, and what fewer digits make of it."""
     found = {}
     for name, exact in now.items():
         value, apart = float(exact), float(abs(exact - before[name]))
@@ -109,7 +108,7 @@ def _solved(k, level, a, b, size_a, size_c, u):
 
 
 def _slack():
-    """Places that are nearer to one another are not told apart."""
+    """Points that are nearer to one another than this count as one."""
     return Decimal(10) ** (-getcontext().prec // SURE)
 
 
@@ -218,7 +217,7 @@ def separatrix_distance(k, level, a, b):
 
 
 def _saddle(k, a, b):
-    """The increasing zero of F, from the place where F' is greatest: F is convex towards it."""
+    """The increasing zero of F, from the point where F' is greatest: F is convex towards it."""
     u, bend = Decimal(0), a * b / k
     while True:
         move = (u * (10 * u * u - 6) + bend) / (30 * u * u - 6)

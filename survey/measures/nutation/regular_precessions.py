@@ -160,7 +160,7 @@ def _pole(half):
 
 
 def _partner(l, s):  # noqa: E741
-    """The other of |y|, |z|, exact but for 3 roundings at a place half a rounding from x."""
+    """The other of |y|, |z|, exact but for 3 roundings at a point half a rounding from x."""
 
     def at(x):
         with np.errstate(all="ignore"):
