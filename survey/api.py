@@ -16,7 +16,7 @@ from survey import measures, status
 from survey.errors import BadInput
 from survey.file import disk, reading, schema
 from survey.file.labels import count, counts, describe, flag_codes, layout, percent
-from survey.grid import Grid, line
+from survey.grid import Grid, lines
 from survey.request import trust
 from survey.request import user_scene as own
 from survey.request import workflow as workflows
@@ -241,7 +241,7 @@ def _grid(used: dict[str, Parameter], given: dict[str, xr.DataArray]) -> Grid:
     return Grid(
         sizes=sizes,
         parameters={key: (array.dims, array.values) for key, array in given.items()},
-        whole=frozenset(dim for key, array in given.items() if used[key].whole for dim in array.dims),
+        uncut=frozenset(dim for key, array in given.items() if used[key].uncut for dim in array.dims),
     )
 
 
@@ -257,10 +257,7 @@ def _lazy(module: Any, scene: str, request: Request, given: dict[str, xr.DataArr
     """The same dataset, its values computed block by block when they are asked for."""
     table = layout(module, request)
     names = list(given)
-    alone = {
-        key: a for key, a in given.items() if a.ndim == 1 and sum(a.dims[0] in b.dims for b in given.values()) == 1
-    }
-    request = replace(request, lines={key: line(np.asarray(array)) for key, array in alone.items()})
+    request = replace(request, lines=lines({name: (array.dims, array) for name, array in given.items()}))
 
     def solve(*arrays: Any) -> tuple[Any, ...]:
         shape = np.broadcast_shapes(*(array.shape for array in arrays))
@@ -343,7 +340,7 @@ def areas(ds: xr.Dataset) -> dict[str, str]:
 
 def _beside(option: Option) -> str:
     words = f"; only with {option.only_with}" if option.only_with else ""
-    return words + (f"; not beside {option.said_by}, which says it" if option.said_by else "")
+    return words + (f"; not beside {option.implied_by}, which says it" if option.implied_by else "")
 
 
 def _parameter_line(module: Any, p: Parameter) -> str:

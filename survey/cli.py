@@ -182,7 +182,7 @@ def info(path, as_json):
     from survey import api
     from survey.file import unfinished
 
-    left = unfinished.told(path)
+    left = unfinished.summary(path)
     table = api.summary(api.open(path)) if os.path.exists(path) or not left else {}
     if as_json:
         return _show(table | ({"unfinished": left} if left else {}), True)

@@ -24,7 +24,9 @@ class Value:
 
 @dataclass(frozen=True)
 class Function:
-    """A public function: what it does, its arguments' names (None: any), and whether every module must have it."""
+    """A public function: what it does, the names of its first arguments (None: any), and whether every module must
+    have it. Further arguments need defaults.
+    """
 
     meaning: str
     arguments: tuple[str, ...] | None = ()
@@ -41,6 +43,11 @@ def check(module, table, where):
             near = get_close_matches(name, table, n=1, cutoff=0.6)
             hint = f"; did you mean {near[0]!r}?" if near else ""
             refuse(module, f"{name} is not in the table{hint} (a helper's name begins with an underscore)", where)
+    check_offered(module, table, where)
+
+
+def check_offered(module, table, where):
+    """As `check`, but the module may have other public names besides."""
     for name, entry in table.items():
         if not hasattr(module, name):
             if entry.needed:
@@ -70,7 +77,7 @@ def _check_function(module, name, function, entry, where):
         refuse(module, f"{name} must be a function", where)
     parameters = inspect.signature(function).parameters.values()
     given = tuple(p.name for p in parameters)
-    more = [p for p in list(parameters)[len(entry.arguments or ()) :] if p.default is p.empty]  # asked of nobody
+    more = [p for p in list(parameters)[len(entry.arguments or ()) :] if p.default is p.empty]  # callers give none
     if entry.arguments is not None and (given[: len(entry.arguments)] != entry.arguments or more):
         words = f"{name}({', '.join(given)}) must be {name}({', '.join(entry.arguments)})"
         refuse(module, words, where)

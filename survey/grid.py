@@ -14,12 +14,12 @@ from survey.errors import BadInput
 class Grid:
     """Parameters on named dimensions: {name: (its dimensions, float64 values)}; a fixed number has no dimension.
 
-    `sizes` holds the dimensions in order. Dimensions in `whole` are never cut.
+    `sizes` holds the dimensions in order. Dimensions in `uncut` are never cut.
     """
 
     sizes: Mapping[Hashable, int]
     parameters: Mapping[str, tuple[tuple[Hashable, ...], np.ndarray]]
-    whole: frozenset[Hashable] = frozenset()
+    uncut: frozenset[Hashable] = frozenset()
 
     @property
     def shape(self):
@@ -31,13 +31,8 @@ class Grid:
 
     @property
     def lines(self):
-        """{name: (number, least, greatest)} of the axes that one parameter has for itself."""
-        alone = {
-            name: dims[0]
-            for name, (dims, _) in self.parameters.items()
-            if len(dims) == 1 and sum(dims[0] in other for other, _ in self.parameters.values()) == 1
-        }
-        return {name: line(self.parameters[name][1]) for name in alone}
+        """`lines` of its parameters."""
+        return lines(self.parameters)
 
     def blocks(self, points_per_block):
         """Slices per dimension, row by row: the first dimensions are cut first, to at most `points_per_block`."""
@@ -46,7 +41,7 @@ class Grid:
     def tiled(self, points_per_block, points_per_region, points_per_tile):
         """(lengths of a tile, [(region, its blocks)]): no tile belongs to two regions, and no block does.
 
-        Regions and blocks are slices per dimension, of at most so many points where `whole` dimensions allow it.
+        Regions and blocks are slices per dimension, of at most so many points where `uncut` dimensions allow it.
         """
         region = self._lengths(points_per_region)
         tile = halved(region, points_per_tile)
@@ -68,7 +63,7 @@ class Grid:
         for name, length in self.sizes.items():
             if size <= points:
                 break
-            if name not in self.whole:
+            if name not in self.uncut:
                 rest = size // length
                 lengths[name] = max(1, points // rest)
                 size = rest * lengths[name]
@@ -87,10 +82,18 @@ class Grid:
         return aligned
 
 
-def line(values):
-    """(number, least, greatest) of the finite values of an axis."""
-    finite = values[np.isfinite(values)]
-    return values.size, float(finite.min(initial=np.inf)), float(finite.max(initial=-np.inf))
+def lines(parameters):
+    """{name: (number, least, greatest)} of each parameter that has an axis which no other shares.
+
+    `parameters` is {name: (its dimensions, its values)}; least and greatest are those of the finite values.
+    """
+    found = {}
+    for name, (dims, values) in parameters.items():
+        if len(dims) == 1 and sum(dims[0] in other for other, _ in parameters.values()) == 1:
+            values = np.asarray(values)
+            finite = values[np.isfinite(values)]
+            found[name] = values.size, float(finite.min(initial=np.inf)), float(finite.max(initial=-np.inf))
+    return found
 
 
 def halved(lengths, most):

@@ -18,13 +18,13 @@ def load(package, name, what):
     """The module `name` of `package`; raises BadInput, naming the nearest, if there is none."""
     if not isinstance(name, str):
         raise BadInput(unknown(what, name, names(package)))
-    whole = f"{package.__name__}.{name}"
-    if str(name).isidentifier() and whole in sys.modules:  # the folder is not read anew for every block
-        return sys.modules[whole]
+    path = f"{package.__name__}.{name}"
+    if str(name).isidentifier() and path in sys.modules:  # the folder is not read again for every block
+        return sys.modules[path]
     known = names(package)
     if name not in known:
         raise BadInput(unknown(what, name, known))
-    return import_module(whole)
+    return import_module(path)
 
 
 def unknown(what, name, known):

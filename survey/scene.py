@@ -15,7 +15,7 @@ class Parameter:
 
     `symbol` is TeX. `default=None` says that it must be given. `excluded` and the open ends are not part of the domain.
     `instead_of` names the parameter that this one replaces when it is given. `when` holds the option
-    values for which the parameter exists ("": where the option does not). An axis of a `whole` parameter is never cut
+    values for which the parameter exists ("": where the option does not). An axis of an `uncut` parameter is never cut
     into blocks. One that is `number_option` may also stand among the options, as one number.
     """
 
@@ -31,7 +31,7 @@ class Parameter:
     excluded: tuple[float, ...] = ()
     instead_of: str | None = None
     when: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    whole: bool = False
+    uncut: bool = False
     number_option: bool = False
 
     def holds(self, values: npt.ArrayLike) -> npt.NDArray[np.bool_]:
@@ -57,7 +57,7 @@ class Parameter:
 class Option:
     """A switch of the scene; the first choice is the default unless `default` says otherwise.
 
-    It exists only with the parameter `only_with`, and not beside the parameter `said_by`, which says the same.
+    It exists only with the parameter `only_with`, and not beside the parameter `implied_by`, which says the same.
     """
 
     name: str
@@ -65,7 +65,7 @@ class Option:
     long_name: str
     default: str = ""
     only_with: str = ""
-    said_by: str = ""
+    implied_by: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "default", self.default or self.choices[0])
@@ -108,9 +108,9 @@ class Request:
     lines: Mapping[str, tuple[int, float, float]] = field(default_factory=dict)
 
     def line(self, name: str) -> tuple[int, float, float] | None:
-        """(number, least, greatest) of the whole axis of the parameter `name`, which no other shares; or None.
+        """(number, least, greatest) of the full axis of the parameter `name`, which no other shares; or None.
 
-        What depends on an axis depends on the whole of it, never on the block: so a block's bits are always the same.
+        What depends on an axis depends on all of it, never on the block, so that the bits do not depend on blocks.
         """
         return self.lines.get(name)
 
@@ -125,14 +125,14 @@ class Trajectory:
     panels: tuple[tuple[str, ...], ...]
 
 
-def told(value: Any, bar: Any) -> str:
+def with_bar(value: Any, bar: Any) -> str:
     """A value with its error bar, in few digits."""
     return f"{float(value):.6g} +- {float(bar):.1g}"
 
 
 def named(answer: Any, name: str) -> str:
     """`name = value +- bar` of an output that is known of a point."""
-    return f"{name} = {told(answer[name], answer[f'{name}_error'])}"
+    return f"{name} = {with_bar(answer[name], answer[f'{name}_error'])}"
 
 
 def condition(scene: Any, when: Mapping[str, tuple[str, ...]], own: str = "") -> str:

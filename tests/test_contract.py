@@ -12,6 +12,8 @@ from survey import BadInput, contract, measures, modules
 
 SCENE = Path(survey.scenes.__file__).with_name("mathieu.py")
 METHOD = Path(survey.methods.__file__).with_name("magnus6.py")
+FAMILIES = ("hill", "cylinder", "danby", "normal_form", "nutation")
+CELLS = Path(survey.measures.__file__).parent / "hill" / "cells.py"
 
 
 def changed(path, tmp_path, old, new):
@@ -61,6 +63,27 @@ def test_a_typo_in_a_method_is_one_line(tmp_path, old, new, words):
     with pytest.raises(BadInput, match=words) as refused:
         measures.check(method)
     assert str(tmp_path / "magnus6.py") in str(refused.value) and "survey/methods/__init__.py" in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("def find(", "def fined(", "find is missing: the Cells of a rectangle"),
+        ("def find(solve, x, y,", "def find(solve, y, x,", r"must be find\(solve, x, y, each, report\)"),
+        ("MOST = 10_000_000", "MOST = 1e7", "MOST = 10000000.0 must be of type int"),
+    ],
+)
+def test_a_typo_in_what_is_asked_of_a_family_is_one_line(tmp_path, old, new, words):
+    cells = changed(CELLS, tmp_path, old, new)
+    with pytest.raises(BadInput, match=words) as refused:
+        contract.check_offered(cells, measures.QUESTIONS["cells"], "survey/measures/__init__.py")
+    assert str(tmp_path / "cells.py") in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_questions_are_found_by_the_folder_of_their_family():
+    found = {family: [q for q in measures.QUESTIONS if measures.question(family, q)] for family in FAMILIES}
+    assert found["hill"] == ["curves", "edges", "folds", "cells"] and found["nutation"] == ["curves"]
+    assert measures.question("no family", "curves") is None
 
 
 def test_all_scenes_and_methods_keep_to_their_tables():

@@ -267,7 +267,7 @@ def test_what_an_unfinished_run_says_is_text_and_its_command_is_no_other_program
             json.dumps({"again": again, "folder": "/tmp/$(reboot)\x1b", "host": "\x1b"})
         )
         assert list(hostile.command(["info", str(tmp_path / "map.nc")])) == []
-        told = unfinished.told(tmp_path / "map.nc")["resume"]
+        told = unfinished.summary(tmp_path / "map.nc")["resume"]
         command = told.rpartition(" && ")[2]
         words = shlex.split(command)
         assert words[:2] == ["survey", "run"] and command == shlex.join(words) and "rm" not in shlex.split(told)[:1]

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from script import parser
 
-from survey.measures.nutation.sheets import surface
+from survey.measures.nutation.regular_precessions import surface
 
 ALONG, ACROSS = 161, 31
 HIGHEST = {1: 1.6, -1: 5.5}  # l

@@ -10,12 +10,20 @@
 #SBATCH --signal=B:TERM@300
 #SBATCH --open-mode=append
 set -u
+for command in dask survey; do
+    command -v $command > /dev/null && continue
+    echo "slurm.sh: $command is not on PATH: activate the environment with survey[cluster] before sbatch" >&2
+    exit 3
+done
 file=$PWD/scheduler-${SLURM_JOB_ID:-$$}.json
 
 dask scheduler --scheduler-file "$file" --port 0 --no-dashboard & scheduler=$!
 srun dask worker --scheduler-file "$file" --nworkers 1 --nthreads "${SLURM_CPUS_PER_TASK:-1}" \
     --local-directory "${TMPDIR:-/tmp}" --no-dashboard & workers=$!
-until [ -s "$file" ]; do sleep 1; done
+until [ -s "$file" ]; do
+    kill -0 $scheduler 2>/dev/null || { echo "slurm.sh: dask's scheduler did not start" >&2; exit 4; }
+    sleep 1
+done
 
 survey run "$@" --scheduler "$file" & run=$!
 trap 'kill -TERM $run' TERM

@@ -123,7 +123,7 @@ class File:
         packed = PACKED | {"chunks": tuple(tile)} if tile and np.prod(shape) and not text else {}
         fill = np.nan if dtype.kind == "f" and tile is not None else None
         kind = h5py.string_dtype() if text else dtype
-        with self._told():
+        with self._reported():
             made = self.file.create_dataset(name, shape, kind, fillvalue=fill, track_order=True, **packed)
             if fill is not None:
                 attributes = {"_FillValue": dtype.type(fill)} | attributes
@@ -136,18 +136,18 @@ class File:
 
     def describe(self, attributes):
         """Give the file these attributes."""
-        with self._told():
+        with self._reported():
             for key, value in attributes.items():
                 _attach(self.file, key, value)
 
     def write(self, put, name, *given):
         """put(variable, *given) for a variable of the file."""
-        with self._told():
+        with self._reported():
             put(self.file[name], *given)
 
     def close(self):
         """Complete the file, durably."""
-        with self._told():
+        with self._reported():
             self._scale()
             self.file.close()
         self.sink.sync()
@@ -177,7 +177,7 @@ class File:
                 self.file[name].dims[axis].attach_scale(self.file[dim])
 
     @contextlib.contextmanager
-    def _told(self):
+    def _reported(self):
         """Raise what the disk has refused meanwhile, rather than what HDF5 makes of it."""
         try:
             yield

@@ -12,7 +12,7 @@ from survey.grid import halved
 TILE_POINTS = 2**16
 
 
-class Output:
+class OutputFile:
     """The netCDF file of a map, written piece by piece beside the blocks; `publish` puts it in its place.
 
     `coordinates`, `variables` and `layout` are those of `survey.file.labels`; `shape` is the map's.

@@ -70,7 +70,7 @@ def _opened(path, chunks=None):
 
 
 def _refuse_absent(path):
-    left = {} if path.exists() else unfinished.told(path)
+    left = {} if path.exists() else unfinished.summary(path)
     if left:
         raise Damaged(f"{path}: it is not there yet; {unfinished.sentence(left)}")
     if not path.is_file():

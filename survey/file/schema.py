@@ -77,12 +77,12 @@ def _check_attributes(given, required):
             raise Damaged(f"the attribute {name} is missing")
     for name in TEXTS:
         if not isinstance(given.get(name, ""), str):
-            raise Damaged(f"the attribute {name} is {_told(given[name])}, and should be a text")
+            raise Damaged(f"the attribute {name} is {_repr(given[name])}, and should be a text")
     if not given["scene"]:
         raise Damaged("the attribute scene is empty")
     rtol = given.get("rtol", 0.5)
     if not (isinstance(rtol, (int, float, np.integer, np.floating)) and 0 < rtol < 1):
-        raise Damaged(f"the attribute rtol is {_told(rtol)}, and should be a number between 0 and 1")
+        raise Damaged(f"the attribute rtol is {_repr(rtol)}, and should be a number between 0 and 1")
     options(given)
 
 
@@ -90,7 +90,7 @@ def options(given):
     """{name: value} in the attribute `options`; raises Damaged."""
     pairs = [pair.split("=") for pair in given.get("options", "").split(", ") if pair]
     if any(len(pair) != 2 for pair in pairs):
-        raise Damaged(f"the attribute options is {_told(given['options'])}, and should read name=value, name=value")
+        raise Damaged(f"the attribute options is {_repr(given['options'])}, and should read name=value, name=value")
     return dict(pairs)
 
 
@@ -126,7 +126,7 @@ def _check_variable(ds, name, variable):
     given = variable.attrs
     for key in ("long_name", "units", "symbol", "comment"):
         if not isinstance(given.get(key, ""), str):
-            raise Damaged(f"{name}.{key} is {_told(given[key])}, and should be a text")
+            raise Damaged(f"{name}.{key} is {_repr(given[key])}, and should be a text")
     if "flag_values" in given or "flag_meanings" in given:
         _flags_of(name, given)
     if "flag_values" in given and variable.dtype.kind not in "iu":
@@ -213,6 +213,6 @@ def _coded(ds, name):
         raise Damaged(f"{name} holds codes that its flag_values do not name")
 
 
-def _told(value):
+def _repr(value):
     text = "a table" if isinstance(value, Mapping) else repr(value)
     return text if len(text) <= 60 else f"{text[:56]} ..."

@@ -1,4 +1,4 @@
-"""What an unfinished run has left in `OUT.nc.blocks/`, told to users: how much is done, and what has changed since."""
+"""What an unfinished run has left in `OUT.nc.blocks/`, shown to users: how much is done, and what has changed since."""
 
 import datetime
 import json
@@ -29,7 +29,7 @@ def finished(path):
     return (len(_blocks(folder)), known["blocks"]) if "blocks" in known else (0, 0)
 
 
-def told(path):
+def summary(path):
     """Plain data on the unfinished run that was to write `path`: what is done, who is at it, how to resume it.
 
     {} if there is none.
@@ -58,7 +58,7 @@ def size(path):
 
 
 def sentence(left):
-    """What `told` has found, in words."""
+    """What `summary` has found, in words."""
     points = _counted(left["points"], "point") if left["points"] else "them"
     done = f"{left['blocks_done']:,} of {_counted(left['blocks'], 'block')} ({left['points_done']:,} of {points})"
     who = f"go on with: {left['resume']}" if "resume" in left else f"{left['at_work']} is at work on it"

@@ -1,13 +1,67 @@
 """The measures: one family a folder, one question a file, shared by the scenes that ask it.
 
-The same question has the same name in every family: `curves` (what [boundaries] draws), `edges`, `cells` ([refine]).
-METHODS in a folder's `__init__` says what methods offer its families, and is checked when a method is loaded.
+The same question has the same name in every family, so that it is found by its folder: QUESTIONS lists those that the
+layers above ask by name. METHODS in a folder's `__init__` lists what methods offer its families. Both are checked when
+a module is loaded.
 """
 
 import sys
 from functools import cache
 
 from survey import contract, methods, modules
+from survey.contract import Function, Value
+
+# {question: what `measures/FAMILY/QUESTION.py` must offer}; a family that has no such file does not answer it.
+QUESTIONS = {
+    # The curves that [boundaries] draws on a map: `closed` where they are known without a search, else `trace`.
+    "curves": {
+        "closed": Function(
+            "the Curves on the map of two `axes`, a Square, where `fixed` holds the other parameters "
+            "(comes with `refusal`, CLASSES, TITLE and ALONG)",
+            ("square", "axes", "fixed", "options"),
+        ),
+        "refusal": Function("why there are no curves on a map of these axes, in words; None if there are", ("axes",)),
+        "CLASSES": Value("{name: code} of the curves' classes", dict),
+        "TITLE": Value("what a class is, one line", str),
+        "ALONG": Value("survey.scene.Output of what is known at each point of a curve", tuple),
+        "trace": Function(
+            "the Curves through `seeds`, edges in the Square; solve(q, p, wanted) gives outputs of the scene",
+            ("solve", "square", "seeds", "each"),
+        ),
+        "Seeds": Value("x, kind, index, low, high: edges to begin from, see `measures.hill.curves`", type),
+    },
+    # The edges of tongues on each row of a map, between which verdicts do not change.
+    "edges": {
+        "find": Function(
+            "the Edges between `low` and `high` on so many `rows`; solve(row, x, wanted) gives outputs of the scene",
+            ("solve", "rows", "low", "high"),
+            needed=True,
+        ),
+        "joined": Function("the Edges of all parts of the same rows", ("parts",), needed=True),
+        "Edges": Value("row, position, error, kind, index, complete: see `measures.hill.edges`", type, needed=True),
+        "CLASSES": Value("{name: code} of the edges' kinds", dict, needed=True),
+    },
+    # Where the curves of `trace` turn back.
+    "folds": {
+        "find": Function("the Folds of the Curves", ("solve", "square", "curves"), needed=True),
+    },
+    # The cells of [refine], decided everywhere in them.
+    "cells": {
+        "find": Function(
+            "the Cells of a rectangle of two Sides; solve(x, y) gives OUTPUTS and their error bounds",
+            ("solve", "x", "y", "each", "report"),
+            needed=True,
+        ),
+        "Side": Value("low, high, depth, log: a side of a rectangle and how often it may be halved", type, needed=True),
+        "accuracy": Function(
+            "the rtol that `find` needs of OUTPUTS where sides are halved `depth` times", ("depth",), needed=True
+        ),
+        "OUTPUTS": Value("the scene's outputs that `find` asks for", tuple, needed=True),
+        "VERDICTS": Value("{name: code} of the cells' verdicts, -1 undecided among them", dict, needed=True),
+        "POINTS": Value("the points that are solved along each side of a block", object, needed=True),
+        "MOST": Value("so many cells at most", int, needed=True),
+    },
+}
 
 
 def method(name):
@@ -17,10 +71,18 @@ def method(name):
     return module
 
 
-def curves_of(family):
-    """The module `curves` of this family; None where no boundary curves are known."""
+@cache
+def question(family, name):
+    """The module that answers the question `name` (of QUESTIONS) for this family; None if it has none.
+
+    Raises BadInput if the module does not keep to QUESTIONS.
+    """
     folder = _folder(family)
-    return modules.load(folder, "curves", "measure") if folder and "curves" in modules.names(folder) else None
+    if folder is None or name not in modules.names(folder):
+        return None
+    module = modules.load(folder, name, "measure")
+    contract.check_offered(module, QUESTIONS[name], "survey/measures/__init__.py")
+    return module
 
 
 @cache

@@ -1,8 +1,8 @@
 """Motions of linear equations Y' = A(t) Y between their known multipliers: for pictures, with an error bar each.
 
-Gauss collocation with three nodes, order 6; each step is taken whole and in two halves, whose difference tells the
-local error d. It is carried to the end by the linearised flow: beside each column of Y goes the matrix V of its error
-ellipse, as in `survey.kernels.lanes`: V <- P V P' + diag(d^2), |error_i| <= sqrt(m n V_ii) after n steps of m
+Gauss collocation with three nodes, order 6; each step is taken at once and in two halves, whose difference estimates
+the local error d. It is carried to the end by the linearised flow: beside each column of Y goes the matrix V of its
+error ellipse, as in `survey.kernels.lanes`: V <- P V P' + diag(d^2), |error_i| <= sqrt(m n V_ii) after n steps of m
 equations.
 
 Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.7, table 7.4.
@@ -10,7 +10,8 @@ Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equat
 
 import numpy as np
 
-EPS = 2.3e-16
+from survey.kernels.math.roundoff import EPS
+
 SAFETY = 4 / 63  # of the difference, of order 6, between a step and its halves
 _ROOT = np.sqrt(15.0)
 GAUSS = 0.5 + np.array([-0.1, 0.0, 0.1]) * _ROOT
@@ -20,12 +21,12 @@ _INNER = np.array([
     [5 / 36 + _ROOT / 24, 2 / 9, 5 / 36 - _ROOT / 24],
     [5 / 36 + _ROOT / 30, 2 / 9 + _ROOT / 15, 5 / 36],
 ])  # fmt: skip
-# Where in each step the coefficients are asked for: in its two halves, and as a whole.
+# Where in each step the coefficients are asked for: in its two halves, then in the full step.
 NODES = np.concatenate([0.5 * GAUSS, 0.5 + 0.5 * GAUSS, GAUSS])
 
 
 def fundamental(matrices, lengths, periods, scale=1.0, terms=None):
-    """t, Y at the ends of all steps of so many periods, and its bars (steps * periods + 1, n, n); Y = 1 at t = 0.
+    """t, Y at the ends of all steps of so many periods, and its bounds (steps * periods + 1, n, n); Y = 1 at t = 0.
 
     `matrices` (steps, 9, n, n) holds A at the NODES of each step of one period, `lengths` (steps) how long they are.
     `scale` (n) holds the sizes of Y's components, `terms` (steps, n, n) what the rounding of A is relative to (or |A|).
@@ -35,7 +36,7 @@ def fundamental(matrices, lengths, periods, scale=1.0, terms=None):
     halves = [_step(matrices[:, 3 * i : 3 * i + 3], 0.5 * h) for i in range(2)]
     steps, units = halves[1] @ halves[0], np.divide.outer(scale * np.ones(n), scale * np.ones(n))
     off = abs(steps - _step(matrices[:, 6:], h)) / units
-    # an entry's difference may vanish by symmetry: the largest speaks for all
+    # an entry's difference may vanish by symmetry: the largest stands for all
     local = SAFETY * off.max(axis=(1, 2), keepdims=True) * units + EPS * (4 * np.eye(n) + 12 * h * terms)
     y, bars = _chain(steps, local, units, periods)
     ends = np.cumsum(lengths.astype(np.longdouble))
@@ -54,7 +55,7 @@ def _step(a, h):
 
 
 def _chain(steps, local, units, periods):
-    """Products of the steps from the first on, period after period, and their bars, from the `local` ones."""
+    """Products of the steps from the first on, period after period, and their error bounds, from the `local` ones."""
     number, n = len(steps) * periods, steps.shape[-1]
     y, squares = np.empty((2, number + 1, n, n))
     y[0], squares[0], ellipses = np.eye(n), 0.0, np.zeros((n, n, n))  # an ellipse for each column
@@ -73,7 +74,7 @@ def _chain(steps, local, units, periods):
 
 
 def of_trace(trace, bar):
-    """The pair of multipliers l, 1/l with l + 1/l = `trace` (complex, known to `bar`), |l| >= 1, and their bars.
+    """The pair of multipliers l, 1/l with l + 1/l = `trace` (complex, known to `bar`), |l| >= 1, and their bounds.
 
     |sqrt(x + d) - sqrt(x)| <= min(sqrt |d|, |d / sqrt x|), x = trace^2 / 4 - 1 (to first order where x is complex).
     """
@@ -91,7 +92,7 @@ def mirrored(nodes):
 
 
 def value(dim, name, symbol, words, values, bars):
-    """A variable along the time `dim`, and its error bar, as `Trajectory.data` holds them."""
+    """A variable along the time `dim`, and its error bound, as `Trajectory.data` holds them."""
     return {
         name: (dim, values, {"long_name": words, "symbol": symbol, "units": "1"}),
         f"{name}_error": (dim, bars, {"long_name": f"error bound of {name}", "units": "1"}),
@@ -99,7 +100,7 @@ def value(dim, name, symbol, words, values, bars):
 
 
 def described(multipliers, bars):
-    """The variables of multipliers and their bars, along the dimension `multiplier`."""
+    """The variables of multipliers and their error bounds, along the dimension `multiplier`."""
     parts = {"real": np.real(multipliers), "imag": np.imag(multipliers), "error": bars}
     words = {"real": "real part of the multiplier", "imag": "imaginary part of the multiplier",
              "error": "error bound of the multiplier, the radius of a disc"}  # fmt: skip

@@ -1,4 +1,4 @@
-"""A block as rows and lanes: what depends on some axes alone is computed once for each place along those."""
+"""A block as rows and lanes: what depends on some axes alone is computed once for each position along those."""
 
 from math import prod
 
@@ -25,7 +25,7 @@ class Rows:
         """`per_row` of several arrays, (arrays, rows)."""
         found = np.empty((len(arrays), self.rows))
         for column, array in zip(found, arrays, strict=True):
-            column[:] = self._whole(array)[:, 0]
+            column[:] = self._broadcast(array)[:, 0]
         return found
 
     def per_row(self, array):
@@ -33,15 +33,15 @@ class Rows:
         return np.ascontiguousarray(self.per_point(array)[:, 0])
 
     def per_point(self, array):
-        """All values, as (rows, lanes), contiguous float64; a copy, as a read-only view would be compiled for anew."""
-        return np.array(self._whole(array), order="C")
+        """All values (rows, lanes), contiguous float64; a copy, as for read-only views kernels would compile again."""
+        return np.array(self._broadcast(array), order="C")
 
-    def _whole(self, array):
-        whole = np.broadcast_to(np.asarray(array, dtype=float), self.shape).transpose(self.order)
-        return whole.reshape(self.rows, self.lanes)
+    def _broadcast(self, array):
+        full = np.broadcast_to(np.asarray(array, dtype=float), self.shape).transpose(self.order)
+        return full.reshape(self.rows, self.lanes)
 
     def back(self, array):
         """(rows, lanes), or (rows, 1), in the block's shape."""
-        whole = np.broadcast_to(array, (self.rows, self.lanes))
+        full = np.broadcast_to(array, (self.rows, self.lanes))
         sorted_shape = [self.shape[axis] for axis in self.order]
-        return np.ascontiguousarray(whole.reshape(sorted_shape).transpose(np.argsort(self.order)))
+        return np.ascontiguousarray(full.reshape(sorted_shape).transpose(np.argsort(self.order)))

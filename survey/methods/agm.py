@@ -10,6 +10,7 @@ from math import copysign, log, pi, sqrt
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math import double as dd
 from survey.kernels.math.elliptic import jacobi
+from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.math.third_kind import mean, third, third_double
 from survey.kernels.nutation import records as rc
 from survey.kernels.nutation import wells as nu
@@ -18,7 +19,6 @@ from survey.kernels.nutation.motion import motion
 
 ORDER = 0  # no steps
 SERVES = ("nutation",)
-_EPS = nu.EPS
 _CANCELLED = 0.05  # advances that are a smaller part of their terms are computed in double-double
 _FINE = 2.0**-94
 _CLOSE = 0.1  # poles that are nearer, in units of a well's width, bound rates by nothing
@@ -135,18 +135,20 @@ def _periods_of(row, out):
     low, high = row[nu.NOISE_LOW], row[nu.NOISE_HIGH]
     noise, share = low + high + row[nu.NOISE_ABOVE], _shares(x, y)
     out[rc.PERIOD] = period
-    out[rc.PERIOD_BAR] = (12.0 * _EPS + 0.5 * share[0] * row[nu.NOISE_ABOVE] + 0.25 * share[1] * (low + high)) * period
+    out[rc.PERIOD_BAR] = (
+        12.0 * ROUNDOFF + 0.5 * share[0] * row[nu.NOISE_ABOVE] + 0.25 * share[1] * (low + high)
+    ) * period
     total, difference, size = down + up, down - up, size_up + size_down
     roots = root_low, root_high
     blur_psi, blur_phi = _blurred(row, roots, pi * turns_up + up, pi * turns_down + down, period, x, y)
     ends = 4.0 * row[nu.WIDTH] * (row[nu.NOISE_ENDS] + row[nu.NOISE_WIDTH])
-    error, rounding = (24.0 * _EPS + ends) * size, 2.0 * _EPS
+    error, rounding = (24.0 * ROUNDOFF + ends) * size, 2.0 * ROUNDOFF
     bare = abs(total) if turns_up + turns_down == 0.0 else abs(difference)  # without multiples of pi
     if bare < _CANCELLED * size and turns_up * turns_down != 0.0:
         total, difference = _fine_parts(row)
-        error, rounding = (_FINE + ends) * size, 12.0 * _EPS
+        error, rounding = (_FINE + ends) * size, 12.0 * ROUNDOFF
     out[rc.PRECESSION], out[rc.SPIN] = pi * (turns_down + turns_up) + total, pi * (turns_down - turns_up) + difference
-    turned = 2.0 * _EPS * pi
+    turned = 2.0 * ROUNDOFF * pi
     turned_psi, turned_phi = turned * abs(turns_down + turns_up), turned * abs(turns_down - turns_up)
     out[rc.PRECESSION_BAR] = error + min(4.0 * noise * size, blur_psi) + rounding * abs(total) + turned_psi
     out[rc.SPIN_BAR] = error + min(4.0 * noise * size, blur_phi) + rounding * abs(difference) + turned_phi
@@ -155,7 +157,7 @@ def _periods_of(row, out):
     out[rc.ACTION] = (period * (row[nu.LEVEL] + rest) - up - down) / (2.0 * pi)
     size = period * (abs(row[nu.LEVEL]) + abs(rest))
     size += abs(row[nu.MINUS]) * (pi + size_up) + abs(row[nu.PLUS]) * (pi + size_down)
-    out[rc.ACTION_BAR] = (24.0 * _EPS + 4.0 * noise) * size / (2.0 * pi)
+    out[rc.ACTION_BAR] = (24.0 * ROUNDOFF + 4.0 * noise) * size / (2.0 * pi)
     if out[rc.ACTION_BAR] > ROUGH * abs(out[rc.ACTION]):
         out[rc.ACTION], out[rc.ACTION_BAR] = action(row)
 

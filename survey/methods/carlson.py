@@ -9,6 +9,7 @@ from math import cos, hypot, pi, sin, sqrt
 
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.carlson import rf_whole, rj, rj_spread
+from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.nutation import records as rc
 from survey.kernels.nutation import wells as nu
 from survey.kernels.nutation.action import ROUGH, action
@@ -16,7 +17,6 @@ from survey.kernels.nutation.motion import first_kind, motion
 
 ORDER = 0  # no steps
 SERVES = ("nutation",)
-_EPS = nu.EPS
 _STEPS = 60
 
 
@@ -48,15 +48,15 @@ def _periods_of(row, out):
     down = _advance(row[nu.PLUS], row[nu.LOW_MINUS], row[nu.HIGH_MINUS], width, high, time, s, g, spread)
     noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + row[nu.NOISE_ABOVE]
     out[rc.PERIOD], out[rc.PRECESSION], out[rc.SPIN] = 4.0 * time, up + down, down - up
-    out[rc.PERIOD_BAR] = (32.0 * _EPS + noise) * out[rc.PERIOD]
+    out[rc.PERIOD_BAR] = (32.0 * ROUNDOFF + noise) * out[rc.PERIOD]
     # here, other than in agm, advances know the distances from poles by these alone
     noise += 0.5 * row[nu.NOISE_ENDS]
-    out[rc.PRECESSION_BAR] = out[rc.SPIN_BAR] = (48.0 * _EPS + 4.0 * noise) * (abs(up) + abs(down))
+    out[rc.PRECESSION_BAR] = out[rc.SPIN_BAR] = (48.0 * ROUNDOFF + 4.0 * noise) * (abs(up) + abs(down))
     square = _second_kind(time, 0.5 * above, g, g)
     parts = out[rc.PERIOD] * row[nu.LEVEL], 4.0 * square, row[nu.MINUS] * up, row[nu.PLUS] * down
     out[rc.ACTION] = (parts[0] + parts[1] - parts[2] - parts[3]) / (2.0 * pi)
     size = abs(parts[0]) + parts[1] + abs(parts[2]) + abs(parts[3])
-    out[rc.ACTION_BAR] = (48.0 * _EPS + 4.0 * noise) * size / (2.0 * pi)
+    out[rc.ACTION_BAR] = (48.0 * ROUNDOFF + 4.0 * noise) * size / (2.0 * pi)
     if out[rc.ACTION_BAR] > ROUGH * abs(out[rc.ACTION]):
         out[rc.ACTION], out[rc.ACTION_BAR] = action(row)
 

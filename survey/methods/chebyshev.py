@@ -13,12 +13,13 @@ import numpy as np
 
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.double import two_sum
+from survey.kernels.math.newton import bracketed
+from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.nutation import records as rc
 from survey.kernels.nutation import wells as nu
 
 ORDER = 0  # no steps: convergence is exponential
 SERVES = ("nutation",)
-_EPS = nu.EPS
 _FIRST, _MOST = 8, 2**15
 _LONGEST = 512  # terms of the series in time
 _FULL = 38.0  # the first neglected coefficient is exp(-FULL)
@@ -88,7 +89,7 @@ def _periods_of(row, n, speed, half, whole, out):
     """See `agm.periods_of`; the error of n nodes follows from the difference to half of them."""
     _sums(row, n // 2, half)
     _sums(row, n, whole)
-    noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + 16.0 * _EPS * whole[4]
+    noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + 16.0 * ROUNDOFF * whole[4]
     seen, missed = exp(-speed * n), exp(-2.0 * speed * n)
     for i in range(4):
         half[i] = 10.0 * (abs(whole[i] - half[i]) * seen + abs(whole[i]) * missed) + noise * abs(whole[i])
@@ -153,21 +154,17 @@ def _integrals(waves, n, x, out):
 
 @inline
 def _when(row, waves, n, time, value, out):
-    """x at which `time` is reached, by Newton's method between brackets; `out` as `_integrals`."""
-    low, high = 0.0, pi
-    x = pi * time / (pi * waves[0, 0])
-    for _ in range(100):
-        _integrals(waves, n, x, out)
-        _integrands(row, x, value)
-        move = (out[0] - time) / value[0]
-        low, high = (low, x) if move > 0.0 else (x, high)
-        new = x - move
-        if not low <= new <= high:
-            new = 0.5 * (low + high)
-        if abs(new - x) <= 4.0 * _EPS * x:
-            break
-        x = new
-    return x
+    """x at which `time` is reached; `out` as `_integrals`."""
+    first, given = pi * time / (pi * waves[0, 0]), (row, waves, n, time, value, out)
+    return bracketed(_to_time, _integrals, given, first, (0.0, pi), (0.0, 4.0 * ROUNDOFF), 100)[0]
+
+
+@inline
+def _to_time(integrals, given, x):
+    row, waves, n, time, value, out = given
+    integrals(waves, n, x, out)
+    _integrands(row, x, value)
+    return out[0] - time, value[0], not (out[0] - time) / value[0] > 0.0
 
 
 @inline
@@ -203,7 +200,7 @@ def _motion(row, start, n, noise, times, waves, out):
         late += early
         out[j, rc.U], out[j, rc.PSI], out[j, rc.PHI] = value[3], up + down, down - up
         rounding = 3.0 * (row[nu.BAR_LOW] + row[nu.BAR_HIGH])
-        out[j, rc.U_BAR] = speed * late + bend * late * late + rounding + 8.0 * _EPS * wide
+        out[j, rc.U_BAR] = speed * late + bend * late * late + rounding + 8.0 * ROUNDOFF * wide
         out[j, rc.PSI_BAR] = out[j, rc.PHI_BAR] = moved + 2.0 * noise * (1.0 + abs(turns)) * 2.0 * size
 
 
@@ -218,5 +215,5 @@ def nutation_motions(rows, kinds, starts, periods, times, out):
             while 2.0 * n * speed < 2.0 * _FULL and n <= _LONGEST:
                 n *= 2
             if n <= _LONGEST:
-                noise = periods[i, rc.PERIOD_BAR] / periods[i, rc.PERIOD] + 4.0 * _EPS * n
+                noise = periods[i, rc.PERIOD_BAR] / periods[i, rc.PERIOD] + 4.0 * ROUNDOFF * n
                 _motion(rows[i], starts[i], n, noise, times[i], waves, out[i])

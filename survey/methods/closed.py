@@ -12,10 +12,10 @@ import numpy as np
 
 from survey.kernels.cylinder import closed, trigonometric, weierstrass
 from survey.kernels.cylinder import records as rc
-from survey.kernels.cylinder.along import EQUILIBRIUM, NO_CONVERGENCE, OK, TRUST, TURNING, finite
-from survey.kernels.cylinder.flow import UNIT
+from survey.kernels.cylinder.steps import EQUILIBRIUM, NO_CONVERGENCE, OK, TRUST, TURNING, finite
 from survey.kernels.cylinder.weierstrass import BAR_W, BAR_X, COUNT, LANES, W, X
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 ORDER = 0  # no steps
 SERVES = ("cylinder",)
@@ -27,7 +27,7 @@ _NO_FORM = 19  # as in the STATUS of scenes/gyrostat.py
 
 
 def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
-    """See `along.trajectories`; tolerance and limit have no meaning here. Only the forms that apply are compiled."""
+    """See `steps.trajectories`; tolerance and limit have no meaning here. Only the forms that apply are compiled."""
     forms, curves = np.zeros(times.shape, np.int8), np.empty((len(P), 2))
     _sort(P, starts, times, forms, curves, floats, turnings, status)
     for form, solve in ((closed.LIBRATION, _elliptics), (closed.TRIGONOMETRIC, _trigonometrics)):
@@ -85,13 +85,18 @@ def _tell(out, phi0, x, w, bar_x, bar_w):
     """Write down one solution at one time; False where the bars are too wide to be bounds."""
     if not (bar_x < TRUST and bar_w < TRUST * (1.0 + abs(w))):
         return False
-    out[rc.PHI], out[rc.W], out[rc.PHI_BAR], out[rc.W_BAR] = phi0 + x, w, bar_x + 2.0 * UNIT * abs(phi0 + x), bar_w
+    out[rc.PHI], out[rc.W], out[rc.PHI_BAR], out[rc.W_BAR] = (
+        phi0 + x,
+        w,
+        bar_x + 2.0 * ROUNDOFF_UP * abs(phi0 + x),
+        bar_w,
+    )
     return True
 
 
 @kernel
 def flow_abels(P, starts, targets, tolerance, limit, floats, status):
-    """See `along.abels`; tolerance and limit have no meaning here."""
+    """See `steps.abels`; tolerance and limit have no meaning here."""
     data = closed.scratch()
     for i in range(len(P)):
         phi0, w0 = starts[i, 0], starts[i, 1]
@@ -120,7 +125,7 @@ def _trigonometric(data, w0, x, out):
     F, f = data[closed.F0], data[closed.SLOPE]
     w = w0 - 2.0 * s * (F * s - f * math.cos(0.5 * x))
     moved = closed.deviating(data, t, w)
-    bar = closed.MARGIN * (2.0 * data[closed.NOISE] + moved + 4.0 * UNIT * (w0 + abs(x) * math.hypot(F, f)))
+    bar = closed.MARGIN * (2.0 * data[closed.NOISE] + moved + 4.0 * ROUNDOFF_UP * (w0 + abs(x) * math.hypot(F, f)))
     return _kept(out, w, t, bar, bar_t)
 
 
@@ -140,13 +145,17 @@ def _elliptic(kind, side, data, phi0, x, out):
         out[rc.VALUE], out[rc.TIME], out[rc.VALUE_BAR], out[rc.TIME_BAR] = phi0, 0.0, 0.0, 0.0
         return TURNING
     if kind == closed.LIBRATION:
-        edge, right = data[closed.BAR_RIGHT] + 4.0 * UNIT * (abs(phi0) + abs(x)), data[closed.RIGHT]
+        edge, right = data[closed.BAR_RIGHT] + 4.0 * ROUNDOFF_UP * (abs(phi0) + abs(x)), data[closed.RIGHT]
         if x >= right - edge:
             t, bar = closed.flight(data, math.pi, 0.0)
             if not bar < math.inf:
                 return NO_CONVERGENCE
-            out[rc.VALUE], out[rc.TIME], out[rc.VALUE_BAR] = phi0 + right, t, edge + 4.0 * UNIT * (abs(phi0) + right)
-            out[rc.TIME_BAR] = bar + 2.0 * UNIT * t
+            out[rc.VALUE], out[rc.TIME], out[rc.VALUE_BAR] = (
+                phi0 + right,
+                t,
+                edge + 4.0 * ROUNDOFF_UP * (abs(phi0) + right),
+            )
+            out[rc.TIME_BAR] = bar + 2.0 * ROUNDOFF_UP * t
             return TURNING
         if x > right - 4.0 * edge:
             return NO_CONVERGENCE
@@ -157,5 +166,7 @@ def _elliptic(kind, side, data, phi0, x, out):
     if not square > 4.0 * noise:
         return NO_CONVERGENCE
     w = math.sqrt(square)
-    blur = 2.0 * UNIT * (abs(phi0) + abs(x))
-    return _kept(out, w, t, closed.MARGIN * (0.5 * (noise + abs(slope) * blur) / w + 2.0 * UNIT * w), bar_t + blur / w)
+    blur = 2.0 * ROUNDOFF_UP * (abs(phi0) + abs(x))
+    return _kept(
+        out, w, t, closed.MARGIN * (0.5 * (noise + abs(slope) * blur) / w + 2.0 * ROUNDOFF_UP * w), bar_t + blur / w
+    )

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from survey.kernels import lanes
-from survey.kernels.cylinder import along, fate, returns
+from survey.kernels.cylinder import fate, returns, steps
 from survey.kernels.cylinder.flow import (
     BOUND_DG,
     BOUND_F,
@@ -126,8 +126,8 @@ def hill_walk_pieces(potential, p, row, table, edges, slack, longest, tolerance,
         error = d11  # all four entries speak in it
         if error <= tolerance and h * wave <= 1.01 * _LONGEST:
             # The stages pass through sums of size 60 that cancel; t itself is rounded.
-            r11, r12, r21 = rounding(terms, 8.0 * h)
-            matrix = (p11, p12, p21, p22, d11 + 2.0 * r11, d12 + r12, d21 + r21)
+            r11, r12, r21 = rounding(terms, h)
+            matrix = (p11, p12, p21, p22, d11 + 2.0 * r11, d12 + 8.0 * r12, d21 + 4.0 * r21)
             old1, old2 = y1, y2
             y1, v1, s1, t1, w1 = column(matrix, y1, v1, s1, t1, w1)
             y2, v2, s2, t2, w2 = column(matrix, y2, v2, s2, t2, w2)
@@ -211,14 +211,14 @@ def flow_begin(p, phi, w, tolerance, T):
 
 @kernel
 def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
-    """See `along.trajectories`."""
-    along.trajectories(flow_setting, flow_begin, flow_at, P, starts, times, tolerance, limit, floats, turnings, status)
+    """See `steps.trajectories`."""
+    steps.trajectories(flow_setting, flow_begin, flow_at, P, starts, times, tolerance, limit, floats, turnings, status)
 
 
 @kernel
 def flow_abels(P, starts, targets, tolerance, limit, floats, status):
-    """See `along.abels`."""
-    along.abels(flow_setting, flow_begin, flow_at, P, starts, targets, tolerance, limit, floats, status)
+    """See `steps.abels`."""
+    steps.abels(flow_setting, flow_begin, flow_at, P, starts, targets, tolerance, limit, floats, status)
 
 
 @kernel

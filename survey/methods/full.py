@@ -12,19 +12,20 @@ import numpy as np
 
 from survey.kernels.cylinder import gyrostat
 from survey.kernels.cylinder import records as rc
-from survey.kernels.cylinder.along import (
+from survey.kernels.cylinder.flow import LOW, TWO_PI, TWO_PI_LOW, longest_step, reduced
+from survey.kernels.cylinder.steps import (
     NO_CONVERGENCE,
     OK,
     OVERFLOW,
     STEP_LIMIT,
     TRUST,
-    UNTOLD,
+    UNDETERMINED,
     bar,
     finite,
     start_sign,
 )
-from survey.kernels.cylinder.flow import LOW, TWO_PI, TWO_PI_LOW, UNIT, longest_step, reduced
 from survey.kernels.jit import kernel
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 ORDER = gyrostat.ORDER
 SERVES = ("cylinder",)
@@ -33,7 +34,7 @@ COST = {"cylinder": 90.0}  # time, relative to the default method
 FLOW_FINEST = 1e-17  # useful truncation error of a step
 FLOW_WORK = 2  # steps, relative to the Taylor method
 _PAIRS = 3  # of components, in each of which a step and the initial state err; `bar` counts two for each step
-_FIRST = 4.0 * UNIT  # rounding of the initial state in the rotated frame
+_FIRST = 4.0 * ROUNDOFF_UP  # rounding of the initial state in the rotated frame
 
 
 @kernel
@@ -53,13 +54,13 @@ def _read(state, squares, n, near, out):
             a += (c * frame[i, 1] - s * frame[i, 2]) * squares[3 + i, 3 + j] * (c * frame[j, 1] - s * frame[j, 2])
             b += frame[i, 0] * squares[i, j] * frame[j, 0]
     out[rc.PHI], out[rc.W] = phi + turns * TWO_PI, w
-    out[rc.PHI_BAR] = bar(_PAIRS * (n + 1), a) + UNIT * (4.0 + 4.0 * abs(turns) * TWO_PI)
-    out[rc.W_BAR] = bar(_PAIRS * (n + 1), b) + UNIT * 4.0 * abs(w)
+    out[rc.PHI_BAR] = bar(_PAIRS * (n + 1), a) + ROUNDOFF_UP * (4.0 + 4.0 * abs(turns) * TWO_PI)
+    out[rc.W_BAR] = bar(_PAIRS * (n + 1), b) + ROUNDOFF_UP * 4.0 * abs(w)
 
 
 @kernel
 def _trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
-    """As `along.trajectory`, by the full equations."""
+    """As `steps.trajectory`, by the full equations."""
     free, G, squares, axis = np.empty(8), np.empty((14, 3)), np.zeros((6, 6)), gyrostat.FRAME[:, 0].copy()
     T, V = np.zeros((gyrostat.LAST + 1, 12)), np.zeros((LOW + 1, 6, 12))
     state, new, J, work = np.empty(6), np.empty(6), np.empty((6, 6)), np.empty((6, 6))
@@ -92,7 +93,7 @@ def _trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
             floats[j, rc.PHI_BAR], floats[j, rc.W_BAR] = here[rc.PHI_BAR] + 3e-16 * abs(before) * TWO_PI, here[rc.W_BAR]
             from_rest = n == 1 and w0 == 0.0
             told = unsure < 3 and count >= 0 and (abs(here[rc.W]) > here[rc.W_BAR] or from_rest)
-            turnings[j] = count + (here[rc.W] * sign < 0.0 and not from_rest) if told else UNTOLD
+            turnings[j] = count + (here[rc.W] * sign < 0.0 and not from_rest) if told else UNDETERMINED
             j += 1
         gyrostat.at(T, h, new)
         gyrostat.carry(G, T, V, h, squares, J, work)
@@ -108,7 +109,7 @@ def _trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
             unsure += 1
             continue
         if unsure > 2:
-            count = UNTOLD - limit  # below zero for good
+            count = UNDETERMINED - limit  # below zero for good
         count += w * sign < 0.0
         sign, unsure = (1 if w > 0.0 else -1), 0
     return STEP_LIMIT
@@ -116,7 +117,7 @@ def _trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
 
 @kernel
 def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
-    """See `along.trajectories`."""
+    """See `steps.trajectories`."""
     for i in range(len(P)):
         size = finite(times[i])
         status[i] = _trajectory(P[i], starts[i, 0], starts[i, 1], times[i, :size], tolerance, limit, floats[i],

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from survey.kernels.cylinder import along, fate, returns
+from survey.kernels.cylinder import fate, returns, steps
 from survey.kernels.cylinder.flow import (
     BOUND_DG,
     BOUND_F,
@@ -137,14 +137,14 @@ def flow_begin(p, phi, w, h, T):
 
 @kernel
 def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
-    """See `along.trajectories`."""
-    along.trajectories(flow_setting, flow_begin, flow_at, P, starts, times, tolerance, limit, floats, turnings, status)
+    """See `steps.trajectories`."""
+    steps.trajectories(flow_setting, flow_begin, flow_at, P, starts, times, tolerance, limit, floats, turnings, status)
 
 
 @kernel
 def flow_abels(P, starts, targets, tolerance, limit, floats, status):
-    """See `along.abels`."""
-    along.abels(flow_setting, flow_begin, flow_at, P, starts, targets, tolerance, limit, floats, status)
+    """See `steps.abels`."""
+    steps.abels(flow_setting, flow_begin, flow_at, P, starts, targets, tolerance, limit, floats, status)
 
 
 @kernel

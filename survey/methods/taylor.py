@@ -7,7 +7,7 @@ Mathematics 14 (2005) 99-117. Domain: every parameter value; explicit, so steps 
 
 import math
 
-from survey.kernels.cylinder import along, fate, lockstep, returns, winding
+from survey.kernels.cylinder import fate, lockstep, returns, steps, winding
 from survey.kernels.cylinder.flow import LAST, PHI, TRUNC_PHI, TRUNC_W, E, W, Y, longest_step, series
 from survey.kernels.cylinder.flow import ORDER as _ORDER
 from survey.kernels.jit import inline, kernel
@@ -66,8 +66,8 @@ def flow_turnings(P, starts, times, tolerance, limit, turnings):
 
 @kernel
 def flow_abels(P, starts, targets, tolerance, limit, floats, status):
-    """See `along.abels`."""
-    along.abels(flow_setting, flow_begin, flow_at, P, starts, targets, tolerance, limit, floats, status)
+    """See `steps.abels`."""
+    steps.abels(flow_setting, flow_begin, flow_at, P, starts, targets, tolerance, limit, floats, status)
 
 
 @kernel

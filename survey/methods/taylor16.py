@@ -34,8 +34,9 @@ for _j in range(_DEGREE + 1):
     _TO_POWERS[: _j + 1, _j] = legendre.leg2poly([0.0] * _j + [1.0])
 _TO_LEGENDRE = np.stack([_TO_LEGENDRE[parity::2, _HALF:] for parity in (0, 1)])
 _TO_POWERS = np.stack([_TO_POWERS[parity::2, parity::2] for parity in (0, 1)])
-WIDTH = _DEGREE + 3
-_TAIL, _SIZE = _DEGREE + 1, _DEGREE + 2
+WIDTH = _DEGREE + 4
+_TAIL, _SIZE, _ALIAS = _DEGREE + 1, _DEGREE + 2, _DEGREE + 3
+_SLOWEST = 0.02  # a faster fall than this of two Legendre coefficients to the next two is not trusted
 _ROUNDING = 4.4e-16
 _ENDS = OWN + WIDTH
 
@@ -55,13 +56,16 @@ def _product(matrix, k, x, i):
 
 @splice
 def _hill_row(samples, h, coefficients):
-    """Per function, in units of -4/h^2: powers of x, then the last two Legendre coefficients, then the largest."""
+    """Per function, in units of -4/h^2: powers of x, the last two Legendre coefficients, the largest sample, and what
+    components of degree >= 20 add to the low coefficients, where the Gauss points take them for these.
+    """
     count = samples.shape[2]
     paired, series = np.empty((_HALF, count)), np.empty((_HALF, count))
     for c in range(2):
         first = c * WIDTH
         for i in range(count):
             coefficients[first + _TAIL, i] = coefficients[first + _SIZE, i] = 0.0
+            coefficients[first + _ALIAS, i] = 1e-300
         for parity in range(2):
             sign = 1.0 - 2.0 * parity
             for k in range(_HALF):
@@ -79,6 +83,12 @@ def _hill_row(samples, h, coefficients):
                     coefficients[first + 2 * k + parity, i] = power
             for i in range(count):
                 coefficients[first + _TAIL, i] += 0.25 * h[i] * h[i] * abs(series[_HALF - 1, i])
+                coefficients[first + _ALIAS, i] += 0.25 * h[i] * h[i] * abs(series[_HALF - 2, i])
+        for i in range(count):  # at the rate at which the last four fall, five times two degrees on
+            tail = coefficients[first + _TAIL, i]
+            rate = min(max(tail / coefficients[first + _ALIAS, i], _SLOWEST), 1.0)
+            square = rate * rate
+            coefficients[first + _ALIAS, i] = tail * (square * square * rate)
 
 
 def _convolved(z, x, n, zeros=()):
@@ -134,7 +144,10 @@ def hill_step(f, c2, p, h):
     by_slope = a_tail * (abs(db_even) + abs(db_odd)) + b_tail * (abs(da_even) + abs(da_odd))
     # What the projection left out acts only through the solutions' own components of that degree.
     missing = (f[10] + abs(p) * f[WIDTH + 10]) * (4.0 * (abs(a[9]) + abs(a[10]) + abs(b[9]) + abs(b[10])))
+    missing = missing + 8.0 * (f[12] + abs(p) * f[WIDTH + 12])
     size = f[11] + abs(p) * (f[WIDTH + 11] + abs(p * c2))
+    # z's rounding reaches y within the step where what it is relative to is large on the step's scale
+    missing = missing + 2.0 * _ROUNDING * ((size - 1.0) + abs(size - 1.0))
     d11 = by_slope + 19.0 * by_value + missing + _ROUNDING
     d12 = 2.0 * by_value + missing + 2.0 * _ROUNDING
     d21 = 38.0 * by_slope + missing + 4.0 * _ROUNDING * size

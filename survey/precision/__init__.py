@@ -35,7 +35,7 @@ import survey.scenes as scenes
 from survey import modules
 from survey.errors import BadInput
 from survey.file.labels import provenance
-from survey.grid import line
+from survey.grid import lines
 from survey.measures.hill import dense
 from survey.precision import peak
 from survey.request import workflow
@@ -169,21 +169,20 @@ def _peer(case, peer):
 
 
 def _lines(point):
-    """The axes that one parameter of a work has for itself, as `Request.lines`."""
+    """The `lines` of a work, whose arrays have as many dimensions each, of length 1 where they do not vary."""
     shapes = {name: np.shape(values) for name, values in point.items()}
-    own = {name: [i for i, size in enumerate(shape) if size > 1] for name, shape in shapes.items()}
-    alone = (name for name in own if len(own[name]) == 1 and sum(own[name] == other for other in own.values()) == 1)
-    return {name: line(np.ravel(point[name])) for name in alone}
+    own = {name: tuple(i for i, size in enumerate(shape) if size > 1) for name, shape in shapes.items()}
+    return lines({name: (own[name], np.ravel(values)) for name, values in point.items()})
 
 
 def _within(reference, point):
     """The reference as the first point of a row of the work, where the work has rows."""
     parameters, options, exact, verdict = reference
-    lines = [name for name in _lines(point) if np.shape(point[name])[-1] > 1]
-    if not lines:
+    dense = [name for name in _lines(point) if np.shape(point[name])[-1] > 1]
+    if not dense:
         return reference
     whole = {name: np.array([[value]]) for name, value in parameters.items()}
-    whole |= {name: np.concatenate([whole[name], np.atleast_2d(point[name])], axis=1) for name in lines}
+    whole |= {name: np.concatenate([whole[name], np.atleast_2d(point[name])], axis=1) for name in dense}
     return whole, options, exact, verdict
 
 

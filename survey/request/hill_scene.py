@@ -8,9 +8,9 @@ import numpy as np
 
 from survey import status
 from survey.errors import BadInput
-from survey.kernels.hill.answers import EPS
+from survey.kernels.math.roundoff import EPS
 from survey.measures.hill import monodromy as measure
-from survey.measures.hill import more_digits, motion, user_equation
+from survey.measures.hill import motion, multiprecision, user_equation
 from survey.measures.hill import why as hill_why
 from survey.scene import Parameter
 
@@ -146,23 +146,23 @@ class HillScene:
     def _lifted(self):
         """z, PERIOD and BREAKS with more digits; numbers as they are."""
         given = (self.z, self.period, self.breaks)
-        return [more_digits.lifted(value) if callable(value) else value for value in given]
+        return [multiprecision.lifted(value) if callable(value) else value for value in given]
 
     @cached_property
     def _words(self):
         """Why z cannot be run with more digits; nothing where it can."""
         point = [p.default if p.default is not None else 1.0 for p in self.PARAMETERS]
         try:
-            with more_digits.LOCK:
+            with multiprecision.LOCK:
                 z, _ = self._exact(point, np.zeros(1))
-                z(more_digits.context().mpf(0.25))
-        except more_digits.Unsupported as error:
+                z(multiprecision.context().mpf(0.25))
+        except multiprecision.Unsupported as error:
             return str(error)
         return ""
 
     def _exact(self, point, edges):
         """z(u) at a point, and the edges of its pieces, with more digits; the edges as float64 knows them are given."""
-        mp = more_digits.context()
+        mp = multiprecision.context()
         z, period, breaks = self._lifted
         p = [mp.mpf(float(value)) for value in point]
         whole = mp.mpf(period(p) if callable(period) else period)

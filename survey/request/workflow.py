@@ -49,7 +49,7 @@ def _axis_kind(value):
     return "number"
 
 
-Axis = Annotated[
+AxisValue = Annotated[
     Annotated[Number, Tag("number")] | Annotated[Spread, Tag("spread")] | Annotated[Listed, Tag("values")],
     Discriminator(_axis_kind),
 ]
@@ -60,7 +60,7 @@ class Solver(Table):
     rtol: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False)] = 1e-10
 
 
-class Output(Table):
+class OutputTable(Table):
     path: str | None = None
     figures: list[str] = []
     variables: list[str] | None = None
@@ -82,9 +82,9 @@ class File(Table):
     title: str = ""
     scene: str
     options: dict[str, Any] = {}
-    axes: dict[str, Axis]
+    axes: dict[str, AxisValue]
     solver: Solver = Solver()
-    output: Output = Output()
+    output: OutputTable = OutputTable()
     boundaries: Boundaries | None = None
     refine: Refine | None = None
 
@@ -252,7 +252,7 @@ def _check_boundaries(scene, name, asked, given):
     if asked is None:
         return None
     axes = [key for key, values in given.items() if np.ndim(values)]
-    measure = measures.curves_of(scene.FAMILY)
+    measure = measures.question(scene.FAMILY, "curves")
     if measure is None:
         raise BadInput(f"boundaries: of the scene {name} no boundary curves are known; leave the table out")
     if hasattr(measure, "closed"):
@@ -296,8 +296,8 @@ def _check_refine(scene, name, file, given):
     if file.refine is None:
         return None
     axes = {key: values for key, values in given.items() if np.ndim(values)}
-    if scene.FAMILY != "hill":
-        raise BadInput(f"refine: the verdict of {name} is one of points, not of cells; leave the table out")
+    if measures.question(scene.FAMILY, "cells") is None:
+        raise BadInput(f"refine: [refine] is not supported for {name}; leave the table out")
     _check_even(scene, name, "refine")
     if len(axes) != 2 or min(values.size for values in axes.values()) < 2:
         raise BadInput("refine: cells need exactly two axes of two values or more; fix the other parameters")
@@ -343,13 +343,13 @@ def check_options(scene, given, parameters=(), table=""):
         told = value if isinstance(value, str) else shown(value)
         if told not in known[key].choices:
             raise BadInput(f"{table}{key}: {modules.unknown('value', told, list(known[key].choices))}")
-        if known[key].said_by in parameters:
-            raise BadInput(f"{table}{key} and {known[key].said_by} say the same thing; give only one of them")
+        if known[key].implied_by in parameters:
+            raise BadInput(f"{table}{key} and {known[key].implied_by} say the same thing; give only one of them")
         if known[key].only_with and known[key].only_with not in parameters:
             raise BadInput(
                 f"{table}{key} goes only with the parameter {known[key].only_with}; give that, or leave it out"
             )
-    exist = [o for o in known.values() if o.said_by not in parameters and o.only_with in ("", *parameters)]
+    exist = [o for o in known.values() if o.implied_by not in parameters and o.only_with in ("", *parameters)]
     return {option.name: str(given.get(option.name, option.default)) for option in exist}
 
 
@@ -468,7 +468,7 @@ def _grid(parameters, given):
         sizes={key: values.size for key, values in axes.items()},
         parameters={key: ((key,), values) for key, values in axes.items()}
         | {key: ((), np.float64(value)) for key, value in fixed.items()},
-        whole=frozenset(key for key in axes if parameters[key].whole),
+        uncut=frozenset(key for key in axes if parameters[key].uncut),
     )
 
 
@@ -543,7 +543,7 @@ def _one_line(error):
 def _nearest(loc):
     """The keys that are allowed beside an unknown one, the nearest first named."""
     table = (
-        {"solver": Solver, "output": Output, "axes": Spread, "boundaries": Boundaries, "refine": Refine}.get(
+        {"solver": Solver, "output": OutputTable, "axes": Spread, "boundaries": Boundaries, "refine": Refine}.get(
             loc[0], File
         )
         if len(loc) > 1

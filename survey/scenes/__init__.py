@@ -1,18 +1,22 @@
-"""The scenes: one physical system per file. See `survey/scene.py` for the words they use.
+"""The scenes: one physical system per file. `survey/scene.py` holds the words in which a scene describes itself.
 
 A scene module holds what CONTRACT lists, and no other public name; the table is checked when the scene is loaded.
-Where a scene gives a status of its own, the verdict is -1, and maps and counts name the status. `compile_ahead` runs in
-a process of its own beside a map, which waits for it (`kernels.jit.wait_for_ahead`) when it needs what is compiled.
+
+`solve(point, request)` answers one block. `point` maps each parameter that exists to a float64 array; all have the same
+number of dimensions and broadcast to the block's shape: an axis of the block is long in the arrays that vary along it
+and 1 in the others, so that what depends on one axis is computed once (`survey.measures.rows` helps). A value outside
+the domain of its parameter arrives as NaN: such points get the status `invalid_parameters`. `request` is a
+survey.scene.Request; `request.line(name)` describes the full axis of a parameter, of which the block may be a part.
+
+`solve` returns, in the block's shape (plus an output's extra dimensions), every output in `request.variables` (all of
+them if that is empty), `X_error` (float64), an absolute error bound, for each float output `X`, and `status` (int8: the
+codes of `survey.status`, from 16 on the scene's own in the order of STATUS). Where an output does not apply a float is
+NaN, an integer its `fill`. Where a scene gives a status of its own, the verdict is -1, and maps and counts name the
+status. `solve` is pure and thread-safe, and gives a point the same bits in any block.
 
 In `why` and `trajectory`, `point` maps each parameter to a number, and `answer` holds everything that is known of one
-point, {name: array}, flags as words.
-
-`point` of `solve` maps each parameter that exists to a float64 array; all have the same number of dimensions and
-broadcast to the block's shape (an axis of the block is long in one array and 1 in the others, so what depends on
-one axis is computed once). A parameter outside its domain arrives as NaN: such points get the status
-`invalid_parameters`. `solve` returns, in the block's shape (plus an output's extra dimensions), every output in
-`request.variables` or all of them, `X_error` (float64) for each float output `X`, and `status` (int8). It is pure,
-thread-safe, and gives a point the same bits in any block.
+point, {name: array}, flags as words. `compile_ahead` runs in a process of its own while a map is solved; the map waits
+for it (`survey.kernels.jit.wait_for_ahead`) where it needs what is compiled there.
 """
 
 import sys
@@ -24,28 +28,30 @@ from survey.contract import Function, Value
 
 CONTRACT = {
     "TITLE": Value("one line", str, needed=True),
-    "PARAMETERS": Value("survey.scene.Parameter, in the order in which they are told", tuple, needed=True),
-    "OPTIONS": Value("survey.scene.Option", tuple, needed=True),
-    "OUTPUTS": Value("survey.scene.Output", tuple, needed=True),
-    "FAMILY": Value("the methods that serve it are those whose SERVES names this family", str, needed=True),
-    "AUDIT": Value("methods by which `survey verify` solves points again", tuple, needed=True),
+    "PARAMETERS": Value("survey.scene.Parameter, in the order in which they are listed", tuple, needed=True),
+    "OPTIONS": Value("survey.scene.Option: switches with a few values each", tuple, needed=True),
+    "OUTPUTS": Value("survey.scene.Output: what `solve` gives, but for `status`", tuple, needed=True),
+    "FAMILY": Value("the methods whose SERVES names this family can solve the scene", str, needed=True),
+    "AUDIT": Value("methods by which `survey verify` solves points again, the first choice first", tuple, needed=True),
     "REFERENCES": Value("sources, one string each", tuple, needed=True),
     "STATUS": Value(
-        "{name: sentence}: its own reasons why a point has no answer; its own words for a common one", dict
+        "{name: sentence}: its own reasons why a point has no answer; its own sentence for a common one", dict
     ),
-    "DIMENSIONS": Value("{name: coordinates} of the extra dimensions of its outputs", dict),
+    "DIMENSIONS": Value("{name: coordinates} of the extra dimensions that its outputs name in `dims`", dict),
     "EVEN": Value("is the coefficient of its Hill equation even about the half period? True if not given", bool),
     "cost": Function(
-        "seconds per point, roughly; `sizes` is {parameter: number of values}", ("options", "sizes"), needed=True
+        "rough seconds per point with the default method; `sizes` is {parameter: number of values}, 1 if it is fixed",
+        ("options", "sizes"),
+        needed=True,
     ),
     "solve": Function("{output: array} of a block, see above", ("point", "request"), needed=True),
     "why": Function("a sentence: what decided the verdict, by which margin against which error bar", ("answer",)),
     "trajectory": Function(
-        "survey.scene.Trajectory: the motion at one point up to `time` (None: what suits)",
+        "survey.scene.Trajectory: the motion at one point up to `time`, or as long as suits if that is None",
         ("point", "answer", "options", "time"),
     ),
     "compile_ahead": Function(
-        "compile some kernels of a map of these variables, in a process of its own", ("variables",)
+        "compile some kernels of a map of these variables, by calls on next to nothing; see above", ("variables",)
     ),
 }
 

@@ -9,7 +9,7 @@ conserved, k = epsilon A (A - C) and L = 2 A h - (A/C) p_phi^2 - epsilon A^2 + p
 Parameters, in order: A > 0 and C (0 < C <= 2 A), moments of inertia; epsilon = 3 mu / R^3, any sign; an initial state:
 theta0 in [0, pi] (0 only if p_psi = p_phi), p_theta0, p_psi, p_phi; and, if wanted, t (psi = phi = 0 at t = 0). Or,
 instead of all these, the scaled integrals l = L/|k|, alpha = p_phi/sqrt|k|, beta = p_psi/sqrt|k| with the option `sign`
-(of k) and ratio = C/A, which only the spin needs; then every well of the effective potential has its place, lower u
+(of k) and ratio = C/A, which only the spin needs; then every well of the effective potential has an index, lower u
 first, and time is in units of A/sqrt|k|, action in units of sqrt|k|.
 
 Per period of the nutation psi advances by `precession` and phi by `spin`; these are not reduced modulo 2 pi, nor are
@@ -33,11 +33,11 @@ from survey import methods
 from survey.errors import BadInput
 from survey.kernels.nutation import brun, brun_lanes
 from survey.kernels.nutation import wells as nu
-from survey.measures.nutation import again, digits
+from survey.measures.nutation import multiprecision, unsettled
 from survey.measures.nutation import wells as nutation
 from survey.measures.rows import Rows
 from survey.modules import load
-from survey.scene import Option, Output, Parameter, Request, Trajectory, named, told
+from survey.scene import Option, Output, Parameter, Request, Trajectory, named, with_bar
 from survey.status import INVALID_PARAMETERS, NO_CONVERGENCE, OK, OVERFLOW
 
 TITLE = "Rotation of an axisymmetric body in a Newtonian field (Brun's problem)"
@@ -71,7 +71,7 @@ PARAMETERS = (
     Parameter("p_theta0", "initial momentum conjugate to theta", r"p_{\theta 0}", when=_STATE, **_LARGE),
     Parameter("p_psi", "momentum of the precession angle", r"p_\psi", when=_STATE, **_LARGE),
     Parameter("p_phi", "momentum of the spin angle", r"p_\varphi", when=_STATE, **_LARGE),
-    Parameter("t", "time since the initial state", "t", when=_MOTION | _STATE, whole=True, **_LARGE),
+    Parameter("t", "time since the initial state", "t", when=_MOTION | _STATE, uncut=True, **_LARGE),
     Parameter("l", "scaled energy L / |k|", "l", when=_SCALED, **_LARGE),
     Parameter("alpha", "scaled momentum p_phi / sqrt|k|", r"\alpha", when=_SCALED, **_LARGE),
     Parameter("beta", "scaled momentum p_psi / sqrt|k|", r"\beta", when=_SCALED, **_LARGE),
@@ -146,17 +146,17 @@ def solve(point, request):
     wanted = request.variables or {"action", "separatrix_distance"}
     if "l" in given:
         sign = int(request.options["sign"])
-        solver = partial(digits.of_integrals, sign=sign)
+        solver = partial(multiprecision.of_integrals, sign=sign)
         slowly = partial(_scaled, sign=sign, method=method, rtol=request.rtol)
         out = _scaled_in_lanes(given, valid, sign, slowly, wanted) if auto else slowly(given, valid)
     else:
         times = block.per_point(point["t"]) if "t" in point else None
         valid &= (given["C"] <= 2.0 * given["A"]) & ((given["theta0"] > 0.0) | (given["p_psi"] == given["p_phi"]))
-        solver = digits.of_state
+        solver = multiprecision.of_state
         slowly = partial(_state, method=method, request=request, times=times)
         out = _state_in_lanes(given, columns, valid, slowly, wanted) if auto else slowly(given, valid)
     if "t" not in point:
-        again.settle(out, _ordered(given), solver, valid, request)
+        unsettled.settle(out, _ordered(given), solver, valid, request)
     out |= nutation.rates(out, request.variables)
     return {name: _back(block, values) for name, values in out.items()}
 
@@ -228,7 +228,7 @@ def _state(given, valid, method, request, times):
     status = np.where(kinds == nu.LOST, np.where(_too_large(points), OVERFLOW, NO_CONVERGENCE), OK)
     out = _finished(out, status, valid, count, heights)
     if times is not None:
-        again.settle(out, points.T, digits.of_state, valid, request, known=True)
+        unsettled.settle(out, points.T, multiprecision.of_state, valid, request, known=True)
     return _with_motion(out, valid, kinds, times, lambda at: nutation.motions(
         method, rows, kinds, starts, periods, at, a, drift)) if times is not None else out  # fmt: skip
 
@@ -327,7 +327,7 @@ def _sides(u, state):
     near = pole * u
     before, here, after = near[:-2], near[1:-1], near[2:]
     top = 1 + np.flatnonzero((here > before) & (here >= after) & (here > 0.9))
-    later = near[top + 1] > near[top - 1]  # the parabola through three places has its top beyond the middle one
+    later = near[top + 1] > near[top - 1]  # the parabola through three points has its top beyond the middle one
     passed = np.zeros(u.size, int)
     passed[top + later] = 1
     return 1 - 2 * (np.cumsum(passed) % 2)
@@ -346,4 +346,4 @@ def why(answer):
     if width <= bar and answer["verdict"] == "regular_nutation":
         return f"0 < u_max - u_min < {bar:.1g}, which takes more digits than float64 has; {apart}"
     across = "beyond" if width > bar else "within"
-    return f"u_max - u_min = {told(width, bar)}, {across} the error bars of the turning points; {apart}"
+    return f"u_max - u_min = {with_bar(width, bar)}, {across} the error bars of the turning points; {apart}"

@@ -34,8 +34,8 @@ that phi lies within `phi_turning_error` of `phi_turning`.
 else by Taylor series, and in double-double arithmetic (some 1e-3 s each) where these miss `rtol`; fates next to
 separatrices are followed in it, too. `workflows/gyrostat_methods.py` maps where each method fails.
 
-`turnings` counts the zeros of w between 0 and t, its ends not among them; it is not told where a zero lies so near to
-t that the error bar of w cannot tell it from t.
+`turnings` counts the zeros of w between 0 and t, its ends not among them; it is unknown where a zero lies so near to t
+that the error bar of w leaves it open on which side.
 
 The method `full` solves the six equations (1)-(6) of a gyrostat whose invariant set is this motion; `survey verify`
 holds trajectories against it, and `workflows/gyrostat_deviation.py` measures how deviations from the set grow.
@@ -45,7 +45,7 @@ keep them all. It is structurally stable where, by the error bars, K is off zero
 equilibrium is degenerate or a Hopf point, no multiplier is 1, the signs of the return maps fit together (so the parity
 law holds), and every unstable branch of a saddle ends elsewhere than in a saddle; near saddle connections it is -1.
 Where an equilibrium is degenerate or a Hopf point within the error bar, the verdict is 0 and the status is
-`degenerate_equilibrium`: the ends are told, numbers of equilibria and cycles are not.
+`degenerate_equilibrium`: the ends are given, numbers of equilibria and cycles are not.
 
 Questions: `trajectory` (phi and w at t), `abel` (w and t at phi), `fate` (where the solution ends) and `portrait` (of
 the system, without an initial state).
@@ -58,7 +58,7 @@ from survey.kernels.cylinder import records as rc
 from survey.measures.cylinder import auto, fate, portrait, solution
 from survey.measures.cylinder.fate import NO_TURNS
 from survey.modules import load
-from survey.scene import Option, Output, Parameter, Request, Trajectory, named, told
+from survey.scene import Option, Output, Parameter, Request, Trajectory, named, with_bar
 from survey.status import INVALID_PARAMETERS, OK
 
 TITLE = "Gyrostat with Barnett-London effect, rotation about axis 1"
@@ -87,9 +87,9 @@ PARAMETERS = (
     Parameter("phi0", "initial angle of rotation", r"\varphi_0", units="rad", default=0.0, when=_STARTS,
               **_FAR),
     Parameter("w0", "initial angular velocity", "w_0", default=0.0, when=_STARTS, **_LARGE),
-    Parameter("t", "time from the initial state (negative: before it)", "t", when=_TIME, whole=True, **_LARGE),
+    Parameter("t", "time from the initial state (negative: before it)", "t", when=_TIME, uncut=True, **_LARGE),
     Parameter("phi", "angle of rotation at which w and t are asked, unwrapped", r"\varphi", units="rad", when=_ABEL,
-              whole=True, **_FAR),
+              uncut=True, **_FAR),
 )  # fmt: skip
 OPTIONS = (
     Option("question", _QUESTIONS, "what is asked of the solution, or of the system"),
@@ -100,11 +100,11 @@ STATUS = {
     "turning": "the solution turns back before it reaches phi, or within phi_turning_error of it: phi_turning and "
     "t_turning say where and when",
     "equilibrium": "the solution runs into an equilibrium, in infinite time, before it reaches phi",
-    "separatrix": "the error bar cannot tell on which side of a separatrix the solution passes",
+    "separatrix": "the error bar leaves it open on which side of a separatrix the solution passes",
     "no_closed_form": "no closed form applies (they need b = 0, g = 0 or (61)): try another method",
-    "too_many_cycles": "there are more cycles than places for them: the first are given",
+    "too_many_cycles": "there are more cycles than the file has room for: the first are given",
     "degenerate_equilibrium": "within the error bar g = g' = 0 at an equilibrium, or f = g = 0 at one that is no "
-    "saddle: the numbers of equilibria and of cycles are not told; K, L, the stratum and the ends are",
+    "saddle: the numbers of equilibria and of cycles are unknown; K, L, the stratum and the ends are given",
 }
 _TURNING = 16
 _MOST_TURNINGS = 2**31 - 1  # are kept as int32
@@ -124,9 +124,9 @@ DIMENSIONS = {
 OUTPUTS = (
     Output("phi", "angle of rotation at t, unwrapped", r"\varphi", units="rad", when=_TIME),
     Output("w", "angular velocity", "w", when={"question": ("trajectory", "abel")},
-           applies="at a place that the solution reaches"),
+           applies="at an angle that the solution reaches"),
     Output("turnings", "number of turning points (sign changes of w)", "n_T", integer=True, fill=-2,
-           applies="where the error bar can tell the number, if less than 2^31; -1 means infinitely many",
+           applies="where the error bar leaves one number, if less than 2^31; -1 means infinitely many",
            when={"question": ("trajectory", "fate")}),
     Output("verdict", "where the solution ends as t -> +inf", flags=_FATES, when=_FATE),
     Output("limit_phi", "equilibrium that is reached, in [0, 2 pi), or right turning point of the libration cycle",
@@ -139,7 +139,7 @@ OUTPUTS = (
            "n", integer=True, fill=NO_TURNS, when=_FATE,
            applies="at verdicts 0, 1, 4, 8 and 9; the number is infinite at the others"),
     Output("t", "time at which the solution reaches phi", "t", when=_ABEL,
-           applies="at a place that the solution reaches"),
+           applies="at an angle that the solution reaches"),
     Output("phi_turning", "turning point on the way to phi, unwrapped", r"\varphi_T", units="rad", when=_ABEL,
            applies="where the solution turns before it reaches phi"),
     Output("t_turning", "time of the turning point", "t_T", when=_ABEL,
@@ -157,9 +157,9 @@ OUTPUTS = (
     Output("rotations_minus", "number of isolated rotation cycles with w < 0", integer=True, when=_PORTRAIT),
     Output("librations", "number of isolated libration cycles", integer=True, when=_PORTRAIT),
     Output("equilibrium_phi", "angle of the equilibrium, ascending in [0, 2 pi)", r"\varphi_e", units="rad",
-           when=_PORTRAIT, dims=("equilibrium",), applies="at as many places as there are equilibria"),
+           when=_PORTRAIT, dims=("equilibrium",), applies="for as many entries as there are equilibria"),
     Output("equilibrium_type", "type of the equilibrium", flags={name: i for i, name in enumerate(_TYPES)},
-           when=_PORTRAIT, dims=("equilibrium",), fill=0, applies="at as many places as there are equilibria"),
+           when=_PORTRAIT, dims=("equilibrium",), fill=0, applies="for as many entries as there are equilibria"),
     Output("cycle_kind", "kind of the cycle", when=_PORTRAIT, dims=("cycle",), fill=0,
            flags={"none": 0, "rotation_plus": 1, "rotation_minus": 2, "libration": 3},
            applies="rotations by |w|, then librations by their right turning points"),
@@ -167,9 +167,9 @@ OUTPUTS = (
            applies="rotations: at the saddle of highest V (phi = 0 if no saddle); librations: the w > 0 at the "
            "equilibrium next to the left of their right turning point"),
     Output("cycle_multiplier", "Floquet multiplier of the cycle", "m", when=_PORTRAIT, dims=("cycle",),
-           applies="at as many places as there are cycles"),
+           applies="for as many entries as there are cycles"),
     Output("cycle_period", "period of the cycle", "T", when=_PORTRAIT, dims=("cycle",),
-           applies="at as many places as there are cycles"),
+           applies="for as many entries as there are cycles"),
     Output("verdict", "is the portrait structurally stable?", when=_PORTRAIT,
            flags={"undecided": -1, "degenerate": 0, "structurally_stable": 1}),
 )  # fmt: skip
@@ -219,7 +219,7 @@ def _why_portrait(answer):
     off = np.abs(answer["cycle_multiplier"] - 1.0)
     if np.isfinite(off).any():
         nearest = np.nanargmin(off)
-        near = told(answer["cycle_multiplier"][nearest], answer["cycle_multiplier_error"][nearest])
+        near = with_bar(answer["cycle_multiplier"][nearest], answer["cycle_multiplier_error"][nearest])
         margins.append(f"the multiplier nearest to 1 is {near}")
     words = {
         "structurally_stable": "no margin is within its error bar",
@@ -274,14 +274,14 @@ def _dense(point, name):
     return rows, last, back
 
 
-def _valid(rows, places):
-    """Rows and places with NaN made harmless, and where all are numbers."""
-    numbers, fine = np.isfinite(rows), np.isfinite(places)
+def _valid(rows, columns):
+    """Rows and columns with NaN made harmless, and where all are numbers."""
+    numbers, fine = np.isfinite(rows), np.isfinite(columns)
     if numbers.all() and fine.all():
-        return rows, places, fine
+        return rows, columns, fine
     numbers = numbers.all(axis=1)[:, None]
     good = numbers & fine
-    return np.where(numbers, rows, 0.0), np.where(good, places, 0.0), good
+    return np.where(numbers, rows, 0.0), np.where(good, columns, 0.0), good
 
 
 def _trajectory(point, measure, method, rtol):
@@ -297,9 +297,9 @@ def _trajectory(point, measure, method, rtol):
 
 
 def _abel(point, measure, method, rtol, before):
-    rows, places, back = _dense(point, "phi")
-    rows, places, good = _valid(rows, places)
-    floats, status = measure.abel(method, rows, places, rtol, before)
+    rows, targets, back = _dense(point, "phi")
+    rows, targets, good = _valid(rows, targets)
+    floats, status = measure.abel(method, rows, targets, rtol, before)
     status = np.where(good, status, INVALID_PARAMETERS)
     results = {"status": back(status)}
     for names, code in ((("w", "t"), OK), (("phi_turning", "t_turning"), _TURNING)):

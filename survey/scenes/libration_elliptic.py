@@ -36,7 +36,7 @@ import numpy as np
 from survey.measures import linear_motion
 from survey.measures.libration import danby, motion
 from survey.measures.rows import Rows
-from survey.scene import Parameter, Trajectory, told
+from survey.scene import Parameter, Trajectory, with_bar
 
 TITLE = "Stability of the triangular libration points of the elliptic problem"
 FAMILY = "danby"
@@ -91,9 +91,8 @@ def why(answer):
     }
     least = min(margins, key=lambda name: margins[name][0])
     value, bar, meeting = margins[least]
-    said = {"stable": "> 0, and so are the other margins", "unstable": "is not positive"}.get(
+    sign = {"stable": "> 0, and so are the other margins", "unstable": "is not positive"}.get(
         answer["verdict"], "is open"
     )
-    return (
-        f"{least} = {told(value, bar)} {said} (at 0 {meeting}); decided by half-period factors, whose bars are sharper"
-    )
+    margin = f"{least} = {with_bar(value, bar)} {sign} (at 0 {meeting})"
+    return f"{margin}; decided by half-period factors, whose bars are sharper"

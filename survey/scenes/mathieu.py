@@ -82,8 +82,8 @@ def _problem(q, a, line=None, ends=None):
         constant=constant,
         line=line,
         span_low=np.full(q.size, dd.HALF_PI[1]),
-        across=monodromy.Across("mathieu", *ends, at=lambda q: _problem(q, np.zeros((q.size, 0)))) if ends else None,
-        places=q,
+        row_axis=monodromy.RowAxis("mathieu", *ends, at=lambda q: _problem(q, np.zeros((q.size, 0)))) if ends else None,
+        positions=q,
     )
 
 

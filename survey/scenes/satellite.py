@@ -28,10 +28,11 @@ from survey.kernels.hill.answers import LARGEST, NO_RULE, NO_UNSTABLE_SIDE, ON_E
 from survey.kernels.hill.satellite import potential, sample, tabulate
 from survey.kernels.jit import kernel
 from survey.kernels.math.elliptic import MEANS
+from survey.kernels.math.roundoff import EPS
 from survey.measures.hill import dense, monodromy
 from survey.measures.hill import motion as hill_motion
 from survey.measures.hill import why as hill_why
-from survey.measures.hill.satellite import EPS, Motion, moduli, rates
+from survey.measures.hill.satellite import Motion, moduli, rates
 from survey.measures.rows import Rows
 from survey.methods import dop853
 from survey.scene import Option, Output, Parameter
@@ -58,7 +59,7 @@ PARAMETERS = (
               minimum=0.0, maximum=2.0, excluded=(1.0,), instead_of="rho"),
 )  # fmt: skip
 OPTIONS = (
-    Option("body", ("prolate", "oblate"), "shape of the body: Iz < I or Iz > I", said_by="inertia_ratio"),
+    Option("body", ("prolate", "oblate"), "shape of the body: Iz < I or Iz > I", implied_by="inertia_ratio"),
     Option("direction", ("1", "-1"), "sense of a rotation: 1 as the orbit, -1 against it", only_with="inertia_ratio"),
 )
 why = hill_why.why
@@ -148,16 +149,16 @@ def _ends(request):
 
 
 def _at(s, oblate, rotates):
-    """The rows at places s of the axis: nodes of series, never solved in double-double, as k is not exact."""
+    """The rows at positions s of the axis: nodes of series, never solved in double-double, as k is not exact."""
     k, kc = np.sqrt(-np.expm1(-s)), np.exp(-s / 2)
     k = 1 / k if rotates else k
     return _problem(Motion(k, kc, k, np.full_like(k, motion.K), oblate), np.zeros((s.size, 0)))
 
 
-def _across(row, ends):
+def _row_axis(row, ends):
     rotates = bool(row.rotates.any())
     key = "satellite", row.oblate, rotates
-    return monodromy.Across(key, *ends, at=lambda places: _at(places, row.oblate, rotates))
+    return monodromy.RowAxis(key, *ends, at=lambda s: _at(s, row.oblate, rotates))
 
 
 def _problem(row, rho, low=None, line=None, ends=None):
@@ -177,8 +178,8 @@ def _problem(row, rho, low=None, line=None, ends=None):
         constant=constant,
         line=line,
         even=~row.rotates,
-        across=_across(row, ends) if ends else None,
-        places=-2 * np.log(row.kc) if ends else None,
+        row_axis=_row_axis(row, ends) if ends else None,
+        positions=-2 * np.log(row.kc) if ends else None,
     )
 
 

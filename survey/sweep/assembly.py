@@ -41,7 +41,7 @@ class Assembly:
     def has(self, number):
         """Block `number` is finished. Raises what writing another part has raised."""
         if not self.output:  # not sooner: it takes a while, in which the first block may be solved
-            self.output = self.writer.submit(output.Output, self.workflow.path, self.kept.folder, *self.map)
+            self.output = self.writer.submit(output.OutputFile, self.workflow.path, self.kept.folder, *self.map)
             self.writes.append(self.output)
         place = self.place[number]
         self.waiting[place] -= 1

@@ -3,9 +3,9 @@
 Contiguous ragged arrays (CF 9.3.3): `edge_count` edges of each row lie one after another along `edge`, and
 `curve_count` points of each curve along `curve_point`.
 
-A scene has boundaries where its family has a measure of curves, `measures/FAMILY/curves.py`. One that knows them in
-closed form has `closed`, which gives them, with `refusal`, CLASSES, TITLE and ALONG (see `measures.nutation.curves`).
-The edges of all others are sought as the zeros of Hill's factors.
+A scene has boundaries where its family has a module `curves` (see QUESTIONS of `survey.measures`). One that knows its
+curves without a search has `closed`; of the others `edges` finds the edges of each row, `curves` follows them over the
+map, and `folds` finds where they turn back.
 """
 
 from itertools import pairwise
@@ -17,10 +17,8 @@ import xarray as xr
 from survey import measures
 from survey.file.labels import flag_attributes, meaning
 from survey.grid import logarithmic
-from survey.measures.hill import curves as hill_curves
-from survey.measures.hill import edges as hill_edges
-from survey.measures.hill import folds as hill_folds
-from survey.measures.hill import look
+from survey.measures.square import Square
+from survey.measures.tasks import in_turn
 from survey.scene import Request
 
 ROWS = 8  # solved together
@@ -29,16 +27,15 @@ RTOL = 1e-13
 MARGIN = 1e-3  # of an axis: how near curves come to a value that is no parameter, such as k = 1
 
 
-def find(workflow, each=None, once=lambda name, make: make()):
-    """The dataset of the workflow's curves; of Hill's edges, and of their curves where there are two axes.
+def find(workflow, each=in_turn, once=lambda name, make: make()):
+    """The dataset of the workflow's curves; of its edges, and of their curves where there are two axes.
 
-    `each(task, numbers, what)` calls the task for every number, in any order, on threads if it likes;
-    `once(name, make)` gives the arrays of `make()`, or those that an earlier run has kept under this name.
+    `each`: see `survey.measures.tasks`; `once(name, make)` gives the arrays of `make()`, or those that an
+    earlier run has kept under this name.
     """
-    measure = measures.curves_of(workflow.scene.FAMILY)
+    measure = _measure(workflow, "curves")
     if hasattr(measure, "closed"):
         return xr.Dataset(_closed(workflow, measure), attrs={"boundaries": workflow.boundaries})
-    each = each or hill_curves.in_turn
     grid, axis = workflow.grid, workflow.boundaries
     other = [dim for dim in grid.sizes if dim != axis]
     across = next((dim for dim in other if grid.sizes[dim] > 1), None)  # curves need a range
@@ -63,7 +60,7 @@ def plan(workflow, cost):
 
     `cost` is the scene's figure for a point, in seconds.
     """
-    measure = measures.curves_of(workflow.scene.FAMILY)
+    measure = _measure(workflow, "curves")
     if hasattr(measure, "closed"):  # measured: about a tenth of a second each
         size = 8 * (1 + len(workflow.grid.sizes) + 2 * len(measure.ALONG))
         return {"bytes_per_curve_point": size}, 0.1 * prod(list(workflow.grid.sizes.values())[2:])
@@ -71,6 +68,11 @@ def plan(workflow, cost):
     # measured: ten to twenty edges a row; half a thousand points of curves
     seconds = prod(sizes) * (2e-3 + 250 * cost) + (0.2 + 1e4 * cost if sizes else 0.0)
     return {"rows": prod(sizes), "bytes_per_edge": 25, "bytes_per_curve_point": 24 * len(sizes)}, seconds
+
+
+def _measure(workflow, question):
+    """The module of the scene's family that answers this question."""
+    return measures.question(workflow.scene.FAMILY, question)
 
 
 def _closed(workflow, measure):
@@ -84,23 +86,23 @@ def _closed(workflow, measure):
     planes = [{third[0]: float(value)} for value in grid.parameters[third[0]][1]] if third else [{}]
     found = [measure.closed(square, names[:2], fixed | plane, workflow.request.options) for plane in planes]
     count, kind, flat, error = (
-        np.concatenate([getattr(curves, name) for curves in found]) for name in ("count", "kind", "places", "error")
+        np.concatenate([getattr(curves, name) for curves in found]) for name in ("count", "kind", "parameters", "error")
     )
     points = [curves.count.sum() for curves in found]
-    places = np.column_stack([flat, *(np.repeat([plane[name] for plane in planes], points) for name in third)])
+    values = np.column_stack([flat, *(np.repeat([plane[name] for plane in planes], points) for name in third)])
     kind = _flags(measure.TITLE, measure.CLASSES, kind)
-    variables = _of_curves(workflow, names, count, kind, places, error, "on the curve")
+    variables = _of_curves(workflow, names, count, kind, values, error, "on the curve")
     for output in measure.ALONG:
-        values, errors = (np.concatenate([curves.along[output.name][i] for curves in found]) for i in (0, 1))
-        told = meaning(output) | {"ancillary_variables": f"curve_{output.name}_error"}
-        variables[f"curve_{output.name}"] = ("curve_point", values, told)
+        along, errors = (np.concatenate([curves.along[output.name][i] for curves in found]) for i in (0, 1))
+        about = meaning(output) | {"ancillary_variables": f"curve_{output.name}_error"}
+        variables[f"curve_{output.name}"] = ("curve_point", along, about)
         variables[f"curve_{output.name}_error"] = ("curve_point", errors, {
             "long_name": f"error bound of curve_{output.name}", "units": output.units})  # fmt: skip
     return variables
 
 
-def _of_curves(workflow, names, count, kind, places, error, where):
-    """The variables that all curves have."""
+def _of_curves(workflow, names, count, kind, values, error, where):
+    """The variables that all curves have; `values` (m, names): the parameters at their points."""
     variables = {
         "curve_count": ("curve", count.astype(np.int32), {
             "long_name": "number of points of the curve", "units": "1", "sample_dimension": "curve_point"}),
@@ -112,29 +114,29 @@ def _of_curves(workflow, names, count, kind, places, error, where):
     }  # fmt: skip
     for i, name in enumerate(names):
         parameter, named = _named(workflow, name)
-        variables[f"curve_{name}"] = ("curve_point", places[:, i], named | {
+        variables[f"curve_{name}"] = ("curve_point", values[:, i], named | {
             "long_name": f"{parameter.long_name} {where}", "ancillary_variables": "curve_position_error"})  # fmt: skip
     return variables
 
 
 def _edges(workflow, axis, rows, each, once):
     """All Edges of all rows, a few rows at a time."""
-    parts, between = [None] * -(-rows // ROWS), _parts(workflow, axis)
+    measure, between = _measure(workflow, "edges"), _parts(workflow, axis)
 
     def make(some):
         solve = _row_solver(workflow, axis, some)
-        own = hill_edges.joined([hill_edges.find(solve, some.size, *ends) for ends in between])
+        own = measure.joined([measure.find(solve, some.size, *ends) for ends in between])
         own.row += some[0]
         return vars(own)
 
     def task(number):
         some = np.arange(number * ROWS, min((number + 1) * ROWS, rows))
         name = f"edges-{axis}-{some[0]}-{some.size}"
-        parts[number] = hill_edges.Edges(**once(name, lambda: make(some)))
+        return once(name, lambda: make(some))
 
-    each(task, range(len(parts)), "parts of the edges")
+    parts = [measure.Edges(**part) for part in each(task, range(-(-rows // ROWS)), "parts of the edges")]
     names = ("row", "position", "error", "kind", "index", "complete")
-    return hill_edges.Edges(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+    return measure.Edges(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
 def _row_solver(workflow, axis, rows):
@@ -167,7 +169,7 @@ def _rows(workflow, axis, other, edges):
                           _yes_or_no("are all edges of the row found", "not_shown complete")),
         "edge_position": ("edge", edges.position, position | {"ancillary_variables": "edge_position_error"}),
         "edge_position_error": ("edge", edges.error, named | {"long_name": "error bound of edge_position"}),
-        "edge_class": ("edge", *_class(edges.kind)),
+        "edge_class": ("edge", *_class(workflow, edges.kind)),
         "edge_index": ("edge", *_index(edges.index)),
     }  # fmt: skip
 
@@ -182,14 +184,16 @@ def _curves(workflow, across, axis, edges, each):
 
     pieces = [_pieces(workflow, name) for name in (across, axis)]
     rows = np.asarray(workflow.grid.parameters[across][1])[edges.row]
-    of_rows = square.inside(np.stack([rows, edges.position], axis=1)), edges.kind, edges.index
-    found = [of_rows, *(_of_columns(solve, square, _columns(pieces[1]), *piece) for piece in pieces[0])]
-    seeds = _seeds(*(np.concatenate(values) for values in zip(*found, strict=True)), pieces)
-    curves = hill_curves.trace(solve, square, seeds, each)
-    folds = hill_folds.find(solve, square, curves)
-    names, places = (across, axis), (square.places(curves.x), square.places(folds.x))
+    of_rows = square.positions(np.stack([rows, edges.position], axis=1)), edges.kind, edges.index
+    searched = _measure(workflow, "edges"), solve, square, _columns(pieces[1])
+    found = [of_rows, *(_of_columns(*searched, *piece) for piece in pieces[0])]
+    measure = _measure(workflow, "curves")
+    seeds = measure.Seeds(*_with_rectangles(*(np.concatenate(v) for v in zip(*found, strict=True)), pieces))
+    curves = measure.trace(solve, square, seeds, each)
+    folds = _measure(workflow, "folds").find(solve, square, curves)
+    names, on_curves, at_folds = (across, axis), square.parameters(curves.x), square.parameters(folds.x)
     where = "on the edge of a tongue"
-    variables = _of_curves(workflow, names, curves.count, _class(curves.kind), places[0], curves.error, where)
+    variables = _of_curves(workflow, names, curves.count, _class(workflow, curves.kind), on_curves, curves.error, where)
     variables |= {
         "edge_curve": ("edge", curves.of_seed[: edges.row.size].astype(np.int32), {
             "long_name": "curve through the edge, counted from 0", "units": "1"}),
@@ -202,11 +206,11 @@ def _curves(workflow, across, axis, edges, each):
     }  # fmt: skip
     for i, name in enumerate(names):
         parameter, named = _named(workflow, name)
-        variables[f"fold_{name}"] = ("fold", places[1][:, i], named | {
+        variables[f"fold_{name}"] = ("fold", at_folds[:, i], named | {
             "long_name": f"{parameter.long_name} at the fold of an edge",
             "ancillary_variables": f"fold_{name}_error"})  # fmt: skip
-        ends = square.places(np.stack([folds.x - folds.error, folds.x + folds.error]))[..., i]
-        variables[f"fold_{name}_error"] = ("fold", abs(ends - places[1][:, i]).max(axis=0), named | {
+        ends = square.parameters(np.stack([folds.x - folds.error, folds.x + folds.error]))[..., i]
+        variables[f"fold_{name}_error"] = ("fold", abs(ends - at_folds[:, i]).max(axis=0), named | {
             "long_name": f"error bound of fold_{name}"})  # fmt: skip
     return variables
 
@@ -214,7 +218,7 @@ def _curves(workflow, across, axis, edges, each):
 def _square(workflow, *names):
     values = [np.asarray(workflow.grid.parameters[name][1]) for name in names]
     low, high = (np.array([end(v) for v in values]) for end in (np.min, np.max))
-    return look.Square(low, high, np.array([logarithmic(v) for v in values]))
+    return Square(low, high, np.array([logarithmic(v) for v in values]))
 
 
 def _pieces(workflow, name):
@@ -226,14 +230,14 @@ def _pieces(workflow, name):
     excluded = np.array(next(p for p in workflow.scene.PARAMETERS if p.name == name).excluded)
     known = np.asarray(workflow.grid.parameters[name][1])
     inner = excluded[(excluded > line.low) & (excluded < line.high)]
-    units = [line.inside(v[:, None])[:, 0] for v in (inner, known[~np.isin(known, excluded)])]
+    units = [line.positions(v[:, None])[:, 0] for v in (inner, known[~np.isin(known, excluded)])]
     apart = np.array([max(4 * line.grain, min(MARGIN, 0.5 * abs(units[1] - cut).min())) for cut in units[0]])
     return list(zip([0.0, *(units[0] + apart)], [*(units[0] - apart), 1.0], strict=True))
 
 
 def _parts(workflow, name):
     """The same parts, by the parameter's values."""
-    return _square(workflow, name).places(np.array(_pieces(workflow, name))[..., None])[..., 0].tolist()
+    return _square(workflow, name).parameters(np.array(_pieces(workflow, name))[..., None])[..., 0].tolist()
 
 
 def _columns(pieces):
@@ -244,26 +248,26 @@ def _columns(pieces):
     return columns
 
 
-def _of_columns(solve, square, columns, low, high):
-    """(places, kind, index) of the edges along the columns, from low to high in the square."""
+def _of_columns(measure, solve, square, columns, low, high):
+    """(positions, kind, index) of the edges along the columns, from low to high in the square."""
 
     def along(column, x, wanted):
-        places = square.places(np.stack(np.broadcast_arrays(x, columns[column][:, None]), axis=-1))
-        out = solve(places[..., 0].reshape(-1, 1), places[..., 1].reshape(-1, 1), wanted)
+        here = square.parameters(np.stack(np.broadcast_arrays(x, columns[column][:, None]), axis=-1))
+        out = solve(here[..., 0].reshape(-1, 1), here[..., 1].reshape(-1, 1), wanted)
         return {name: values.reshape(x.shape) for name, values in out.items()}
 
-    edges = hill_edges.find(along, columns.size, low, high)
+    edges = measure.find(along, columns.size, low, high)
     return np.stack([edges.position, columns[edges.row]], axis=1), edges.kind, edges.index
 
 
-def _seeds(x, kind, index, pieces):
-    """Seeds, each in the rectangle of pieces that holds it."""
+def _with_rectangles(x, kind, index, pieces):
+    """(x, kind, index, low, high): each position x with the ends of the rectangle of pieces that holds it."""
     low, high = np.zeros_like(x), np.ones_like(x)
-    for place, own in enumerate(pieces):
+    for dim, own in enumerate(pieces):
         lows, highs = np.array(own).T
-        piece = np.clip(np.searchsorted(lows, x[:, place], "right") - 1, 0, None)
-        low[:, place], high[:, place] = lows[piece], highs[piece]
-    return hill_curves.Seeds(x, kind, index, low, high)
+        piece = np.clip(np.searchsorted(lows, x[:, dim], "right") - 1, 0, None)
+        low[:, dim], high[:, dim] = lows[piece], highs[piece]
+    return x, kind, index, low, high
 
 
 def _named(workflow, name):
@@ -272,8 +276,8 @@ def _named(workflow, name):
     return parameter, {"units": parameter.units, "symbol": parameter.symbol}
 
 
-def _class(kind):
-    return _flags("kind of the periodic solution at the edge", hill_edges.CLASSES, kind)
+def _class(workflow, kind):
+    return _flags("kind of the periodic solution at the edge", _measure(workflow, "edges").CLASSES, kind)
 
 
 def _flags(title, classes, kind):

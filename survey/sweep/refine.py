@@ -1,52 +1,52 @@
-"""The map on whole cells, as small as needed where the verdict changes, and the area of each verdict.
+"""The map in cells, as small as needed where the verdict changes, and the area of each verdict.
 
 Cells are halved until they are decided or as wide as [refine] says, and become variables along the dimension `cell`.
 """
 
 import math
+import threading
 import time
 from itertools import count, pairwise
 
 import numpy as np
 import xarray as xr
 
+from survey import measures
 from survey.errors import BadInput
 from survey.file.labels import flag_attributes, percent, round_up
-from survey.measures.hill import cells as hill_cells
-from survey.measures.hill import monodromy
-from survey.measures.hill.edges import FACTORS
+from survey.measures.tasks import in_turn
 from survey.scene import Request
 
 LABELS = ("unstable", "stable")
-ROUNDING = 1e-13  # of the sum of areas, relative to the whole
+ROUNDING = 1e-13  # of the sum of areas, relative to the total
 
 
-def find(workflow, each, once=lambda name, make: make(), tell=None):
+def find(workflow, each=in_turn, once=lambda name, make: make(), report=None):
     """The dataset of the workflow's cells and areas.
 
-    `each(task, numbers, finished)` as `dispatch.on_threads`; `once(name, make)` gives the arrays of `make()`, or those
-    that an earlier run has kept under this name. `tell(settled, points, left)` hears which part of the map is settled,
-    how many points were solved for it, and the seconds that the parts known to be open will take.
+    `each`: see `survey.measures.tasks`; `once(name, make)` gives the arrays of `make()`, or those that an
+    earlier run has kept under this name. `report(settled, points, left)` hears which part of the map is
+    settled, how many points were solved for it, and the seconds that the parts known to be open will take.
     """
-    panels = _panels(workflow)
-    points, found, whole = 0, [], _area(panels)
+    measure, panels = _measure(workflow), _panels(workflow)
+    points, found, total = 0, [], _area(panels)
     for x, y in panels:
-        share, done = _area([(x, y)]) / whole, _area(panels[: len(found)]) / whole
-        told = [done, points]
+        share, done = _area([(x, y)]) / total, _area(panels[: len(found)]) / total
+        known = [done, points]
 
-        def settled(part, solved, share=share, done=done, before=points, told=told):
-            told[:] = done + share * part, before + solved
+        def settled(part, solved, share=share, done=done, before=points, known=known):
+            known[:] = done + share * part, before + solved
 
         name = f"cells-{len(found)}-{x.depth}-{y.depth}"
-        parts = _in_parts(name, each, once, lambda left, told=told: tell and tell(*told, left))
+        parts = _in_parts(name, each, once, lambda left, known=known: report and report(*known, left))
         try:
-            cells = hill_cells.find(_solver(workflow, x, y), x, y, parts, settled)
+            cells = measure.find(_solver(workflow, x, y), x, y, parts, settled)
         except OverflowError as error:
             raise BadInput(f"refine.width: the map has {error}; take a greater width, or a smaller map") from None
         found.append(cells)
         points += cells.points
-    if tell:
-        tell(1.0, points, 0.0)
+    if report:
+        report(1.0, points, 0.0)
     return _describe(workflow, found, points)
 
 
@@ -55,14 +55,19 @@ def plan(workflow, cost):
 
     `cost` is the scene's figure for a point, in seconds.
     """
-    panels = _panels(workflow)
-    most = min(sum(1 << x.depth + y.depth for x, y in panels), hill_cells.MOST)
+    measure, panels = _measure(workflow), _panels(workflow)
+    most = min(sum(1 << x.depth + y.depth for x, y in panels), measure.MOST)
     # measured: some twenty curves' widths of cells; along a value that a parameter excludes, each cell is solved
     usual = min(sum(20 << max(x.depth, y.depth) for x, y in panels), most)
     blocks = sum(16 + 2 * ((1 << y.depth) * _cut(workflow, 0, x) + (1 << x.depth) * _cut(workflow, 1, y))
                  for x, y in panels)  # fmt: skip
-    seconds = 3e-6 * usual + blocks * hill_cells.PLACES.size**2 * 20 * cost
+    seconds = 3e-6 * usual + blocks * measure.POINTS.size**2 * 20 * cost
     return {"most": most, "bytes_at_most": 33 * most, "usually": usual}, seconds
+
+
+def _measure(workflow):
+    """The module `cells` of the scene's family."""
+    return measures.question(workflow.scene.FAMILY, "cells")
 
 
 def _cut(workflow, at, axis):
@@ -71,23 +76,21 @@ def _cut(workflow, at, axis):
     return len({axis.low, axis.high} & set(next(p.excluded for p in workflow.scene.PARAMETERS if p.name == name)))
 
 
-def _in_parts(name, each, once, tell):
-    """`each` of `cells.find`, called once a level: what a part finds is kept as soon as it is there."""
-    levels = count()
+def _in_parts(name, each, once, report):
+    """`each`, which `cells.find` calls once for every halving: what a part finds is kept as soon as it is there."""
+    halvings, lock = count(), threading.Lock()
 
-    def parts(task, items):
-        level, began, leaves = next(levels), time.perf_counter(), [None] * len(items)
+    def parts(task, items, what):
+        halving, began, done = next(halvings), time.perf_counter(), count(1)
 
         def part(number):
-            arrays = once(f"{name}-{level}-{number}", lambda: {"leaves": task(items[number])})
-            leaves[number] = arrays["leaves"]
+            leaves = once(f"{name}-{halving}-{number}", lambda: {"leaves": task(items[number])})["leaves"]
+            with lock:
+                solved = next(done)
+                report((time.perf_counter() - began) / solved * (len(items) - solved))
+            return leaves
 
-        def finished(done, _=None):
-            if done:
-                tell((time.perf_counter() - began) / done * (len(items) - done))
-
-        each(part, range(len(items)), finished)
-        return leaves
+        return each(part, range(len(items)), what)
 
     return parts
 
@@ -103,7 +106,7 @@ def _panels(workflow):
 
 
 def _sides(workflow, name, width, log):
-    """The Axis between each two neighbours of the ends and the excluded values."""
+    """The Side between each two neighbours of the ends and the excluded values."""
     values = workflow.grid.parameters[name][1]
     low, high = float(values.min()), float(values.max())
     excluded = next(p.excluded for p in workflow.scene.PARAMETERS if p.name == name)
@@ -113,15 +116,17 @@ def _sides(workflow, name, width, log):
         return math.log(b / a) if log else b - a
 
     return [
-        hill_cells.Axis(a, b, max(0, math.ceil(math.log2(length(a, b) / (width * length(low, high))) - 1e-9)), log)
+        _measure(workflow).Side(
+            a, b, max(0, math.ceil(math.log2(length(a, b) / (width * length(low, high))) - 1e-9)), log
+        )
         for a, b in pairwise(cuts)
     ]
 
 
 def _solver(workflow, x, y):
     """What `cells.find` asks of the scene; NaN outside the parameters' domains."""
-    rtol = hill_cells.accuracy(max(x.depth, y.depth))
-    request = Request(workflow.request.options, "auto", rtol, frozenset(FACTORS))
+    rtol = _measure(workflow).accuracy(max(x.depth, y.depth))
+    request = Request(workflow.request.options, "auto", rtol, frozenset(_measure(workflow).OUTPUTS))
     fixed = {name: np.full((1, 1, 1), values) for name, (dims, values) in workflow.grid.parameters.items() if not dims}
     axes = [next(p for p in workflow.scene.PARAMETERS if p.name == name) for name in workflow.refine]
 
@@ -144,7 +149,7 @@ def _describe(workflow, found, points):
         for side, end in enumerate(("low", "high")):
             meaning = {"long_name": f"{end} end of the cell in {p.long_name}", "units": p.units, "symbol": p.symbol}
             variables[f"cell_{p.name}_{end}"] = ("cell", box[:, 2 * at + side], meaning)
-    flags = {key: code for key, code in monodromy.VERDICTS.items() if key != "marginal"}
+    flags = {key: code for key, code in _measure(workflow).VERDICTS.items()}
     variables["cell_verdict"] = ("cell", verdict, {
         "long_name": "stability everywhere in the cell", "units": "1",
         "comment": "undecided: an edge of a tongue may lie in it, or the verdict could not be shown",

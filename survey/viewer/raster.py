@@ -24,7 +24,7 @@ HATCH = 6  # pixels from line to line
 viridis = colormaps["viridis"]
 
 
-class Axis:
+class MapAxis:
     """One axis of the map: its increasing coordinates, on the scale in which they are drawn.
 
     `values` (n,), `log`: is the scale logarithmic; `cells` (n + 1,): where each point's cell ends, on the scale.
@@ -52,7 +52,7 @@ class Axis:
         return tuple(float(end) for end in self.unscaled(self.cells[[0, -1]]))
 
     @property
-    def told(self):
+    def range_text(self):
         """Its range, for a message."""
         return f"{self.values[0]:g} to {self.values[-1]:g}"
 
@@ -87,7 +87,7 @@ class Pixels:
     They go to the next start, or the last to `stop`.
     """
 
-    axis: Axis
+    axis: MapAxis
     edges: np.ndarray
     starts: np.ndarray
     stop: int
@@ -179,7 +179,7 @@ class CellLayer(Layer):
 
     def __init__(self, ds, name, dims, place):
         super().__init__(ds, name, dims, place)
-        axes = [Axis(ds[dim].values) for dim in dims]
+        axes = [MapAxis(ds[dim].values) for dim in dims]
         self.ends = [
             [axis.scaled(ds[f"cell_{dim}_{end}"].values) for end in ("low", "high")]
             for axis, dim in zip(axes, dims, strict=True)

@@ -44,7 +44,7 @@ class Map:
         self.dims = ds.status.dims[:2]
         down = [dim for dim in self.dims if ds[dim].values[0] > ds[dim].values[-1]]
         self.ds = ds.isel({dim: slice(None, None, -1) for dim in down})
-        self.axes = [raster.Axis(self.ds[dim].values) for dim in self.dims]
+        self.axes = [raster.MapAxis(self.ds[dim].values) for dim in self.dims]
         own = set(ds.status.dims)
         self.names = [name for name, v in ds.data_vars.items() if own <= set(v.dims) and not name.endswith("_error")]
         self.title, self.options = plain(ds.attrs.get("title", "")), plain(ds.attrs["options"])
@@ -78,13 +78,13 @@ class Map:
         for at, axis in zip("xy", self.axes, strict=True):
             view.window.append(_numbers(at, told[at], 2) if at in told else axis.ends)
             if not view.window[-1][0] < view.window[-1][1] or axis.pixels(*view.window[-1], 1) is None:
-                raise BadInput(f"{at} = {told[at]}: give low,high of a range that meets the map's, {axis.told}")
+                raise BadInput(f"{at} = {told[at]}: give low,high of a range that meets the map's, {axis.range_text}")
         if "point" in told:
             numbers = _numbers("point", told["point"], 2)
             view.point = tuple(axis.nearest(value) for axis, value in zip(self.axes, numbers, strict=True))
             if None in view.point:
                 raise BadInput(
-                    f"point = {told['point']}: it lies outside the map, {' by '.join(a.told for a in self.axes)}"
+                    f"point = {told['point']}: it lies outside the map, {' by '.join(a.range_text for a in self.axes)}"
                 )
         for dim in self.others:
             (value,) = _numbers(f"at_{dim}", told.get(f"at_{dim}", "0"), 1)

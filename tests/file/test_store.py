@@ -271,7 +271,7 @@ def test_a_disk_that_refuses_leaves_the_old_file(copy, small, monkeypatch, where
     assert survey.run(small, output=copy).status.size == 24  # the lock is free, and what is there is of use
 
 
-CALLS = [(os, "fsync"), (os, "replace"), (file_blocks, "pack"), (output.Output, "put"), (netcdf.File, "define")]
+CALLS = [(os, "fsync"), (os, "replace"), (file_blocks, "pack"), (output.OutputFile, "put"), (netcdf.File, "define")]
 
 
 @pytest.mark.parametrize(("where", "name"), CALLS, ids=lambda value: getattr(value, "__name__", value))

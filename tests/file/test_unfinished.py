@@ -42,7 +42,7 @@ def refusal(small, *overrides):
 
 
 def test_what_is_left_is_told(left, small):
-    told = unfinished.told("small.nc")
+    told = unfinished.summary("small.nc")
     assert (told["blocks_done"], told["blocks"], told["points_done"], told["points"]) == (3, 6, 12, 24)
     assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ", told["last_written"])
     assert told["resume"] == "survey run small.nc.blocks/workflow.toml -o small.nc"
@@ -51,21 +51,21 @@ def test_what_is_left_is_told(left, small):
     again = workflow.read(left / "workflow.toml", output="small.nc")  # the command that was told
     seen = []
     engine.run(again, progress=lambda done, total, reused, **_: seen.append((done, total, reused)))
-    assert seen[0] == (3, 6, 3) and reading.check("small.nc") == [] and unfinished.told("small.nc") == {}
+    assert seen[0] == (3, 6, 3) and reading.check("small.nc") == [] and unfinished.summary("small.nc") == {}
 
 
 def test_the_command_that_began_is_told_with_its_folder(left, small, tmp_path, monkeypatch):
     holder = json.loads((left / "holder.json").read_text())
     (left / "holder.json").write_text(json.dumps(holder | {"again": "survey run small.toml --workers 2"}))
-    assert unfinished.told("small.nc")["resume"] == "survey run small.toml --workers 2"
+    assert unfinished.summary("small.nc")["resume"] == "survey run small.toml --workers 2"
     monkeypatch.chdir("/")
-    assert unfinished.told(tmp_path / "small.nc")["resume"] == f"cd {tmp_path} && survey run small.toml --workers 2"
+    assert unfinished.summary(tmp_path / "small.nc")["resume"] == f"cd {tmp_path} && survey run small.toml --workers 2"
 
 
 def test_a_run_at_work_is_told_and_not_disturbed(left, small):
     checked = workflow.read(small)
     with file_blocks.Blocks(checked.path, fingerprint.fingerprint(checked)) as kept:
-        told = unfinished.told("small.nc")
+        told = unfinished.summary("small.nc")
         assert f"pid {kept.holder['pid']}" in told["at_work"] and "resume" not in told
         assert unfinished.sentence(told).endswith("is at work on it")
 

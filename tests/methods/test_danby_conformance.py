@@ -67,7 +67,7 @@ def bars_hold(nodes, chain):
 
 
 @pytest.mark.parametrize("method", CHAINS, ids=NAMES)
-def test_bars_hold_at_every_effort(method):
+def test_bars_hold_on_every_rung(method):
     assert bars_hold(method.NODES, method.danby_chain)
 
 

@@ -14,7 +14,7 @@ import survey.methods
 from survey import modules
 from survey.kernels.jit import inline, kernel
 from survey.kernels.lanes import chain
-from survey.measures.hill import effort
+from survey.measures.hill import pointwise
 from survey.methods import magnus6, rk4, taylor16
 
 HILL = [n for n in modules.names(survey.methods) if "hill" in modules.load(survey.methods, n, "method").SERVES]
@@ -70,11 +70,11 @@ def test_the_reference_of_the_order_is_right():
 
 
 def bars_hold(method):
-    """With q = 5, over four periods: at every effort, each true error lies within its bar."""
+    """With q = 5, over four periods: on every rung, each true error lies within its bar."""
     held = []
     frequency = np.sqrt(np.max(PROBLEM.bound[0, 0] + PROBLEM.p))
-    for steps in effort.LADDER[4:33]:
-        if frequency * PROBLEM.span[0] / steps > effort.LONGEST:
+    for steps in pointwise.STEPS.rungs[4:33]:
+        if frequency * PROBLEM.span[0] / steps > pointwise.LONGEST:
             continue
         out = fixed(method, int(steps))
         held.append(np.all(abs(out[:, :4] - EXACT[:, :4]) <= out[:, 4:8] + EXACT[:, 4:8]))

@@ -177,3 +177,13 @@ def test_a_bar_for_every_value_where_solutions_differ_by_30_orders():
     for name in NAMES:
         assert (np.isfinite(out[name]) == np.isfinite(out[f"{name}_error"])).all(), name
     assert (out.status == status.OK).all() and (out.verdict.sel(rho=0.0) == MARGINAL).all()
+
+
+@pytest.mark.parametrize("method", ["auto", "taylor16", "magnus6", "dop853"])
+@pytest.mark.parametrize("body", ["prolate", "oblate"])
+def test_a_rotation_number_whose_zeros_cannot_be_counted_says_so(method, body):
+    """Where y1 is known to nothing at T/2, a zero next to it may be miscounted. At rho = 0 it is 1/2 or 0."""
+    ds = survey.evaluate("satellite", k=float(np.nextafter(1, 0)), rho=0.0, body=body, method=method, rtol=1e-12)
+    exact = survey.evaluate("satellite", k=0.5, rho=0.0, body=body)  # the same on the whole line rho = 0
+    off = abs(abs(float(ds.rotation_number)) - abs(float(exact.rotation_number)))
+    assert off <= float(ds.rotation_number_error) + 1e-15

@@ -12,6 +12,7 @@ import survey
 from survey.cli import main
 from survey.errors import Stopped
 from survey.file import reading
+from survey.measures.hill import curves as hill_curves
 from survey.request.workflow import check
 from survey.show import figures
 from survey.sweep import boundaries, plan
@@ -94,7 +95,7 @@ def test_the_bits_are_the_same_on_any_number_of_threads_and_in_any_order():
 
     def shuffled(task, numbers, what):
         with ThreadPoolExecutor(3) as pool:
-            list(pool.map(task, reversed(numbers)))
+            return list(pool.map(task, reversed(numbers)))[::-1]
 
     one, other = boundaries.find(workflow), boundaries.find(workflow, shuffled)
     xr.testing.assert_identical(one, other)
@@ -240,7 +241,7 @@ def test_rows_whose_edges_are_known_are_kept_by_a_run_that_stops(path, tmp_path,
         raise Stopped("a power cut")
 
     with monkeypatch.context() as patch:
-        patch.setattr(boundaries.hill_curves, "trace", stop)
+        patch.setattr(hill_curves, "trace", stop)
         with pytest.raises(Stopped, match="power cut"):
             survey.run(WORKFLOW, output=tmp_path / "map.nc")
     monkeypatch.setattr(boundaries, "_row_solver", stop)  # none is to be found again

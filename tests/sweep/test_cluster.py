@@ -243,6 +243,12 @@ def queue(folder, *words, **more):
     return subprocess.Popen(command, cwd=folder, env=environment, stderr=subprocess.PIPE, text=True)
 
 
+def test_the_batch_script_says_what_is_missing_instead_of_waiting(small):
+    running = queue(small.parent, PATH="/usr/bin:/bin")
+    told = running.communicate(timeout=60)[1]
+    assert running.returncode == 3 and "is not on PATH: activate the environment" in told
+
+
 def test_the_batch_script_runs_a_sweep(small, surveyed):
     running = queue(small.parent)
     told = running.communicate(timeout=180)[1]

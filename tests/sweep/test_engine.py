@@ -54,7 +54,7 @@ def test_labels_of_an_extra_dimension_are_kept(tmp_path):
     coordinates = {"x": (("x",), np.arange(3.0), {"units": "1"}), "order": (("order",), labels, {"long_name": "order"})}
     layout = {"c": (np.dtype(float), np.nan, (2,)), "status": (np.dtype("int8"), 0, ())}
     variables = {"c": (("x", "order"), {"units": "1"}), "status": (("x",), {"units": "1"})}
-    output = file_output.Output(tmp_path / "o.nc", tmp_path, coordinates, variables, layout, (3,), (2,))
+    output = file_output.OutputFile(tmp_path / "o.nc", tmp_path, coordinates, variables, layout, (3,), (2,))
     for part in (slice(0, 2), slice(2, 3)):
         output.put("c", values[part], (part,))
     output.put("status", np.zeros(3, np.int8))

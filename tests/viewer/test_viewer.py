@@ -72,7 +72,7 @@ def test_every_point_is_in_the_pixel_where_it_lies(axes, direct, sizes, monkeypa
     monkeypatch.setattr(raster, "OVERVIEW", 10**4 if direct else 90)
     ds = made(*axes)
     layer = raster.Layer(ds, "verdict", ("x", "y"), {})
-    xs, ys = (axis.pixels(*axis.ends, size) for axis, size in zip(map(raster.Axis, axes), sizes, strict=True))
+    xs, ys = (axis.pixels(*axis.ends, size) for axis, size in zip(map(raster.MapAxis, axes), sizes, strict=True))
     mask, value = whole(layer).pixels(xs, ys)
     assert mask.shape == sizes[::-1] and value is None
     factors = (1, 1) if direct else [-(-a.size // 90) for a in axes]
@@ -97,7 +97,7 @@ def test_a_pixel_of_numbers_shows_the_largest_magnitude_of_its_points():
     ds["value"][50:60, 50:60] = np.nan
     for overview in (False, True):
         layer = raster.Layer(ds, "value", ("x", "y"), {})
-        xs, ys = (raster.Axis(ds[dim].values).pixels(-0.5, ds[dim].size - 0.5, ds[dim].size // 10) for dim in "xy")
+        xs, ys = (raster.MapAxis(ds[dim].values).pixels(-0.5, ds[dim].size - 0.5, ds[dim].size // 10) for dim in "xy")
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(raster, "DIRECT", 0 if overview else 10**9)
             _, value = whole(layer).pixels(xs, ys)
@@ -113,7 +113,7 @@ def test_the_rarest_kind_is_seen_and_undecided_and_failed_before_all():
     ds = made(np.arange(1000.0), np.arange(800.0))
     ds["verdict"][100, 100] = 2
     layer = raster.Layer(ds, "verdict", ("x", "y"), {})
-    xs, ys = (raster.Axis(ds[dim].values).pixels(-0.5, ds[dim].size - 0.5, 80) for dim in "xy")
+    xs, ys = (raster.MapAxis(ds[dim].values).pixels(-0.5, ds[dim].size - 0.5, 80) for dim in "xy")
     mask, _ = layer.pixels(xs, ys)
     image, kinds = raster.paint(mask, None, layer)
     image = image.view(np.uint8).reshape(80, 80, 4)
@@ -133,7 +133,7 @@ def test_what_is_not_read_yet_is_not_drawn_and_what_is_drawn_is_true(name, monke
     ds = made(np.arange(1000.0), np.arange(300.0))
     ds[name].encoding["chunksizes"] = (47, 30)
     layer, last = (raster.Layer(ds, name, ("x", "y"), {}) for _ in range(2))
-    xs, ys = (raster.Axis(ds[dim].values).pixels(-0.5, ds[dim].size - 0.5, 60) for dim in "xy")
+    xs, ys = (raster.MapAxis(ds[dim].values).pixels(-0.5, ds[dim].size - 0.5, 60) for dim in "xy")
     true_mask, true_value = whole(last).pixels(xs, ys)
     drawn = []
     while layer.waits(xs, ys):
@@ -156,7 +156,7 @@ def test_no_answer_by_nature_is_grey_and_told_by_its_status(tmp_path):
     ds = survey.evaluate("brun", l=np.linspace(-1, 1, 12), beta=np.linspace(-1, 1, 10), alpha=0.1, sign="1")
     bare = ds.status.values == status.FIRST_OF_SCENE
     layer = raster.Layer(ds, "verdict", ("l", "beta"), {})
-    xs, ys = (raster.Axis(ds[dim].values).pixels(-2, 2, 400) for dim in ("l", "beta"))
+    xs, ys = (raster.MapAxis(ds[dim].values).pixels(-2, 2, 400) for dim in ("l", "beta"))
     mask, _ = layer.pixels(xs, ys)
     image, kinds = raster.paint(mask, None, layer)
     seen = image.view(np.uint8).reshape(*mask.shape, 4)[..., :3]
@@ -182,7 +182,7 @@ def test_of_a_refined_map_each_cell_is_seen_where_it_lies():
         ds[f"cell_{dim}_low"], ds[f"cell_{dim}_high"] = ("cell", low[k]), ("cell", low[k] + size)
     ds["cell_verdict"] = ("cell", rng.choice([-1, 0, 1], 400).astype(np.int8), FLAGS)
     layer = raster.CellLayer(ds, "verdict", ("x", "y"), {})
-    xs, ys = (raster.Axis(ds[dim].values).pixels(0.2, 0.8, 50) for dim in "xy")
+    xs, ys = (raster.MapAxis(ds[dim].values).pixels(0.2, 0.8, 50) for dim in "xy")
     mask, _ = layer.pixels(xs, ys)
     for flag, code in (("undecided", -1), ("unstable", 0), ("stable", 1)):
         own = ds.cell_verdict.values == code

@@ -164,6 +164,20 @@ SADDLE = [2.2392854657601977, 2.129834011504694, 1.9042235387022515, 1.670864519
 SADDLE_PERIOD = "836.306482278309586125838774447"
 
 
+def test_truth_of_a_motion_that_turns_just_before_a_pole():
+    """P(1) = 0 exactly, P < 0 next to it: it turns at 1 - u = 3.5e-17, and takes as long as our scene says."""
+    point = [2.0, 4.0, 0.5, np.pi / 2, -1.0, -1.0, -1.0]
+    brun_truth.states(np.array([point]), brun.NODES, out := np.empty((1, brun_truth.COLUMNS)))
+    with mp.workdps(60):
+        cosine = mp.cos(mpf(point[3]))
+        energy = 1 + (1 - cosine) / (1 + cosine)
+        level, five = energy - 2 * (1 - cosine**2), energy + 2 * cosine**2 + 1 - 10
+        short = mp.findroot(lambda v: 2 * level - five * v - 8 * v**2 + 2 * v**3, 2 * level / five)
+        assert abs(1 - in_full(out[0], 1) - short) < 1e-30
+    ds = survey.evaluate("brun", **dict(zip(brun.NAMES, point, strict=True)))
+    assert abs(float(ds.period) - out[0, 4]) < float(ds.period_error)
+
+
 def test_truth_beside_a_saddle_of_bruns_problem():
     out = np.empty((1, brun_truth.COLUMNS))
     brun_truth.states(np.array([SADDLE]), brun.NODES, out)

@@ -71,7 +71,7 @@ def test_the_workflows_of_a_page_are_accepted(page, folder):
 
 def test_every_key_of_a_workflow_is_told():
     page = (DOCS / "workflow_file.md").read_text()
-    tables = [workflow.File, workflow.Spread, workflow.Listed, workflow.Solver, workflow.Output]
+    tables = [workflow.File, workflow.Spread, workflow.Listed, workflow.Solver, workflow.OutputTable]
     keys = {key for table in [*tables, workflow.Boundaries, workflow.Refine] for key in table.model_fields}
     told = "".join(re.findall(r"^\| `(.*?)` \|", page, re.MULTILINE))
     assert [key for key in keys if key not in told] == []

@@ -112,6 +112,19 @@ def at_pole(v, d2, c1, c2, c3, c4):
 
 
 @inline
+def beside_pole(side, k, L, slope, end):
+    """Where the motion turns just before the pole that is itself a root: u, 1 - u, 1 + u into `end` (6)."""
+    five = add(times(k, 5.0), L)
+    if five[0] < 0.0:
+        zero = (0.0, 0.0)
+        short = at_pole(div(times(slope, 2.0), five), zero, times(slope, 2.0), neg(five), times(k, 4.0), neg(k))
+        far, u = sub((2.0, 0.0), short), sub((1.0, 0.0), short)
+        end[0], end[1] = u if side == 1 else neg(u)
+        end[2], end[3] = short if side == 1 else far
+        end[4], end[5] = far if side == 1 else short
+
+
+@inline
 def well(A, k, L, a, b, level, below, ul, uh, vl, vh, wl, wh, out, most):
     """T, advances at the poles, action of a well; `level` is L + k - a b, `below` L + k + a b; v = 1 - u, w = 1 + u."""
     delta, sigma = sub(b, a), add(b, a)
@@ -384,6 +397,8 @@ def states(points, most, out):
                 e[side, 0], e[side, 1] = (-1.0, 0.0) if side == 0 else (1.0, 0.0)
                 e[side, 2], e[side, 3] = (2.0, 0.0) if side == 0 else (0.0, 0.0)
                 e[side, 4], e[side, 5] = (0.0, 0.0) if side == 0 else (2.0, 0.0)
+                if (below[0] if side == 0 else level[0]) < 0.0:  # P < 0 next to it: the motion turns before
+                    beside_pole(side, k, L, below if side == 0 else level, e[side])
             else:
                 e[side] = ends[j]
         if e[1, 0] - e[0, 0] <= 1e-12:

@@ -213,13 +213,11 @@ def _true_satellite(way, inertia, direction, oblate):
             found["exponent_per_orbit"] = grows / turns, 0.0, doubt / turns + 8 * ULP * np.abs(grows / turns)
         wrong = found["wrong"]
         wrong["lyapunov certifies what is not stable"] = (answer["lyapunov"] == 1) & found.pop("unstable")
-        with np.errstate(invalid="ignore"):  # float64 counts zeros over 20 periods only where it knows D in one
-            known = ok & (answer["discriminant_error"] < 1e-3 * np.maximum(1.0, np.abs(answer["discriminant"])))
-        rough = rough_rotation(k, short, rho, body, known)
         with np.errstate(invalid="ignore"):
             # its Runge-Kutta steps add up to an error of about 1e-4, which D feels times the squares of the factors
-            told = np.abs(out[:, :8:2]).max(axis=1) ** 2 < LOUD
-            wrong["rotation number"] = told & (np.abs(np.abs(answer["rotation_number"]) - rough) > 0.08)
+            known = ok & (np.abs(out[:, :8:2]).max(axis=1) ** 2 < LOUD)
+            off = np.abs(np.abs(answer["rotation_number"]) - rough_rotation(k, short, rho, body, known))
+            wrong["rotation number"] = known & (off > 0.08 + answer["rotation_number_error"])
         return found
 
     return truth

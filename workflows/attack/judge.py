@@ -152,7 +152,7 @@ def _silent(batch, module, answer, counts, faults):
             continue
         values = answer[o.name]
         if o.flags is not None:
-            bad |= _any(~np.isin(values, list(o.flags.values())))
+            bad |= _any(~np.isin(values, list(o.flags.values())) & ~_as(lost, values))
             if o.name == "verdict":
                 counts["undecided"] += int((ok & (values == -1)).sum())
                 bad |= lost & (values != -1)

@@ -5,9 +5,10 @@ import math
 import numpy as np
 
 from survey.kernels.cylinder.equilibria import ANGLE, BAR, KIND, SADDLE
-from survey.kernels.cylinder.flow import B12, B31, BOUND_DDG, BOUND_DG, BOUND_F, C23, S2, S3, UNIT, D, values
+from survey.kernels.cylinder.flow import B12, B31, BOUND_DDG, BOUND_DG, BOUND_F, C23, S2, S3, D, values
 from survey.kernels.cylinder.records import START_PHI, START_PHI_BAR, START_W, START_W_BAR
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 ORDER = 16
 TRUNCATION = 1e-17  # of the series, relative
@@ -51,13 +52,13 @@ def unstable(p, eqs, count, starts):
         reach = FURTHEST
         for n in (ORDER - 1, ORDER):
             reach = min(reach, (TRUNCATION * a[1] / (abs(a[n]) + 1e-300)) ** (1.0 / (n - 1)))
-        slope = slip * (p[BOUND_F] * a[1] + p[BOUND_DDG]) + 4.0 * UNIT * (p[BOUND_F] * a[1] + p[BOUND_DG])
+        slope = slip * (p[BOUND_F] * a[1] + p[BOUND_DDG]) + 4.0 * ROUNDOFF_UP * (p[BOUND_F] * a[1] + p[BOUND_DG])
         for side in (-1.0, 1.0):
             x, w = side * reach, 0.0
             for n in range(ORDER, 0, -1):
                 w = (w + a[n]) * x
             starts[size, START_PHI], starts[size, START_W] = phi + x, w
-            starts[size, START_PHI_BAR] = slip + 4.0 * UNIT
-            starts[size, START_W_BAR] = 20.0 * UNIT * abs(w) + 2.0 * reach * slope / spread + 2.0 * a[1] * slip
+            starts[size, START_PHI_BAR] = slip + 4.0 * ROUNDOFF_UP
+            starts[size, START_W_BAR] = 20.0 * ROUNDOFF_UP * abs(w) + 2.0 * reach * slope / spread + 2.0 * a[1] * slip
             size += 1
     return size

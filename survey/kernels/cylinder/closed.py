@@ -16,15 +16,16 @@ import math
 
 import numpy as np
 
-from survey.kernels.cylinder.flow import B12, B31, C23, S2, S3, TWO_PI, UNIT, D
+from survey.kernels.cylinder.flow import B12, B31, C23, S2, S3, TWO_PI, D
 from survey.kernels.cylinder.trigonometric import deviation, drift, misfit
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.carlson import rf
 from survey.kernels.math.elliptic import complete
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 NONE, TRIGONOMETRIC, LIBRATION, ROTATION, LOST = 0, 1, 2, 3, 4
 SIZE = 32
-SAME = 64.0 * UNIT  # how far, relative, parameters may miss the conditions of (61); the miss goes into the bars
+SAME = 64.0 * ROUNDOFF_UP  # how far, relative, parameters may miss the conditions of (61); the miss goes into the bars
 
 # places in data
 W0, A1, B1, A2, B2, ROUGH = range(6)  # g(phi0 + x) = A1 cos x + B1 sin x + A2 cos 2x + B2 sin 2x
@@ -54,7 +55,7 @@ def square_of_w(data, x):
     inner = 2.0 * c * (data[A1] + data[A2] * cx) + s * (2.0 * data[B1] + 4.0 * data[B2] * c * c)
     first, second = math.hypot(data[A1], data[B1]), math.hypot(data[A2], data[B2])
     slope = data[A1] * cx + data[B1] * sx + data[A2] * (cx - sx) * (cx + sx) + 2.0 * data[B2] * sx * cx
-    noise = 4.0 * UNIT * (data[W0] ** 2 + 6.0 * abs(s) * (data[ROUGH] + abs(s) * (first + 2.0 * second)))
+    noise = 4.0 * ROUNDOFF_UP * (data[W0] ** 2 + 6.0 * abs(s) * (data[ROUGH] + abs(s) * (first + 2.0 * second)))
     return data[W0] ** 2 + 2.0 * s * inner, 2.0 * slope, noise
 
 
@@ -74,7 +75,7 @@ def reach(data, side):
             if x > 0.0 or data[W0] == 0.0:
                 if slope < 0.0 and slope * slope > 1e3 * noise * bend:
                     new = x - h / slope
-                    return new, 2.0 * noise / -slope + 4.0 * UNIT * new
+                    return new, 2.0 * noise / -slope + 4.0 * ROUNDOFF_UP * new
                 if not (data[W0] == 0.0 and x == 0.0 and slope > 0.0):
                     return math.nan, 0.0
         root = math.sqrt(slope * slope + 2.0 * bend * max(h, 0.0))
@@ -82,11 +83,11 @@ def reach(data, side):
         x += step
         if x >= TWO_PI:
             return math.inf, 0.0
-        if step <= 2.0 * UNIT * x:
+        if step <= 2.0 * ROUNDOFF_UP * x:
             _h, slope, noise = square_of_w(data, side * x)
             slope *= side
             if slope < 0.0 and slope * slope > 1e3 * noise * bend:
-                return x, 2.0 * noise / -slope + 4.0 * UNIT * x
+                return x, 2.0 * noise / -slope + 4.0 * ROUNDOFF_UP * x
             return math.nan, 0.0
     return math.nan, 0.0
 
@@ -166,8 +167,8 @@ def start_trigonometric(p, phi0, w0, side, mu, other, data):
     data[W0], data[F0], data[SLOPE], data[MU], data[OTHER] = abs(w0), side * F, f, mu, other
     data[SQUARE] = (abs(w0) - 2.0 * side * F) * abs(w0) - f * f  # n^2 - (mu b)^2
     offset, miss, blur = misfit(p[B12], p[B31], p[D], p[C23], p[S2], p[S3], mu, other, w0, F)
-    slack = 6.0 * UNIT * abs(mu) * b
-    data[NOISE] = slack + (4.0 * UNIT * abs(w0) + 2.0 * b * blur if b > 0.0 else 0.0)
+    slack = 6.0 * ROUNDOFF_UP * abs(mu) * b
+    data[NOISE] = slack + (4.0 * ROUNDOFF_UP * abs(w0) + 2.0 * b * blur if b > 0.0 else 0.0)
     data[OFFSET], data[MISS], data[GAIN] = offset + (0.0 if other == 0.0 else slack), miss, b * abs(other)
 
 
@@ -184,12 +185,12 @@ def trigonometric_reach(data, x):
     w0, f, square = data[W0], data[SLOPE], data[SQUARE]
     if data[F0] == 0.0 and f == 0.0:
         t = x / w0
-        return t, (2.0 * UNIT + deviating(data, t, w0) / w0) * t
+        return t, (2.0 * ROUNDOFF_UP + deviating(data, t, w0) / w0) * t
     root = math.sqrt(abs(square))
     turns = math.floor(0.5 * x / math.pi + 0.5)
     rest = 0.5 * x - turns * math.pi
     y1, y2 = math.sin(rest), w0 * math.cos(rest) + f * math.sin(rest)
-    blur = 4.0 * UNIT * (w0 * abs(math.cos(rest)) + abs(f * y1))
+    blur = 4.0 * ROUNDOFF_UP * (w0 * abs(math.cos(rest)) + abs(f * y1))
     if square > 0.0:
         theta = (math.atan2(root * y1, y2) + turns * math.pi) / root
         near = y2 * y2 + square * y1 * y1
@@ -214,8 +215,8 @@ def trigonometric_reach(data, x):
     t = 2.0 * theta
     # the formula is evaluated with rounded data, which moves Delta^2 as well
     moved = deviating(data, t, near / w0)  # near = w0 w
-    bar = (data[NOISE] + moved) * total / w0 + 2.0 * abs(y1) * blur / near + 6.0 * UNIT * t
-    bar += 3.0 * UNIT * (abs(x) + 1.0) * w0 / near * 2.0
+    bar = (data[NOISE] + moved) * total / w0 + 2.0 * abs(y1) * blur / near + 6.0 * ROUNDOFF_UP * t
+    bar += 3.0 * ROUNDOFF_UP * (abs(x) + 1.0) * w0 / near * 2.0
     return t, MARGIN * bar
 
 
@@ -232,7 +233,7 @@ def start_libration(data):
     q0, q1, p1 = -4.0 * b1 - 4.0 * b2 * ch, -4.0 * b2, 4.0 * a2
     qa, qb = q0 + q1 * ch - p1 * sh, q0 + q1 * ch + p1 * sh
     first, second = math.hypot(data[A1], data[B1]), math.hypot(data[A2], data[B2])
-    blur = 4.0 * (first + 3.0 * second) * (8.0 * UNIT + data[BAR_LEFT] + data[BAR_RIGHT])
+    blur = 4.0 * (first + 3.0 * second) * (8.0 * ROUNDOFF_UP + data[BAR_LEFT] + data[BAR_RIGHT])
     if not (qa > 30.0 * blur and qb > 30.0 * blur and sh > 0.0):
         return False
     product = math.sqrt(qa) * math.sqrt(qb)
@@ -254,7 +255,7 @@ def start_libration(data):
     if left == 0.0:
         data[SLACK] = 0.0
         return True
-    edge = data[BAR_LEFT] / left + data[BAR_RIGHT] / right + rho + 8.0 * UNIT
+    edge = data[BAR_LEFT] / left + data[BAR_RIGHT] / right + rho + 8.0 * ROUNDOFF_UP
     data[SLACK] = 0.5 * math.sin(chi) * edge / math.sqrt(math.cos(chi) ** 2 + kc2 * math.sin(chi) ** 2)
     return True
 
@@ -263,7 +264,7 @@ def start_libration(data):
 def phase_bar(data, theta):
     """Bound of the error of theta - theta0, as time."""
     whole = theta + data[THETA0]
-    relative = 0.25 * data[RHO] * theta + 0.5 * data[RHO_M] * whole + 12.0 * UNIT * (whole + 1.0)
+    relative = 0.25 * data[RHO] * theta + 0.5 * data[RHO_M] * whole + 12.0 * ROUNDOFF_UP * (whole + 1.0)
     return (relative + data[SLACK]) / data[OMEGA]
 
 
@@ -271,7 +272,7 @@ def phase_bar(data, theta):
 def flight(data, chi, slack):
     """(t, bar t) at which chi >= chi0 is reached; slack is the error of chi."""
     theta = first_kind(chi, data[KC2], data[QUARTER])
-    slack += 8.0 * UNIT * (1.0 + abs(chi))
+    slack += 8.0 * ROUNDOFF_UP * (1.0 + abs(chi))
     slack /= math.sqrt(math.cos(chi) ** 2 + data[KC2] * math.sin(chi) ** 2)
     return (theta - data[THETA0]) / data[OMEGA], MARGIN * (phase_bar(data, theta) + slack / data[OMEGA])
 
@@ -281,7 +282,7 @@ def libration_reach(data, x):
     """(t, bar t) at which phi0 + x, x in [0, RIGHT], is first reached."""
     ahead, behind = data[RIGHT] - x, data[LEFT] + x
     chi = 2.0 * math.atan2(math.sqrt(math.sin(0.5 * behind)), math.sqrt(data[RATIO] * math.sin(0.5 * ahead)))
-    blur = 2.0 * UNIT * (data[LEFT] + data[RIGHT])
+    blur = 2.0 * ROUNDOFF_UP * (data[LEFT] + data[RIGHT])
     edge = (data[BAR_LEFT] + blur) / behind if behind > 0.0 else 0.0
     edge += (data[BAR_RIGHT] + blur) / ahead if ahead > 0.0 else 0.0
     slack = 0.5 * math.sin(chi) * (edge + data[RHO])
@@ -307,7 +308,7 @@ def start_rotation(data):
         slope = 0.5 - 0.5 * tail / (y * y) + 0.5 * (number + 2.0 * y * (y * top - cross)) / (q * q)
         slope -= 2.0 * y * y * number / (q * q * q)
         move = value / slope
-        if not move > 2.0 * UNIT * y:
+        if not move > 2.0 * ROUNDOFF_UP * y:
             break
         y -= move
     q = y * y - tail
@@ -321,7 +322,7 @@ def start_rotation(data):
     kappa = mean / ((1.0 + abs2(r)) * (1.0 + abs2(s)) + 2.0 * (r * s.conjugate()).real)
     c1 = -2.0 * kappa * (r.conjugate() * (1.0 + abs2(s)) + s.conjugate() * (1.0 + abs2(r)))
     c2 = 2.0 * kappa * r.conjugate() * s.conjugate()
-    gaps = abs(c1 - first) + abs(c2 - second) + 12.0 * UNIT * (abs(mean) + abs(first) + abs(second))
+    gaps = abs(c1 - first) + abs(c2 - second) + 12.0 * ROUNDOFF_UP * (abs(mean) + abs(first) + abs(second))
     least = kappa * ((1.0 - abs(r)) * (1.0 - abs(s))) ** 2
     if not least > 30.0 * gaps:
         return False
@@ -337,7 +338,7 @@ def start_rotation(data):
     data[QUARTER], _second = complete(0.0, data[KC])
     data[LEAST], data[MISFIT] = least, gaps
     data[RHO], data[RHO_M] = 0.0, 0.0
-    data[SLACK] = 16.0 * UNIT * (1.0 + 2.0 / (1.0 - abs(centre))) / data[KC]
+    data[SLACK] = 16.0 * ROUNDOFF_UP * (1.0 + 2.0 / (1.0 - abs(centre))) / data[KC]
     data[THETA0] = first_kind(mapped(data, 0.0), kc2, data[QUARTER])
     return True
 
@@ -359,7 +360,7 @@ def mapped(data, x):
 def rotation_bar(data, theta, t):
     centre = math.hypot(data[RE], data[IM])
     return phase_bar(data, theta + abs(data[THETA0])) + t * (
-        0.5 * data[MISFIT] / data[LEAST] + 16.0 * UNIT / (1.0 - centre)
+        0.5 * data[MISFIT] / data[LEAST] + 16.0 * ROUNDOFF_UP / (1.0 - centre)
     )
 
 
@@ -367,9 +368,9 @@ def rotation_bar(data, theta, t):
 def rotation_reach(data, x):
     """(t, bar t) at which phi0 + x is reached."""
     chi = mapped(data, x)
-    t, bar = flight(data, chi, 8.0 * UNIT * (1.0 + abs(x)))
+    t, bar = flight(data, chi, 8.0 * ROUNDOFF_UP * (1.0 + abs(x)))
     return t, bar + MARGIN * (
-        rotation_bar(data, 0.0, t) + data[SLACK] / data[OMEGA] + 8.0 * UNIT * abs(x) / math.sqrt(data[LEAST])
+        rotation_bar(data, 0.0, t) + data[SLACK] / data[OMEGA] + 8.0 * ROUNDOFF_UP * abs(x) / math.sqrt(data[LEAST])
     )
 
 

@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 
-from survey.kernels.cylinder.flow import BOUND_DDG, BOUND_DG, BOUND_F, BOUND_G, C23, S2, TWO_PI, UNIT, values
+from survey.kernels.cylinder.flow import BOUND_DDG, BOUND_DG, BOUND_F, BOUND_G, C23, S2, TWO_PI, values
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 MOST = 12  # rows of a table of equilibria: 4 at most, and degenerate ones
 ANGLE, F, DG, BAR, KIND, STABLE, VAA, VAB, VBB, LEVEL = range(10)
@@ -78,10 +79,10 @@ def describe(p, x, row):
     """Type, error bar and region of attraction of the equilibrium at x."""
     f, _g, dg = values(p, x)
     row[ANGLE], row[F], row[DG] = x, f, dg
-    noise = 4.0 * UNIT * p[BOUND_G]
+    noise = 4.0 * ROUNDOFF_UP * p[BOUND_G]
     row[BAR] = 4e-16 * (1.0 + abs(x)) + noise / max(abs(dg), 1e-300)
     row[VAA], row[VAB], row[VBB], row[LEVEL] = 0.0, 0.0, 0.0, 0.0
-    row[STABLE] = 0.0 if abs(f) <= 16.0 * UNIT * p[BOUND_F] + p[BOUND_F] * row[BAR] else math.copysign(1.0, f)
+    row[STABLE] = 0.0 if abs(f) <= 16.0 * ROUNDOFF_UP * p[BOUND_F] + p[BOUND_F] * row[BAR] else math.copysign(1.0, f)
     if row[BAR] > 1e-7 or dg == 0.0:
         row[KIND], row[STABLE] = DEGENERATE, 0.0
         row[BAR] = max(1e-6, 2.0 * math.sqrt(noise / max(p[BOUND_DDG], 1e-300)))

@@ -7,18 +7,6 @@ along the flow, since an error along an orbit does not change its fate. Nothing 
 import math
 
 from survey.kernels.cylinder import records as rc
-from survey.kernels.cylinder.along import (
-    NO_CONVERGENCE,
-    OK,
-    SEPARATRIX,
-    STEP_LIMIT,
-    bar,
-    carried,
-    clean_turning,
-    expand,
-    start_sign,
-    time_of_turning,
-)
 from survey.kernels.cylinder.equilibria import (
     ANGLE,
     BAR,
@@ -33,13 +21,28 @@ from survey.kernels.cylinder.equilibria import (
     resting,
     settled,
 )
-from survey.kernels.cylinder.flow import TWO_PI, TWO_PI_LOW, UNIT, reduced, table, values
+from survey.kernels.cylinder.flow import PHI, TWO_PI, reduced, table, values
 from survey.kernels.cylinder.returns import ABOVE, BELOW, CYCLE_BAR, CYCLE_CLASS, CYCLE_X, INTERVAL, between
+from survey.kernels.cylinder.steps import (
+    NO_CONVERGENCE,
+    OK,
+    SEPARATRIX,
+    STEP_LIMIT,
+    bar,
+    carried,
+    clean_turning,
+    expand,
+    passage,
+    start_sign,
+    time_of_turning,
+    wrapped,
+)
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 UNDECIDED, EQUILIBRIUM, SADDLE, ROTATION_PLUS, ROTATION_MINUS, LIBRATION = -1, 0, 1, 2, 3, 4
 SPIN_UP_PLUS, SPIN_UP_MINUS, PERIODIC_ROTATION, PERIODIC_LIBRATION, EQUILIBRIUM_START = 5, 6, 7, 8, 9
-INFINITE, UNTOLD, NO_TURNS = -1, -2, -(2**31)
+INFINITE, UNDETERMINED, NO_TURNS = -1, -2, -(2**31)
 TRUST = 1e-4
 GENERIC, REVERSIBLE = 0, 3  # strata that are followed; REVERSIBLE is I2, K = L = 0
 
@@ -143,26 +146,6 @@ def section_ahead(phi, w, section, spacing):
 
 
 @inline
-def crossing_time(at, p, T, target, h):
-    """dt in [0, h] where phi = target, w of either sign."""
-    low, high, dt = 0.0, h, 0.5 * h
-    up = at(p, T, h)[0] > T[0, 0]
-    for _ in range(60):
-        x, v, _e, _y = at(p, T, dt)
-        if (x < target) == up:
-            low = dt
-        else:
-            high = dt
-        new = dt - (x - target) / v if v != 0.0 else low
-        if not low <= new <= high:
-            new = 0.5 * (low + high)
-        if abs(new - dt) <= 1e-17 + 1e-16 * h:
-            return new
-        dt = new
-    return dt
-
-
-@inline
 def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, start, tolerance, limit, out):
     """Fill out (VERDICT to STATUS of `records`) for `start` (START_PHI to START_W_BAR).
 
@@ -171,10 +154,10 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
     """
     count, n_plus, n_minus, n_lib, stratum, weak = sizes[0], sizes[1], sizes[2], sizes[3], sizes[4], sizes[5] > 0
     out[rc.VERDICT], out[rc.LIMIT] = UNDECIDED, -1
-    out[rc.TURNINGS], out[rc.NET_TURNS], out[rc.STATUS] = UNTOLD, NO_TURNS, OK
+    out[rc.TURNINGS], out[rc.NET_TURNS], out[rc.STATUS] = UNDETERMINED, NO_TURNS, OK
     phi0, w0 = start[rc.START_PHI], start[rc.START_W]
     phi, turns = reduced(phi0)
-    w, slip = w0, start[rc.START_PHI_BAR] + 4.0 * UNIT * (turns != 0.0)
+    w, slip = w0, start[rc.START_PHI_BAR] + 4.0 * ROUNDOFF_UP * (turns != 0.0)
     sign = start_sign(p, phi, w)
     if w == 0.0:
         row = resting(p, eqs, count, phi0)
@@ -183,13 +166,13 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
             out[rc.TURNINGS], out[rc.NET_TURNS] = 0, offset(phi, eqs[row, ANGLE])[1]
             return
         if sign == 0:  # beside an equilibrium, within rounding
-            row = captured(eqs, count, phi, w, slip + 16.0 * UNIT)
+            row = captured(eqs, count, phi, w, slip + 16.0 * ROUNDOFF_UP)
             if row < 0:
                 out[rc.STATUS] = SEPARATRIX
                 return
             out[rc.VERDICT], out[rc.LIMIT] = EQUILIBRIUM, row
             out[rc.NET_TURNS] = turns + offset(phi, eqs[row, ANGLE])[1]
-            out[rc.TURNINGS] = INFINITE if eqs[row, KIND] == FOCUS else UNTOLD
+            out[rc.TURNINGS] = INFINITE if eqs[row, KIND] == FOCUS else UNDETERMINED
             return
     T = table()
     how = setting(p, w0, tolerance)
@@ -213,7 +196,7 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
         passed = (x1 - target) * sign >= 0.0
         if passed:
             turned = False
-            h = crossing_time(at, p, T, target, h)
+            h = passage(at, p, T, target, x1 > T[0, PHI], h)
             x1, w1, _e, _y = at(p, T, h)
         saa, sab, sbb = carried(p, T, h, w1, saa, sab, sbb)
         phi, w = (target if passed else x1), (0.0 if turned else w1)
@@ -287,11 +270,9 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
         elif abs(w) <= 2.0 * bar_w and n > 1 and held < 0:
             out[rc.STATUS] = SEPARATRIX
             return
-        if abs(phi) > math.pi:
-            k = 1.0 if phi > 0.0 else -1.0
-            phi = (phi - k * TWO_PI) - k * TWO_PI_LOW
-            target -= k * TWO_PI
-            turns += k
+        phi, k = wrapped(phi)
+        target -= k * TWO_PI
+        turns += k
         if held < 0:
             held = captured(eqs, count, phi, w, bar_phi + bar_w)
         if held >= 0:

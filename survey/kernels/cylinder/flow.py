@@ -13,6 +13,7 @@ import numpy as np
 
 from survey.kernels.cylinder.records import PHI0, START_PHI, START_W, W0
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 ORDER = 20  # of the Taylor series in t; near -ln(eps)/2 + 1 = 19 the work per unit of time is least (Jorba & Zou)
 LOW = 8  # order of the series of the variational equation, which only carries error bars
@@ -26,7 +27,6 @@ PHI, W, SIN, COS, SIN2, COS2, E, Y, U1, Z1, U2, Z2, F_, DG = range(ROWS)
 TRUNC_PHI, TRUNC_W, STEP, WEIGHT = range(4)
 
 B12, B31, D, C23, S2, S3, BOUND_F, BOUND_G, BOUND_DG, BOUND_DDG = range(10)
-UNIT = 1.2e-16  # one rounding, relative
 TWO_PI = 2.0 * math.pi
 TWO_PI_LOW = 2.4492935982947064e-16  # 2 pi - TWO_PI
 
@@ -146,7 +146,7 @@ def centred(phi):
     if abs(phi) <= math.pi:
         return phi, 0.0
     rest, _turns = reduced(phi)
-    return rest, 4.0 * UNIT
+    return rest, 4.0 * ROUNDOFF_UP
 
 
 @inline

@@ -1,7 +1,8 @@
 """The flow on the cylinder in double-double arithmetic: Taylor series of order 30, for what float64 leaves open.
 
-As `flow` and `along`, whose error ellipse is carried here too, by the variational equation in float64: it only carries
-bars. A step expands S = sin phi, C = cos phi and w in A[quantity, hi or lo, order]; they start anew in each step.
+As `flow` and `steps`, whose error ellipse is carried here too, by the variational equation in float64, which serves
+the bars only. A step expands S = sin phi, C = cos phi and w in A[quantity, hi or lo, order]; each step computes S and C
+afresh.
 
     phi' = w,  S' = C w,  C' = -S w,  w' = b12 S' + b31 C' - d C S - c23 (1 - 2 S S) + s2 C - s3 S      (57)
 
@@ -13,21 +14,6 @@ import math
 import numpy as np
 
 from survey.kernels.cylinder import records as rc
-from survey.kernels.cylinder.along import (
-    EQUILIBRIUM,
-    NO_CONVERGENCE,
-    OK,
-    OVERFLOW,
-    SEPARATRIX,
-    STEP_LIMIT,
-    TRUST,
-    TURNING,
-    UNTOLD,
-    bar,
-    certain,
-    node_ahead,
-    rests,
-)
 from survey.kernels.cylinder.equilibria import MOST, equilibria
 from survey.kernels.cylinder.flow import (
     B12,
@@ -44,14 +30,30 @@ from survey.kernels.cylinder.flow import (
     SIN,
     SIN2,
     TWO_PI,
-    TWO_PI_LOW,
-    UNIT,
     D,
     jacobian,
     longest_step,
     table,
     values,
     variation,
+)
+from survey.kernels.cylinder.steps import (
+    EQUILIBRIUM,
+    NO_CONVERGENCE,
+    OK,
+    OVERFLOW,
+    SEPARATRIX,
+    STEP_LIMIT,
+    TRUST,
+    TURNING,
+    UNDETERMINED,
+    bar,
+    certain,
+    conclude,
+    rests,
+    runs_into_node,
+    trusted,
+    unturned,
 )
 from survey.kernels.cylinder.winding import ends, zeros
 from survey.kernels.jit import inline, kernel
@@ -68,10 +70,12 @@ from survey.kernels.math.double import (
     times,
     two_prod,
 )
+from survey.kernels.math.newton import bracketed
+from survey.kernels.math.roundoff import PAIR_ROUNDOFF, ROUNDOFF_UP
 
 ORDER = 30
 TOLERANCE = 1e-30  # truncation of one step, relative to 1 + |w|
-ROUGH = 16.0 * 2.0**-104  # rounding of a sum or a product of the series, relative
+ROUGH = 16.0 * PAIR_ROUNDOFF  # rounding of a sum or a product of the series, relative
 FALL = 1.0 / 50.0  # by more, two terms further on, no series is trusted to fall
 LIMIT = 20_000  # steps; about 0.4 s
 SLOWER = 3.0  # steps may grow by so much: what then needs more than LIMIT is given up at once
@@ -86,7 +90,7 @@ def scratch():
 
 
 @inline
-def whole(turns):
+def radians(turns):
     """2 pi turns."""
     high, low = two_prod(4.0 * turns, HALF_PI[0])
     return add(add((high, low), two_prod(4.0 * turns, HALF_PI[1])), (4.0 * turns * HALF_PI_REST, 0.0))
@@ -96,14 +100,14 @@ def whole(turns):
 def centred(phi):
     """phi in about [-pi, pi], and the turns taken out of it."""
     turns = math.floor(phi[0] / (4.0 * HALF_PI[0]) + 0.5)
-    return add(phi, neg(whole(turns))), turns
+    return add(phi, neg(radians(turns))), turns
 
 
 @kernel
 def sine_cosine(phi):
     """sin and cos of |phi| < 4, to a few units of double-double."""
     quarter = math.floor(phi[0] / HALF_PI[0] + 0.5)
-    x = add(phi, neg(whole(0.25 * quarter)))
+    x = add(phi, neg(radians(0.25 * quarter)))
     z = square(x)
     s, c = (1.0, 0.0), (1.0, 0.0)
     for n in range(TERMS, 0, -1):
@@ -181,7 +185,7 @@ def at(phi, A, dt):
 
 @kernel
 def carried(p, T, dt, w, ellipse):
-    """The error ellipse (phi phi, phi w, w w) after dt of the current step, as `along.carried`."""
+    """The error ellipse (phi phi, phi w, w w) after dt of the current step, as `steps.carried`."""
     saa, sab, sbb = ellipse
     a, b, c, d = jacobian(T, dt)
     rate = p[BOUND_F] * abs(w) + p[BOUND_G]
@@ -212,7 +216,7 @@ def clean(p, phi, w, bar_phi, bar_w):
 
 @kernel
 def trajectory(p, phi0, w0, asked, floats, turnings):
-    """As `along.trajectory`, and `winding.counts`."""
+    """As `steps.trajectory`, and `winding.counts`."""
     A, T, eqs, end = scratch(), table(), np.zeros((MOST, 10)), np.zeros(5)
     size = equilibria(p, eqs)
     phi, turns = centred((phi0, 0.0))
@@ -232,18 +236,21 @@ def trajectory(p, phi0, w0, asked, floats, turnings):
                 break
             x, v = at(phi, A, dt)
             a, _b, c = carried(p, T, dt[0], v[0], ellipse)
-            late = n * ROUGH * asked[j]
-            wide, high = bar(n, a) + abs(v[0]) * late, bar(n, c) + (p[BOUND_F] * abs(v[0]) + p[BOUND_G]) * late
+            delay = n * ROUGH * asked[j]  # error of the time
+            wide, high = bar(n, a) + abs(v[0]) * delay, bar(n, c) + (p[BOUND_F] * abs(v[0]) + p[BOUND_G]) * delay
             if not (wide < TRUST and high < TRUST * (1.0 + abs(v[0]))):
                 return NO_CONVERGENCE
-            floats[j, rc.PHI], floats[j, rc.W] = add(x, whole(turns))[0], v[0]
-            floats[j, rc.PHI_BAR], floats[j, rc.W_BAR] = wide + UNIT * abs(floats[j, rc.PHI]), high + UNIT * abs(v[0])
+            floats[j, rc.PHI], floats[j, rc.W] = add(x, radians(turns))[0], v[0]
+            floats[j, rc.PHI_BAR], floats[j, rc.W_BAR] = (
+                wide + ROUNDOFF_UP * abs(floats[j, rc.PHI]),
+                high + ROUNDOFF_UP * abs(v[0]),
+            )
             from_rest = n == 1 and w0 == 0.0
             if still:
                 turnings[j] = 0
             elif known:
                 more = zeros(end, add((asked[j], 0.0), neg(since))[0])
-                turnings[j] = count + more if more >= 0 else UNTOLD
+                turnings[j] = count + more if more >= 0 else UNDETERMINED
             elif unsure < 3 and (abs(v[0]) > high or from_rest):
                 turnings[j] = count + (v[0] * sign < 0.0 and not from_rest)
             j += 1
@@ -256,7 +263,7 @@ def trajectory(p, phi0, w0, asked, floats, turnings):
         if abs(phi[0]) > math.pi:
             phi, k = centred(phi)
             turns += k
-        if not (ellipse[0] < TRUST and ellipse[2] < (1.0 + abs(w[0])) ** 2):
+        if not trusted(ellipse[0], ellipse[2], w[0]):
             return NO_CONVERGENCE if math.isfinite(w[0]) else OVERFLOW
         bar_phi, bar_w = bar(n, ellipse[0]), bar(n, ellipse[2])
         if known or still or abs(w[0]) <= bar_w:
@@ -268,62 +275,64 @@ def trajectory(p, phi0, w0, asked, floats, turnings):
         count += w[0] * sign < 0.0
         sign, unsure = (1 if w[0] > 0.0 else -1), 0
         # its angle is that of float64
-        known = ends(p, eqs, size, phi[0], w[0], bar_phi + UNIT * abs(phi[0]), bar_w + UNIT * abs(w[0]), end)
+        known = ends(
+            p, eqs, size, phi[0], w[0], bar_phi + ROUNDOFF_UP * abs(phi[0]), bar_w + ROUNDOFF_UP * abs(w[0]), end
+        )
         since = t
     return STEP_LIMIT
 
 
 @kernel
-def time_where(phi, A, target, h):
-    """dt in [0, h] where phi = target, for w > 0 on the step: Newton's method, kept inside a bracket at first."""
-    low, high, dt = 0.0, h, 0.5 * h
-    for _ in range(60):
-        x, v = at(phi, A, (dt, 0.0))
-        off = add(x, neg(target))[0]
-        if off < 0.0:
-            low = dt
-        else:
-            high = dt
-        new = dt - off / v[0] if v[0] != 0.0 else low
-        if not low <= new <= high:
-            new = 0.5 * (low + high)
-        moved, dt = abs(new - dt), new
-        if moved <= 1e-17 + 1e-16 * h:
-            break
-    exact = (dt, 0.0)
-    for _ in range(3):
-        x, v = at(phi, A, exact)
-        move = -add(x, neg(target))[0] / v[0] if v[0] != 0.0 else 0.0
-        if not abs(move) < 1e-8 * h:
-            break
-        exact = shifted(exact, move)
-    return exact
+def passage(phi, A, target, h):
+    """dt in [0, h] where phi = target, for w > 0 on the step."""
+    given = phi, A, target
+    dt = bracketed(_to_target, at, given, 0.5 * h, (0.0, h), (1e-17 + 1e-16 * h, 0.0), 60)[1]
+    return sharpened(_to_target_exactly, given, dt, h)
+
+
+@inline
+def _to_target_exactly(given, dt):
+    phi, A, target = given
+    x, w = at(phi, A, dt)
+    return add(x, neg(target))[0], w[0]
+
+
+@inline
+def _to_target(at, given, dt):
+    off, slope = _to_target_exactly(given, (dt, 0.0))
+    return off, slope, off < 0.0
 
 
 @kernel
 def time_of_turning(p, phi, A, h):
-    """dt in [0, h] where w, which changes sign on the step, is 0: as `time_where`."""
-    low, high, dt = 0.0, h, 0.5 * h
-    for _ in range(60):
-        x, v = at(phi, A, (dt, 0.0))
-        if v[0] > 0.0:
-            low = dt
-        else:
-            high = dt
-        f, g, _dg = values(p, x[0])
-        slope = f * v[0] + g
-        new = dt - v[0] / slope if slope != 0.0 else low
-        if not low <= new <= high:
-            new = 0.5 * (low + high)
-        moved, dt = abs(new - dt), new
-        if moved <= 1e-17 + 1e-16 * h:
-            break
+    """dt in [0, h] where w > 0 changes sign on the step."""
+    given = p, phi, A
+    dt = bracketed(_to_rest, at, given, 0.5 * h, (0.0, h), (1e-17 + 1e-16 * h, 0.0), 60)[1]
+    return sharpened(_to_rest_exactly, given, dt, h)
+
+
+@inline
+def _to_rest(at, given, dt):
+    p, phi, A = given
+    x, w = at(phi, A, (dt, 0.0))
+    f, g, _dg = values(p, x[0])
+    return w[0], f * w[0] + g, w[0] > 0.0
+
+
+@inline
+def _to_rest_exactly(given, dt):
+    p, phi, A = given
+    x, w = at(phi, A, dt)
+    return w[0], values(p, x[0])[0] * w[0] + acceleration(p, x)[0]
+
+
+@inline
+def sharpened(residual, given, dt, h):
+    """The zero next to dt in double-double; residual(given, dt) -> (value, slope)."""
     exact = (dt, 0.0)
     for _ in range(3):
-        x, v = at(phi, A, exact)
-        f, _g, _dg = values(p, x[0])
-        slope = f * v[0] + acceleration(p, x)[0]
-        move = -v[0] / slope if slope != 0.0 else 0.0
+        value, slope = residual(given, exact)
+        move = -value / slope if slope != 0.0 else 0.0
         if not abs(move) < 1e-8 * h:
             break
         exact = shifted(exact, move)
@@ -332,7 +341,7 @@ def time_of_turning(p, phi, A, h):
 
 @kernel
 def abel(p, phi0, w0, targets, floats, status):
-    """As `along.abel`."""
+    """As `steps.abel`."""
     A, T = scratch(), table()
     phi, turns = centred((phi0, 0.0))
     w, t, ellipse, n, started = (w0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.0), 0, w0 > 0.0
@@ -364,10 +373,10 @@ def abel(p, phi0, w0, targets, floats, status):
             dt = time_of_turning(p, phi, A, h)
             x, v = at(phi, A, dt)
         while j < size:
-            target = add((targets[j], 0.0), neg(whole(turns)))
+            target = add((targets[j], 0.0), neg(radians(turns)))
             if add(target, neg(x))[0] > 0.0:
                 break
-            when = time_where(phi, A, target, dt[0])
+            when = passage(phi, A, target, dt[0])
             _x, there = at(phi, A, when)
             a, b, c = carried(p, T, when[0], there[0], ellipse)
             a += (ROUGH * (abs(targets[j]) + h * there[0])) ** 2
@@ -381,44 +390,43 @@ def abel(p, phi0, w0, targets, floats, status):
         bar_phi, bar_w = bar(n, ellipse[0]), bar(n, ellipse[2])
         edge = 1.1 * bar_phi + ROUGH * (1.0 + abs(x[0] + turns * TWO_PI))
         # from here on a turning point lies beyond x
-        while 0 <= doubt < j and add(x, neg(add((targets[doubt], 0.0), neg(whole(turns)))))[0] > edge:
+        while 0 <= doubt < j and add(x, neg(add((targets[doubt], 0.0), neg(radians(turns)))))[0] > edge:
             doubt += 1
         if doubt == j:
             doubt = -1
         if turned:
             ending = TURNING if clean(p, x, v[0], bar_phi, bar_w) else SEPARATRIX
             bar_t = 1.2 * bar_w / abs(acceleration(p, x)[0]) if ending == TURNING else 0.0
-            end, when = add(x, whole(turns))[0], add(t, dt)[0]
+            end, when = add(x, radians(turns))[0], add(t, dt)[0]
             for i in range(doubt if doubt >= 0 else j, size):
                 if i >= j or not certain(floats[i]):
                     status[i] = ending
                     floats[i, rc.VALUE], floats[i, rc.TIME] = end, when
-                    floats[i, rc.VALUE_BAR], floats[i, rc.TIME_BAR] = edge + UNIT * abs(end), bar_t + UNIT * when
+                    floats[i, rc.VALUE_BAR], floats[i, rc.TIME_BAR] = (
+                        edge + ROUNDOFF_UP * abs(end),
+                        bar_t + ROUNDOFF_UP * when,
+                    )
             return
         phi, w, t = x, v, shifted(t, h)
         if phi[0] > math.pi:
             phi, k = centred(phi)
             turns += k
-        if not (ellipse[0] < TRUST and ellipse[2] < (1.0 + abs(w[0])) ** 2):
+        if not trusted(ellipse[0], ellipse[2], w[0]):
             ending = NO_CONVERGENCE if math.isfinite(w[0]) else OVERFLOW
             break
         started = started or w[0] > 2.0 * bar_w
         if started and not w[0] > 2.0 * bar_w:
             ending = SEPARATRIX
             break
-        if w[0] < 0.3 * p[BOUND_G] / (p[BOUND_F] + 1e-300) and j < size:
-            gap = node_ahead(p, phi[0], w[0])
-            if gap > 0.0 and (targets[j] - turns * TWO_PI) - turns * TWO_PI_LOW >= phi[0] + gap:
-                ending = EQUILIBRIUM
-                break
-    for i in range(doubt if doubt >= 0 else j, size):
-        if i >= j or not certain(floats[i]):
-            status[i] = ending
+        if j < size and runs_into_node(p, phi[0], w[0], unturned(targets[j], turns)):
+            ending = EQUILIBRIUM
+            break
+    conclude(ending, doubt, j, floats, status)
 
 
 @inline
 def fill(p, row, n, phi, w, t, a, b, c):
-    """w, t and their bars where phi is passed, as `along.fill_crossing`."""
+    """w, t and their bars where phi is passed, as `steps.fill_crossing`."""
     n += 1  # the target errs too
     row[rc.VALUE], row[rc.TIME] = max(w, 0.0), t
     f, g = values(p, phi[0])[0], acceleration(p, phi)[0]
@@ -427,7 +435,7 @@ def fill(p, row, n, phi, w, t, a, b, c):
     bar_phi, bar_w = bar(n, a), bar(n, c)
     if not spread < 0.1 * w:
         spread = 2.0 * (bar_w + math.sqrt(abs(2.0 * (abs(g) + abs(f) * bar_w) * bar_phi))) + w
-    row[rc.VALUE_BAR] = spread + UNIT * w
+    row[rc.VALUE_BAR] = spread + ROUNDOFF_UP * w
     accel = max(abs(f * w + g), 1e-300)
-    late = min(bar_phi / w if w > 0.0 else math.inf, spread / accel + bar_w / accel) * 1.2
-    row[rc.TIME_BAR] = late + UNIT * abs(t)
+    delay = min(bar_phi / w if w > 0.0 else math.inf, spread / accel + bar_w / accel) * 1.2
+    row[rc.TIME_BAR] = delay + ROUNDOFF_UP * abs(t)

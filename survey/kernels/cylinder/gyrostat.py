@@ -13,8 +13,9 @@ import math
 
 import numpy as np
 
-from survey.kernels.cylinder.flow import B12, B31, BOUND_F, BOUND_G, C23, LOW, S2, S3, UNIT, D
+from survey.kernels.cylinder.flow import B12, B31, BOUND_F, BOUND_G, C23, LOW, S2, S3, D
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 ORDER = 20
 LAST = ORDER + 1  # T[LAST, 0]: truncation error of the step, relative
@@ -242,12 +243,13 @@ def local_error(G, T, dt):
     torque = (_norm(G, 0) * w + moment) * w + (_norm(G, _B) * w + _norm(G, _C) + force) * 2.0
     rate = _norm(G, _INVERSE) * torque
     truncation = T[LAST, 0]
-    return truncation * (1.0 + w) + UNIT * (1.5 * w + 4.0 * dt * rate), truncation + UNIT * (1.5 + 4.0 * dt * w)
+    by_w = truncation * (1.0 + w) + ROUNDOFF_UP * (1.5 * w + 4.0 * dt * rate)
+    return by_w, truncation + ROUNDOFF_UP * (1.5 + 4.0 * dt * w)
 
 
 @kernel
 def carry(G, T, V, dt, squares, J, work):
-    """squares <- J squares J^T + diag(d^2) over dt of the current step, as in `along`; J and `work` are scratch."""
+    """squares <- J squares J^T + diag(d^2) over dt of the current step, as in `steps`; J and `work` are scratch."""
     jacobian(V, dt, J)
     for i in range(6):
         for j in range(6):

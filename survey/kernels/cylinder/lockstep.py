@@ -5,7 +5,7 @@ turned by a (symmetry S4 of `gyrostat.md`) c23 = 0, and psi = phi - a obeys, wit
 
     psi' = w,  S' = C w,  C' = -S w,  w' = b12 S' + b31 C' - d C S + s2 C - s3 S        (57):
 
-three Cauchy products. S and C are worked out anew for each step. Errors are carried as in `along`, by the
+three Cauchy products. S and C are worked out anew for each step. Errors are carried as in `steps`, by the
 variational equation in its Lienard form (`flow.variation`), to order LOW.
 
 A lane whose next time lies within its step is evaluated there and then goes on from where the step began: so steps
@@ -17,17 +17,6 @@ import math
 import numpy as np
 
 from survey.kernels.cylinder import records as rc
-from survey.kernels.cylinder.along import (
-    NO_CONVERGENCE,
-    OK,
-    OVERFLOW,
-    STEP_LIMIT,
-    TRUST,
-    UNTOLD,
-    bar,
-    finite,
-    start_sign,
-)
 from survey.kernels.cylinder.flow import (
     B12,
     B31,
@@ -39,11 +28,22 @@ from survey.kernels.cylinder.flow import (
     S3,
     TWO_PI,
     TWO_PI_LOW,
-    UNIT,
     D,
     reduced,
 )
+from survey.kernels.cylinder.steps import (
+    NO_CONVERGENCE,
+    OK,
+    OVERFLOW,
+    STEP_LIMIT,
+    TRUST,
+    UNDETERMINED,
+    bar,
+    finite,
+    start_sign,
+)
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.kernels.unroll import unroll
 
 ORDER = 16
@@ -232,8 +232,8 @@ def _advance(T, state, before, fixed, fate, tolerance):
         last = max(last * d2, _FALL * abs(T[_W + ORDER - 2, i]))
         cut = d13 * max(last * dt, max(previous * d2, _FALL * abs(T[_W + ORDER - 3, i])))
         speed = fixed[_PF, i] * abs(v) + fixed[_PG, i]
-        e = cut * dt * (1.0 / ORDER) + UNIT * (4.0 + 3.0 * dt * (abs(v) + dt * speed))
-        g = cut + UNIT * (1.5 * abs(v) + 8.0 * dt * speed)
+        e = cut * dt * (1.0 / ORDER) + ROUNDOFF_UP * (4.0 + 3.0 * dt * (abs(v) + dt * speed))
+        g = cut + ROUNDOFF_UP * (1.5 * abs(v) + 8.0 * dt * speed)
         saa, sab, sbb = state[_SAA, i], state[_SAB, i], state[_SBB, i]
         state[_SAA, i] = u1 * u1 * saa + 2.0 * u1 * u2 * sab + u2 * u2 * sbb + e * e
         state[_SAB, i] = u1 * z1 * saa + (u1 * z2 + u2 * z1) * sab + u2 * z2 * sbb
@@ -275,7 +275,7 @@ def _enter(p, phi0, w0, state, fixed, i):
     for k in range(_STATE):
         state[k, i] = 0.0
     state[_PSI, i], state[_TURNS, i], state[_V, i] = rest - angle, turns, w0
-    slip = UNIT * 4.0 * (turns != 0.0 or angle != 0.0)
+    slip = ROUNDOFF_UP * 4.0 * (turns != 0.0 or angle != 0.0)
     state[_SAA, i] = slip * slip
     state[_RATE, i] = abs(w0) + math.sqrt(p[BOUND_DG] + p[BOUND_F] * (abs(w0) + 0.25 * p[BOUND_F]))
     state[_SIGN, i] = start_sign(p, rest, w0)
@@ -293,7 +293,7 @@ def _tell(state, before, fixed, i, floats, turnings):
     from_rest = before[_STEPS, i] == 0.0 and before[_V, i] == 0.0  # then w is 0 at the start and nowhere else
     told = before[_UNSURE, i] < 3.0 and before[_COUNT, i] >= 0.0 and (abs(v) > high or from_rest)
     passed = before[_SIGN, i] * v < 0.0 and not from_rest
-    turnings[0] = int(before[_COUNT, i]) + passed if told else UNTOLD
+    turnings[0] = int(before[_COUNT, i]) + passed if told else UNDETERMINED
     for k in range(_STATE):
         state[k, i] = before[k, i]
     return True
@@ -343,7 +343,7 @@ def _collect(times, limit, state, before, fixed, fate, row, column, floats, turn
 def trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
     """phi, w, their bars and turnings at the ascending times >= 0 of each row, which end at its first infinity.
 
-    P (rows, 10) from `flow.coefficients`; as `along.trajectories`. Returns the number of steps
+    P (rows, 10) from `flow.coefficients`; as `steps.trajectories`. Returns the number of steps
     of lanes, free ones too.
     """
     work = np.zeros((ROWS, LANES))  # one array: LLVM sees that its rows do not overlap

@@ -10,9 +10,9 @@ import math
 
 import numpy as np
 
-from survey.kernels.cylinder.along import bar, carried, expand, local_error, time_at, time_of_turning
 from survey.kernels.cylinder.equilibria import ANGLE, captured
 from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, BOUND_G, TWO_PI, table, values
+from survey.kernels.cylinder.steps import bar, carried, expand, local_error, passage, time_of_turning
 from survey.kernels.jit import inline, kernel, splice
 
 ROTATION, LIBRATION = 0, 1
@@ -45,7 +45,7 @@ def rotation(setting, begin, at, p, eqs, count, section, w0, tolerance, node):
         elif x1 < target:
             reach = h
         if x1 >= target or w1 <= 0.0:
-            reach = time_at(at, p, T, target, reach if w1 <= 0.0 else h)
+            reach = passage(at, p, T, target, True, reach if w1 <= 0.0 else h)
             x1, w1, de, dy = at(p, T, reach)
         saa, sab, sbb = carried(p, T, reach, w1, saa, sab, sbb)
         y_error += local_error(p, T, 0.0, reach)[1]

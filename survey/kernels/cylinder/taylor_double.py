@@ -7,7 +7,7 @@ Source: see `kernels.cylinder.flow_double`.
 """
 
 from survey.kernels.cylinder import flow_double
-from survey.kernels.cylinder.along import finite
+from survey.kernels.cylinder.steps import finite
 
 ORDER = 30
 SERVES = ()  # a last resort, never a user's choice
@@ -16,14 +16,14 @@ FLOW_WORK = 1
 
 
 def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
-    """See `along.trajectories`; tolerance and limit have no meaning here. One call a row, to be stopped in time."""
+    """See `steps.trajectories`; tolerance and limit have no meaning here. One call a row, to be stopped in time."""
     for i in range(len(P)):
         asked = times[i, : finite(times[i])]
         status[i] = flow_double.trajectory(P[i], starts[i, 0], starts[i, 1], asked, floats[i], turnings[i])
 
 
 def flow_abels(P, starts, targets, tolerance, limit, floats, status):
-    """See `along.abels`; likewise."""
+    """See `steps.abels`; likewise."""
     for i in range(len(P)):
         asked = targets[i, : finite(targets[i])]
         flow_double.abel(P[i], starts[i, 0], starts[i, 1], asked, floats[i], status[i])

@@ -17,12 +17,13 @@ import math
 import numpy as np
 
 from survey.kernels.cylinder import flow
-from survey.kernels.cylinder.along import UNTOLD
-from survey.kernels.cylinder.flow import TWO_PI, TWO_PI_LOW, UNIT, centred
+from survey.kernels.cylinder.flow import TWO_PI, TWO_PI_LOW, centred
 from survey.kernels.cylinder.lockstep import sine_cosine
+from survey.kernels.cylinder.steps import UNDETERMINED
 from survey.kernels.cylinder.weierstrass import BAR_W, BAR_X, COUNT, LANES, W, X, arctangent
 from survey.kernels.jit import inline
 from survey.kernels.math.double import two_prod
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 # Rows of the work array behind what comes out: what is asked, and what the stages hand on.
 B12, B31, D, C23, S2, S3, MU, OTHER, PHI, SLIP, W0, TIME = range(5, 17)
@@ -93,12 +94,12 @@ def misfit(b12, b31, d, c23, s2, s3, mu, other, w0, F):
     miss = abs(across) / square + abs(beside) / math.sqrt(square) + _EXACT * (abs(d) + abs(c23) + abs(s2) + abs(s3))
     delta = (d * u + 4.0 * c23 * v) / (square * square)
     near = abs(mu - other) < SPREAD
-    unequal = abs(delta - mu * other) + 8.0 * UNIT * abs(delta)
-    moved = 0.0 if near else 8.0 * UNIT * abs(delta / (mu - other))
-    blur = moved + 2.0 * UNIT * abs(mu)
+    unequal = abs(delta - mu * other) + 8.0 * ROUNDOFF_UP * abs(delta)
+    moved = 0.0 if near else 8.0 * ROUNDOFF_UP * abs(delta / (mu - other))
+    blur = moved + 2.0 * ROUNDOFF_UP * abs(mu)
     miss += 0.5 * square * unequal if near else 0.0
     n = -(s2 * b12 + s3 * b31) / (square * other)
-    error = UNIT * (12.0 * abs(n) + 2.0 * abs(w0)) + moved * abs(n / other) + blur * math.sqrt(square)
+    error = ROUNDOFF_UP * (12.0 * abs(n) + 2.0 * abs(w0)) + moved * abs(n / other) + blur * math.sqrt(square)
     exact = other == 0.0
     return (0.0 if exact else abs((w0 - n) - F) + error), (0.0 if exact else miss), (0.0 if exact else blur)
 
@@ -112,9 +113,9 @@ def _curve(T):
         F, f = mu * (b12 * s + b31 * c), mu * (b12 * c - b31 * s)
         offset, miss, blur = misfit(b12, b31, T[D, i], T[C23, i], T[S2, i], T[S3, i], mu, other, w0, F)
         b = math.sqrt(b12 * b12 + b31 * b31)
-        slack = (6.0 * UNIT + 2.0 * slip) * abs(mu) * b
+        slack = (6.0 * ROUNDOFF_UP + 2.0 * slip) * abs(mu) * b
         T[_F, i], T[_SLOPE, i] = -F if w0 < 0.0 else F, f
-        T[_NOISE, i] = slack + (4.0 * UNIT * abs(w0) + 2.0 * b * blur if b > 0.0 else 0.0)
+        T[_NOISE, i] = slack + (4.0 * ROUNDOFF_UP * abs(w0) + 2.0 * b * blur if b > 0.0 else 0.0)
         T[_OFFSET, i], T[_MISS, i], T[_GAIN, i] = offset + (0.0 if other == 0.0 else slack), miss, b * abs(other)
 
 
@@ -155,7 +156,7 @@ def deviation(offset, miss, gain, mu, other, w0, F, f, square, w, t):
     least = square / most if square > 0.0 else min(w, w0)
     most = most if square > 0.0 else max(w, w0)
     root = math.sqrt(math.sqrt(math.sqrt(math.sqrt(math.sqrt(math.sqrt(most / least))))))
-    steep = abs(other) / max(abs(mu), 1e-300) * (64.0 * ((root - 1.0) / math.sqrt(root)) + 16.0 * UNIT)
+    steep = abs(other) / max(abs(mu), 1e-300) * (64.0 * ((root - 1.0) / math.sqrt(root)) + 16.0 * ROUNDOFF_UP)
     shrinks = square <= 0.0 and (w < w0) == (mu * other > 0.0)  # e as w^((1 - mu)/mu), and w is monotone
     steep = 0.0 if shrinks else steep
     growth = 1.0 / (1.0 - min(gain * min(t, 2.0 / least), min(steep, _WILDEST)) / 1024.0)
@@ -181,23 +182,25 @@ def _formula(T):
         x, w = 2.0 * arctangent(y1, y2) + turns * TWO_PI, w0 * low / norm
         moved = deviation(T[_OFFSET, i], T[_MISS, i], T[_GAIN, i], T[MU, i], other, w0, F, f, square, w, t)
         bar = (noise + moved) * max(drift(w0, f, square, half, s, c, low), 0.0) / norm
-        bar += 16.0 * UNIT * (abs(y1) * (abs(c) + abs(f * s)) + abs(y1 * y2)) / norm + 6.0 * UNIT * (w * t + abs(x))
+        bar += 16.0 * ROUNDOFF_UP * (abs(y1) * (abs(c) + abs(f * s)) + abs(y1 * y2)) / norm + 6.0 * ROUNDOFF_UP * (
+            w * t + abs(x)
+        )
         sx, cx = 2.0 * y1 * y2 / norm, (y2 - y1) * (y2 + y1) / norm
         slope = abs(f * cx - F * sx) + math.sqrt(F * F + f * f) * bar
-        bar_w = MARGIN * (slope * bar + moved + 4.0 * noise + 4.0 * UNIT * w)
+        bar_w = MARGIN * (slope * bar + moved + 4.0 * noise + 4.0 * ROUNDOFF_UP * w)
         # uniform rotation, and rest
         uniform, rests = F == 0.0 and f == 0.0, w0 == 0.0
         x, w = (w0 * t if uniform else x), (w0 if uniform else w)
         size = w0 * w0 + F * F + f * f
         bar_x = MARGIN * bar if size > _SMALLEST and size < _LARGEST else math.inf
-        bar_x = 2.0 * UNIT * x + moved * t if uniform else bar_x
+        bar_x = 2.0 * ROUNDOFF_UP * x + moved * t if uniform else bar_x
         bar_w = moved if uniform else bar_w
         bar_x, bar_w = (0.0 if other == 0.0 else math.inf) if rests else bar_x, 0.0 if rests else bar_w
         x, w = (0.0 if rests else x), (0.0 if rests else w)
         back = T[W0, i] < 0.0
         T[X, i], T[W, i], T[BAR_X, i], T[BAR_W, i] = -x if back else x, -w if back else w, bar_x, bar_w
         # on the curve itself w keeps its sign
-        T[COUNT, i] = 0.0 if other == 0.0 or w > bar_w else float(UNTOLD)
+        T[COUNT, i] = 0.0 if other == 0.0 or w > bar_w else float(UNDETERMINED)
 
 
 @inline

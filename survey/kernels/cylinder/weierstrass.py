@@ -21,10 +21,11 @@ import math
 import numpy as np
 
 from survey.kernels.cylinder import flow
-from survey.kernels.cylinder.along import UNTOLD
-from survey.kernels.cylinder.flow import TWO_PI, TWO_PI_LOW, UNIT, centred
+from survey.kernels.cylinder.flow import TWO_PI, TWO_PI_LOW, centred
 from survey.kernels.cylinder.lockstep import sine_cosine
+from survey.kernels.cylinder.steps import UNDETERMINED
 from survey.kernels.jit import inline
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 LANES = 32
 _LEVELS = 7  # of the means: enough for 1e-6 <= b1/a1 <= 1e6
@@ -83,8 +84,8 @@ def _energy(T):
         T[_SIDE, i] = -1.0 if back else 1.0
         T[W0, i] = abs(w0)
         T[_M, i], T[_P, i], T[_Q, i], T[_R, i], T[_O, i] = m, p, -q if back else q, r, -o if back else o
-        T[_D_1, i], T[_D_2, i] = (8.0 * UNIT + 2.0 * slip) * first, (9.0 * UNIT + 2.0 * slip) * second
-        T[_D_M, i] = T[_D_1, i] + T[_D_2, i] + UNIT * (2.0 * w0 * w0 + abs(p) + abs(m))
+        T[_D_1, i], T[_D_2, i] = (8.0 * ROUNDOFF_UP + 2.0 * slip) * first, (9.0 * ROUNDOFF_UP + 2.0 * slip) * second
+        T[_D_M, i] = T[_D_1, i] + T[_D_2, i] + ROUNDOFF_UP * (2.0 * w0 * w0 + abs(p) + abs(m))
         T[_BEND, i] = 2.0 * (first + 2.0 * second)
 
 
@@ -98,8 +99,8 @@ def _lattice(T):
         cross = d * (s3 - s2) * (s3 + s2) - 4.0 * s2 * s3 * c23
         g2, wide = (second - first) + mean, first + second + mean
         g3 = m * (mean * (1.0 / 18.0) - share) + cross * (1.0 / 32.0)
-        d_g2 = 3.0 * UNIT * wide
-        d_g3 = 4.0 * UNIT * (abs(m) * (mean * (1.0 / 18.0) + share) + math.sqrt(second) * first)
+        d_g2 = 3.0 * ROUNDOFF_UP * wide
+        d_g3 = 4.0 * ROUNDOFF_UP * (abs(m) * (mean * (1.0 / 18.0) + share) + math.sqrt(second) * first)
         flipped, height = g3 < 0.0, abs(g3)
         root, move = 0.5 * math.sqrt(g2 if g2 > 0.0 else 0.0) + 0.9 * math.sqrt(height / math.sqrt(wide)), 0.0
         for _ in range(_HALLEY):  # to the greatest root of 4 e^3 - g2 e - |g3|
@@ -110,25 +111,27 @@ def _lattice(T):
         # the error of m moves both invariants at once: by its derivatives
         by_m = mean * (1.0 / 6.0) - share
         by_m = (root * m * (1.0 / 6.0) + (-by_m if flipped else by_m)) / slope
-        d_value = d_g3 + UNIT * (4.0 * root * square + 2.0 * height)
-        d_root = (root * d_g2 + d_value) / slope + UNIT * root
+        d_value = d_g3 + ROUNDOFF_UP * (4.0 * root * square + 2.0 * height)
+        d_root = (root * d_g2 + d_value) / slope + ROUNDOFF_UP * root
         q4 = g2 - 3.0 * square  # (difference of the other two)^2; an error of g2 moves the root too
-        d_q4 = (abs(slope - 6.0 * square) * d_g2 + 6.0 * root * d_value) / slope + UNIT * (abs(q4) + 12.0 * square)
+        d_q4 = (abs(slope - 6.0 * square) * d_g2 + 6.0 * root * d_value) / slope + ROUNDOFF_UP * (
+            abs(q4) + 12.0 * square
+        )
         d_q4 += abs(m * (1.0 / 6.0) - 6.0 * root * by_m) * d_m
         d_root += abs(by_m) * d_m
         apart = flipped and q4 > 0.0
         gap = math.sqrt(abs(q4))
         e1 = 0.5 * (root + gap) if apart else (-root if flipped else root)
-        d_e1 = 0.5 * d_root + 0.25 * d_q4 / gap + UNIT * e1 if apart else d_root
+        d_e1 = 0.5 * d_root + 0.25 * d_q4 / gap + ROUNDOFF_UP * e1 if apart else d_root
         H2 = gap * (e1 + root) if apart else 0.25 * (9.0 * square - q4)
         near = 0.25 * d_q4 / q4 + 0.5 * (d_e1 + d_root) / (e1 + root)
-        e_h = (near if apart else (18.0 * root * d_root + d_q4) / (8.0 * H2)) + 2.0 * UNIT
+        e_h = (near if apart else (18.0 * root * d_root + d_q4) / (8.0 * H2)) + 2.0 * ROUNDOFF_UP
         H = math.sqrt(H2)
         inner = H + 1.5 * abs(e1)
         e_inner = (H * e_h + 1.5 * d_e1) / inner
         a2 = 0.125 * abs(q4) / inner if e1 < 0.0 else 0.5 * inner
-        e_a = 0.5 * (e_inner + (d_q4 / abs(q4) if e1 < 0.0 else 0.0)) + 2.0 * UNIT
-        e_b = 0.5 * e_h + UNIT
+        e_a = 0.5 * (e_inner + (d_q4 / abs(q4) if e1 < 0.0 else 0.0)) + 2.0 * ROUNDOFF_UP
+        e_b = 0.5 * e_h + ROUNDOFF_UP
         lost = not (abs(move) <= 1e-6 * root and wide > _SMALLEST and wide < _LARGEST)
         lost = lost or (flipped and abs(q4) <= 30.0 * d_q4)
         T[_E1, i], T[_D_E1, i], T[_H2, i], T[_E_H, i], T[_Q4, i], T[_D_Q4, i] = e1, d_e1, H2, e_h, q4, d_q4
@@ -155,8 +158,8 @@ def _phase(T):
         turns = (theta * (1.0 / math.pi) + _NEAREST) - _NEAREST
         phase = (theta - turns * math.pi) - turns * _PI_LOW
         s, c = sine_cosine(phase)
-        e_mean = 0.5 * ((1.0 + by_shape) * T[_E_A, i] + (1.0 - by_shape) * T[_E_B, i]) + 12.0 * UNIT
-        late = t * (e_mean + 4.0 * UNIT) + 2.0 * UNIT / mean
+        e_mean = 0.5 * ((1.0 + by_shape) * T[_E_A, i] + (1.0 - by_shape) * T[_E_B, i]) + 12.0 * ROUNDOFF_UP
+        late = t * (e_mean + 4.0 * ROUNDOFF_UP) + 2.0 * ROUNDOFF_UP / mean
         T[_LATE, i] = late if abs(a - b) <= 1e-15 * a else math.inf
         T[_TURNS, i], T[_PHASE, i], T[_BY_SHAPE, i] = turns, phase, 2.0 * by_shape
         T[_XI_P, i], T[_XI_Q, i], T[_Y, i] = c * c, s * s, s * c
@@ -207,31 +210,31 @@ def _formula(T):
         d_m, d_1, d_2, bend = T[_D_M, i], T[_D_1, i], T[_D_2, i], T[_BEND, i]
         e1, d_e1, H2, e_h, q4, d_q4 = T[_E1, i], T[_D_E1, i], T[_H2, i], T[_E_H, i], T[_Q4, i], T[_D_Q4, i]
         late, turns, phase, by_shape = T[_LATE, i], T[_TURNS, i], T[_PHASE, i], 0.5 * T[_BY_SHAPE, i]
-        e = abs(1.0 + by_shape) * T[_E_A, i] + abs(1.0 - by_shape) * T[_E_B, i] + 40.0 * UNIT
+        e = abs(1.0 + by_shape) * T[_E_A, i] + abs(1.0 - by_shape) * T[_E_B, i] + 40.0 * ROUNDOFF_UP
         mean = 0.5 * (T[_MEAN_A + _LEVELS, i] + T[_MEAN_B + _LEVELS, i])
         size, unit = 1.0 / (T[_XI_P, i] + T[_XI_Q, i]), mean * mean
         P, Q, Y = T[_XI_P, i] * size * unit, T[_XI_Q, i] * size, T[_Y, i] * size * size * unit * mean
         # the constants of the formula
         start, g = w0 * w0, 0.5 * q + o
-        d_g = 0.5 * d_1 + d_2 + UNIT * abs(g)
+        d_g = 0.5 * d_1 + d_2 + ROUNDOFF_UP * abs(g)
         A = (m - 3.0 * r) * (1.0 / 24.0)
-        d_a = (d_m + 3.0 * d_2) * (1.0 / 24.0) + 2.0 * UNIT * abs(A)
+        d_a = (d_m + 3.0 * d_2) * (1.0 / 24.0) + 2.0 * ROUNDOFF_UP * abs(A)
         E, B, tilt, far = e1 - A, 0.5 * g, q - 2.0 * o, m - p + r  # far = w^2 at x = pi
         C0, C = start * tilt * (1.0 / 32.0), start * far * (1.0 / 64.0)
-        d_c0 = start * (d_1 + 2.0 * d_2) * (1.0 / 32.0) + 2.0 * UNIT * abs(C0)
-        d_c = start * (d_m + d_1 + d_2 + UNIT * abs(far)) * (1.0 / 64.0) + 2.0 * UNIT * abs(C)
+        d_c0 = start * (d_1 + 2.0 * d_2) * (1.0 / 32.0) + 2.0 * ROUNDOFF_UP * abs(C0)
+        d_c = start * (d_m + d_1 + d_2 + ROUNDOFF_UP * abs(far)) * (1.0 / 64.0) + 2.0 * ROUNDOFF_UP * abs(C)
         L0 = 0.125 * g * g - 1.5 * start * A
-        d_l0 = 0.25 * abs(g) * d_g + 1.5 * start * d_a + UNIT * (0.25 * g * g + 3.0 * start * abs(A))
+        d_l0 = 0.25 * abs(g) * d_g + 1.5 * start * d_a + ROUNDOFF_UP * (0.25 * g * g + 3.0 * start * abs(A))
         # v Q, and what is linear in it
         v = P + E * Q
-        d_v = e * P + (d_e1 + d_a + UNIT * abs(E)) * Q + UNIT * abs(v)
+        d_v = e * P + (d_e1 + d_a + ROUNDOFF_UP * abs(E)) * Q + ROUNDOFF_UP * abs(v)
         line, low = B * v + C0 * Q, L0 * Q - 0.5 * start * v
-        d_line = abs(B) * d_v + 0.5 * d_g * abs(v) + d_c0 * Q + 2.0 * UNIT * (abs(B * v) + abs(C0 * Q))
-        d_low = d_l0 * Q + 0.5 * start * d_v + UNIT * (abs(L0 * Q) + start * abs(v))
+        d_line = abs(B) * d_v + 0.5 * d_g * abs(v) + d_c0 * Q + 2.0 * ROUNDOFF_UP * (abs(B * v) + abs(C0 * Q))
+        d_low = d_l0 * Q + 0.5 * start * d_v + ROUNDOFF_UP * (abs(L0 * Q) + start * abs(v))
         rise, rest = w0 * Y, line * Q
         d_n = 2.0 * e * abs(rise) + d_line * Q
         lower = 2.0 * (v * v - C * Q * Q)
-        d_lower = 4.0 * abs(v) * d_v + 2.0 * d_c * Q * Q + 6.0 * UNIT * (v * v + abs(C) * Q * Q)
+        d_lower = 4.0 * abs(v) * d_v + 2.0 * d_c * Q * Q + 6.0 * ROUNDOFF_UP * (v * v + abs(C) * Q * Q)
         plain = rise * rest > 0.0 or (rise * rest == 0.0 and w0 > 0.0)
         other = rest - rise
         y1, y2 = rise + rest if plain else low * Q, lower if plain else other
@@ -253,19 +256,19 @@ def _formula(T):
         d_two = start * abs(Y) * (2.0 * e * abs(other) + d_n) + Q * (d_low * abs(force - pull) + abs(low) * d_force)
         wronskian, d_w = one if plain else two, d_one if plain else d_two
         w = 2.0 * wronskian / norm
-        d_w = 2.0 * d_w / norm + 2.0 * abs(w) * (abs(y1) * d_1y + abs(y2) * d_2y) / norm + 8.0 * UNIT * abs(w)
+        d_w = 2.0 * d_w / norm + 2.0 * abs(w) * (abs(y1) * d_1y + abs(y2) * d_2y) / norm + 8.0 * ROUNDOFF_UP * abs(w)
         square, slope = _square(m, p, q, r, o, 2.0 * y1 * y2 / norm, (y2 - y1) * (y2 + y1) / norm)
         # the root of w^2 is better than the formula where w is not small
-        noise = d_m + d_1 + 2.0 * d_2 + 6.0 * UNIT * (abs(m) + 2.0 * bend)
+        noise = d_m + d_1 + 2.0 * d_2 + 6.0 * ROUNDOFF_UP * (abs(m) + 2.0 * bend)
         d_square = 2.0 * (slope + bend * fixed) * fixed + noise
         speed = math.sqrt(abs(square))
-        d_speed = 0.6 * d_square / speed + 2.0 * UNIT * speed
+        d_speed = 0.6 * d_square / speed + 2.0 * ROUNDOFF_UP * speed
         clear = d_square < 0.1 * square and d_speed < d_w and d_w < speed
         w, d_w = math.copysign(speed, w) if clear else w, d_speed if clear else d_w
         # does it swing or rotate?
         bound = A + 0.5 * e1
         split = 0.125 * g * g - start * bound
-        d_split = 0.25 * abs(g) * d_g + start * (d_a + 0.5 * d_e1) + UNIT * (g * g + 2.0 * start * abs(bound))
+        d_split = 0.25 * abs(g) * d_g + start * (d_a + 0.5 * d_e1) + ROUNDOFF_UP * (g * g + 2.0 * start * abs(bound))
         swings = split > 0.0 or (split >= -d_split and q4 < 0.0)
         known = abs(split) > d_split or q4 < -d_q4
         half = 1.0 if phase >= 0.0 else -1.0
@@ -274,20 +277,20 @@ def _formula(T):
         sign = sign if plain or other * lower >= 0.0 else -sign
         sign = sign if swings else (1.0 if y1 * phase >= 0.0 else -1.0)
         x = 2.0 * arctangent(sign * y1, sign * y2) + (0.0 if swings else turns * TWO_PI)
-        bar_x = abs(w) * late + bend * late * late + fixed + 4.0 * UNIT * abs(x)
+        bar_x = abs(w) * late + bend * late * late + fixed + 4.0 * ROUNDOFF_UP * abs(x)
         bar_w = slope * late + bend * late * (abs(w) * late + bend * late * late) + d_w
         lost = T[_LOST, i] != 0.0 or not (known and norm > _LEAST)
         T[X, i], T[W, i] = T[_SIDE, i] * x, T[_SIDE, i] * w
         T[BAR_X, i], T[BAR_W, i] = math.inf if lost else _SAFE * bar_x, _SAFE * bar_w
         passed = 2.0 * turns + (0.0 if w > 0.0 else half) if swings else 0.0
-        T[COUNT, i] = passed if abs(w) > T[BAR_W, i] else float(UNTOLD)
+        T[COUNT, i] = passed if abs(w) > T[BAR_W, i] else float(UNDETERMINED)
 
 
 @inline
 def solve(T):
     """Rows X to COUNT of T (ROWS, LANES) from rows D to TIME, |PHI| <= pi and off by SLIP, TIME > 0; W0 is changed.
 
-    BAR_X is infinite where the digits are lost. COUNT is UNTOLD where |W| <= BAR_W.
+    BAR_X is infinite where the digits are lost. COUNT is UNDETERMINED where |W| <= BAR_W.
     """
     _energy(T)
     _lattice(T)

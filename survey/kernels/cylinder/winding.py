@@ -10,11 +10,22 @@ import math
 
 import numpy as np
 
-from survey.kernels.cylinder.along import UNTOLD, bar, carried, expand, finite, rests, start_sign
 from survey.kernels.cylinder.equilibria import ANGLE, BAR, DG, FOCUS, KIND, MOST, NODE, STABLE, F, equilibria, offset
 from survey.kernels.cylinder.equilibria import settled as node_settled
-from survey.kernels.cylinder.flow import BOUND_DDG, BOUND_DG, BOUND_F, BOUND_G, TWO_PI, TWO_PI_LOW, UNIT, reduced, table
+from survey.kernels.cylinder.flow import BOUND_DDG, BOUND_DG, BOUND_F, BOUND_G, reduced, table
+from survey.kernels.cylinder.steps import (
+    UNDETERMINED,
+    bar,
+    carried,
+    expand,
+    finite,
+    later,
+    rests,
+    start_sign,
+    wrapped,
+)
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 NEVER, START, RATE, DOUBT, DRIFT = range(5)  # of an end: no turning follows; angle, rate and their doubts
 STRAIGHT = 1e-7  # rad: so near to its line the angle is kept, or nearer than the error bars are
@@ -36,8 +47,8 @@ def ends(p, eqs, count, phi, w, bar_phi, bar_w, end):
             continue
         a = 0.5 * row[F]
         square = -row[DG] - a * a
-        doubt = 16.0 * UNIT * p[BOUND_F] + p[BOUND_F] * row[BAR]
-        doubt = 16.0 * UNIT * p[BOUND_DG] + p[BOUND_DDG] * row[BAR] + abs(row[F]) * doubt
+        doubt = 16.0 * ROUNDOFF_UP * p[BOUND_F] + p[BOUND_F] * row[BAR]
+        doubt = 16.0 * ROUNDOFF_UP * p[BOUND_DG] + p[BOUND_DDG] * row[BAR] + abs(row[F]) * doubt
         if not square > 100.0 * doubt:
             continue
         omega = math.sqrt(square)
@@ -50,28 +61,28 @@ def ends(p, eqs, count, phi, w, bar_phi, bar_w, end):
             end[NEVER] = 0.0
             # w = 0 where tan theta = -a/Omega
             end[START], end[RATE] = math.atan2(y, x) - math.atan2(-a, omega), omega
-            end[DOUBT] = off + 1.1 * blur + doubt / square + 8.0 * UNIT
-            end[DRIFT] = doubt / omega + 4.0 * UNIT * omega
+            end[DOUBT] = off + 1.1 * blur + doubt / square + 8.0 * ROUNDOFF_UP
+            end[DRIFT] = doubt / omega + 4.0 * ROUNDOFF_UP * omega
             return True
     return False
 
 
 @kernel
 def zeros(end, dt):
-    """How often w changes sign within dt from where `end` was noted, or UNTOLD."""
+    """How often w changes sign within dt from where `end` was noted, or UNDETERMINED."""
     if end[NEVER] > 0.0:
         return 0
-    doubt = (end[DOUBT] + end[DRIFT] * dt + 4.0 * UNIT * end[RATE] * dt) / math.pi
+    doubt = (end[DOUBT] + end[DRIFT] * dt + 4.0 * ROUNDOFF_UP * end[RATE] * dt) / math.pi
     first, last = end[START] / math.pi, (end[START] - end[RATE] * dt) / math.pi
-    doubt += 4.0 * UNIT * abs(last)
+    doubt += 4.0 * ROUNDOFF_UP * abs(last)
     if math.floor(first - doubt) != math.floor(first + doubt) or math.floor(last - doubt) != math.floor(last + doubt):
-        return UNTOLD
+        return UNDETERMINED
     return int(math.floor(first) - math.floor(last))
 
 
 @inline
 def counts(setting, begin, at, p, phi0, w0, times, tolerance, limit, out):
-    """Fill out[j] with the number of turning points before the ascending times[j] >= 0 where it is UNTOLD."""
+    """Fill out[j] with the number of turning points before the ascending times[j] >= 0 where it is UNDETERMINED."""
     eqs, end, T = np.zeros((MOST, 10)), np.zeros(5), table()
     count = equilibria(p, eqs)
     if p[BOUND_G] == 0.0 or rests(p, phi0, w0):
@@ -80,7 +91,7 @@ def counts(setting, begin, at, p, phi0, w0, times, tolerance, limit, out):
     how = setting(p, w0, tolerance)
     phi, turns = reduced(phi0)
     w, t, t_low, n, j, turned, unsure = w0, 0.0, 0.0, 0, 0, 0, 0
-    slip = UNIT * 4.0 * (turns != 0.0)
+    slip = ROUNDOFF_UP * 4.0 * (turns != 0.0)
     saa, sab, sbb = slip * slip, 0.0, 0.0
     sign = start_sign(p, phi, w)
     while j < len(times) and sign != 0 and n < limit:
@@ -93,17 +104,13 @@ def counts(setting, begin, at, p, phi0, w0, times, tolerance, limit, out):
             _x, v, _e, _y = at(p, T, dt)
             _a, _b, c = carried(p, T, dt, v, saa, sab, sbb)
             sure = abs(v) > bar(n, c) or (n == 1 and w0 == 0.0)
-            if out[j] == UNTOLD and sure and unsure < 3:
+            if out[j] == UNDETERMINED and sure and unsure < 3:
                 out[j] = turned + (n > 1 or w0 != 0.0) * (v * sign < 0.0)
             j += 1
         phi, w, _e, _y = at(p, T, h)
         saa, sab, sbb = carried(p, T, h, w, saa, sab, sbb)
-        high = t + h
-        t_low += h - (high - t)
-        t = high
-        if abs(phi) > math.pi:
-            k = 1.0 if phi > 0.0 else -1.0
-            phi = (phi - k * TWO_PI) - k * TWO_PI_LOW
+        t, t_low = later(t, t_low, h)
+        phi, _k = wrapped(phi)
         bar_phi, bar_w = bar(n, saa), bar(n, sbb)
         if not (bar_phi < 1e-3 and bar_w < 1e-3 * (1.0 + abs(w))):
             return
@@ -118,7 +125,7 @@ def counts(setting, begin, at, p, phi0, w0, times, tolerance, limit, out):
         if ends(p, eqs, count, phi, w, bar_phi, bar_w, end):
             for i in range(j, len(times)):
                 more = zeros(end, (times[i] - t) - t_low)
-                if out[i] == UNTOLD and more >= 0:
+                if out[i] == UNDETERMINED and more >= 0:
                     out[i] = turned + more
             return
 

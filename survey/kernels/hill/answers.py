@@ -9,9 +9,9 @@ import numpy as np
 
 from survey.kernels import lanes
 from survey.kernels.jit import inline, kernel, splice
+from survey.kernels.math.roundoff import EPS
 from survey.kernels.unroll import unroll
 
-EPS = 2.3e-16
 LEAST = 2e-323  # what a few products lose where they underflow
 LARGEST = float(np.finfo(np.float32).max)  # bars are kept as float32
 UNDECIDED, UNSTABLE, STABLE, MARGINAL = -1, 0, 1, 2
@@ -20,21 +20,21 @@ NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE = 0, 1, 2
 # Columns of `measure`, each followed by that of its error bound.
 FLOATS = ("discriminant", "y1", "y2", "dy1", "dy2", "exponent", "rotation_number")
 DISCRIMINANT, Y1, Y2, DY1, DY2, EXPONENT, ROTATION = range(0, 14, 2)
-FACTORS = np.array([Y1, DY1, Y2, DY2])  # in the order of the results
+FACTOR_ROWS = np.array([Y1, DY1, Y2, DY2])  # in the order of the results
 UNTRIED = -1
 
 
 @kernel
-def levels(p, bound, span, rate, phase, distance, ladder, out):
-    """The ladder's first step number that gives every point `phase` steps per radian and `distance` times `rate`.
+def first_rungs(p, bound, span, rate, phase, distance, ladder, out):
+    """The first rung of the ladder, of numbers of steps, with `phase` steps per radian and `distance` times `rate`.
 
-    |z| <= bound[r, 0] + |p| bound[r, 1] + p^2 bound[r, 2] in row r of `p` and of `out`, which holds places in the
-    ladder: its length where no number is enough, UNTRIED where the point or its row is not finite.
+    |z| <= bound[r, 0] + |p| bound[r, 1] + p^2 bound[r, 2] in row r of `p` and of `out`, which holds rungs:
+    the length of the ladder where no number is enough, UNTRIED where the point or its row is not finite.
     """
     top = len(ladder)
     for r in range(p.shape[0]):
         least = distance * rate[r] * span[r]
-        level = 0
+        rung = 0
         for i in range(p.shape[1]):
             size = abs(p[r, i])
             frequency = sqrt(bound[r, 0] + size * (bound[r, 1] + size * bound[r, 2]))
@@ -43,39 +43,39 @@ def levels(p, bound, span, rate, phase, distance, ladder, out):
                 out[r, i] = UNTRIED
                 continue
             steps = max(steps, least)
-            while level < top and ladder[level] < steps:
-                level += 1
-            while level > 0 and ladder[level - 1] >= steps:
-                level -= 1
-            out[r, i] = level
+            while rung < top and ladder[rung] < steps:
+                rung += 1
+            while rung > 0 and ladder[rung - 1] >= steps:
+                rung -= 1
+            out[r, i] = rung
 
 
 @kernel
-def segments(level, top, order, rows, of_level, starts):
-    """Points with a level in 0..top by row and level: their flat places in `order`; returns the number of segments.
+def segments(rung, top, order, rows, on_rung, starts):
+    """Points with a rung in 0..top by row and rung: their flat indices in `order`; returns the number of segments.
 
-    Segment i is order[starts[i] : starts[i + 1]], all in row rows[i] and of level of_level[i].
+    Segment i is order[starts[i] : starts[i + 1]], all in row rows[i] and on rung on_rung[i].
     """
     counts = np.empty(top + 2, np.int64)
     for at in range(top + 2):
         counts[at] = 0
     count = place = 0
-    for r in range(level.shape[0]):
+    for r in range(rung.shape[0]):
         low, high = top + 1, -1
-        for i in range(level.shape[1]):
-            at = level[r, i]
+        for i in range(rung.shape[1]):
+            at = rung[r, i]
             if 0 <= at <= top:
                 counts[at] += 1
                 low, high = min(low, at), max(high, at)
         for at in range(low, high + 1):
             if counts[at] > 0:
-                rows[count], of_level[count], starts[count] = r, at, place
+                rows[count], on_rung[count], starts[count] = r, at, place
                 place, counts[at] = place + counts[at], place
                 count += 1
-        for i in range(level.shape[1]):
-            at = level[r, i]
+        for i in range(rung.shape[1]):
+            at = rung[r, i]
             if 0 <= at <= top:
-                order[counts[at]] = r * level.shape[1] + i
+                order[counts[at]] = r * rung.shape[1] + i
                 counts[at] += 1
         for at in range(low, high + 1):
             counts[at] = 0
@@ -84,21 +84,21 @@ def segments(level, top, order, rows, of_level, starts):
 
 
 @kernel
-def measure(results, squares, rule, wanted, rtol, whole, overflow, floats, verdict, late, status):
-    """What follows from `results` (N, 10) by arithmetic: `floats` (14, N) with the bars, `verdict`, who misses `rtol`.
+def measure(results, squares, rule, wanted, rtol, full_period, overflow, floats, verdict, missed, status):
+    """What follows from `results` (N, RESULTS) by arithmetic: `floats` (14, N), `verdict`, who has `missed` `rtol`.
 
     Points whose `status` is not 0 are passed over; those that leave the range of floats get the status `overflow`.
-    `rule` (N, or empty) holds what exact rules say, `wanted` (7) which columns count for `late`; `whole` as in
+    `rule` (N, or empty) holds what exact rules say, `wanted` (7) which columns count for `missed`; `full_period` as in
     `_squares`; `squares` (N, 4, or empty) holds what it finds, where more digits of it are known.
     """
     for i in range(len(results)):
-        late[i] = False
+        missed[i] = False
         verdict[i] = UNDECIDED
         if status[i] != 0:
             for c in range(len(floats)):
                 floats[c, i] = np.nan
             continue
-        sine, sine_bar, cosine, cosine_bar = _squares(results[i], squares, i, whole)
+        sine, sine_bar, cosine, cosine_bar = _squares(results[i], squares, i, full_period)
         said = decide(sine, sine_bar, cosine, cosine_bar, rule[i] if len(rule) > 0 else NO_RULE)
         # D from 2 - 4 sin^2 or 4 cos^2 - 2, whichever has the smaller bar.
         by_sine = sine_bar <= cosine_bar
@@ -115,63 +115,67 @@ def measure(results, squares, rule, wanted, rtol, whole, overflow, floats, verdi
                 floats[c, i] = np.nan
             continue
         verdict[i] = said
-        missed = said == UNDECIDED
+        wide = said == UNDECIDED
         if wanted[0]:
             floats[DISCRIMINANT, i], floats[DISCRIMINANT + 1, i] = d, bar
-            missed |= not bar <= rtol * (1.0 + abs(d))
+            wide |= not bar <= rtol * (1.0 + abs(d))
         for c in range(4):
-            at, value, bar = FACTORS[c], results[i, lanes.Y1 + c], results[i, lanes.Y1_BAR + c]
+            at, value, bar = FACTOR_ROWS[c], results[i, lanes.Y1 + c], results[i, lanes.Y1_BAR + c]
             if wanted[at // 2]:
                 floats[at, i], floats[at + 1, i] = value, bar
-                missed |= not bar <= rtol * (1.0 + abs(value))
-        late[i] = missed
+                wide |= not bar <= rtol * (1.0 + abs(value))
+        missed[i] = wide
 
 
 @kernel
-def transcendental(results, squares, wanted, rtol, whole, floats, verdict, late, status):
+def transcendental(results, squares, wanted, rtol, full_period, floats, verdict, missed, status):
     """The columns of `measure` that are no arithmetic: exponent and rotation number, if wanted, and who misses."""
     for i in range(len(results)):
         if status[i] != 0:
             continue
-        sine, sine_bar, cosine, cosine_bar = _squares(results[i], squares, i, whole)
+        sine, sine_bar, cosine, cosine_bar = _squares(results[i], squares, i, full_period)
         if wanted[EXPONENT // 2]:
             by_sine = sine < cosine
             growth, bar = -sine if by_sine else -cosine, sine_bar if by_sine else cosine_bar
-            late[i] |= _grows(growth, bar, rtol, floats[:, i], verdict[i])
+            missed[i] |= _grows(growth, bar, rtol, floats[:, i], verdict[i])
         if wanted[ROTATION // 2]:
             zeros, doubt = results[i, lanes.Y1_ZEROS] + results[i, lanes.Y2_ZEROS], 0.0
-            if whole:  # where y2's last zero may lie on either side of T: sin^2 of the angle is at most -y1' y2
+            if full_period:  # where y2's last zero may lie on either side of T: sin^2 of the angle is at most -y1' y2
                 zeros, bar = results[i, lanes.Y2_ZEROS], results[i, lanes.Y2_BAR]
                 if abs(results[i, lanes.Y2]) <= bar:
                     doubt = min(bar * (abs(results[i, lanes.DY1]) + results[i, lanes.DY1_BAR]), 1.0)
             x, bar = _rotation(sine, sine_bar, cosine, cosine_bar, verdict[i], zeros)
             bar += sqrt(doubt) if verdict[i] != UNSTABLE else 0.0
+            if not full_period:  # a zero next to T/2 may be miscounted where the other product's sign leaves it open
+                lost1 = abs(results[i, lanes.Y1]) <= results[i, lanes.Y1_BAR] and not sine > sine_bar
+                lost2 = abs(results[i, lanes.Y2]) <= results[i, lanes.Y2_BAR] and not cosine > cosine_bar
+                bar += 0.5 * lost1 + 0.5 * lost2
             floats[ROTATION, i], floats[ROTATION + 1, i] = x, bar
-            late[i] |= not bar <= rtol * (1.0 + x)
+            missed[i] |= not bar <= rtol * (1.0 + x)
 
 
 @kernel
-def exponents(first, count, rtol, floats, verdict, late):
+def exponents(first, count, rtol, floats, verdict, missed):
     """The exponents of `count` points from each of `first` on, whose D and bar are known, and who misses `rtol`."""
     for start in first:
         for i in range(start, start + count):
             # |D| - 2 = 4 sinh^2(exponent / 2)
             growth = 0.25 * (abs(floats[DISCRIMINANT, i]) - 2.0)
-            late[i] |= _grows(growth, 0.25 * floats[DISCRIMINANT + 1, i], rtol, floats[:, i], verdict[i])
+            missed[i] |= _grows(growth, 0.25 * floats[DISCRIMINANT + 1, i], rtol, floats[:, i], verdict[i])
 
 
 @splice
-def _squares(result, squares, i, whole):
+def _squares(result, squares, i, full_period):
     """sin^2 and cos^2 of half the angle, each with its bar: -y1' y2 and y1 y2', or row i of `squares` if it has rows.
 
-    With `whole` the results are those at T: then (2 - D) / 4 and (2 + D) / 4, D = y1 + y2', and the zeros of y2 in
-    (0, T) give the band (that solution's angle advances from 0 to between d pi and (d + 1) pi).
+    With `full_period` the results are those at T: then (2 - D) / 4 and (2 + D) / 4, D = y1 + y2', and the zeros of
+    y2 in (0, T) give the band (that solution's angle advances from 0 to between d pi and (d + 1) pi).
     """
     y1, dy1, y2, dy2 = result[lanes.Y1], result[lanes.DY1], result[lanes.Y2], result[lanes.DY2]
     y1_bar, dy2_bar = result[lanes.Y1_BAR], result[lanes.DY2_BAR]
     sine, sine_bar = _product(-dy1, y2, result[lanes.DY1_BAR], result[lanes.Y2_BAR])
     cosine, cosine_bar = _product(y1, dy2, y1_bar, dy2_bar)
-    if whole:
+    if full_period:
         trace, size = y1 + dy2, abs(y1) + abs(dy2) + 2.0
         bar = 0.25 * (y1_bar + dy2_bar + 2.0 * EPS * size)
         sine, cosine, sine_bar, cosine_bar = 0.25 * (2.0 - trace), 0.25 * (2.0 + trace), bar, bar

@@ -10,10 +10,11 @@ I. E. Sutherland, G. W. Hodgman, Comm. ACM 17 (1974) 32 (polygons).
 
 import numpy as np
 
-from survey.kernels.hill.answers import EPS, STABLE, UNDECIDED, UNSTABLE
+from survey.kernels.hill.answers import STABLE, UNDECIDED, UNSTABLE
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math.roundoff import EPS
 
-AGAIN = 3  # no verdict: a cell whose factors must be solved anew
+UNSOLVED = 3  # no verdict: a cell whose factors must be solved first
 # A series serves a block if its tail, at the last cells, is at most this share of what a factor varies there.
 ENOUGH = 1e-4
 # It serves a cell no more where its tail is more than this share.
@@ -25,13 +26,13 @@ LEAF = 7
 
 
 @kernel
-def descend(series, doubts, places, depth, halves):
+def descend(series, doubts, blocks, depth, halves):
     """Halve B blocks until a cell is decided or `depth` halvings small: leaves (>= M, 7), and M.
 
     `series` (B, 4, n, n); `doubts` (B, 4, 3): of each factor the series' tail in X, in Y, and its other slack;
-    `places` (B, 4): number of halvings and place along X, the same along Y; `halves` (2, levels, 2, n, n): per
-    axis and number of halvings the matrices to the lower and to the upper half. A leaf is its place, its verdict, or
-    AGAIN, and which parts of it are stable and unstable at least.
+    `blocks` (B, 4): number of halvings and index along X, the same along Y; `halves` (2, depth, 2, n, n): per axis and
+    number of halvings the matrices to the lower and to the upper half. A leaf is its block, its verdict, or
+    UNSOLVED, and which parts of it are stable and unstable at least.
     """
     n, most = series.shape[2], depth[0] + depth[1] + 2
     stack, slack = np.empty((most, 4, n, n)), np.empty((most, 4))
@@ -39,7 +40,7 @@ def descend(series, doubts, places, depth, halves):
     sums, polygons = np.empty((4, 2)), np.empty((2, CORNERS, 2))
     leaves, count = np.empty((1024, LEAF)), 0
     for b in range(len(series)):
-        _begin(series[b], doubts[b], places[b], stack[0], slack[0], where[0], size[0])
+        _begin(series[b], doubts[b], blocks[b], stack[0], slack[0], where[0], size[0])
         top = 0
         while top >= 0:
             if count + 4 > len(leaves):
@@ -48,16 +49,16 @@ def descend(series, doubts, places, depth, halves):
             _add_up(own, size[top], sums)
             verdict = decide(sums, bars)
             left = max(depth[0] - here[0], depth[1] - here[2])
-            anew_x, anew_y = False, False
+            short_x, short_y = False, False
             if verdict == UNDECIDED:
-                anew_x, anew_y = _anew(sums, bars, doubts[b], here, places[b], depth)
-            if anew_x or anew_y:
-                count, top = _children(here, places[b], anew_x, anew_y, leaves, count), top - 1
+                short_x, short_y = _too_short(sums, bars, doubts[b], here, blocks[b], depth)
+            if short_x or short_y:
+                count, top = _children(here, blocks[b], short_x, short_y, leaves, count), top - 1
             elif verdict != UNDECIDED or left == 0:
                 stable, unstable = 1.0 * (verdict == STABLE), 1.0 * (verdict == UNSTABLE)
                 if verdict == UNDECIDED:
                     stable, unstable = _cut(own, sums, bars, polygons)
-                _put(here, verdict, stable, unstable, leaves[count])
+                _write(here, verdict, stable, unstable, leaves[count])
                 count, top = count + 1, top - 1
             else:
                 axis = 0 if depth[0] - here[0] == left else 1
@@ -79,10 +80,10 @@ def _more(leaves, count):
 
 
 @inline
-def _begin(series, doubt, place, own, slack, where, size):
-    """The whole block as the first cell."""
+def _begin(series, doubt, block, own, slack, where, size):
+    """The block as the first cell."""
     for f in range(4):
-        slack[f], where[f] = doubt[f, 0] + doubt[f, 1] + doubt[f, 2], place[f]
+        slack[f], where[f] = doubt[f, 0] + doubt[f, 1] + doubt[f, 2], block[f]
         for j in range(series.shape[1]):
             for k in range(series.shape[2]):
                 own[f, j, k] = series[f, j, k]
@@ -90,7 +91,7 @@ def _begin(series, doubt, place, own, slack, where, size):
 
 
 @inline
-def _put(here, verdict, stable, unstable, leaf):
+def _write(here, verdict, stable, unstable, leaf):
     for i in range(4):
         leaf[i] = here[i]
     leaf[4], leaf[5], leaf[6] = verdict, stable, unstable
@@ -115,7 +116,7 @@ def _sure(sums, bars, f):
 
 @inline
 def decide(sums, bars):
-    """The verdict of the whole cell: unstable <=> y1 y2' < 0 or y1' y2 > 0."""
+    """The verdict of the cell: unstable <=> y1 y2' < 0 or y1' y2 > 0."""
     first, second = _sure(sums, bars, 0) and _sure(sums, bars, 1), _sure(sums, bars, 2) and _sure(sums, bars, 3)
     cosine, sine = (sums[0, 0] > 0.0) == (sums[1, 0] > 0.0), (sums[2, 0] > 0.0) != (sums[3, 0] > 0.0)
     if (first and not cosine) or (second and not sine):
@@ -124,8 +125,8 @@ def decide(sums, bars):
 
 
 @inline
-def _anew(sums, bars, doubt, here, place, depth):
-    """Along which axes is the series too short for the unsure factors of this cell, so that solving anew helps?
+def _too_short(sums, bars, doubt, here, block, depth):
+    """Along which axes is the series too short for the unsure factors of this cell, so that solving its halves helps?
 
     The tail must be small beside what a factor varies: on the block itself, whose halves are solved otherwise, beside
     what it varies on the last cells; on a smaller cell, which is solved itself otherwise, beside what it varies there.
@@ -133,8 +134,8 @@ def _anew(sums, bars, doubt, here, place, depth):
     is halved to the end already, nothing helps.
     """
     x = y = hidden_x = hidden_y = False
-    whole = here[0] == place[0] and here[2] == place[2]
-    share = ENOUGH * 0.5 ** max(depth[0] - here[0], depth[1] - here[2]) if whole else BLURRED
+    full = here[0] == block[0] and here[2] == block[2]
+    share = ENOUGH * 0.5 ** max(depth[0] - here[0], depth[1] - here[2]) if full else BLURRED
     for f in range(4):
         if not _sure(sums, bars, f):
             most, size = max(share * sums[f, 1], doubt[f, 2]), abs(sums[f, 0]) + sums[f, 1]
@@ -142,23 +143,23 @@ def _anew(sums, bars, doubt, here, place, depth):
             y |= not doubt[f, 1] <= most
             hidden_x |= not doubt[f, 0] <= size
             hidden_y |= not doubt[f, 1] <= size
-    if not whole:
-        return x and here[0] > place[0], y and here[2] > place[2]
+    if not full:
+        return x and here[0] > block[0], y and here[2] > block[2]
     if (hidden_x and here[0] == depth[0]) or (hidden_y and here[2] == depth[1]):
         return False, False
     return x and here[0] < depth[0] and hidden_x >= hidden_y, y and here[2] < depth[1] and hidden_y >= hidden_x
 
 
 @inline
-def _children(here, place, along_x, along_y, leaves, count):
-    """What is to be solved anew: halves or quarters of the block, or this cell of it; returns the new count."""
-    whole = here[0] == place[0] and here[2] == place[2]
-    for i in range(2 if whole and along_x else 1):
-        for j in range(2 if whole and along_y else 1):
-            _put(here, AGAIN, 0.0, 0.0, leaves[count])
-            if whole and along_x:
+def _children(here, block, along_x, along_y, leaves, count):
+    """What must be solved next: halves or quarters of the block, or this cell of it; returns the new count."""
+    full = here[0] == block[0] and here[2] == block[2]
+    for i in range(2 if full and along_x else 1):
+        for j in range(2 if full and along_y else 1):
+            _write(here, UNSOLVED, 0.0, 0.0, leaves[count])
+            if full and along_x:
                 leaves[count, 0], leaves[count, 1] = here[0] + 1, 2 * here[1] + i
-            if whole and along_y:
+            if full and along_y:
                 leaves[count, 2], leaves[count, 3] = here[2] + 1, 2 * here[3] + j
             count += 1
     return count

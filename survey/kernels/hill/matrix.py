@@ -20,8 +20,13 @@ def samples_only(samples, h, coefficients):
 
 @inline
 def rounding(size, h):
-    """Bounds D11, D12, D21 of the rounding of one step h where |z| <= size; z itself known to a few ulp."""
-    return 2.0 * ROUNDING, 2.0 * ROUNDING * h, 2.0 * ROUNDING * (h * size)
+    """Bounds D11, D12, D21 of the rounding of one step h; z itself is known to 4 ROUNDING times `size` >= |z|.
+
+    Where `size` is large on the step's scale, as it is beside larger values of z, that reaches y within the step.
+    """
+    excess = 0.125 * h * h * size - 0.5
+    within = 2.0 * ROUNDING * (1.0 + 4.0 * (excess + abs(excess)))
+    return within, within * h, 4.0 * ROUNDING * (h * size)
 
 
 @inline

@@ -10,15 +10,16 @@ Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013),
 
 import numpy as np
 
-from survey.kernels.hill.taylor_double import HALF_ULP, STEP, composed, rounded, step, workspace
+from survey.kernels.hill.taylor_double import STEP, composed, rounded, step, workspace
 from survey.kernels.jit import kernel
 from survey.kernels.lanes import DY2_BAR, RESULTS, Y1_BAR
-from survey.kernels.math.double import UNIT, add, div, mul
+from survey.kernels.math.double import add, div, mul
+from survey.kernels.math.roundoff import PAIR_ROUNDOFF, ROUNDOFF_UP
 
 ORDER = 34
 SERVES = ()  # a last resort, never a user's choice
 NODES = 20
-# What follows the results of a whole period: sin^2 and cos^2 of half the angle, (2 - D) / 4 and (2 + D) / 4, each with
+# What follows the results of a full period: sin^2 and cos^2 of half the angle, (2 - D) / 4 and (2 + D) / 4, each with
 # its error bound.
 SINE, SINE_BAR, COSINE, COSINE_BAR = range(RESULTS, RESULTS + 4)
 SQUARES = 4
@@ -27,14 +28,15 @@ SQUARES = 4
 def missing(before, last, size):
     """What an interpolant misses, from the sizes of its last four Chebyshev coefficients, pair by pair, and of z."""
     # rounding may leave nothing of two coefficients, but no more is known of them than that
-    return 3 * last * (last / (before + UNIT * size + 1e-300) + 0.02)
+    return 3 * last * (last / (before + PAIR_ROUNDOFF * size + 1e-300) + 0.02)
 
 
 @kernel
-def solve(series, misses, lengths, whole, out):
+def solve(series, misses, lengths, full_period, out):
     """y'' + z y = 0 over all steps, from z's series in x = t / h (steps, NODES, 2), lengths (steps, 2), `missing` of z.
 
-    Fills `out` as `survey.kernels.lanes.chain` does; with `whole` also its columns SINE to COSINE_BAR, D = y1 + y2'.
+    Fills `out` as `survey.kernels.lanes.chain` does; with `full_period` also its columns SINE to COSINE_BAR, where
+    D = y1 + y2'.
     """
     steps, work = len(series), workspace(0)
     z, even, odd = work[0], work[1], work[2]
@@ -55,10 +57,10 @@ def solve(series, misses, lengths, whole, out):
         c[8], c[9], c[10] = c[8] + miss, (c[9] + miss) * longer[0], (c[10] + 2.0 * miss) * shorter[0]
         c[11] = 0.0
     y1, v1, y2, v2 = composed(chain, 0.0, out)
-    if whole:
-        bar, trace = out[Y1_BAR] + out[DY2_BAR] + UNIT * (abs(y1[0]) + abs(v2[0]) + 2.0), add(y1, v2)
+    if full_period:
+        bar, trace = out[Y1_BAR] + out[DY2_BAR] + PAIR_ROUNDOFF * (abs(y1[0]) + abs(v2[0]) + 2.0), add(y1, v2)
         out[SINE] = 0.25 * add((2.0, 0.0), (-trace[0], -trace[1]))[0]
         out[COSINE] = 0.25 * add((2.0, 0.0), trace)[0]
-        out[SINE_BAR] = 0.25 * bar + HALF_ULP * abs(out[SINE])
-        out[COSINE_BAR] = 0.25 * bar + HALF_ULP * abs(out[COSINE])
+        out[SINE_BAR] = 0.25 * bar + ROUNDOFF_UP * abs(out[SINE])
+        out[COSINE_BAR] = 0.25 * bar + ROUNDOFF_UP * abs(out[COSINE])
     rounded(y1, v1, y2, v2, unit, out)

@@ -26,7 +26,8 @@ from survey.kernels.lanes import (
     column,
     relative,
 )
-from survey.kernels.math.double import UNIT, add, convolved, div, mul, over, slope, total
+from survey.kernels.math.double import add, convolved, div, mul, over, slope, total
+from survey.kernels.math.roundoff import PAIR_ROUNDOFF, ROUNDOFF_UP
 
 ORDER = 34
 SERVES = ()  # a last resort, never a user's choice
@@ -37,7 +38,6 @@ STEP = 12
 SOLUTIONS = 3
 # Of a step, relative to its size in the largest norm: sums of products, the reciprocal steps, h.
 ROUNDING = 4.0
-HALF_ULP = 1.2e-16
 
 
 def hill_density():
@@ -80,7 +80,7 @@ def step(z, even, odd, square, reverse, out):
     out[4], out[5] = p21
     out[6], out[7] = p22
     a, b = tail(even), tail(odd)
-    rounding = ROUNDING * UNIT
+    rounding = ROUNDING * PAIR_ROUNDOFF
     out[8] = a + ORDER * b + rounding * (1.0 + size)
     out[9] = b + rounding * (1.0 + size)
     out[10] = ORDER * a + rounding * size
@@ -119,7 +119,7 @@ def hill_walk(start, expand, potential, miss, row, p, span, before, after, work,
                 step(z, even, odd, square, side < 0.0, chain[place])
         for c in range(len(clock)):
             clock[c, 0, 0], clock[c, 1, 0] = total(clock[c])
-    compose(chain[:steps], h, miss(row, clock) + steps * UNIT, out)
+    compose(chain[:steps], h, miss(row, clock) + steps * PAIR_ROUNDOFF, out)
 
 
 @inline
@@ -158,7 +158,7 @@ def rounded(y1, v1, y2, v2, h, out):
     out[Y1], out[DY1], out[Y2], out[DY2] = y1[0], div(v1, h)[0], mul(y2, h)[0], v2[0]
     out[DY1_BAR], out[Y2_BAR] = out[DY1_BAR] / h[0], out[Y2_BAR] * h[0]
     for i in range(4):
-        out[Y1_BAR + i] += HALF_ULP * abs(out[Y1 + i])
+        out[Y1_BAR + i] += ROUNDOFF_UP * abs(out[Y1 + i])
 
 
 @inline

@@ -10,9 +10,9 @@ import numpy as np
 from survey.kernels.jit import inline, kernel
 from survey.kernels.libration.coefficients import COMMON, FACTORS, LABELS, NUMERATORS, POWERS
 from survey.kernels.math import double as dd
+from survey.kernels.math.roundoff import PAIR_ROUNDOFF, ROUNDOFF
 
-UNIT = 2.0**-53
-WIDE = 16.0 * dd.UNIT  # of one double-double operation, generously
+WIDE = 16.0 * PAIR_ROUNDOFF  # of one double-double operation, generously
 MARGIN = 1.01  # for what is of second order in the bars
 # (1 - sqrt(611/675))/2, (1 - sqrt(71/75))/2 and (1 - sqrt(23/27))/2, each the sum of three numbers
 MU_1 = (0.024293897142052323, -1.424188204168191e-18, -8.15199000958143e-35)
@@ -77,7 +77,7 @@ def form(row, f):
         slope = slope * v + value
         value = value * v + NUMERATORS[row, k]
         noise = noise * v + abs(value)
-    noise = UNIT * (2.0 * noise - abs(value) + v * abs(slope))  # running bound of Horner's rule; v is rounded
+    noise = ROUNDOFF * (2.0 * noise - abs(value) + v * abs(slope))  # running bound of Horner's rule; v is rounded
     above, below, count = 1.0, COMMON[row], 3
     for j in range(f.shape[1]):
         for _ in range(POWERS[row, j]):
@@ -87,7 +87,7 @@ def form(row, f):
         count += 2 * abs(POWERS[row, j])
     above /= below
     value *= above
-    return value, MARGIN * (abs(above) * noise + UNIT * count * abs(value))
+    return value, MARGIN * (abs(above) * noise + ROUNDOFF * count * abs(value))
 
 
 @inline
@@ -109,7 +109,7 @@ def form_double(row, f):
     above = dd.div(above, below)
     value = dd.mul(value, above)
     wide = WIDE * ((last + 1) * size * abs(above[0]) + count * abs(value[0]))
-    return value[0], MARGIN * (wide + UNIT * abs(value[0]))
+    return value[0], MARGIN * (wide + ROUNDOFF * abs(value[0]))
 
 
 @kernel
@@ -140,7 +140,7 @@ def product(k, f):
     whole = k[0] + k[2]
     total = dd.shifted(dd.add(first, second), whole)
     size = abs(whole) + abs(first[0]) + abs(second[0])
-    return total[0], MARGIN * (UNIT * abs(total[0]) + WIDE * size)
+    return total[0], MARGIN * (ROUNDOFF * abs(total[0]) + WIDE * size)
 
 
 @kernel
@@ -150,7 +150,7 @@ def linear(mu, vectors, frequencies, nearest, distance):
     The last two are rows of `distance`. NaN and -1 outside 0 < mu < mu_R. Of equals the first counts.
     """
     f = np.empty((2, len(FACTORS)))
-    near = 64.0 * UNIT  # |k . omega| in float64 is good to less
+    near = 64.0 * ROUNDOFF  # |k . omega| in float64 is good to less
     for n in range(len(mu)):
         frequencies[:, n], distance[:, n], nearest[n] = np.nan, np.nan, -1
         if not factors(mu[n], f):

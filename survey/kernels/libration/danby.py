@@ -1,7 +1,7 @@
 """Danby's problem in lanes: the monodromy of the elliptic triangular points over half a period, and its factors.
 
 In the true anomaly f, with r(f) = 1 / (1 + e cos f), rotated axes and the state (x, q, p, m) = (xi, eta' + xi,
-xi' - eta, -eta) (the scene's notes, section 2):
+xi' - eta, -eta) (`scenes/libration_elliptic.md`, section 2):
 
     x' = p - m      m' = x - q      q' = -x' - d2 r m      p' = -m' + d1 r x
 
@@ -17,11 +17,11 @@ import numpy as np
 
 from survey.kernels.jit import inline, splice
 from survey.kernels.libration.traces import A_BAR, B_BAR, C_BAR, D_BAR, T_BAR, A, B, C, D, T
+from survey.kernels.math.roundoff import EPS
 from survey.kernels.unroll import largest, unroll
 
 TILE = 64
 VECTOR = 8
-EPS = 2.3e-16
 ROUNDING = 4.4e-16
 WORST = 300.0
 # Rows of the working table, lanes innermost: the propagator so far (4 x 4), V (upper triangle), the sum of local

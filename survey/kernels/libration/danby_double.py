@@ -16,21 +16,21 @@ from math import asinh, ceil, sinh, sqrt
 import numpy as np
 
 from survey.kernels.jit import inline, kernel
-from survey.kernels.libration.traces import FACTORS, A, C, D, T
+from survey.kernels.libration.traces import INVARIANTS, A, C, D, T
 from survey.kernels.math import double as dd
-from survey.kernels.math.double import UNIT
+from survey.kernels.math.roundoff import PAIR_ROUNDOFF
 
 ORDERS = 100  # at most; a series ends where its terms fall below SMALL
 FIRST = 8  # which they do not by chance before this one
 SMALL = 1e-33
 RATIO = 0.3  # half a step over the distance to the nearest singularity: i, or i sqrt(b0 / b2)
 # Of a coefficient, relative to its terms: two products and sums, and what their constants miss; of a sum of products.
-ROUNDING, PRODUCT = 20.0 * UNIT, 6.0 * UNIT
+ROUNDING, PRODUCT = 20.0 * PAIR_ROUNDOFF, 6.0 * PAIR_ROUNDOFF
 MARGIN = 1.01  # for what is of second order in the bars
 X, G, K, M = range(4)
 # Columns A to T of `traces` are leading parts; LOW columns further on follows what rounding left of them, and BARS
 # further on the bounds of their errors.
-LOW, BARS, RESULTS = FACTORS, 2 * FACTORS, 3 * FACTORS
+LOW, BARS, RESULTS = INVARIANTS, 2 * INVARIANTS, 3 * INVARIANTS
 
 
 @kernel
@@ -148,10 +148,12 @@ def sums(series, errors, last, c, ends, doubt):
         for n in range(last, -1, -1):
             s = dd.add((both[n % 2, 0], both[n % 2, 1]), (series[i, 0, n + 1], series[i, 1, n + 1]))
             both[n % 2, 0], both[n % 2, 1] = s
-            bound += errors[i, n + 1] + UNIT * abs(s[0])
+            bound += errors[i, n + 1] + PAIR_ROUNDOFF * abs(s[0])
         even, odd = (both[0, 0], both[0, 1]), (both[1, 0], both[1, 1])
         # each coefficient that follows is less than half of that before
-        bound += 2.0 * (abs(series[i, 0, last + 1]) + abs(series[i, 0, last])) + UNIT * (abs(even[0]) + abs(odd[0]))
+        bound += 2.0 * (abs(series[i, 0, last + 1]) + abs(series[i, 0, last])) + PAIR_ROUNDOFF * (
+            abs(even[0]) + abs(odd[0])
+        )
         ends[0, 0, i, c], ends[0, 1, i, c] = dd.add(even, odd)
         ends[1, 0, i, c], ends[1, 1, i, c] = dd.sub(even, odd)
         doubt[0, i, c] = doubt[1, i, c] = bound
@@ -160,7 +162,7 @@ def sums(series, errors, last, c, ends, doubt):
             other = X if i == G else M
             s = dd.sub((ends[side, 0, i, c], ends[side, 1, i, c]), (ends[side, 0, other, c], ends[side, 1, other, c]))
             ends[side, 0, i, c], ends[side, 1, i, c] = s
-            doubt[side, i, c] += doubt[side, other, c] + UNIT * abs(s[0])
+            doubt[side, i, c] += doubt[side, other, c] + PAIR_ROUNDOFF * abs(s[0])
 
 
 @inline
@@ -214,7 +216,7 @@ def finish(whole, spread, steps, out):
     """A, B, C, D, t and the bounds of their errors: A = det P, B = det T, C = det Q, D = det S, t = tr T'P."""
     bars = np.zeros(4)
     row_bars(spread, steps, bars)
-    for at in range(FACTORS - 1):
+    for at in range(INVARIANTS - 1):
         i, j = 0 if at in (A, D) else 2, 0 if at in (A, C) else 2
         a, b = (whole[0, i, j], whole[1, i, j]), (whole[0, i, j + 1], whole[1, i, j + 1])
         c, d = (whole[0, i + 1, j], whole[1, i + 1, j]), (whole[0, i + 1, j + 1], whole[1, i + 1, j + 1])

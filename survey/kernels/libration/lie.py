@@ -14,13 +14,13 @@ import numpy as np
 from survey.kernels.jit import inline, kernel
 from survey.kernels.libration.lie_plan import CLEAR, DELTA, DIVIDE, ETA, FINISH, LINEAR, MULTIPLY, ONE, XI
 from survey.kernels.math import double
+from survey.kernels.math.roundoff import ROUNDOFF
 
 LANES = 32
 RE, IM, SIZE, BAR, WIDTH = 0, LANES, 2 * LANES, 3 * LANES, 4 * LANES
-UNIT = 2.0**-53
-ROUND = 2.2 * UNIT  # a product's roundings are 3 sqrt 2 UNIT of |C| |f| |g|, shared by two factors
-CONSTANT = 3.0 * UNIT  # beyond ROUND: a constant has four, and its product one; a quotient by a divisor, three
-FORMS = 1.01 * UNIT  # the linear forms' relative error: rounded double-doubles
+ROUND = 2.2 * ROUNDOFF  # a product's roundings are 3 sqrt 2 ROUNDOFF of |C| |f| |g|, shared by two factors
+CONSTANT = 3.0 * ROUNDOFF  # beyond ROUND: a constant has four, and its product one; a quotient by a divisor, three
+FORMS = 1.01 * ROUNDOFF  # the linear forms' relative error: rounded double-doubles
 SLACK = 1.0 + 1e-9  # the roundings of the bars themselves
 K = (1.299038105676658, -3.5759170798963886e-17)  # 3 sqrt(3) / 4
 LEAST = 3e-7  # s below it, which is mu within 4e-15 of mu_R, has not all digits in double-double
@@ -131,7 +131,7 @@ def _multiply(out, f, g, number, sign):
         im = out[IM + i] + (p * g[IM + i] + q * g[RE + i])
         bar = size * (f[SIZE + i] * g[BAR + i] + f[BAR + i] * g[SIZE + i])
         out[RE + i], out[IM + i] = re, im
-        out[BAR + i] += bar + UNIT * (abs(re) + abs(im))
+        out[BAR + i] += bar + ROUNDOFF * (abs(re) + abs(im))
 
 
 @inline
@@ -141,7 +141,7 @@ def _linear(out, f, number):
     for i in range(LANES):
         re, im = out[RE + i] + number * f[RE + i], out[IM + i] + number * f[IM + i]
         out[RE + i], out[IM + i] = re, im
-        out[BAR + i] += size * (f[BAR + i] + CONSTANT * f[SIZE + i]) + UNIT * (abs(re) + abs(im))
+        out[BAR + i] += size * (f[BAR + i] + CONSTANT * f[SIZE + i]) + ROUNDOFF * (abs(re) + abs(im))
 
 
 @inline
@@ -176,4 +176,4 @@ def _measure(big, source, weights, first, last, out):
                 out[1, j, i] += weight * row[BAR + i]
     for j in range(3):
         for i in range(out.shape[2]):
-            out[1, j, i] = out[1, j, i] * SLACK + (last - first + 4) * UNIT * out[0, j, i]
+            out[1, j, i] = out[1, j, i] * SLACK + (last - first + 4) * ROUNDOFF * out[0, j, i]

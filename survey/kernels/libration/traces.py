@@ -14,22 +14,22 @@ from math import isfinite, sqrt
 import numpy as np
 
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math.roundoff import EPS
 
-EPS = 2.3e-16
 LARGEST = float(np.finfo(np.float32).max)  # bars are kept as float32
 UNDECIDED, UNSTABLE, STABLE = -1, 0, 1
 NONE, MINUS_ONE, KREIN = 0, 1, 2
 # The columns of a point's results, each with its error bound; the rows of its answers.
 A, B, C, D, T, A_BAR, B_BAR, C_BAR, D_BAR, T_BAR = range(10)
-RESULTS, FACTORS = 10, 5
+RESULTS, INVARIANTS = 10, 5  # columns, and how many of them are values
 SUM, SUM_BAR, PAIRS, PAIRS_BAR = range(4)  # a, b: the sums of the multipliers, and of the products of two
 PLACES = 24  # of a row's series
 TILE = 64
 
 
 @kernel
-def measure(results, rtol, overflow, floats, verdict, collision, late, status):
-    """a, its bar, b, its bar (4, N), verdict and collision from `results` (N, 10); who misses `rtol` is `late`.
+def measure(results, rtol, overflow, floats, verdict, collision, missed, status):
+    """a, its bar, b, its bar (4, N), verdict and collision from `results` (N, RESULTS); who misses `rtol` is `missed`.
 
     Points whose `status` is not 0 are passed over; those that leave the range of floats get the status `overflow`.
     """
@@ -37,13 +37,13 @@ def measure(results, rtol, overflow, floats, verdict, collision, late, status):
         if status[i] == 0:
             r = results[i]
             values, bars = (r[A], r[B], r[C], r[D], r[T]), (r[A_BAR], r[B_BAR], r[C_BAR], r[D_BAR], r[T_BAR])
-            _judge(values, bars, i, rtol, overflow, floats, verdict, collision, late, status)
+            _settle(values, bars, i, rtol, overflow, floats, verdict, collision, missed, status)
 
 
 @inline
-def _judge(values, bars, i, rtol, overflow, floats, verdict, collision, late, status):
+def _settle(values, bars, i, rtol, overflow, floats, verdict, collision, missed, status):
     """Answer point i from its A, B, C, D, t and their bars."""
-    late[i] = False
+    missed[i] = False
     t, t_bar = values[T], bars[T]
     ab, ab_bar = product(values[A], values[B], bars[A], bars[B])
     cd, cd_bar = product(values[C], values[D], bars[C], bars[D])
@@ -56,7 +56,7 @@ def _judge(values, bars, i, rtol, overflow, floats, verdict, collision, late, st
         status[i] = overflow
         floats[SUM, i] = floats[SUM_BAR, i] = floats[PAIRS, i] = floats[PAIRS_BAR, i] = np.nan
         verdict[i] = collision[i] = UNDECIDED
-        late[i] = True
+        missed[i] = True
         return
     floats[SUM, i], floats[SUM_BAR, i], floats[PAIRS, i], floats[PAIRS_BAR, i] = a, a_bar, b, b_bar
     k, k_bar = discriminant(t, ab, cd, t_bar, ab_bar, cd_bar)
@@ -67,11 +67,11 @@ def _judge(values, bars, i, rtol, overflow, floats, verdict, collision, late, st
     elif verdict[i] == STABLE:
         definite = (values[B] > 0.0) == (values[D] > 0.0)
         collision[i] = MINUS_ONE if definite else nearest(t, k, t_bar, k_bar)
-    late[i] = missed(a, a_bar, b, b_bar, rtol) or verdict[i] == UNDECIDED
+    missed[i] = inaccurate(a, a_bar, b, b_bar, rtol) or verdict[i] == UNDECIDED
 
 
 @inline
-def missed(a, a_bar, b, b_bar, rtol):
+def inaccurate(a, a_bar, b, b_bar, rtol):
     return not (a_bar <= rtol * (1.0 + abs(a)) and b_bar <= rtol * (1.0 + abs(b)))
 
 
@@ -135,12 +135,12 @@ def nearest(t, k, t_bar, k_bar):
 
 
 @kernel
-def dense(series, bars, rows, mu, rtol, overflow, floats, verdict, collision, late, status):
-    """Answer the late points of `rows` of mu (R, L) from their Chebyshev series in 4 s - 3 (rows, 5, PLACES).
+def dense(series, bars, rows, mu, rtol, overflow, floats, verdict, collision, missed, status):
+    """Answer the `missed` points of `rows` of mu (R, L) from their Chebyshev series in 4 s - 3 (rows, 5, PLACES).
 
-    `bars` (rows, 5) hold for the whole row; late stays who misses `rtol` or is undecided.
+    `bars` (rows, 5) hold for the whole row; `missed` remain those that miss `rtol` or are undecided.
     """
-    here, x = np.empty((FACTORS, TILE)), np.empty(TILE)
+    here, x = np.empty((INVARIANTS, TILE)), np.empty(TILE)
     for r in range(len(rows)):
         bar = bars[r, A], bars[r, B], bars[r, C], bars[r, D], bars[r, T]
         for first in range(0, mu.shape[1], TILE):
@@ -148,14 +148,14 @@ def dense(series, bars, rows, mu, rtol, overflow, floats, verdict, collision, la
             for i in range(count):
                 m = mu[rows[r], first + i]
                 x[i] = 4.0 * sqrt(1.0 - 3.0 * m * (1.0 - m)) - 3.0
-            for j in range(FACTORS):
+            for j in range(INVARIANTS):
                 for i in range(count):  # Clenshaw; PLACES is a constant, so that the inner loop is unrolled
-                    ahead = further = 0.0
+                    one = two = 0.0
                     for n in range(PLACES - 1, 0, -1):
-                        ahead, further = series[r, j, n] + 2.0 * x[i] * ahead - further, ahead
-                    here[j, i] = series[r, j, 0] + x[i] * ahead - further
+                        one, two = series[r, j, n] + 2.0 * x[i] * one - two, one
+                    here[j, i] = series[r, j, 0] + x[i] * one - two
             for i in range(count):
                 at = rows[r] * mu.shape[1] + first + i
-                if late[at]:
+                if missed[at]:
                     values = here[A, i], here[B, i], here[C, i], here[D, i], here[T, i]
-                    _judge(values, bar, at, rtol, overflow, floats, verdict, collision, late, status)
+                    _settle(values, bar, at, rtol, overflow, floats, verdict, collision, missed, status)

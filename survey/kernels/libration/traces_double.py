@@ -7,7 +7,7 @@ import numpy as np
 from survey.kernels.jit import inline, kernel
 from survey.kernels.libration.danby_double import BARS, LOW
 from survey.kernels.libration.traces import (
-    FACTORS,
+    INVARIANTS,
     KREIN,
     LARGEST,
     MINUS_ONE,
@@ -24,27 +24,26 @@ from survey.kernels.libration.traces import (
     D,
     T,
     decide,
+    inaccurate,
     lost,
-    missed,
 )
 from survey.kernels.math import double as dd
-from survey.kernels.math.double import UNIT
+from survey.kernels.math.roundoff import PAIR_ROUNDOFF, ROUNDOFF_UP
 
-HALF_ULP = 1.2e-16
 MARGIN = 1.01  # for what is of second order in the bars, and for signs told from leading parts
 PLACES = 32  # of a row's series
 
 
 @kernel
-def measure(results, rtol, overflow, floats, verdict, collision, late, status):
+def measure(results, rtol, overflow, floats, verdict, collision, missed, status):
     """As `traces.measure`, from results (N, danby_double.RESULTS)."""
     for i in range(len(results)):
-        _judge(results[i], i, rtol, overflow, floats, verdict, collision, late, status)
+        _settle(results[i], i, rtol, overflow, floats, verdict, collision, missed, status)
 
 
 @inline
-def _judge(r, i, rtol, overflow, floats, verdict, collision, late, status):
-    """Answer point i from its results r; late is who is undecided in any way, or misses `rtol`."""
+def _settle(r, i, rtol, overflow, floats, verdict, collision, missed, status):
+    """Answer point i from its results r; `missed` if it is undecided in any way, or misses `rtol`."""
     t, t_bar = (r[T], r[LOW + T]), r[BARS + T]
     ab, ab_bar = product((r[A], r[LOW + A]), (r[B], r[LOW + B]), r[BARS + A], r[BARS + B])
     cd, cd_bar = product((r[C], r[LOW + C]), (r[D], r[LOW + D]), r[BARS + C], r[BARS + D])
@@ -53,10 +52,10 @@ def _judge(r, i, rtol, overflow, floats, verdict, collision, late, status):
     b = dd.add(dd.scaled(t, -8.0 if by_ab else 8.0), dd.scaled(ab if by_ab else cd, 16.0))
     b = dd.shifted(b, 6.0 if by_ab else -10.0)
     size = 1.0 + abs(t[0]) + abs(ab[0] if by_ab else cd[0])
-    a_bar = MARGIN * (4.0 * t_bar + 8.0 * UNIT * size) + HALF_ULP * abs(a[0])
-    b_bar = MARGIN * (16.0 * min(ab_bar, cd_bar) + 8.0 * t_bar + 64.0 * UNIT * size) + HALF_ULP * abs(b[0])
+    a_bar = MARGIN * (4.0 * t_bar + 8.0 * PAIR_ROUNDOFF * size) + ROUNDOFF_UP * abs(a[0])
+    b_bar = MARGIN * (16.0 * min(ab_bar, cd_bar) + 8.0 * t_bar + 64.0 * PAIR_ROUNDOFF * size) + ROUNDOFF_UP * abs(b[0])
     verdict[i] = collision[i] = UNDECIDED
-    late[i] = True
+    missed[i] = True
     if not (isfinite(a[0]) and isfinite(b[0]) and a_bar < LARGEST and b_bar < LARGEST):
         status[i] = overflow
         floats[SUM, i] = floats[SUM_BAR, i] = floats[PAIRS, i] = floats[PAIRS_BAR, i] = np.nan
@@ -70,14 +69,14 @@ def _judge(r, i, rtol, overflow, floats, verdict, collision, late, status):
         collision[i] = lost(t[0], beyond, ab[0], cd[0], k[0], t_bar, ab_bar, cd_bar, k_bar)
     elif verdict[i] == STABLE:
         collision[i] = MINUS_ONE if (r[B] > 0.0) == (r[D] > 0.0) else nearest(t, k, t_bar, k_bar)
-    late[i] = missed(a[0], a_bar, b[0], b_bar, rtol) or verdict[i] == UNDECIDED or collision[i] == UNDECIDED
+    missed[i] = inaccurate(a[0], a_bar, b[0], b_bar, rtol) or verdict[i] == UNDECIDED or collision[i] == UNDECIDED
 
 
 @inline
 def product(a, b, ea, eb):
     """a b and its error bound; of its sign, where that is certain of both factors, it leaves no doubt."""
     p = dd.mul(a, b)
-    return p, MARGIN * (ea * abs(b[0]) + eb * abs(a[0]) + ea * eb + 2.0 * UNIT * abs(p[0]))
+    return p, MARGIN * (ea * abs(b[0]) + eb * abs(a[0]) + ea * eb + 2.0 * PAIR_ROUNDOFF * abs(p[0]))
 
 
 @inline
@@ -87,7 +86,7 @@ def discriminant(t, ab, cd, t_bar, ab_bar, cd_bar):
     by_ab = abs(t[0]) * t_bar + 2.0 * ab_bar <= abs(other[0]) * t_bar + 2.0 * cd_bar
     root, last, bar = (t, ab, ab_bar) if by_ab else (other, cd, cd_bar)
     square, last = dd.square(root), dd.scaled(last, 4.0)
-    rounding = UNIT * (4.0 * square[0] + 2.0 * abs(last[0]) + (0.0 if by_ab else 4.0 * abs(root[0])))
+    rounding = PAIR_ROUNDOFF * (4.0 * square[0] + 2.0 * abs(last[0]) + (0.0 if by_ab else 4.0 * abs(root[0])))
     return dd.sub(square, last), MARGIN * (2.0 * abs(root[0]) * t_bar + t_bar * t_bar + 4.0 * bar + rounding)
 
 
@@ -96,11 +95,11 @@ def nearest(t, k, t_bar, k_bar):
     """As `traces.nearest`, of k > k_bar."""
     root = dd.sqrt(k)
     low, high = dd.sqrt(dd.shifted(k, -k_bar)), dd.sqrt(dd.shifted(k, k_bar))
-    bar = MARGIN * (t_bar + dd.sub(high, low)[0] + 16.0 * UNIT)
+    bar = MARGIN * (t_bar + dd.sub(high, low)[0] + 16.0 * PAIR_ROUNDOFF)
     one, two = dd.add(dd.shifted(t, -1.0), root), dd.sub(dd.shifted(t, -1.0), root)
     cosine = dd.mul(two, dd.shifted(dd.scaled(dd.square(two), 4.0), -3.0))
     gap = dd.sub(one, cosine)[0]
-    margin = bar * (1.0 + abs(12.0 * two[0] * two[0] - 3.0) + 24.0 * bar) + 64.0 * UNIT
+    margin = bar * (1.0 + abs(12.0 * two[0] * two[0] - 3.0) + 24.0 * bar) + 64.0 * PAIR_ROUNDOFF
     beyond = dd.shifted(two, 0.5)[0]
     if gap > margin and beyond < -bar:
         return MINUS_ONE
@@ -113,7 +112,7 @@ def to_series(results, matrix, series, bars):
 
     `matrix` (2, PLACES, PLACES) makes coefficients of values, row by coefficient.
     """
-    for j in range(FACTORS):
+    for j in range(INVARIANTS):
         bars[j] = 0.0
         for n in range(PLACES):
             s = (0.0, 0.0)
@@ -124,18 +123,18 @@ def to_series(results, matrix, series, bars):
 
 
 @kernel
-def dense(series, bars, mu, rtol, overflow, floats, verdict, collision, late, status):
+def dense(series, bars, mu, rtol, overflow, floats, verdict, collision, missed, status):
     """Answer all points mu (N) of a row from its series (5, 2, PLACES) in 4 s - 3; the `bars` (5) hold for the row."""
-    r = np.empty(BARS + FACTORS)
+    r = np.empty(BARS + INVARIANTS)
     for i in range(len(mu)):
         square = dd.shifted(dd.times(dd.square(dd.two_sum(0.5, -mu[i])), 3.0), 0.25)
         x = dd.shifted(dd.scaled(dd.sqrt(square), 4.0), -3.0)
-        for j in range(FACTORS):
-            ahead, further = (0.0, 0.0), (0.0, 0.0)
+        for j in range(INVARIANTS):
+            one, two = (0.0, 0.0), (0.0, 0.0)
             for n in range(PLACES - 1, -1, -1):  # Clenshaw
-                twice = dd.scaled(dd.mul(x, ahead), 2.0 if n else 1.0)
-                last = dd.add((series[j, 0, n], series[j, 1, n]), dd.sub(twice, further))
-                ahead, further = last, ahead
-            r[j], r[LOW + j] = ahead
+                twice = dd.scaled(dd.mul(x, one), 2.0 if n else 1.0)
+                last = dd.add((series[j, 0, n], series[j, 1, n]), dd.sub(twice, two))
+                one, two = last, one
+            r[j], r[LOW + j] = one
             r[BARS + j] = bars[j]
-        _judge(r, i, rtol, overflow, floats, verdict, collision, late, status)
+        _settle(r, i, rtol, overflow, floats, verdict, collision, missed, status)

@@ -1,34 +1,94 @@
-"""Chebyshev series of many rows at many points: rows share nothing, lanes of a row share their coefficients.
+"""Chebyshev series: nodes, coefficients from values there, what a series may be wrong by, and its sums.
 
-Source: J. C. Mason, D. C. Handscomb, Chebyshev Polynomials (2003), 2.4.1 (Clenshaw's recurrence).
+The n nodes are those of the first kind. Bits of what is kept rest on how each caller rounds cos(k theta_i), theta_i
+the angle of node i: so `to_coefficients` takes these cosines.
+
+Sources: J. C. Mason, D. C. Handscomb, Chebyshev Polynomials (2003), 2.4.1 (Clenshaw's recurrence), 4.6 (discrete
+orthogonality); L. N. Trefethen, Approximation Theory and Approximation Practice (2013), theorem 15.2.
 """
+
+from functools import cache
 
 import numpy as np
 
-from survey.kernels.hill.answers import EPS, STABLE, UNDECIDED, UNSTABLE
-from survey.kernels.jit import kernel, splice
-
-TILE = 64
-TERMS = 8  # as many as `_sum` spells out
-ROWS = 8
+from survey.kernels.jit import kernel
+from survey.kernels.math.roundoff import EPS
 
 
-def expand(values, matrix, place):
+def angles(n):
+    """theta_i = (i + 1/2) pi / n of the n nodes cos theta_i."""
+    return np.pi * (np.arange(n) + 0.5) / n
+
+
+def nodes(n):
+    """The n nodes, from 1 to -1."""
+    return np.cos(angles(n))
+
+
+@cache
+def symmetric_nodes(n):
+    """As `nodes`, symmetric to the last bit."""
+    x = np.sin(np.pi * (n - 1 - 2 * np.arange(n)) / (2 * n))
+    return np.concatenate([x[: n // 2], [0.0] * (n % 2), -x[: n // 2][::-1]])
+
+
+def cosines(n):
+    """cos(k theta_i) (n, n; [k, i]) of the nodes."""
+    return np.cos(np.pi * np.outer(np.arange(n), np.arange(n) + 0.5) / n)
+
+
+def to_coefficients(cosines):
+    """The matrix (n, n; [k, i]) from values at n nodes to coefficients of T_k, from cos(k theta_i)."""
+    matrix = 2 / len(cosines) * cosines
+    matrix[0] /= 2
+    return matrix
+
+
+@cache
+def by_columns(n):
+    """As `to_coefficients`, transposed: from value i, the first index, to coefficient k."""
+    return to_coefficients(np.cos(np.pi * np.arange(n)[:, None] * (2 * np.arange(n) + 1) / (2 * n))).T
+
+
+def lebesgue(degree):
+    """Bound of the Lebesgue constant of interpolation of this degree, or a lower one (Trefethen, theorem 15.2)."""
+    return 2 / np.pi * np.log(degree + 1) + 1
+
+
+def expand(values, matrix, ulps):
     """The series of each row of `values` (R, n) at nodes, by `matrix` (n, n; [from, to]), and its `_doubt` (R)."""
     series = np.zeros_like(values)
-    for at, weights in enumerate(matrix):  # in this order, so that a row's bits do not depend on the others
-        series += values[:, at, None] * weights
-    return series, _doubt(np.abs(series), place)
+    for i, weights in enumerate(matrix):  # in this order, so that a row's bits do not depend on the others
+        series += values[:, i, None] * weights
+    return series, _doubt(np.abs(series), ulps)
 
 
-def transform(rows, matrix, place):
+def transform(rows, matrix, ulps):
     """Coefficients (n, m) along the first axis of `rows`, values at nodes, by `matrix` (n, n; [from, to]), and the
     `_doubt` (a number) of their sums over the columns.
     """
     series = np.zeros_like(rows)
     for row, weights in zip(rows, matrix, strict=True):
         series += weights[:, None] * row
-    return series, float(_doubt(np.abs(series).sum(axis=1)[None], place)[0])
+    return series, float(_doubt(np.abs(series).sum(axis=1)[None], ulps)[0])
+
+
+def tail(sizes):
+    """What series with coefficients of these sizes (..., n) leave out and fold back, from the rate of their decay."""
+    last, before = sizes[..., -4:].max(axis=-1), sizes[..., -8:-4].max(axis=-1, initial=0.0)
+    with np.errstate(invalid="ignore"):
+        rate = np.clip(last / (before + 1e-300), 0.1, 0.9)
+    return 4.0 * last / (1.0 - rate)
+
+
+def _doubt(sizes, ulps):
+    """`tail` and rounding of such series (R, n), whose argument on [-1, 1] is known to so many ulp.
+
+    Rounding is that of the transform, of Clenshaw's recurrence, and of the argument, where T_k' <= k^2.
+    """
+    k = np.arange(sizes.shape[1])
+    rounding = (sizes * (4.0 + k + (0.5 + ulps) * k * k)).sum(axis=1)
+    return tail(sizes) + EPS * rounding
 
 
 @kernel
@@ -45,78 +105,3 @@ def restrict(series, x, work, out):
             last, before = before, last
         for i in range(m):
             out[r, i] = series[0, i] + x[r] * last[i] - before[i]
-
-
-def _doubt(sizes, place):
-    """What series of such coefficients (R, n) leave out and fold back, and rounding; a place on [-1, 1] is known to
-    `place` ulp.
-
-    The first from its last coefficients at the rate at which they fall; the second of the transform, of Clenshaw's
-    recurrence, and of the rounded place in the axis, where T_k' <= k^2.
-    """
-    k = np.arange(sizes.shape[1])
-    last, before = sizes[:, -4:].max(axis=1), sizes[:, -8:-4].max(axis=1, initial=0.0)
-    rounding = (sizes * (4.0 + k + (0.5 + place) * k * k)).sum(axis=1)
-    rate = np.clip(last / (before + 1e-300), 0.1, 0.9)
-    return 4.0 * last / (1.0 - rate) + EPS * rounding
-
-
-@splice
-def _polynomials(x, tile):
-    """T_0 ... at x, in the first lanes of the rows of `tile`."""
-    for i in range(len(x)):
-        tile[0, i], tile[1, i] = 1.0, x[i]
-    for k in range(2, len(tile)):
-        for i in range(len(x)):
-            tile[k, i] = 2.0 * x[i] * tile[k - 1, i] - tile[k - 2, i]
-
-
-@splice
-def _sum(c, tile, sums, count):
-    """sum_k c_k T_k in `count` lanes, TERMS terms a turn."""
-    for i in range(count):
-        sums[i] = 0.0
-    for k in range(len(c) - TERMS, -1, -TERMS):
-        c0, c1, c2, c3, c4, c5, c6, c7 = c[k], c[k + 1], c[k + 2], c[k + 3], c[k + 4], c[k + 5], c[k + 6], c[k + 7]
-        t = tile[k : k + TERMS]
-        for i in range(count):
-            low = (c0 * t[0, i] + c1 * t[1, i]) + (c2 * t[2, i] + c3 * t[3, i])
-            high = (c4 * t[4, i] + c5 * t[5, i]) + (c6 * t[6, i] + c7 * t[7, i])
-            sums[i] += low + high
-
-
-@kernel
-def discriminants(rows, coefficients, bars, x, rtol, floats, verdict, late):
-    """D of the `rows` from its series at x (L): D, its bar and the verdict; `late` where not enough.
-
-    Row rows[j]: D = sum_k coefficients[j, k] T_k(x) within bars[j], coefficients in a multiple of TERMS. Columns as in
-    `kernels.hill.answers.measure`.
-    """
-    terms, tiles = coefficients.shape[1], (len(x) + TILE - 1) // TILE
-    table, sums = np.empty((tiles, terms, TILE)), np.empty(TILE)
-    for t in range(tiles):
-        _polynomials(x[t * TILE : (t + 1) * TILE], table[t])
-    # A tile of the table stays in the first cache for some rows, and what is written within some pages.
-    for turn in range((len(rows) + ROWS - 1) // ROWS * tiles):
-        start, t = turn // tiles * ROWS, turn % tiles
-        count = len(x) - t * TILE if t == tiles - 1 else TILE
-        for j in range(start, len(rows) if start + ROWS > len(rows) else start + ROWS):
-            _sum(coefficients[j], table[t], sums, count)
-            first = rows[j] * len(x) + t * TILE
-            said, missed = verdict[first : first + count], late[first : first + count]
-            _judge(sums, bars[j], floats[:, first : first + count], rtol, said, missed)
-
-
-@splice
-def _judge(d, bar, floats, rtol, verdict, late):
-    """D, its bar and the verdict of neighbouring points, and who is late. Views: an offset index is not vector code."""
-    for i in range(len(verdict)):
-        floats[0, i], floats[1, i] = d[i], bar
-    for i in range(len(verdict)):
-        stable, unstable = abs(d[i]) < 2.0 - bar, abs(d[i]) > 2.0 + bar
-        verdict[i] = np.int8(STABLE) if stable else np.int8(UNSTABLE) if unstable else np.int8(UNDECIDED)
-    for i in range(len(verdict)):
-        late[i] = verdict[i] == UNDECIDED
-    if not bar <= rtol:
-        for i in range(len(verdict)):
-            late[i] |= not bar <= rtol * (1.0 + abs(d[i]))

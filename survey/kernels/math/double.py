@@ -1,8 +1,8 @@
 """Double-double numbers: a pair (hi, lo) of float64 whose exact sum, |lo| <= ulp(hi) / 2, carries about 31 digits.
 
-Each operation is good to a few UNIT, relative to its result. Strict floats are what makes them right: no fastmath,
-no contraction. Range: products between 1e-290 and 1e300. The error of a product takes one fused instruction where the
-processor has it and Dekker's splitting elsewhere: both are exact, so the bits are the same.
+Each operation is good to a few PAIR_ROUNDOFF (`roundoff`), relative to its result. Strict floats are what makes them
+right: no fastmath, no contraction. Range: products between 1e-290 and 1e300. The error of a product takes one fused
+instruction where the processor has it and Dekker's splitting elsewhere: both are exact, so the bits are the same.
 
 Sources: T. J. Dekker, Numer. Math. 18 (1971) 224 (product, split); D. H. Bailey's QD (add, div, sqrt);
 T. Ogita, S. M. Rump, S. Oishi, SIAM J. Sci. Comput. 26 (2005) 1955 (inner products); DLMF 19.8(i) (mean).
@@ -18,7 +18,6 @@ from numba.extending import lower_builtin, type_callable
 from survey.kernels.jit import inline
 
 SPLITTER = 134217729.0  # 2^27 + 1
-UNIT = 2.0**-104
 PI = (3.141592653589793, 1.2246467991473532e-16)
 HALF_PI = (1.5707963267948966, 6.123233995736766e-17)
 HALF_PI_REST = -1.4973849048591698e-33  # for what is left of pi / 2 beside it
@@ -99,7 +98,7 @@ def sub(a, b):
 
 @inline
 def loose(a, b):
-    """a + b to a UNIT of |a| + |b|: half the work of `add`, for terms that have errors themselves, or one sign."""
+    """a + b within PAIR_ROUNDOFF (|a| + |b|): half of `add`, for terms of one sign, or with errors of their own."""
     s, e = two_sum(a[0], b[0])
     return quick_two_sum(s, e + (a[1] + b[1]))
 
@@ -155,7 +154,7 @@ def div(a, b):
 
 @inline
 def ratio(a, b):
-    """a/b to 4 UNIT: a third of the work of `div` (Joldes, Muller, Popescu 2017, algorithm 17)."""
+    """a/b to 4 PAIR_ROUNDOFF: a third of the work of `div` (Joldes, Muller, Popescu 2017, algorithm 17)."""
     q = a[0] / b[0]
     p = times(b, q)
     return quick_two_sum(q, ((a[0] - p[0]) + (a[1] - p[1])) / b[0])

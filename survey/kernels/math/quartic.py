@@ -4,8 +4,8 @@ from math import sqrt
 
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.double import add, mul
+from survey.kernels.math.roundoff import PAIR_SUM_ROUNDOFF
 
-UNIT = 2.0**-98  # of the sum of |terms|: the rounding of a value, the coefficients' own included
 STEPS = 200
 ROUGH = 1e-14  # relative: below, float64 has no digits of a sum left
 SAME = 1e-8  # steps that are smaller, relative, need no bracket
@@ -110,6 +110,6 @@ def root(c, inside, outside):
         if not abs(move) < SAME * abs(pair[0]):
             break
         pair = add(pair, (-move, 0.0))
-        if abs(move * move * second) <= UNIT * abs(pair[0] * first):
+        if abs(move * move * second) <= PAIR_SUM_ROUNDOFF * abs(pair[0] * first):
             break
-    return pair, 2.0 * UNIT * (size / abs(first) + abs(pair[0])) if first != 0.0 else 1.0
+    return pair, 2.0 * PAIR_SUM_ROUNDOFF * (size / abs(first) + abs(pair[0])) if first != 0.0 else 1.0

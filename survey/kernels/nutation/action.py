@@ -11,13 +11,14 @@ from math import pi, sqrt
 import numpy as np
 
 from survey.kernels.jit import kernel
+from survey.kernels.math.chebyshev import nodes
+from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.nutation import lanes as nl
 from survey.kernels.nutation import wells as nu
 
-EPS = nu.EPS
 ROUGH = 2e-13  # bars of (S14), relative, beyond which the action is a sum
 NODES = 16
-_COSINES = np.cos((np.arange(NODES) + 0.5) * pi / NODES)
+_COSINES = nodes(NODES)
 # (S22): nodes w = STEP n, DOWN <= n <= UP; there c, 1 - c^2, (1 + c)/2, (1 - c)/2, and the weight c s^3
 STEP, DOWN, UP = 0.3125, -256, 320
 NEGLIGIBLE = 1e-19
@@ -94,12 +95,12 @@ def action(row):
     noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH]
     value = small(row, low, high)
     if value >= 0.0:
-        return value, (64.0 * EPS + noise + 2.5 * row[nu.NOISE_WIDTH]) * value
+        return value, (64.0 * ROUNDOFF + noise + 2.5 * row[nu.NOISE_WIDTH]) * value
     at_plus, at_minus = (row[nu.LOW_PLUS], row[nu.HIGH_PLUS]), (row[nu.LOW_MINUS], row[nu.HIGH_MINUS])
     square = 0.5 * nu.above(row, low * high)
     noise = row[nu.NOISE_LOW], row[nu.NOISE_HIGH], row[nu.NOISE_ABOVE]
     value, moved = positive(width, (low, high), square, at_plus, at_minus, noise)
-    return value, 64.0 * EPS * value + moved + 2.0 * (row[nu.NOISE_WIDTH] + row[nu.NOISE_ENDS]) * value
+    return value, 64.0 * ROUNDOFF * value + moved + 2.0 * (row[nu.NOISE_WIDTH] + row[nu.NOISE_ENDS]) * value
 
 
 @kernel
@@ -113,4 +114,4 @@ def mend(work, answers):
         roots = (sqrt(work[nl.Q_LOW + i]), sqrt(work[nl.Q_HIGH + i]))
         at_plus, at_minus = (work[nl.V_LOW + i], work[nl.V_HIGH + i]), (work[nl.W_LOW + i], work[nl.W_HIGH + i])
         value, _moved = positive(width, roots, 0.5 * work[nl.ABOVE + i], at_plus, at_minus, (0.0, 0.0, 0.0))
-        answers[nl.ACTION + i], answers[nl.ACTION_BAR + i] = value, (66.0 * EPS + 4.0 * blur) * value
+        answers[nl.ACTION + i], answers[nl.ACTION_BAR + i] = value, (66.0 * ROUNDOFF + 4.0 * blur) * value

@@ -6,11 +6,11 @@ import numpy as np
 
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math import double as dd
-from survey.kernels.math.quartic import UNIT, slope
+from survey.kernels.math.quartic import slope
+from survey.kernels.math.roundoff import PAIR_SUM_ROUNDOFF, ROUNDOFF
 from survey.kernels.math.sines import sin_cos
 from survey.kernels.nutation import records as rc
 from survey.kernels.nutation.wells import (
-    EPS,
     HIGH,
     HIGH_MINUS,
     HIGH_PLUS,
@@ -78,14 +78,14 @@ def phase(row, theta, p_theta, start):
     done, left = (done, 1.0 - done) if done < left else (1.0 - left, left)
     bow = row[K] * width * width * left * done
     size = row[Q_LOW] * left + row[Q_HIGH] * done
-    start[rc.START_BAR] = 8.0 * EPS * min(v, w)
+    start[rc.START_BAR] = 8.0 * ROUNDOFF * min(v, w)
     q, moved = size - bow, (abs(row[Q_HIGH] - row[Q_LOW]) + abs(row[K]) * width * width) * start[rc.START_BAR] / width
-    rough = 16.0 * EPS * (size + abs(bow)) + moved
+    rough = 16.0 * ROUNDOFF * (size + abs(bow)) + moved
     if q > 4.0 * rough:  # done left = c, done + left = 1
         c = (2.0 * sine * cosine * p_theta / width) ** 2 / q
         root = sqrt(max(1.0 - 4.0 * c, 0.0))
         other = 2.0 * c / (1.0 + root)
-        error = width * other * (16.0 * EPS + rough / q) / max(root, TINY)
+        error = width * other * (16.0 * ROUNDOFF + rough / q) / max(root, TINY)
         if width * root < start[rc.START_BAR]:  # on which side of the middle?
             error += 2.0 * width * root
         if error < start[rc.START_BAR]:
@@ -106,8 +106,10 @@ def measure(row, start, c, u, theta, p_theta):
     offset = (slope(c, u)[0] - height * k * (2.0 * u[0] + row[SUM]) / q) / q
     square = offset * offset + 4.0 * height / q
     terms = abs(c[1][0]) + abs(u[0]) * (4.0 * abs(c[2][0]) + 8.0 * abs(k))
-    bar = UNIT * terms / q + 8.0 * EPS * abs(offset)
-    noise = 16.0 * EPS + row[NOISE_LOW] + row[NOISE_HIGH] + bar * (abs(offset) + bar) / square if square > 0.0 else 1.0
+    bar = PAIR_SUM_ROUNDOFF * terms / q + 8.0 * ROUNDOFF * abs(offset)
+    noise = (
+        16.0 * ROUNDOFF + row[NOISE_LOW] + row[NOISE_HIGH] + bar * (abs(offset) + bar) / square if square > 0.0 else 1.0
+    )
     if noise < row[NOISE_WIDTH]:
         row[WIDTH], row[NOISE_WIDTH] = sqrt(square), noise
 
@@ -136,7 +138,7 @@ def of_states(points, rows, kinds, count, heights, starts):
             rows[i, j] = both[place, j]
         if kinds[i] >= NUTATION:
             phase(rows[i], theta, p_theta, starts[i])
-            if kinds[i] == NUTATION and rows[i, NOISE_WIDTH] > EPS:
+            if kinds[i] == NUTATION and rows[i, NOISE_WIDTH] > ROUNDOFF:
                 measure(rows[i], starts[i], about_equator(a, b, level, k), u, theta, p_theta)
 
 

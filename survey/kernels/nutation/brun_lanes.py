@@ -8,7 +8,7 @@ import numpy as np
 
 from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.math import double as dd
-from survey.kernels.nutation import action, fine
+from survey.kernels.nutation import action, lanes_double
 from survey.kernels.nutation import lanes as nl
 from survey.kernels.nutation.brun import of_state
 from survey.kernels.nutation.lanes import GIVEN, GOOD, OUTPUTS, TILE, WELLS, A, B, finish, put
@@ -105,7 +105,7 @@ def solve(work, steps, within, exactly, actions):
     nl.wells(work, steps[1])
     nl.means(work, steps[2])
     if exactly:
-        fine.fine(work, steps[2])
+        lanes_double.fill(work, steps[2])
     if actions:
         nl.small_actions(work)
 
@@ -140,7 +140,7 @@ def answer(polynomials, fill, known_u, points, actions, out, wells, done):
 
     All of them go with FEW steps, what these leave with MORE and then with MOST; exactly where that is asked for.
     """
-    work, answers = np.zeros(fine.ALL), np.empty(OUTPUTS * TILE)
+    work, answers = np.zeros(lanes_double.ALL), np.empty(OUTPUTS * TILE)
     left = which = np.arange(len(done))
     for n in range(6):
         steps, exactly = (FEW if known_u else FEW_FROM_POLES, MORE, MOST)[n // 2], n % 2 == 1

@@ -7,12 +7,10 @@ of steps suffice: otherwise it is left to them. A lane's bits do not depend on i
 
 from math import copysign, pi, sqrt
 
-import numpy as np
-
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math import double as dd
-from survey.kernels.math.quartic import UNIT
-from survey.kernels.nutation.wells import EPS
+from survey.kernels.math.chebyshev import nodes
+from survey.kernels.math.roundoff import PAIR_SUM_ROUNDOFF, ROUNDOFF
 
 TILE = 64
 GIVEN = 7  # rows of what is given
@@ -21,13 +19,13 @@ NAMES = ("u_min", "u_max", "period", "precession", "spin", "action")
 U_MIN, U_MAX, PERIOD, PRECESSION, SPIN, ACTION = range(0, 6 * TILE, TILE)
 U_MIN_BAR, U_MAX_BAR, PERIOD_BAR, PRECESSION_BAR, SPIN_BAR, ACTION_BAR = range(6 * TILE, 12 * TILE, TILE)
 OUTPUTS = 12
-RIGHT = 0.125 * EPS  # errors of the set-up, relative
+RIGHT = 0.125 * ROUNDOFF  # errors of the set-up, relative
 BLUR = 0.01  # the error of a well's width, relative
 WIDE = 0.1  # wells that are wider are no parabolas
 NEAR, LAST = 3e-5, 1e-17  # the last two means, and the last weight of R
 SLANT, CANCELLED = 0.25, 0.05  # as in methods/agm.py
 NODES = 16
-COSINES = np.cos((np.arange(NODES) + 0.5) * pi / NODES)
+COSINES = nodes(NODES)
 # where the rows of a tile begin: of what is given the last two, b and a
 B, A = 5 * TILE, 6 * TILE
 # pairs: k, L, L + k - a b, L + k + a b, b - a, b + a
@@ -72,7 +70,7 @@ def halley(c0, c1, c2, c3, c4, y):
 
 @inline
 def residual(c0, c1, c2, c3, c4, y):
-    """c(y) at a float64, by Horner's rule with the error of each operation: to a few UNIT of the sum of |terms|."""
+    """c(y) at a float64, by Horner's rule with the error of each operation: to a few 2^-98 of the sum of |terms|."""
     s, e = c4
     for high, low in (c3, c2, c1, c0):
         p, q = dd.two_prod(s, y)
@@ -91,8 +89,8 @@ def polished(c0, c1, c2, c3, c4, x):
     inverse = 1.0 / first
     move, size_inverse = residual(c0, c1, c2, c3, c4, x) * inverse, abs(inverse)
     turn = 0.5 * move * second * inverse
-    rest = 4.0 * turn * turn + size_inverse * (8.0 * EPS * steep + 2.0 * move * move * (a3 + 9.0 * a4))
-    bar = 2.0 * UNIT * (size * size_inverse + x) + abs(move) * rest
+    rest = 4.0 * turn * turn + size_inverse * (8.0 * ROUNDOFF * steep + 2.0 * move * move * (a3 + 9.0 * a4))
+    bar = 2.0 * PAIR_SUM_ROUNDOFF * (size * size_inverse + x) + abs(move) * rest
     return dd.quick_two_sum(x, -move * (1.0 + turn)), bar
 
 
@@ -229,14 +227,14 @@ def settle(work, i):
     level_rest = (level[0] - 0.5 * common[0]) + (level[1] - 0.5 * common[1])
     root_low, root_high = sqrt(far[0]), sqrt(near[0])
     g = root_low * root_high
-    error = 8.0 * (abs(k[0]) * (bar_v + bar_w) + UNIT * (abs(level[0]) + 8.0 * abs(k[0])))
+    error = 8.0 * (abs(k[0]) * (bar_v + bar_w) + PAIR_SUM_ROUNDOFF * (abs(level[0]) + 8.0 * abs(k[0])))
     smooth = middle[0] >= 0.0
     sure = (error < RIGHT * near[0]) & (error < RIGHT * far[0]) & (bar_v + bar_w < BLUR * width)
     sure &= smooth | ((error < RIGHT * abs(bend[0])) & (bar_v + bar_w < RIGHT * width))
     sure &= (bar_v < RIGHT * v[0]) & (bar_w < RIGHT * w[0])
     sure &= (bar_w < RIGHT * v_low[0]) & (bar_v < RIGHT * w_high[0])
     sure &= (work[MINUS + i] != 0.0) & (work[PLUS + i] != 0.0)
-    sure &= width > 4.0 * (bar_v + bar_w + EPS * (abs(low[0]) + abs(high[0])))  # else it is a regular precession
+    sure &= width > 4.0 * (bar_v + bar_w + ROUNDOFF * (abs(low[0]) + abs(high[0])))  # else it is a regular precession
     two = (k[0] > 0.0) & (bend[0] < 0.0)
     aside = (-0.5 * total[0] > high[0]) | (-0.5 * total[0] < low[0])  # Q is least outside the well
     sure &= (k[0] <= 0.0) | (bend[0] > error) | (aside & (bend[0] < -error))
@@ -358,8 +356,10 @@ def finish(work, size, drift, i, answers):
     exactly = fine & cancelled
     total = work[FINE_TOTAL + i] * period if exactly else total
     difference = work[FINE_DIFFERENCE + i] * period if exactly else difference
-    error, rounding = (work[FINE + i] * rough, 12.0 * EPS) if exactly else (25.0 * EPS * rough, 2.0 * EPS)
-    turned = 2.0 * EPS * pi
+    error, rounding = (
+        (work[FINE + i] * rough, 12.0 * ROUNDOFF) if exactly else (25.0 * ROUNDOFF * rough, 2.0 * ROUNDOFF)
+    )
+    turned = 2.0 * ROUNDOFF * pi
     precession, spin = pi * (turns_down + turns_up) + total, pi * (turns_down - turns_up) + difference
     error_precession = error + rounding * abs(total) + turned * abs(turns_down + turns_up)
     error_spin = error + rounding * abs(difference) + turned * abs(turns_down - turns_up)
@@ -368,21 +368,21 @@ def finish(work, size, drift, i, answers):
     action = (period * (work[LEVEL + i] + rest) - up - down) / (2.0 * pi)
     rough = period * (abs(work[LEVEL + i]) + abs(rest))
     rough += abs(minus) * (pi + size_up) + abs(plus) * (pi + size_down)
-    error_action = 25.0 * EPS * rough / (2.0 * pi)
+    error_action = 25.0 * ROUNDOFF * rough / (2.0 * pi)
     small = (error_action > 1e-14 * abs(action)) & (work[SMALL_ACTION + i] > 0.0)
     action = work[SMALL_ACTION + i] if small else action
     blur = (work[BAR_V + i] + work[BAR_W + i]) / width
-    error_action = (65.0 * EPS + 2.5 * blur) * action if small else error_action
+    error_action = (65.0 * ROUNDOFF + 2.5 * blur) * action if small else error_action
     period *= size
-    error_period = 15.0 * EPS * period
+    error_period = 15.0 * ROUNDOFF * period
     turned = drift * period
     answers[U_MIN + i], answers[U_MAX + i], answers[PERIOD + i] = work[LOW + i], work[HIGH + i], period
     answers[PRECESSION + i], answers[SPIN + i], answers[ACTION + i] = precession, spin + turned, action
-    answers[U_MIN_BAR + i] = work[BAR_W + i] + EPS * abs(work[LOW + i])
-    answers[U_MAX_BAR + i] = work[BAR_V + i] + EPS * abs(work[HIGH + i])
+    answers[U_MIN_BAR + i] = work[BAR_W + i] + ROUNDOFF * abs(work[LOW + i])
+    answers[U_MAX_BAR + i] = work[BAR_V + i] + ROUNDOFF * abs(work[HIGH + i])
     answers[PERIOD_BAR + i], answers[PRECESSION_BAR + i] = error_period, error_precession
     answers[ACTION_BAR + i] = error_action
-    answers[SPIN_BAR + i] = error_spin + 23.0 * EPS * abs(turned) + EPS * abs(spin + turned)
+    answers[SPIN_BAR + i] = error_spin + 23.0 * ROUNDOFF * abs(turned) + ROUNDOFF * abs(spin + turned)
     work[GOOD + i] = 0.0 if not sure else 1.0 if cancelled & (not fine) else 2.0
 
 
@@ -396,7 +396,7 @@ def add_node(work, cosine, i):
 
 
 @inline
-def judge(work, i):
+def conclude(work, i):
     """The action, or 0 where singularities are too near for so few nodes."""
     k, width, total = work[K + i], work[WIDTH + i], work[SUM + i]
     ratio = 0.25 * work[BEND + i] / k
@@ -413,7 +413,7 @@ def small_actions(work):
         for i in range(TILE):
             add_node(work, COSINES[j], i)
     for i in range(TILE):
-        judge(work, i)
+        conclude(work, i)
 
 
 @inline

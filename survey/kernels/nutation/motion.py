@@ -11,10 +11,9 @@ import numpy as np
 from survey.kernels.jit import inline
 from survey.kernels.math.carlson import rf, rj_spread
 from survey.kernels.math.elliptic import MEANS, means
+from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.nutation import records as rc
 from survey.kernels.nutation import wells as nu
-
-EPS = nu.EPS
 
 
 @inline
@@ -119,16 +118,16 @@ def motion(cosine, row, start, period, times, out):
         first, second = angles(row, z / rate, half, down, at)
         first, second = side * first - base_up, side * second - base_down
         all_up, all_down = first + 2.0 * n * up, second + 2.0 * n * down
-        late = (relative + 4.0 * EPS) * abs(times[j]) + (16.0 * EPS + relative) * (1.0 + quarter) / rate
+        late = (relative + 4.0 * ROUNDOFF) * abs(times[j]) + (16.0 * ROUNDOFF + relative) * (1.0 + quarter) / rate
         rate_up, rate_down = rates(row, at)
         moved = (abs(rate_up) + abs(rate_down)) * late + (abs(rate_up - first_up) + abs(rate_down - first_down)) * early
         late += early
         speed = row[nu.WIDTH] * sqrt(at[3] * at[4]) * at[5]
         bend = row[nu.WIDTH] * max(row[nu.Q_LOW], row[nu.Q_HIGH]) + 4.0 * abs(row[nu.K]) * row[nu.WIDTH] ** 2
-        rounding = 3.0 * (row[nu.BAR_LOW] + row[nu.BAR_HIGH]) + 8.0 * EPS * row[nu.WIDTH]
+        rounding = 3.0 * (row[nu.BAR_LOW] + row[nu.BAR_HIGH]) + 8.0 * ROUNDOFF * row[nu.WIDTH]
         out[j, rc.U], out[j, rc.PSI], out[j, rc.PHI] = at[0], all_up + all_down, all_down - all_up
         out[j, rc.U_BAR] = speed * late + bend * late * late + rounding
         size = abs(first) + abs(second) + abs(base_up) + abs(base_down) + abs(up) + abs(down)
-        turned = abs(n) * (period[rc.PRECESSION_BAR] + 4.0 * EPS * (abs(up) + abs(down)))
-        out[j, rc.PSI_BAR] = moved + (24.0 * EPS + 2.0 * relative) * size + turned
+        turned = abs(n) * (period[rc.PRECESSION_BAR] + 4.0 * ROUNDOFF * (abs(up) + abs(down)))
+        out[j, rc.PSI_BAR] = moved + (24.0 * ROUNDOFF + 2.0 * relative) * size + turned
         out[j, rc.PHI_BAR] = out[j, rc.PSI_BAR]

@@ -9,7 +9,8 @@ from math import copysign, inf, nan, sqrt
 
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math import double as dd
-from survey.kernels.math.quartic import ROUGH, UNIT, root, roughly, slope, slopes, value
+from survey.kernels.math.quartic import ROUGH, root, roughly, slope, slopes, value
+from survey.kernels.math.roundoff import PAIR_SUM_ROUNDOFF, ROUNDOFF
 
 # places in a row: turning points (1 - u and 1 + u of each), Q there and at the poles, b - a and b + a, the rest of P
 LOW, HIGH, LOW_PLUS, LOW_MINUS, HIGH_PLUS, HIGH_MINUS, WIDTH, SUM = range(8)
@@ -23,7 +24,6 @@ SIZE = 2 * REST
 NONE, LOST, SEPARATRIX, NUTATION, PRECESSION, PASSAGE = -2, -1, 0, 1, 2, 3
 NEWTON = 60
 LOST_DIGITS = 1e-18
-EPS = 2.0**-53
 TINY = 1e-300
 
 
@@ -65,7 +65,7 @@ def saddle(a, b, k):
             break
     level, rise = torque(u, a, b, k)
     if not rise > 0.0:
-        return 0.0, 0.0, abs(u) < 0.4 and rise > -32.0 * EPS * (a * a + b * b + k)
+        return 0.0, 0.0, abs(u) < 0.4 and rise > -32.0 * ROUNDOFF * (a * a + b * b + k)
     before, least = u, abs(level)
     for _ in range(NEWTON):  # from there F is convex towards its zero, if it has one
         if not rise > 0.0:  # beyond the least |F|, which is more than half of that at the step before
@@ -73,7 +73,7 @@ def saddle(a, b, k):
         move, before, least = level / rise, u, abs(level)
         u -= move
         level, rise = torque(u, a, b, k)
-        if abs(move) <= 4.0 * EPS * abs(u):
+        if abs(move) <= 4.0 * ROUNDOFF * abs(u):
             break
     if abs(u) >= 0.4:
         return 0.0, 0.0, False
@@ -86,7 +86,7 @@ def saddle(a, b, k):
 @inline
 def roughness(u, a, b, k):
     """The rounding of F at a saddle."""
-    return 8.0 * EPS * ((abs(a) + abs(b * u)) * (abs(b) + abs(a * u)) + k * abs(u))
+    return 8.0 * ROUNDOFF * ((abs(a) + abs(b * u)) * (abs(b) + abs(a * u)) + k * abs(u))
 
 
 @kernel
@@ -113,7 +113,7 @@ def lowest(square, product, k, most):
         new = v - move
         if not low < new < high:
             new = 0.5 * (low + high)
-        if abs(new - v) <= 2.0 * EPS * v:
+        if abs(new - v) <= 2.0 * ROUNDOFF * v:
             return new
         v = new
     return v
@@ -126,7 +126,7 @@ def peak(c, y, at):
     At a pole (y = 0) that the motion may reach P is 0, and half its slope `at` speaks instead.
     """
     if y == 0.0:
-        return y, at, 4.0 * UNIT * (abs(c[4][0]) + abs(c[2][0]))
+        return y, at, 4.0 * PAIR_SUM_ROUNDOFF * (abs(c[4][0]) + abs(c[2][0]))
     height, size = roughly(c, y)
     _first, second = slopes(c, y)
     if height < ROUGH * size and second < 0.0:
@@ -134,7 +134,7 @@ def peak(c, y, at):
         if abs(move) < 1e-3 * y:
             y -= move
             height, size = roughly(c, y)
-    return y, height, 4.0 * UNIT * size
+    return y, height, 4.0 * PAIR_SUM_ROUNDOFF * size
 
 
 @kernel
@@ -164,15 +164,15 @@ def inner(equatorial, loose, inside, outside):
 
 @inline
 def looseness(a, b, rough):
-    """The rounding of P(0) = L - a^2 - b^2, which may nearly cancel; that of L's terms is `rough` UNIT/4."""
-    return 0.25 * UNIT * (a * a + b * b + rough)
+    """The rounding of P(0) = L - a^2 - b^2, which may nearly cancel; `rough` times 2^-100 is that of L's terms."""
+    return 0.25 * PAIR_SUM_ROUNDOFF * (a * a + b * b + rough)
 
 
 @inline
 def hill_at_pole(gap, product, k, at):
     """L above W at a pole that the motion may reach (b -+ a = 0) and where W is greatest, and its bar; or NaN."""
     if gap == 0.0 and product + 4.0 * k < 0.0:
-        return at, 4.0 * UNIT * (abs(product) + abs(k) + abs(at))
+        return at, 4.0 * PAIR_SUM_ROUNDOFF * (abs(product) + abs(k) + abs(at))
     return nan, 0.0
 
 
@@ -206,7 +206,7 @@ def fill(gaps, k, level, ats, equatorial, loose, right, left, row):
     put(row, LOW_MINUS, w)
     put(row, HIGH_PLUS, v)
     put(row, HIGH_MINUS, wh)
-    row[BAR_HIGH], row[BAR_LOW] = bar_v + EPS * abs(uh[0]), bar_w + EPS * abs(ul[0])
+    row[BAR_HIGH], row[BAR_LOW] = bar_v + ROUNDOFF * abs(uh[0]), bar_w + ROUNDOFF * abs(ul[0])
     row[NOISE_WIDTH] = (bar_v + bar_w) / max(width, TINY)
     put(row, K, k)
     put(row, L, level)
@@ -232,10 +232,14 @@ def fill(gaps, k, level, ats, equatorial, loose, right, left, row):
     row[Q_MINUS] = q_minus[0] if plus[0] == 0.0 else plus[0] * plus[0] / (w[0] * wh[0])
     # errors: of Q, what the pole's slope and the turning points leave
     bar = bar_v + bar_w
-    moved = abs(k[0]) * (bar + 16.0 * UNIT)
+    moved = abs(k[0]) * (bar + 16.0 * PAIR_SUM_ROUNDOFF)
     near, far = from_plus[0], from_minus[0]
-    plus_side = (8.0 * UNIT * abs(ats[0][0]) + (abs(row[Q_PLUS]) + 4.0 * abs(k[0])) * bar) / max(near, TINY)
-    minus_side = (8.0 * UNIT * abs(ats[1][0]) + (abs(row[Q_MINUS]) + 4.0 * abs(k[0])) * bar) / max(far, TINY)
+    plus_side = (8.0 * PAIR_SUM_ROUNDOFF * abs(ats[0][0]) + (abs(row[Q_PLUS]) + 4.0 * abs(k[0])) * bar) / max(
+        near, TINY
+    )
+    minus_side = (8.0 * PAIR_SUM_ROUNDOFF * abs(ats[1][0]) + (abs(row[Q_MINUS]) + 4.0 * abs(k[0])) * bar) / max(
+        far, TINY
+    )
     plus_side, minus_side = plus_side + 8.0 * moved * near, minus_side + 8.0 * moved * far
     row[NOISE_HIGH] = (plus_side if uh[0] >= 0.0 else minus_side) / max(row[Q_HIGH], TINY)
     row[NOISE_LOW] = (plus_side if ul[0] >= 0.0 else minus_side) / max(row[Q_LOW], TINY)
@@ -244,7 +248,7 @@ def fill(gaps, k, level, ats, equatorial, loose, right, left, row):
     beside_saddle(equatorial, uh, bar_v, -1.0, row, Q_HIGH, NOISE_HIGH)
     beside_saddle(equatorial, ul, bar_w, 1.0, row, Q_LOW, NOISE_LOW)
     row[NOISE_ENDS] = max(bar_v / max(v[0], TINY), bar_w / max(w[0], TINY), bar_v / wh[0], bar_w / vl[0])
-    rough = 8.0 * (moved + UNIT * (abs(level[0]) + abs(k[0])))
+    rough = 8.0 * (moved + PAIR_SUM_ROUNDOFF * (abs(level[0]) + abs(k[0])))
     row[NOISE_ABOVE] = noise_above(row, rough, at_lowest(equatorial, loose, k, total, ul, uh, bar_w, bar_v, rough, row))
 
 
@@ -252,7 +256,7 @@ def fill(gaps, k, level, ats, equatorial, loose, right, left, row):
 def direct(k, rest, square, u, bar, row, place, error):
     """Q at a turning point as L - k + k (S^2 + 2 u^2), where that is better known than from the pole."""
     value = dd.add(rest, dd.mul(k, dd.add(square, dd.times(dd.mul(u, u), 2.0))))
-    noise = 8.0 * (abs(k[0]) * bar + UNIT * (abs(rest[0]) + 8.0 * abs(k[0])))
+    noise = 8.0 * (abs(k[0]) * bar + PAIR_SUM_ROUNDOFF * (abs(rest[0]) + 8.0 * abs(k[0])))
     if noise < row[error] * value[0]:
         put(row, place, value)
         row[error] = noise / value[0]
@@ -274,7 +278,7 @@ def beside_saddle(equatorial, u, bar, side, row, place, error):
     terms = abs(equatorial[1][0]) + abs(u[0]) * (2.0 * abs(equatorial[2][0]) + 4.0 * abs(equatorial[4][0]) * u[0] ** 2)
     if side * steep[0] > 0.0:
         put(row, place, dd.over(steep, side * row[WIDTH]))
-        row[error] = (4.0 * UNIT * terms + abs(second) * bar) / abs(steep[0]) + 2.0 * EPS
+        row[error] = (4.0 * PAIR_SUM_ROUNDOFF * terms + abs(second) * bar) / abs(steep[0]) + 2.0 * ROUNDOFF
 
 
 @kernel
@@ -286,7 +290,7 @@ def still(gaps, k, level, ats, equatorial, loose, y, hum, chart, plus, row):
     """
     _first, second = slopes(chart, y)
     square = max(-second, TINY)
-    bar, wide = EPS * y, 2.0 * sqrt(hum / square) if y > 0.0 else 8.0 * hum / square
+    bar, wide = ROUNDOFF * y, 2.0 * sqrt(hum / square) if y > 0.0 else 8.0 * hum / square
     near, far = ((y, 0.0), dd.two_sum(2.0, -y), bar), (dd.two_sum(2.0, -y), (y, 0.0), bar)
     if plus:
         fill(gaps, k, level, ats, equatorial, loose, near, far, row)
@@ -321,8 +325,10 @@ def at_lowest(equatorial, loose, k, total, ul, uh, bar_w, bar_v, bar, row):
     product, off = dd.mul(left, right), dd.add((u, 0.0), dd.times(total, 0.5))
     q = dd.div(height, product)
     better = dd.times(dd.sub(q, dd.mul(k, dd.mul(off, off))), 4.0)
-    noise = bar_w / left[0] + bar_v / right[0] + 2.0 * EPS
-    error = 4.0 * ((UNIT * size + loose) / product[0] + abs(q[0]) * noise + k[0] * abs(off[0]) * (bar_w + bar_v))
+    noise = bar_w / left[0] + bar_v / right[0] + 2.0 * ROUNDOFF
+    error = 4.0 * (
+        (PAIR_SUM_ROUNDOFF * size + loose) / product[0] + abs(q[0]) * noise + k[0] * abs(off[0]) * (bar_w + bar_v)
+    )
     if error < bar:
         put(row, BEND, better)
     return min(error, bar)
@@ -349,7 +355,7 @@ def barrier(a, b, k, equatorial, loose, at_plus, at_minus):
     if rise > 0.0:
         height, size = value(equatorial, (between, 0.0))
         rough = roughness(between, a, b, size_k)
-        bar = 4.0 * (UNIT * size + loose) + rough**2 / rise  # the saddle's place is as good as F there
+        bar = 4.0 * (PAIR_SUM_ROUNDOFF * size + loose) + rough**2 / rise  # the saddle's place is as good as F there
         return height[0] / ((1.0 - between) * (1.0 + between)), bar, between, rise
     distance, bar = nan, 0.0
     if size_k < 0.0:

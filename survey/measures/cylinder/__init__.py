@@ -1,9 +1,14 @@
 """Flows on the cylinder, phi' = w, w' = f(phi) w + g(phi): solutions, fates, portraits.
 
-METHODS lists what a method that serves the family "cylinder" offers; one that answers some questions only says so in
-WHEN. P (rows, 10) holds the coefficients of `kernels.cylinder.flow`; `starts` (rows, 2) holds phi0 and w0; `tolerance`
-bounds the truncation of one step; `limit` is a budget of steps. phi is in radians; t and w are in the parameters'
-units.
+METHODS lists what a method that serves the family "cylinder" offers; one that answers only some questions says so in
+WHEN, and leaves out what the others need. A method that has one step is made complete by `survey.kernels.cylinder`:
+`along`, `returns` and `fate` take its `flow_setting`, `flow_begin` and `flow_at`.
+
+P (rows, 10) holds the columns B12 to BOUND_DDG of `survey.kernels.cylinder.flow`, p is one row of it; `starts`
+(rows, 2) holds phi0 and w0. `tolerance` bounds the truncation error of one step (of phi, and of w relative to 1 + |w|),
+`limit` is a budget of steps. The columns of `floats`, of starts with error bounds and of fates are those of `records`
+in `survey.kernels.cylinder`; the tables of equilibria and of cycles are described in `equilibria` and `returns` there,
+the codes of `status` in `along`. phi is in radians; t and w are in the units of the parameters.
 """
 
 from survey.contract import Function, Value
@@ -13,32 +18,40 @@ METHODS = {
         "FLOW_FINEST": Value("the least tolerance of one step that is of use", float, needed=True),
         "FLOW_WORK": Value("how many steps it takes where Taylor's method of order 20 takes one", int, needed=True),
         "flow_trajectories": Function(
-            "fill floats (rows, n, 4: phi, w, bars), turnings (rows, n) and status (rows) at ascending times >= 0",
+            "fill floats (rows, n, STATE: PHI to W_BAR), turnings (rows, n; UNDETERMINED if unknown) and status (rows) "
+            "at ascending times (rows, n) >= 0, a row of which may end in infinities",
             ("P", "starts", "times", "tolerance", "limit", "floats", "turnings", "status"),
             needed=True,
         ),
         "flow_turnings": Function(
-            "fill turnings (rows, n) where they are untold, also far into a focus",
+            "fill turnings (rows, n) where they are UNDETERMINED, also far into a focus",
             ("P", "starts", "times", "tolerance", "limit", "turnings"),
         ),
         "flow_abels": Function(
-            "fill floats (rows, n, 4: w, t, bars) and status (rows, n) at ascending targets phi >= phi0, for w0 >= 0",
+            "fill floats (rows, n, STATE: VALUE to TIME_BAR) and status (rows, n) at ascending targets phi >= phi0, "
+            "for w0 >= 0",
             ("P", "starts", "targets", "tolerance", "limit", "floats", "status"),
         ),
         "flow_image": Function(
-            "one return map at x, see `kernels.cylinder.returns.image`",
+            "fill `node` with the image of x under one return map, see `kernels.cylinder.returns.image`",
             ("kind", "p", "eqs", "count", "place", "x", "tolerance", "node"),
         ),
         "flow_cycles": Function(
-            "fixed points of a return map, see `kernels.cylinder.returns.fixed_points`",
+            "append the fixed points of a return map to `cycles`, see `kernels.cylinder.returns.fixed_points`",
             ("kind", "p", "eqs", "count", "place", "interval", "xs", "tolerance", "cycles", "found", "edges"),
         ),
         "flow_fates": Function(
-            "fates of initial states, see `kernels.cylinder.fate.fates`",
+            "fill out (rows, FATE) for initial states, see `kernels.cylinder.fate.fates`",
             ("p", "section", "ends", "sizes", "eqs", "plus", "minus", "lib", "starts", "tolerance", "limit", "out"),
         ),
-        "flow_setting": Function("what steers the steps of one solution", None),
-        "flow_begin": Function("expand at (phi, w); returns the step", None),
-        "flow_at": Function("(phi, w, integral of f, integral of g) at dt after the start of the step", None),
+        "flow_setting": Function("what steers the steps of one solution", ("p", "w", "tolerance")),
+        "flow_begin": Function(
+            "expand at (phi, w) into the table T of `kernels.cylinder.flow`, steered by `flow_setting`; returns the "
+            "length of the step",
+            None,
+        ),
+        "flow_at": Function(
+            "(phi, w, integral of f, integral of g) at dt after the start of the step in T", ("p", "T", "dt")
+        ),
     }
 }

@@ -3,33 +3,34 @@
 The rule is read off the true errors that `workflows/gyrostat_methods.py` maps (rtol = 1e-10). Of all initial states of
 a system with b = 0 a closed form serves every one on that plane, with a median error of 4e-16 against 9e-15 of the
 Taylor series and at a cost free of t. Next to double and triple roots (separatrices, folds) it serves 38 % of the
-plane, the series 84 %; on (61), from conservative to stiff, 87 % and 100 %. The bars tell where: so `method`, the
-Taylor series, is asked where no closed form answers or its bar misses rtol, and its answer is taken where its bar is no
-wider. dop853, rk4 or full alone serve 5 points of 4776. What still misses rtol is solved in double-double arithmetic.
+plane, the series 84 %; on (61), from conservative to stiff, 87 % and 100 %. The error bounds show where: so `method`,
+the Taylor series, is asked where no closed form answers or its bound misses rtol, and its answer is taken where its
+bound is no wider. dop853, rk4 or full alone serve 5 points of 4776. What still misses rtol is solved in double-double
+arithmetic.
 """
 
 import numpy as np
 
 from survey.kernels.cylinder import taylor_double
-from survey.kernels.cylinder.along import EQUILIBRIUM, NO_CONVERGENCE, OK, SEPARATRIX, TURNING, UNTOLD
+from survey.kernels.cylinder.steps import EQUILIBRIUM, NO_CONVERGENCE, OK, SEPARATRIX, TURNING, UNDETERMINED
 from survey.measures.cylinder import solution
 from survey.methods import closed
 
-FINEST = 3e-16  # less than this no float64 can tell
+FINEST = 3e-16  # no float64 can be known better
 
 
 def trajectories(method, rows, times, rtol):
-    """As `cylinder.trajectories`: in closed form, and by `method` where that has no answer or too wide a bar."""
+    """As `cylinder.trajectories`: in closed form, and by `method` where that has no answer or too wide a bound."""
     results = solution.trajectories(closed, rows, times, rtol)
-    missed, untold = solution.missed(results, rtol), results[1] == UNTOLD
-    if untold.any():
-        missed |= untold
-        results[0][untold] = np.nan
-        results[2][untold & (results[2] == OK)] = closed.NO_CONVERGENCE
+    missed, uncounted = solution.missed(results, rtol), results[1] == UNDETERMINED
+    if uncounted.any():
+        missed |= uncounted
+        results[0][uncounted] = np.nan
+        results[2][uncounted & (results[2] == OK)] = closed.NO_CONVERGENCE
     if not missed.any():
         return results
     results = _completed(results, missed, lambda some, at: solution.trajectories(method, some, at, rtol), rows, times)
-    left = _left_open(results, rtol) | ((results[1] == UNTOLD) & (results[2] == OK))
+    left = _left_open(results, rtol) | ((results[1] == UNDETERMINED) & (results[2] == OK))
     exact = taylor_double
     return _completed(results, left, lambda some, at: solution.trajectories(exact, some, at, rtol), rows, times)
 
@@ -46,22 +47,22 @@ def abel(method, rows, targets, rtol, before=False):
 
 
 def _left_open(results, rtol):
-    """What double-double arithmetic may still tell: all that misses rtol, but by too many steps or an overflow."""
+    """What double-double arithmetic may still answer: what misses rtol, unless by too many steps or an overflow."""
     status = results[-1]
     answered = (status == OK) | (status == TURNING) | (status == NO_CONVERGENCE) | (status == SEPARATRIX)
     return answered & solution.missed(results, max(rtol, FINEST))
 
 
-def _completed(results, missed, solve, rows, places):
-    """`results` with those of `solve` put in where they are missed and `solve` does no worse."""
+def _completed(results, missed, solve, rows, columns):
+    """`results`, with those of `solve` where they are `missed` and `solve` does no worse."""
     some = missed.any(axis=1)
     if not some.any():
         return results
-    others = solve(rows[some], np.where(missed[some], places[some], np.inf))
+    others = solve(rows[some], np.where(missed[some], columns[some], np.inf))
     old = [result[some] for result in results]
     take = missed[some] & (solution.badness(others) <= solution.badness(old))
-    if len(others) == 3:  # turnings that either tells are certain
-        np.copyto(others[1], old[1], where=others[1] == UNTOLD)
+    if len(others) == 3:  # turnings that either knows are certain
+        np.copyto(others[1], old[1], where=others[1] == UNDETERMINED)
     for result, held, new in zip(results, old, others, strict=True):
         held[take] = new[take]
         result[some] = held

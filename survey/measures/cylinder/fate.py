@@ -16,9 +16,9 @@ from survey.kernels.cylinder import fate as kf
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder import returns as rt
 from survey.kernels.cylinder import taylor_double
-from survey.kernels.cylinder.along import OK, SEPARATRIX, STEP_LIMIT
 from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, coefficients
 from survey.kernels.cylinder.flow_double import energy as energy_beside
+from survey.kernels.cylinder.steps import OK, SEPARATRIX, STEP_LIMIT
 from survey.measures.cylinder.solution import tolerances, trajectories
 
 NO_TURNS = kf.NO_TURNS
@@ -37,7 +37,7 @@ def empty(size, status):
     """The outputs of `solve` for `size` states, filled with what does not apply."""
     floats = ("limit_phi", "limit_w", "multiplier")
     result = {name + end: np.full(size, np.nan) for name in floats for end in ("", "_error")}
-    for name, fill in (("verdict", -1), ("turnings", kf.UNTOLD), ("net_turns", NO_TURNS), ("status", status)):
+    for name, fill in (("verdict", -1), ("turnings", kf.UNDETERMINED), ("net_turns", NO_TURNS), ("status", status)):
         result[name] = np.full(size, fill, dtype=np.int64)
     return result
 
@@ -53,18 +53,18 @@ def solve(method, six, starts, rtol, result, where):
         _limits(s, row, result, i)
     middle = np.where(out[:, rc.NET_TURNS] != NO_TURNS, 0.0, np.nan) + _middles(s, out)
     turns = np.trunc((middle + 2.0 * math.pi * out[:, rc.NET_TURNS] - starts[:, 0]) / (2.0 * math.pi))
-    told = np.isfinite(turns) & (out[:, rc.VERDICT] != kf.PERIODIC_LIBRATION)
-    result["net_turns"][where[told]] = turns[told]
+    known = np.isfinite(turns) & (out[:, rc.VERDICT] != kf.PERIODIC_LIBRATION)
+    result["net_turns"][where[known]] = turns[known]
 
 
 def followed(method, s, starts, rtol):
-    """`fates` of the skeleton s, once more with more effort where they are not decided."""
+    """`fates` of the skeleton s, solved again with a greater budget or finer steps where they are not decided."""
     first, second = tolerances(method, rtol)
     out = fates(method, s, starts, first)
     for code, tolerance in ((STEP_LIMIT, first), (SEPARATRIX, second)):
-        again = out[:, rc.STATUS] == code
-        if again.any():
-            out[again] = fates(method, s, starts[again], tolerance, MORE)
+        open_ = out[:, rc.STATUS] == code
+        if open_.any():
+            out[open_] = fates(method, s, starts[open_], tolerance, MORE)
     if s.stratum not in (I0, I1) and starts.shape[1] == 2:  # no better than the bars of a start can its fate be
         for i in np.flatnonzero(out[:, rc.STATUS] == SEPARATRIX):
             _handed_over(method, s, starts[i], first, out[i])
@@ -72,7 +72,7 @@ def followed(method, s, starts, rtol):
 
 
 def _handed_over(method, s, start, tolerance, out):
-    """Follow one start in double-double past what float64 cannot tell, until its fate from there on is decided."""
+    """Follow one start in double-double past what float64 cannot decide, until its fate from there on is decided."""
     times = HANDED_OVER / (s.p[BOUND_F] + math.sqrt(s.p[BOUND_DG]) + abs(start[1]))
     row, done = np.concatenate([s.p[:6], start])[None], 0
     for last in (10, 19, len(times)):  # most are decided early, and what comes later costs most
@@ -82,7 +82,7 @@ def _handed_over(method, s, start, tolerance, out):
             if later[rc.VERDICT] != kf.UNDECIDED:
                 out[:] = later
                 if later[rc.TURNINGS] >= 0:
-                    out[rc.TURNINGS] = later[rc.TURNINGS] + turned if turned >= 0 else kf.UNTOLD
+                    out[rc.TURNINGS] = later[rc.TURNINGS] + turned if turned >= 0 else kf.UNDETERMINED
                 return
         done = last
 
@@ -222,7 +222,7 @@ def _rotations(method, six, eqs, section, K, L):
     table, edges, fine = np.zeros((rt.MOST_CYCLES, 10)), np.zeros(7), max(FINE, method.FLOW_FINEST)
     xs = scale * np.geomspace(LEAST, 30.0, 80)
     found = method.flow_cycles(rt.ROTATION, p, eqs, len(eqs), section, 0, xs, fine, table, 0, edges)
-    border, start, untold = edges[:2].copy(), edges[4], edges[6]
+    border, start, unknown = edges[:2].copy(), edges[4], edges[6]
     end = np.sign(K) if K != 0.0 else np.sign(L)
     top, change, error, last = xs[-1], edges[2], edges[3], 0.0
     while change * end < 0.0 and abs(change) > 4.0 * error and top < 1e5 * scale and found < len(table) - 1:
@@ -230,7 +230,7 @@ def _rotations(method, six, eqs, section, K, L):
         xs = top * np.array([1.0, 1.3, 1.7, 2.2, 3.0])
         before = found
         found = method.flow_cycles(rt.ROTATION, p, eqs, len(eqs), section, 0, xs, fine, table, found, edges)
-        untold += edges[6]
+        unknown += edges[6]
         if found > before and (found - before) % 2:
             break
         top, change, error = xs[-1], edges[2], edges[3]
@@ -243,13 +243,13 @@ def _rotations(method, six, eqs, section, K, L):
     near = np.sign(border[1] - border[0]) if border[0] > 0.0 else np.sign(start)
     sure = border[0] > 0.0 or start > LEAST * scale
     sides = [near, *(cycles[:, rt.ABOVE])], [*cycles[:, rt.BELOW], end]
-    return cycles, border, bool(untold == 0.0 and sure and found < len(table) - 2 and sides[0] == sides[1])
+    return cycles, border, bool(unknown == 0.0 and sure and found < len(table) - 2 and sides[0] == sides[1])
 
 
 def _far_cycle(p, section, K, L, scale):
-    """The large cycle w(0) ~ -L/(pi K) where the return map cannot tell it (D = pi K/w^2 + ..., below rounding).
+    """The large cycle w(0) ~ -L/(pi K) where the return map does not show it (D = pi K/w^2 + ..., below rounding).
 
-    The expansion leaves a shift of the size of the velocities of the system, which the bar covers.
+    The expansion leaves a shift of the size of the velocities of the system, which the error bound covers.
     """
     b12, b31 = p[0], p[1]
     w = -L / (math.pi * K) - 2.0 * b31 + b12 * math.sin(section) + b31 * math.cos(section) - b31
@@ -274,7 +274,7 @@ def _librations(method, p, eqs):
 
 
 def fates(method, skeleton, starts, tolerance, more=1):
-    """The fates (VERDICT to STATUS of `records`) of starts phi0, w0 (and their bars)."""
+    """The fates (VERDICT to STATUS of `records`) of starts phi0, w0 (and their error bounds)."""
     if skeleton.stratum in (I0, I1):
         return (_free if skeleton.stratum == I0 else _conservative)(skeleton, starts)
     out = np.zeros((len(starts), rc.FATE))
@@ -307,7 +307,7 @@ def _free(s, starts):
             row[rc.VERDICT], row[rc.NET_TURNS] = kf.EQUILIBRIUM_START, 0
             row[rc.LIMIT_PHI], row[rc.LIMIT_PHI_BAR] = phi, 0.0
         elif abs(abs(y) - b) <= noise:
-            row[rc.VERDICT], row[rc.TURNINGS], row[rc.STATUS] = kf.UNDECIDED, kf.UNTOLD, SEPARATRIX
+            row[rc.VERDICT], row[rc.TURNINGS], row[rc.STATUS] = kf.UNDECIDED, kf.UNDETERMINED, SEPARATRIX
         elif abs(y) > b:
             row[rc.VERDICT] = kf.PERIODIC_ROTATION
         else:  # the next root of y + b cos(phi - axis) ahead
@@ -320,7 +320,7 @@ def _free(s, starts):
 
 
 def _above(p, phi, w, row):
-    """Sign of the energy less that of the equilibrium `row`, in double-double; 0 where its bar reaches 0."""
+    """Sign of the energy less that of the equilibrium `row`, in double-double; 0 where its error bound reaches 0."""
     gap, bar = energy_beside(p, phi, w, row[eq.ANGLE])
     bar += 0.5 * p[BOUND_DG] * row[eq.BAR] ** 2  # V' = 0 at the equilibrium
     return 0 if abs(gap) <= bar else math.copysign(1.0, gap)
@@ -350,7 +350,7 @@ def _conservative(s, starts):
     out[:, rc.TURNINGS] = np.where(rotates, 0, kf.INFINITE)
     out[:, rc.NET_TURNS] = np.where(rotates, kf.NO_TURNS, 0)
     out[near, rc.VERDICT], out[near, rc.STATUS] = kf.UNDECIDED, SEPARATRIX
-    out[near, rc.TURNINGS], out[near, rc.NET_TURNS] = kf.UNTOLD, kf.NO_TURNS
+    out[near, rc.TURNINGS], out[near, rc.NET_TURNS] = kf.UNDETERMINED, kf.NO_TURNS
     for i in np.flatnonzero(w == 0.0):
         row = eq.resting(s.p, s.equilibria, len(s.equilibria), phi[i])
         if row >= 0:

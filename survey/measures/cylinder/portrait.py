@@ -1,8 +1,8 @@
 """Portraits of the flow phi' = w, w' = f w + g on the cylinder: what does not depend on the initial state, in numbers.
 
 Ends, equilibria and cycles are those of the skeleton that decides the fates (`fate`). Here each cycle is
-followed once more for its period, and the unstable branches of the saddles are followed to where they end: where all
-of them end elsewhere than in a saddle there is no saddle connection.
+followed again for its period, and the unstable branches of the saddles are followed to their ends: where none of them
+ends in a saddle there is no saddle connection.
 """
 
 import math
@@ -13,16 +13,18 @@ import numpy as np
 from survey.kernels.cylinder import equilibria as eq
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder import returns as rt
-from survey.kernels.cylinder.along import TURNING
 from survey.kernels.cylinder.branches import unstable
-from survey.kernels.cylinder.flow import BOUND_DDG, BOUND_DG, BOUND_F, UNIT
+from survey.kernels.cylinder.flow import BOUND_DDG, BOUND_DG, BOUND_F
+from survey.kernels.cylinder.steps import TURNING
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.measures.cylinder import solution
 from survey.measures.cylinder.fate import EXACT, I0, G, followed, remembered, sizes
 from survey.status import NO_CONVERGENCE, OK
 
-CYCLES, EQUILIBRIA = 8, 4  # places; surveys of random points found no more than 4 cycles, and g has 4 roots at most
+# As many are kept: surveys of random points found no more than 4 cycles, and g has 4 roots at most.
+CYCLES, EQUILIBRIA = 8, 4
 NONE, ROTATION_PLUS, ROTATION_MINUS, LIBRATION = range(4)
-TOO_MANY, UNTOLD_RESTS = 20, 21  # as in the STATUS of scenes/gyrostat.py
+TOO_MANY, UNKNOWN_RESTS = 20, 21  # as in the STATUS of scenes/gyrostat.py
 UNDECIDED, DEGENERATE, STABLE = -1, 0, 1
 COUNTS = ("equilibria", "saddles", "rotations_plus", "rotations_minus", "librations")
 ROUNDING = 4e-16  # of K and L, relative to the sizes of their terms
@@ -36,8 +38,8 @@ def empty(count, status):
     result = {name + end: np.full((count, *extra), np.nan) for name, extra in floats.items() for end in ("", "_error")}
     for name in ("stratum", "end_plus", "end_minus", *COUNTS, "verdict"):
         result[name] = np.full(count, -1, dtype=np.int64)
-    for name, places in (("equilibrium_type", EQUILIBRIA), ("cycle_kind", CYCLES)):
-        result[name] = np.full((count, places), NONE, dtype=np.int64)
+    for name, size in (("equilibrium_type", EQUILIBRIA), ("cycle_kind", CYCLES)):
+        result[name] = np.full((count, size), NONE, dtype=np.int64)
     return result | {"status": np.full(count, status, dtype=np.int64)}
 
 
@@ -48,15 +50,15 @@ def solve(method, systems, rtol):
         s = remembered(method, six)
         _ends(s, six, result, i)
         if any(_is_degenerate(s, row) for row in s.equilibria):
-            # how many equilibria and cycles there are then, the error bars do not tell
-            result["verdict"][i], result["status"][i] = DEGENERATE, UNTOLD_RESTS
+            # then the error bounds leave open how many equilibria and cycles there are
+            result["verdict"][i], result["status"][i] = DEGENERATE, UNKNOWN_RESTS
             continue
         result["verdict"][i] = _verdict(method, s, rtol)
         _rests(s, result, i)
         cycles = [(kind, row) for kind, table in enumerate((s.plus, s.minus, s.librations), 1) for row in table]
         if len(cycles) > CYCLES:
             result["verdict"][i], result["status"][i] = UNDECIDED, TOO_MANY
-        listed += [(i, place, kind, row, s, six) for place, (kind, row) in enumerate(cycles[:CYCLES])]
+        listed += [(i, at, kind, row, s, six) for at, (kind, row) in enumerate(cycles[:CYCLES])]
     for kinds, timed in (((ROTATION_PLUS, ROTATION_MINUS), _rotations), ((LIBRATION,), _librations)):
         some = [cycle for cycle in listed if cycle[2] in kinds]
         if some:
@@ -80,14 +82,14 @@ def _rests(s, result, i):
     rests = (-1, -1) if s.stratum == I0 else (len(kinds), np.count_nonzero(kinds == eq.SADDLE))
     for name, number in zip(COUNTS, (*rests, *cycles), strict=True):
         result[name][i] = number
-    for place, row in enumerate(s.equilibria[:EQUILIBRIA]):
-        result["equilibrium_phi"][i, place] = row[eq.ANGLE]
-        result["equilibrium_phi_error"][i, place] = row[eq.BAR] + 1e-15
-        result["equilibrium_type"][i, place] = _type(row)
+    for at, row in enumerate(s.equilibria[:EQUILIBRIA]):
+        result["equilibrium_phi"][i, at] = row[eq.ANGLE]
+        result["equilibrium_phi_error"][i, at] = row[eq.BAR] + 1e-15
+        result["equilibrium_type"][i, at] = _type(row)
 
 
 def _type(row):
-    """1 saddle, 2 to 7 node or focus: attracting, weak (f = 0 within the bar), repelling; 8 degenerate."""
+    """1 saddle, 2 to 7 node or focus: attracting, weak (f = 0 within the error bound), repelling; 8 degenerate."""
     kind = int(row[eq.KIND])
     if kind in (eq.NODE, eq.FOCUS):
         return 3 + int(row[eq.STABLE]) + 3 * (kind == eq.FOCUS)
@@ -95,7 +97,7 @@ def _type(row):
 
 
 def _verdict(method, s, rtol):
-    """Is the point structurally stable, by the error bars?"""
+    """Is the point structurally stable, by the error bounds?"""
     scale = s.p[BOUND_F] + math.sqrt(s.p[BOUND_DG])
     degenerate = s.stratum != G or (s.K == 0.0 and not _is_exact(s.p))
     degenerate = degenerate or any(not _hyperbolic(row) for row in s.librations)
@@ -117,15 +119,15 @@ def _is_exact(p):
 
 
 def _is_degenerate(s, row):
-    """Does the bar of an equilibrium reach g' = 0, or f = 0 where it is no saddle (in stratum G a Hopf point)?"""
+    """Does the bound of an equilibrium reach g' = 0, or f = 0 where it is no saddle (in stratum G a Hopf point)?"""
     p = s.p
-    if row[eq.KIND] == eq.DEGENERATE or abs(row[eq.DG]) <= p[BOUND_DDG] * row[eq.BAR] + 8.0 * UNIT * p[BOUND_DG]:
+    if row[eq.KIND] == eq.DEGENERATE or abs(row[eq.DG]) <= p[BOUND_DDG] * row[eq.BAR] + 8.0 * ROUNDOFF_UP * p[BOUND_DG]:
         return True
     return s.stratum == G and row[eq.KIND] != eq.SADDLE and row[eq.STABLE] == 0.0
 
 
 def _hyperbolic(row):
-    """Does the bar of a cycle's multiplier keep off 1?"""
+    """Does the error bound of a cycle's multiplier keep off 1?"""
     return row[rt.CYCLE_CLASS] >= 0.0 and abs(row[rt.MULTIPLIER] - 1.0) > row[rt.MULTIPLIER_BAR]
 
 
@@ -139,7 +141,7 @@ def _far(row, K, scale):
 
 
 def _rotations(method, cycles, rtol):
-    """|w|, bar, period, bar of rotation cycles, in columns: w on the section, the period by one turn from there."""
+    """|w|, its bound, period, its bound of rotation cycles, in columns: w on the section, the period by one turn."""
     w, bar = np.array([[row[rt.CYCLE_X], row[rt.CYCLE_BAR]] for _, _, _, row, _, _ in cycles]).T
     side = np.array([1.0 if kind == ROTATION_PLUS else -1.0 for _, _, kind, _, _, _ in cycles])
     section = np.array([s.section for _, _, _, _, s, _ in cycles])
@@ -154,7 +156,7 @@ def _rotations(method, cycles, rtol):
 
 
 def _librations(method, cycles, rtol):
-    """w > 0 at the equilibrium to the left of the right turning point, bar, period, bar, in columns.
+    """w > 0 at the equilibrium to the left of the right turning point, error bound, period, error bound, in columns.
 
     From the right turning point the cycle is followed to the left one forward in time, and backward (S1: b -> -b).
     """
@@ -181,18 +183,18 @@ def _librations(method, cycles, rtol):
 
 
 def _within(function, x, bar):
-    """Value and bar of `function` (x -> value, bar) at x known within `bar`."""
+    """Value and error bound of `function` (x -> value, error bound) at x known within `bar`."""
     (value, own), low, high = function(x), function(x - bar)[0], function(x + bar)[0]
     return value, 1.2 * np.maximum(np.abs(low - value), np.abs(high - value)) + 2.0 * own
 
 
 def _write(cycles, columns, result):
     """Write |w|, period and multiplier of cycles; a cycle that could not be followed has no answer."""
-    for (i, place, kind, row, _s, _six), (w, w_bar, period, period_bar) in zip(cycles, columns, strict=True):
-        result["cycle_kind"][i, place] = kind
+    for (i, at, kind, row, _s, _six), (w, w_bar, period, period_bar) in zip(cycles, columns, strict=True):
+        result["cycle_kind"][i, at] = kind
         values = (w, w_bar), (row[rt.MULTIPLIER], row[rt.MULTIPLIER_BAR]), (period, period_bar)
         for name, (value, bar) in zip(("w", "multiplier", "period"), values, strict=True):
             if math.isfinite(value) and math.isfinite(bar):
-                result[f"cycle_{name}"][i, place], result[f"cycle_{name}_error"][i, place] = value, bar
+                result[f"cycle_{name}"][i, at], result[f"cycle_{name}_error"][i, at] = value, bar
             else:
                 result["status"][i], result["verdict"][i] = NO_CONVERGENCE, UNDECIDED

@@ -1,14 +1,14 @@
 """Single solutions of a flow on the cylinder phi' = w, w' = f(phi) w + g(phi): in time, and w and t over phi (57).
 
-Arrays in, arrays out; a row is one solution, its columns are the times or places asked for. A row that misses the
+Arrays in, arrays out; a row is one solution, its columns are the times or angles asked for. A row that misses the
 asked accuracy is solved again with smaller steps, and the better answer is kept.
 """
 
 import numpy as np
 
 from survey.kernels.cylinder import records as rc
-from survey.kernels.cylinder.along import OK, TURNING, UNTOLD
 from survey.kernels.cylinder.flow import BOUND_DDG, spread
+from survey.kernels.cylinder.steps import OK, TURNING, UNDETERMINED
 
 STEPS = 200_000  # budget of one solution; about 0.1 s with the Taylor method
 SHARE = 1e-3  # of the asked accuracy, for the truncation error of one step
@@ -48,7 +48,7 @@ def split(rows):
 def trajectories(method, rows, times, rtol):
     """PHI to W_BAR of `records` (last axis), turnings and status at `times` (rows, columns), of either sign.
 
-    turnings counts the sign changes of w between 0 and t; it is -2 where the error bar cannot tell.
+    turnings counts the sign changes of w between 0 and t; it is UNDETERMINED where the error bound leaves it open.
     """
     past = times < 0
     if not past.any():
@@ -58,52 +58,56 @@ def trajectories(method, rows, times, rtol):
         picked = mine.any(axis=1)
         if not picked.any():
             continue
-        places = np.where(mine, np.abs(times), np.inf)[picked]
-        parts = _in_time(method, reverse(rows[picked]) if back else rows[picked], places, rtol)
+        elapsed = np.where(mine, np.abs(times), np.inf)[picked]
+        parts = _in_time(method, reverse(rows[picked]) if back else rows[picked], elapsed, rtol)
         if back:
             parts[0][..., rc.W] *= -1.0
         take = mine[picked]
-        for whole, part in zip(results, parts, strict=True):
-            held = whole[picked]
+        for result, part in zip(results, parts, strict=True):
+            held = result[picked]
             held[take] = part[take]
-            whole[picked] = held
+            result[picked] = held
     return results
 
 
 def _nothing(shape):
     """floats, turnings and status before anything is known."""
-    return np.full((*shape, rc.STATE), np.nan), np.full(shape, UNTOLD, dtype=np.int64), np.zeros(shape, dtype=np.int64)
+    return (
+        np.full((*shape, rc.STATE), np.nan),
+        np.full(shape, UNDETERMINED, dtype=np.int64),
+        np.zeros(shape, dtype=np.int64),
+    )
 
 
-def _in_time(method, rows, places, rtol):
-    places, back = _sorted(places)
+def _in_time(method, rows, times, rtol):
+    times, back = _sorted(times)
     budget = STEPS * min(method.FLOW_WORK, 10)
 
     def run(pick, tolerance):
         P, starts = split(rows[pick])
-        at = np.ascontiguousarray(places[pick])
+        at = np.ascontiguousarray(times[pick])
         floats, turnings, status = _nothing(at.shape)
         ends = np.zeros(len(P), dtype=np.int64)
         method.flow_trajectories(P, starts, at, tolerance, budget, floats, turnings, ends)
         np.copyto(status, ends[:, None], where=~np.isfinite(floats[..., rc.PHI]))  # else OK
         return floats, turnings, status
 
-    asked = np.isfinite(places)
+    asked = np.isfinite(times)
     results = _repeated(run, asked, attempts(method, rtol), rtol)
     if hasattr(method, "flow_turnings"):
-        _count(method, rows, places, attempts(method, rtol)[-1], asked, results)
+        _count(method, rows, times, attempts(method, rtol)[-1], asked, results)
     return back(results)
 
 
-def _count(method, rows, places, tolerance, asked, results):
-    """Tell the turnings that the steps have not told, as those beside a focus, where w is less than its bar."""
+def _count(method, rows, times, tolerance, asked, results):
+    """Count the turnings that the steps left UNDETERMINED, as beside a focus, where w is less than its error bound."""
     _floats, turnings, status = results
-    pick = (asked & (turnings == UNTOLD) & (status == OK)).any(axis=1)
+    pick = (asked & (turnings == UNDETERMINED) & (status == OK)).any(axis=1)
     if pick.any():
         P, starts = split(rows[pick])
-        told = turnings[pick]
-        method.flow_turnings(P, starts, np.ascontiguousarray(places[pick]), tolerance, STEPS, told)
-        turnings[pick] = np.where(status[pick] == OK, told, turnings[pick])
+        counted = turnings[pick]
+        method.flow_turnings(P, starts, np.ascontiguousarray(times[pick]), tolerance, STEPS, counted)
+        turnings[pick] = np.where(status[pick] == OK, counted, turnings[pick])
 
 
 def abel(method, rows, targets, rtol, before=False):
@@ -116,23 +120,23 @@ def abel(method, rows, targets, rtol, before=False):
     floats = np.full((*targets.shape, rc.STATE), np.nan)
     status, phi0 = np.zeros(targets.shape, dtype=np.int64), rows[:, rc.PHI0, None]
     for side in (1.0, -1.0):
-        ahead = targets >= phi0 if side > 0 else targets < phi0
+        onward = targets >= phi0 if side > 0 else targets < phi0
         for past in (False, True):
-            picked = ahead.any(axis=1) & (((rows[:, rc.W0] * side < 0) | back) == past)
+            picked = onward.any(axis=1) & (((rows[:, rc.W0] * side < 0) | back) == past)
             if not picked.any():
                 continue
             part = reverse(rows[picked]) if past else rows[picked]
             part = mirror(part) if side < 0 else part
             part[:, rc.W0] = np.abs(part[:, rc.W0])
-            f, s = _in_phi(method, part, np.where(ahead[picked], side * targets[picked], np.inf), rtol)
+            f, s = _in_phi(method, part, np.where(onward[picked], side * targets[picked], np.inf), rtol)
             first = np.where(s == TURNING, side, side * (-1.0 if past else 1.0))
             f[..., rc.VALUE] *= first
             f[..., rc.TIME] *= -1.0 if past else 1.0
             f += 0.0  # no negative zeros
-            for whole, new in ((floats, f), (status, s)):
-                held = whole[picked]
-                held[ahead[picked]] = new[ahead[picked]]
-                whole[picked] = held
+            for result, new in ((floats, f), (status, s)):
+                held = result[picked]
+                held[onward[picked]] = new[onward[picked]]
+                result[picked] = held
     return floats, status
 
 
@@ -156,15 +160,15 @@ def _repeated(run, asked, ladder, rtol):
     first, *others = ladder
     results = run(slice(None), first)
     for tolerance in others:
-        again = (missed(results, rtol) & asked).any(axis=1)
-        if not again.any() or tolerance >= first:
+        coarse = (missed(results, rtol) & asked).any(axis=1)
+        if not coarse.any() or tolerance >= first:
             break
-        finer = run(again, tolerance)
-        kept = [result[again] for result in results]
+        finer = run(coarse, tolerance)
+        kept = [result[coarse] for result in results]
         better = badness(finer) <= badness(kept)
         for result, old, new in zip(results, kept, finer, strict=True):
             old[better] = new[better]
-            result[again] = old
+            result[coarse] = old
     return results
 
 
@@ -184,11 +188,11 @@ def badness(results):
     return worst + np.where((status == OK) | (status == TURNING), 0.0, 1e300)
 
 
-def _sorted(places):
-    """`places` in ascending columns, and the function that brings results back into their order."""
-    if (places[:, 1:] >= places[:, :-1]).all():
-        return places, lambda results: results
-    order = np.argsort(places, axis=1, kind="stable")
+def _sorted(columns):
+    """`columns` (rows, n) in ascending order, and the function that brings results back into their order."""
+    if (columns[:, 1:] >= columns[:, :-1]).all():
+        return columns, lambda results: results
+    order = np.argsort(columns, axis=1, kind="stable")
     back = np.argsort(order, axis=1)
 
     def undone(results):
@@ -196,4 +200,4 @@ def _sorted(places):
             np.take_along_axis(result, back[..., None] if result.ndim == 3 else back, axis=1) for result in results
         )
 
-    return np.take_along_axis(places, order, axis=1), undone
+    return np.take_along_axis(columns, order, axis=1), undone

@@ -1,38 +1,50 @@
 """Hill's question: is y'' + z(t) y = 0, z of period T, stable?
 
-METHODS lists what a method that serves the family "hill" offers. One that is adaptive gives the scene's own kernels
-`hill_walk`; any other gives `hill_density`, NODES, `hill_chain` and `hill_scatter`.
+METHODS lists what a method that serves the family "hill" offers. A method of fixed steps gives `hill_density`, NODES,
+`hill_chain` and `hill_scatter`; an adaptive one gives `hill_walk` and `hill_walk_pieces`, from which the scenes make
+their own kernels.
 
-The results of a point are the columns of `kernels.hill.answers`: the half-period factors, their bars, and the zeros of
-y1 and y2. t is in the units of the period.
+z = c0(t) + p c1(t) + p^2 c2, c2 a number; a row of points shares c0 and c1, and p varies along it. What a method gives
+of a point are the columns RESULTS of `survey.kernels.lanes`: both solutions and their derivatives at the end of the
+half period, their error bounds, and the zeros of y1 and y2 on the way. t is in the unit of the period, z in its
+inverse square. `survey.kernels.lanes.chain` and `scatter` make `hill_chain` and `hill_scatter` of one step.
 """
 
 from survey.contract import Function, Value
 
 METHODS = {
     "hill": {
-        "NODES": Value("fractions of a step at which z is sampled", tuple),
+        "NODES": Value("where in a step z is sampled: fractions of the step", tuple),
         "hill_density": Function(
-            "steps per radian of the fastest phase and per distance to the nearest singularity, for accuracy rtol",
+            "(steps per radian of the fastest phase, steps per distance to the nearest singularity of z): so many are "
+            "tried first for accuracy rtol",
             ("rtol",),
         ),
         "hill_chain": Function(
-            "fill out (points, 10): samples (rows, steps, 2, nodes), lengths h (rows, steps) of the steps, points "
-            "order[starts[r]:ends[r]] of row r at p",
+            "fill out (N, RESULTS) at the points p (N) of rows of equal numbers of steps; row r owns the points "
+            "order[starts[r] : ends[r]], samples (rows, steps, 2, NODES) holds its c0 and c1, h (rows, steps) the "
+            "lengths of its steps",
             ("samples", "c2", "h", "p", "order", "starts", "ends", "out"),
         ),
         "hill_scatter": Function(
-            "as hill_chain, one point a row", ("samples", "c2", "h", "p", "order", "starts", "out")
+            "as hill_chain, where row r owns the one point order[starts[r]]; the same bits",
+            ("samples", "c2", "h", "p", "order", "starts", "out"),
         ),
         "hill_walk": Function(
-            "integrate a point over `span` to `tolerance`; (z, size) = potential(t, p, row, table); False: step limit",
+            "fill out (RESULTS) of one point from 0 to `span` with local errors below `tolerance`; returns False at "
+            "the step limit; potential(t, p, row, table) gives (z, size of the terms whose sum z is)",
             ("potential", "p", "row", "table", "span", "tolerance", "out"),
         ),
         "hill_walk_pieces": Function(
-            "as hill_walk, a step ending at each of `edges`, where z may jump; no step is longer than `longest`",
+            "as hill_walk, from the first to the last of `edges`, between which z may jump: a step ends at each, z is "
+            "asked for no nearer to one than `slack`, and no step is longer than `longest`",
             ("potential", "p", "row", "table", "edges", "slack", "longest", "tolerance", "out"),
         ),
-        "WIDTH": Value("number of rows of z's coefficients a step, for the charts", int),
-        "hill_step": Function("P of one step and its local error bounds: what `hill_chain` composes", None),
+        "WIDTH": Value("for the charts: numbers that each of c0, c1 is reduced to per step", int),
+        "hill_step": Function(
+            "for the charts: the propagator (4 numbers) of one step and its local error bounds (3), of which "
+            "`hill_chain` is composed",
+            None,
+        ),
     }
 }

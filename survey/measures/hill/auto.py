@@ -1,8 +1,8 @@
 """Which method where: a constant coefficient by its closed form, everything else by midpoint Taylor, and points
 that it leaves undecided in double-double arithmetic, or by the adaptive DOP853 where a problem has no such kernel. So
-are the few whose D, if asked for, hangs on an ulp of the parameters, where more is asked than float64 can tell.
+are the few whose D, if asked for, depends on an ulp of the parameters, where rtol is below what float64 can reach.
 
-Measured (`survey precision satellite`): midpoint Taylor is the fastest at every accuracy and has the sharpest bars.
+Measured (`survey precision satellite`): midpoint Taylor is the fastest at every accuracy and has the sharpest bounds.
 """
 
 import numpy as np
@@ -11,11 +11,11 @@ from survey import status
 from survey.kernels.hill import taylor_double
 from survey.kernels.hill.answers import DISCRIMINANT, LEAST, UNDECIDED
 from survey.kernels.lanes import RESULTS
-from survey.measures.hill import dense, effort
+from survey.kernels.math.roundoff import EPS
+from survey.measures.hill import dense, pointwise
 from survey.measures.hill.answers import NO_SQUARES, Answers
 from survey.methods import dop853, taylor16
 
-EPS = 2.3e-16
 # A discriminant with a wider bar, relative to 1 + |D|, is ill conditioned, if so few steps (0.2 s a hundred points) do.
 ILL, FEW_STEPS = 1e-11, 500
 # Keep a call of the double-double kernel below about a second.
@@ -23,7 +23,7 @@ CALL_STEPS = 20_000
 
 
 def solve(problem, asked, answers, decide=True):
-    """Answer every point of the problem, in place; what stays undecided is left so unless it is to `decide`."""
+    """Answer every point of the problem, in place; `decide`: solve what stays undecided again, with more digits."""
     free = None
     if problem.constant is not None:
         rows, z = problem.constant
@@ -34,13 +34,13 @@ def solve(problem, asked, answers, decide=True):
     if free is not None:
         open_points = ~free if open_points is None else open_points & ~free
     if open_points is None or open_points.any():
-        effort.solve(problem, taylor16, asked, answers, open_points)
+        pointwise.solve(problem, taylor16, asked, answers, open_points)
     if free is not None:
-        places = np.flatnonzero(free)
-        own = Answers(places.size, asked)
-        results = closed_form(z[np.isfinite(z)], problem.span[places // problem.p.shape[1]])
-        own.judge(results, None if problem.rule is None else problem.rule.reshape(-1)[places])
-        answers.put(places, own)
+        points = np.flatnonzero(free)
+        own = Answers(points.size, asked)
+        results = closed_form(z[np.isfinite(z)], problem.span[points // problem.p.shape[1]])
+        own.assess(results, None if problem.rule is None else problem.rule.reshape(-1)[points])
+        answers.replace(points, own)
     ours = (answers.status == status.OK) & (True if free is None else ~free)
     left = ours & (answers.verdict == UNDECIDED) & decide
     if problem.exact is not None:
@@ -49,24 +49,24 @@ def solve(problem, asked, answers, decide=True):
             d, bar = abs(answers.floats[DISCRIMINANT]), answers.floats[DISCRIMINANT + 1]
             _exactly(problem, answers, np.flatnonzero(ours & (bar > ILL * (1 + d))), asked, FEW_STEPS)
     elif left.any() and problem.walk is not None:
-        again = Answers(left.size, asked)
-        effort.solve(problem, dop853, asked, again, left)
-        decided = np.flatnonzero(left & (again.status == status.OK) & (again.verdict != UNDECIDED))
-        answers.put(decided, again, decided)
+        other = Answers(left.size, asked)
+        pointwise.solve(problem, dop853, asked, other, left)
+        decided = np.flatnonzero(left & (other.status == status.OK) & (other.verdict != UNDECIDED))
+        answers.replace(decided, other, decided)
 
 
-def _exactly(problem, answers, places, asked, most):
-    """Solve the points at `places` in double-double, where at most so many steps do; those without an answer stay."""
-    if not places.size:
+def _exactly(problem, answers, points, asked, most):
+    """Solve the `points` in double-double, where at most so many steps do; those without an answer stay."""
+    if not points.size:
         return
     phase, distance = taylor_double.hill_density()
-    rows, p = places // problem.p.shape[1], problem.p.reshape(-1)[places]
-    low = np.zeros(p.size) if problem.p_low is None else problem.p_low.reshape(-1)[places]
+    rows, p = points // problem.p.shape[1], problem.p.reshape(-1)[points]
+    low = np.zeros(p.size) if problem.p_low is None else problem.p_low.reshape(-1)[points]
     frequency = np.sqrt((problem.bound[rows] * np.stack([p**0, abs(p), p**2], axis=1)).sum(axis=1))
     length = 0.5 * problem.span[rows] * np.maximum(phase * frequency, distance * problem.rate[rows])
     steps = 2 * np.maximum(np.ceil(length), 1)  # z = 0 asks for none
     within = steps <= most
-    places, rows, p, low = places[within], rows[within], p[within], low[within]
+    points, rows, p, low = points[within], rows[within], p[within], low[within]
     steps = steps[within].astype(np.int64)
     calls = np.cumsum(steps) // CALL_STEPS
     for call in np.unique(calls):
@@ -75,10 +75,10 @@ def _exactly(problem, answers, places, asked, most):
         known = np.isfinite(results).all(axis=1)
         these, results = these[known], results[known]
         own = Answers(these.size, asked)
-        rule = None if problem.rule is None else problem.rule.reshape(-1)[places[these]]
-        squares = np.ascontiguousarray(results[:, RESULTS:]) if problem.whole else NO_SQUARES
-        own.judge(np.ascontiguousarray(results[:, :RESULTS]), rule, squares)
-        answers.put(places[these], own)
+        rule = None if problem.rule is None else problem.rule.reshape(-1)[points[these]]
+        squares = np.ascontiguousarray(results[:, RESULTS:]) if problem.full_period else NO_SQUARES
+        own.assess(np.ascontiguousarray(results[:, :RESULTS]), rule, squares)
+        answers.replace(points[these], own)
 
 
 def closed_form(z, span):
@@ -99,7 +99,7 @@ def closed_form(z, span):
 
 
 def _zeros(turns, negative):
-    """The whole number of zeros nearest to `turns` - 1/2 whose parity fits the sign."""
+    """The number of zeros nearest to `turns` - 1/2 whose parity fits the sign."""
     number = np.floor(turns)
     wrong = (number % 2 == 1) != negative
     return np.where(wrong, number + np.where(turns - number < 0.5, -1, 1), number)

@@ -1,9 +1,9 @@
-"""The verdict of a Hill problem on whole cells of a plane of two parameters, not at points: no tongue slips between.
+"""The verdict of a Hill problem everywhere in cells of a plane of two parameters, so that no tongue is missed.
 
-The half-period factors are analytic in the parameters, so on blocks small enough each is its tensor Chebyshev
-series to within a bar: the nodes' own bars times the Lebesgue constants, the series' tails, and rounding. A series that
-misses the factor at places between its nodes has that in its tails. Where a series serves no more, its block is solved
-anew in halves; all other halving is done on the series alone (`survey.kernels.hill.cells`).
+The half-period factors are analytic in the parameters, so on blocks small enough each is its tensor Chebyshev series to
+within a bound: the bounds at its nodes times the Lebesgue constants, the tails of the series, and rounding. A series
+that misses the factor between its nodes has that in its tails. Where a series no longer serves, the halves of its block
+are solved; all other halving is done on the series alone (`survey.kernels.hill.cells`).
 
 Sources: W. Magnus, S. Winkler, Hill's Equation (1966), theorem 1.1; L. N. Trefethen, Approximation Theory and
 Approximation Practice (2013), chapters 3, 8, 15.
@@ -14,27 +14,32 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from survey.kernels.hill.answers import EPS, UNDECIDED
-from survey.kernels.hill.cells import AGAIN, ENOUGH, descend
+from survey.kernels.hill.answers import STABLE, UNDECIDED, UNSTABLE
+from survey.kernels.hill.cells import ENOUGH, UNSOLVED, descend
+from survey.kernels.math.chebyshev import lebesgue, nodes, tail, to_coefficients
+from survey.kernels.math.roundoff import EPS
 from survey.measures.hill.edges import FACTORS
+from survey.measures.tasks import in_turn
 
+OUTPUTS = FACTORS  # what `find` asks of the scene
+VERDICTS = {"undecided": UNDECIDED, "unstable": UNSTABLE, "stable": STABLE}
 NODES = 16
 CHECK = 0.539  # near an extremum of T_16, and of no period with it
 START = 2  # halvings of the first blocks
 BATCH = 16  # blocks of one task
 MOST = 10_000_000  # cells
 
-X = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
-PLACES = np.append(X, CHECK)
-POLYNOMIALS = chebyshev.chebvander(PLACES, NODES - 1)
-TRANSFORM = 2 / NODES * POLYNOMIALS[:NODES].T / (1.0 + (np.arange(NODES) == 0))[:, None]
-LEBESGUE = 2 / np.pi * np.log(NODES + 1) + 1  # Trefethen, theorem 15.2
+X = nodes(NODES)
+POINTS = np.append(X, CHECK)
+POLYNOMIALS = chebyshev.chebvander(POINTS, NODES - 1)
+TRANSFORM = to_coefficients(POLYNOMIALS[:NODES].T)
+LEBESGUE = lebesgue(NODES)
 DEGREE = np.arange(NODES)
 
 
 @dataclass(frozen=True)
-class Axis:
-    """Parameters from `low` to `high`, halved at most `depth` times; in the middle, or `log`: at the geometric mean."""
+class Side:
+    """A side of a rectangle: from `low` to `high`, halved at most `depth` times; `log`: at the geometric mean."""
 
     low: float
     high: float
@@ -42,12 +47,12 @@ class Axis:
     log: bool = False
 
     def at(self, part):
-        """The parameter after the `part` (0 to 1) of the axis; both ends exact."""
+        """The parameter after the `part` (0 to 1) of the side; both ends exact."""
         inside = self.low * (self.high / self.low) ** part if self.log else self.low * (1 - part) + self.high * part
         return np.where(part == 0, self.low, np.where(part == 1, self.high, inside))
 
     def length(self, start, end):
-        """Of the parameter between two parts of the axis; nothing cancels."""
+        """Of the side between two of its parts; nothing cancels."""
         if not self.log:
             return (self.high - self.low) * (end - start)
         rate = np.log(self.high / self.low)
@@ -78,53 +83,55 @@ class Cells:
     points: int
 
 
-def find(solve, x, y, each=lambda task, items: [task(item) for item in items], tell=None):
-    """The Cells of the rectangle of the axes x and y.
+def find(solve, x, y, each=in_turn, report=None):
+    """The Cells of the rectangle of the Sides x and y.
 
-    `solve(x, y)` gives the four factors with their bars at broadcast arrays of both parameters, NaN where none are;
-    `each(task, items)` gives the list of task(item), on threads if it likes. `tell(part, points)` is told how much of
-    the rectangle is settled. Raises OverflowError if there are more than MOST cells.
+    `solve(x, y)` gives the four factors with their error bounds at broadcast arrays of both parameters,
+    NaN where there are none; `each`: see `measures.tasks`. `report(part, points)` hears which part of the
+    rectangle is settled, and how many points were solved for it. Raises OverflowError if there are more
+    than MOST cells.
     """
     depth = np.array([x.depth, y.depth])
     halves = np.full((2, max(depth.max(), 1), 2, NODES, NODES), np.nan)
     halves[0, : x.depth], halves[1, : y.depth] = x.halves(), y.halves()
     todo, kept, points = _first(depth), [], 0
 
-    def task(places):
-        leaves, count = descend(*_series(solve, x, y, places), places, depth, halves)
+    def task(blocks):
+        leaves, count = descend(*_series(solve, x, y, blocks), blocks, depth, halves)
         return leaves[:count]
 
     while len(todo):
-        leaves = np.concatenate(each(task, [todo[first : first + BATCH] for first in range(0, len(todo), BATCH)]))
-        points += len(todo) * PLACES.size**2
-        again = leaves[:, 4] == AGAIN
-        todo = leaves[again, :4].astype(np.int64)
-        kept.append(leaves[~again])
-        if tell:
-            tell(1 - float((0.5 ** (todo[:, 0] + todo[:, 2])).sum()), points)
+        batches = [todo[first : first + BATCH] for first in range(0, len(todo), BATCH)]
+        leaves = np.concatenate(each(task, batches, "parts of the cells"))
+        points += len(todo) * POINTS.size**2
+        unsolved = leaves[:, 4] == UNSOLVED
+        todo = leaves[unsolved, :4].astype(np.int64)
+        kept.append(leaves[~unsolved])
+        if report:
+            report(1 - float((0.5 ** (todo[:, 0] + todo[:, 2])).sum()), points)
         if sum(map(len, kept)) > MOST:
             raise OverflowError(f"more than {MOST:,} cells")
     return _gathered(x, y, depth, np.concatenate(kept), points)
 
 
 def accuracy(depth):
-    """The relative accuracy of the factors that cells of so many halvings need: below what a series may leave out."""
+    """The rtol with which `find` asks for the factors where cells are halved so often: below what series leave out."""
     return float(np.clip(1e-2 * ENOUGH * 0.5**depth, 1e-13, 1e-9))
 
 
 def _first(depth):
-    """Places (B, 4) of the first blocks."""
+    """The first blocks (B, 4), as `descend` takes them."""
     level = np.minimum(depth, START)
     i, j = (grid.reshape(-1) for grid in np.meshgrid(*(np.arange(1 << at) for at in level), indexing="ij"))
     return np.column_stack([np.full(i.size, level[0]), i, np.full(i.size, level[1]), j])
 
 
-def _series(solve, x, y, places):
+def _series(solve, x, y, blocks):
     """The factors' series (B, 4, n, n) on blocks, and what each leaves open: tails in x, in y, the rest (B, 4, 3)."""
-    (middle_x, radius_x), (middle_y, radius_y) = _spans(x, places[:, :2]), _spans(y, places[:, 2:])
+    (middle_x, radius_x), (middle_y, radius_y) = _spans(x, blocks[:, :2]), _spans(y, blocks[:, 2:])
     out = solve(
-        (middle_x[:, None] + radius_x[:, None] * PLACES)[:, :, None],
-        (middle_y[:, None] + radius_y[:, None] * PLACES)[:, None, :],
+        (middle_x[:, None] + radius_x[:, None] * POINTS)[:, :, None],
+        (middle_y[:, None] + radius_y[:, None] * POINTS)[:, None, :],
     )
     values = np.stack([out[name] for name in FACTORS], axis=1)
     bars = np.stack([out[f"{name}_error"] for name in FACTORS], axis=1).max(axis=(2, 3))
@@ -134,27 +141,19 @@ def _series(solve, x, y, places):
     between = POLYNOMIALS @ series @ POLYNOMIALS.T
     missed_x = abs(values - between)[..., NODES, :NODES].max(axis=2)
     missed_y = abs(values - between)[..., :NODES, NODES].max(axis=2)
-    # of the transform, and of the rounded places, where T_j' <= j^2
+    # of the transform, and of the rounded points, where T_j' <= j^2
     rounding_x = 4 + DEGREE + DEGREE**2 * (1 + abs(middle_x) / radius_x)[:, None, None]
     rounding_y = 4 + DEGREE + DEGREE**2 * (1 + abs(middle_y) / radius_y)[:, None, None]
     noise = LEBESGUE**2 * bars + EPS * ((by_x * rounding_x).sum(axis=2) + (by_y * rounding_y).sum(axis=2))
-    tails = [np.maximum(_tail(by_x), 4 * (missed_x - noise)), np.maximum(_tail(by_y), 4 * (missed_y - noise))]
+    tails = [np.maximum(2 * tail(by_x), 4 * (missed_x - noise)), np.maximum(2 * tail(by_y), 4 * (missed_y - noise))]
     return series, np.stack([*tails, noise], axis=2)
 
 
-def _spans(axis, places):
-    """Middle and half width of the cells, places (B, 2) of one axis."""
-    part = 0.5 ** places[:, 0]
-    low, high = axis.at(places[:, 1] * part), axis.at((places[:, 1] + 1) * part)
+def _spans(side, blocks):
+    """Middle and half width of the blocks (B, 2: number of halvings, index) along one side."""
+    part = 0.5 ** blocks[:, 0]
+    low, high = side.at(blocks[:, 1] * part), side.at((blocks[:, 1] + 1) * part)
     return 0.5 * (low + high), 0.5 * (high - low)
-
-
-def _tail(sizes):
-    """What lies beyond the last degree (last axis of `sizes`), twice for what is folded back, at the rate of fall."""
-    last, before = sizes[..., -4:].max(axis=-1), sizes[..., -8:-4].max(axis=-1)
-    with np.errstate(invalid="ignore"):
-        rate = np.clip(last / (before + 1e-300), 0.1, 0.9)
-    return 8 * last / (1 - rate)
 
 
 def _gathered(x, y, depth, leaves, points):

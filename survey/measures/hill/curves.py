@@ -5,9 +5,9 @@ of some columns) as seeds, both ways along F = 0: predictor by tangent and curva
 F, its gradient and second derivatives from nine neighbouring points; all curves step together. A step is taken if the
 corrector is short against it, the curve turns little, and F keeps its positive side (neighbouring zeros of F have
 opposite ones); else it is halved. Curves end at the border of the map, where they close, or are lost where F has a
-double point. At last every point is closed in by certain signs of F.
+double point. At last every point is bracketed by certain signs of F.
 
-Places are in the unit square: both axes' ranges are 1, in logarithms where the axis is logarithmic.
+Positions are those of `survey.measures.square`.
 A closed curve that meets neither a row nor a column that was searched has no seed, and is not found.
 
 Source: E. L. Allgower, K. Georg, Numerical Continuation Methods (1990), chapters 2, 6 and 10.
@@ -18,7 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from survey.measures.hill.edges import ASIDE, COUNTS, FACTORS, close_in, of_kind, tongue
-from survey.measures.hill.look import looker
+from survey.measures.hill.expansion import expander
+from survey.measures.tasks import in_turn
 
 LONGEST, SHORTEST = 0.02, 1e-9  # steps
 BEND = 0.15  # radians per step
@@ -26,13 +27,13 @@ TURN = np.cos(2 * BEND)  # a step that turns more is taken again
 OFF = 0.05  # of a step: how long the corrector may be
 STEPS = 10_000
 NEAR = 0.02  # of a step: how far a seed may lie from the curve that goes through it
-WIDE = 1e-7  # the first half width of a point, before it is closed in
-CHUNK = 256  # points closed in together
+WIDE = 1e-7  # half the width of the first bracket of a point
+CHUNK = 256  # points bracketed together
 
 
 @dataclass
 class Seeds:
-    """Edges as places (n, 2) with `kind`, `index`; `low`, `high` (n, 2) the rectangle in which F is analytic."""
+    """Edges as positions (n, 2) with `kind`, `index`; `low`, `high` (n, 2) the rectangle in which F is analytic."""
 
     x: np.ndarray
     kind: np.ndarray
@@ -43,8 +44,10 @@ class Seeds:
 
 @dataclass
 class Curves:
-    """Curves one after another: `count` points each, `kind`, `index`, `complete` per curve; `of_seed` the curve of each
-    seed. Per point places `x` (m, 2), unit tangents `along` (m, 2) and `error`, the distance from the curve at most.
+    """Curves one after another: `count` points each; `kind`, `index`, `complete` per curve.
+
+    Per point its position `x` (m, 2), unit tangent `along` (m, 2) and `error`, a bound of its distance from the
+    curve; `of_seed` is the curve of each seed.
     """
 
     count: np.ndarray
@@ -57,26 +60,19 @@ class Curves:
     of_seed: np.ndarray
 
 
-def in_turn(task, numbers, what):
-    """Call the task for every number."""
-    for number in numbers:
-        task(number)
-
-
 def trace(solve, square, seeds, each=in_turn):
     """The Curves through all seeds.
 
-    `solve(q, p, wanted)` gives outputs at q (m, 1), p (m, n), the square's parameters. `each(task, numbers, what)`
-    calls the task for every number, in any order, on threads if it likes.
+    `solve(q, p, wanted)` gives outputs at q (m, 1), p (m, n), the square's parameters; `each`: see `measures.tasks`.
     """
-    look = looker(solve, square)
+    expand = expander(solve, square)
     of_seed = np.full(seeds.kind.size, -1)
     towards = np.zeros(seeds.x.shape)
 
     def task(own):
         # on the edge itself the rotation number would ask for double-double arithmetic
         step = np.full(own.size, LONGEST)
-        seen = look(seeds.x[own], seeds.kind[own], step, seeds.low[own], seeds.high[own], count=False)
+        seen = expand(seeds.x[own], seeds.kind[own], step, seeds.low[own], seeds.high[own], count=False)
         towards[own] = seen.course(np.ones(own.size))[0]
 
     _in_chunks(each, task, of_seed.size, "parts of the curves' seeds")
@@ -85,7 +81,7 @@ def trace(solve, square, seeds, each=in_turn):
         left = np.flatnonzero(of_seed < 0)
         group = np.unique(np.stack([seeds.kind[left], seeds.index[left]], axis=1), axis=0, return_index=True)[1]
         start = np.sort(left[group])  # one of each kind and index: no two on the same curve
-        for path, seed in zip(_follow(look, seeds, start), start, strict=True):
+        for path, seed in zip(_follow(expand, seeds, start), start, strict=True):
             on_it = (of_seed < 0) & (seeds.kind == seeds.kind[seed]) & (seeds.index == seeds.index[seed])
             near = np.flatnonzero(on_it)
             of_seed[near[_on(path, seeds.x[near], towards[near])]] = len(paths)
@@ -101,7 +97,10 @@ def _in_chunks(each, task, number, what):
 
 @dataclass
 class Path:
-    """Points of a curve in order: places, tangents, lines to close in along; is it closed or does it end at borders?"""
+    """Points of a curve in order: positions, tangents, lines on which they are bracketed.
+
+    `complete`: the curve is closed, or both its ends lie on borders.
+    """
 
     x: np.ndarray
     along: np.ndarray
@@ -109,7 +108,7 @@ class Path:
     complete: bool
 
 
-def _follow(look, seeds, start):
+def _follow(expand, seeds, start):
     """The paths through the seeds `start`, both ways, all together."""
     n = start.size
     kind, index = np.tile(seeds.kind[start], 2), np.tile(seeds.index[start], 2)
@@ -117,7 +116,7 @@ def _follow(look, seeds, start):
     side = np.repeat([1.0, -1.0], n)
     x = np.tile(seeds.x[start], (2, 1))
     step = np.full(2 * n, 0.1 * LONGEST)
-    along, normal, bend = look(x, kind, step, low, high, count=False).course(side)
+    along, normal, bend = expand(x, kind, step, low, high, count=False).course(side)
     home, heading, gone = x.copy(), along.copy(), np.zeros(2 * n)
     ended, closed, lost = np.zeros((3, 2 * n), bool)
     trail = [(np.arange(2 * n), home, heading, _first_line(x, normal, low, high))]
@@ -128,7 +127,7 @@ def _follow(look, seeds, start):
         length, guess, edge, border = _predict(x[a], along[a], normal[a], bend[a], step[a], low[a], high[a])
         leaves = border & (length < 4 * SHORTEST)  # it stands at the border and points outside
         with np.errstate(all="ignore"):
-            seen = look(guess, kind[a], length, low[a], high[a])
+            seen = expand(guess, kind[a], length, low[a], high[a])
             border &= abs(seen.zero(edge)) <= OFF * length
             line = np.where(border[:, None], edge, seen.course(side[a])[1])
             off = seen.zero(line)
@@ -155,27 +154,27 @@ def _follow(look, seeds, start):
 
 
 def _predict(x, along, normal, bend, step, low, high):
-    """Steps along the parabola of tangent and curvature: (length, place, line to correct along, border).
+    """Steps along the parabola of tangent and curvature: (length, position, line to correct along, border).
 
     Where it leaves the rectangle it goes to its border, and is corrected along that.
     """
 
-    def place(length):
+    def reached(length):
         return x + length[:, None] * along + (0.5 * bend * length**2)[:, None] * normal
 
     def outside(at):
         return (at < low) | (at > high)
 
-    guess = place(step)
+    guess = reached(step)
     border = outside(guess).any(axis=1)
     length, line = step.copy(), np.zeros_like(x)
     if border.any():
         inner, outer = np.zeros_like(step), step.copy()
         for _ in range(50):
             middle = 0.5 * (inner + outer)
-            out = outside(place(middle)).any(axis=1)
+            out = outside(reached(middle)).any(axis=1)
             inner, outer = np.where(out, inner, middle), np.where(out, middle, outer)
-        end = place(outer)
+        end = reached(outer)
         across = outside(end)
         end = np.clip(end, low, high)
         guess[border], length[border] = end[border], outer[border]
@@ -191,7 +190,7 @@ def _first_line(x, normal, low, high):
 
 
 def _returns(x, new, t, home, heading, length, gone):
-    """Does the step from x to new pass the place where its curve began?"""
+    """Does the step from x to new pass the position where its curve began?"""
     before, after = home - x, home - new
     there = ((before * t).sum(axis=1) >= 0) & ((after * t).sum(axis=1) <= 0)
     near = abs(after[:, 0] * heading[:, 1] - after[:, 1] * heading[:, 0]) <= OFF * length
@@ -219,7 +218,7 @@ def _joined(trail, ended, closed):
 
 
 def _on(path, x, towards):
-    """Which of the places x (n, 2), with tangents `towards`, lie on the path (its cubic Hermite pieces)?"""
+    """Which of the positions x (n, 2), with tangents `towards`, lie on the path (its cubic Hermite pieces)?"""
     found = np.zeros(len(x), bool)
     a, b, ta, tb = path.x[:-1], path.x[1:], path.along[:-1], path.along[1:]
     length = np.hypot(*(b - a).T)
@@ -235,7 +234,7 @@ def _on(path, x, towards):
 
 
 def _close_all_in(solve, square, paths, starts, seeds, of_seed, each):
-    """The Curves of the paths, each point closed in on its line and counted by its rotation number."""
+    """The Curves of the paths, each point bracketed on its line and counted by its rotation number."""
     count = np.array([len(path.x) for path in paths], int)
     whose = np.repeat(np.arange(len(paths)), count)
     x, along, line = (np.concatenate([getattr(p, name) for p in paths] or [np.zeros((0, 2))])
@@ -245,8 +244,8 @@ def _close_all_in(solve, square, paths, starts, seeds, of_seed, each):
 
     def task(own):
         def at(who, t, wanted):
-            places = square.places(x[own[who], None] + t[..., None] * line[own[who], None])
-            out = solve(places[..., 0].reshape(-1, 1), places[..., 1].reshape(-1, 1), wanted)
+            here = square.parameters(x[own[who], None] + t[..., None] * line[own[who], None])
+            out = solve(here[..., 0].reshape(-1, 1), here[..., 1].reshape(-1, 1), wanted)
             return {name: values.reshape(t.shape) for name, values in out.items()}
 
         mine = kind[whose[own]]

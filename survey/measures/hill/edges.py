@@ -3,9 +3,10 @@
     y1 = 0   even antiperiodic      y2' = 0  odd antiperiodic      y1' = 0  even periodic      y2 = 0  odd periodic
 
 The factors are analytic in every parameter, so on panels short enough each is its Chebyshev series to rounding, and
-the eigenvalues of the series' colleague matrix are all its zeros, double ones too. Each is then closed in by signs of
-the factor itself, certain against its bar. A row is complete when, between its edges and at its ends, every factor has
-the sign that the list says, and the rotation number counts the same tongues; else its panels are halved.
+the eigenvalues of the series' colleague matrix are all its zeros, double ones too. Each is then bracketed by signs of
+the factor itself that are certain against its error bound. A row is complete when, between its edges and at its ends,
+every factor has the sign that the list implies, and the rotation number counts the same tongues; else its panels are
+halved.
 
 Sources: W. Magnus, S. Winkler, Hill's Equation (1966), theorem 1.1; J. P. Boyd, SIAM J. Numer. Anal. 40 (2002) 1666.
 """
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from survey.kernels.hill.answers import STABLE, UNSTABLE
+from survey.kernels.math.chebyshev import cosines, nodes, to_coefficients
 from survey.scene import Output
 
 FACTORS = ("y1", "dy2", "dy1", "y2")
@@ -28,7 +30,7 @@ OUTPUTS = (
 NODES = 24
 # The last coefficients of a converged series, relative to its largest.
 CONVERGED = 1e-9
-# Panels are halved so often; on to the second towards so FEW places of a row, where edges accumulate: not over noise.
+# Panels are halved DEEP times; up to DEEPEST about FEW points of a row, where edges accumulate, not where F is noise.
 DEEP, DEEPEST, FEW = 13, 45, 4
 HALVINGS = 3
 ROUNDS = 12
@@ -51,7 +53,7 @@ class Edges:
 def find(solve, rows, low, high, panels=4):
     """All edges between `low` and `high` on each of `rows` rows.
 
-    `solve(row, x, wanted)` gives the outputs `wanted`, with their bars, at x (m, n), one row number for each of m.
+    `solve(row, x, wanted)` gives the outputs `wanted`, with their bounds, at x (m, n), one row number for each of m.
     """
     found, left = [], np.arange(rows)
     complete = np.zeros(rows, np.bool_)
@@ -83,21 +85,19 @@ def _candidates(solve, rows, low, high, panels):
     ends = np.linspace(low, high, panels + 1)
     row = np.repeat(rows, panels)
     left, right = np.tile(ends[:-1], rows.size), np.tile(ends[1:], rows.size)
-    nodes = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
-    matrix = 2 / NODES * np.cos(np.pi * np.outer(np.arange(NODES), np.arange(NODES) + 0.5) / NODES)
-    matrix[0] /= 2
+    x, matrix = nodes(NODES), to_coefficients(cosines(NODES))
     found = [(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))]
     for depth in range(DEEPEST):
         middle, radius = 0.5 * (left + right), 0.5 * (right - left)
-        out = solve(row, middle[:, None] + radius[:, None] * nodes, FACTORS)
+        out = solve(row, middle[:, None] + radius[:, None] * x, FACTORS)
         series = np.stack([out[name] for name in FACTORS]) @ matrix.T
         noise = np.stack([out[f"{name}_error"] for name in FACTORS]).max(axis=2)
         size, tail = abs(series).max(axis=2), abs(series[:, :, -3:]).max(axis=2)
         rough = ~(tail <= CONVERGED * size + noise).all(axis=0) & (depth < DEEPEST - 1)
         if depth >= DEEP:
             rough &= np.bincount(row[rough], minlength=row.max() + 1)[row] <= FEW
-        told = np.isfinite(size).all(axis=0) & ~rough
-        for kind, panel in zip(*np.nonzero((size > noise) & told), strict=True):
+        known = np.isfinite(size).all(axis=0) & ~rough
+        for kind, panel in zip(*np.nonzero((size > noise) & known), strict=True):
             zeros = _zeros(series[kind, panel])
             number = np.full(zeros.size, 1)
             at = middle[panel] + radius[panel] * zeros
@@ -114,7 +114,7 @@ def _halves(one, other):
 
 
 def _zeros(series):
-    """Real zeros in [-1, 1], a little beyond its ends, and of a double zero that rounding lifted, its place twice."""
+    """Real zeros in [-1, 1] and a little beyond; a double zero that rounding lifted stands there twice."""
     if abs(series[0]) > abs(series[1:]).sum():
         return np.zeros(0)
     series = series[: np.flatnonzero(abs(series) > 1e-15 * abs(series).max())[-1] + 1]
@@ -125,11 +125,11 @@ def _zeros(series):
 def _close_in(solve, row, kind, x, radius, low, high):
     """(row, position, error, kind, index) of the zeros that change sign and lie on the axis, each once."""
 
-    def look(who, x):
+    def function(who, x):
         return of_kind(solve(row[who], x, FACTORS), kind[who])
 
     scale = max(abs(low), abs(high))
-    x, width, sure = close_in(look, x, np.minimum(1e-9 * scale, 1e-4 * radius), 4 * np.spacing(abs(x)))
+    x, width, sure = close_in(function, x, np.minimum(1e-9 * scale, 1e-4 * radius), 4 * np.spacing(abs(x)))
     inside = sure & (x >= low) & (x <= high)
     row, kind, x, width = (values[inside] for values in (row, kind, x, width))
     order = np.lexsort((x, kind, row))
@@ -143,21 +143,22 @@ def _close_in(solve, row, kind, x, radius, low, high):
 
 
 def of_kind(out, kind):
-    """The factor, and its bar, that belongs to each row's kind."""
+    """The factor, and its error bound, that belongs to each row's kind."""
     rows = np.arange(kind.size)
     return (np.stack([out[name + end] for name in FACTORS])[kind, rows] for end in ("", "_error"))
 
 
 def tongue(out, kind):
-    """The tongue's number from the rotation number at places close by its edge (n, m), odd where antiperiodic."""
+    """The tongue's number from the rotation number close by its edge, at m points (n, m), odd where antiperiodic."""
     near = np.rint(2 * np.nan_to_num(out["rotation_number"])).astype(int)
     return near[np.arange(kind.size), np.argmax(near % 2 == (kind < 2)[:, None], axis=1)]
 
 
-def close_in(look, x, width, grain):
+def close_in(function, x, width, grain):
     """Sharpen simple zeros near x (n) on lines: (x, half width, certain), with opposite, certain signs at its ends.
 
-    `look(who, x)` gives the functions `who` (m places in x) and their bars at x (m, 3); `grain` (n) is x's rounding.
+    `function(who, x)` gives the functions `who` (m indices into the lines) and their error bounds at x (m, 3);
+    `grain` (n) is the rounding of x.
     """
     x, width, sure = x.copy(), width.copy(), np.zeros(x.size, np.bool_)
     left = np.arange(x.size)
@@ -165,7 +166,7 @@ def close_in(look, x, width, grain):
         if not left.size:
             break
         wide = width[left]
-        f, bar = look(left, x[left, None] + wide[:, None] * np.array([-1.0, 0.0, 1.0]))
+        f, bar = function(left, x[left, None] + wide[:, None] * np.array([-1.0, 0.0, 1.0]))
         certain = (abs(f) > bar)[:, ::2].all(axis=1) & (np.sign(f[:, 0]) == -np.sign(f[:, 2]))
         with np.errstate(all="ignore"):
             slope = (f[:, 2] - f[:, 0]) / (2 * wide)
@@ -187,22 +188,22 @@ def _complete(solve, rows, edges, low, high):
     row, x, width, kind, index = (values[order] for values in edges)
     own = [np.flatnonzero(row == r) for r in rows]
     most = max((mine.size for mine in own), default=0) + 3
-    places = np.full((rows.size, most), float(high))
+    points = np.full((rows.size, most), float(high))
     for i, mine in enumerate(own):
-        places[i, 0] = low
-        places[i, 1 : mine.size + 2] = 0.5 * (np.concatenate([[low], x[mine]]) + np.concatenate([x[mine], [high]]))
-    out = solve(rows, places, (*FACTORS, *COUNTS))
+        points[i, 0] = low
+        points[i, 1 : mine.size + 2] = 0.5 * (np.concatenate([[low], x[mine]]) + np.concatenate([x[mine], [high]]))
+    out = solve(rows, points, (*FACTORS, *COUNTS))
     signs = np.stack([np.where(abs(out[n]) > out[f"{n}_error"], np.sign(out[n]), 0) for n in FACTORS])
     band = _band(out)
     sound = np.isfinite([out[name] for name in FACTORS]).all(axis=(0, 2))
     for i, mine in enumerate(own):
-        # at both ends and between edges, but nothing is told between edges closer than their errors
-        told = np.ones(mine.size + 3, np.bool_)
-        told[2:-2] = np.diff(x[mine]) > width[mine][1:] + width[mine][:-1]
-        told[[0, -1]] = [(abs(x[mine] - end) > width[mine]).all() for end in (low, high)]
-        seen = np.where(told, signs[:, i, : mine.size + 3], 0)
+        # at both ends and between edges; between edges closer than their errors nothing is known
+        known = np.ones(mine.size + 3, np.bool_)
+        known[2:-2] = np.diff(x[mine]) > width[mine][1:] + width[mine][:-1]
+        known[[0, -1]] = [(abs(x[mine] - end) > width[mine]).all() for end in (low, high)]
+        seen = np.where(known, signs[:, i, : mine.size + 3], 0)
         sound[i] &= _signs_agree(seen, kind[mine])
-        sound[i] &= _rotation_agrees(np.where(told, band[i, : mine.size + 3], np.nan), index[mine])
+        sound[i] &= _rotation_agrees(np.where(known, band[i, : mine.size + 3], np.nan), index[mine])
     return sound
 
 
@@ -214,15 +215,15 @@ def _signs_agree(seen, kind):
 
 
 def _band(out):
-    """2 theta / 2 pi to the half: n in the gap of tongue n, n + 1/2 in the band above it; NaN where it is not told."""
+    """2 theta / 2 pi to the half: n in the gap of tongue n, n + 1/2 in the band above it; NaN where it is not known."""
     turns, bar = 2 * out["rotation_number"], 2 * out["rotation_number_error"]
-    whole = np.rint(turns)
-    inside = (out["verdict"] == STABLE) & (abs(turns - whole) > bar)
-    return np.where(out["verdict"] == UNSTABLE, whole, np.where(inside, np.floor(turns) + 0.5, np.nan))
+    nearest = np.rint(turns)
+    inside = (out["verdict"] == STABLE) & (abs(turns - nearest) > bar)
+    return np.where(out["verdict"] == UNSTABLE, nearest, np.where(inside, np.floor(turns) + 0.5, np.nan))
 
 
 def _rotation_agrees(band, index):
-    """Does every edge lie between its tongue n and a band beside it, as `band` (m + 3), at the ends too, tells?"""
+    """Does every edge lie between its tongue n and a band beside it, as `band` (m + 3), at the ends too, says?"""
     before, after = abs(band[1:-2] - index), abs(band[2:-1] - index)
     wrong = (before > 0.5) | (after > 0.5) | (before == after)
     return not wrong.any() and not (abs(band[[0, -2]] - band[[1, -1]]) > 0).any()

@@ -1,8 +1,8 @@
-"""Folds of edge curves: places where F = 0 and dF/dp = 0, so that two edges of a row meet and vanish.
+"""Folds of edge curves: points where F = 0 and dF/dp = 0, so that two edges of a row meet and vanish.
 
 On a short panel of p about a curve's turn, F(q, .) is its Chebyshev series to rounding. Its stationary value g(q) there
-is analytic with a simple zero at the fold, which is closed in by certain signs of g. The place in p is where the
-series' derivative vanishes; its error bar is that of the derivative (Bernstein's inequality) over the second one.
+is analytic with a simple zero at the fold, which is bracketed by certain signs of g. Its p is where the derivative of
+the series vanishes; its error bound is that of the derivative (Bernstein's inequality) over the second derivative.
 
 Sources: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 3 and 15;
 P. Borwein, T. Erdelyi, Polynomials and Polynomial Inequalities (1995), section 5.1.
@@ -13,22 +13,22 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from survey.kernels.math.chebyshev import cosines, lebesgue, nodes, to_coefficients
+from survey.kernels.math.roundoff import EPS
 from survey.measures.hill.curves import LONGEST
 from survey.measures.hill.edges import FACTORS, close_in, of_kind
 
 NODES = 16
-LEBESGUE = 2 / np.pi * np.log(NODES + 1) + 1
-X = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
-TO_SERIES = 2 / NODES * np.cos(np.pi * np.outer(np.arange(NODES), np.arange(NODES) + 0.5) / NODES)
-TO_SERIES[0] /= 2
+LEBESGUE = lebesgue(NODES)
+X = nodes(NODES)
+TO_SERIES = to_coefficients(cosines(NODES))
 ROUNDS = 12
 WIDER = (1, 4, 16)  # panels: times the step at the turn
-EPS = 2.3e-16
 
 
 @dataclass
 class Folds:
-    """`curve` of each fold, its place `x` (m, 2) in the square and the `error` (m, 2) of both coordinates."""
+    """`curve` of each fold, its position `x` (m, 2) in the square and the `error` (m, 2) of both coordinates."""
 
     curve: np.ndarray
     x: np.ndarray
@@ -48,12 +48,12 @@ def find(solve, square, curves):
     kind = curves.kind[whose[at]]
 
     def stationary(who, q, start, wider=1):
-        """(p, value, its bar, bar of p) where F(q, .) is stationary near p = start (m), on each panel; q is (m, n)."""
+        """(p, value, its bound, bound of p) where F(q, .) is stationary near p = start (m), on each panel; q (m, n)."""
         half = np.minimum(wider * radius[who], 0.5)
         middle = np.clip(start, half, 1 - half)
         p = (middle[:, None] + half[:, None] * X)[:, None]
-        places = square.places(np.stack(np.broadcast_arrays(q[..., None], p), axis=-1))
-        out = solve(places[..., 0, 0].reshape(-1, 1), places[..., 1].reshape(-1, NODES), FACTORS)
+        here = square.parameters(np.stack(np.broadcast_arrays(q[..., None], p), axis=-1))
+        out = solve(here[..., 0, 0].reshape(-1, 1), here[..., 1].reshape(-1, NODES), FACTORS)
         f, bar = of_kind({name: values.reshape(*q.shape, NODES) for name, values in out.items()}, kind[who])
         x, value, bar, off = _stationary(f, bar, ((start - middle) / half)[:, None])
         return middle[:, None] + half[:, None] * x, value, bar, np.where(abs(x) < 1, half[:, None] * off, np.inf)
@@ -72,12 +72,12 @@ def find(solve, square, curves):
         better = (off < error) & (abs(new[:, 1] - p) <= error + off)  # not another stationary point
         p, error = np.where(better, new[:, 1], p), np.where(better, off, error)
     good = sure & np.isfinite(error)
-    places, errors = np.stack([q, p], axis=1), np.stack([width + square.grain, error], axis=1)
-    return Folds(whose[at][good], places[good], errors[good])
+    x, errors = np.stack([q, p], axis=1), np.stack([width + square.grain, error], axis=1)
+    return Folds(whose[at][good], x[good], errors[good])
 
 
 def _stationary(f, bar, x):
-    """Where the series through f (..., NODES) is stationary near x: (x, value, its bar, bar of x), x in [-1, 1]."""
+    """Where the series through f (..., NODES) is stationary near x: (x, value, its bound, bound of x), x in [-1, 1]."""
     series = f @ TO_SERIES.T
     bar = LEBESGUE * bar.max(axis=-1) + 2 * abs(series[..., -2:]).sum(axis=-1) + 4 * EPS * abs(series).sum(axis=-1)
     columns = np.moveaxis(series, -1, 0)

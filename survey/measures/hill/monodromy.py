@@ -6,7 +6,8 @@ With y1, y2 the solutions with y1(0) = y2'(0) = 1, y1'(0) = y2(0) = 0, and every
     unstable  <=>  y1' y2 > 0  or  y1 y2' < 0          (signs of four numbers: nothing cancels)
     sinh^2(exponent / 2) = y1' y2 or -y1 y2';  sin^2(theta / 2) = -y1' y2,  cos^2(theta / 2) = y1 y2'
 
-det M = 1 is no check: it fails by 1e3 where |D| is 1e19. A verdict is given only where the bars leave no other.
+det M = 1 does not check the numbers: it fails by 1e3 where |D| is 1e19. A verdict is given only where
+the error bounds exclude the others.
 Source: W. Magnus, S. Winkler, Hill's Equation (1966), 1.3 and 2.1; symmetric z: theorem 1.1 there.
 """
 
@@ -19,7 +20,7 @@ from survey import measures, status
 from survey.kernels.hill.answers import FLOATS, MARGINAL, STABLE, UNDECIDED, UNSTABLE
 from survey.kernels.lanes import RESULTS
 from survey.kernels.math.double import split_error
-from survey.measures.hill import auto, effort
+from survey.measures.hill import auto, pointwise
 from survey.measures.hill.answers import Answers, Asked
 from survey.scene import Output
 
@@ -40,10 +41,10 @@ OUTPUTS = (
 
 
 @dataclass(frozen=True)
-class Across:
-    """An axis of `number` rows from place `low` to `high`; equal keys, and so equal axes, mean the same equations.
+class RowAxis:
+    """An axis of `number` rows from position `low` to `high`; equal keys, and so equal axes, mean the same equations.
 
-    The factors are analytic in the place; `at(places)` is the Problem of rows there, without points of its own.
+    The factors are analytic in the position; `at(positions)` is the Problem of rows there, without points of its own.
     """
 
     key: Hashable
@@ -62,12 +63,12 @@ class Problem:
     points p of those rows, and which of them reached the end; `exact(rows, p, low, steps)` gives them in double-double,
     for p + low, each in its even number of steps. |z| <= bound[r, 0] + |p| bound[r, 1] + p^2 bound[r, 2];
     `rate` is 1 / distance to z's nearest singularity. `rule` (R, L) holds what exact rules say (`answers`), and
-    `constant` the rows where z does not depend on t, with z there (rows, L); None where nothing is to be said.
-    `line` is the whole axis of p, when every row has the same points: (number, least, greatest). `even` (R) says
-    where p -> -p exchanges y1 and y2' at T/2, and leaves y2 and y1'. `across` is the axis of the rows, if there
-    is one, and `places` (R) where they lie on it, known to 4 + |place| ulp.
-    `cut(rows, steps)` gives the lengths of the steps (rows, steps) where they differ. With `whole`, where z is not
-    even, the whole period stands for the half. `span_low` and `p_low` are what float64 took from the half period and
+    `constant` the rows where z does not depend on t, with z there (rows, L); None where there are none.
+    `line` is the full axis of p, when every row has the same points: (number, least, greatest). `even` (R) says
+    where p -> -p exchanges y1 and y2' at T/2, and leaves y2 and y1'. `row_axis` is the axis of the rows, if
+    there is one, and `positions` (R) where they lie on it, known to 4 + |position| ulp.
+    `cut(rows, steps)` gives the lengths of the steps (rows, steps) where they differ. With `full_period`, where z is
+    not even, the period stands for the half. `span_low` and `p_low` are what float64 took from the half period and
     from p: None where nothing is known of it, or where it is 0.
     """
 
@@ -83,10 +84,10 @@ class Problem:
     constant: tuple[np.ndarray, np.ndarray] | None = None
     line: tuple[int, float, float] | None = None
     even: np.ndarray | None = None
-    across: Across | None = None
-    places: np.ndarray | None = None
+    row_axis: RowAxis | None = None
+    positions: np.ndarray | None = None
     cut: Callable | None = None
-    whole: bool = False
+    full_period: bool = False
     span_low: np.ndarray | None = None
     p_low: np.ndarray | None = None
 
@@ -108,7 +109,7 @@ class Problem:
         span_low = None if self.span_low is None else self.span_low[rows]
         return replace(
             self, p=p, span=self.span[rows], bound=self.bound[rows], rate=self.rate[rows], rule=rule, constant=None,
-            span_low=span_low, p_low=None, line=None, across=None, exact=None,
+            span_low=span_low, p_low=None, line=None, row_axis=None, exact=None,
             sample=lambda used, nodes, steps: self.sample(rows[used], nodes, steps),
             walk=self.walk and (lambda used, p, tolerance: self.walk(rows[used], p, tolerance)),
             cut=self.cut and (lambda used, steps: self.cut(rows[used], steps)),
@@ -142,15 +143,16 @@ def of_rows(rows, sample, walk, exact=None):
 def solve(problem, method, rtol, wanted=()):
     """The wanted outputs (R, L; all by default) with `_error` each, `verdict`, `status`.
 
-    `method` is the name of a method, or "auto" (see `auto`); effort grows until `rtol` is met or useless.
+    `method` is the name of a method, or "auto" (see `auto`); points climb its ladder until
+    `rtol` is met or more work is of no use.
     """
-    asked = Asked(rtol, np.array([name in wanted or not wanted for name in FLOATS]), whole=problem.whole)
+    asked = Asked(rtol, np.array([name in wanted or not wanted for name in FLOATS]), full_period=problem.full_period)
     answers = Answers(problem.p.size, asked)
     if method == "auto":
         decide = not wanted or not DECIDED.isdisjoint(wanted)
         auto.solve(problem, asked, answers, decide)
     else:
-        effort.solve(problem, measures.method(method), asked, answers)
+        pointwise.solve(problem, measures.method(method), asked, answers)
     out = {"verdict": answers.verdict.reshape(problem.p.shape), "status": answers.status.reshape(problem.p.shape)}
     for i in np.flatnonzero(asked.wanted):
         out[FLOATS[i]], out[f"{FLOATS[i]}_error"] = answers.floats[2 * i : 2 * i + 2].reshape(2, *problem.p.shape)
@@ -158,7 +160,7 @@ def solve(problem, method, rtol, wanted=()):
 
 
 def overflow(out, where):
-    """Take back the answers of the points `where` a value or bar lies beyond the range of floats; changes `out`."""
+    """Take back the answers of the points `where` a value or bound lies beyond the range of floats; changes `out`."""
     if where.any():
         failed = (out["status"] == status.OK) & where
         out["status"] = np.where(failed, status.OVERFLOW, out["status"]).astype(np.int8)

@@ -17,7 +17,7 @@ def solve(problem, answer, time, name="t"):
     periods = _number(float(answer["exponent"])) if time is None else max(1, ceil(time / period))
     fastest = np.sqrt(float(problem.bound[0] @ abs(problem.p[0, 0]) ** np.arange(3)))
     steps = int(np.clip(fastest * period / PHASE, LEAST, MOST)) // 4 * 4
-    z, size, lengths = _sampled(problem, steps if problem.whole else steps // 2)
+    z, size, lengths = _sampled(problem, steps if problem.full_period else steps // 2)
     matrices = np.zeros((*z.shape, 2, 2))
     matrices[..., 0, 1], matrices[..., 1, 0] = 1.0, -z
     terms = abs(matrices[:, 0])
@@ -49,7 +49,7 @@ def _sampled(problem, steps):
     p, lengths = problem.p[0, 0], problem.lengths(np.array([0]), steps)[0]
     z = c0 + p * c1 + p * p * problem.c2
     size = (abs(c0) + abs(p * c1) + p * p * problem.c2).max(axis=1)
-    if problem.whole:
+    if problem.full_period:
         return z, size, lengths
     z = np.concatenate([z, linear_motion.mirrored(z)])  # z(T - t) = z(t)
     return z, np.concatenate([size, size[::-1]]), np.concatenate([lengths, lengths[::-1]])

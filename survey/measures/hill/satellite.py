@@ -9,8 +9,7 @@ import numpy as np
 from survey.kernels.hill import satellite as motion
 from survey.kernels.hill.satellite import complete_integrals, half_periods
 from survey.kernels.math.double import split_error
-
-EPS = 2.3e-16
+from survey.kernels.math.roundoff import EPS
 
 
 def moduli(point):

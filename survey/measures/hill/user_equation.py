@@ -6,7 +6,7 @@ z is sampled at Chebyshev points on each piece between its breaks. From the coef
             geometrically, the highest frequency that matters where z is entire
     noise   what does not fall: the rounding of z and of u, and what is too fine to be resolved
 
-The noise enters the bars: z is handed on as (z - B) + B, so that its rounding counts relative to B >= max |z|, and
+The noise enters the bounds: z is handed on as (z - B) + B, so that its rounding counts relative to B >= max |z|, and
 B is as large as the noise asks. All depends on the point alone.
 
 Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 3, 7 and 8.
@@ -21,13 +21,12 @@ import numpy as np
 from survey.kernels.hill import sampled_double
 from survey.kernels.jit import fresh, inline, kernel
 from survey.kernels.lanes import RESULTS
-from survey.measures.hill import effort, monodromy
-from survey.measures.hill import more_digits as digits
+from survey.measures.hill import monodromy, multiprecision, pointwise
 from survey.methods import dop853
 
 SIZES = (65, 513, 4097)
-# z is looked at in so many evenly spread places of the part that is solved, however smooth it seems, and in so many
-# when a scene is checked; in so many at least between two breaks.
+# z is probed at so many evenly spread points of the part that is solved, however smooth it seems, and at so many when a
+# scene is checked; at so many at least between two breaks.
 PROBES, CHECKED, LEAST_PROBES = 128, 16384, 8
 # Relative to max |z|: z is resolved where its last coefficients are below the first, rough where above the second.
 RESOLVED, ROUGH = 1e-14, 1e-8
@@ -50,22 +49,22 @@ SAME_Z = 1000
 
 @lru_cache(maxsize=32)
 def kernels(z):
-    """Kernels of the function z(u, p): `look(points, u, out)`, z at u (N, M); `probe`, z between those places; `walk`,
+    """Kernels of the function z(u, p): `sample(points, u, out)`, z at u (N, M); `probe`, z between these; `walk`,
     DOP853 point by point.
     """
     z = inline(getattr(z, "py_func", z))
 
     @fresh
-    def look(points, u, out):
+    def sample(points, u, out):
         for i in range(u.shape[0]):
             for j in range(u.shape[1]):
                 out[i, j] = z(u[i, j], points[i])
 
     @fresh
     def probe(points, ends, values, size, x, number, missed):
-        """How far z (N, M) at the places x of ends (N, 2) misses z at the one of `number` places most unlike the rest.
+        """How far z (N, M) at the points x of ends (N, 2) misses z at the one of `number` points most unlike the rest.
 
-        That is where the sixth differences of z at evenly spread places are largest: in the middle of seven. Where all
+        That is where the sixth differences of z at evenly spread points are largest: in the middle of seven. Where all
         are below ROUGH times the `size` of z there is none.
         """
         for i in range(len(points)):
@@ -86,7 +85,7 @@ def kernels(z):
                     most, middle = e6, j - 3
             if most <= ROUGH * size[i]:
                 continue
-            # where two places are unlike the rest, it may be beside both
+            # where two points are unlike the rest, it may be beside both
             first = 0 if middle == 3 else middle - 1
             last = number[i] if middle == number[i] - 4 else middle + 2
             for j in range(first, last):
@@ -106,7 +105,7 @@ def kernels(z):
                 potential, 0.0, points[i], scale[i], own, slack[i], longest[i], tolerance[i], out[i]
             )
 
-    return SimpleNamespace(look=look, probe=probe, walk=walk)
+    return SimpleNamespace(sample=sample, probe=probe, walk=walk)
 
 
 class Raised(Exception):
@@ -114,10 +113,10 @@ class Raised(Exception):
 
 
 def at(z, points, u):
-    """z at the places u (N, M) of the points (N, n)."""
+    """z at u (N, M) of the points (N, n)."""
     out = np.empty(u.shape)
     try:
-        kernels(z).look(np.ascontiguousarray(points), np.ascontiguousarray(u), out)
+        kernels(z).sample(np.ascontiguousarray(points), np.ascontiguousarray(u), out)
     except Exception as error:
         raise Raised from error
     return out
@@ -126,7 +125,7 @@ def at(z, points, u):
 def problem(z, points, edges, period, slack, even, exact=None):
     """The Hill problem of z at the points (N, n), and where z is `rough`, not smooth between its breaks.
 
-    `exact(point, edges)`, if given, says z(u) and the `edges` (P + 1) of a point in more digits (`more_digits`).
+    `exact(point, edges)`, if given, says z(u) and the `edges` (P + 1) of a point in more digits (`multiprecision`).
 
     `edges` (N, P + 1): 0, the breaks, and the end of the part that is solved, T/2 if `even`, else T; where a point has
     fewer, its last one repeated. Points whose z is rough, not finite, or not even where it should be, have span NaN.
@@ -139,10 +138,10 @@ def problem(z, points, edges, period, slack, even, exact=None):
     weight = length * np.maximum(np.maximum(BY_PHASE * frequency, rate), 1 / end[:, None])
     total = np.cumsum(weight, axis=1)[:, -1:]
     need = length * total / (np.where(weight > 0, weight, 1) * end[:, None])
-    frequency = (need * frequency).max(axis=1) + effort.LONGEST * more
+    frequency = (need * frequency).max(axis=1) + pointwise.LONGEST * more
 
     def steps(rows, number):
-        """Starts and lengths of the steps (rows, number), and the places between which z may be asked for in each."""
+        """Starts and lengths of the steps (rows, number), and the ends between which z may be asked for in each."""
         i = np.arange(rows.size)[:, None]
         count = np.floor((number - pieces[rows, None]) * (weight[rows] / total[rows])).astype(int) + (length[rows] > 0)
         count[i[:, 0], weight[rows].argmax(axis=1)] += number - count.sum(axis=1)
@@ -170,8 +169,8 @@ def problem(z, points, edges, period, slack, even, exact=None):
         out = np.full((rows.size, RESULTS + (0 if even else sampled_double.SQUARES)), np.nan)
         for i in np.flatnonzero(number <= EXACT_STEPS):
             start = steps(rows[i : i + 1], number[i])[0][0]
-            with digits.LOCK:
-                found = digits.series(*exact(points[rows[i]], edges[rows[i]]), start, sampled_double.NODES)
+            with multiprecision.LOCK:
+                found = multiprecision.series(*exact(points[rows[i]], edges[rows[i]]), start, sampled_double.NODES)
             if found is None or not _agree(z, points[rows[i]], scale[rows[i]], *found[3:]):
                 continue
             terms, lengths, sizes = found[:3]
@@ -181,7 +180,7 @@ def problem(z, points, edges, period, slack, even, exact=None):
     own = monodromy.Problem(
         p=np.ones((len(points), 1)), span=np.where(rough | np.isnan(scale), np.nan, end), c2=0.0,
         bound=np.column_stack([frequency**2, 0 * end, 0 * end]), rate=(need * rate).max(axis=1) + 2 * more,
-        sample=sample, walk=walk, cut=lambda rows, number: steps(rows, number)[1], whole=not even,
+        sample=sample, walk=walk, cut=lambda rows, number: steps(rows, number)[1], full_period=not even,
         exact=exactly if exact else None,
     )  # fmt: skip
     return own, rough
@@ -208,7 +207,7 @@ def measured(z, points, edges, period, slack, probes=PROBES):
         return at(z, points[own], period[own, None] - u if mirrored else u)
 
     def missed(pieces, known, size):
-        """How far z between the places of `known`, z at Chebyshev points, is from what these tell of it."""
+        """How far z is from its interpolant between the Chebyshev points of `known`."""
         ends, own = np.concatenate([left[pieces], right[pieces]], axis=1), owner[pieces]
         share = np.diff(ends, axis=1)[:, 0] / edges[own, -1]
         number = np.maximum(np.ceil(probes * np.nan_to_num(share)), LEAST_PROBES).astype(np.int64)
@@ -247,13 +246,13 @@ def unlike(z, points, ends, known, size, number):
 
 
 @inline
-def interpolated(values, x, place):
-    """The polynomial through `values` at the Chebyshev points x (M) on [0, 1], at a place there (barycentric)."""
+def interpolated(values, x, u):
+    """The polynomial through `values` at the Chebyshev points x (M) on [0, 1], at `u` there (barycentric)."""
     above = below = 0.0
     for j in range(len(x)):
-        if x[j] == place:
+        if x[j] == u:
             return values[j]
-        weight = (1.0 - 2.0 * (j % 2)) * (0.5 if j == 0 or j == len(x) - 1 else 1.0) / (place - x[j])
+        weight = (1.0 - 2.0 * (j % 2)) * (0.5 if j == 0 or j == len(x) - 1 else 1.0) / (u - x[j])
         above += weight * values[j]
         below += weight
     return above / below

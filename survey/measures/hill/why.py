@@ -1,21 +1,20 @@
 """Why a point of Hill's equation has its verdict, in a sentence: which factor decided, against which error bar."""
 
-from survey.scene import told
+from survey.measures.hill.edges import FACTORS
+from survey.scene import with_bar
 
 RULE = "an exact rule decides here (no unstable side, or |D| = 2), whatever the error bars"
-
-FACTORS = {"y1", "y2", "dy1", "dy2"}
 
 
 def why(answer, even=True):
     """The sentence, from what is known of the point (`answer`); `even`: are the factors those at T/2?"""
     if answer["verdict"] == "marginal":
         return f"{RULE}: |D| = 2"
-    if not (even and FACTORS <= set(answer)):
+    if not (even and set(FACTORS) <= set(answer)):
         return _by_trace(answer)
     factors = {name: _product(answer, *name) for name in (("dy1", "y2"), ("y1", "dy2"))}
     (p, p_bar), (q, q_bar) = factors.values()
-    above, below = f"y1' y2 = {told(p, p_bar)}", f"y1 y2' = {told(q, q_bar)}"
+    above, below = f"y1' y2 = {with_bar(p, p_bar)}", f"y1 y2' = {with_bar(q, q_bar)}"
     if answer["verdict"] == "unstable":
         if p > p_bar:
             return f"{above} > 0 at T/2, {_times(p, p_bar)} its error bar: D = 2 + 4 y1' y2 > 2"
@@ -25,8 +24,8 @@ def why(answer, even=True):
         nearest = min(_ratio(p, p_bar), _ratio(q, q_bar))
         return f"{above} < 0 and {below} > 0 at T/2, at least {nearest:.2g} times their error bars: |D| < 2"
     elif answer["verdict"] == "undecided":
-        across = above if abs(p) <= p_bar else below
-        return f"{across} at T/2: the error bar reaches across 0, an edge of a tongue"
+        open_ = above if abs(p) <= p_bar else below
+        return f"{open_} at T/2: the error bar reaches across 0, an edge of a tongue"
     return f"{above}, {below} at T/2; {RULE}"
 
 
@@ -39,11 +38,11 @@ def _by_trace(answer):
         side = f"{_times(off, bar)} its error bar: " + ("|D| > 2" if abs(d) > 2 else "|D| < 2")
     else:
         side = "less than its error bar: the factors at T/2, more digits of D or an exact rule decide"
-    return f"D = {told(d, bar)}, {off:.2g} from |D| = 2, {side}"
+    return f"D = {with_bar(d, bar)}, {off:.2g} from |D| = 2, {side}"
 
 
 def _product(answer, one, other):
-    """The product of two factors and its bar."""
+    """The product of two factors and its error bound."""
     (x, dx), (y, dy) = ((float(answer[name]), float(answer[f"{name}_error"])) for name in (one, other))
     return x * y, abs(x) * dy + abs(y) * dx + dx * dy
 

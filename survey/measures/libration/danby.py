@@ -1,14 +1,13 @@
 """Danby's question: are the triangular points of the elliptic problem stable? Trace invariants, verdict, collision.
 
 The monodromy's characteristic polynomial is l^4 - a l^3 + b l^2 - a l + 1. By the reversibility half a period gives all
-(`traces`; the scene's notes, section 3): stable <=> A B > 0, C D > 0, K > 0 and 0 < t < 2, decided by the bars
-of these, and A B = 0 are multipliers -1, K = 0 two pairs that meet.
+(`traces`; `scenes/libration_elliptic.md`, section 3): stable <=> A B > 0, C D > 0, K > 0 and 0 < t < 2, decided by the
+error bounds of these; A B = 0 means multipliers -1, K = 0 two pairs that meet.
 
-Effort: steps from a ladder, more where the bars ask for it, so that a point depends on itself, the method and rtol
-alone. A dense row (one e, many mu) is five Chebyshev series in s = sqrt(1 - 3 mu (1 - mu)), of which A to t are entire
-functions: they are solved at PLACES values of s in [1/2, 1], and what they leave undecided or too inaccurate is solved
-point by point. e = 0 has its closed form, and so has mu = 0. What float64 leaves open, or not as accurate as asked, is
-solved in double-double (`measures.libration.danby_double`).
+Points climb a ladder of steps (`survey.measures.answers`). A dense row (one e, many mu) is five Chebyshev series in
+s = sqrt(1 - 3 mu (1 - mu)), of which A to t are entire functions: they are solved at PLACES values of s in [1/2, 1],
+and what they leave undecided or too inaccurate is solved point by point. e = 0 has its closed form, and so has mu = 0.
+What float64 leaves open, or not as accurate as asked, is solved in double-double (`measures.libration.danby_double`).
 """
 
 from functools import lru_cache
@@ -18,8 +17,7 @@ import numpy as np
 from survey import measures, status
 from survey.kernels.libration import traces
 from survey.kernels.libration.traces import (
-    EPS,
-    FACTORS,
+    INVARIANTS,
     KREIN,
     MINUS_ONE,
     NONE,
@@ -29,8 +27,11 @@ from survey.kernels.libration.traces import (
     UNDECIDED,
     UNSTABLE,
 )
+from survey.kernels.math.chebyshev import angles, lebesgue, nodes, to_coefficients
+from survey.kernels.math.roundoff import EPS
+from survey.measures.answers import Ladder
 from survey.measures.libration import danby_double
-from survey.measures.libration.danby_answers import Answers
+from survey.measures.libration.answers import Answers
 from survey.methods import taylor16
 from survey.scene import Output
 
@@ -43,22 +44,21 @@ OUTPUTS = (
     Output("collision", "how stability is lost nearest, or has been lost: multipliers meet at -1, or two pairs meet",
            flags=COLLISIONS),
 )  # fmt: skip
-LADDER = np.array([2, 3, 4, 5, 6, 7, 8, *((5 + i % 4) << (i // 4 + 1) for i in range(49))])
+# Numbers of steps; a point climbs to 1.7 times as many. Of adaptive methods: tolerances of a step.
+_NUMBERS = np.array([2, 3, 4, 5, 6, 7, 8, *((5 + i % 4) << (i // 4 + 1) for i in range(49))])
+STEPS = Ladder(_NUMBERS, np.arange(_NUMBERS.size) + 3, slice(INVARIANTS, RESULTS), most=5)
+TOLERANCES = Ladder(10.0 ** -np.arange(4.0, 16.0), np.arange(12) + 1, slice(INVARIANTS, RESULTS), most=5)
 FINEST = 1e-14
-TOLERANCES = 10.0 ** -np.arange(4.0, 16.0)
 # A series pays from so many points in the row on; of the asked accuracy for its values.
 DENSE, SHARE, HARD = 3 * PLACES, 0.05, 0.25
 # Keep a kernel call below about a second: steps, or points of an adaptive method.
 CALL_WORK, WALKS = 3_000_000, 500
-ATTEMPTS = 5  # to meet the accuracy, each with steps 1.7 times as many
-_ANGLES = np.pi * (np.arange(PLACES) + 0.5) / PLACES
-TO_SERIES = 2 / PLACES * np.cos(np.outer(np.arange(PLACES), _ANGLES))
-TO_SERIES[0] /= 2
-LEBESGUE = 1.0 + 2 / np.pi * np.log(PLACES)
+TO_SERIES = to_coefficients(np.cos(np.outer(np.arange(PLACES), angles(PLACES))))
+LEBESGUE = lebesgue(PLACES - 1)
 
 
 def solve(e, mu, method="auto", rtol=1e-10, dense=False):
-    """The outputs for rows e (R) of points mu (R, L), all (R, L): a, b, their bars, verdict, collision, status.
+    """The outputs for rows e (R) of points mu (R, L), all (R, L): a, b, their bounds, verdict, collision, status.
 
     `dense`: the rows are long enough for series (see DENSE), wherever they are cut.
     """
@@ -67,18 +67,18 @@ def solve(e, mu, method="auto", rtol=1e-10, dense=False):
     left = valid & ((e > 0)[:, None] & (mu > 0) | (method != "auto"))
     closed = valid & ~left
     if closed.any():
-        answers.put(np.flatnonzero(closed), closed_form(mu[closed], rtol))
+        answers.replace(np.flatnonzero(closed), closed_form(mu[closed], rtol))
     hard = ()
     if method == "auto" and dense:
         left, hard = _by_series(e, mu, rtol, answers, left)
     if left.any():
         used = taylor16 if method == "auto" else measures.method(method)
-        places = np.flatnonzero(left)
-        answers.put(places, _point_by_point(e[places // mu.shape[1]], *rates(mu[left]), used, rtol))
+        points = np.flatnonzero(left)
+        answers.replace(points, _point_by_point(e[points // mu.shape[1]], *rates(mu[left]), used, rtol))
     if method == "auto":
-        places = np.flatnonzero((valid & (mu > 0)).reshape(-1) & answers.unsettled)
-        if places.size:
-            danby_double.solve(e, mu, rtol, answers, places, hard)
+        points = np.flatnonzero((valid & (mu > 0)).reshape(-1) & answers.unsettled)
+        if points.size:
+            danby_double.solve(e, mu, rtol, answers, points, hard)
     answers.status[~valid.reshape(-1)] = status.INVALID_PARAMETERS
     answers.floats[:, answers.status != status.OK] = np.nan
     names = ("a", "a_error", "b", "b_error")
@@ -94,82 +94,71 @@ def rates(mu):
 
 
 def factors(e, mu, rtol=1e-13):
-    """A, B, C, D, t (N, 5) and their bars (N, 5), to what midpoint Taylor can."""
+    """A, B, C, D, t (N, 5) and their error bounds (N, 5), to what midpoint Taylor can."""
     results = np.empty((e.size, RESULTS))
     _point_by_point(e, *rates(mu), taylor16, rtol, results)
-    return results[:, :FACTORS], results[:, FACTORS:]
+    return results[:, :INVARIANTS], results[:, INVARIANTS:]
 
 
 def _by_series(e, mu, rtol, answers, left):
-    """Answer the points `left` (R, L) from their rows' series; returns those that are late, and the hard rows.
+    """Answer the points `left` (R, L) from their rows' series; returns those that missed what was asked, and hard rows.
 
     Hard is a row where float64 misses `rtol` at a quarter of the nodes: points of other rows are few in double-double.
     """
     rows = np.flatnonzero(left.any(axis=1))
-    s = 0.75 + 0.25 * np.cos(_ANGLES)
+    s = 0.75 + 0.25 * nodes(PLACES)
     d1, d2 = np.tile(1.5 * (1.0 + s), rows.size), np.tile(1.5 * (1.0 - s), rows.size)
     results = np.empty((rows.size * PLACES, RESULTS))
-    nodes = _point_by_point(np.repeat(e[rows], PLACES), d1, d2, taylor16, max(SHARE * rtol, 1e-13), results)
+    own = _point_by_point(np.repeat(e[rows], PLACES), d1, d2, taylor16, max(SHARE * rtol, 1e-13), results)
     results = results.reshape(rows.size, PLACES, RESULTS)
-    series = np.ascontiguousarray(np.swapaxes(TO_SERIES @ results[..., :FACTORS], 1, 2))
+    series = np.ascontiguousarray(np.swapaxes(TO_SERIES @ results[..., :INVARIANTS], 1, 2))
     tail = abs(series[..., -2:]).sum(axis=-1)
-    with np.errstate(over="ignore"):  # then the points are late
-        bars = LEBESGUE * results[..., FACTORS:].max(axis=1) + tail + 16 * EPS * abs(series).sum(axis=-1)
-    sound = (nodes.status == status.OK).reshape(rows.size, PLACES).all(axis=1)
-    answers.late |= left.reshape(-1)
+    with np.errstate(over="ignore"):  # then the points miss what was asked
+        bars = LEBESGUE * results[..., INVARIANTS:].max(axis=1) + tail + 16 * EPS * abs(series).sum(axis=-1)
+    sound = (own.status == status.OK).reshape(rows.size, PLACES).all(axis=1)
+    answers.missed |= left.reshape(-1)
     traces.dense(series[sound], bars[sound], rows[sound], mu, rtol, status.OVERFLOW, *answers.all)
-    hard = nodes.missed(rtol).reshape(rows.size, PLACES).mean(axis=1) >= HARD
-    return answers.late.reshape(mu.shape) & left, rows[hard]
+    hard = own.inaccurate(rtol).reshape(rows.size, PLACES).mean(axis=1) >= HARD
+    return answers.missed.reshape(mu.shape) & left, rows[hard]
 
 
 def _point_by_point(e, d1, d2, method, rtol, results=None):
-    """Answers of points (N each), each with its own effort; fills `results` (N, 10) if they are given."""
+    """Answers of points (N each), each on a rung of its own; fills `results` (N, RESULTS) if they are given."""
     results = np.empty((e.size, RESULTS)) if results is None else results
     adaptive = getattr(method, "ADAPTIVE", False)
-    run = _walk if adaptive else _chain
-    top = len(TOLERANCES if adaptive else LADDER) - 1
+    run, ladder = (_walk, TOLERANCES) if adaptive else (_chain, STEPS)
     asked = max(rtol, FINEST)
-    level = np.full(e.size, np.searchsorted(-TOLERANCES, -0.01 * asked))
-    if not adaptive:
-        level = np.searchsorted(LADDER, method.danby_steps(e, asked))
+    if adaptive:
+        rung = np.full(e.size, np.searchsorted(-ladder.rungs, -0.01 * asked))
+    else:
+        rung = np.searchsorted(ladder.rungs, method.danby_steps(e, asked))
+
+    def again(points, rung):
+        return run(method, e[points], d1[points], d2[points], ladder.rungs[rung])
+
+    def assess(points, results):
+        found = Answers(points.size)
+        found.assess(results, rtol)
+        return found
+
     answers = Answers(e.size)
-    answers.status[level > top] = status.STEP_LIMIT
-    left = np.flatnonzero(level <= top)
-    run(method, e, d1, d2, level, left, results)
-    answers.judge(results, rtol)
-    left = left[answers.late[left]]
-    for _ in range(ATTEMPTS):
-        if not left.size:
-            break
-        level[left] += 1 if adaptive else 3
-        left = left[level[left] <= top]
-        old, bar = results[left], _bar(results[left])
-        run(method, e, d1, d2, level, left, results)
-        better = _bar(results[left]) < bar
-        results[left[~better]] = old[~better]
-        again = Answers(left.size)
-        again.judge(results[left], rtol)
-        answers.put(left, again)
-        # Truncation falls by far more than 2 each time; where the bar does not halve, rounding rules.
-        halved = _bar(results[left]) < 0.5 * bar
-        left = left[again.late & (halved | (again.status == status.OVERFLOW))]
+    answers.status[rung > ladder.top] = status.STEP_LIMIT
+    first = np.flatnonzero(rung <= ladder.top)
+    results[first] = again(first, rung[first])
+    answers.assess(results, rtol)
+    ladder.climb(rung, results, answers, again, assess)
     return answers
 
 
-def _bar(results):
-    bar = results[:, FACTORS:].max(axis=1)
-    return np.where(np.isfinite(bar), bar, np.inf)
-
-
-def _chain(method, e, d1, d2, level, left, results):
-    """Points with the same steps together, in calls of bounded work."""
-    key = level[left] * 1000 + grading(e[left])
+def _chain(method, e, d1, d2, number):
+    """Results (N, RESULTS) by `number` (N) fixed steps; points of one mesh together, in calls of bounded work."""
+    results, key = np.empty((e.size, RESULTS)), number * 1000 + grading(e)
     order = np.argsort(key, kind="stable")
     nodes = tuple(method.NODES)
-    for same in np.split(left[order], np.flatnonzero(np.diff(key[order])) + 1):
+    for same in np.split(order, np.flatnonzero(np.diff(key[order])) + 1):
         if not same.size:
             continue
-        steps = int(LADDER[level[same[0]]])
+        steps = int(number[same[0]])
         v, h = mesh(steps, int(grading(e[same[:1]])[0]), nodes)
         most = max(64, CALL_WORK // steps)
         for first in range(0, same.size, most):
@@ -177,15 +166,16 @@ def _chain(method, e, d1, d2, level, left, results):
             out = np.empty((some.size, RESULTS))
             method.danby_chain(v, h, e[some], d1[some], d2[some], out)
             results[some] = out
+    return results
 
 
-def _walk(method, e, d1, d2, level, left, results):
-    """Points of their own, each with its tolerance."""
-    for first in range(0, left.size, WALKS):
-        some = left[first : first + WALKS]
-        out = np.empty((some.size, RESULTS))
-        method.danby_walk(e[some], d1[some], d2[some], TOLERANCES[level[some]], out)
-        results[some] = out
+def _walk(method, e, d1, d2, tolerance):
+    """Results (N, RESULTS) of points one by one, each with its tolerance (N)."""
+    results = np.empty((e.size, RESULTS))
+    for first in range(0, e.size, WALKS):
+        some = slice(first, first + WALKS)
+        method.danby_walk(e[some], d1[some], d2[some], tolerance[some], results[some])
+    return results
 
 
 def grading(e):
@@ -233,7 +223,7 @@ def closed_form(mu, rtol):
     rest = mu == 0
     answers.floats[:, rest] = np.array([4.0, 0.0, 6.0, 0.0])[:, None]
     answers.verdict[rest], answers.collision[rest] = UNSTABLE, NONE
-    answers.late[:] = answers.missed(rtol) | (answers.verdict == UNDECIDED)
+    answers.missed[:] = answers.inaccurate(rtol) | (answers.verdict == UNDECIDED)
     return answers
 
 

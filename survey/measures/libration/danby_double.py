@@ -1,7 +1,7 @@
 """Danby's map in double-double, for points that float64 leaves undecided or less accurate than asked.
 
 Points one by one; rows of many such points by Chebyshev series, as in `danby`, and then one by one what these
-leave open. Verdicts are told from about 27 digits; values are rounded once, at the end.
+leave open. Verdicts are decided with about 27 digits; values are rounded once, at the end.
 """
 
 from decimal import Decimal, localcontext
@@ -11,40 +11,42 @@ import numpy as np
 
 from survey import status
 from survey.kernels.libration import danby_double, traces_double
-from survey.kernels.libration.traces import FACTORS
+from survey.kernels.libration.traces import INVARIANTS
 from survey.kernels.libration.traces_double import PLACES
-from survey.kernels.math.double import UNIT
-from survey.measures.libration.danby_answers import Answers
+from survey.kernels.math.chebyshev import lebesgue
+from survey.kernels.math.roundoff import PAIR_ROUNDOFF
+from survey.measures.libration.answers import Answers
 
 POINTS, VALUES = 1000, 50_000  # of a kernel call, to keep it below about a second
-LEBESGUE = 1.0 + 2 / np.pi * np.log(PLACES)
+LEBESGUE = lebesgue(PLACES - 1)
 # Of Clenshaw's sum at the ends of its interval: n rounds |c_n| up to n + 1 times, each with a weight up to n + 1
-CLENSHAW = 4.0 * UNIT * np.arange(1.0, PLACES + 1) ** 3
-TRANSFORM = 16.0 * UNIT * PLACES  # of the sums that make coefficients of values
+CLENSHAW = 4.0 * PAIR_ROUNDOFF * np.arange(1.0, PLACES + 1) ** 3
+TRANSFORM = 16.0 * PAIR_ROUNDOFF * PLACES  # of the sums that make coefficients of values
 DIGITS = 40
 
 
-def solve(e, mu, rtol, answers, places, rows=()):
-    """Answer the points `places` (ascending) of rows e (R) of points mu (R, L), in place; `rows`: by series first."""
-    of_rows = places // mu.shape[1]
-    for row in np.intersect1d(rows, of_rows):
-        some = places[slice(*np.searchsorted(of_rows, (row, row + 1)))]
-        _put(answers, some, _by_series(e[row], mu.reshape(-1)[some], rtol))
+def solve(e, mu, rtol, answers, points, rows=()):
+    """Answer the `points` (ascending) of rows e (R) of mu (R, L), in place; those of `rows` by series first."""
+    row_of = points // mu.shape[1]
+    for row in np.intersect1d(rows, row_of):
+        some = points[slice(*np.searchsorted(row_of, (row, row + 1)))]
+        _take(answers, some, _by_series(e[row], mu.reshape(-1)[some], rtol))
     if len(rows):
-        settled = np.isin(of_rows, rows) & ~answers.unsettled[places]
-        places, of_rows = places[~settled], of_rows[~settled]
-    for first in range(0, places.size, POINTS):
-        some = places[first : first + POINTS]
+        settled = np.isin(row_of, rows) & ~answers.unsettled[points]
+        points, row_of = points[~settled], row_of[~settled]
+    for first in range(0, points.size, POINTS):
+        some = points[first : first + POINTS]
         both = np.empty((some.size, 4))
         danby_double.rates(mu.reshape(-1)[some], both)
         own = Answers(some.size)
-        traces_double.measure(_results(e[of_rows[first : first + POINTS]], both), rtol, status.OVERFLOW, *own.all)
-        _put(answers, some, own)
+        traces_double.measure(_results(e[row_of[first : first + POINTS]], both), rtol, status.OVERFLOW, *own.all)
+        _take(answers, some, own)
 
 
-def _put(answers, places, own):
+def _take(answers, points, own):
+    """The answers of the points become their `own`, where there are any."""
     better = own.status == status.OK
-    answers.put(places[better], own, better)
+    answers.replace(points[better], own, better)
 
 
 def _results(e, both):
@@ -57,24 +59,24 @@ def _by_series(e, mu, rtol):
     """Answers of points mu of one row."""
     both, matrix = tables()
     results = _results(np.full(PLACES, e), both)
-    series, bars = np.empty((FACTORS, 2, PLACES)), np.empty(FACTORS)
+    series, bars = np.empty((INVARIANTS, 2, PLACES)), np.empty(INVARIANTS)
     traces_double.to_series(results, matrix, series, bars)
     sizes = abs(series[:, 0])
     # what the series leaves out falls faster than by a half from each coefficient to the next
     with np.errstate(over="ignore"):
         bars = LEBESGUE * bars + 4.0 * sizes[:, -2:].sum(axis=1) + (CLENSHAW * sizes).sum(axis=1)
-        bars += TRANSFORM * abs(results[:, :FACTORS]).max(axis=0)
+        bars += TRANSFORM * abs(results[:, :INVARIANTS]).max(axis=0)
     own = Answers(mu.size)
     for first in range(0, mu.size, VALUES):
         part = Answers(mu[first : first + VALUES].size)
         traces_double.dense(series, bars, mu[first : first + VALUES], rtol, status.OVERFLOW, *part.all)
-        own.put(slice(first, first + VALUES), part)
+        own.replace(slice(first, first + VALUES), part)
     return own
 
 
 @lru_cache
 def tables():
-    """The rates at the places (PLACES, 4), and the matrix that makes coefficients of values (2, PLACES, PLACES)."""
+    """The rates at the nodes (PLACES, 4), and the matrix that makes coefficients of values (2, PLACES, PLACES)."""
     with localcontext() as context:
         context.prec = DIGITS
         cosines = [_cosine(k) for k in range(4 * PLACES)]  # of k pi / (2 PLACES)

@@ -29,9 +29,9 @@ RESOLUTION = 1e-12  # relative: what the halvings, the rule and the roundings he
 
 
 def radius(remainders, time):
-    """(radius, bar, r) at each mu: the radius for `time`, how much less rounding may make it, and the order r.
+    """(radius, bound, r) at each mu: the radius for `time`, how much less rounding may make it, and the order r.
 
-    `remainders`: {(r, d): (values, bars) (2, 3, N)}, as a method's function of that name gives them. NaN and r = -1
+    `remainders`: {(r, d): (values, bounds) (2, 3, N)}, as a method's function of that name gives them. NaN and r = -1
     where no order is known.
     """
     top = max(d for _r, d in remainders)

@@ -15,7 +15,7 @@ GROWTH = 5.0
 
 
 def orbit(mu, e, time):
-    """f, xi and eta, from rest in xi = 1, up to f = `time`, with their bars, as `Trajectory.data` holds them."""
+    """f, xi and eta, from rest in xi = 1, up to f = `time`, with their bounds, as `Trajectory.data` holds them."""
     matrices, lengths = coefficients(mu, e)
     turns = int(np.clip(ceil(time / (2 * pi) - 1e-9), 1, MOST))
     f, y, bars = linear_motion.fundamental(matrices, lengths, turns)
@@ -41,7 +41,7 @@ def coefficients(mu, e):
 
 
 def multipliers(a, a_bar, b, b_bar):
-    """The four zeros of l^4 - a l^3 + b l^2 - a l + 1 and their bars: l + 1/l = w, w^2 - a w + b - 2 = 0."""
+    """The four zeros of l^4 - a l^3 + b l^2 - a l + 1 and their error bounds: l + 1/l = w, w^2 - a w + b - 2 = 0."""
     x, d = 0.25 * complex(a) ** 2 - (b - 2.0), 0.5 * abs(a) * a_bar + 0.25 * a_bar**2 + b_bar
     root = np.sqrt(x)
     bar = 0.5 * a_bar + min(np.sqrt(d), d / abs(root) if root else np.inf)

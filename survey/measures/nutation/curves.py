@@ -1,12 +1,12 @@
 """The bifurcation set of nutations on a map of two of the scaled integrals l, alpha, beta, in closed form.
 
-On maps of initial states the same curves are level curves, see `levels`.
+On maps of initial states the same curves are level curves, see `level_curves`.
 
-Regular precessions are the surface (S18) of `sheets`, which a map cuts in curves. They are stable, and a well
-begins, where A^2 omega_n^2 / |k| = y^2 + z^2 - s (1 - 3 y^2 z^2) is positive; where it is negative they are saddles,
-the separatrices; where it is 0 the sheets meet in cusps (k > 0). The surface ends, and for k < 0 threads go on without
-it, at the upright rotations, alpha = +-beta, l = alpha^2 - s; with the same alpha and beta and a greater l the motion
-passes the pole, where the advances jump. Equation numbers: `scenes/brun.md`.
+A map cuts the surface of regular precessions (S18) in curves. The precessions are stable, and a well begins, where
+A^2 omega_n^2 / |k| = y^2 + z^2 - s (1 - 3 y^2 z^2) is positive; where it is negative they are saddles, the
+separatrices; where it is 0 the sheets of the surface meet in cusps (k > 0). The surface ends at the upright rotations,
+alpha = +-beta, l = alpha^2 - s, which for k < 0 go on without it as threads; with the same alpha and beta and a greater
+l the motion passes the pole, where the advances jump. Equation numbers: `scenes/brun.md`.
 
 Curves are sampled until chords are short and near them, cut where they leave the map or become unstable.
 """
@@ -16,9 +16,10 @@ from itertools import pairwise, product
 
 import numpy as np
 
-from survey.kernels.nutation.wells import EPS, TINY
-from survey.measures.nutation import levels
-from survey.measures.nutation.sheets import parts, surface
+from survey.kernels.math.roundoff import ROUNDOFF
+from survey.kernels.nutation.wells import TINY
+from survey.measures.nutation import level_curves
+from survey.measures.nutation.regular_precessions import parts, surface
 from survey.scene import Output
 
 CLASSES = {
@@ -43,23 +44,25 @@ ROUNDS = 60
 
 @dataclass
 class Curves:
-    """Curves one after another: `count` points each, of class `kind`. Per point `places` (m, 2), the parameters; their
-    `error` (m), in the unit square of the map; and `along`: {name of ALONG: (values, errors)}.
+    """Curves one after another: `count` points each, of class `kind`.
+
+    Per point its `parameters` (m, 2), its `error` (m), in the unit square of the map, and `along`: {name of
+    ALONG: (values, errors)}.
     """
 
     count: np.ndarray
     kind: np.ndarray
-    places: np.ndarray
+    parameters: np.ndarray
     error: np.ndarray
     along: dict
 
 
 def refusal(axes):
     """Why there are no curves on a map of these axes, in words; None if there are."""
-    if len(axes) in (2, 3) and (set(axes) <= set(AXES) or set(axes) <= set(levels.STATE)):
+    if len(axes) in (2, 3) and (set(axes) <= set(AXES) or set(axes) <= set(level_curves.STATE)):
         return None
     return (
-        f"curves are known on two or three axes of {', '.join(AXES)} or of {', '.join(levels.STATE)}, "
+        f"curves are known on two or three axes of {', '.join(AXES)} or of {', '.join(level_curves.STATE)}, "
         f"not on {', '.join(axes) or 'none'}"
     )
 
@@ -80,22 +83,22 @@ def closed(square, axes, fixed, options):
 
 def _of_states(square, axes, fixed):
     """The Curves on a map of initial states."""
-    count, kinds, places, errors, known = [], [], [], [], []
-    for function, x, error, columns in levels.traced(square, axes, fixed):
-        here = _nowhere(len(x)) | levels.along(function, columns)
-        kind = np.full(len(x), PASSAGE if function in (levels.upper_pole, levels.lower_pole) else SADDLE)
-        if function is levels.precession:
+    count, kinds, parameters, errors, known = [], [], [], [], []
+    for function, x, error, columns in level_curves.traced(square, axes, fixed):
+        here = _nowhere(len(x)) | level_curves.along(function, columns)
+        kind = np.full(len(x), PASSAGE if function in (level_curves.upper_pole, level_curves.lower_pole) else SADDLE)
+        if function is level_curves.precession:
             kind[here["nutation_square"][0] > 0.0] = STABLE
         for part in np.split(np.arange(len(x)), 1 + np.flatnonzero(np.diff(kind))):
             count.append(part.size)
             kinds.append(kind[part[0]])
-        places.append(square.places(x))
+        parameters.append(square.parameters(x))
         errors.append(error)
         known.append(here)
     return Curves(
         count=np.array(count, int),
         kind=np.array(kinds, int),
-        places=np.concatenate([np.zeros((0, 2)), *places]),
+        parameters=np.concatenate([np.zeros((0, 2)), *parameters]),
         error=np.concatenate([np.zeros(0), *errors]),
         along={
             output.name: tuple(np.concatenate([np.zeros(0), *(here[output.name][i] for here in known)]) for i in (0, 1))
@@ -112,18 +115,18 @@ def _furthest(square, axes):
 def _traced(part, square, axes, s):
     """[(kind, {name: (values, errors)})]: the runs of a part on the map, cut at cusps, and these as points."""
 
-    def place(t):
+    def position(t):
         here = surface(*part.at(t), s)
-        return square.inside(_positive(np.stack([here[name][0] for name in axes], axis=-1), square))
+        return square.positions(_positive(np.stack([here[name][0] for name in axes], axis=-1), square))
 
     def inside(t):
-        x = place(t)
+        x = position(t)
         return ((x >= 0.0) & (x <= 1.0)).all(axis=-1)
 
     def stable(t):
         return s < 0.0 or surface(*part.at(t), s)["nutation_square"][0] >= 0.0
 
-    t = _sampled(part, place)
+    t = _sampled(part, position)
     borders, cusps = _changes(inside, t), _changes(stable, t) if s > 0.0 else np.array([])
     t = np.unique(np.concatenate([t, borders, cusps]))
     cuts = np.unique(np.concatenate([t[[0, -1]], borders, cusps]))
@@ -145,14 +148,14 @@ def _positive(values, square):
     return np.where(square.log, np.maximum(values, TINY), values)
 
 
-def _sampled(part, place):
+def _sampled(part, position):
     """Parameters of a part so close that on the map chords are short and near the curve."""
     if part.low == part.high:
         return np.array([part.low])
     t = np.linspace(part.low, part.high, FIRST)
     for _ in range(ROUNDS):
         middle = 0.5 * (t[:-1] + t[1:])
-        x, between = place(t), place(middle)
+        x, between = position(t), position(middle)
         chord, half = x[1:] - x[:-1], between - x[:-1]
         path = np.hypot(*half.T) + np.hypot(*(x[1:] - between).T)
         with np.errstate(all="ignore"):
@@ -186,11 +189,11 @@ def _uprights(third, value, s, square, axes):
         a, b = (p, side * p) if third == "alpha" else (side * p, p)
         square_p = (value + s if third == "l" else p * p) + 4.0 * s
         here = _nowhere(1) | {
-            "l": (np.array([value if third == "l" else p * p - s]), np.array([2.0 * EPS * (p * p + 1.0)])),
-            "alpha": (np.array([a]), np.array([2.0 * EPS * abs(p) * (third == "l")])),
-            "beta": (np.array([b]), np.array([2.0 * EPS * abs(p) * (third == "l")])),
+            "l": (np.array([value if third == "l" else p * p - s]), np.array([2.0 * ROUNDOFF * (p * p + 1.0)])),
+            "alpha": (np.array([a]), np.array([2.0 * ROUNDOFF * abs(p) * (third == "l")])),
+            "beta": (np.array([b]), np.array([2.0 * ROUNDOFF * abs(p) * (third == "l")])),
             "u": (np.array([side]), np.zeros(1)),
-            "nutation_square": (np.array([square_p]), np.array([4.0 * EPS * (p * p + 4.0)])),
+            "nutation_square": (np.array([square_p]), np.array([4.0 * ROUNDOFF * (p * p + 4.0)])),
         }
         if _on_map(here, square, axes)[0]:
             found.append((UPRIGHT if square_p >= 0.0 else THREAD, here))
@@ -220,7 +223,7 @@ def _passages(third, value, s, square, axes):
             ends = np.array([max(low["l"], value * value - s), high["l"]])
             other = "beta" if third == "alpha" else "alpha"
             here = {"l": ends, third: np.full(2, value), other: np.full(2, side * value)}
-        here = _nowhere(2) | {name: (v, 2.0 * EPS * (abs(v) + 1.0)) for name, v in here.items()}
+        here = _nowhere(2) | {name: (v, 2.0 * ROUNDOFF * (abs(v) + 1.0)) for name, v in here.items()}
         if ends[0] < ends[1] and _on_map(here, square, axes).all():
             found.append((PASSAGE, here))
     return found
@@ -241,15 +244,15 @@ def _joined(found, square, axes):
     def all_of(name, which):
         return np.concatenate([here[name][which] for _, here in found] or [np.zeros(0)])
 
-    places = np.stack([all_of(name, 0) for name in axes], axis=-1)
+    parameters = np.stack([all_of(name, 0) for name in axes], axis=-1)
     bars = np.stack([all_of(name, 1) for name in axes], axis=-1)
     ends = _positive(np.stack([square.low, square.high]), square)
     ratios = np.log(np.divide(ends[1], ends[0], out=np.ones(2), where=square.log))
-    width = np.where(square.log, ratios * abs(places), square.high - square.low)
+    width = np.where(square.log, ratios * abs(parameters), square.high - square.low)
     return Curves(
         count=np.array([here["l"][0].size for _, here in found], int),
         kind=np.array([kind for kind, _ in found], int),
-        places=places,
+        parameters=parameters,
         error=np.hypot(*(bars / width).T),
         along={output.name: (all_of(output.name, 0), all_of(output.name, 1)) for output in ALONG},
     )

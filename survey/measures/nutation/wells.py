@@ -6,6 +6,7 @@ and from these, at given times, those of a motion.
 
 import numpy as np
 
+from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.nutation import brun, brun_lanes
 from survey.kernels.nutation import records as rc
 from survey.kernels.nutation import wells as nu
@@ -37,7 +38,7 @@ def of_integrals(points, sign):
 
 
 def in_lanes(kernel, points, actions):
-    """Values and bars (OUTPUTS, n) of `points` (7, n), numbers of wells (n), who is answered (n): see `brun_lanes`.
+    """Values and bounds (OUTPUTS, n) of `points` (7, n), numbers of wells (n), who is answered (n): see `brun_lanes`.
 
     actions: to full accuracy in small wells, too.
     """
@@ -48,7 +49,7 @@ def in_lanes(kernel, points, actions):
 
 
 def named(values):
-    """{name: values, name_error: bars} of the answers of `in_lanes`."""
+    """{name: values, name_error: error bounds} of the answers of `in_lanes`."""
     return dict(zip((*NAMES, *(f"{name}_error" for name in NAMES)), values, strict=True))
 
 
@@ -67,12 +68,12 @@ def periods(method, rows, kinds, rtol):
 
 
 def outputs(rows, out, inertia, drift):
-    """{name: values, name_error: bars} of wells from `periods`; inertia is A, drift a (1/C - 1/A) to 8 roundings."""
+    """{name: values, name_error: bounds} of wells from `periods`; inertia is A, drift a (1/C - 1/A) to 8 roundings."""
     good = np.isfinite(out[:, rc.PERIOD])
     period = inertia * out[:, rc.PERIOD]
-    bar = inertia * out[:, rc.PERIOD_BAR] + 2.0 * nu.EPS * period
+    bar = inertia * out[:, rc.PERIOD_BAR] + 2.0 * ROUNDOFF * period
     spin = out[:, rc.SPIN] + drift * period
-    spin_bar = out[:, rc.SPIN_BAR] + np.abs(drift) * (bar + 8.0 * nu.EPS * period) + nu.EPS * np.abs(spin)
+    spin_bar = out[:, rc.SPIN_BAR] + np.abs(drift) * (bar + 8.0 * ROUNDOFF * period) + ROUNDOFF * np.abs(spin)
     found = {
         "u_min": (rows[:, nu.LOW], rows[:, nu.BAR_LOW]),
         "u_max": (rows[:, nu.HIGH], rows[:, nu.BAR_HIGH]),
@@ -85,7 +86,7 @@ def outputs(rows, out, inertia, drift):
 
 
 def _smallest(rows):
-    """What the action of a regular precession may be, by the bars of its turning points; 0 of other wells."""
+    """What the action of a regular precession may be, by the error bounds of its turning points; 0 of other wells."""
     wide = np.where(rows[:, nu.WIDTH] == 0.0, rows[:, nu.BAR_LOW] + rows[:, nu.BAR_HIGH], 0.0)
     near = np.minimum(rows[:, nu.HIGH_PLUS], rows[:, nu.LOW_MINUS])
     steep = np.sqrt(np.maximum(np.maximum(rows[:, nu.Q_LOW], rows[:, nu.Q_HIGH]), 0.0))
@@ -100,7 +101,7 @@ def _named(found, good):
 
 
 def rates(out, wanted):
-    """{name: values, name_error: bars} of those `wanted` that follow from `outputs`: frequencies, rotation numbers."""
+    """{name: values, name_error: bounds} of the frequencies and rotation numbers `wanted`, from those of `outputs`."""
     period, bar = out["period"], out["period_error"]
     result = {}
     with np.errstate(invalid="ignore"):
@@ -108,31 +109,31 @@ def rates(out, wanted):
             value = TURN / period
             result |= {
                 "nutation_frequency": value,
-                "nutation_frequency_error": value * (bar / (period - bar) + 4.0 * nu.EPS),
+                "nutation_frequency_error": value * (bar / (period - bar) + 4.0 * ROUNDOFF),
             }
         for name in ("precession", "spin"):
             angle, rough = out[name], out[f"{name}_error"]
             if f"{name}_rate" in wanted:
                 value = angle / period
                 result[f"{name}_rate"] = value
-                result[f"{name}_rate_error"] = (rough + np.abs(value) * bar) / (period - bar) + 2.0 * nu.EPS * np.abs(
+                result[f"{name}_rate_error"] = (rough + np.abs(value) * bar) / (period - bar) + 2.0 * ROUNDOFF * np.abs(
                     value
                 )
             if f"{name}_number" in wanted:
                 value = angle / TURN
                 result[f"{name}_number"] = value
-                result[f"{name}_number_error"] = rough / TURN + 3.0 * nu.EPS * np.abs(value)
+                result[f"{name}_number_error"] = rough / TURN + 3.0 * ROUNDOFF * np.abs(value)
     return result
 
 
 def motions(method, rows, kinds, starts, out, times, inertia, drift):
-    """{name: values, name_error: bars} of u, psi and phi at `times` (n, m)."""
+    """{name: values, name_error: error bounds} of u, psi and phi at `times` (n, m)."""
     here = np.full((*times.shape, rc.MOTION), np.nan)
     rows, kinds = np.ascontiguousarray(rows), np.ascontiguousarray(kinds)
     method.nutation_motions(rows, kinds, starts, out, times / inertia[:, None], here)
     turned = drift[:, None] * times
     phi = here[..., rc.PHI] + turned
-    bar = here[..., rc.PHI_BAR] + 12.0 * nu.EPS * np.abs(turned) + nu.EPS * np.abs(phi)
+    bar = here[..., rc.PHI_BAR] + 12.0 * ROUNDOFF * np.abs(turned) + ROUNDOFF * np.abs(phi)
     found = {
         "u": (here[..., rc.U], here[..., rc.U_BAR]),
         "psi": (here[..., rc.PSI], here[..., rc.PSI_BAR]),
@@ -143,7 +144,7 @@ def motions(method, rows, kinds, starts, out, times, inertia, drift):
 
 
 def verdicts(rows, kinds):
-    """The verdict of each well: its kind, and a regular precession also where the well's width is within its bar."""
+    """The verdict of each well: its kind, and a regular precession also where the well's width is within its bound."""
     one = (kinds == nu.NUTATION) & (rows[..., nu.NOISE_WIDTH] >= 1.0)
     return np.where(one, nu.PRECESSION, np.maximum(kinds, UNDECIDED))
 
@@ -156,13 +157,13 @@ def heights(kernel, points):
 
 
 def distance(heights):
-    """The output of that name: (L - L of the separatrix)/|k|, and its bar; NaN where there is none, or FAR away.
+    """The output of that name: (L - L of the separatrix)/|k|, and its bound; NaN where there is none, or FAR away.
 
-    An infinite bar is left beside NaN where it is in doubt whether there is one.
+    An infinite error bound is left beside NaN where it is in doubt whether there is one.
     """
     with np.errstate(divide="ignore", invalid="ignore"):  # k = 0 has no separatrix
         value = heights[:, rc.ABOVE] / heights[:, rc.FIELD]
-        bar = heights[:, rc.ABOVE_BAR] / heights[:, rc.FIELD] + 4.0 * nu.EPS * np.abs(value)
+        bar = heights[:, rc.ABOVE_BAR] / heights[:, rc.FIELD] + 4.0 * ROUNDOFF * np.abs(value)
     near = np.abs(value) < FAR
     return {
         "separatrix_distance": np.where(near, value, np.nan),

@@ -6,8 +6,8 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from survey.kernels.cylinder import along, flow
 from survey.kernels.cylinder import equilibria as eq
+from survey.kernels.cylinder import flow, steps
 from survey.methods import taylor
 
 SIX = (0.7, -0.4, 1.1, 0.3, 0.5, -0.2)
@@ -111,5 +111,5 @@ def test_regions_of_attraction_hold():
 def test_errors_of_the_start_and_the_target_lie_within_the_bar_of_a_crossing(n):
     """2 n local errors, and those of the initial phi, the target and the time, which all add up in w."""
     floats, size = np.empty((1, 4)), 1e-10
-    along.fill_crossing(floats, 0, n, 1.0, 0.0, (n + 3) * size**2, 0.0, n * size**2, -1.0, 0.0)
+    steps.fill_crossing(floats, 0, n, 1.0, 0.0, (n + 3) * size**2, 0.0, n * size**2, -1.0, 0.0)
     assert (2 * n + 3) * size <= floats[0, 2] < 1.1 * (2 * n + 4) * size

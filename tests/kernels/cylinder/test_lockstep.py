@@ -7,7 +7,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from survey.kernels.cylinder import along, lockstep
+from survey.kernels.cylinder import lockstep, steps
 from survey.kernels.jit import fresh
 from survey.measures.cylinder import solution
 from survey.methods import closed, dop853, taylor
@@ -18,7 +18,7 @@ TURN = lockstep.LANES + 3  # more rows than lanes
 
 @fresh
 def one_by_one(P, starts, times, tolerance, limit, floats, turnings, status):
-    along.trajectories(taylor.flow_setting, taylor.flow_begin, taylor.flow_at, P, starts, times, tolerance, limit,
+    steps.trajectories(taylor.flow_setting, taylor.flow_begin, taylor.flow_at, P, starts, times, tolerance, limit,
                        floats, turnings, status)  # fmt: skip
 
 
@@ -32,7 +32,7 @@ def solved(rows, times, tolerance=1e-13, run=taylor.flow_trajectories, limit=sol
     """floats, turnings and status of `run` at the same times for every row."""
     P, starts = solution.split(np.asarray(rows, float))
     times = np.tile(np.asarray(times, float), (len(P), 1))
-    floats, turnings = np.full((*times.shape, 4), np.nan), np.full(times.shape, along.UNTOLD)
+    floats, turnings = np.full((*times.shape, 4), np.nan), np.full(times.shape, steps.UNDETERMINED)
     status = np.full(len(P), 99)
     run(P, starts, times, tolerance, limit, floats, turnings, status)
     return floats, turnings, status
@@ -48,9 +48,9 @@ def agree(rows, times, tolerance=1e-13):
     best, counted, _ = solved(rows, times, 1e-17, one_by_one)
     both = np.isfinite(mine[..., 0]) & np.isfinite(best[..., 0])
     assert (np.abs(mine - best)[both][:, :2] <= mine[both][:, 2:] + best[both][:, 2:]).all()
-    both &= (told != along.UNTOLD) & (counted != along.UNTOLD)
+    both &= (told != steps.UNDETERMINED) & (counted != steps.UNDETERMINED)
     assert np.array_equal(told[both], counted[both])
-    assert ((status == along.OK) == np.isfinite(mine[:, -1, 0])).all()
+    assert ((status == steps.OK) == np.isfinite(mine[:, -1, 0])).all()
     return both.mean()
 
 
@@ -74,7 +74,7 @@ def test_references_to_t_20_lie_within_their_bars(rtol):
     data = json.loads((files("survey.reference") / "gyrostat_trajectories.json").read_text())["trajectories"]
     rows = np.array([[point[n] for n in gyrostat._NAMES] for point, *_ in gyrostat.references("trajectory")])
     floats, _turnings, status = solution.trajectories(taylor, rows, np.full((len(rows), 1), 20.0), rtol)
-    assert (status == along.OK).all()
+    assert (status == steps.OK).all()
     for found, case in zip(floats[:, 0], data, strict=True):
         for value, bar, name in zip(found[:2], found[2:], ("phi", "w"), strict=True):
             error = abs(mp.mpf(float(value)) - mp.mpf(case[name]))
@@ -121,7 +121,7 @@ def test_a_row_of_nan_costs_itself_alone(place):
     good = solved(rows, [5.0])
     rows[3, place] = np.nan
     bad = solved(rows, [5.0])
-    assert np.isnan(bad[0][3]).all() and bad[2][3] != along.OK
+    assert np.isnan(bad[0][3]).all() and bad[2][3] != steps.OK
     for one, other in zip(good, bad, strict=True):
         assert np.array_equal(np.delete(one, 3, axis=0), np.delete(other, 3, axis=0), equal_nan=True)
 
@@ -129,9 +129,9 @@ def test_a_row_of_nan_costs_itself_alone(place):
 def test_a_row_of_times_ends_at_its_first_infinity_and_a_budget_ends_a_row():
     rows = drawn(TURN, 8)
     floats, _turnings, status = solved(rows, [2.0, np.inf, 3.0])
-    assert np.isfinite(floats[:, 0]).all() and np.isnan(floats[:, 1:]).all() and (status == along.OK).all()
-    assert (solved(rows, [np.inf])[2] == along.OK).all()
-    assert (solved(rows, [1e9], limit=5)[2] == along.STEP_LIMIT).all()
+    assert np.isfinite(floats[:, 0]).all() and np.isnan(floats[:, 1:]).all() and (status == steps.OK).all()
+    assert (solved(rows, [np.inf])[2] == steps.OK).all()
+    assert (solved(rows, [1e9], limit=5)[2] == steps.STEP_LIMIT).all()
 
 
 def test_exact_equilibria_stay():
@@ -155,13 +155,13 @@ def test_bars_hold_where_every_second_coefficient_vanishes():
     exact, _, known = solution.trajectories(closed, rows, times, 1e-10)
     for method in (taylor, dop853):
         found, _, status = solution.trajectories(method, rows, times, 1e-8)
-        good = (known == along.OK) & (status == along.OK)
+        good = (known == steps.OK) & (status == steps.OK)
         assert good.mean() > 0.95
         bars = found[..., 2:] + exact[..., 2:]
         assert (abs(found[..., :2] - exact[..., :2]) <= bars)[good].all(), method
     targets = rows[:, 6:7] + np.sign(exact[:, :1, 0] - rows[:, 6:7]) * [[1e-3, 1e-2]]
     exact, known = solution.abel(closed, rows, targets, 1e-10)
     found, status = solution.abel(taylor, rows, targets, 1e-8)
-    good = (known == along.OK) & (status == along.OK)
+    good = (known == steps.OK) & (status == steps.OK)
     assert good.mean() > 0.5
     assert (abs(found - exact)[..., :2] <= (found + exact)[..., 2:])[good].all()

@@ -6,7 +6,7 @@ from flow_truth import exact
 from mpmath import mp, mpf
 
 from survey.kernels.cylinder import flow_double, taylor_double
-from survey.kernels.cylinder.along import NO_CONVERGENCE, OK, SEPARATRIX, STEP_LIMIT, TURNING
+from survey.kernels.cylinder.steps import NO_CONVERGENCE, OK, SEPARATRIX, STEP_LIMIT, TURNING
 from survey.measures.cylinder import auto, solution
 from survey.methods import dop853, rk4, taylor
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from survey.kernels.cylinder import trigonometric
-from survey.kernels.cylinder.along import OK
+from survey.kernels.cylinder.steps import OK
 from survey.kernels.jit import fresh
 from survey.measures.cylinder import solution
 from survey.methods import closed, taylor

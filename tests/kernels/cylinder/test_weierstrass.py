@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from survey.kernels.cylinder import weierstrass
-from survey.kernels.cylinder.along import OK, UNTOLD
+from survey.kernels.cylinder.steps import OK, UNDETERMINED
 from survey.kernels.jit import fresh
 from survey.measures.cylinder import solution
 from survey.methods import closed, taylor
@@ -119,7 +119,7 @@ def test_thousands_agree_with_taylor_series_within_both_bars(scale, unit):
     both = (status == OK) & (fine == OK)
     assert both.mean() > 0.99
     assert (np.abs(mine - other)[both][:, :2] <= mine[both][:, 2:] + other[both][:, 2:]).all()
-    both &= (told != UNTOLD) & (counted != UNTOLD)
+    both &= (told != UNDETERMINED) & (counted != UNDETERMINED)
     assert both.mean() > 0.99 and np.array_equal(told[both], counted[both])
 
 

@@ -9,6 +9,7 @@ from mpmath import mp, mpf
 from survey.kernels.hill import satellite
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math import double as dd
+from survey.kernels.math.roundoff import PAIR_ROUNDOFF
 
 
 @kernel
@@ -61,7 +62,7 @@ def check(x, y):
         assert value(out[0]) == wanted[0] and value(out[1]) == wanted[1]
         for i, (pair, number) in enumerate(zip(out[2:], wanted[2:], strict=True)):
             size = abs(number) if i < 12 else abs(value(x)) + abs(value(y))  # the last one may cancel
-            assert abs(value(pair) - number) <= (8 if i == 7 else 4) * dd.UNIT * size, i
+            assert abs(value(pair) - number) <= (8 if i == 7 else 4) * PAIR_ROUNDOFF * size, i
             assert pair[0] == pair[0] + pair[1], i
 
 
@@ -114,9 +115,9 @@ def test_series():
         a, b = ([value(s[:, n]) for n in range(orders)] for s in series)
         for n in range(orders):
             terms = [a[i] * b[n - i] for i in range(n + 1)]
-            assert abs(value(out[n]) - mp.fsum(terms)) <= 2 * dd.UNIT * mp.fsum(map(abs, terms))
+            assert abs(value(out[n]) - mp.fsum(terms)) <= 2 * PAIR_ROUNDOFF * mp.fsum(map(abs, terms))
         for got, terms in ((out[-2], a), (out[-1], [n * v for n, v in enumerate(a)])):
-            assert abs(value(got) - mp.fsum(terms)) <= 8 * dd.UNIT * mp.fsum(map(abs, terms))
+            assert abs(value(got) - mp.fsum(terms)) <= 8 * PAIR_ROUNDOFF * mp.fsum(map(abs, terms))
 
 
 @kernel
@@ -132,7 +133,7 @@ def test_half_period_from_one_minus_k(short):
     with mp.workdps(60):
         k = 1 - mpf(short)
         wanted = 2 * mp.ellipk(k**2) if k < 1 else mp.ellipk(1 / k**2) / k
-        assert abs(value(half_of(row, np.empty(satellite.EXACTLY))) / wanted - 1) < 16 * dd.UNIT
+        assert abs(value(half_of(row, np.empty(satellite.EXACTLY))) / wanted - 1) < 16 * PAIR_ROUNDOFF
 
 
 @pytest.mark.parametrize("amplitude", [0.0, 1e-9, 0.03, 0.8, 1.5, 1.5707963, np.nextafter(np.pi / 2, 0)])
@@ -141,7 +142,7 @@ def test_half_period_from_the_amplitude(amplitude):
     row = np.array([0.0, 0.0, 0.0, 0.0, amplitude, satellite.AMPLITUDE])
     with mp.workdps(60):
         wanted = mp.pi / mp.agm(1, mp.cos(mpf(amplitude)))
-        assert abs(value(half_of(row, np.empty(satellite.EXACTLY))) / wanted - 1) < 16 * dd.UNIT
+        assert abs(value(half_of(row, np.empty(satellite.EXACTLY))) / wanted - 1) < 16 * PAIR_ROUNDOFF
 
 
 def test_both_ways_to_the_error_of_a_product_give_the_same_bits():

@@ -257,7 +257,7 @@ def test_at_degenerate_equilibria_nothing_is_counted(six, off):
     six = np.array(six)
     six[5 if six[5] < 0 else 0] += off
     found = portraits(six)
-    assert found["status"][0] == cp.UNTOLD_RESTS and found["verdict"][0] == 0
+    assert found["status"][0] == cp.UNKNOWN_RESTS and found["verdict"][0] == 0
     assert all(found[name][0] == -1 for name in cp.COUNTS)
     assert np.isnan(found["equilibrium_phi"]).all() and np.isnan(found["cycle_w"]).all()
     assert found["K"][0] == pytest.approx(six[0] * six[5] - six[1] * six[4], abs=1e-15)

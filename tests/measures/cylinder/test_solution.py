@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from flow_truth import exact, zeros_beside_a_focus
 
-from survey.kernels.cylinder.along import EQUILIBRIUM, NO_CONVERGENCE, OK, SEPARATRIX, TURNING, UNTOLD
+from survey.kernels.cylinder.steps import EQUILIBRIUM, NO_CONVERGENCE, OK, SEPARATRIX, TURNING, UNDETERMINED
 from survey.measures.cylinder import auto, solution
 from survey.methods import closed, dop853, rk4, taylor
 
@@ -287,7 +287,7 @@ def test_a_turning_within_the_bar_of_w_is_not_counted_but_by_double_double():
     row = np.array([[0, 0, -1.200558782775014, -0.2737773771513731, 1.2166661048093794, 0.2739402077906878,
                      -1.5913397469582256, 6.652845693193966e-18]])  # fmt: skip
     times = np.array([[1.2577104547576345]])
-    assert solution.trajectories(taylor, row, times, 1e-10)[1][0, 0] == UNTOLD
+    assert solution.trajectories(taylor, row, times, 1e-10)[1][0, 0] == UNDETERMINED
     assert auto.trajectories(taylor, row, times, 1e-10)[1][0, 0] == 0
     assert exact(row[0, :6], *row[0, 6:], times[0, 0])[1] > 0
 

@@ -43,7 +43,7 @@ def test_undecided_points_are_tried_again(monkeypatch, exact):
     problem_of = mathieu._problem
     if not exact:
         monkeypatch.setattr(mathieu, "_problem", lambda *given: replace(problem_of(*given), exact=None))
-    good = auto.effort.solve
+    good = auto.pointwise.solve
 
     def spoiled(problem, method, asked, answers, where=None):
         good(problem, method, asked, answers, where)
@@ -52,6 +52,6 @@ def test_undecided_points_are_tried_again(monkeypatch, exact):
         else:
             answers.verdict[:] = -1
 
-    monkeypatch.setattr(auto.effort, "solve", spoiled)
+    monkeypatch.setattr(auto.pointwise, "solve", spoiled)
     ds = survey.evaluate("mathieu", a=[0.5, 1.0, 2.0], q=1.0)
     assert tried == ([] if exact else [3]) and ds.verdict.values.tolist() == [0, 0, 1]

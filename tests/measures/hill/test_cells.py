@@ -11,7 +11,7 @@ from scipy.special import mathieu_a, mathieu_b
 from survey.kernels.hill.answers import STABLE, UNDECIDED, UNSTABLE
 from survey.measures.hill import cells as hill_cells
 from survey.measures.hill import edges as hill_edges
-from survey.measures.hill.cells import Axis
+from survey.measures.hill.cells import Side
 from survey.scene import Request
 from survey.scenes import mathieu, satellite
 
@@ -42,7 +42,7 @@ def test_mathieus_unstable_area_is_the_integral_of_the_characteristic_values(log
     low = 0.05 if log else 0.0
     x, weights = np.polynomial.legendre.leggauss(30)
     exact = (1 - low / 2) * (weights * tongues(low + (1 - low / 2) * (x + 1))).sum()
-    cells = hill_cells.find(solver(mathieu, "a", "q"), Axis(-7, 6, depth), Axis(low, 2, depth, log))
+    cells = hill_cells.find(solver(mathieu, "a", "q"), Side(-7, 6, depth), Side(low, 2, depth, log))
     bar = 0.5 * (cells.total - cells.stable - cells.unstable)
     assert abs(cells.unstable + bar - exact) <= bar < narrow
     sides = cells.box.reshape(-1, 2, 2)
@@ -65,7 +65,7 @@ def test_the_area_of_a_satellites_tongue_is_the_integral_of_its_edges():
     edges = _edges(k, 0.9, 1.3, 1e-11)
     assert edges.complete.all() and np.bincount(edges.row).tolist() == [2] * 12
     exact = 0.2 * (weights * np.diff(edges.position.reshape(12, 2))[:, 0]).sum()
-    cells = hill_cells.find(solver(satellite, "k", "rho", body="prolate"), Axis(0.1, 0.5, 9), Axis(0.9, 1.3, 9))
+    cells = hill_cells.find(solver(satellite, "k", "rho", body="prolate"), Side(0.1, 0.5, 9), Side(0.9, 1.3, 9))
     bar = 0.5 * (cells.total - cells.stable - cells.unstable)
     assert abs(cells.unstable + bar - exact) <= bar < 1e-6
 
@@ -74,7 +74,7 @@ def test_the_area_of_a_satellites_tongue_is_the_integral_of_its_edges():
 def test_the_unstable_shares_of_librations(start, share):
     """14.8 % of prolate and 54 % of oblate bodies and amplitudes (notes, section 4)."""
     solve = solver(satellite, "inertia_ratio", "amplitude", direction="1", rtol=1e-9)
-    cells = hill_cells.find(solve, Axis(start, start + 1, 7), Axis(0, 1.57, 7))
+    cells = hill_cells.find(solve, Side(start, start + 1, 7), Side(0, 1.57, 7))
     low, high = cells.unstable / cells.total, 1 - cells.stable / cells.total
     assert low < share < high < low + 0.045
 
@@ -83,7 +83,7 @@ def test_no_tongue_is_stable_however_narrow():
     """Rows of prolate tongues n = 3 ... 7, down to 3e-13 wide: all that lies in them is unstable or undecided."""
     k = np.array([0.0512, 0.1512, 0.3013])
     edges = _edges(k, 0.61, 3.41, 1e-13)
-    cells = hill_cells.find(solver(satellite, "k", "rho", body="prolate"), Axis(0.0, 0.4, 7), Axis(0.6, 3.42, 7))
+    cells = hill_cells.find(solver(satellite, "k", "rho", body="prolate"), Side(0.0, 0.4, 7), Side(0.6, 3.42, 7))
     assert (holding(cells, k[edges.row], edges.position) == UNDECIDED).all()
     inside = edges.index[1:] == edges.index[:-1]
     width, middle = np.diff(edges.position)[inside], (0.5 * (edges.position[1:] + edges.position[:-1]))[inside]
@@ -96,7 +96,7 @@ def test_no_tongue_is_stable_however_narrow():
        st.floats(-2.5, 1.0), st.floats(0.3, 5.0), st.integers(0, 2**32 - 1))  # fmt: skip
 def test_a_decided_cell_has_that_verdict_at_all_its_points(kind, low, size, seed):
     body, ends = kind
-    cells = hill_cells.find(solver(satellite, "k", "rho", body=body), Axis(*ends, 6), Axis(low, low + size, 6))
+    cells = hill_cells.find(solver(satellite, "k", "rho", body=body), Side(*ends, 6), Side(low, low + size, 6))
     part = np.random.default_rng(seed).random((2, 2000))
     k, rho = ends[0] + np.ptp(ends) * part[0], low + size * part[1]
     own = holding(cells, k, rho)
@@ -115,7 +115,7 @@ def test_a_factor_that_vanishes_between_the_nodes_is_not_believed():
         values = {"y1": hidden, "dy2": one, "dy1": -one, "y2": one}
         return values | {f"{name}_error": bar for name in values}
 
-    cells = hill_cells.find(solve, Axis(0, 1, 2), Axis(0, 1, 2))
+    cells = hill_cells.find(solve, Side(0, 1, 2), Side(0, 1, 2))
     assert (cells.verdict == UNDECIDED).all() and cells.stable == cells.unstable == 0
 
 
@@ -127,14 +127,14 @@ def test_what_is_not_finite_stays_undecided():
         values = {"y1": one, "dy2": one, "dy1": -one, "y2": one}
         return values | {f"{name}_error": 1e-15 * one for name in values}
 
-    cells = hill_cells.find(solve, Axis(0, 1, 5), Axis(0, 1, 5))
+    cells = hill_cells.find(solve, Side(0, 1, 5), Side(0, 1, 5))
     corner = (cells.box[:, 1] > 0.7) & (cells.box[:, 3] > 0.7)
     assert (cells.verdict[corner] == UNDECIDED).all() and (cells.verdict[~corner] == STABLE).all()
     assert 1 - 0.3**2 - 0.05 < cells.stable < 1 - 0.3**2 and cells.unstable == 0
 
 
 def test_threads_give_the_same_bits():
-    solve, axes = solver(mathieu, "a", "q"), (Axis(-2, 12, 7), Axis(0, 5, 6))
+    solve, axes = solver(mathieu, "a", "q"), (Side(-2, 12, 7), Side(0, 5, 6))
     with ThreadPoolExecutor(3) as pool:
         threaded = hill_cells.find(solve, *axes, each=lambda task, items: list(pool.map(task, items)))
     alone = hill_cells.find(solve, *axes)

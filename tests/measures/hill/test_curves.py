@@ -9,11 +9,11 @@ from measures.hill.test_edges import solver
 from survey.measures.hill import curves as hill_curves
 from survey.measures.hill import edges as hill_edges
 from survey.measures.hill import folds as hill_folds
-from survey.measures.hill import look
+from survey.measures.square import Square
 from survey.scene import Request
 from survey.scenes import mathieu, satellite
 
-UNIT = look.Square(np.zeros(2), np.ones(2), np.zeros(2, bool))
+UNIT = Square(np.zeros(2), np.ones(2), np.zeros(2, bool))
 
 
 def seeds(x, kind, index):
@@ -28,8 +28,8 @@ def satellite_curves(body, k, rho):
         return satellite.solve({"k": q, "rho": p}, Request({"body": body}, "auto", 1e-13, frozenset(wanted)))
 
     edges = hill_edges.find(solver(satellite, "k", k, "rho", body=body), k.size, *rho)
-    square = look.Square(np.array([k[0], rho[0]]), np.array([k[-1], rho[1]]), np.zeros(2, bool))
-    x = square.inside(np.stack([k[edges.row], edges.position], axis=1))
+    square = Square(np.array([k[0], rho[0]]), np.array([k[-1], rho[1]]), np.zeros(2, bool))
+    x = square.positions(np.stack([k[edges.row], edges.position], axis=1))
     return solve, square, hill_curves.trace(solve, square, seeds(x, edges.kind, edges.index))
 
 
@@ -59,7 +59,7 @@ def test_any_row_is_crossed_where_its_edges_are(body, k, rho):
     assert curves.complete.all() and (curves.of_seed >= 0).all()
     rows = np.random.default_rng(4).uniform(*k, 15)
     edges = hill_edges.find(solver(satellite, "k", rows, "rho", body=body), rows.size, *rho)
-    parts = np.split(square.places(curves.x), np.cumsum(curves.count)[:-1])
+    parts = np.split(square.parameters(curves.x), np.cumsum(curves.count)[:-1])
     assert edges.complete.all()
     for row, value in enumerate(rows):
         crossed = []
@@ -84,7 +84,7 @@ def test_the_error_bar_holds_the_curve():
         normal = np.array([-curves.along[point, 1], curves.along[point, 0]])
         signs = []
         for side in (-1, 1):
-            k, rho = square.places(curves.x[point] + side * curves.error[point] * normal)
+            k, rho = square.parameters(curves.x[point] + side * curves.error[point] * normal)
             y1, dy1, y2, dy2 = mp_factors("OL", float(k), float(rho))[:4]
             signs.append(dict(y1=y1, dy1=dy1, y2=y2, dy2=dy2)[names[curves.kind[whose[point]]]] > 0)
         assert signs[0] != signs[1]
@@ -94,7 +94,7 @@ def test_the_fold_of_the_rotations_is_where_eigenvalues_meet():
     """Half the sum, and the square of the difference, of the two eigenvalues are analytic in k through the fold."""
     solve, square, curves = satellite_curves("prolate", np.linspace(1.05, 1.4, 6), (-2.5, 0.5))
     folds = hill_folds.find(solve, square, curves)
-    (k, rho), (k_error, rho_error) = square.places(folds.x)[0], folds.error[0] * (square.high - square.low)
+    (k, rho), (k_error, rho_error) = square.parameters(folds.x)[0], folds.error[0] * (square.high - square.low)
     kind = int(curves.kind[folds.curve[0]])
     assert len(folds.x) == 1 and k_error < 1e-12 and rho_error < 1e-9
 
@@ -120,14 +120,14 @@ def test_folds_lie_on_their_curves():
 
     rows = np.linspace(-5.0, 20.0, 60)
     edges = hill_edges.find(solver(mathieu, "a", rows, "q"), rows.size, -10.0, 10.0)
-    square = look.Square(np.array([-5.0, -10.0]), np.array([20.0, 10.0]), np.zeros(2, bool))
-    x = square.inside(np.stack([rows[edges.row], edges.position], axis=1))
+    square = Square(np.array([-5.0, -10.0]), np.array([20.0, 10.0]), np.zeros(2, bool))
+    x = square.positions(np.stack([rows[edges.row], edges.position], axis=1))
     curves = hill_curves.trace(solve, square, seeds(x, edges.kind, edges.index))
     folds = hill_folds.find(solve, square, curves)
     parts = np.split(curves.x, np.cumsum(curves.count)[:-1])
     for curve, place in zip(folds.curve, folds.x, strict=True):
         assert np.hypot(*(parts[curve] - place).T).min() < hill_curves.LONGEST
-    a, q = square.places(folds.x).T
+    a, q = square.parameters(folds.x).T
     error = folds.error * (square.high - square.low)
     still = abs(q) < 1
     assert (abs(q) <= error[:, 1])[still].all() and (abs(a - np.rint(a)) <= error[:, 0])[still].all()
@@ -169,8 +169,8 @@ def test_a_curve_that_meets_a_double_point_is_lost_there():
 
 
 def test_a_logarithmic_axis_keeps_its_ends():
-    square = look.Square(np.array([1e-8, -1.0]), np.array([0.5, 3.0]), np.array([True, False]))
-    ends = square.places(np.array([[0.0, 0.0], [1.0, 1.0]]))
+    square = Square(np.array([1e-8, -1.0]), np.array([0.5, 3.0]), np.array([True, False]))
+    ends = square.parameters(np.array([[0.0, 0.0], [1.0, 1.0]]))
     np.testing.assert_array_equal(ends, [square.low, square.high])
     x = np.random.default_rng(0).uniform(size=(50, 2))
-    np.testing.assert_allclose(square.inside(square.places(x)), x, atol=4 * square.grain)
+    np.testing.assert_allclose(square.positions(square.parameters(x)), x, atol=4 * square.grain)

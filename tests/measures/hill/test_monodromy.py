@@ -65,8 +65,8 @@ def test_exponent_and_rotation_number_agree_with_the_discriminant():
 def test_verdict_is_undecided_where_the_bar_holds_both_answers():
     results = np.array([[1e-9, 1.0, 1e-9, 1.0, *[1e-8] * 4, 0, 0], [0.1, -9.9, 0.1, 0.1, *[1e-8] * 4, 1, 0]])
     answers = Answers(2, Asked(1e-10, np.ones(7, bool)))
-    answers.judge(results, None)
-    assert list(answers.verdict) == [monodromy.UNDECIDED, monodromy.STABLE] and answers.late.all()
+    answers.assess(results, None)
+    assert list(answers.verdict) == [monodromy.UNDECIDED, monodromy.STABLE] and answers.missed.all()
 
 
 def test_failures_are_values():

@@ -84,6 +84,52 @@ def test_no_symmetry_at_all_against_another_integrator():
             assert int(here.verdict) == int(abs(ends[0] + ends[3]) < 2)
 
 
+def bent(u, p):
+    return p[0] if u < p[2] else p[1]
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("rtol", [1e-6, 1.5396245461649855e-10, 1e-13])
+def test_the_rounding_of_large_values_reaches_small_ones_beside_them(method, rtol):
+    """z = 10^4, then 4 pi^2 in so few steps that its rounding, relative to 10^4, acts within the last of them."""
+    a, b, place = 1e4, 39.47841760435743, 0.5642194903320384
+    scene = survey.hill(bent, period=1.0, parameters=("a", "b", "place"), breaks=lambda p: [0.0, p[2]])
+    own = survey.evaluate(scene, a=a, b=b, place=place, method=method, rtol=rtol)
+    with mp.workdps(40):
+        flow = mp.eye(2)
+        for z, length in ((mpf(a), mpf(place)), (mpf(b), 1 - mpf(place))):
+            w = mp.sqrt(z)
+            c, s = mp.cos(w * length), mp.sin(w * length)
+            flow = mp.matrix([[c, s / w], [-w * s, c]]) * flow
+        for name, true in zip(("y1", "y2", "dy1", "dy2"), flow, strict=True):
+            assert abs(mpf(float(own[name])) - true) <= float(own[f"{name}_error"]), name
+
+
+def lorentzian(u, p):
+    x = (u - p[2]) / p[3]
+    return p[0] + p[1] / (1.0 + x * x)
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8])
+@pytest.mark.parametrize("width", [1e-2, 1e-3, 1.6429032378987633e-4])
+def test_what_ten_nodes_take_for_lower_degrees_is_in_the_bars(rtol, width):
+    """Next to a pole of z that lies closer to a break than a step is long, by solve_ivp in pieces."""
+    p = a, b, c, d = 18.862271708754122, 42.95125459284832, 0.2807229970669972, width
+    breaks = [c - 4 * d, c, c + 4 * d]
+    scene = survey.hill(lorentzian, period=1.0, parameters=("a", "b", "c", "d"),
+                        breaks=lambda p: [0.0, p[2] - 4 * p[3], p[2], p[2] + 4 * p[3]])  # fmt: skip
+    own, y = survey.evaluate(scene, a=a, b=b, c=c, d=d, rtol=rtol), np.array([1.0, 0.0, 0.0, 1.0])
+
+    def slope(u, y):
+        z = lorentzian(u, p)
+        return [y[1], -z * y[0], y[3], -z * y[2]]
+
+    for low, high in itertools.pairwise([0.0, *breaks, c + 40 * d, 1.0]):
+        y = solve_ivp(slope, (low, high), y, method="DOP853", rtol=3e-14, atol=1e-14).y[:, -1]
+    for name, true in zip(("y1", "dy1", "y2", "dy2"), y, strict=True):
+        assert abs(float(own[name]) - true) <= float(own[f"{name}_error"]) + 1e-12 * (1 + abs(true)), name
+
+
 def square(u, p):
     d = 0.5 * p[2] * pi
     return p[0] + p[1] if u < d or u > pi - d else p[0] - p[1]

@@ -13,7 +13,7 @@ import survey
 from survey import status
 from survey.kernels.libration import danby_double as kernels
 from survey.measures.libration import danby, danby_double
-from survey.measures.libration.danby_answers import Answers
+from survey.measures.libration.answers import Answers
 from survey.sweep import cost
 
 REFERENCE = json.loads(resources.files("survey.reference").joinpath("libration_elliptic.json").read_text())

@@ -10,7 +10,7 @@ import xarray as xr
 from mpmath import mp, mpf
 
 import survey
-from survey.measures.hill import more_digits
+from survey.measures.hill import multiprecision
 
 HARMONIC = 2.0
 
@@ -113,19 +113,19 @@ def test_what_cannot_be_run_with_more_digits_says_why_and_keeps_its_answer():
     assert ds.status.values.tolist() == [0, 0]
 
 
-@pytest.mark.parametrize("name", sorted(more_digits.SAME - {"cbrt", "power", "sign"}))
+@pytest.mark.parametrize("name", sorted(multiprecision.SAME - {"cbrt", "power", "sign"}))
 def test_functions_mean_the_same_with_more_digits(name):
     function, twice = getattr(math, name), name in ("atan2", "hypot")
     if name == "cbrt" and not hasattr(math, "cbrt"):
         return
     x = (1.25,) if name == "acosh" else (0.3,)
-    lifted = more_digits.lifted(lambda u: function(u, 0.7) if twice else function(u))
-    with more_digits.LOCK:
-        value = lifted(more_digits.context().mpf(x[0]))
+    lifted = multiprecision.lifted(lambda u: function(u, 0.7) if twice else function(u))
+    with multiprecision.LOCK:
+        value = lifted(multiprecision.context().mpf(x[0]))
     assert abs(float(value) - (function(x[0], 0.7) if twice else function(x[0]))) <= 4e-16 * max(1, abs(float(value)))
 
 
 def test_a_function_of_another_kind_is_refused():
     for bad in (lambda u: round(u), lambda u: np.dot(u, u), lambda u: mp.zeta(u), lambda u: "a"):
-        with pytest.raises(more_digits.Unsupported), more_digits.LOCK:
-            more_digits.lifted(bad)(more_digits.context().mpf(0.5))
+        with pytest.raises(multiprecision.Unsupported), multiprecision.LOCK:
+            multiprecision.lifted(bad)(multiprecision.context().mpf(0.5))

@@ -9,7 +9,7 @@ from brun_truth import NAMES, OUTPUTS, draw, integrals, outputs, turning_points
 from mpmath import mp, mpf
 
 import survey
-from survey.measures.nutation import digits
+from survey.measures.nutation import multiprecision
 from survey.status import NO_CONVERGENCE, OK, OVERFLOW
 
 NO_MOTION = 16
@@ -185,7 +185,7 @@ def test_more_digits_say_what_is_known():
     points = np.array([draw(random)[1] for _ in range(30)])
     ds = of_states(points.T)
     for i in np.flatnonzero(ds.status == OK):
-        _passes, _wells, (found,) = digits.of_state(*points[i].tolist())
+        _passes, _wells, (found,) = multiprecision.of_state(*points[i].tolist())
         for name in OUTPUTS:
             off = abs(found[name] - float(ds[name][i]))
             assert off <= found[f"{name}_error"] + float(ds[f"{name}_error"][i]), (name, points[i].tolist())

@@ -1,4 +1,4 @@
-"""A user's function in more digits: its own Python code, with mpmath's functions in the place of math's and numpy's.
+"""A user's function in more digits: its own Python code, with mpmath's functions instead of those of math and numpy.
 
 Numbers that stand in the code, or beside it, are the binary64 numbers that they are; what is computed from them, the
 parameters and u is computed with PRECISION bits. What cannot be run so raises Unsupported, whose text says why.
@@ -21,7 +21,7 @@ from survey.kernels.jit import fresh
 
 PRECISION = 128  # bits: a double-double number holds 106
 BITS = 192  # after the point, of what is multiplied by values of z
-# What numpy calls otherwise than mpmath.
+# What numpy and mpmath call by different names.
 NUMPY = {
     "arcsin": "asin", "arccos": "acos", "arctan": "atan", "arctan2": "atan2", "arcsinh": "asinh", "arccosh": "acosh",
     "arctanh": "atanh", "absolute": "fabs", "abs": "fabs", "pow": "power",
@@ -75,7 +75,7 @@ def _numbers(values):
 
 
 class _Refused:
-    """Stands for what mpmath has not, until it is used."""
+    """Stands for what mpmath lacks; raises when it is used."""
 
     def __init__(self, words):
         self._words = words
@@ -116,7 +116,7 @@ def _lift(value, seen):
 
 
 def _named(value):
-    """mpmath's function in the place of one of math's, numpy's or Python's."""
+    """mpmath's function instead of one of math, numpy or Python."""
     mp, name = context(), getattr(value, "__name__", type(value).__name__)
     if isinstance(value, ModuleType):
         return _Refused(f"it uses the module {name}")
@@ -188,32 +188,32 @@ def series(z, edges, start, nodes):
     for edge in edges[1:-1]:
         ends[int(abs(start - float(edge)).argmin())] = edge
     lengths = [high - low for low, high in pairwise(ends)]
-    places = [[low + h * x for x in _nodes(nodes)] for low, h in zip(ends[:-1], lengths, strict=True)]
+    points = [[low + h * x for x in _nodes(nodes)] for low, h in zip(ends[:-1], lengths, strict=True)]
     try:
-        values = [[z(u) for u in step] for step in places]
+        values = [[z(u) for u in step] for step in points]
     except Unsupported:
         return None
     if not all(mp.isfinite(value) for step in values for value in step):
         return None
     found, sizes = zip(*(_polynomial(step) for step in values), strict=True)
     lengths = np.array([_two(h) for h in lengths])
-    return np.array(found), lengths, np.array(sizes).T, np.array(places, float), np.array(values, float)
+    return np.array(found), lengths, np.array(sizes).T, np.array(points, float), np.array(values, float)
 
 
 def _polynomial(values):
-    """The power series of the polynomial through the values, and the sizes; in whole numbers, so exactly."""
+    """The power series of the polynomial through the values, and the sizes; in integers, so exactly."""
     mp, nodes = context(), len(values)
     power, last = _transforms(nodes)
     size = max(abs(value) for value in values)
     shift = PRECISION - (int(mp.mag(size)) if size else 0)
-    whole = [to_fixed(value._mpf_, shift) for value in values]
-    coefficients = [_ratio(sum(map(mul, row, whole)), shift + BITS) for row in power]
-    tail = [abs(_ratio(sum(map(mul, row, whole)), shift + BITS)[0]) for row in last]
+    integers = [to_fixed(value._mpf_, shift) for value in values]
+    coefficients = [_ratio(sum(map(mul, row, integers)), shift + BITS) for row in power]
+    tail = [abs(_ratio(sum(map(mul, row, integers)), shift + BITS)[0]) for row in last]
     return coefficients, (tail[0] + tail[1], tail[2] + tail[3], float(size))
 
 
 def _ratio(number, bits):
-    """A whole number / 2^bits as a double-double."""
+    """An integer / 2^bits as a double-double."""
     high = float(number)
     return math.ldexp(high, -bits), math.ldexp(float(number - int(high)), -bits)
 
@@ -235,7 +235,7 @@ def _nodes(number):
 def _transforms(number):
     """From values at `_nodes`: rows that give the power series, and the last four Chebyshev coefficients, 2^BITS times.
 
-    T_j(2 x - 1) has whole coefficients (of x^n, below 6^j): the digits that they cost are among BITS.
+    T_j(2 x - 1) has integer coefficients (of x^n, below 6^j): the digits that they cost are among BITS.
     """
     mp = type(context())()
     mp.prec = BITS + 64

@@ -1,10 +1,9 @@
 """Nutations in decimal arithmetic with as many digits as a point takes: the few that double-double leaves open.
 
-The set-up of `kernels/nutation/wells.py` is double-double already, so where its bars are too wide (1e-26 from
-separatrices)
-only more digits help. Each point is solved with twice the digits until the answers agree: the difference bounds the
-error of the last one. No subtraction is avoided; digits make up for it. What stays open after MOST lies on a
-separatrix or a regular precession, as far as can be told. A point takes about a millisecond.
+The set-up of `kernels.nutation.wells` is double-double already, so where its error bounds are too wide (1e-26 from
+separatrices) only more digits help. Each point is solved with twice the digits until the answers agree; their
+difference bounds the error of the last one. No subtraction is avoided; digits make up for it. What stays open after
+MOST lies on a separatrix or a regular precession, as far as can be decided. A point takes about a millisecond.
 
 Formulas (S1)-(S14) of `scenes/brun.md`; the quartic by Ferrari's resolvent.
 """
@@ -13,10 +12,11 @@ from decimal import MAX_EMAX, MIN_EMIN, Context, Decimal, DivisionByZero, Invali
 from functools import cache
 from itertools import pairwise
 
+from survey.kernels.math.roundoff import ROUNDOFF
+
 FIRST, MOST = 50, 400  # digits
 SURE = 3  # a third of the digits at least are right where a sign is trusted
 CLOSE = Decimal("1e-20")  # relative to 1 + |value|, of answers that agree
-EPS = 2.0**-53
 LEAST = 5e-324
 HALF, ONE, TWO, FOUR = Decimal("0.5"), Decimal(1), Decimal(2), Decimal(4)
 CUSP = Decimal("0.15")  # saddles need |a b| < 4 k / 27
@@ -24,7 +24,7 @@ FAR = Decimal("1e38")  # as in `nutation.distance`
 
 
 class Unclear(ArithmeticError):
-    """These digits do not tell."""
+    """These digits do not decide."""
 
 
 class NoMotion(Exception):
@@ -32,7 +32,7 @@ class NoMotion(Exception):
 
 
 def of_state(size_a, size_c, epsilon, theta, p_theta, b, a):
-    """Of an initial state: does it pass a pole, the number of wells, [{name: value, name_error: bar}] of its own.
+    """Of an initial state: does it pass a pole, the number of wells, [{name: value, name_error: bound}] of its own.
 
     None where it stays open.
     """
@@ -58,7 +58,7 @@ def _settled(solve):
                 now = None
             if now is not None and before is not None and _agree(before, now):
                 passes, number, found = now
-                return passes, number, [_told(*pair) for pair in zip(before[2], found, strict=True)]
+                return passes, number, [_rounded(*pair) for pair in zip(before[2], found, strict=True)]
         before, digits = now, 2 * digits
     return None
 
@@ -74,12 +74,12 @@ def _agree(before, now):
     )
 
 
-def _told(before, now):
-    """{name: float64, name_error: its bar}: half an ulp, and what fewer digits make of it."""
+def _rounded(before, now):
+    """{name: float64, name_error: its error bound}: half an ulp, and what fewer digits make of it."""
     found = {}
     for name, exact in now.items():
         value, apart = float(exact), float(abs(exact - before[name]))
-        found |= {name: value, f"{name}_error": EPS * abs(value) + 2.0 * apart + LEAST}
+        found |= {name: value, f"{name}_error": ROUNDOFF * abs(value) + 2.0 * apart + LEAST}
     return found
 
 
@@ -108,7 +108,7 @@ def _solved(k, level, a, b, size_a, size_c, u):
 
 
 def _slack():
-    """Places that are nearer to one another are not told apart."""
+    """Points that are nearer to one another than this count as one."""
     return Decimal(10) ** (-getcontext().prec // SURE)
 
 
@@ -217,7 +217,7 @@ def separatrix_distance(k, level, a, b):
 
 
 def _saddle(k, a, b):
-    """The increasing zero of F, from the place where F' is greatest: F is convex towards it."""
+    """The increasing zero of F, from the point where F' is greatest: F is convex towards it."""
     u, bend = Decimal(0), a * b / k
     while True:
         move = (u * (10 * u * u - 6) + bend) / (30 * u * u - 6)

@@ -1,4 +1,4 @@
-"""Along one trajectory: steps that carry their error, values at given times, solutions of the Abel equation (57).
+"""Steps along a solution, which carry their error: its values at given times, and at given angles (Abel equation (57)).
 
 A method gives three functions: `setting` (what steers its steps), `begin` (start a step: its size, its truncation
 error noted in T) and `at` (the solution inside the step). The rest is common.
@@ -6,7 +6,7 @@ error noted in T) and `at` (the solution inside the step). The rest is common.
 The error of (phi, w) after n steps is, to first order, the sum of J_nk delta_k over the steps, |delta_k| <= d_k
 componentwise. S <- J S J^T + diag(d^2) holds the sum of squares, and by Cauchy and Schwarz |error_i| <=
 sqrt(2 n S_ii), for any correlation of the delta_k: an error of the initial phi is one term more, but of the last step
-only delta_i counts. Steps never depend on the times or places asked for.
+only delta_i counts. Steps never depend on the times or angles asked for.
 """
 
 import math
@@ -25,8 +25,8 @@ from survey.kernels.cylinder.flow import (
     TRUNC_W,
     TWO_PI,
     TWO_PI_LOW,
-    UNIT,
     WEIGHT,
+    W,
     jacobian,
     longest_step,
     reduced,
@@ -35,28 +35,29 @@ from survey.kernels.cylinder.flow import (
     variation,
 )
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math.newton import bracketed
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 OK, OVERFLOW, NO_CONVERGENCE, STEP_LIMIT = 0, 2, 3, 4  # as in survey/status.py
 TURNING, EQUILIBRIUM, SEPARATRIX = 16, 17, 18  # as in the STATUS of scenes/gyrostat.py
 TRUST = 0.02  # error bars above this share of the scale of the system are no longer first-order bounds
-MANY = -1
-UNTOLD = -2  # a count that the error bar cannot tell
+UNDETERMINED = -2  # a count that the error bar leaves open
 
 
 @kernel
 def local_error(p, T, w, dt):
     """Error bars (phi, w) that one step adds: truncation as the method notes it, and rounding.
 
-    The slope w' of each stage is rounded by 4 UNIT rate, and by |dw'/dphi| ulp(phi)/2 since phi is rounded there. Stage
-    i has a share b_i in w, and b_i (1 - c_i) in phi, as simplifying assumption D(1) has it: so signed sums of b_i a_ij
-    count, and the weight is that of the b_i.
+    The slope w' of each stage is rounded by 4 roundoffs of the rate, and by |dw'/dphi| ulp(phi)/2 since phi is rounded
+    there. Stage i has a share b_i in w, and b_i (1 - c_i) in phi, as simplifying assumption D(1) has it: so signed sums
+    of b_i a_ij count, and the weight is that of the b_i.
     """
     weight = T[LAST, WEIGHT]
     many, phi_in_step = max(1.0, weight), abs(T[0, PHI]) + dt * abs(w)
     rate = many * (p[BOUND_F] * abs(w) + p[BOUND_G])
     rate += 0.25 * weight * (p[BOUND_F] * abs(w) + p[BOUND_DG]) * phi_in_step
-    phi = T[LAST, TRUNC_PHI] + UNIT * (4.0 + 3.0 * dt * (many * abs(w) + dt * rate))
-    return phi, T[LAST, TRUNC_W] + UNIT * (1.5 * abs(w) + 4.0 * dt * rate)
+    phi = T[LAST, TRUNC_PHI] + ROUNDOFF_UP * (4.0 + 3.0 * dt * (many * abs(w) + dt * rate))
+    return phi, T[LAST, TRUNC_W] + ROUNDOFF_UP * (1.5 * abs(w) + 4.0 * dt * rate)
 
 
 @kernel
@@ -86,13 +87,42 @@ def expand(begin, p, phi, w, how, T):
 
 
 @inline
+def later(t, t_low, h):
+    """The time t + t_low after a step h, summed with the error of each addition."""
+    high = t + h
+    return high, t_low + (h - (high - t))
+
+
+@inline
+def wrapped(phi):
+    """phi, at most a turn outside [-pi, pi], brought back to it, and the turns taken out of it."""
+    if not abs(phi) > math.pi:
+        return phi, 0.0
+    k = 1.0 if phi > 0.0 else -1.0
+    return (phi - k * TWO_PI) - k * TWO_PI_LOW, k
+
+
+@inline
+def unturned(target, turns):
+    """The unwrapped angle `target` as seen from an angle that so many turns were taken out of."""
+    return (target - turns * TWO_PI) - turns * TWO_PI_LOW
+
+
+@inline
+def trusted(saa, sbb, w):
+    """Is the error ellipse so small that it may be carried on to first order?"""
+    return saa < TRUST and sbb < (1.0 + abs(w)) ** 2
+
+
+@inline
 def trajectory(setting, begin, at, p, phi0, w0, times, tolerance, limit, floats, turnings):
     """Fill floats[j] (PHI to W_BAR) and turnings[j] at the ascending times[j] >= 0; returns a status."""
     T = table()
     how = setting(p, w0, tolerance)
     phi, turns = reduced(phi0)
     w, t, t_low, n = w0, 0.0, 0.0, 0
-    saa, sab, sbb = (UNIT * 4.0 * (turns != 0.0)) ** 2, 0.0, 0.0
+    slip = ROUNDOFF_UP * 4.0 * (turns != 0.0)
+    saa, sab, sbb = slip * slip, 0.0, 0.0
     sign, unsure, count = start_sign(p, phi, w), 0, 0
     j, size = 0, len(times)
     while j < size:
@@ -110,11 +140,11 @@ def trajectory(setting, begin, at, p, phi0, w0, times, tolerance, limit, floats,
             floats[j, rc.PHI], floats[j, rc.W] = x + turns * TWO_PI, v
             floats[j, rc.PHI_BAR], floats[j, rc.W_BAR] = bar_phi + 3e-16 * abs(turns) * TWO_PI, bar_w
             from_rest = n == 1 and w0 == 0.0  # then w is 0 at the start and nowhere else
-            told = unsure < 3 and count >= 0 and (abs(v) > bar_w or from_rest)
-            turnings[j] = count + (v * sign < 0.0 and not from_rest) if told else UNTOLD
+            sure = unsure < 3 and count >= 0 and (abs(v) > bar_w or from_rest)
+            turnings[j] = count + (v * sign < 0.0 and not from_rest) if sure else UNDETERMINED
             if not (bar_phi < TRUST and bar_w < TRUST * (1.0 + abs(v))):
                 floats[j, rc.PHI] = floats[j, rc.W] = floats[j, rc.PHI_BAR] = floats[j, rc.W_BAR] = math.nan
-                turnings[j] = UNTOLD
+                turnings[j] = UNDETERMINED
                 return NO_CONVERGENCE
             j += 1
         if j == size:
@@ -122,20 +152,16 @@ def trajectory(setting, begin, at, p, phi0, w0, times, tolerance, limit, floats,
         x, v, _e, _y = at(p, T, h)
         saa, sab, sbb = carried(p, T, h, v, saa, sab, sbb)
         phi, w = x, v
-        high = t + h
-        t_low += h - (high - t)
-        t = high
-        if abs(phi) > math.pi:
-            k = 1.0 if phi > 0.0 else -1.0
-            phi = (phi - k * TWO_PI) - k * TWO_PI_LOW
-            turns += k
-        if not (saa < TRUST and sbb < (1.0 + abs(w)) ** 2):
+        t, t_low = later(t, t_low, h)
+        phi, k = wrapped(phi)
+        turns += k
+        if not trusted(saa, sbb, w):
             return NO_CONVERGENCE if math.isfinite(w) else OVERFLOW
         if abs(w) <= bar(n, sbb):
             unsure += 1
         else:
             if unsure > 2:
-                count = UNTOLD - limit  # below zero for good
+                count = UNDETERMINED - limit  # below zero for good
             if w * sign < 0.0:
                 count += 1
             sign, unsure = (1 if w > 0.0 else -1), 0
@@ -175,7 +201,7 @@ def start_sign(p, phi, w):
     if w != 0.0:
         return 1 if w > 0.0 else -1
     g = values(p, phi)[1]
-    if abs(g) <= 8.0 * UNIT * p[BOUND_G]:
+    if abs(g) <= 8.0 * ROUNDOFF_UP * p[BOUND_G]:
         return 0
     return 1 if g > 0.0 else -1
 
@@ -187,44 +213,31 @@ def rests(p, phi, w):
 
 
 @inline
-def time_at(at, p, T, target, h):
-    """dt in [0, h] where phi = target, for w > 0 on the step: Newton's method kept inside a bracket."""
-    low, high, dt = 0.0, h, 0.5 * h
-    for _ in range(60):
-        x, v, _e, _y = at(p, T, dt)
-        if x < target:
-            low = dt
-        else:
-            high = dt
-        new = dt - (x - target) / v if v != 0.0 else low
-        if not (low <= new <= high):
-            new = 0.5 * (low + high)
-        if abs(new - dt) <= 1e-17 + 1e-16 * h:
-            return new
-        dt = new
-    return dt
+def passage(at, p, T, target, up, h):
+    """dt in [0, h] where phi = target, w without a zero inside the step; `up`: phi increases there."""
+    return bracketed(_to_target, at, (p, T, target, up), 0.5 * h, (0.0, h), (1e-17 + 1e-16 * h, 0.0), 60)[1]
+
+
+@inline
+def _to_target(at, given, dt):
+    p, T, target, up = given
+    phi, w, _e, _y = at(p, T, dt)
+    return phi - target, w, (phi < target) == up
 
 
 @inline
 def time_of_turning(at, p, T, h):
     """dt in [0, h] where w, which changes sign on the step, is 0."""
-    low, high, dt = 0.0, h, 0.5 * h
-    first = T[0, 1] > 0.0 or (T[0, 1] == 0.0 and T[1, 1] > 0.0)
-    for _ in range(60):
-        x, v, _e, _y = at(p, T, dt)
-        if (v > 0.0) == first:
-            low = dt
-        else:
-            high = dt
-        f, g, _dg = values(p, x)
-        slope = f * v + g
-        new = dt - v / slope if slope != 0.0 else low
-        if not (low <= new <= high):
-            new = 0.5 * (low + high)
-        if abs(new - dt) <= 1e-17 + 1e-16 * h:
-            return new
-        dt = new
-    return dt
+    first = T[0, W] > 0.0 or (T[0, W] == 0.0 and T[1, W] > 0.0)
+    return bracketed(_to_rest, at, (p, T, first), 0.5 * h, (0.0, h), (1e-17 + 1e-16 * h, 0.0), 60)[1]
+
+
+@inline
+def _to_rest(at, given, dt):
+    p, T, first = given
+    phi, w, _e, _y = at(p, T, dt)
+    f, g, _dg = values(p, phi)
+    return w, f * w + g, (w > 0.0) == first
 
 
 @kernel
@@ -253,6 +266,23 @@ def node_ahead(p, phi, w):
 
 
 @inline
+def runs_into_node(p, phi, w, target):
+    """Does the solution at (phi, w > 0) certainly end in a stable node that it meets before the target?"""
+    if not w < 0.3 * p[BOUND_G] / (p[BOUND_F] + 1e-300):
+        return False
+    gap = node_ahead(p, phi, w)
+    return gap > 0.0 and target >= phi + gap
+
+
+@inline
+def conclude(ending, doubt, j, floats, status):
+    """Note how the solution ends: at the targets from the j-th on, and those in doubt, from `doubt` on (-1: none)."""
+    for i in range(doubt if doubt >= 0 else j, len(status)):
+        if i >= j or not certain(floats[i]):
+            status[i] = ending
+
+
+@inline
 def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, status):
     """The solution from (phi0, w0 >= 0) at ascending targets >= phi0, forward in time.
 
@@ -265,7 +295,7 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
     how = setting(p, w0, tolerance)
     phi, turns = reduced(phi0)
     w, t, t_low, n, started = w0, 0.0, 0.0, 0, w0 > 0.0
-    slip = UNIT * 4.0 * (turns != 0.0)
+    slip = ROUNDOFF_UP * 4.0 * (turns != 0.0)
     saa, sab, sbb = slip * slip, 0.0, 0.0
     j, size, doubt = 0, len(targets), -1  # doubt: the first target in doubt
     ending = OK
@@ -297,10 +327,10 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
             reach = time_of_turning(at, p, T, h)
             x1, v1, _e, _y = at(p, T, reach)
         while j < size:
-            target = (targets[j] - turns * TWO_PI) - turns * TWO_PI_LOW
+            target = unturned(targets[j], turns)
             if target > x1:
                 break
-            dt = time_at(at, p, T, target, reach)
+            dt = passage(at, p, T, target, True, reach)
             x, v, _e, _y = at(p, T, dt)
             a, b, c = carried(p, T, dt, v, saa, sab, sbb)
             a += (3e-16 * abs(targets[j])) ** 2 + (2e-16 * h * v) ** 2
@@ -316,7 +346,7 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
         bar_phi, bar_w = bar(n, saa), bar(n, sbb)
         edge = bar_phi * 1.1 + 4e-16 * abs(x1 + turns * TWO_PI)
         # from here on a turning point lies beyond x1
-        while doubt >= 0 and doubt < j and x1 - ((targets[doubt] - turns * TWO_PI) - turns * TWO_PI_LOW) > edge:
+        while doubt >= 0 and doubt < j and x1 - unturned(targets[doubt], turns) > edge:
             doubt += 1
         if doubt == j:
             doubt = -1
@@ -331,27 +361,20 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
                     floats[i, rc.TIME_BAR] = bar_t * 1.2
             return
         phi, w = x1, v1
-        high = t + h
-        t_low += h - (high - t)
-        t = high
-        if phi > math.pi:
-            phi = (phi - TWO_PI) - TWO_PI_LOW
-            turns += 1.0
-        if not (saa < TRUST and sbb < (1.0 + abs(w)) ** 2):
+        t, t_low = later(t, t_low, h)
+        phi, k = wrapped(phi)
+        turns += k
+        if not trusted(saa, sbb, w):
             ending = NO_CONVERGENCE if math.isfinite(w) else OVERFLOW
             break
         started = started or w > 2.0 * bar_w
         if started and not w > 2.0 * bar_w:
             ending = SEPARATRIX
             break
-        if w < 0.3 * p[BOUND_G] / (p[BOUND_F] + 1e-300) and j < size:
-            gap = node_ahead(p, phi, w)
-            if gap > 0.0 and (targets[j] - turns * TWO_PI) - turns * TWO_PI_LOW >= phi + gap:
-                ending = EQUILIBRIUM
-                break
-    for i in range(doubt if doubt >= 0 else j, size):
-        if i >= j or not certain(floats[i]):
-            status[i] = ending
+        if j < size and runs_into_node(p, phi, w, unturned(targets[j], turns)):
+            ending = EQUILIBRIUM
+            break
+    conclude(ending, doubt, j, floats, status)
 
 
 @inline

@@ -14,7 +14,8 @@ from itertools import product
 
 import numpy as np
 
-from survey.kernels.nutation.wells import EPS, TINY
+from survey.kernels.math.roundoff import ROUNDOFF
+from survey.kernels.nutation.wells import TINY
 
 
 @dataclass
@@ -28,21 +29,21 @@ class Part:
 
 def surface(y, z, ry, rz, s):
     """(S18): {name: (value, error bound)} of AXES and ALONG at y, z with relative errors `ry`, `rz`."""
-    yy, zz, both = y * y, z * z, ry + rz + 3.0 * EPS
+    yy, zz, both = y * y, z * z, ry + rz + 3.0 * ROUNDOFF
     u = np.clip(-s * y * z, -1.0, 1.0)
     return {
         "l": (
             yy + zz - 3.0 * s * yy * zz,
-            2.0 * (yy * (ry + 2.0 * EPS) + zz * (rz + 2.0 * EPS) + 3.0 * yy * zz * both),
+            2.0 * (yy * (ry + 2.0 * ROUNDOFF) + zz * (rz + 2.0 * ROUNDOFF) + 3.0 * yy * zz * both),
         ),
-        "alpha": (z * (1.0 - s * yy), abs(z) * ((rz + 4.0 * EPS) * (1.0 + yy) + 2.0 * yy * ry)),
-        "beta": (y * (1.0 - s * zz), abs(y) * ((ry + 4.0 * EPS) * (1.0 + zz) + 2.0 * zz * rz)),
-        "u": (u, abs(u) * (ry + rz + EPS)),
+        "alpha": (z * (1.0 - s * yy), abs(z) * ((rz + 4.0 * ROUNDOFF) * (1.0 + yy) + 2.0 * yy * ry)),
+        "beta": (y * (1.0 - s * zz), abs(y) * ((ry + 4.0 * ROUNDOFF) * (1.0 + zz) + 2.0 * zz * rz)),
+        "u": (u, abs(u) * (ry + rz + ROUNDOFF)),
         "precession_rate": (y, abs(y) * ry),
         "reduced_spin_rate": (z, abs(z) * rz),
         "nutation_square": (
             yy + zz - s * (1.0 - 3.0 * yy * zz),
-            2.0 * (yy * (ry + 2.0 * EPS) + zz * (rz + 2.0 * EPS) + 3.0 * yy * zz * both + EPS),
+            2.0 * (yy * (ry + 2.0 * ROUNDOFF) + zz * (rz + 2.0 * ROUNDOFF) + 3.0 * yy * zz * both + ROUNDOFF),
         ),
     }
 
@@ -63,8 +64,8 @@ def _of_momentum(a, s, most):
         ranges = [*inner, (-most, -high), (high, most)] if low < high else [(-most, most)]
         return [Part(_oblate(a), *np.arcsinh(ends)) for ends in ranges if ends[0] < ends[1]]
     if abs(a) < TINY:
-        return [Part(lambda t: (t, 0.0 * t, EPS, EPS), -most, most)] + [
-            Part(lambda t, y=y: (y + 0.0 * t, t, EPS, EPS), -1.0, 1.0) for y in (1.0, -1.0)
+        return [Part(lambda t: (t, 0.0 * t, ROUNDOFF, ROUNDOFF), -most, most)] + [
+            Part(lambda t, y=y: (y + 0.0 * t, t, ROUNDOFF, ROUNDOFF), -1.0, 1.0) for y in (1.0, -1.0)
         ]
     last, first = np.arcsinh(2.0 / abs(a)), 2.0 * np.arctanh(1.0 / most)
     outer = [Part(_far(a, side), first, last) for side in (1.0, -1.0)] if first < last else []
@@ -84,7 +85,7 @@ def _oblate(a):
 
     def at(t):
         y = np.sinh(t)
-        return y, a / (1.0 + y * y), 0.0 * y, 3.0 * EPS + 0.0 * y
+        return y, a / (1.0 + y * y), 0.0 * y, 3.0 * ROUNDOFF + 0.0 * y
 
     return at
 
@@ -101,7 +102,7 @@ def _between(a):
     def at(t):
         u, root = _root(a, t)
         z = np.copysign(root, a)
-        return -u / z, z, 4.0 * EPS, 3.0 * EPS
+        return -u / z, z, 4.0 * ROUNDOFF, 3.0 * ROUNDOFF
 
     return at
 
@@ -111,7 +112,7 @@ def _far(a, side):
 
     def at(t):
         u, root = _root(a, t)
-        return np.copysign(1.0, a) * side * root / u, -np.copysign(u * (u / root), a), 4.0 * EPS, 5.0 * EPS
+        return np.copysign(1.0, a) * side * root / u, -np.copysign(u * (u / root), a), 4.0 * ROUNDOFF, 5.0 * ROUNDOFF
 
     return at
 
@@ -159,7 +160,7 @@ def _pole(half):
 
 
 def _partner(l, s):  # noqa: E741
-    """The other of |y|, |z|, exact but for 3 roundings at a place half a rounding from x."""
+    """The other of |y|, |z|, exact but for 3 roundings at a point half a rounding from x."""
 
     def at(x):
         with np.errstate(all="ignore"):
@@ -171,7 +172,7 @@ def _partner(l, s):  # noqa: E741
 
 def _signed(partner, own, other):
     def at(t):
-        return own * t, other * partner(t), EPS, 4.0 * EPS
+        return own * t, other * partner(t), ROUNDOFF, 4.0 * ROUNDOFF
 
     return at
 

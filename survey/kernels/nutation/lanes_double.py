@@ -2,7 +2,7 @@
 
 from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.math import double as dd
-from survey.kernels.math.quartic import UNIT
+from survey.kernels.math.roundoff import PAIR_SUM_ROUNDOFF
 from survey.kernels.nutation.lanes import (
     BAR_V,
     BAR_W,
@@ -116,7 +116,7 @@ def part(gap, near, far, root_near, root_far, incline, bow, line, ratio):
 def noise(work, i):
     """What the bars of the set-up leave of the parts, relative to their terms, as in methods/agm.py."""
     bar_v, bar_w, size_k = work[BAR_V + i], work[BAR_W + i], abs(work[K + i])
-    error = 8.0 * (size_k * (bar_v + bar_w) + UNIT * (abs(work[L + i]) + 8.0 * size_k))
+    error = 8.0 * (size_k * (bar_v + bar_w) + PAIR_SUM_ROUNDOFF * (abs(work[L + i]) + 8.0 * size_k))
     total = error / work[Q_LOW + i] + error / work[Q_HIGH + i] + FINEST
     total += error / abs(work[BEND + i]) + 2.0 * (bar_v + bar_w) / work[WIDTH + i] if work[MIDDLE + i] < 0.0 else 0.0
     return 4.0 * total + bar_v / work[V_HIGH + i] + bar_w / work[W_LOW + i]
@@ -157,7 +157,7 @@ def end(work):
 
 
 @splice
-def fine(work, means):
+def fill(work, means):
     """Fill the rows FINE of `work` (ALL), where so many means suffice float64."""
     begin(work)
     go(work, means + FURTHER)

@@ -6,29 +6,30 @@ On such a map there is no closed form. Its curves are zeros of functions that ar
     regular precession  (b - a u)(a - b u) + k u (1 - u^2)^2, u = cos theta0, where p_theta0 = 0 is given (F of brun.md)
     pole passage        p_psi -+ p_phi, where the motion reaches the pole u = +-1
 
-with b = p_psi, a = p_phi. They are sought on LINES lines of the map each way by marching squares, and every point is
-closed in along its line by certain signs: a closed curve narrower than a LINES-th of the map may be missed, and a
-curve ends up to as much before the cusp where its saddle ends. There is none where a well begins that the motion is not
-in. A precession is stable where its squared frequency (S18) is positive, else it is the saddle itself.
+with b = p_psi, a = p_phi. They are searched for on LINES lines of the map each way by marching squares, and every
+point is bracketed on its line by certain signs. A closed curve narrower than a LINES-th of the map may be missed,
+and a curve may end as much before the cusp where its saddle ends. No curve shows where a well begins in which the
+motion is not. A precession is stable where its squared frequency (S18) is positive, else it is the saddle itself.
 
-Places are in the unit square, as in `curves`.
+Positions are those of `survey.measures.square`.
 """
 
 import contourpy
 import numpy as np
 
+from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.nutation import brun
-from survey.kernels.nutation.wells import EPS, HIGH, LOW, PASSAGE
+from survey.kernels.nutation.wells import HIGH, LOW, PASSAGE
 from survey.measures.hill.edges import close_in
 from survey.measures.nutation import wells
 
 STATE = ("A", "C", "epsilon", "theta0", "p_theta0", "p_psi", "p_phi")
 LINES, HALVINGS = 513, 30
-SURE = 1e-9  # half the width of what every point is closed in
+SURE = 1e-9  # half the width of what brackets a point
 
 
 def traced(square, axes, fixed):
-    """[(function, places (m, 2) in the square, errors (m), columns (7, m) of states)] of every curve on the map.
+    """[(function, positions (m, 2) in the square, errors (m), columns (7, m) of states)] of every curve on the map.
 
     The function is one of those below.
     """
@@ -36,22 +37,22 @@ def traced(square, axes, fixed):
     found = []
     for function in functions:
 
-        def look(x, function=function):
+        def on_map(x, function=function):
             return function(states(square, axes, fixed, x))
 
-        for x, error in _lines(look, square.grain):
+        for x, error in _lines(on_map, square.grain):
             found.append((function, x, error, states(square, axes, fixed, x)))
     return [(function, *part) for function, *rest in found for part in _reaching(function, *rest)]
 
 
 def states(square, axes, fixed, x):
-    """Columns (7, m) of the initial states at places x (m, 2)."""
-    here = dict(zip(axes, square.places(x).T, strict=True))
+    """Columns (7, m) of the initial states at positions x (m, 2)."""
+    here = dict(zip(axes, square.parameters(x).T, strict=True))
     return np.stack([np.broadcast_to(here.get(name, fixed.get(name)), len(x)).astype(float) for name in STATE])
 
 
 def separatrix(columns):
-    """L above the separatrix over |k|, and its bar; NaN where there is none."""
+    """L above the separatrix over |k|, and its error bound; NaN where there is none."""
     out = wells.distance(wells.heights(brun.heights_of_states, columns))
     a, c, _, theta, _, b, spin = columns
     outside = (c > 2.0 * a) | ((theta == 0.0) & (b != spin))
@@ -59,36 +60,40 @@ def separatrix(columns):
 
 
 def precession(columns):
-    """(b - a u)(a - b u) + k u (1 - u^2)^2, and its bar; NaN at the poles, where it has other zeros."""
+    """(b - a u)(a - b u) + k u (1 - u^2)^2, and its error bound; NaN at the poles, where it has other zeros."""
     size, c, epsilon, theta, _, b, a = columns
     u, sine = np.cos(theta), np.sin(theta)
     k, square = epsilon * size * (size - c), sine * sine
     one, two, three = b - a * u, a - b * u, k * u * square * square
-    bar = 8.0 * EPS * ((abs(b) + abs(a * u)) * abs(two) + (abs(a) + abs(b * u)) * abs(one) + abs(k) * square * square)
+    bar = (
+        8.0
+        * ROUNDOFF
+        * ((abs(b) + abs(a * u)) * abs(two) + (abs(a) + abs(b * u)) * abs(one) + abs(k) * square * square)
+    )
     return np.where((square > 0.0) & (c <= 2.0 * size) & (k != 0.0), one * two + three, np.nan), bar
 
 
 def upper_pole(columns):
     """p_psi - p_phi."""
-    return columns[5] - columns[6], EPS * abs(columns[5] - columns[6])
+    return columns[5] - columns[6], ROUNDOFF * abs(columns[5] - columns[6])
 
 
 def lower_pole(columns):
     """p_psi + p_phi."""
-    return columns[5] + columns[6], EPS * abs(columns[5] + columns[6])
+    return columns[5] + columns[6], ROUNDOFF * abs(columns[5] + columns[6])
 
 
-def _lines(look, grain):
-    """[(places (m, 2), errors (m))] of the curves where `look` is 0, from border to border or round."""
+def _lines(function, grain):
+    """[(positions (m, 2), errors (m))] of the curves where `function` is 0, from border to border or round."""
     ticks = np.linspace(0.0, 1.0, LINES)
     first, second = np.meshgrid(ticks, ticks, indexing="ij")
-    values = look(np.stack([first.ravel(), second.ravel()], axis=1))[0].reshape(LINES, LINES)
+    values = function(np.stack([first.ravel(), second.ravel()], axis=1))[0].reshape(LINES, LINES)
     lines = contourpy.contour_generator(second, first, np.ma.masked_invalid(values)).lines(0.0)
-    return [part for line in lines for part in _closed_in(look, np.asarray(line)[:, ::-1], grain)]
+    return [part for line in lines for part in _closed_in(function, np.asarray(line)[:, ::-1], grain)]
 
 
-def _closed_in(look, x, grain):
-    """The curve through the places x, each between two crossings of lines; cut where one cannot be made certain."""
+def _closed_in(function, x, grain):
+    """The curve through the positions x, each between two crossings of lines; cut where one cannot be made certain."""
     step, rows = (LINES - 1) * x, np.arange(len(x))
     along = np.argmax(abs(step - np.rint(step)), axis=1)
     x[rows, 1 - along] = np.rint(step)[rows, 1 - along] / (LINES - 1)
@@ -96,9 +101,9 @@ def _closed_in(look, x, grain):
     high = np.minimum(low + 1.0 / (LINES - 1), 1.0)
 
     def at(who, t):
-        places = np.repeat(x[who][:, None], t.shape[1], axis=1)
-        places[np.arange(len(t)), :, along[who]] = t
-        value, bar = look(places.reshape(-1, 2))
+        here = np.repeat(x[who][:, None], t.shape[1], axis=1)
+        here[np.arange(len(t)), :, along[who]] = t
+        value, bar = function(here.reshape(-1, 2))
         return value.reshape(t.shape), bar.reshape(t.shape)
 
     sign = np.sign(at(rows, low[:, None])[0][:, 0])
@@ -113,7 +118,7 @@ def _closed_in(look, x, grain):
 
 
 def _runs(good):
-    """Index arrays of the runs of at least two places that are good."""
+    """Index arrays of the runs of at least two that are good."""
     parts = np.split(np.arange(good.size), 1 + np.flatnonzero(np.diff(good)))
     return [part for part in parts if part.size > 1 and good[part[0]]]
 
@@ -132,12 +137,12 @@ def _reaching(function, x, error, columns):
 
 
 def along(function, columns):
-    """{name: (values, bars)} of the regular precession that each state (7, m) of a curve belongs to; none at poles."""
+    """{name: (values, bounds)} of the precession to which each state (7, m) of a curve belongs; none at poles."""
     if function in (upper_pole, lower_pole):
         return {}
     size, c, epsilon, theta, _, b, a = columns
     k = epsilon * size * (size - c)
-    u, off = np.cos(theta), EPS * np.ones(theta.size)
+    u, off = np.cos(theta), ROUNDOFF * np.ones(theta.size)
     if function is separatrix:
         u, off = np.empty((2, theta.size))
         brun.saddles_of_states(np.ascontiguousarray(columns), u, off)
@@ -145,14 +150,14 @@ def along(function, columns):
     y, y_bar = _rate(b, a, u, off, v, root)
     z, z_bar = _rate(a, b, u, off, v, root)
     square = y * y + z * z - np.sign(k) * (1.0 - 3.0 * u * u)
-    bar = 2.0 * (abs(y) * y_bar + abs(z) * z_bar) + 6.0 * abs(u) * off + 8.0 * EPS * (y * y + z * z + 4.0)
+    bar = 2.0 * (abs(y) * y_bar + abs(z) * z_bar) + 6.0 * abs(u) * off + 8.0 * ROUNDOFF * (y * y + z * z + 4.0)
     return {
         "u": (u, off), "precession_rate": (y, y_bar), "reduced_spin_rate": (z, z_bar), "nutation_square": (square, bar),
     }  # fmt: skip
 
 
 def _rate(own, other, u, off, v, root):
-    """(own - other u) / ((1 - u^2) sqrt|k|) and its bar: psi' or the reduced phi', times A / sqrt|k|."""
+    """(own - other u) / ((1 - u^2) sqrt|k|) and its error bound: psi' or the reduced phi', times A / sqrt|k|."""
     rate = (own - other * u) / (v * root)
-    bar = (4.0 * EPS * (abs(own) + abs(other * u)) + abs(other) * off) / (v * root)
-    return rate, bar + abs(rate) * (2.0 * abs(u) * off / v + 8.0 * EPS)
+    bar = (4.0 * ROUNDOFF * (abs(own) + abs(other * u)) + abs(other) * off) / (v * root)
+    return rate, bar + abs(rate) * (2.0 * abs(u) * off / v + 8.0 * ROUNDOFF)

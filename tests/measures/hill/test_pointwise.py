@@ -2,10 +2,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from survey.kernels.hill.answers import UNTRIED, levels, segments
-from survey.measures.hill import effort
+from survey.kernels.hill.answers import UNTRIED, first_rungs, segments
+from survey.measures.hill import pointwise
 from survey.measures.hill.answers import Asked
-from survey.measures.hill.effort import LADDER, LONGEST
+from survey.measures.hill.pointwise import LONGEST, STEPS
 from survey.methods import taylor16
 
 RNG = np.random.default_rng(3)
@@ -19,21 +19,21 @@ def test_rows_that_come_together_take_the_steps_of_their_fastest_point():
     rows["span"][::20] = np.nan
     phase, distance = taylor16.hill_density(1e-10)
     single = np.empty(p.shape, np.int64)
-    levels(p, rows["bound"], rows["span"], rows["rate"], max(phase, 1 / LONGEST), distance, LADDER, single)
+    first_rungs(p, rows["bound"], rows["span"], rows["rate"], max(phase, 1 / LONGEST), distance, STEPS.rungs, single)
     wanted = np.where(single == UNTRIED, UNTRIED, single.max(axis=1, keepdims=True))
     problem = SimpleNamespace(p=p, **rows)
-    together = effort._first_steps(problem, taylor16, Asked(1e-10, np.ones(7, bool), together=True))
+    together = pointwise._first_steps(problem, taylor16, Asked(1e-10, np.ones(7, bool), together=True))
     np.testing.assert_array_equal(together, wanted)
-    assert (wanted == UNTRIED).any() and (wanted == len(LADDER)).any() and len(np.unique(wanted)) > 20
+    assert (wanted == UNTRIED).any() and (wanted == len(STEPS.rungs)).any() and len(np.unique(wanted)) > 20
 
 
 def test_rows_with_the_same_steps_are_not_sorted_and_come_out_the_same():
-    level = np.repeat(RNG.integers(-1, len(LADDER) + 1, (200, 1)), 5, axis=1)
-    order, *parts = (np.empty(level.size, np.int64) for _ in range(4))
-    count = segments(level, len(LADDER) - 1, order, *parts)
-    rows, of_level, starts = (part[:count] for part in parts)
-    found = effort._segments(level)
+    rung = np.repeat(RNG.integers(-1, len(STEPS.rungs) + 1, (200, 1)), 5, axis=1)
+    order, *parts = (np.empty(rung.size, np.int64) for _ in range(4))
+    count = segments(rung, len(STEPS.rungs) - 1, order, *parts)
+    rows, on_rung, starts = (part[:count] for part in parts)
+    found = pointwise._segments(rung)
     points = [found[0][first:last].tolist() for first, last in zip(*found[3:], strict=True)]
     assert points == [order[a:b].tolist() for a, b in zip(starts, parts[2][1 : count + 1], strict=True)]
     np.testing.assert_array_equal(found[1], rows)
-    np.testing.assert_array_equal(found[2], of_level)
+    np.testing.assert_array_equal(found[2], on_rung)

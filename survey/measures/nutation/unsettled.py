@@ -1,9 +1,9 @@
-"""Which nutations are solved again with more digits (`digits`): open verdicts, and bars that miss rtol."""
+"""Which nutations are solved again with more digits (`multiprecision`): open verdicts, and bounds that miss rtol."""
 
 import numpy as np
 
 from survey.kernels.nutation import wells as nu
-from survey.measures.nutation import digits, wells
+from survey.measures.nutation import multiprecision, wells
 from survey.status import NO_CONVERGENCE, OK, OVERFLOW
 
 ILL = 1e-13  # float64 reaches this, relative to 1 + |value|, at every point that is not ill conditioned
@@ -16,7 +16,7 @@ _PARTS = {"nutation_frequency": {"period"}} | {
 
 
 def settle(out, points, solver, valid, request, known=False):
-    """Solve the points (parameters, n) again in place, as `solver` of `digits` does, where that is needed.
+    """Solve the points (parameters, n) again in place, as `solver` of `multiprecision` does, where that is needed.
 
     known: only motions whose period is known already. Of methods other than `auto` only distances from a separatrix
     whose existence is in doubt.
@@ -34,7 +34,7 @@ def settle(out, points, solver, valid, request, known=False):
 
 
 def _open(out, request):
-    """Where a verdict is open, or a bar of an output that is asked for misses rtol."""
+    """Where a verdict is open, or an error bound of an output that is asked for misses rtol."""
     status, verdict = out["status"], out["verdict"]
     found = (status == NO_CONVERGENCE) | (status == OVERFLOW)
     found |= (status == OK) & (verdict != nu.NUTATION) & (verdict != nu.PASSAGE)
@@ -50,7 +50,7 @@ def _open(out, request):
 def _solve(out, i, point, solver, everything):
     try:
         answer = solver(*point.tolist())
-    except digits.NoMotion:
+    except multiprecision.NoMotion:
         answer = None
         if everything:
             _put(out, i, [{}], wells.NO_MOTION, wells.UNDECIDED, 0)

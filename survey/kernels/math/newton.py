@@ -1,0 +1,31 @@
+"""Newton's method kept inside a bracket: the one loop for zeros that are simple and of whose sign both ends are known.
+
+Others differ in more than their function: `math.quartic.root` starts from parabolas and ends in double-double,
+`cylinder.returns.solved` stops at an image that is another orbit's, or known well enough, and keeps its last image.
+"""
+
+from survey.kernels.jit import inline
+
+
+@inline
+def bracketed(residual, solution, given, start, bracket, close, most):
+    """The last x in `bracket` at which the residual was asked, and the one that follows it, which is the zero.
+
+    residual(solution, given, x) -> (value, slope, does the zero lie above x?). `steps` is a kernel that the residual
+    calls: in the tuple `given`, it would be called by a pointer. A step that leaves the bracket is replaced by its
+    middle. The two are at most close[0] + close[1] |x| apart, or the same after `most` steps.
+    """
+    x, (low, high) = start, bracket
+    for _ in range(most):
+        value, slope, above = residual(solution, given, x)
+        if above:
+            low = x
+        else:
+            high = x
+        new = x - value / slope if slope != 0.0 else low
+        if not low <= new <= high:
+            new = 0.5 * (low + high)
+        if abs(new - x) <= close[0] + close[1] * abs(x):
+            return x, new
+        x = new
+    return x, x

@@ -1,0 +1,80 @@
+"""The answers of points as their results come in, and the ladder that points climb which miss the asked accuracy.
+
+A rung of a ladder is an amount of work: a number of steps, or for an adaptive method the tolerance of one step. A
+point begins on the rung that its method asks for; where its error bounds miss the accuracy, or leave the verdict open,
+it is solved again on a higher one, as long as that halves its bounds. So the work on a point depends on that point,
+the method and rtol, never on its neighbours, and its bits are the same in any block.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from survey import status
+
+UNDECIDED = -1
+
+
+class Answers:
+    """Of N points: `floats` (rows, N), `codes` (int8 each, N), `status`, and who has `missed` what was asked.
+
+    `kept` are the rows of `floats` that hold anything (all of them by default).
+    """
+
+    def __init__(self, size, rows, codes, kept=None):
+        self.kept, self.codes = range(rows) if kept is None else kept, codes
+        self.floats = np.empty((rows, size))
+        for name in codes:
+            setattr(self, name, np.full(size, UNDECIDED, np.int8))
+        self.status, self.missed = np.zeros(size, np.int8), np.zeros(size, np.bool_)
+
+    def replace(self, points, other, those=slice(None)):
+        """The answers of `points` become those of `other`: of all its points, or of `those`, in that order."""
+        for row in self.kept:
+            self.floats[row, points] = other.floats[row, those]
+        for name in (*self.codes, "status", "missed"):
+            getattr(self, name)[points] = getattr(other, name)[those]
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """`rungs`, ascending in work; a point of rung i climbs to rung `above[i]` (beyond the last: it stays as it is).
+
+    `bounds` are the columns of the results that hold error bounds; a point climbs at most `most` times.
+    """
+
+    rungs: np.ndarray
+    above: np.ndarray
+    bounds: slice
+    most: int
+
+    @property
+    def top(self):
+        """The highest rung."""
+        return len(self.rungs) - 1
+
+    def climb(self, rung, results, answers, solve, assess):
+        """Solve the points that missed what was asked again, on higher rungs; the better results are kept.
+
+        `rung` (N), `results` (N, columns) and `answers` are changed. `solve(points, rung)` gives the results of points
+        on their rungs, `assess(points, results)` their Answers.
+        """
+        left = np.flatnonzero(answers.missed & (rung <= self.top))
+        for _ in range(self.most):
+            if not left.size:
+                break
+            rung[left] = self.above[rung[left]]
+            left = left[rung[left] <= self.top]
+            before, new = results[left], solve(left, rung[left])
+            bound, new_bound = self._bound(before), self._bound(new)
+            results[left] = np.where((new_bound < bound)[:, None], new, before)
+            assessed = assess(left, results[left])
+            answers.replace(left, assessed)
+            # truncation falls by far more than 2 from rung to rung: where the bound does not halve, rounding rules
+            useful = (new_bound < 0.5 * bound) | (assessed.status == status.OVERFLOW)
+            left = left[assessed.missed & useful]
+
+    def _bound(self, results):
+        """The widest bound of each point; infinite where one is not finite."""
+        widest = results[:, self.bounds].max(axis=1)
+        return np.where(np.isfinite(widest), widest, np.inf)

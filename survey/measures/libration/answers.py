@@ -1,0 +1,32 @@
+"""The answers of points of Danby's map as they come in."""
+
+from survey import status
+from survey.kernels.libration import traces
+from survey.kernels.libration.traces import PAIRS, PAIRS_BAR, SUM, SUM_BAR, UNDECIDED
+from survey.measures import answers
+
+
+class Answers(answers.Answers):
+    """`floats` (4, N): a, b, each followed by its error bound; `verdict` and `collision`."""
+
+    def __init__(self, size):
+        super().__init__(size, 4, ("verdict", "collision"))
+
+    @property
+    def all(self):
+        """What the kernels fill, in their order."""
+        return self.floats, self.verdict, self.collision, self.missed, self.status
+
+    def assess(self, results, rtol):
+        """Answer every point whose status is ok from its results (N, RESULTS)."""
+        traces.measure(results, rtol, status.OVERFLOW, *self.all)
+
+    def inaccurate(self, rtol):
+        """Whose error bounds exceed rtol (1 + |value|), or who has no answer (N)."""
+        a, a_bar, b, b_bar = self.floats[[SUM, SUM_BAR, PAIRS, PAIRS_BAR]]
+        return ~((a_bar <= rtol * (1 + abs(a))) & (b_bar <= rtol * (1 + abs(b)))) | (self.status != status.OK)
+
+    @property
+    def unsettled(self):
+        """Who has missed what was asked, has no answer, or whose collision is undecided (N)."""
+        return self.missed | (self.collision == UNDECIDED) | (self.status != status.OK)
