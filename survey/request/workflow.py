@@ -297,7 +297,7 @@ def _check_refine(scene, name, file, given):
         return None
     axes = {key: values for key, values in given.items() if np.ndim(values)}
     if measures.question(scene.FAMILY, "cells") is None:
-        raise BadInput(f"refine: [refine] is not supported for {name}; leave the table out")
+        raise BadInput(f"[refine] is not supported for {name}; leave the table out")
     _check_even(scene, name, "refine")
     if len(axes) != 2 or min(values.size for values in axes.values()) < 2:
         raise BadInput("refine: cells need exactly two axes of two values or more; fix the other parameters")
