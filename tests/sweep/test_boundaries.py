@@ -240,7 +240,7 @@ def test_rows_whose_edges_are_known_are_kept_by_a_run_that_stops(path, tmp_path,
         raise Stopped("a power cut")
 
     with monkeypatch.context() as patch:
-        patch.setattr(boundaries.hill_curves, "trace", stop)
+        patch.setattr(boundaries.curves, "trace", stop)
         with pytest.raises(Stopped, match="power cut"):
             survey.run(WORKFLOW, output=tmp_path / "map.nc")
     monkeypatch.setattr(boundaries, "_row_solver", stop)  # none is to be found again
