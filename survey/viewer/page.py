@@ -246,7 +246,7 @@ class Page:
         if point is None:
             self.near.visible = False
             return
-        (x, y), text = self.pointer, "\n".join(map(widgets.words, self.map.under(self.view, point)))
+        (x, y), text = self.pointer, "\n".join(map(widgets.literal, self.map.under(self.view, point)))
         left, low = (
             np.mean(axis.scaled(np.array(window))) < axis.scaled(at)
             for axis, window, at in zip(self.map.axes, self.view.window, (x, y), strict=True)
