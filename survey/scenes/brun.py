@@ -33,7 +33,7 @@ from survey import methods
 from survey.errors import BadInput
 from survey.kernels.nutation import brun, brun_lanes
 from survey.kernels.nutation import wells as nu
-from survey.measures.nutation import multiprecision, unsettled
+from survey.measures.nutation import derived, multiprecision, unsettled
 from survey.measures.nutation import wells as nutation
 from survey.measures.rows import Rows
 from survey.modules import load
@@ -83,21 +83,12 @@ OPTIONS = (
     Option("motion", ("at_t",), "with t: u, psi and phi at t, too", only_with="t"),
 )
 
-_TURNS = "off separatrices, where the period is infinite"
-
-
-def _branch(unit):
-    """The convention for advances, in words."""
-    return (
-        f"{_TURNS}; not reduced: jumps by {unit} where p_psi - p_phi (u = 1) or p_psi + p_phi (u = -1) changes its sign"
-        " on motions that pass that pole, and is the mean of both limits there"
-    )
+_TURNS = derived.FINITE
 
 
 def _outputs(when, dims):
     given = {"when": when, "dims": dims}
-    turns, by_turn, by_one = ({"applies": words} | given for words in (_TURNS, _branch("2 pi"), _branch("1")))
-    by_rate = {"applies": _branch("2 pi / T")} | given
+    turns, by_turn = ({"applies": words} | given for words in (_TURNS, derived.branch("2 pi")))
     return (
         Output("u_min", "lower turning point of u = cos theta", r"u_{\min}", **turns),
         Output("u_max", "upper turning point of u = cos theta", r"u_{\max}", **turns),
@@ -106,11 +97,7 @@ def _outputs(when, dims):
         Output("spin", "advance of phi in a period", r"\Delta\varphi", units="rad", **by_turn),
         Output("action", "action of the nutation, 1 / 2 pi times the integral of p_theta d theta over a period", "J_u",
                **turns),
-        Output("nutation_frequency", "frequency of the nutation", r"2\pi / T", **turns),
-        Output("precession_rate", "mean rate of precession", r"\Delta\psi / T", **by_rate),
-        Output("spin_rate", "mean rate of spin", r"\Delta\varphi / T", **by_rate),
-        Output("precession_number", "rotation number of the precession", r"\Delta\psi / 2\pi", **by_one),
-        Output("spin_number", "rotation number of the spin", r"\Delta\varphi / 2\pi", **by_one),
+        *(Output(d.name, d.long_name, d.symbol, d.units, applies=d.applies, **given) for d in derived.DERIVED),
     )  # fmt: skip
 
 
@@ -157,7 +144,7 @@ def solve(point, request):
         out = _state_in_lanes(given, columns, valid, slowly, wanted) if auto else slowly(given, valid)
     if "t" not in point:
         unsettled.settle(out, _ordered(given), solver, valid, request)
-    out |= nutation.rates(out, request.variables)
+    out |= derived.solve(out, request.variables)
     return {name: _back(block, values) for name, values in out.items()}
 
 

@@ -3,16 +3,11 @@
 import numpy as np
 
 from survey.kernels.nutation import wells as nu
-from survey.measures.nutation import multiprecision, wells
+from survey.measures.nutation import derived, multiprecision, wells
 from survey.status import NO_CONVERGENCE, OK, OVERFLOW
 
 ILL = 1e-13  # float64 reaches this, relative to 1 + |value|, at every point that is not ill conditioned
 DISTANCE = "separatrix_distance"
-_PARTS = {"nutation_frequency": {"period"}} | {
-    f"{name}_{kind}": {name, "period"} if kind == "rate" else {name}
-    for name in ("precession", "spin")
-    for kind in ("rate", "number")
-}
 
 
 def settle(out, points, solver, valid, request, known=False):
@@ -39,7 +34,7 @@ def _open(out, request):
     found = (status == NO_CONVERGENCE) | (status == OVERFLOW)
     found |= (status == OK) & (verdict != nu.NUTATION) & (verdict != nu.PASSAGE)
     rtol = max(request.rtol, ILL)
-    asked = set().union(*(_PARTS.get(name, {name}) for name in request.variables or wells.NAMES))
+    asked = set().union(*(derived.PARTS.get(name, {name}) for name in request.variables or wells.NAMES))
     for name in asked & {*wells.NAMES, DISTANCE} & out.keys():
         with np.errstate(invalid="ignore"):
             missed = out[f"{name}_error"] > rtol * (1.0 + np.abs(out[name]))

@@ -12,7 +12,6 @@ from survey.kernels.nutation import records as rc
 from survey.kernels.nutation import wells as nu
 from survey.kernels.nutation.lanes import NAMES, OUTPUTS
 
-TURN = 2.0 * np.pi
 TRUST = 0.03  # relative errors beyond are no errors of first order
 UNDECIDED = -1
 NO_MOTION = 16  # the status of integrals without a motion
@@ -97,32 +96,6 @@ def _named(found, good):
     result = {}
     for name, (value, error) in found.items():
         result[name], result[f"{name}_error"] = np.where(good, value, np.nan), np.where(good, error, np.nan)
-    return result
-
-
-def rates(out, wanted):
-    """{name: values, name_error: bounds} of the frequencies and rotation numbers `wanted`, from those of `outputs`."""
-    period, bar = out["period"], out["period_error"]
-    result = {}
-    with np.errstate(invalid="ignore"):
-        if "nutation_frequency" in wanted:
-            value = TURN / period
-            result |= {
-                "nutation_frequency": value,
-                "nutation_frequency_error": value * (bar / (period - bar) + 4.0 * ROUNDOFF),
-            }
-        for name in ("precession", "spin"):
-            angle, rough = out[name], out[f"{name}_error"]
-            if f"{name}_rate" in wanted:
-                value = angle / period
-                result[f"{name}_rate"] = value
-                result[f"{name}_rate_error"] = (rough + np.abs(value) * bar) / (period - bar) + 2.0 * ROUNDOFF * np.abs(
-                    value
-                )
-            if f"{name}_number" in wanted:
-                value = angle / TURN
-                result[f"{name}_number"] = value
-                result[f"{name}_number_error"] = rough / TURN + 3.0 * ROUNDOFF * np.abs(value)
     return result
 
 
