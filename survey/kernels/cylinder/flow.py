@@ -23,7 +23,7 @@ PHI, W, SIN, COS, SIN2, COS2, E, Y, U1, Z1, U2, Z2, F_, DG = range(ROWS)
 # E = integral of f (exp E is the area factor), Y = integral of g (the change of w - F), U, Z the variations of phi
 # and of y = w - F for unit changes of phi (1) and w (2), F_ = f, DG = g'.
 
-# Places in T[LAST]. WEIGHT: sum of |b_i| over the stages of a Runge-Kutta step, which all round phi; 0 for series.
+# Columns of T[LAST]. WEIGHT: sum of |b_i| over the stages of a Runge-Kutta step, which all round phi; 0 for series.
 TRUNC_PHI, TRUNC_W, STEP, WEIGHT = range(4)
 
 B12, B31, D, C23, S2, S3, BOUND_F, BOUND_G, BOUND_DG, BOUND_DDG = range(10)

@@ -20,7 +20,7 @@ import numpy as np
 
 from survey.kernels.hill import answers as kernels
 from survey.kernels.hill.series import TERMS, discriminants
-from survey.kernels.jit import wait_for_ahead
+from survey.kernels.jit import wait_for_other_compiler
 from survey.kernels.lanes import RESULTS
 from survey.kernels.math import chebyshev
 from survey.measures.hill import pointwise
@@ -118,7 +118,7 @@ def _rows(problem, method, asked, answers, chosen, axis, open_points):
 
 
 def _answer(problem, asked, answers, rows, series, bars, axis, open_points):
-    wait_for_ahead()
+    wait_for_other_compiler()
     x = (problem.p[rows[0]] - axis.middle) / axis.radius  # all rows have the same points
     _discriminants(answers, rows, series, bars, 2 * x * x - 1 if axis.even else x)
     if asked.wanted[kernels.EXPONENT // 2]:

@@ -58,7 +58,7 @@ def system(point, options):
         start=np.column_stack([np.sqrt(2) * k, zero, one, zero, zero, one]),
         parameters=np.column_stack([2 * k * k - 1, np.sqrt(2) * rho, constant]),
         span=span,
-        effort=span * (abs(rho) + k + 1),
+        steps=span * (abs(rho) + k + 1),
     )
 
 
