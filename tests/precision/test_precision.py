@@ -31,11 +31,11 @@ def test_records_hold_what_was_measured_and_the_asked_accuracy_is_reached(quick,
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: name == "scipy" or None)
     paths = precision.write("satellite", tmp_path, peers=True, say=said.append)
     assert [path.name for path in paths] == [f"precision_satellite.{kind}" for kind in ("json", "csv", "png")]
-    told = json.loads(paths[0].read_text())
-    records = told["records"]
-    assert list(records[0]) == FIELDS and told["machine"]["cpu"]
+    written = json.loads(paths[0].read_text())
+    records = written["records"]
+    assert list(records[0]) == FIELDS and written["machine"]["cpu"]
     times = {(r["method"], r["work"], r["setting"]): r["seconds_per_point"] for r in records}
-    for least in told["machine"]["least"]:
+    for least in written["machine"]["least"]:
         assert 0 < least["seconds_per_point"] < times[least["method"], least["work"], least["setting"]]
     methods = {record["method"] for record in records if not record["peer"]}
     assert {"auto", "rk4", "magnus6", "taylor16"} <= methods
