@@ -66,11 +66,11 @@ def test_a_peer_is_judged_by_its_discriminant(quick):
     assert constant(0.1) == verdicts.count(0) and constant(10.0) == verdicts.count(1)
 
 
-def test_a_share_is_points_of_the_work(quick):
+def test_a_sample_is_points_of_the_work(quick):
     (point, _) = quick.works()["row"]
-    assert precision._share(point, None) is point and precision._share(point, 8) is point
-    share = precision._share(point, 3)
-    assert share["k"].shape == share["rho"].shape == (3,) and set(share["rho"]) < set(point["rho"][0])
+    assert precision._sample(point, None) is point and precision._sample(point, 8) is point
+    sample = precision._sample(point, 3)
+    assert sample["k"].shape == sample["rho"].shape == (3,) and set(sample["rho"]) < set(point["rho"][0])
 
 
 def test_a_wrong_value_or_verdict_shows_in_the_chart(quick):
