@@ -42,7 +42,7 @@ def find(workflow, each=in_turn, once=lambda name, make: make(), report=None):
         try:
             cells = measure.find(_solver(workflow, x, y), x, y, parts, settled)
         except OverflowError as error:
-            raise BadInput(f"refine.width: the map has {error}; take a greater width, or a smaller map") from None
+            raise BadInput(f"refine.width: the map has {error}; use a larger width, or a smaller map") from None
         found.append(cells)
         points += cells.points
     if report:

@@ -6,7 +6,7 @@ z is sampled at Chebyshev points on each piece between its breaks. From the coef
             geometrically, the highest frequency that matters where z is entire
     noise   what does not fall: the rounding of z and of u, and what is too fine to be resolved
 
-The noise enters the bounds: z is handed on as (z - B) + B, so that its rounding counts relative to B >= max |z|, and
+The noise enters the bounds: z is passed on as (z - B) + B, so that its rounding counts relative to B >= max |z|, and
 B is as large as the noise asks. All depends on the point alone.
 
 Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 3, 7 and 8.
@@ -25,8 +25,8 @@ from survey.measures.hill import monodromy, multiprecision, pointwise
 from survey.methods import dop853
 
 SIZES = (65, 513, 4097)
-# z is probed at so many evenly spread points of the part that is solved, however smooth it seems, and at so many when a
-# scene is checked; at so many at least between two breaks.
+# Evenly spread points of the part that is solved at which z is probed, however smooth it seems; those when a scene is
+# checked; and the least number between two breaks.
 PROBES, CHECKED, LEAST_PROBES = 128, 16384, 8
 # Relative to max |z|: z is resolved where its last coefficients are below the first, rough where above the second.
 RESOLVED, ROUGH = 1e-14, 1e-8
@@ -36,7 +36,7 @@ MIRRORED = 1e-8
 ROUNDING = 8.8e-16
 # z is asked for no nearer to a break than this share of the period: rounding decides there on which side.
 SLACK = 2.0**-50
-# Steps are dealt out by rate, and by frequency at this share of it.
+# Steps are distributed by rate, and by frequency at this share of it.
 BY_PHASE = 0.15
 # DOP853 makes no step longer than this share of the distance to a singularity: it would pass a spike unseen.
 STRIDE = 0.5
