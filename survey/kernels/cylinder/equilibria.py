@@ -71,7 +71,7 @@ def _acceleration(flow, given, x):
 
 @kernel
 def describe(p, x, row):
-    """Type, error bar and region of attraction of the equilibrium at x."""
+    """Type, error bound and region of attraction of the equilibrium at x."""
     f, _g, dg = values(p, x)
     row[ANGLE], row[F], row[DG] = x, f, dg
     noise = 4.0 * ROUNDOFF_UP * p[BOUND_G]

@@ -69,7 +69,7 @@ def attracts(cycle):
 def rotation_decides(cycles, size, end, w, error, before, before_error):
     """(decided, index of the cycle or -1 for spin-up) at a passage with |w|; before = |w| one turn ago or -1.
 
-    decided: 1 yes, 0 not yet, -1 the error bar leaves it open.
+    decided: 1 yes, 0 not yet, -1 the error bound leaves it open.
     """
     on, below = cycle_at(cycles, size, w, error)
     if on >= 0:

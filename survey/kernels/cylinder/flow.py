@@ -16,7 +16,7 @@ from survey.kernels.jit import inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 ORDER = 20  # of the Taylor series in t; near -ln(eps)/2 + 1 = 19 the work per unit of time is least (Jorba & Zou)
-LOW = 8  # order of the series of the variational equation, which only carries error bars
+LOW = 8  # order of the series of the variational equation, which only carries error bounds
 LAST = ORDER + 1
 ROWS = 14
 PHI, W, SIN, COS, SIN2, COS2, E, Y, U1, Z1, U2, Z2, F_, DG = range(ROWS)

@@ -209,7 +209,7 @@ def side(p, phi, w):
 
 @kernel
 def clean(p, phi, w, bar_phi, bar_w):
-    """Is a zero of w certain near phi: does g keep its sign over the error bars?"""
+    """Is a zero of w certain near phi: does g keep its sign over the error bounds?"""
     g = abs(acceleration(p, phi)[0])
     return 10.0 * (p[BOUND_DG] * bar_phi + p[BOUND_F] * (abs(w) + bar_w)) + 4.0 * ROUGH * p[BOUND_G] < g
 
