@@ -75,7 +75,7 @@ def series(p, phi, w, T, order):
     T[0, E] = T[0, Y] = 0.0
     for n in range(order):
         a0 = a1 = a2 = a3 = 0.0
-        for k in range(n + 1):  # (sin phi)' = w cos phi and its kin, Cauchy products
+        for k in range(n + 1):  # (sin phi)' = w cos phi and the like, Cauchy products
             wk = T[k, W]
             a0 += wk * T[n - k, SIN]
             a1 += wk * T[n - k, COS]

@@ -161,7 +161,7 @@ def trajectory(setting, begin, at, p, phi0, w0, times, tolerance, limit, floats,
             unsure += 1
         else:
             if unsure > 2:
-                count = UNDETERMINED - limit  # below zero for good
+                count = UNDETERMINED - limit  # below zero permanently
             if w * sign < 0.0:
                 count += 1
             sign, unsure = (1 if w > 0.0 else -1), 0

@@ -87,7 +87,7 @@ def segments(rung, top, order, rows, on_rung, starts):
 def measure(results, squares, rule, wanted, rtol, full_period, overflow, floats, verdict, missed, status):
     """What follows from `results` (N, RESULTS) by arithmetic: `floats` (14, N), `verdict`, who has `missed` `rtol`.
 
-    Points whose `status` is not 0 are passed over; those that leave the range of floats get the status `overflow`.
+    Points whose `status` is not 0 are skipped; those that leave the range of floats get the status `overflow`.
     `rule` (N, or empty) holds what exact rules say, `wanted` (7) which columns count for `missed`; `full_period` as in
     `_squares`; `squares` (N, 4, or empty) holds what it finds, where more digits of it are known.
     """

@@ -31,7 +31,7 @@ TILE = 64
 def measure(results, rtol, overflow, floats, verdict, collision, missed, status):
     """a, its bar, b, its bar (4, N), verdict and collision from `results` (N, RESULTS); who misses `rtol` is `missed`.
 
-    Points whose `status` is not 0 are passed over; those that leave the range of floats get the status `overflow`.
+    Points whose `status` is not 0 are skipped; those that leave the range of floats get the status `overflow`.
     """
     for i in range(len(results)):
         if status[i] == 0:

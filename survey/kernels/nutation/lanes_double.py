@@ -158,7 +158,7 @@ def end(work):
 
 @splice
 def fill(work, means):
-    """Fill the rows FINE of `work` (ALL), where so many means suffice float64."""
+    """Fill the rows FINE of `work` (ALL); `means` is the number of means that suffices in float64."""
     begin(work)
     go(work, means + FURTHER)
     end(work)

@@ -3,7 +3,7 @@
 D is an entire function of p (z is a polynomial in p), so its series on the axis converges faster than any power; where
 p -> -p exchanges y1 and y2', D is a series in p^2 and its nodes those of one half axis. Where the rows are an axis too,
 D's coefficients are series across it, solved at its nodes; a panel of rows on which they do not converge is halved,
-and what is left over is served row by row.
+and the rest is served row by row.
 
 The error bound of D: those at the nodes times the Lebesgue constants, the tails of the series, and rounding. Points
 whose verdict or accuracy it leaves open count as `missed`, and are solved one by one from their factors. All depends on

@@ -75,7 +75,7 @@ def _solve(problem, method, asked, answers, chosen):
 
 
 def _first_steps(problem, method, asked):
-    """The first rung (R, L) with so many steps as the method asks for; above the top where none has; UNTRIED at NaN."""
+    """The first rung (R, L) with as many steps as the method asks for; above the top where none has; UNTRIED at NaN."""
     phase, distance = method.hill_density(asked.rtol)
     phase = max(phase, 1 / LONGEST)
     if not asked.together:

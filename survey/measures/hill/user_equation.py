@@ -30,7 +30,7 @@ SIZES = (65, 513, 4097)
 PROBES, CHECKED, LEAST_PROBES = 128, 16384, 8
 # Relative to max |z|: z is resolved where its last coefficients are below the first, rough where above the second.
 RESOLVED, ROUGH = 1e-14, 1e-8
-# An even z may differ from its mirror image by so much, which then counts as noise.
+# An even z may differ from its mirror image by this much, which then counts as noise.
 MIRRORED = 1e-8
 # What the bars of every method allow at least for the rounding of z, relative to B.
 ROUNDING = 8.8e-16
@@ -43,7 +43,7 @@ STRIDE = 0.5
 CALL_SAMPLES = 4_000_000
 # The most steps in double-double: 20 ms a hundred.
 EXACT_STEPS = 2000
-# z in float64 and with more digits may differ by so many times the rounding that the bars allow for.
+# z in float64 and with more digits may differ by this many times the rounding that the bounds allow for.
 SAME_Z = 1000
 
 
@@ -134,7 +134,7 @@ def problem(z, points, edges, period, slack, even, exact=None):
     length, end = np.diff(edges, axis=1), edges[:, -1]
     pieces = np.count_nonzero(length > 0, axis=1)
     frequency, more = np.sqrt(size), np.where(pieces > 1, pieces, 0) / end
-    # Each piece gets steps by its weight: so many in all that each has what it needs, and one more.
+    # Each piece gets steps by its weight: enough in all that each has what it needs, and one more.
     weight = length * np.maximum(np.maximum(BY_PHASE * frequency, rate), 1 / end[:, None])
     total = np.cumsum(weight, axis=1)[:, -1:]
     need = length * total / (np.where(weight > 0, weight, 1) * end[:, None])

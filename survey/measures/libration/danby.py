@@ -49,7 +49,8 @@ _NUMBERS = np.array([2, 3, 4, 5, 6, 7, 8, *((5 + i % 4) << (i // 4 + 1) for i in
 STEPS = Ladder(_NUMBERS, np.arange(_NUMBERS.size) + 3, slice(INVARIANTS, RESULTS), most=5)
 TOLERANCES = Ladder(10.0 ** -np.arange(4.0, 16.0), np.arange(12) + 1, slice(INVARIANTS, RESULTS), most=5)
 FINEST = 1e-14
-# A series pays from so many points in the row on; of the asked accuracy for its values.
+# The least number of points in a row for which a series pays; the share of the asked accuracy for its values; the share
+# of its nodes that miss it in a hard row.
 DENSE, SHARE, HARD = 3 * NODES, 0.05, 0.25
 # Keep a kernel call below about a second: steps, or points of an adaptive method.
 CALL_WORK, WALKS = 3_000_000, 500
