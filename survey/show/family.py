@@ -10,7 +10,7 @@ from survey import status
 from survey.file.labels import options_of, scene_statuses
 from survey.grid import logarithmic
 from survey.show.layout import add_legend
-from survey.show.palette import greys_of
+from survey.show.palette import greys
 from survey.show.text import label_of, spaced
 
 ANGLE = "phi"
@@ -37,10 +37,12 @@ def draw_family(axes, ds, variable, paper):
     chosen = np.unique(np.linspace(0, parameter.size - 1, min(MOST, parameter.size)).round().astype(int))
     upwards = np.argsort(phi.values)
 
+    part = dict(zip(variable.dims, (chosen, upwards), strict=True))
+
     def rows(name):
         if name not in ds:  # it was not asked for
             return np.full((chosen.size, phi.size), np.nan)
-        return ds[name].transpose(*variable.dims).values[np.ix_(chosen, upwards)]
+        return ds[name].isel(part).transpose(*variable.dims).values
 
     angles = phi.values[upwards]
     values, bars, states, turning = map(rows, (variable.name, f"{variable.name}_error", "status", "phi_turning"))
@@ -49,7 +51,8 @@ def draw_family(axes, ds, variable, paper):
     lines = [_line(angles, *row) for row in zip(values, turning, there, ends, strict=True)]
     colours = parameter.values[chosen].astype(float)
     norm = (LogNorm if logarithmic(parameter.values) else Normalize)(colours.min(), colours.max())
-    drawn = LineCollection(lines, cmap="viridis", norm=norm, array=colours, lw=0.8 if len(lines) > 40 else 1.2)
+    width = (0.4 if paper else 0.8) if len(lines) > 40 else 1.2
+    drawn = LineCollection(lines, cmap="viridis", norm=norm, array=colours, lw=width)
     axes.add_collection(drawn)
     axes.autoscale_view()
     axes.set_xlim(angles[[0, -1]])
@@ -120,9 +123,8 @@ def _turning_points(axes, turning, there, ends):
 
 def _unknown_ends(axes, ds, states, lines, ends, paper):
     """Ring the ends of curves that stop for another reason than a turning point; returns the legend handles."""
-    kinds = {name: ([code], grey) for (name, code), grey in
-             zip(scene_statuses(ds).items(), greys_of(ds, {"undecided": -1}).values(), strict=True)
-             if name != "turning"}  # fmt: skip
+    codes = scene_statuses(ds)
+    kinds = {name: ([codes[name]], grey) for name, grey in greys(ds).items() if name != "turning"}
     kinds |= {"failed": (list(status.FAILURES), "white"), "outside the domain": ([status.INVALID_PARAMETERS], "white")}
     handles = []
     for name, (codes, colour) in kinds.items():

@@ -67,10 +67,9 @@ def _flat(ds, name):
         others, at = [dim for dim in ds.status.dims if dim != family.ANGLE], {family.ANGLE: -1}
         keep = [others[0], family.ANGLE] if name in family.AT_TURNING else others[:2]
     part = ds.isel({dim: at.get(dim, 0) for dim in (*ds.status.dims, *ds[name].dims) if dim not in keep})
-    state = part.status.transpose(*keep)
-    variable = part[name].transpose(*keep)
-    unsorted = [dim for dim in keep if not _is_monotonic(variable[dim].values)]
-    return (part, variable.sortby(unsorted), state.sortby(unsorted)) if unsorted else (part, variable, state)
+    unsorted = [dim for dim in keep if not _is_monotonic(part[dim].values)]
+    part = part.sortby(unsorted) if unsorted else part
+    return part, part[name].transpose(*keep), part.status.transpose(*keep)
 
 
 def _is_monotonic(values):

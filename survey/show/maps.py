@@ -13,7 +13,7 @@ from survey.show.boundaries import draw_boundaries, in_plane
 from survey.show.cells import draw_cells
 from survey.show.layout import add_legend
 from survey.show.marks import hatched, marks, marks_without_answer
-from survey.show.palette import UNDECIDED, greys_of, hatch_of, kinds_of
+from survey.show.palette import UNDECIDED, greys, hatch_of, kinds_of
 from survey.show.style import style_named
 from survey.show.text import label_of, spaced
 
@@ -108,9 +108,9 @@ def _verdicts(axes, x, y, ds, variable, state, number, paper):
 def _undefined(axes, x, y, ds, state, missing, number, paper):
     """Draw the points without a value in the grey of their status, where the scene names one; returns handles."""
     handles = []
-    greys = greys_of(ds, {"undecided": UNDECIDED})
-    for (name, code), grey in zip(scene_statuses(ds).items(), greys.values(), strict=True):
-        here = missing & (state.values == code)
+    codes = scene_statuses(ds)
+    for name, grey in greys(ds).items():
+        here = missing & (state.values == codes[name])
         if here.any():
             cells = np.ma.masked_array(here, ~here)
             axes.pcolormesh(x, y, cells.T, cmap=ListedColormap([grey]), shading="nearest", rasterized=True)

@@ -55,7 +55,7 @@ def test_curves_end_in_their_turning_points_and_follow_the_solution_to_there(cir
         assert np.hypot(*curve.T) == pytest.approx(radius, abs=0.01)
         ends = (-radius, radius) if radius < 2.2 else (-2.2, 2.2)
         assert tuple(curve[[0, -1], 0]) == pytest.approx(ends)
-    (dots,) = (line for line in figure.axes[0].lines if line.get_xdata().size == 18)
+    (dots,) = (line for line in figure.axes[0].lines if len(line.get_xdata()) == 18)
     assert sorted(dots.get_xdata()) == pytest.approx(sorted([*circles.w0.values[:9], *-circles.w0.values[:9]]))
     assert not dots.get_ydata().any() and figure.axes[1].get_ylabel() == "initial velocity"
     assert tuple(drawn.get_array()) == tuple(circles.w0.values)
@@ -75,10 +75,22 @@ def test_the_direction_of_the_axes_and_the_order_of_the_dimensions_change_nothin
         assert np.array_equal(one, two)
 
 
+def test_colours_belong_to_their_curves_on_an_axis_that_is_not_sorted(circles):
+    drawn, curves = lines(figures.draw(circles.isel(w0=[3, 9, 0])))
+    assert list(drawn.get_array()) == list(circles.w0.values[[0, 3, 9]])
+    assert [np.hypot(*curve[0]) for curve in curves] == pytest.approx(list(drawn.get_array()), rel=0.05)
+
+
+def test_one_curve_and_none(circles):
+    assert len(lines(figures.draw(circles.isel(w0=[2])))[1]) == 1
+    circles.status[...], circles.w[...], circles.phi_turning[...] = status.STEP_LIMIT, np.nan, np.nan
+    assert legend(figures.draw(circles)) == ["solutions", "initial angle", "failed (10)"]
+
+
 def test_of_many_curves_some_hundreds_are_drawn_evenly(circles, monkeypatch):
     monkeypatch.setattr(family, "MOST", 4)
     figure = figures.draw(circles)
-    assert lines(figure)[0].get_array() == pytest.approx([0.5, 1.1, 1.7, 2.3])
+    assert list(lines(figure)[0].get_array()) == pytest.approx([0.5, 1.1, 1.7, 2.3])
     assert legend(figure)[0] == "4 of 10 solutions"
 
 
