@@ -20,16 +20,16 @@ def misses(seed, number):
     """Complaints: an error outside its bar, or above 100 times the floor, of a rounded output at least; a wide bar."""
     random = np.random.default_rng(seed)
     kinds, points = zip(*(draw(random) for _ in range(number)), strict=True)
-    ds, told = evaluate(np.array(points)), []
+    ds, faults = evaluate(np.array(points)), []
     for i, (kind, point) in enumerate(zip(kinds, points, strict=True)):
         one = ds.isel(point=i)
         if (one.status != 0 or one.verdict == 0) and abs(one.separatrix_distance) < 1e-20:
             continue  # which says why there is no answer; a change of an input by 1e-16 is far more
         if one.status != 0 or one.verdict < 1:
-            told.append((kind, point.tolist(), int(one.status), int(one.verdict)))
+            faults.append((kind, point.tolist(), int(one.status), int(one.verdict)))
             continue
-        told += [(kind, *complaint, point.tolist()) for complaint in compared(one, *truth(point))]
-    return told
+        faults += [(kind, *complaint, point.tolist()) for complaint in compared(one, *truth(point))]
+    return faults
 
 
 def compared(one, exact, floor):
@@ -44,7 +44,7 @@ def compared(one, exact, floor):
 
 def scaled_misses(seed, number):
     """As `misses`, of every well at scaled integrals."""
-    random, told = np.random.default_rng(seed), []
+    random, faults = np.random.default_rng(seed), []
     cases = [draw_scaled(random) for _ in range(number)]
     for sign in (1, -1):
         mine = [(kind, point) for kind, s, point in cases if s == sign]
@@ -56,12 +56,12 @@ def scaled_misses(seed, number):
             if one.verdict == 0 and abs(one.separatrix_distance) < 1e-20:
                 continue
             if int(one.status) != (0 if found else 16) or int(one.wells) != len(found):
-                told.append((kind, sign, point, int(one.status), int(one.wells), len(found)))
+                faults.append((kind, sign, point, int(one.status), int(one.wells), len(found)))
                 continue
             for j, ends in enumerate(found):
                 exact = truth(point, scaled(sign), ends)
-                told += [(kind, sign, *complaint, point) for complaint in compared(one.isel(well=j), *exact)]
-    return told
+                faults += [(kind, sign, *complaint, point) for complaint in compared(one.isel(well=j), *exact)]
+    return faults
 
 
 def test_hard_cases():

@@ -6,6 +6,7 @@ import numpy as np
 
 from survey.kernels.cylinder.flow import BOUND_DDG, BOUND_DG, BOUND_F, BOUND_G, C23, S2, TWO_PI, values
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math.newton import bracketed
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 MOST = 12  # rows of a table of equilibria: 4 at most, and degenerate ones
@@ -57,26 +58,20 @@ def equilibria(p, table):
 @kernel
 def root(p, low, high):
     """The root of g between low and high, where g is monotone and changes sign."""
-    sign = values(p, high)[1] >= 0.0
-    x = 0.5 * (low + high)
-    for _ in range(80):
-        _f, g, dg = values(p, x)
-        if (g >= 0.0) == sign:
-            high = x
-        else:
-            low = x
-        new = x - g / dg if dg != 0.0 else low
-        if not low <= new <= high:
-            new = 0.5 * (low + high)
-        if abs(new - x) < 2e-16 * (1.0 + abs(x)):
-            return new
-        x = new
-    return x
+    given = p, values(p, high)[1] >= 0.0
+    return bracketed(_acceleration, values, given, 0.5 * (low + high), (low, high), (2e-16, 2e-16), 80)[1]
+
+
+@inline
+def _acceleration(flow, given, x):
+    p, rising = given
+    _f, g, dg = flow(p, x)
+    return g, dg, (g >= 0.0) != rising
 
 
 @kernel
 def describe(p, x, row):
-    """Type, error bar and region of attraction of the equilibrium at x."""
+    """Type, error bound and region of attraction of the equilibrium at x."""
     f, _g, dg = values(p, x)
     row[ANGLE], row[F], row[DG] = x, f, dg
     noise = 4.0 * ROUNDOFF_UP * p[BOUND_G]

@@ -267,7 +267,7 @@ def test_at_degenerate_equilibria_nothing_is_counted(six, off):
 def test_beside_degenerate_equilibria_roots_are_counted_right():
     """Double and triple roots taken apart by 1e-18 to 1e-6 of a parameter: counted as mpmath does, or not at all."""
     random = np.random.default_rng(5)
-    p, table, told = np.empty(10), np.zeros((eq.MOST, 10)), 0
+    p, table, counted = np.empty(10), np.zeros((eq.MOST, 10)), 0
     for i in range(200):
         six = random.integers(-8, 9, 6) / 4.0
         six[5] = -six[2]  # g' = 0
@@ -278,9 +278,9 @@ def test_beside_degenerate_equilibria_roots_are_counted_right():
         s = SimpleNamespace(p=p, stratum=cf.I1)
         if not rows.size or any(cp._is_degenerate(s, row) for row in rows):
             continue
-        told += 1
+        counted += 1
         assert len(rows) == roots(six)
-    assert told > 20
+    assert counted > 20
 
 
 def roots(six):
