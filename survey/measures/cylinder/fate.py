@@ -148,6 +148,7 @@ class Skeleton:
     librations: np.ndarray
     thresholds: np.ndarray  # (w_c, w_d) of the two rotation maps; NaN where every turn from w > 0 is completed
     conclusive: bool  # do the signs of D fit together (so the parity law holds), and did every map answer?
+    folded: bool  # is an equilibrium degenerate, or so nearly that float64 hides it, and with it cycles?
 
 
 def sizes(b12, b31, d, c23, s2, s3):
@@ -184,17 +185,18 @@ def skeleton(method, six):
     sign = np.sign(K) if K != 0.0 else np.sign(L)
     ends = np.array([sign, sign if K != 0.0 else -sign])
     table = np.zeros((eq.MOST, 10))
-    eqs = table[: eq.equilibria(p, table)] if stratum != I0 else table[:0]
+    count, folded = eq.equilibria(p, table) if stratum != I0 else (0, False)
+    eqs = table[:count]
     section = _section(p, eqs)
     none, thresholds = np.zeros((0, 10)), np.full((2, 2), np.nan)
     if stratum != G:
-        return Skeleton(p, stratum, K, L, ends, section, eqs, none, none, none, thresholds, True)
+        return Skeleton(p, stratum, K, L, ends, section, eqs, none, none, none, thresholds, True, folded)
     plus, thresholds[0], first = _rotations(method, six, eqs, section, K, L)
     mirrored = [six[0], -six[1], six[2], -six[3], -six[4], six[5]]
     minus, thresholds[1], second = _rotations(method, mirrored, _mirrored(eqs), -section, K, -L)
     librations, third = _librations(method, p, eqs)
     conclusive = first and second and third
-    return Skeleton(p, stratum, K, L, ends, section, eqs, plus, minus, librations, thresholds, conclusive)
+    return Skeleton(p, stratum, K, L, ends, section, eqs, plus, minus, librations, thresholds, conclusive, folded)
 
 
 def _section(p, eqs):
