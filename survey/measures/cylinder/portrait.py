@@ -17,7 +17,7 @@ from survey.kernels.cylinder.branches import unstable
 from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F
 from survey.kernels.cylinder.steps import TURNING
 from survey.measures.cylinder import solution
-from survey.measures.cylinder.fate import EXACT, I0, G, followed, remembered, sizes
+from survey.measures.cylinder.fate import EXACT, I0, G, followed, outline, remembered, sizes
 from survey.status import NO_CONVERGENCE, OK
 
 # As many are kept: surveys of random points found no more than 4 cycles, and g has 4 roots at most.
@@ -46,13 +46,14 @@ def solve(method, systems, rtol):
     """Every output for rows of six finite parameters."""
     result, listed = empty(len(systems), OK), []
     for i, six in enumerate(systems):
-        s = remembered(method, six)
+        s = outline(six)
         _ends(s, six, result, i)
         _rests(s, result, i)
         if s.folded or any(_is_hopf(s, row) for row in s.equilibria):
             # then the error bounds leave open how many cycles there are
             result["verdict"][i], result["status"][i] = DEGENERATE, UNKNOWN_CYCLES
             continue
+        s = remembered(method, six)
         result["verdict"][i] = _verdict(method, s, rtol)
         for name, table in zip(COUNTS[2:], (s.plus, s.minus, s.librations), strict=True):
             result[name][i] = len(table)
