@@ -35,6 +35,9 @@ class Survey:
     def map(self, var=None, ax=None, boundaries=True, style=None, width="single"):
         """Draw the stability map, or the variable `var`; along one axis, its curve and error band.
 
+        Solutions of Abel's equation at several angles are curves, one for each value of the first parameter, up to
+        their turning points; at one angle (`ds.survey.slice(phi=1.0).survey.map("w")`) they are a map.
+
         Undecided, failed and outside points are marked and counted in the legend; points where the outputs are
         undefined are grey, listed by their status; edges of tongues are drawn where the file contains them, unless
         `boundaries` is False. Draws onto the matplotlib Axes `ax`, by default a new figure's, and returns it

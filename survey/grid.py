@@ -41,7 +41,8 @@ class Grid:
     def tiled(self, points_per_block, points_per_region, points_per_tile):
         """(lengths of a tile, [(region, its blocks)]): no tile or block belongs to two regions.
 
-        Regions and blocks are slices per dimension, of at most so many points where `uncut` dimensions allow it.
+        Regions and blocks are slices per dimension, of at most these numbers of points, as far as `uncut` dimensions
+        allow.
         """
         region = self._lengths(points_per_region)
         tile = halved(region, points_per_tile)

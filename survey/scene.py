@@ -57,7 +57,7 @@ class Parameter:
 class Option:
     """A switch of the scene; the first choice is the default unless `default` says otherwise.
 
-    It exists only with the parameter `only_with`, and not beside the parameter `replaced_by`, which says the same.
+    It exists only with the parameter `only_with`, and not beside the parameter `replaced_by`, which specifies the same.
     """
 
     name: str

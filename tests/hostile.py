@@ -77,8 +77,8 @@ def base(folder, scene="evil.py"):
     shutil.copy(GOLDEN, folder / "base.nc")
     if scene != "mathieu":
         with netCDF4.Dataset(folder / "base.nc", "a") as file:
-            told = {"scene": scene, "scene_text": text, "scene_hash": hashlib.sha256(text.encode()).hexdigest()}
-            file.setncatts(told)
+            attributes = {"scene": scene, "scene_text": text, "scene_hash": hashlib.sha256(text.encode()).hexdigest()}
+            file.setncatts(attributes)
     digest(folder / "base.nc")
     return sentinel
 
@@ -93,12 +93,12 @@ def mutate(source, path, seed):
     """Write a mutation of the sound file `source` to `path`; returns what it is."""
     rng = np.random.default_rng(seed)
     kinds = [attribute, attribute, attribute, lost, lost, variable, variable, axis, dimension]
-    told = []
+    changed = []
     shutil.copy(source, path)
     for _ in range(1 + int(rng.integers(5) == 0)):
-        told.append(kinds[rng.integers(len(kinds))](path, rng))
+        changed.append(kinds[rng.integers(len(kinds))](path, rng))
     digest(path)
-    return "; ".join(told)
+    return "; ".join(changed)
 
 
 def _pick(rng, items):
@@ -139,7 +139,7 @@ def lost(path, rng):
 
 
 def _again(path, change):
-    """Write the file anew after `change(dataset)`; as it was where that cannot be written."""
+    """Write the file again after `change(dataset)`; as it was where that cannot be written."""
     try:
         with xr.open_dataset(path, decode_cf=False) as opened:
             ds = opened.load()
@@ -155,11 +155,11 @@ def _again(path, change):
 def variable(path, rng):
     """A variable that is missing, of another type, shape or name, or has other values."""
     how = _pick(rng, ["drop", "float", "text", "wide", "transpose", "rename", "values", "codes", "more"])
-    told = []
+    changed = []
 
     def change(ds):
         name = _pick(rng, ds.variables)
-        told.append(name)
+        changed.append(name)
         if how == "drop":
             return ds.drop_vars(name)
         if how == "rename":
@@ -177,7 +177,7 @@ def variable(path, rng):
         values[some] = _pick(rng, NUMBERS) if values.dtype.kind == "f" else int(_pick(rng, [-128, -1, 9, 99, 127]))
         return ds.assign({name: (ds[name].dims, values, ds[name].attrs)})
 
-    return f"{how} " + (_again(path, change) or " ".join(map(str, told)))
+    return f"{how} " + (_again(path, change) or " ".join(map(str, changed)))
 
 
 def axis(path, rng):
@@ -200,18 +200,18 @@ def axis(path, rng):
 def dimension(path, rng):
     """A dimension that is renamed, cut to nothing or one, or stretched."""
     how = _pick(rng, ["rename", "none", "one", "twice"])
-    told = []
+    changed = []
 
     def change(ds):
         dim = _pick(rng, ds.sizes)
-        told.append(dim)
+        changed.append(dim)
         if how == "rename":
             return ds.rename({dim: _pick(rng, NAMES)})
         if how == "twice":
             return xr.concat([ds, ds], dim, data_vars="minimal", coords="minimal", compat="override")
         return ds.isel({dim: slice(0, int(how == "one"))})
 
-    return f"{how} " + (_again(path, change) or " ".join(map(str, told)))
+    return f"{how} " + (_again(path, change) or " ".join(map(str, changed)))
 
 
 def ask(path, sentinel, points=0, solve=False, draw=True):
@@ -244,9 +244,9 @@ def command(words):
     """What is wrong with the program's end, in words: none of these is."""
     from survey import cli
 
-    said, told = io.StringIO(), io.StringIO()
+    out, err = io.StringIO(), io.StringIO()
     code = None
-    with redirect_stdout(said), redirect_stderr(told), warnings.catch_warnings(record=True) as warned:
+    with redirect_stdout(out), redirect_stderr(err), warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always")
         try:
             cli.main(words)
@@ -256,11 +256,11 @@ def command(words):
             yield f"{type(error).__name__}: {error}"
     if code not in (0, 2, 3):
         yield f"exit code {code}"
-    lines = told.getvalue().splitlines()
+    lines = err.getvalue().splitlines()
     if any(not line.startswith("survey: ") for line in lines) or (code == 2 and len(lines) != 1):
-        yield f"stderr: {told.getvalue()[:500]}"
+        yield f"stderr: {err.getvalue()[:500]}"
     yield from (f"warned: {one.message}" for one in warned[:1])
-    yield from unseen(said.getvalue() + told.getvalue())
+    yield from unseen(out.getvalue() + err.getvalue())
 
 
 def unseen(text):
@@ -343,8 +343,8 @@ def page(path):
     shown.choose((0, 0))
     shown.solve()
     shown.show_source()
-    told = "".join(part.text for part in document.select({"type": Div})).replace("\n", " ")
-    return told + html.escape(document.title)  # as bokeh's page escapes it
+    shown_text = "".join(part.text for part in document.select({"type": Div})).replace("\n", " ")
+    return shown_text + html.escape(document.title)  # as bokeh's page escapes it
 
 
 def main():
@@ -356,10 +356,10 @@ def main():
         sentinel = base(folder, scene)
         draw = "--draw" in sys.argv
         for seed in range(first, first + number):
-            told = mutate(folder / "base.nc", folder / "file.nc", seed)
+            mutation = mutate(folder / "base.nc", folder / "file.nc", seed)
             found = ask(folder / "file.nc", sentinel, points, solve, draw)
             for what, wrong in found:
-                print(f"{seed} [{told}] {what}: {wrong}"[:1500], flush=True)
+                print(f"{seed} [{mutation}] {what}: {wrong}"[:1500], flush=True)
             print(f"{seed + 1 - first} of {number}", end="\r", file=sys.stderr, flush=True)
 
 

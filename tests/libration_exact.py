@@ -15,7 +15,7 @@ DIGITS = 80
 
 
 def factors(w1, w2):
-    """The FACTORS of the closed forms, from frequencies of any type; exchanging w1 and -w2 exchanges the two modes."""
+    """The FORM_FACTORS from frequencies of any type; exchanging w1 and -w2 exchanges the two modes."""
     u, v = w1 * w1, w2 * w2
     return w1, w2, u, v, u - v, 1 - 5 * u, 1 - 5 * v, 1 - 10 * u, 1 - 10 * v, 4 - u, 4 - v, 9 - 4 * u * v
 

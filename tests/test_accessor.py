@@ -388,7 +388,7 @@ def test_lazy_files_are_read_in_part(mathieu, tmp_path):
         (lambda s: s.trajectory(a=1.0, q=0.5, time=-1.0), "time = -1.0"),
         (lambda s: s.trajectory(a=1.0, q=0.5, time="20"), "time = '20': give a positive number"),
         (lambda s: s.compare(3), "give the dataset"),
-        (lambda s: s.compare(survey.evaluate("mathieu", a=7.5, q=1.0)), "no value of a is in both"),
+        (lambda s: s.compare(survey.evaluate("mathieu", a=7.5, q=1.0)), "no value of a is common to both"),
         (lambda s: s.compare(survey.evaluate("libration", mu=0.01)), "the scenes differ"),
         (lambda s: s.slice(q=1.0).survey.slice(a=1.0).survey.areas(), "two values or more"),
     ],

@@ -92,9 +92,9 @@ def test_no_words_show_the_help(capsys, monkeypatch):
 @pytest.mark.parametrize("new", [True, False])
 def test_the_plan_says_what_its_time_leaves_out(small, new, monkeypatch):
     monkeypatch.setattr(jit, "is_new", lambda: new)
-    told = plan.plan(workflow.read(small))["not_estimated"]
-    assert "writing the file" in told and "compiling" in told
-    assert ("none has been compiled on this machine yet" in told) == new
+    answer = plan.plan(workflow.read(small))["not_estimated"]
+    assert "writing the file" in answer and "compiling" in answer
+    assert ("none has been compiled on this machine yet" in answer) == new
 
 
 def test_plan_counts_what_run_does_and_calls_no_kernel(program, small):
@@ -105,8 +105,8 @@ def test_plan_counts_what_run_does_and_calls_no_kernel(program, small):
 
 
 def test_info_verify_and_plot(program, ran):
-    told = json.loads(program("info", "small.nc", "--json").stdout)
-    assert told["counts"]["status"]["ok"] == 24 and told["provenance"]["kernel_hash"]
+    answer = json.loads(program("info", "small.nc", "--json").stdout)
+    assert answer["counts"]["status"]["ok"] == 24 and answer["provenance"]["kernel_hash"]
     assert "phi0" in program("info", "small.nc").stdout
     verified = program("verify", "small.nc")
     assert verified.returncode == 0 and "20 points solved again by dop853 and full" in verified.stdout, verified.stderr
@@ -161,9 +161,9 @@ def test_verify_finds_a_wrong_value_by_solving_again(program, ran):
 
 def test_scenes_tell_all_that_is_needed(program):
     assert "satellite" in program("scenes").stdout
-    told = program("scenes", "satellite").stdout
+    answer = program("scenes", "satellite").stdout
     for words in ("k != 1", "body", "prolate | oblate", "discriminant", "taylor16", "undecided -1", "Astakhova"):
-        assert words in told
+        assert words in answer
     assert json.loads(program("scenes", "gyrostat", "--json").stdout)["name"] == "gyrostat"
 
 
@@ -187,12 +187,12 @@ def test_an_interrupted_run_can_be_resumed(program, small, name, code):
     while not list(blocks.glob("*.block")) and time.time() < deadline:
         time.sleep(0.005)
     running.send_signal(getattr(signal, name))
-    told = running.communicate(timeout=30)[1]
-    assert running.returncode == code and "resume with: survey run small.toml" in told, told
+    answer = running.communicate(timeout=30)[1]
+    assert running.returncode == code and "resume with: survey run small.toml" in answer, answer
     finished = len(list(blocks.glob("*.block")))
     assert finished and not (program.folder / "small.nc").exists()
     left = json.loads(program("info", "small.nc", "--json").stdout)["unfinished"]
-    safe, blocks_asked = map(int, re.search(r"finished blocks are safe: (\d+) of (\d+); go on", told).groups())
+    safe, blocks_asked = map(int, re.search(r"finished blocks are safe: (\d+) of (\d+); resume with", answer).groups())
     assert 1 <= safe <= left["blocks_done"] == finished and blocks_asked == left["blocks"]
     assert 0 < left["points_done"] <= left["points"] == 160_000 and left["resume"] == shlex.join(["survey", *command])
     seen = program("verify", "small.nc")

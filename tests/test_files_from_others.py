@@ -40,8 +40,8 @@ def checked(folder, seeds, scene="evil.py", **asked):
     sentinel = hostile.base(folder, scene)
     found = []
     for seed in seeds:
-        told = hostile.mutate(folder / "base.nc", folder / "file.nc", seed)
-        found += [(seed, told, *one) for one in hostile.ask(folder / "file.nc", sentinel, **asked)]
+        mutation = hostile.mutate(folder / "base.nc", folder / "file.nc", seed)
+        found += [(seed, mutation, *one) for one in hostile.ask(folder / "file.nc", sentinel, **asked)]
     assert not found, found
 
 
@@ -84,9 +84,9 @@ def changed(folder, **attributes):
 def test_a_scene_is_a_module_of_the_folder_of_scenes_and_nothing_else(folder, scene):
     path, before = changed(folder, scene=scene), set(sys.modules)
     started = time.process_time()
-    with pytest.raises(errors.SurveyError) as told:
+    with pytest.raises(errors.SurveyError) as refused:
         survey.open(path).survey.trajectory(a=1.0, q=1.0)
-    assert "\n" not in str(told.value) and len(str(told.value)) < 2100 and time.process_time() - started < 20
+    assert "\n" not in str(refused.value) and len(str(refused.value)) < 2100 and time.process_time() - started < 20
     assert not {name for name in set(sys.modules) - before if "passwd" in name or name == "x"}
 
 
@@ -268,7 +268,7 @@ def test_what_an_unfinished_run_says_is_text_and_its_command_is_no_other_program
             json.dumps({"resume_command": command, "folder": "/tmp/$(reboot)\x1b", "host": "\x1b"})
         )
         assert list(hostile.command(["info", str(tmp_path / "map.nc")])) == []
-        told = unfinished.summary(tmp_path / "map.nc")["resume"]
-        command = told.rpartition(" && ")[2]
+        resume = unfinished.summary(tmp_path / "map.nc")["resume"]
+        command = resume.rpartition(" && ")[2]
         words = shlex.split(command)
-        assert words[:2] == ["survey", "run"] and command == shlex.join(words) and "rm" not in shlex.split(told)[:1]
+        assert words[:2] == ["survey", "run"] and command == shlex.join(words) and "rm" not in shlex.split(resume)[:1]

@@ -46,6 +46,6 @@ def test_what_is_named_exists(page):
 
 
 def test_the_tests_mirror_the_packages():
-    """Tests of a package lie in a folder of its name; a file that bears no module's name says what it checks."""
+    """Tests of a package lie in a folder of its name."""
     folders = {path.parent.relative_to(ROOT / "tests") for path in (ROOT / "tests").rglob("test_*.py")}
     assert [f for f in sorted(folders) if not ((ROOT / "survey" / f).is_dir() or str(f) == "workflows")] == []

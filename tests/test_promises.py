@@ -97,8 +97,8 @@ def start(folder, *words, **keywords):
 def resume(folder, *words):
     """(exit code, stderr) of the program run to its end."""
     running = start(folder, *words, stderr=subprocess.PIPE)
-    told = running.communicate(timeout=120)[1]
-    return running.returncode, told
+    stderr = running.communicate(timeout=120)[1]
+    return running.returncode, stderr
 
 
 def same(folder, unbroken):
@@ -150,9 +150,9 @@ def test_kills_at_random_times_lose_and_corrupt_nothing(folder, unbroken, kills,
         if (folder / "sweep.nc").exists():
             assert reading.check(folder / "sweep.nc") == []
     reused = len(blocks(folder))
-    code, told = resume(folder)
+    code, stderr = resume(folder)
     counted = f"computed {45 - reused}, reused {reused} of 45 blocks"
-    assert code == 0 and (counted in told or "already complete" in told), told
+    assert code == 0 and (counted in stderr or "already complete" in stderr), stderr
     same(folder, unbroken)
 
 
@@ -190,19 +190,19 @@ variables = ["verdict"]
 [refine]
 width = 0.001
 """
-# the program with many small parts of cells, telling which of them it works out
+# the program with many small parts of cells, which prints those that it computes
 PARTS = """
 import os
-from survey.file import blocks as store
+from survey.file import blocks
 from survey.measures.hill import cells
 cells.BATCH = 1
-once = store.Blocks.once
-def told(kept, name, make):
-    def make_and_tell():
+once = blocks.Blocks.once
+def reporting(kept, name, make):
+    def make_and_report():
         os.write(1, name.encode() + b" ")
         return make()
-    return once(kept, name, make_and_tell)
-store.Blocks.once = told
+    return once(kept, name, make_and_report)
+blocks.Blocks.once = reporting
 from survey.cli import main
 main()
 """
@@ -238,8 +238,8 @@ def test_workers_stop_promptly_with_the_run(folder, name, code):
     wait_for(lambda: len(blocks(folder)) > 3)
     children = psutil.Process(running.pid).children(recursive=True)
     running.send_signal(getattr(signal, name))
-    told = running.communicate(timeout=10)[1]
-    assert running.returncode == code and "resume with: survey run sweep.toml --workers 2" in told
+    stderr = running.communicate(timeout=10)[1]
+    assert running.returncode == code and "resume with: survey run sweep.toml --workers 2" in stderr
     wait_for(lambda: not any(_works(child) for child in children), 5)
 
 
@@ -249,26 +249,36 @@ def test_an_interrupt_from_the_terminal_is_one_line_while_workers_start(folder):
     running = start(folder, "--workers", "2", "--quiet", stderr=subprocess.PIPE, preexec_fn=heeding)
     wait_for(lambda: any(_is_worker(child) for child in psutil.Process(running.pid).children()))
     os.killpg(running.pid, signal.SIGINT)
-    told = running.communicate(timeout=60)[1]
-    assert running.returncode == 130 and told.count("\n") == 1 and "interrupted; no block was finished yet; go" in told
+    stderr = running.communicate(timeout=60)[1]
+    assert (
+        running.returncode == 130
+        and stderr.count("\n") == 1
+        and "interrupted; no block was finished yet; resume" in stderr
+    )
 
 
 def test_drift_and_a_second_writer_are_refused(folder, unbroken):
     running = start(folder)
     wait_for(lambda: len(blocks(folder)) > 3)
     running.send_signal(signal.SIGSTOP)
-    code, told = resume(folder, "--quiet")
-    assert code == 2 and told.count("\n") == 1 and f"another run is writing it (host {socket.gethostname()}, " in told
-    assert f"pid {running.pid}" in told
+    code, stderr = resume(folder, "--quiet")
+    assert (
+        code == 2 and stderr.count("\n") == 1 and f"another run is writing it (host {socket.gethostname()}, " in stderr
+    )
+    assert f"pid {running.pid}" in stderr
     running.kill()
     running.wait()
     kept = len(blocks(folder))
-    code, told = resume(folder, "--quiet", "--set", "solver.rtol=1e-9")
-    assert code == 2 and told.count("\n") == 1 and "from another workflow (solver.rtol 1e-10 -> 1e-09); go back" in told
-    assert f"--fresh, which deletes {kept} finished blocks" in told
+    code, stderr = resume(folder, "--quiet", "--set", "solver.rtol=1e-9")
+    assert (
+        code == 2
+        and stderr.count("\n") == 1
+        and "from another workflow (solver.rtol 1e-10 -> 1e-09); go back" in stderr
+    )
+    assert f"--fresh, which deletes {kept} finished blocks" in stderr
     assert len(blocks(folder)) == kept
-    code, told = resume(folder, "--fresh")
-    assert code == 0 and "reused 0 of" in told and "--fresh" in xr.load_dataset(folder / "sweep.nc").attrs["history"]
+    code, stderr = resume(folder, "--fresh")
+    assert code == 0 and "reused 0 of" in stderr and "--fresh" in xr.load_dataset(folder / "sweep.nc").attrs["history"]
     same(folder, unbroken)
 
 
@@ -282,8 +292,8 @@ def test_a_flipped_bit_of_a_block_is_mended(folder, unbroken):
     bits[len(bits) // 3] ^= 8
     kept[2].write_bytes(bits)
     kept[3].write_bytes(kept[3].read_bytes()[:-5])
-    code, told = resume(folder)
-    assert code == 0 and f"reused {len(kept) - 2} of 45 blocks" in told, told
+    code, stderr = resume(folder)
+    assert code == 0 and f"reused {len(kept) - 2} of 45 blocks" in stderr, stderr
     same(folder, unbroken)
 
 
@@ -333,8 +343,8 @@ def test_a_file_size_limit_is_one_line_and_the_run_can_go_on(folder, unbroken):
 
     environment = {key: value for key, value in os.environ.items() if not key.startswith("COV")}  # it writes files too
     running = start(folder, "--quiet", stderr=subprocess.PIPE, preexec_fn=limit, env=environment)
-    told = running.communicate(timeout=60)[1]
-    assert running.returncode == 4 and told.count("\n") == 1 and "sweep.nc: writing failed" in told, told
+    stderr = running.communicate(timeout=60)[1]
+    assert running.returncode == 4 and stderr.count("\n") == 1 and "sweep.nc: writing failed" in stderr, stderr
     assert not (folder / "sweep.nc").exists()
     assert resume(folder)[0] == 0
     same(folder, unbroken)
@@ -347,8 +357,8 @@ def test_a_full_disk_is_one_line_and_the_run_can_go_on(folder, unbroken):
         pytest.skip("needs the right to mount a small tmpfs")
     try:
         (disk / "sweep.toml").write_text(SWEEP)
-        code, told = resume(disk, "--quiet")
-        assert code == 2 and "the disk of" in told and told.count("\n") == 1, told
+        code, stderr = resume(disk, "--quiet")
+        assert code == 2 and "the disk of" in stderr and stderr.count("\n") == 1, stderr
         (disk / "filler").write_bytes(bytes(60_000))
         program = PROGRAM.replace("from", "survey.sweep.engine.refuse_too_large = lambda _: None; from")
         command = [sys.executable, "-c", program, "run", "sweep.toml", "--quiet"]
@@ -356,8 +366,8 @@ def test_a_full_disk_is_one_line_and_the_run_can_go_on(folder, unbroken):
         assert done.returncode == 4 and "are free" in done.stderr and done.stderr.count("\n") == 1, done.stderr
         kept = len(blocks(disk))
         subprocess.run(["mount", "-o", "remount,size=20m", disk], check=True)
-        code, told = resume(disk)
-        assert code == 0 and f"reused {kept} of" in told and kept > 0
+        code, stderr = resume(disk)
+        assert code == 0 and f"reused {kept} of" in stderr and kept > 0
         same(disk, unbroken)
     finally:
         subprocess.run(["umount", disk], check=True)
@@ -368,8 +378,8 @@ def test_a_home_that_cannot_be_written_is_fine(folder):
     environment.pop("NUMBA_CACHE_DIR", None)
     small = ["--set", "axes.w0.num=2", "--set", "axes.phi0.num=2"]
     running = start(folder, *small, env=environment, stderr=subprocess.PIPE)
-    told = running.communicate(timeout=120)[1]
-    assert running.returncode == 0 and "status: ok: 4" in told, told
+    stderr = running.communicate(timeout=120)[1]
+    assert running.returncode == 0 and "status: ok: 4" in stderr, stderr
 
 
 def test_two_processes_fill_one_empty_kernel_cache(folder):
@@ -389,20 +399,20 @@ def test_an_edit_of_what_a_kernel_calls_takes_effect_in_the_next_process(tmp_pat
     )
     environment = os.environ | {"PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
 
-    def told():
+    def printed():
         command = [sys.executable, "-c", words]
         done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
         return done.stdout
 
-    first = told()
+    first = printed()
     source = tmp_path / "survey" / "kernels" / "math" / "elliptic.py"
     text = source.read_text()
     edited = text.replace("mean = 0.5 * (pairs", "mean = 0.6 * (pairs")
     assert edited != text
     source.write_text(edited)
-    assert told() != first
+    assert printed() != first
     source.write_text(text)
-    assert told() == first
+    assert printed() == first
 
 
 KEPT = sorted((Path(__file__).parent.parent / "results").glob("*_small.nc"))
@@ -447,7 +457,7 @@ def test_memory_is_bounded_by_blocks_not_by_the_map(tmp_path, side):
         command = [sys.executable, "-m", "survey", "run", str(workflow), "-o", "map.nc", "--quiet", "--fresh"]
         asked = [f"axes.k.num={k}", f"axes.rho.num={rho}", "output.variables=['discriminant']", "output.figures=[]"]
         command += [word for text in asked for word in ("--set", text)]
-        told = subprocess.run([sys.executable, "-c", PEAK, *command], cwd=tmp_path, capture_output=True, text=True)
-        assert told.returncode == 0, told.stderr
-        peaks.append(int(told.stdout.split()[-1]) / 1024)
+        ran = subprocess.run([sys.executable, "-c", PEAK, *command], cwd=tmp_path, capture_output=True, text=True)
+        assert ran.returncode == 0, ran.stderr
+        peaks.append(int(ran.stdout.split()[-1]) / 1024)
     assert peaks[1] < 1024 and peaks[1] - peaks[0] < 256, peaks

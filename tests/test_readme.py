@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
+import numpy as np
 import pytest
 import snippets
 from snippets import ROOT
@@ -55,16 +57,26 @@ def test_the_main_command_runs(folder):
 
 
 def test_the_notebook_example_runs(folder):
-    code, _ = fenced("python")
+    code, *_ = fenced("python")
     done = subprocess.run([sys.executable, "-c", small(code)], cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("undecided unstable stable marginal\n") and "+-" in done.stdout
 
 
+def test_the_example_of_abels_equation_runs(capsys, monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    scope = {}
+    exec(fenced("python")[1], scope)
+    assert capsys.readouterr().out.startswith("turning\n")
+    states = np.unique(scope["abel"].status)
+    assert list(states) == [0, 16]  # some turn, some do not
+    plt.close("all")
+
+
 def test_the_scene_of_ones_own_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (call,) = re.findall(r'`survey.evaluate\("two_harmonics.py",\s(.*?)\)`', README)
-    (tmp_path / "two_harmonics.py").write_text(fenced("python")[1])
+    (tmp_path / "two_harmonics.py").write_text(fenced("python")[2])
     ds = survey.evaluate("two_harmonics.py", **eval(f"dict({call})"))
     assert int(ds.verdict) == 1 and ds.attrs["title"].startswith("Mathieu's equation with a second harmonic")
 

@@ -165,9 +165,9 @@ def begun(phi0, w0, order):
     return T
 
 
-def truth(rows, abscissae, over_phi, effort=FINE):
+def truth(rows, abscissae, over_phi, accuracy=FINE):
     """Pairs (values, low parts), each (rows, columns, 2), and codes, for rows of eight numbers; abscissae ascend."""
-    order, tolerance = effort
+    order, tolerance = accuracy
     out = np.full((*abscissae.shape, 4), np.nan)
     codes = np.zeros(abscissae.shape, dtype=np.int64)
     for row, at, o, code in zip(rows, np.ascontiguousarray(abscissae), out, codes, strict=True):

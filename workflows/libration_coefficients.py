@@ -15,7 +15,7 @@ from matplotlib.patches import Patch
 from script import parser
 
 import survey
-from survey.show.figures import COLOURS
+from survey.show.palette import COLOURS
 
 SURVEY = Path(__file__).with_suffix(".toml")
 LINES = [COLOURS[i] for i in (6, 0, 4, 5, 2, 9)]

@@ -152,7 +152,7 @@ def _refined(a, low, high):
     return low, high
 
 
-# terms: (numerator in v, common denominator, powers of the FACTORS), as in FORMS
+# terms: (numerator in v, common denominator, powers of the FORM_FACTORS), as in FORMS
 
 
 def term(name, w1=0, w2=0, weight=1):

@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import xarray as xr
 
-from survey import status
+from survey import measures, status
 from survey.errors import BadInput
 from survey.file import schema
 from survey.file.labels import flag_codes, percent, undecided_share
@@ -34,19 +34,20 @@ def of_map(ds):
     units = " ".join(u for u in (ds[dim].attrs.get("units", "1") for dim in ds.status.dims) if u != "1") or "1"
     found = _described([list(codes)[i] for i in kept], area[kept], bar[kept], total, units, COMMENT)
     found.attrs["areas"] += "; from points: features narrower than their spacing are not seen"
-    if len(ds.status.dims) == 2 and _is_hill(ds):
+    if len(ds.status.dims) == 2 and _can_be_refined(ds):
         found.attrs["areas"] += " ([refine] bounds it)"
     return found
 
 
-def _is_hill(ds):
+def _can_be_refined(ds):
     """Does the scene's family support [refine]? That of a user's own scene does, which is known without running it."""
+    if "scene_hash" in ds.attrs:
+        return True
     try:
-        return (
-            "scene_hash" in ds.attrs or getattr(user_scene.find(user_scene.of_dataset(ds))[1], "FAMILY", "") == "hill"
-        )
+        scene = user_scene.find(user_scene.of_dataset(ds))[1]
     except BadInput:
         return False
+    return measures.question(scene.FAMILY, "cells") is not None
 
 
 def _of_cells(ds):

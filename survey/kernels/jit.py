@@ -72,16 +72,15 @@ def is_new():
     return _DIRECTORY is not None and not numba.config.DISABLE_JIT and next(_DIRECTORY.rglob("*.nbi"), None) is None
 
 
-ahead = (
-    None  # wait() returns once what compiles for this process, on a new machine, is done (see `sweep.compile_ahead`)
-)
+# On a new machine, waits for the process that compiles further kernels for this one (see `sweep.compile_ahead`).
+other_compiler = None
 waited = 0.0
 
 
-def wait_for_ahead():
-    """Wait for what compiles ahead: it will be done sooner than if this process began now."""
+def wait_for_other_compiler():
+    """Wait for the other process that compiles: it will be done sooner than if this one began now."""
     global waited
-    wait = ahead
+    wait = other_compiler
     if wait is not None:
         began = time.perf_counter()
         wait()

@@ -59,7 +59,7 @@ QUESTIONS = {
         "OUTPUTS": Value("the scene's outputs that `find` asks for", tuple, needed=True),
         "VERDICTS": Value("{name: code} of the cells' verdicts, -1 undecided among them", dict, needed=True),
         "POINTS": Value("the points that are solved along each side of a block", object, needed=True),
-        "MOST": Value("so many cells at most", int, needed=True),
+        "MOST": Value("the largest number of cells", int, needed=True),
     },
 }
 

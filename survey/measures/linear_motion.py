@@ -26,7 +26,7 @@ NODES = np.concatenate([0.5 * GAUSS, 0.5 + 0.5 * GAUSS, GAUSS])
 
 
 def fundamental(matrices, lengths, periods, scale=1.0, terms=None):
-    """t, Y at the ends of all steps of so many periods, and its bounds (steps * periods + 1, n, n); Y = 1 at t = 0.
+    """t, Y at the ends of all steps of `periods` periods, and its bounds (steps * periods + 1, n, n); Y = 1 at t = 0.
 
     `matrices` (steps, 9, n, n) holds A at the NODES of each step of one period, `lengths` (steps) how long they are.
     `scale` (n) holds the sizes of Y's components, `terms` (steps, n, n) what the rounding of A is relative to (or |A|).

@@ -8,7 +8,7 @@ Source: B. C. Carlson, Numer. Algorithms 10 (1995) 13-26; formulas (S5), (S6), (
 from math import cos, hypot, pi, sin, sqrt
 
 from survey.kernels.jit import inline, kernel
-from survey.kernels.math.carlson import rf_whole, rj, rj_spread
+from survey.kernels.math.carlson import rf_complete, rj, rj_spread
 from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.nutation import records as rc
 from survey.kernels.nutation import wells as nu
@@ -38,12 +38,12 @@ def _second_kind(first, y, z, g):
 
 @inline
 def _periods_of(row, out):
-    """See `agm.periods_of`."""
+    """See `agm._periods_of`."""
     width = row[nu.WIDTH]
     low, high = row[nu.Q_LOW], row[nu.Q_HIGH]
     g = sqrt(low) * sqrt(high)
     s, spread, above = row[nu.MIDDLE], nu.spread(row), nu.above(row, g)
-    time = rf_whole(above, g)
+    time = rf_complete(above, g)
     up = _advance(row[nu.MINUS], row[nu.HIGH_PLUS], row[nu.LOW_PLUS], width, low, time, s, g, spread)
     down = _advance(row[nu.PLUS], row[nu.LOW_MINUS], row[nu.HIGH_MINUS], width, high, time, s, g, spread)
     noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + row[nu.NOISE_ABOVE]
@@ -71,7 +71,7 @@ def nutation_periods(rows, kinds, tolerance, out):
 
 @inline
 def _cosine(z, kc, quarter, pairs, last):
-    """As `agm.cosine`: F(chi) = z by Newton's method, from the side where F, convex or concave, lets it be monotone.
+    """As `agm._cosine`: F(chi) = z by Newton's method, from the side where F, convex or concave, lets it be monotone.
 
     chi and pi/2 - chi, each with all its digits: next to a separatrix c = cos chi is as small as k'.
     """

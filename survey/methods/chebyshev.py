@@ -86,7 +86,7 @@ def _sums(row, n, out):
 
 @inline
 def _periods_of(row, n, speed, coarse, fine, out):
-    """See `agm.periods_of`; the error of n nodes follows from the difference to half of them."""
+    """See `agm._periods_of`; the error of n nodes follows from the difference to half of them."""
     _sums(row, n // 2, coarse)
     _sums(row, n, fine)
     noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + 16.0 * ROUNDOFF * fine[4]

@@ -108,7 +108,7 @@ def _trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
             unsure += 1
             continue
         if unsure > 2:
-            count = UNDETERMINED - limit  # below zero for good
+            count = UNDETERMINED - limit  # below zero permanently
         count += w * sign < 0.0
         sign, unsure = (1 if w > 0.0 else -1), 0
     return STEP_LIMIT

@@ -19,11 +19,6 @@ def check_size(axes):
         raise BadInput(f"the axes span {points:.3g} points; a map holds at most {MAX_POINTS:.0e}; use fewer")
 
 
-def is_number(value):
-    """Is this a TOML number?"""
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
-
-
 def as_float(key, number):
     """The number as a float; raises BadInput for an integer too large to be one."""
     try:

@@ -16,7 +16,7 @@ status. `solve` is pure and thread-safe, and gives a point the same bits in any 
 
 In `why` and `trajectory`, `point` maps each parameter to a number, and `answer` holds everything that is known of one
 point, {name: array}, flags as words. `compile_ahead` runs in a process of its own while a map is solved; the map waits
-for it (`survey.kernels.jit.wait_for_ahead`) where it needs what is compiled there.
+for it (`survey.kernels.jit.wait_for_other_compiler`) where it needs what is compiled there.
 """
 
 import sys

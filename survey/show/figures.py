@@ -1,4 +1,4 @@
-"""Dataset -> figure: the stability map, a variable with its colour bar, or a curve with its error band.
+"""Dataset -> figure: the stability map, a variable with its colour bar, a curve with its error band, or many curves.
 
 Pictures are for the screen (`style` "screen") or for papers ("paper": column widths, no title, and hatching, so that
 verdicts can be told apart in grey print too).
@@ -11,6 +11,7 @@ from matplotlib.text import Text
 
 from survey import modules
 from survey.errors import BadInput
+from survey.show import family
 from survey.show.layout import alone, fit
 from survey.show.maps import draw_map
 from survey.show.profiles import draw_profile
@@ -40,13 +41,15 @@ def onto(axes, ds, name=None, boundaries=True, style=None):
     name = name or ("verdict" if "verdict" in ds else drawable[0])
     if name not in drawable:
         raise BadInput(modules.unknown("variable", name, drawable))
-    variable, state = _flat(ds, name)
+    part, variable, state = _flat(ds, name)
     for text in axes.findobj(Text):  # perhaps made while the user had LaTeX on
         text.set_usetex(False)
-    if variable.ndim == 2:
+    if variable.ndim == 2 and variable.dims[-1] == family.ANGLE and family.over_angles(ds):
+        family.draw_family(axes, part, variable, paper)
+    elif variable.ndim == 2:
         draw_map(axes, ds, variable, state, boundaries, paper)
     elif variable.ndim == 1:
-        draw_profile(axes, ds, variable, state, paper)
+        draw_profile(axes, part, variable, state, paper)
     else:
         raise BadInput(f"{name} is a single number; a figure needs at least one axis")
     if not paper:
@@ -55,13 +58,18 @@ def onto(axes, ds, name=None, boundaries=True, style=None):
 
 
 def _flat(ds, name):
-    """The variable and the status on at most two of the survey's dimensions (the first position along any other)."""
-    keep = list(ds.status.dims)[:2]
-    first = {dim: 0 for dim in ds[name].dims if dim not in keep}
-    state = ds.status.isel({dim: 0 for dim in ds.status.dims if dim not in keep})
-    variable = ds[name].isel(first).transpose(*state.dims)
-    unsorted = [dim for dim in keep if not _is_monotonic(variable[dim].values)]
-    return (variable.sortby(unsorted), state.sortby(unsorted)) if unsorted else (variable, state)
+    """The survey, the variable and the status on at most two of the survey's dimensions.
+
+    The first position along any other, but the last angle of Abel solutions, of which w and t are curves over it.
+    """
+    keep, at = list(ds.status.dims)[:2], {}
+    if family.over_angles(ds):
+        others, at = [dim for dim in ds.status.dims if dim != family.ANGLE], {family.ANGLE: -1}
+        keep = [others[0], family.ANGLE] if name in family.AT_TURNING else others[:2]
+    part = ds.isel({dim: at.get(dim, 0) for dim in (*ds.status.dims, *ds[name].dims) if dim not in keep})
+    unsorted = [dim for dim in keep if not _is_monotonic(part[dim].values)]
+    part = part.sortby(unsorted) if unsorted else part
+    return part, part[name].transpose(*keep), part.status.transpose(*keep)
 
 
 def _is_monotonic(values):

@@ -13,7 +13,7 @@ from survey.show.boundaries import draw_boundaries, in_plane
 from survey.show.cells import draw_cells
 from survey.show.layout import add_legend
 from survey.show.marks import hatched, marks, marks_without_answer
-from survey.show.palette import UNDECIDED, hatch_of, kinds_of
+from survey.show.palette import UNDECIDED, greys, hatch_of, kinds_of
 from survey.show.style import style_named
 from survey.show.text import label_of, spaced
 
@@ -43,8 +43,11 @@ def draw_map(axes, ds, variable, state, boundaries, paper):
         if not shown.mask.all():
             axes.figure.colorbar(drawn, ax=axes, label=label_of(variable), ticks=ticks)
         axes.set_facecolor("#dddddd")
-        handles = marks_without_answer(axes, x, y, failed, outside, number, paper)
-        handles += [Patch(color="#dddddd", label="does not apply")] if (shown.mask & ~(failed | outside)).any() else []
+        missing = shown.mask & ~(failed | outside)
+        handles = _undefined(axes, x, y, ds, state, missing, number, paper)
+        handles += marks_without_answer(axes, x, y, failed, outside, number, paper)
+        missing &= ~np.isin(state.values, list(scene_statuses(ds).values()))
+        handles += [Patch(color="#dddddd", label="does not apply")] if missing.any() else []
     if boundaries and "curve_count" in ds:
         handles += draw_boundaries(axes, in_plane(ds, variable), x, y)
     if handles:
@@ -100,6 +103,19 @@ def _verdicts(axes, x, y, ds, variable, state, number, paper):
                 hatched(axes, x, y, (shown == code).filled(False), hatch_of(flags, names[code]))
     undecided = (shown == table.get("undecided", -1)).filled(False)
     return handles + marks(axes, x, y, undecided, "undecided", number, paper, UNDECIDED)
+
+
+def _undefined(axes, x, y, ds, state, missing, number, paper):
+    """Draw the points without a value in the grey of their status, where the scene names one; returns handles."""
+    handles = []
+    codes = scene_statuses(ds)
+    for name, grey in greys(ds).items():
+        here = missing & (state.values == codes[name])
+        if here.any():
+            cells = np.ma.masked_array(here, ~here)
+            axes.pcolormesh(x, y, cells.T, cmap=ListedColormap([grey]), shading="nearest", rasterized=True)
+            handles += marks(axes, x, y, here, spaced(name), number, paper, grey)
+    return handles
 
 
 def colour_limits(shown):

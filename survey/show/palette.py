@@ -11,6 +11,7 @@ COLOURS = ("#D55E00", "#A6D8F5", "#E69F00", "#F0E442", "#009E73", "#CC79A7", "#0
 UNDECIDED = "#000000"
 # where the outputs are undefined, by the scene's own statuses: in print between unstable, stable and black
 GREYS = ("#808080", "#B3B3B3", "#5E5E5E")
+LIGHT_GREYS = ("#C6C6C6", "#A6A6A6", "#868686")  # the same in a map with a colour bar
 HATCHES = ("//////", "", "....", "\\\\\\\\", "xxxx", "----", "||||", "++++", "oo", "**")  # of the COLOURS, in papers
 
 
@@ -36,8 +37,12 @@ def colours_of(table):
 
 def greys_of(ds, table):
     """{status: grey} of the scene's own statuses, where the flag variable can be undecided."""
-    names = [name for name in scene_statuses(ds) if "undecided" in table]
-    return {name: GREYS[i % len(GREYS)] for i, name in enumerate(names)}
+    return greys(ds, GREYS) if "undecided" in table else {}
+
+
+def greys(ds, shades=LIGHT_GREYS):
+    """{status: grey} of the scene's own statuses."""
+    return {name: shades[i % len(shades)] for i, name in enumerate(scene_statuses(ds))}
 
 
 def hatch_of(table, name):

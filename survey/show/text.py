@@ -60,12 +60,18 @@ def title_of(ds, variable):
     lines = [literal(ds.attrs.get("title", "")), literal(variable.attrs.get("long_name", variable.name))]
     fixed = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "fi"]
     fixed = [c for c in fixed if c.name in ds.dims or float(c) != 0]
-    position = {name: f" (1 of {ds.sizes[name]})" for name in variable.coords if ds.sizes.get(name, 1) > 1}
+    position = {name: f" ({_place(ds[name], c)} of {ds.sizes[name]})"
+                for name, c in variable.coords.items() if c.ndim == 0 and ds.sizes.get(name, 1) > 1}  # fmt: skip
     numbers = [f"{_equal(c)}{position.get(c.name, '')}" for c in fixed]
     labels = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "UO"]
     numbers = ", ".join(numbers + [f"{literal(c.name)} {literal(c.item())}{position.get(c.name, '')}" for c in labels])
     lines[1] += f" ({literal(ds.attrs['options'])})" if ds.attrs.get("options") else ""
     return "\n".join([*lines, numbers] if numbers else lines)
+
+
+def _place(axis, coordinate):
+    """Where a value stands on its axis, counted from 1."""
+    return int(np.argmax(axis.values == coordinate.item())) + 1
 
 
 def _equal(coordinate):

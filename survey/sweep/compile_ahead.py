@@ -21,10 +21,10 @@ def compiling_ahead(scene, request):
         return
     command = [sys.executable, "-c", program(scene, request.variables)]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    jit.ahead = process.wait
+    jit.other_compiler = process.wait
     try:
         yield
     finally:
-        jit.ahead = None
+        jit.other_compiler = None
         process.kill()
         process.wait()

@@ -41,7 +41,7 @@ class Patience:
         self.seconds, self.longest = seconds, 0.0
 
     def took(self, seconds):
-        """A block has taken so many seconds; None if that is unknown."""
+        """A block has taken this many seconds; None if that is unknown."""
         self.longest = max(self.longest, seconds or 0.0)
 
     @property

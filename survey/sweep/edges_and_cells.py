@@ -14,7 +14,7 @@ def find(workflow, once, progress=None):
 
 
 def _on_threads(progress=None):
-    """`each` of `survey.measures.tasks` on threads of this process; `progress` hears of every task that ends."""
+    """`each` of `survey.measures.tasks` on threads of this process; `progress` is called as each task ends."""
 
     def each(task, items, what):
         results = [None] * len(items)

@@ -119,8 +119,8 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, resu
         compiled, patience = {}, dispatch.Patience(block_timeout)
 
         compiles_here = len(reused) < len(blocks) and not (workers or scheduler)
-        ahead = compiling_ahead(workflow.scene, workflow.request) if compiles_here else contextlib.nullcontext()
-        with ahead, Assembly(workflow, kept, tile, regions) as assembly:
+        compiler = compiling_ahead(workflow.scene, workflow.request) if compiles_here else contextlib.nullcontext()
+        with compiler, Assembly(workflow, kept, tile, regions) as assembly:
 
             def finished(done, solved=None):
                 if solved:

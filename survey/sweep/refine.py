@@ -25,8 +25,8 @@ def find(workflow, each=in_turn, once=lambda name, make: make(), report=None):
     """The dataset of the workflow's cells and areas.
 
     `each`: see `survey.measures.tasks`; `once(name, make)` gives the arrays of `make()`, or those that an
-    earlier run has kept under this name. `report(settled, points, left)` hears which part of the map is
-    settled, how many points were solved for it, and the seconds that the parts known to be open will take.
+    earlier run has kept under this name. `report(settled, points, left)` is called with the part of the map
+    that is settled, the points solved for it, and the seconds that the parts known to be open will take.
     """
     measure, panels = _measure(workflow), _panels(workflow)
     points, found, total = 0, [], _area(panels)
@@ -42,7 +42,7 @@ def find(workflow, each=in_turn, once=lambda name, make: make(), report=None):
         try:
             cells = measure.find(_solver(workflow, x, y), x, y, parts, settled)
         except OverflowError as error:
-            raise BadInput(f"refine.width: the map has {error}; take a greater width, or a smaller map") from None
+            raise BadInput(f"refine.width: the map has {error}; use a larger width, or a smaller map") from None
         found.append(cells)
         points += cells.points
     if report:

@@ -21,7 +21,7 @@ class TimeLeft:
         self.began, self.worked = np.inf, 0.0
 
     def took(self, number, seconds):
-        """Block `number` took one worker so many seconds, without compilation; None: its worker died."""
+        """Block `number` took one worker this many seconds, without compilation; None: its worker died."""
         self.open[number] = False
         if seconds is None:
             return

@@ -86,8 +86,8 @@ def test_a_point_without_an_answer_is_counted_by_its_status(copy):
     bare = ds.sizes[ds.status.dims[1]]
     ds = labels.count(ds)
     assert ds.attrs["verdict_counts"] == f"undecided: {bare - 2}, stable: {ds.status.size - bare}, step_limit: 2"
-    for told in (ds.attrs["verdict_counts"], f"undecided: {bare}, stable: {ds.status.size - bare}"):
-        ds.assign_attrs(verdict_counts=told).to_netcdf(copy)
+    for counts in (ds.attrs["verdict_counts"], f"undecided: {bare}, stable: {ds.status.size - bare}"):
+        ds.assign_attrs(verdict_counts=counts).to_netcdf(copy)
         assert not [complaint for complaint in reading.check(copy) if "verdict_counts" in complaint]
     ds.assign_attrs(verdict_counts=f"stable: {ds.status.size}").to_netcdf(copy)
     assert any("verdict_counts" in complaint for complaint in reading.check(copy))

@@ -1,4 +1,4 @@
-"""What an unfinished run has left is told: how much is done, how to go on, what differs from the run that is asked."""
+"""What an unfinished run has left: how much is done, how to resume, what differs from the run that is asked for."""
 
 import json
 import re
@@ -41,15 +41,15 @@ def refusal(small, *overrides):
 
 
 def test_what_is_left_is_told(left, small):
-    told = unfinished.summary("small.nc")
-    assert (told["blocks_done"], told["blocks"], told["points_done"], told["points"]) == (3, 6, 12, 24)
-    assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ", told["last_written"])
-    assert told["resume"] == "survey run small.nc.blocks/workflow.toml -o small.nc"
+    answer = unfinished.summary("small.nc")
+    assert (answer["blocks_done"], answer["blocks"], answer["points_done"], answer["points"]) == (3, 6, 12, 24)
+    assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ", answer["last_written"])
+    assert answer["resume"] == "survey run small.nc.blocks/workflow.toml -o small.nc"
     with pytest.raises(
         Damaged, match=r"does not exist yet; .* 3 of 6 blocks \(12 of 24 points\).* resume with: survey run"
     ):
         survey.open("small.nc")
-    again = workflow.read(left / "workflow.toml", output="small.nc")  # the command that was told
+    again = workflow.read(left / "workflow.toml", output="small.nc")  # the command that `resume` names
     seen = []
     engine.run(again, progress=lambda done, total, reused, **_: seen.append((done, total, reused)))
     assert seen[0] == (3, 6, 3) and reading.check("small.nc") == [] and unfinished.summary("small.nc") == {}
@@ -66,22 +66,22 @@ def test_the_command_that_began_is_told_with_its_folder(left, small, tmp_path, m
 def test_a_run_at_work_is_told_and_not_disturbed(left, small):
     checked = workflow.read(small)
     with blocks.Blocks(checked.path, fingerprint.fingerprint(checked)) as kept:
-        told = unfinished.summary("small.nc")
-        assert f"pid {kept.holder['pid']}" in told["at_work"] and "resume" not in told
-        assert unfinished.sentence(told).endswith("is writing it")
+        answer = unfinished.summary("small.nc")
+        assert f"pid {kept.holder['pid']}" in answer["at_work"] and "resume" not in answer
+        assert unfinished.sentence(answer).endswith("is writing it")
 
 
 def test_drift_names_the_keys_and_the_ways_on(left, small):
-    told = refusal(small, "solver.rtol=1e-6")
-    assert told == (
+    answer = refusal(small, "solver.rtol=1e-6")
+    assert answer == (
         "small.nc.blocks contains 3 finished blocks from another workflow (solver.rtol 1e-09 -> 1e-06); go back to "
         "that workflow (survey run small.nc.blocks/workflow.toml -o small.nc), or write another file with -o, or start "
         "again with --fresh, which deletes 3 finished blocks"
     )
-    told = refusal(small, "axes.w0.num=7", "axes.t=1.5", "title='other'")
-    assert "(axes.t {'start': 0.0, 'stop': 3.0, 'num': 4} -> 1.5, axes.w0.num 6 -> 7)" in told
-    told = refusal(small, *[f"axes.{key}=0.1" for key in ("b12", "b31", "d", "s2", "s3")])
-    assert "(axes.b12 0.7 -> 0.1, axes.b31 -0.4 -> 0.1, axes.d 1.1 -> 0.1 and 2 more)" in told
+    answer = refusal(small, "axes.w0.num=7", "axes.t=1.5", "title='other'")
+    assert "(axes.t {'start': 0.0, 'stop': 3.0, 'num': 4} -> 1.5, axes.w0.num 6 -> 7)" in answer
+    answer = refusal(small, *[f"axes.{key}=0.1" for key in ("b12", "b31", "d", "s2", "s3")])
+    assert "(axes.b12 0.7 -> 0.1, axes.b31 -0.4 -> 0.1, axes.d 1.1 -> 0.1 and 2 more)" in answer
     engine.run(workflow.read(small, ["solver.rtol=1e-6"]), fresh=True)
     assert survey.open("small.nc").attrs["blocks_reused"] == 0
 
@@ -98,8 +98,8 @@ def test_other_code_is_told_plainly(left, small):
     assert f"blocks from another version of the code (survey 0.0.9 -> {now['survey']}); go back to that" in refusal(
         small
     )
-    told = refusal(small, "solver.rtol=1e-6")
-    assert "-> 1e-06)" in told and "go back to that version and that workflow" in told
+    answer = refusal(small, "solver.rtol=1e-6")
+    assert "-> 1e-06)" in answer and "go back to that version and that workflow" in answer
 
 
 @pytest.mark.parametrize("damage", ["flipped", "gone", "another"])

@@ -189,8 +189,8 @@ def test_bars_hold_on_random_points():
     assert both.mean() > 0.95
     assert (np.abs(mine - best)[both][:, :2] <= mine[both][:, 2:] + best[both][:, 2:]).all()
     assert np.median(mine[both][:, 2:]) < 1e-10
-    told = both & (count >= 0) & (truth >= 0)
-    assert told.mean() > 0.9 and np.array_equal(count[told], truth[told])
+    known = both & (count >= 0) & (truth >= 0)
+    assert known.mean() > 0.9 and np.array_equal(count[known], truth[known])
 
 
 @pytest.mark.parametrize("scale", [(1, 1, 1, 1, 1, 1, 3, 0), (0, 0, 1, 0, 0, 1, 3, 0), (10, 10, 1, 1, 1, 1, 3, 1)])

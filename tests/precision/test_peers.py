@@ -34,8 +34,8 @@ def test_points_keep_their_places(peer):
         assert abs(together[place] - value) < 1e-6
 
 
-def test_batches_hold_every_point_and_like_efforts():
-    efforts = np.array([5.0, 1.0, 4.0, 2.0, 3.0])
-    system = System(None, np.zeros((5, 1)), np.zeros((5, 1)), efforts, efforts)
+def test_batches_hold_every_point_and_like_numbers_of_steps():
+    steps = np.array([5.0, 1.0, 4.0, 2.0, 3.0])
+    system = System(None, np.zeros((5, 1)), np.zeros((5, 1)), steps, steps)
     assert batches(system, 2).tolist() == [[1, 3], [4, 2], [0, 0]]
     assert batches(system, 8).tolist() == [[1, 3, 4, 2, 0, 0, 0, 0]]

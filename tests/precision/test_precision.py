@@ -31,11 +31,11 @@ def test_records_hold_what_was_measured_and_the_asked_accuracy_is_reached(quick,
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: name == "scipy" or None)
     paths = precision.write("satellite", tmp_path, peers=True, say=said.append)
     assert [path.name for path in paths] == [f"precision_satellite.{kind}" for kind in ("json", "csv", "png")]
-    told = json.loads(paths[0].read_text())
-    records = told["records"]
-    assert list(records[0]) == FIELDS and told["machine"]["cpu"]
+    written = json.loads(paths[0].read_text())
+    records = written["records"]
+    assert list(records[0]) == FIELDS and written["machine"]["cpu"]
     times = {(r["method"], r["work"], r["setting"]): r["seconds_per_point"] for r in records}
-    for least in told["machine"]["least"]:
+    for least in written["machine"]["least"]:
         assert 0 < least["seconds_per_point"] < times[least["method"], least["work"], least["setting"]]
     methods = {record["method"] for record in records if not record["peer"]}
     assert {"auto", "rk4", "magnus6", "taylor16"} <= methods
@@ -66,11 +66,11 @@ def test_a_peer_is_judged_by_its_discriminant(quick):
     assert constant(0.1) == verdicts.count(0) and constant(10.0) == verdicts.count(1)
 
 
-def test_a_share_is_points_of_the_work(quick):
+def test_a_sample_is_points_of_the_work(quick):
     (point, _) = quick.works()["row"]
-    assert precision._share(point, None) is point and precision._share(point, 8) is point
-    share = precision._share(point, 3)
-    assert share["k"].shape == share["rho"].shape == (3,) and set(share["rho"]) < set(point["rho"][0])
+    assert precision._sample(point, None) is point and precision._sample(point, 8) is point
+    sample = precision._sample(point, 3)
+    assert sample["k"].shape == sample["rho"].shape == (3,) and set(sample["rho"]) < set(point["rho"][0])
 
 
 def test_a_wrong_value_or_verdict_shows_in_the_chart(quick):

@@ -52,9 +52,9 @@ def test_nothing_of_a_strange_survey_runs(strange):
     for ask in (lambda: ds.survey.trajectory(**AT), lambda: ds.survey.zoom(a=(0.0, 1.0), num=2)):
         with pytest.raises(
             Untrusted, match=r"--trust-scene, or in Python survey\.open\(path, trust_scene=True\)"
-        ) as told:
+        ) as refused:
             ask()
-        assert "\n" not in str(told.value)
+        assert "\n" not in str(refused.value)
     hostile.page(strange.path)
     assert not strange.ran
 

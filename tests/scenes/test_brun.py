@@ -256,6 +256,6 @@ def test_what_is_no_state():
 
 @pytest.mark.parametrize("wrong", [{"l": 1.0}, {"sign": "1"}, {"t": -1.0, "ratio": 0.3}])
 def test_two_ways_at_once_are_refused(wrong):
-    with pytest.raises(BadInput) as told:
+    with pytest.raises(BadInput) as refused:
         survey.evaluate("brun", **FREE | wrong)
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(refused.value)

@@ -20,16 +20,16 @@ def misses(seed, number):
     """Complaints: an error outside its bar, or above 100 times the floor, of a rounded output at least; a wide bar."""
     random = np.random.default_rng(seed)
     kinds, points = zip(*(draw(random) for _ in range(number)), strict=True)
-    ds, told = evaluate(np.array(points)), []
+    ds, faults = evaluate(np.array(points)), []
     for i, (kind, point) in enumerate(zip(kinds, points, strict=True)):
         one = ds.isel(point=i)
         if (one.status != 0 or one.verdict == 0) and abs(one.separatrix_distance) < 1e-20:
             continue  # which says why there is no answer; a change of an input by 1e-16 is far more
         if one.status != 0 or one.verdict < 1:
-            told.append((kind, point.tolist(), int(one.status), int(one.verdict)))
+            faults.append((kind, point.tolist(), int(one.status), int(one.verdict)))
             continue
-        told += [(kind, *complaint, point.tolist()) for complaint in compared(one, *truth(point))]
-    return told
+        faults += [(kind, *complaint, point.tolist()) for complaint in compared(one, *truth(point))]
+    return faults
 
 
 def compared(one, exact, floor):
@@ -44,7 +44,7 @@ def compared(one, exact, floor):
 
 def scaled_misses(seed, number):
     """As `misses`, of every well at scaled integrals."""
-    random, told = np.random.default_rng(seed), []
+    random, faults = np.random.default_rng(seed), []
     cases = [draw_scaled(random) for _ in range(number)]
     for sign in (1, -1):
         mine = [(kind, point) for kind, s, point in cases if s == sign]
@@ -56,12 +56,12 @@ def scaled_misses(seed, number):
             if one.verdict == 0 and abs(one.separatrix_distance) < 1e-20:
                 continue
             if int(one.status) != (0 if found else 16) or int(one.wells) != len(found):
-                told.append((kind, sign, point, int(one.status), int(one.wells), len(found)))
+                faults.append((kind, sign, point, int(one.status), int(one.wells), len(found)))
                 continue
             for j, ends in enumerate(found):
                 exact = truth(point, scaled(sign), ends)
-                told += [(kind, sign, *complaint, point) for complaint in compared(one.isel(well=j), *exact)]
-    return told
+                faults += [(kind, sign, *complaint, point) for complaint in compared(one.isel(well=j), *exact)]
+    return faults
 
 
 def test_hard_cases():
@@ -103,3 +103,25 @@ def test_many_hard_cases(seed):
 def test_many_hard_cases_of_scaled_integrals(seed):
     with mp.workdps(60):
         assert scaled_misses(seed, 1000) == []
+
+
+ATTACKED = [
+    # p_psi = +-p_phi but for an ulp, far from both poles: the integral of the third kind has a parameter of 1e-34
+    (0.7094687596845162, 1.291239726698599, 8.945842071118667, 2.1179917764009564, -0.6067452734098381,
+     0.062437788306259165, 0.06243778830625917),
+    (2.854856305072559, 3.358440474556878, 2.4878300007402845, 1.0976082748215041, 1.0052608801625322,
+     -0.08021768497938961, -0.08021768497938962),
+    (1.0, 0.5, 1.0, 1.2, 0.7, 1e-6, -1e-6 * (1 + 2**-52)),
+    # a well of width 2e-8, in which the start lies where u cannot say
+    (1.183232514547523, 0.9384292434143278, 1.72150855940458e-06, 1.8852089893650088, 3.4956725957385437e-13,
+     0.0001379268097312102, 0.00042537750926646293),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("method", ["auto", "agm", "carlson", "chebyshev"])
+@pytest.mark.parametrize("point", ATTACKED)
+def test_what_an_attack_found_is_within_its_bars(point, method):
+    ds = evaluate(np.array([point]), method=method).isel(point=0)
+    with mp.workdps(80):
+        for name, true in zip(OUTPUTS, truth(point)[0], strict=True):
+            assert abs(mpf(float(ds[name])) - true) <= float(ds[f"{name}_error"]), name

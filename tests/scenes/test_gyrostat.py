@@ -56,6 +56,15 @@ def test_next_to_no_motion_there_is_a_bar_or_no_answer(start):
         assert (ds[name].notnull() == np.isfinite(ds[f"{name}_error"])).all(), name
 
 
+@pytest.mark.parametrize("method", ["auto", "taylor", "dop853"])
+def test_a_bar_whose_square_underflows_is_not_zero(method):
+    """g = 0: w decays towards a line of equilibria, here to 1e-236."""
+    ds = survey.evaluate("gyrostat", question="trajectory", b12=-1.2275169987903272, b31=-0.25840520034837094,
+                         phi0=-4548921.414959067, w0=2.2444386423875864, t=777.3128895507939, method=method,
+                         rtol=1e-6)  # fmt: skip
+    assert ds.status != OK or ds.w_error > 0
+
+
 def test_abel_tells_what_applies():
     phi0, w0, phi = grid(3, 4, 5)
     out = solve("abel", phi0=phi0, w0=w0, phi=phi)

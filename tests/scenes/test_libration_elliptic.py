@@ -196,10 +196,10 @@ print(*(v.hex() for v in danby.solve(np.array([0.3]), np.linspace(0, 0.5, 75)[No
 
 
 def test_plain_python_gives_the_same_bits():
-    told = [
+    printed = [
         subprocess.run(
             [sys.executable, "-c", PLAIN], capture_output=True, text=True, env=os.environ | {"NUMBA_DISABLE_JIT": off}
         ).stdout
         for off in ("0", "1")
     ]
-    assert told[0] == told[1] and told[0].count("0x1.") > 100
+    assert printed[0] == printed[1] and printed[0].count("0x1.") > 100

@@ -14,7 +14,7 @@ NAMES = ("y1", "dy1", "y2", "dy2")
 BODIES = ("prolate", "oblate")
 
 
-def told(y1, dy1, y2, dy2):
+def decided(y1, dy1, y2, dy2):
     """D and the verdict from the factors, known so well that their signs are certain."""
     d = 4 * y1 * dy2 - 2 if abs(y1 * dy2) < abs(dy1 * y2) else 4 * dy1 * y2 + 2
     return d, UNSTABLE if dy1 * y2 > 0 or y1 * dy2 < 0 else STABLE
@@ -27,7 +27,7 @@ def miss(body, rho, scale=1.0, **modulus):
     """
     exact = factors(body, rho, **modulus)
     out = solve(body, rtol=1e-13, rho=rho, **modulus)
-    d, verdict = told(*exact[:4])
+    d, verdict = decided(*exact[:4])
     off = abs(out["discriminant"][0] - d)
     assert out["status"][0] == status.OK and out["verdict"][0] == verdict, (body, rho, modulus)
     assert off <= out["discriminant_error"][0] + 4e-16 * (2 + abs(d)), (body, rho, modulus)
@@ -59,7 +59,7 @@ def test_a_discriminant_that_an_ulp_of_rho_moves_by_more(short, rho):
     """The worst of 4,500 beside the thin bands of oblate bodies: an ulp of rho moves D by up to 3e-11."""
     short, rho = float.fromhex(short), float.fromhex(rho)
     with mp.workdps(40):
-        d, verdict = told(*mp_factors("OL", 1 - mpf(short), mpf(rho), 40)[:4])
+        d, verdict = decided(*mp_factors("OL", 1 - mpf(short), mpf(rho), 40)[:4])
         for rtol, most in ((1e-10, 1e-11), (1e-12, 1e-12), (1e-13, 1e-12)):
             out = solve("oblate", rtol=rtol, rho=rho, one_minus_k=short)
             assert abs(out["discriminant"][0] - d) < min(most * max(1, abs(d)), mpf(out["discriminant_error"][0]))
@@ -94,7 +94,7 @@ def test_dense_rows_by_the_separatrix(body, short):
     rho = np.linspace(0.1, 4, 3000)
     ds = survey.evaluate("satellite", one_minus_k=short, rho=rho, body=body, variables=["discriminant", "verdict"])
     for i in range(0, rho.size, 30):
-        d, verdict = told(*factors(body, rho[i], one_minus_k=short)[:4])
+        d, verdict = decided(*factors(body, rho[i], one_minus_k=short)[:4])
         assert int(ds.verdict[i]) == verdict, rho[i]
         assert abs(float(ds.discriminant[i]) - d) <= float(ds.discriminant_error[i]), rho[i]
         assert float(ds.discriminant_error[i]) < 1e-9 * (1 + abs(d))
@@ -159,7 +159,7 @@ def test_the_same_by_mpmath(seed):
     family = ("P" if body == "prolate" else "O") + ("L" if short > 0 else "R")
     with mp.workdps(45):
         exact = mp_factors(family, 1 - mpf(short), mpf(rho), 45)[:4]
-        d, verdict = told(*exact)
+        d, verdict = decided(*exact)
         out = solve(body, rtol=1e-13, rho=rho, one_minus_k=short)
         assert abs(out["discriminant"][0] - d) < min(1e-12 * max(1, abs(d)), mpf(out["discriminant_error"][0]))
     assert out["verdict"][0] == verdict

@@ -119,7 +119,7 @@ def test_a_map_without_tongues_has_empty_curves(tmp_path):
 
 
 def test_rows_through_a_value_where_tongues_accumulate(tmp_path, capsys):
-    """Inertia ratio 1 is left out, and told; all other edges are those of the eigenproblem in rho, both bodies'."""
+    """Inertia ratio 1 is left out, and named; all other edges are those of the eigenproblem in rho, both bodies'."""
     (tmp_path / "through.toml").write_text(
         'scene = "satellite"\naxes.amplitude.values = [0.3, 1.1]\n'
         "axes.inertia_ratio = {start = 0.0, stop = 2.0, num = 20}\n"
@@ -148,7 +148,7 @@ def test_rows_through_a_value_where_tongues_accumulate(tmp_path, capsys):
     [("k", {"start": 0.0, "stop": 2.0, "num": 41}), ("one_minus_k", {"start": 0.5, "stop": -0.5, "num": 40})],
 )
 def test_rows_through_the_separatrix(tmp_path, name, axis):
-    """On both sides of k = 1 the edges lie where the verdict changes, and no column is sought on it."""
+    """On both sides of k = 1 the edges lie where the verdict changes, and no column is searched on it."""
     axes = {"rho": {"values": [-1.2, 0.6, 1.5]}, name: axis}
     ds = survey.run({"scene": "satellite", "axes": axes, "boundaries": {"axis": name}}, output=tmp_path / "both.nc")
     low, high = map(float, ds.attrs["edge_left_out"].removeprefix(f"{name} from ").split(" to "))
@@ -228,7 +228,10 @@ def test_a_row_of_its_own(tmp_path):
         ({"boundaries": {"axis": "rhoo"}}, r"boundaries.axis: unknown axis 'rhoo'; did you mean 'rho'"),
         ({"boundaries": {"axes": "rho"}}, r"unknown key boundaries.axes; did you mean 'axis'"),
         ({"axes": {"k": 0.5, "rho": 1.0}}, r"boundaries: they are drawn on one axis or two"),
-        ({"scene": "gyrostat", "axes": {"w0": {"values": [1.0, 2.0]}}, "options": {}}, r"gyrostat no boundary curves"),
+        (
+            {"scene": "gyrostat", "axes": {"w0": {"values": [1.0, 2.0]}}, "options": {}},
+            r"no boundary curves are known for the scene gyrostat",
+        ),
     ],
 )
 def test_what_cannot_be_is_refused(changes, words):

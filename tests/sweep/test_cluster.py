@@ -71,8 +71,8 @@ def start(folder, file, *words, **more):
 
 def test_a_cluster_gives_the_same_file(cluster, small, surveyed):
     running = start(small.parent, cluster[0])
-    told = running.communicate(timeout=180)[1]
-    assert running.returncode == 0 and "computed 6, reused 0 of 6 blocks" in told, told
+    stderr = running.communicate(timeout=180)[1]
+    assert running.returncode == 0 and "computed 6, reused 0 of 6 blocks" in stderr, stderr
     assert reading.check(small.with_suffix(".nc")) == []
     xr.testing.assert_equal(*(xr.load_dataset(path).drop_attrs() for path in (surveyed, small.with_suffix(".nc"))))
 
@@ -83,8 +83,8 @@ def test_a_lost_scheduler_is_told_and_the_run_can_go_on(cluster, small):
     blocks = small.parent / "small.nc.blocks"
     wait_for(lambda: len(list(blocks.glob("*.block"))) > 5)
     cluster[1][0].kill()
-    told = running.communicate(timeout=120)[1]
-    assert running.returncode == 4 and told.splitlines()[-1].startswith("survey: the dask cluster at tcp://"), told
+    stderr = running.communicate(timeout=120)[1]
+    assert running.returncode == 4 and stderr.splitlines()[-1].startswith("survey: the dask cluster at tcp://"), stderr
     assert len(list(blocks.glob("*.block"))) > 5
 
 
@@ -100,8 +100,10 @@ def test_a_worker_that_freezes_does_not_hold_up_the_run(cluster, small, surveyed
     frozen = psutil.Process(cluster[1][1].pid).children()
     for process in frozen:
         process.suspend()
-    told = running.communicate(timeout=180)[1]
-    assert running.returncode == 0 and "finished no block for more than 3 s; their blocks go to others" in told, told
+    stderr = running.communicate(timeout=180)[1]
+    assert running.returncode == 0 and "finished no block for more than 3 s; their blocks go to others" in stderr, (
+        stderr
+    )
     assert not any(process.is_running() and process.status() == "stopped" for process in frozen)
     xr.testing.assert_equal(*(xr.load_dataset(small.parent / name).drop_attrs() for name in ("whole.nc", "small.nc")))
 
@@ -144,11 +146,11 @@ def test_a_cluster_with_tls(small, tmp_path, surveyed):
             (other | {ca: tls[ca]}, 4, "reject each other's TLS certificates ("),
         ):
             running = start(small.parent, file, "--quiet", **more)
-            told = running.communicate(timeout=60)[1]
-            assert running.returncode == code and told.count("\n") == 1 and words in told, told
+            stderr = running.communicate(timeout=60)[1]
+            assert running.returncode == code and stderr.count("\n") == 1 and words in stderr, stderr
         running = start(small.parent, file, **tls)
-        told = running.communicate(timeout=180)[1]
-        assert running.returncode == 0 and "computed 6, reused 0 of 6 blocks" in told, told
+        stderr = running.communicate(timeout=180)[1]
+        assert running.returncode == 0 and "computed 6, reused 0 of 6 blocks" in stderr, stderr
     finally:
         for process in reversed(processes):
             process.kill()
@@ -167,12 +169,12 @@ def test_an_expired_certificate_is_told_in_one_line(small, tmp_path):
     try:
         wait_for(file.exists)
         running = start(small.parent, file, "--quiet", **expired)
-        told = running.communicate(timeout=60)[1]
+        stderr = running.communicate(timeout=60)[1]
     finally:
         process.kill()
         process.wait()
-    assert running.returncode == 4 and told.count("\n") == 1, told
-    assert "renew the one that has expired" in told, told
+    assert running.returncode == 4 and stderr.count("\n") == 1, stderr
+    assert "renew the one that has expired" in stderr, stderr
 
 
 def test_blocks_travel_where_no_folder_is_shared(small, tmp_path):
@@ -203,8 +205,8 @@ def test_workers_that_see_another_disk_send_their_blocks(scheduler, small, surve
         pytest.skip("needs the right to mount a small tmpfs")
     hidden = ("unshare", "-m", "sh", "-c", f'mount -t tmpfs none "{away}" && exec "$0" "$@"')
     processes += [worker(file, before=hidden) for _ in range(2)]
-    told = start(away, file).communicate(timeout=180)[1]
-    assert "computed 6, reused 0 of 6 blocks" in told, told
+    stderr = start(away, file).communicate(timeout=180)[1]
+    assert "computed 6, reused 0 of 6 blocks" in stderr, stderr
     assert reading.check(away / "small.nc") == []
     xr.testing.assert_equal(*(xr.load_dataset(path).drop_attrs() for path in (surveyed, away / "small.nc")))
 
@@ -216,8 +218,8 @@ def test_a_cluster_with_an_edited_survey_is_refused(scheduler, small):
         source.write("\n# edited\n")
     processes.append(worker(file, PYTHONPATH=str(file.parent / "other")))
     running = start(small.parent, file, "--quiet")
-    told = running.communicate(timeout=180)[1]
-    assert running.returncode == 4 and told.count("\n") == 1 and "runs different code (sources: " in told, told
+    stderr = running.communicate(timeout=180)[1]
+    assert running.returncode == 4 and stderr.count("\n") == 1 and "runs different code (sources: " in stderr, stderr
 
 
 def test_a_worker_with_other_code_is_refused(small, tmp_path):
@@ -247,14 +249,14 @@ def queue(folder, *words, **more):
 
 def test_the_batch_script_says_what_is_missing_instead_of_waiting(small):
     running = queue(small.parent, PATH="/usr/bin:/bin")
-    told = running.communicate(timeout=60)[1]
-    assert running.returncode == 3 and "is not on PATH: activate the environment" in told
+    stderr = running.communicate(timeout=60)[1]
+    assert running.returncode == 3 and "is not on PATH: activate the environment" in stderr
 
 
 def test_the_batch_script_runs_a_sweep(small, surveyed):
     running = queue(small.parent)
-    told = running.communicate(timeout=180)[1]
-    assert running.returncode == 0, told
+    stderr = running.communicate(timeout=180)[1]
+    assert running.returncode == 0, stderr
     xr.testing.assert_equal(*(xr.load_dataset(path).drop_attrs() for path in (surveyed, small.with_suffix(".nc"))))
     assert not list(small.parent.glob("scheduler-*")) and not (small.parent / "requeued").exists()
 
@@ -266,8 +268,8 @@ def test_the_batch_script_takes_the_settings_of_tls(small, tmp_path, surveyed):
     running = queue(small.parent, **certificate(tmp_path, "survey"), DASK_DISTRIBUTED__COMM__DEFAULT_SCHEME="tls")
     file = small.parent / "scheduler-17.json"
     wait_for(lambda: file.exists() and "tls://" in file.read_text())
-    told = running.communicate(timeout=180)[1]
-    assert running.returncode == 0, told
+    stderr = running.communicate(timeout=180)[1]
+    assert running.returncode == 0, stderr
     xr.testing.assert_equal(*(xr.load_dataset(path).drop_attrs() for path in (surveyed, small.with_suffix(".nc"))))
 
 
@@ -277,6 +279,6 @@ def test_the_batch_script_stops_before_the_walltime_and_is_queued_again(small):
     blocks = small.parent / "small.nc.blocks"
     wait_for(lambda: list(blocks.glob("*.block")))
     running.terminate()
-    told = running.communicate(timeout=60)[1]
-    assert running.returncode == 143 and "finished blocks are safe" in told, told
+    stderr = running.communicate(timeout=60)[1]
+    assert running.returncode == 143 and "finished blocks are safe" in stderr, stderr
     assert (small.parent / "requeued").read_text() == "requeue 17\n" and list(blocks.glob("*.block"))

@@ -47,7 +47,7 @@ def test_the_map_reads_what_the_process_beside_it_compiles(tmp_path, scene, row,
         env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_DISABLE_JIT": "0"},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    told = dict(line.split(maxsplit=1) for line in done.stdout.splitlines())
-    assert told == dict(
+    found = dict(line.split(maxsplit=1) for line in done.stdout.splitlines())
+    assert found == dict(
         zip(("hill_chain", "discriminants", "exponents", "transcendental"), (COMPILED, *kernels), strict=True)
     )

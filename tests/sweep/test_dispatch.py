@@ -1,4 +1,4 @@
-"""Tasks on threads, on processes that die, on a cluster: each number once, deaths told of the task that caused them."""
+"""Tasks on threads, on processes that die, on a cluster: each number once, deaths blamed on their task."""
 
 import multiprocessing
 import os
@@ -17,7 +17,7 @@ NUMBERS = list(range(12))
 
 
 class Heard:
-    """What `finished` and `died` are told."""
+    """What `finished` and `died` are called with."""
 
     def __init__(self):
         self.results, self.counts, self.dead = [], [], []

@@ -86,9 +86,9 @@ class Faults:
         (folder / "table").write_bytes(bytes(ctypes.sizeof(Table)))
         with open(folder / "table", "r+b") as file:
             self.table = Table.from_buffer(mmap.mmap(file.fileno(), 0))
-        told = {"TABLE": folder / "table", "FOLDER": self.out, "LOG": self.log}
+        settings = {"TABLE": folder / "table", "FOLDER": self.out, "LOG": self.log}
         environment = {key: value for key, value in os.environ.items() if not key.startswith("COV")}
-        environment |= {f"FAULTS_{key}": str(value) for key, value in told.items()} | {"LD_PRELOAD": str(library)}
+        environment |= {f"FAULTS_{key}": str(value) for key, value in settings.items()} | {"LD_PRELOAD": str(library)}
         words = [sys.executable, "-c", SERVER, "", "plain.toml", "beside.toml"]
         self.server = subprocess.Popen(
             words, cwd=folder, env=environment, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
@@ -111,8 +111,8 @@ class Faults:
         """(dataset, calls) of a run that nothing disturbs."""
         if words not in self.known:
             self.empty()
-            code, told, _ = self.run(words)
-            assert code == 0, told
+            code, stderr, _ = self.run(words)
+            assert code == 0, stderr
             self.known[words] = self.sound(), self.log.read_text().splitlines()
         return self.known[words]
 
@@ -132,8 +132,8 @@ class Faults:
         """A fault at the at-th call, and one resume."""
         unbroken, _ = self.whole(words)
         self.empty()
-        code, told, call = self.run(words, at, ERRORS[what], ever)
-        where = f"{what} at {call or at}: {told}"
+        code, stderr, call = self.run(words, at, ERRORS[what], ever)
+        where = f"{what} at {call or at}: {stderr}"
         path = self.out / "sweep.nc"
         assert self.table.met or self.table.calls < at, where
         if not self.table.met:  # threads take turns: this time there were fewer calls
@@ -141,16 +141,16 @@ class Faults:
         elif what == "kill":
             assert code == -9, where
         elif code == 0:  # what cannot be read is read or worked out again
-            assert " read " in call and not told, where
+            assert " read " in call and not stderr, where
         else:
-            assert code == 4 and re.fullmatch(r"survey: .*out/sweep\.nc.*\n", told), where
-            assert os.strerror(ERRORS[what]) in told, where
+            assert code == 4 and re.fullmatch(r"survey: .*out/sweep\.nc.*\n", stderr), where
+            assert os.strerror(ERRORS[what]) in stderr, where
         if code == 0:
             xr.testing.assert_equal(self.sound(), unbroken)
         elif path.exists():
             assert reading.check(path) == [], where
-        code, told, _ = self.run(words)
-        assert code == 0, f"{where}; then {told}"
+        code, stderr, _ = self.run(words)
+        assert code == 0, f"{where}; then {stderr}"
         xr.testing.assert_equal(self.sound(), unbroken)
 
 

@@ -1,4 +1,4 @@
-"""[refine] in a workflow: cells and areas in the netCDF file, told by `survey info`, drawn instead of pixels."""
+"""[refine] in a workflow: cells and areas in the netCDF file, shown by `survey info`, drawn instead of pixels."""
 
 import matplotlib.pyplot as plt
 import pytest

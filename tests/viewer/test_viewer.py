@@ -163,8 +163,8 @@ def test_no_answer_by_nature_is_grey_and_told_by_its_status(tmp_path):
     grey = (seen == 0x80).all(axis=-1)
     np.testing.assert_array_equal(grey, bare[np.ix_(xs.starts, ys.starts)].T)
     assert 0 < grey.sum() < grey.size and set(kinds) == {"no_motion", "regular_nutation"}
-    told = ds.attrs["verdict_counts"]
-    assert told == f"regular_nutation: {(~bare).sum()}, no_motion: {bare.sum()}"
+    counts = ds.attrs["verdict_counts"]
+    assert counts == f"regular_nutation: {(~bare).sum()}, no_motion: {bare.sum()}"
     ds.attrs["complete"] = 1
     ds.to_netcdf(tmp_path / "map.nc")
     shown = Map(tmp_path / "map.nc")
@@ -230,9 +230,9 @@ def test_a_falling_axis_is_drawn_rising(tmp_path):
     ],
 )
 def test_a_link_of_another_map_is_one_line(query, message):
-    with pytest.raises(BadInput, match=re.escape(message)) as told:
+    with pytest.raises(BadInput, match=re.escape(message)) as refused:
         Map(MAP).read(query)
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(refused.value)
 
 
 def test_where_an_integer_does_not_apply_it_is_no_value():
@@ -258,10 +258,10 @@ def test_without_the_token_there_is_nothing_and_from_elsewhere_nobody():
     with picture.served(MAP, "--link", old) as (address, process):
         address, query = address.split("?")
         assert query.startswith("var=exponent&x=0.1,0.5&y=")
-        told = process.stderr.readline() + process.stderr.readline()
+        printed = process.stderr.readline() + process.stderr.readline()
         host, token = re.fullmatch(r"(http://127\.0\.0\.1:\d+/)([\w-]{32})/", address).groups()
         port = int(host.rstrip("/").rpartition(":")[2])
-        assert "Only this machine" in told and f"ssh -L {port}:127.0.0.1:{port}" in told
+        assert "Only this machine" in printed and f"ssh -L {port}:127.0.0.1:{port}" in printed
         assert answer(address) == 200
         other = token[:-1] + ("B" if token.endswith("A") else "A")
         for path in ("", "ws", "static/js/bokeh.min.js", "autoload.js", token[:-1], f"{other}/", f"x/{token}/"):
@@ -326,9 +326,9 @@ def test_what_cannot_be_viewed_is_one_line(tmp_path):
         ("other.nc", "this netCDF file was not written by survey"),
         ("line.nc", "this survey has fewer than two axes"),
     ):
-        with pytest.raises(BadInput, match=message) as told:
+        with pytest.raises(BadInput, match=message) as refused:
             Map(tmp_path / name)
-        assert "\n" not in str(told.value)
+        assert "\n" not in str(refused.value)
 
 
 def test_without_its_package_the_command_names_it(tmp_path):
@@ -361,9 +361,9 @@ def test_in_a_browser_a_point_is_told_and_clicked_and_its_link_shows_the_same(tm
         picture.wait(driver)
         whole = driver.execute_script(PIXELS)
         picture.act(driver, 0.85, 0.75)
-        told = "verdict: unstable\n"
-        picture.wait(driver, lambda: any(told in text for text in driver.execute_script(TEXTS)))
-        (near,) = (text for text in driver.execute_script(TEXTS) if told in text)
+        verdict = "verdict: unstable\n"
+        picture.wait(driver, lambda: any(verdict in text for text in driver.execute_script(TEXTS)))
+        (near,) = (text for text in driver.execute_script(TEXTS) if verdict in text)
         assert re.search(r"discriminant = -?[\d.e-]+ ± [\d.e-]+\n", near) and near.startswith("k = 0.8415, rho = 0.77")
         picture.act(driver, 0.85, 0.75, click=True)
 

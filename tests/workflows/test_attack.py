@@ -4,26 +4,26 @@ import json
 
 import numpy as np
 import pytest
-from attack import brun, brun_truth, command, danby, gyrostat_truth, hill, judge
+from attack import brun, brun_truth, command, compare, danby, gyrostat_truth, hill
 from brun_truth import truth as brun_in_full
 from mpmath import mp, mpf
 
 import survey
 
-FAULTS = judge.FAULTS
+FAULTS = compare.FAULTS
 
 
 def found(family, seed, size, index=0):
     """(counts, faults) of a chunk."""
     part = command.solve(family, seed, index, size)
     faults = [fault for fault in part["faults"] if fault["kind"] in FAULTS]
-    return sum((judge.Counter(row[3]) for row in part["rows"]), judge.Counter()), faults
+    return sum((compare.Counter(row[3]) for row in part["rows"]), compare.Counter()), faults
 
 
 @pytest.mark.parametrize(("family", "size"), [("satellite", 400), ("mathieu", 300), ("libration_elliptic", 300),
                                               ("gyrostat", 300), ("brun", 400), ("libration", 60),
                                               ("own", 60)])  # fmt: skip
-def test_nothing_falls(family, size):
+def test_there_are_no_faults(family, size):
     counts, faults = found(family, 3, size)
     assert counts["points"] >= size
     assert not faults, "\n".join(f"{f['kind']} {f['what']} {f['said']}\n  {f['line']}" for f in faults)
@@ -32,7 +32,7 @@ def test_nothing_falls(family, size):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("family", command.FAMILIES)
-def test_nothing_falls_at_length(family):
+def test_there_are_no_faults_at_length(family):
     """10^5 points in all."""
     share, size = command.FAMILIES[family]
     for index in range(max(1, round(1e5 * share / size))):
@@ -44,20 +44,20 @@ def batch(**more):
     """A few points of a satellite, unstable and stable, far from every edge."""
     given = {"k": np.array([0.95, 0.5, 0.3, 0.9]), "rho": np.array([0.6, 1.3, 2.0, 0.8])}
     true = hill._true_satellite("k", False, 1, False)
-    return judge.Batch("satellite", "control", given, true, None, {"body": "prolate"}, "auto", 1e-8, **more)
+    return compare.Batch("satellite", "control", given, true, None, {"body": "prolate"}, "auto", 1e-8, **more)
 
 
-def judged(monkeypatch, change):
-    """What the judge says of answers that were changed."""
+def counted(monkeypatch, change):
+    """The faults counted in answers that were changed."""
     honest = survey.evaluate
     monkeypatch.setattr(
-        judge.survey, "evaluate", lambda *given, **named: change(honest(*given, **named).copy(deep=True))
+        compare.survey, "evaluate", lambda *given, **named: change(honest(*given, **named).copy(deep=True))
     )
-    return judge.judge(batch())[0]
+    return compare.compare(batch())[0]
 
 
 def test_the_honest_answers_pass():
-    assert not any(judge.judge(batch())[0][kind] for kind in FAULTS)
+    assert not any(compare.compare(batch())[0][kind] for kind in FAULTS)
 
 
 def test_a_bar_too_small_is_a_lie(monkeypatch):
@@ -66,7 +66,7 @@ def test_a_bar_too_small_is_a_lie(monkeypatch):
         ds["discriminant_error"][:] = 1e-10
         return ds
 
-    assert judged(monkeypatch, smaller)["lies"] >= 4
+    assert counted(monkeypatch, smaller)["lies"] >= 4
 
 
 def test_a_turned_verdict_is_wrong(monkeypatch):
@@ -74,7 +74,7 @@ def test_a_turned_verdict_is_wrong(monkeypatch):
         ds["verdict"] = 1 - ds.verdict
         return ds
 
-    assert judged(monkeypatch, turned)["wrong"] >= 4
+    assert counted(monkeypatch, turned)["wrong"] >= 4
 
 
 def test_a_nan_beside_ok_is_silent(monkeypatch):
@@ -83,14 +83,14 @@ def test_a_nan_beside_ok_is_silent(monkeypatch):
         ds["y2_error"][2] = -1.0
         return ds
 
-    assert judged(monkeypatch, emptied)["silent"] == 2
+    assert counted(monkeypatch, emptied)["silent"] == 2
 
 
 def test_an_exception_is_a_traceback(monkeypatch):
     def broken(ds):
         raise ZeroDivisionError
 
-    assert judged(monkeypatch, broken)["tracebacks"] == 1
+    assert counted(monkeypatch, broken)["tracebacks"] == 1
 
 
 def in_full(out, i):
@@ -188,8 +188,8 @@ def test_truth_beside_a_saddle_of_bruns_problem():
     with mp.workdps(40):
         assert abs(in_full(full, 2) - mpf(SADDLE_PERIOD)) < 1e-24
     given = dict(zip(brun.NAMES, np.array([SADDLE]).T, strict=True))
-    one = judge.Batch("brun states", "saddle", given, brun._of_states, "brun")
-    counts, worst, faults = judge.judge(one)
+    one = compare.Batch("brun states", "saddle", given, brun._of_states, "brun")
+    counts, worst, faults = compare.compare(one)
     assert not faults and counts["unchecked"] == 0 and worst < 1
 
 
@@ -239,7 +239,7 @@ def test_the_command(tmp_path, capsys):
     page = tmp_path / "attack.md"
     assert command.run(20, ["libration"], 1, page, 1, None, False) == 0, page.read_text()
     first, table = page.read_text(), page.with_suffix(".csv").read_text()
-    assert "nothing fell" in capsys.readouterr().err
+    assert "no faults" in capsys.readouterr().err
     assert "| libration |" in first and table.startswith("scene,method,region,points")
     assert command.run(20, ["libration"], 1, page, 1, None, False) == 0
     assert page.with_suffix(".csv").read_text() == table

@@ -79,8 +79,8 @@ def test_every_key_of_a_workflow_is_documented():
     page = (DOCS / "workflow_file.md").read_text()
     tables = [schema.File, schema.Spread, schema.Listed, schema.SolverTable, schema.OutputTable]
     keys = {key for table in [*tables, schema.BoundariesTable, schema.RefineTable] for key in table.model_fields}
-    told = "".join(re.findall(r"^\| `(.*?)` \|", page, re.MULTILINE))
-    assert [key for key in keys if key not in told] == []
+    documented = "".join(re.findall(r"^\| `(.*?)` \|", page, re.MULTILINE))
+    assert [key for key in keys if key not in documented] == []
 
 
 @pytest.fixture
@@ -259,7 +259,7 @@ def test_a_scene_with_its_mathematics_has_its_notebook_and_its_kept_file():
     """A scene is whole in its own file; published ones have NAME.md, a notebook and a golden file besides."""
     named = {path.stem for path in (ROOT / "survey/scenes").glob("*.md")}
     assert named <= set(modules.names(survey.scenes))
-    assert {path.stem for path in NOTEBOOKS} == named | {"own_hill", "overnight"}
+    assert {path.stem for path in NOTEBOOKS} == named | {"abel", "own_hill", "overnight"}
     assert {path.stem for path in (ROOT / "tests/golden").glob("*.toml")} == named
 
 
@@ -283,9 +283,9 @@ def test_an_item_of_a_list_keeps_its_lines(tool):
 
 @pytest.mark.parametrize("page", [ROOT / "README.md", DOCS / "overnight.md"], ids=lambda path: path.stem)
 def test_the_statuses_that_count_as_failed_are_told(page):
-    (told,) = re.findall(r"Failed.*? are points with the status\s([^.]*)\.", page.read_text())
+    (listed,) = re.findall(r"Failed.*? are points with the status\s([^.]*)\.", page.read_text())
     failures = {name for name, code in status.CODES.items() if code in status.FAILURES and name != "pending"}
-    assert set(re.findall(r"`(\w+)`", told)) == failures
+    assert set(re.findall(r"`(\w+)`", listed)) == failures
 
 
 @pytest.mark.parametrize("page", [ROOT / "README.md", ROOT / "results/README.md", *PAGES], ids=lambda p: p.stem)

@@ -1,9 +1,9 @@
-"""Attack survey: hard random points for every scene, each held against an independent truth; a table of what fell.
+"""Attack survey: hard random points for every scene, each held against an independent truth; a table of the faults.
 
     python workflows/attack --points 1000000 --workers 2 -o results/attack.md
 
 writes the table, the same numbers as CSV by scene, method and region beside it, and every fault with a line of Python
-that shows it again. Stopped, it goes on where it was; the same seed draws the same points.
+that reproduces it. When stopped, it resumes where it was; the same seed draws the same points.
 """
 
 import argparse
@@ -23,7 +23,7 @@ def main(arguments=None):
     words.add_argument("--seed", type=int, default=1, help="another seed draws other points (default 1)")
     words.add_argument("--minutes", type=float, metavar="M", help="stop after so long, and write what is known")
     words.add_argument("--workers", type=int, default=1, metavar="N", help="processes (default 1)")
-    words.add_argument("--fresh", action="store_true", help="begin anew")
+    words.add_argument("--fresh", action="store_true", help="start again")
     words.add_argument("-o", "--output", type=Path, default=Path("results/attack.md"), metavar="FILE.md")
     asked = words.parse_args(arguments)
     scenes = [name for name in asked.scenes.split(",") if name] or list(command.FAMILIES)

@@ -9,8 +9,8 @@ import numpy as np
 from mpmath import mp
 
 from attack import brun_truth
+from attack.compare import Batch
 from attack.hill import accuracy
-from attack.judge import Batch
 
 NAMES = ("A", "C", "epsilon", "theta0", "p_theta0", "p_psi", "p_phi")
 METHODS = ("auto", "auto", "auto", "agm", "carlson", "chebyshev")
@@ -150,9 +150,9 @@ def _rows(out, answer):
     found = {}
     with np.errstate(all="ignore"):
         beside = out[..., 13]
-        late = beside * out[..., 4]
-        turned = 2 * pi * beside + (np.abs(out[..., 6]) + np.abs(out[..., 8])) * beside + late * out[..., 16]
-    more = {"u_min": out[..., 14], "u_max": out[..., 15], "period": late, "precession": turned, "spin": turned}
+        delay = beside * out[..., 4]
+        turned = 2 * pi * beside + (np.abs(out[..., 6]) + np.abs(out[..., 8])) * beside + delay * out[..., 16]
+    more = {"u_min": out[..., 14], "u_max": out[..., 15], "period": delay, "precession": turned, "spin": turned}
     for i, name in enumerate(OUTPUTS):
         value, low = out[..., 2 * i], out[..., 2 * i + 1]
         scale = np.abs(value)

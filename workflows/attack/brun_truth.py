@@ -373,7 +373,8 @@ def states(points, most, out):
                 elif upper < 0:
                     upper = j
         if number < 1 or (lower < 0 and b[0] != -a[0]) or (upper < 0 and b[0] != a[0]) or (p[0] == 0.0):
-            if p[0] != 0.0 or c[1, 0] == 0.0:
+            known = 1e-28 * (abs(cos[0]) * (2.0 * abs(energy[0]) + 8.0 * abs(k[0])) + abs(a[0] * X[0]))
+            if p[0] != 0.0 or abs(c[1, 0]) <= known:
                 continue
             # at rest: the start is a root itself, exactly
             if c[1, 0] > 0.0:

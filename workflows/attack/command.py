@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from attack.judge import FAULTS
+from attack.compare import FAULTS
 
 # share of the points, points of a chunk
 FAMILIES = {
@@ -31,7 +31,7 @@ FAMILIES = {
 WHERE = {"satellite": ("hill", "satellites"), "mathieu": ("hill", "mathieu"), "own": ("hill", "own"),
          "libration_elliptic": ("danby", "chunk"), "gyrostat_fate": ("fate", "chunk")}  # fmt: skip
 FOLDER = Path(__file__).parent
-TOLD = 60  # faults in the page
+LISTED = 60  # faults in the page
 
 
 def batches(family, seed, index, size):
@@ -43,15 +43,15 @@ def batches(family, seed, index, size):
 
 def solve(family, seed, index, size):
     """What a chunk found: {"rows": [[scene, method, region, counts, worst]], "faults": [...]}."""
-    from attack import judge
+    from attack import compare
 
     rows, faults = defaultdict(Counter), []
     worst, began = defaultdict(float), time.process_time()
     for batch in batches(family, seed, index, size):
         try:
-            counts, ratio, found = judge.judge(batch)
+            counts, ratio, found = compare.compare(batch)
         except Exception:  # of the truth, or of points taken again
-            counts, ratio, found = judge.failed(batch)
+            counts, ratio, found = compare.failed(batch)
         key = batch.name, batch.method, batch.region
         rows[key] += counts
         worst[key] = max(worst[key], ratio)
@@ -85,7 +85,7 @@ def sources():
 
 
 def run(points, scenes, seed, output, workers, minutes, fresh):
-    """Do what is left of the attack and write its page; 1 if anything fell, 4 if it was stopped early."""
+    """Do what is left of the attack and write its page; 1 if there is a fault, 4 if it was stopped early."""
     console = Console(stderr=True)
     kept = output.with_name(output.name + ".chunks")
     identity = {"points": points, "scenes": scenes, "seed": seed, "sources": sources()}
@@ -95,7 +95,7 @@ def run(points, scenes, seed, output, workers, minutes, fresh):
     manifest = kept / "attack.json"
     if manifest.exists() and json.loads(manifest.read_text()) != identity:
         console.print(f"attack: {kept} holds another attack (points, scenes, seed or sources differ); "
-                      "give --fresh to begin anew, or another -o", style="red", soft_wrap=True)  # fmt: skip
+                      "give --fresh to start again, or another -o", style="red", soft_wrap=True)  # fmt: skip
         return 2
     manifest.write_text(json.dumps(identity))
     chunks = plan(points, scenes)
@@ -104,12 +104,12 @@ def run(points, scenes, seed, output, workers, minutes, fresh):
     found = [json.loads(_path(kept, c).read_text()) for c in chunks if _path(kept, c).exists()]
     if not found:
         return 4
-    fell = write(output, found, identity, len(found) == len(chunks))
-    console.print(f"attack: {output}: {'nothing fell' if not fell else f'{fell} faults'}", soft_wrap=True)
+    count = write(output, found, identity, len(found) == len(chunks))
+    console.print(f"attack: {output}: {count or 'no'} faults", soft_wrap=True)
     if len(found) < len(chunks):
         console.print(f"attack: {len(chunks) - len(found)} of {len(chunks)} chunks left: give the same command again")
         return 4
-    return 1 if fell else 0
+    return 1 if count else 0
 
 
 def _path(kept, chunk):
@@ -125,8 +125,8 @@ def _work(left, seed, kept, workers, minutes, console, done, number):
         reused, waiting, queue = done, {}, list(reversed(left))
         progress(done, number, reused, "chunks")
         while queue or waiting:
-            late = minutes is not None and time.monotonic() - began > 60 * minutes
-            while queue and not late and len(waiting) < workers:
+            out_of_time = minutes is not None and time.monotonic() - began > 60 * minutes
+            while queue and not out_of_time and len(waiting) < workers:
                 chunk = queue.pop()
                 waiting[pool.submit(solve, chunk[0], seed, *chunk[1:])] = chunk
             if not waiting:
@@ -177,20 +177,20 @@ def write(output, found, identity, complete):
             c = counts[name]
             writer.writerow([*name, *(c[x] for x in COLUMNS), f"{worst[name]:.4g}", f"{c['seconds']:.4g}"])
     total = sum(counts.values(), Counter())
-    fell = sum(total[x] for x in FAULTS)
+    count = sum(total[x] for x in FAULTS)
     seconds = sum(part["seconds"] for part in found)
     page = [*_prose(identity, total, seconds, complete), "", "## By scene and method", "",
             *_table(rows, lambda r: (r[0], r[1]), ("scene", "method")), "", "## By scene and region", "",
             *_table(rows, lambda r: (r[0], r[2]), ("scene", "region")), ""]  # fmt: skip
     if faults:
-        page += ["## What fell", ""]
+        page += ["## Faults", ""]
     for fault in _spread(faults):
         words = f"{fault['kind']}, {fault['scene']}, {fault['region']}: {fault['what']} {fault['said']}"
         shown = [f"  {line}" for line in fault["line"].splitlines()]
         page += [f"- {words} (chunk {fault['chunk']})", "", "  ```python", *shown, "  ```"]
     output.parent.mkdir(parents=True, exist_ok=True)
     output.write_text("\n".join(page) + "\n")
-    return fell
+    return count
 
 
 def _spread(faults):
@@ -199,7 +199,7 @@ def _spread(faults):
     for fault in faults:
         sort = fault["kind"], fault["scene"], fault["what"]
         seen[sort] += 1
-        if seen[sort] <= 3 and sum(min(n, 3) for n in seen.values()) <= TOLD:
+        if seen[sort] <= 3 and sum(min(n, 3) for n in seen.values()) <= LISTED:
             yield fault
 
 
@@ -214,11 +214,10 @@ ends of domains, tiny and huge values, exact special values, long times, all met
 one, in batches and as maps. Each answer is held against a truth of higher accuracy that shares no code with the
 package: Taylor series in double-double arithmetic of the attack's own, of other forms of the equations (Duffing's
 equation for satellites, the eccentric anomaly for Danby's map), closed forms where z is piecewise constant, trapezoidal
-sums for Brun's problem (with 120 digits for a sample of the states beside a saddle, where double-double tells too
-little), exact fractions,
-60 digits of the closed forms of the normal form (whose integers are the package's), long motions and exact mirror
-images for fates and portraits. Some points of each batch are solved again, alone and at another rtol: both answers
-must lie within the sum of their bars.
+sums for Brun's problem (with 120 digits for a sample of the states beside a saddle, where double-double is too
+short), exact fractions, 60 digits of the closed forms of the normal form (whose integers are the package's), long
+motions and exact mirror images for fates and portraits. Some points of each batch are solved again, alone and at
+another rtol: both answers must lie within the sum of their bars.
 
 A **lie** is a value farther from the truth than its error bar and the truth's own doubt together. A **wrong** verdict
 is one that the truth contradicts; an undecided one is honest, and so are a bar wider than rtol asks for (missed) and

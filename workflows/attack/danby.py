@@ -3,8 +3,8 @@
 import numpy as np
 
 from attack import danby_truth
+from attack.compare import Batch
 from attack.hill import ULP, accuracy, beside
-from attack.judge import Batch
 
 TIP = 0.04699080701821065, 0.31450715975493514
 POINT = 0.028595479208968317, 0.0  # where the curves A and B begin
@@ -104,10 +104,10 @@ def chunk(random, size):
             mu = random.uniform(0, 0.5 if random.random() < 0.3 else 0.06, 150)
             mu[:4] = 0.5 - np.arange(4) * 2.0**-54  # (two of them are 1/2)
             mu = np.unique(mu)
-            places = np.append(random.choice(mu.size - 3, 27, replace=False), mu.size - 1 - np.arange(3))
+            chosen = np.append(random.choice(mu.size - 3, 27, replace=False), mu.size - 1 - np.arange(3))
             method = "taylor16" if method == "taylor16" else "auto"
             given = {"mu": mu, "e": np.array([e])}
-            yield Batch("libration_elliptic", kind, given, truth, None, {}, method, rtol, "", ("mu", "e"), places)
+            yield Batch("libration_elliptic", kind, given, truth, None, {}, method, rtol, "", ("mu", "e"), chosen)
             used += 30
             continue
         yield Batch("libration_elliptic", kind, {"mu": mu, "e": e}, truth, None, {}, method, rtol)

@@ -7,9 +7,9 @@ import xarray as xr
 
 import survey
 from attack import gyrostat_truth
+from attack.compare import Batch
 from attack.gyrostat import SYSTEM, _separatrix, force, potential, system
 from attack.hill import LONG, ULP
-from attack.judge import Batch
 
 SPAN = 150.0
 MIRROR = {2: 3, 3: 2, 5: 6, 6: 5}

@@ -3,8 +3,8 @@
 import numpy as np
 
 from attack import gyrostat_truth
+from attack.compare import Batch
 from attack.hill import accuracy
-from attack.judge import Batch
 
 SYSTEM = ("b12", "b31", "d", "c23", "s2", "s3")
 METHODS = {

@@ -8,8 +8,8 @@ from mpmath import mp, mpf
 
 import survey
 from attack import hill_truth
+from attack.compare import Batch
 from attack.hill_truth import AMPLITUDE, BENT, COSINE, HARMONICS, INERTIA, LORENTZ, ONE_MINUS_K, RHO, TWO_PI, K
-from attack.judge import Batch
 
 LONG = np.longdouble
 ULP = float(np.finfo(LONG).eps)
@@ -149,10 +149,10 @@ def satellites(random, size):
         options = {"direction": str(direction)} if inertia else {"body": "oblate" if oblate else "prolate"}
         if not inertia and number > 1 and random.random() < 0.1:
             names = {way: np.unique(given[:4]), "rho": np.unique(random.uniform(0, 4, 150))}
-            places = random.choice(names[way].size * 150, 60, replace=False)
+            chosen = random.choice(names[way].size * 150, 60, replace=False)
             method = "auto" if method in ("rk4", "dop853") else str(method)
             true = _true_satellite(way, False, 1, oblate)
-            yield Batch("satellite", f"{kind}, map", names, true, None, options, method, rtol, "", (way, "rho"), places)
+            yield Batch("satellite", f"{kind}, map", names, true, None, options, method, rtol, "", (way, "rho"), chosen)
             used += 60
             continue
         region = f"{kind}{', ' + sub if sub else ''}{', inertia ratio' if inertia else ''}"
@@ -440,7 +440,7 @@ def own(random, size):
 
 
 def _draw_harmonics(random, name, size):
-    """(region, (N, 10), range of a in which edges are looked for)."""
+    """(region, (N, 10), range of a in which edges are searched for)."""
     p = np.zeros((size, 10))
     period = 10 ** random.uniform(-1, 2, size if random.random() < 0.5 else 1)
     unit = (pi / period) ** 2  # the edges of z = a lie at its multiples by squares

@@ -5,8 +5,8 @@ from itertools import product
 import numpy as np
 from mpmath import mp, mpf
 
+from attack.compare import Batch
 from attack.hill import LONG, ULP, accuracy, beside
-from attack.judge import Batch
 
 METHODS = ("auto", "auto", "rational", "rational_double", "lie")
 CRITICAL = (0.0385208965045513970786520697274, 0.0242938971420523216662227326885, 0.0135160160224525267555750091159,

@@ -133,7 +133,7 @@ def draw(imports, path):
     rows, arrows, blue = layers(), packages(imports), of_arrays()
     foot = set().union(*rows[1 + max(i for i, row in enumerate(rows) if set(row) & blue) :])
     main = {a: {b for b in others if b not in foot} for a, others in arrows.items() if a not in foot}
-    places = _places(rows, main)
+    positions = _positions(rows, main)
     figure = plt.figure(figsize=(COLUMNS * (WIDTH + MARGIN), len(rows) * (HEIGHT + GAP)))
     axes = figure.add_axes((0, 0, 1, 1))
     axes.set(xlim=(0, figure.get_figwidth()), ylim=(-figure.get_figheight(), 0))
@@ -142,8 +142,8 @@ def draw(imports, path):
     for a, others in arrows.items():
         for b in others:
             light = (a, b) in pale or b in foot
-            _arrow(axes, places[a], places[b], light, b in foot)
-    for name, (x, y) in places.items():
+            _arrow(axes, positions[a], positions[b], light, b in foot)
+    for name, (x, y) in positions.items():
         fill = "#dcebf7" if name in blue else "#efefef" if name in foot else "#fff4dc"
         _box(axes, x, y, name, meaning(name).replace("`", ""), fill)
     figure.savefig(path)
@@ -172,7 +172,7 @@ def _arrow(axes, start, end, light, foot):
     axes.add_patch(FancyArrowPatch(*ends, arrowstyle="-|>", shrinkA=0, shrinkB=0, mutation_scale=8, **style))
 
 
-def _places(rows, arrows):
+def _positions(rows, arrows):
     """{name: (x, y)}: layer after layer, the columns on which dark arrows are short and miss other boxes."""
     column = {name: 0.5 * (COLUMNS - len(row)) + i for row in rows for i, name in enumerate(row)}
     depth = {name: number for number, row in enumerate(rows) for name in row}

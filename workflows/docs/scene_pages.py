@@ -81,7 +81,7 @@ def escaped(text):
 def notes(text):
     """The mathematics as Markdown: headings one lower, indented lines as they stand, numbered equations apart.
 
-    Indented lines that go on with an item of a list stay in it; a formula there begins a line.
+    Indented lines that continue an item of a list stay in it; a formula there begins a line.
     """
     out, before = [], "blank"
     for line in text.splitlines():

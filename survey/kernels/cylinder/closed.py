@@ -8,7 +8,7 @@ kind 2) or on the complex roots (rotation, kind 3). Nothing lies at infinity, so
 
 For phi and w at a time see `trigonometric` and `weierstrass`.
 
-All start with w0 >= 0 (the caller mirrors). `data` holds what `start_*` found out; `*_at` and `*_reach` take it.
+All start with w0 >= 0 (the caller mirrors). `data` holds what `start_*` has found; `*_reach` take it.
 """
 
 import cmath

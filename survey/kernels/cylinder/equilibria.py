@@ -7,6 +7,7 @@ import numpy as np
 from survey.kernels.cylinder.flow import BOUND_DDG, BOUND_DG, BOUND_F, BOUND_G, C23, S2, TWO_PI, values
 from survey.kernels.cylinder.roots import CENTRE, MOST_DISCS, NO_REAL, RADIUS, ROOTS, SLOPE, discs
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math.newton import bracketed
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 MOST = 4  # g has 4 roots at most
@@ -121,21 +122,15 @@ def insert(sorted_, size, x):
 @kernel
 def root(p, low, high):
     """The root of g between low and high, where g is monotone and changes sign."""
-    sign = values(p, high)[1] >= 0.0
-    x = 0.5 * (low + high)
-    for _ in range(80):
-        _f, g, dg = values(p, x)
-        if (g >= 0.0) == sign:
-            high = x
-        else:
-            low = x
-        new = x - g / dg if dg != 0.0 else low
-        if not low <= new <= high:
-            new = 0.5 * (low + high)
-        if abs(new - x) < 2e-16 * (1.0 + abs(x)):
-            return new
-        x = new
-    return x
+    given = p, values(p, high)[1] >= 0.0
+    return bracketed(_acceleration, values, given, 0.5 * (low + high), (low, high), (2e-16, 2e-16), 80)[1]
+
+
+@inline
+def _acceleration(flow, given, x):
+    p, rising = given
+    _f, g, dg = flow(p, x)
+    return g, dg, (g >= 0.0) != rising
 
 
 @kernel

@@ -48,7 +48,7 @@ GENERIC, REVERSIBLE = 0, 3  # strata that are followed; REVERSIBLE is I2, K = L 
 
 
 @inline
-def place_of(cycles, size, x, error):
+def cycle_at(cycles, size, x, error):
     """(index of the cycle that x lies on within the bars, or -1; number of cycles below x)."""
     below = 0
     for i in range(size):
@@ -69,9 +69,9 @@ def attracts(cycle):
 def rotation_decides(cycles, size, end, w, error, before, before_error):
     """(decided, index of the cycle or -1 for spin-up) at a passage with |w|; before = |w| one turn ago or -1.
 
-    decided: 1 yes, 0 not yet, -1 the error bar leaves it open.
+    decided: 1 yes, 0 not yet, -1 the error bound leaves it open.
     """
-    on, below = place_of(cycles, size, w, error)
+    on, below = cycle_at(cycles, size, w, error)
     if on >= 0:
         return (1, on) if attracts(cycles[on]) else (-1, -1)
     if below == size and size > 0:

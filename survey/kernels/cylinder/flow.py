@@ -16,14 +16,14 @@ from survey.kernels.jit import inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 ORDER = 20  # of the Taylor series in t; near -ln(eps)/2 + 1 = 19 the work per unit of time is least (Jorba & Zou)
-LOW = 8  # order of the series of the variational equation, which only carries error bars
+LOW = 8  # order of the series of the variational equation, which only carries error bounds
 LAST = ORDER + 1
 ROWS = 14
 PHI, W, SIN, COS, SIN2, COS2, E, Y, U1, Z1, U2, Z2, F_, DG = range(ROWS)
 # E = integral of f (exp E is the area factor), Y = integral of g (the change of w - F), U, Z the variations of phi
 # and of y = w - F for unit changes of phi (1) and w (2), F_ = f, DG = g'.
 
-# Places in T[LAST]. WEIGHT: sum of |b_i| over the stages of a Runge-Kutta step, which all round phi; 0 for series.
+# Columns of T[LAST]. WEIGHT: sum of |b_i| over the stages of a Runge-Kutta step, which all round phi; 0 for series.
 TRUNC_PHI, TRUNC_W, STEP, WEIGHT = range(4)
 
 B12, B31, D, C23, S2, S3, BOUND_F, BOUND_G, BOUND_DG, BOUND_DDG = range(10)
@@ -75,7 +75,7 @@ def series(p, phi, w, T, order):
     T[0, E] = T[0, Y] = 0.0
     for n in range(order):
         a0 = a1 = a2 = a3 = 0.0
-        for k in range(n + 1):  # (sin phi)' = w cos phi and its kin, Cauchy products
+        for k in range(n + 1):  # (sin phi)' = w cos phi and the like, Cauchy products
             wk = T[k, W]
             a0 += wk * T[n - k, SIN]
             a1 += wk * T[n - k, COS]

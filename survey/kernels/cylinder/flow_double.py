@@ -67,7 +67,7 @@ TOLERANCE = 1e-30  # truncation of one step, relative to 1 + |w|
 ROUGH = 16.0 * PAIR_ROUNDOFF  # rounding of a sum or a product of the series, relative
 FALL = 1.0 / 50.0  # by more, two terms further on, no series is trusted to fall
 LIMIT = 20_000  # steps; about 0.4 s
-SLOWER = 3.0  # steps may grow by so much: what then needs more than LIMIT is given up at once
+SLOWER = 3.0  # steps may grow by this factor: what needs more than LIMIT even then is given up at once
 _S, _C, _W = range(3)
 
 
@@ -167,7 +167,7 @@ def side(p, phi, w):
 
 @kernel
 def clean(p, phi, w, bar_phi, bar_w):
-    """Is a zero of w certain near phi: does g keep its sign over the error bars?"""
+    """Is a zero of w certain near phi: does g keep its sign over the error bounds?"""
     g = abs(acceleration(p, phi)[0])
     return 10.0 * (p[BOUND_DG] * bar_phi + p[BOUND_F] * (abs(w) + bar_w)) + 4.0 * ROUGH * p[BOUND_G] < g
 
@@ -228,7 +228,7 @@ def trajectory(p, phi0, w0, asked, floats, turnings):
             unsure += not known
             continue
         if unsure > 2:
-            unsure = LIMIT  # for good
+            unsure = LIMIT  # permanently
             continue
         count += w[0] * sign < 0.0
         sign, unsure = (1 if w[0] > 0.0 else -1), 0

@@ -282,8 +282,8 @@ def _enter(p, phi0, w0, state, fixed, i):
 
 
 @inline
-def _tell(state, before, fixed, i, floats, turnings):
-    """Write down lane i at its next time and go back to where the step began; False where the bar is too wide."""
+def _record(state, before, fixed, i, floats, turnings):
+    """Record lane i at its next time and return to where the step began; False where the bar is too wide."""
     n, v, turns, angle = state[_STEPS, i], state[_V, i], state[_TURNS, i], fixed[_TURN, i]
     wide, high = bar(n, state[_SAA, i]), bar(n, state[_SBB, i])
     if not (wide < TRUST and high < TRUST * (1.0 + abs(v))):
@@ -315,7 +315,7 @@ def _refill(P, starts, times, waiting, state, fixed, row, column, status):
 
 @kernel
 def _collect(times, limit, state, before, fixed, fate, row, column, floats, turnings, status):
-    """Write down what the lanes have reached and free those that have ended; returns whether any has."""
+    """Record what the lanes have reached and free those that have ended; returns whether any has."""
     freed = False
     for i in range(LANES):
         if row[i] < 0 or (fate[i] == _GOING and state[_STEPS, i] < limit):
@@ -323,7 +323,7 @@ def _collect(times, limit, state, before, fixed, fate, row, column, floats, turn
         r, j = row[i], column[i]
         ending = -1
         if fate[i] == _AT:
-            if not _tell(state, before, fixed, i, floats[r, j], turnings[r, j : j + 1]):
+            if not _record(state, before, fixed, i, floats[r, j], turnings[r, j : j + 1]):
                 ending = NO_CONVERGENCE
             elif j + 1 == times.shape[1] or not math.isfinite(times[r, j + 1]):
                 ending = OK
@@ -343,8 +343,7 @@ def _collect(times, limit, state, before, fixed, fate, row, column, floats, turn
 def trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
     """phi, w, their bars and turnings at the ascending times >= 0 of each row, which end at its first infinity.
 
-    P (rows, 10) from `flow.coefficients`; as `steps.trajectories`. Returns the number of steps
-    of lanes, free ones too.
+    P (rows, 10) from `flow.coefficients`; as `steps.trajectories`. Returns the number of steps of lanes, free ones too.
     """
     work = np.zeros((ROWS, LANES))  # one array: LLVM sees that its rows do not overlap
     T, state, before, fixed, fate = split(work)

@@ -140,7 +140,7 @@ def fixed_points(image_of, kind, p, eqs, count, anchor, interval, xs, tolerance,
         copy(m, b)
         if differ(a, b) or followed_down(image_of, kind, p, eqs, count, anchor, a, b, tolerance, m):
             touching = not differ(a, b) and not differ(a, m)
-            if touching:  # touches 0 within the error bar: one cycle or two or none
+            if touching:  # touches 0 within the error bound: one cycle or two or none
                 write_cycle(a, b, m, interval, steepness(kind, p, m[X]), cycles[found])
                 cycles[found, CYCLE_BAR] = max(cycles[found, CYCLE_BAR], 0.1 * (b[X] - a[X]))
                 cycles[found, CYCLE_CLASS] = -m[CLASS]

@@ -40,8 +40,8 @@ from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 OK, OVERFLOW, NO_CONVERGENCE, STEP_LIMIT = 0, 2, 3, 4  # as in survey/status.py
 TURNING, EQUILIBRIUM, SEPARATRIX = 16, 17, 18  # as in the STATUS of scenes/gyrostat.py
-TRUST = 0.02  # error bars above this share of the scale of the system are no longer first-order bounds
-UNDETERMINED = -2  # a count that the error bar leaves open
+TRUST = 0.02  # error bounds above this share of the scale of the system no longer hold to first order
+UNDETERMINED = -2  # a count that the error bound leaves open
 
 
 @kernel
@@ -161,7 +161,7 @@ def trajectory(setting, begin, at, p, phi0, w0, times, tolerance, limit, floats,
             unsure += 1
         else:
             if unsure > 2:
-                count = UNDETERMINED - limit  # below zero for good
+                count = UNDETERMINED - limit  # below zero permanently
             if w * sign < 0.0:
                 count += 1
             sign, unsure = (1 if w > 0.0 else -1), 0
@@ -242,7 +242,7 @@ def _to_rest(at, given, dt):
 
 @kernel
 def clean_turning(p, phi, bar_phi, bar_w):
-    """Is a zero of w certain at phi: does g keep its sign over the error bars?"""
+    """Is a zero of w certain at phi: does g keep its sign over the error bounds?"""
     g = abs(values(p, phi)[1])
     return g > 0.0 and 10.0 * (p[BOUND_DG] * bar_phi + p[BOUND_F] * bar_w) < g
 
@@ -288,7 +288,7 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
 
     Fills floats[j] (VALUE to TIME_BAR) at targets[j] with status OK, or those of the turning point before it, or
     within whose bar it lies, with TURNING; EQUILIBRIUM where the solution runs into one first, SEPARATRIX
-    where the error bar leaves open whether it turns. OK is certain: a target that is reached with no certain w is in
+    where the error bound leaves open whether it turns. OK is certain: a target that is reached with no certain w is in
     doubt until the solution has left it behind.
     """
     T = table()

@@ -9,7 +9,7 @@ wp = e1 + xi, e1 the greatest real root of 4 e^3 - g2 e - g3, and xi lies on y^2
 (e1 - e2)(e1 - e3). The isogenies xi = z (z + b^2)/(z + a^2) of the means a, b, from a1^2 = (H + 3 e1/2)/2, b1^2 = H,
 lead to it from (M cot M t)^2, and all their terms are positive, for real and for complex e2, e3. The period is pi/M.
 
-One lane is one solution at one time; no lane calls libm. Every error bar is carried forward with its value: "d_" is
+One lane is one solution at one time; no lane calls libm. Every error bound is carried forward with its value: "d_" is
 a bound of an error, "e_" of a relative one. `delay` is an error in time; it acts through w and w'.
 
 Sources: E. T. Whittaker, G. N. Watson, A Course of Modern Analysis, 20.6; DLMF 23.10, 23.22(ii); J.-B. Bost, J.-F.

@@ -1,8 +1,8 @@
-"""Turning points of a solution, counted to any time, also where it winds into a focus and w falls below its error bar.
+"""Turning points of a solution, counted to any time, also where it winds into a focus and w falls below its bound.
 
 About an attracting focus x' = w, w' = f w + g' x + r, |r| <= BOUND_F |x w| + BOUND_DDG x^2 / 2. With a = f/2, Omega =
 sqrt(-g' - a^2) and y = (w - a x)/Omega, the angle obeys theta' = -Omega + e, |e| <= rho C, C = (BOUND_F (|a| + Omega) +
-BOUND_DDG / 2)/Omega, and rho falls at least as exp(-|a| t/2) where rho C <= |a|/2: so to the end of time theta misses
+BOUND_DDG / 2)/Omega, and rho falls at least as exp(-|a| t/2) where rho C <= |a|/2: so for all time theta misses
 its straight line by 2 rho C/|a| at most, and the zeros of w, half a turn apart, are counted without following them.
 """
 
@@ -28,7 +28,7 @@ from survey.kernels.jit import inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 NEVER, START, RATE, DOUBT, DRIFT = range(5)  # of an end: no turning follows; angle, rate and their doubts
-STRAIGHT = 1e-7  # rad: so near to its line the angle is kept, or nearer than the error bars are
+STRAIGHT = 1e-7  # rad: so near to its line the angle is kept, or nearer than the error bounds are
 
 
 @kernel

@@ -59,7 +59,7 @@ def segments(rung, top, order, rows, on_rung, starts):
     counts = np.empty(top + 2, np.int64)
     for at in range(top + 2):
         counts[at] = 0
-    count = place = 0
+    count = position = 0
     for r in range(rung.shape[0]):
         low, high = top + 1, -1
         for i in range(rung.shape[1]):
@@ -69,8 +69,8 @@ def segments(rung, top, order, rows, on_rung, starts):
                 low, high = min(low, at), max(high, at)
         for at in range(low, high + 1):
             if counts[at] > 0:
-                rows[count], on_rung[count], starts[count] = r, at, place
-                place, counts[at] = place + counts[at], place
+                rows[count], on_rung[count], starts[count] = r, at, position
+                position, counts[at] = position + counts[at], position
                 count += 1
         for i in range(rung.shape[1]):
             at = rung[r, i]
@@ -79,7 +79,7 @@ def segments(rung, top, order, rows, on_rung, starts):
                 counts[at] += 1
         for at in range(low, high + 1):
             counts[at] = 0
-    starts[count] = place
+    starts[count] = position
     return count
 
 
@@ -87,7 +87,7 @@ def segments(rung, top, order, rows, on_rung, starts):
 def measure(results, squares, rule, wanted, rtol, full_period, overflow, floats, verdict, missed, status):
     """What follows from `results` (N, RESULTS) by arithmetic: `floats` (14, N), `verdict`, who has `missed` `rtol`.
 
-    Points whose `status` is not 0 are passed over; those that leave the range of floats get the status `overflow`.
+    Points whose `status` is not 0 are skipped; those that leave the range of floats get the status `overflow`.
     `rule` (N, or empty) holds what exact rules say, `wanted` (7) which columns count for `missed`; `full_period` as in
     `_squares`; `squares` (N, 4, or empty) holds what it finds, where more digits of it are known.
     """
@@ -99,12 +99,12 @@ def measure(results, squares, rule, wanted, rtol, full_period, overflow, floats,
                 floats[c, i] = np.nan
             continue
         sine, sine_bar, cosine, cosine_bar = _squares(results[i], squares, i, full_period)
-        said = decide(sine, sine_bar, cosine, cosine_bar, rule[i] if len(rule) > 0 else NO_RULE)
+        decided = decide(sine, sine_bar, cosine, cosine_bar, rule[i] if len(rule) > 0 else NO_RULE)
         # D from 2 - 4 sin^2 or 4 cos^2 - 2, whichever has the smaller bar.
         by_sine = sine_bar <= cosine_bar
         d = 2.0 - 4.0 * sine if by_sine else 4.0 * cosine - 2.0
         bar = 4.0 * (sine_bar if by_sine else cosine_bar) + 2.0 * EPS * (2.0 + abs(d))
-        if said == MARGINAL and abs(d) > bar:  # on an edge |D| = 2
+        if decided == MARGINAL and abs(d) > bar:  # on an edge |D| = 2
             d, bar = 2.0 if d > 0.0 else -2.0, 0.0
         within = isfinite(d) and bar < LARGEST
         for c in range(4):
@@ -114,8 +114,8 @@ def measure(results, squares, rule, wanted, rtol, full_period, overflow, floats,
             for c in range(len(floats)):
                 floats[c, i] = np.nan
             continue
-        verdict[i] = said
-        wide = said == UNDECIDED
+        verdict[i] = decided
+        wide = decided == UNDECIDED
         if wanted[0]:
             floats[DISCRIMINANT, i], floats[DISCRIMINANT + 1, i] = d, bar
             wide |= not bar <= rtol * (1.0 + abs(d))

@@ -48,7 +48,7 @@ def solve(series, misses, lengths, full_period, out):
             z[0, i], z[1, i] = series[n, i, 0], series[n, i, 1]
         square = mul(h, h)
         step(z, even, odd, square, False, c)
-        # Variation of constants: an error of z moves the propagator by at most so much times both solutions.
+        # Variation of constants: an error of z moves the propagator by at most that error times both solutions.
         size = np.abs(even[0]).sum() + np.abs(odd[0]).sum()
         miss = square[0] * misses[n] * size * size
         longer, shorter = div(h, unit), div(unit, h)

@@ -55,12 +55,12 @@ def discriminants(rows, coefficients, bars, x, rtol, floats, verdict, missed):
         for j in range(start, len(rows) if start + ROWS > len(rows) else start + ROWS):
             _sum(coefficients[j], table[t], sums, count)
             first = rows[j] * len(x) + t * TILE
-            decided, late = verdict[first : first + count], missed[first : first + count]
-            _judge(sums, bars[j], floats[:, first : first + count], rtol, decided, late)
+            decided, misses = verdict[first : first + count], missed[first : first + count]
+            _decide(sums, bars[j], floats[:, first : first + count], rtol, decided, misses)
 
 
 @splice
-def _judge(d, bar, floats, rtol, verdict, missed):
+def _decide(d, bar, floats, rtol, verdict, missed):
     """D, its bar and the verdict of neighbouring points, and who missed. Views: an offset index is not vector code."""
     for i in range(len(verdict)):
         floats[0, i], floats[1, i] = d[i], bar

@@ -8,7 +8,7 @@ every factor in double-double; numerators by Horner's rule in v, since in u thei
 import numpy as np
 
 from survey.kernels.jit import inline, kernel
-from survey.kernels.libration.coefficients import COMMON, FACTORS, LABELS, NUMERATORS, POWERS
+from survey.kernels.libration.coefficients import COMMON, FORM_FACTORS, LABELS, NUMERATORS, POWERS
 from survey.kernels.math import double as dd
 from survey.kernels.math.roundoff import PAIR_ROUNDOFF, ROUNDOFF
 
@@ -18,7 +18,7 @@ MARGIN = 1.01  # for what is of second order in the bars
 MU_1 = (0.024293897142052323, -1.424188204168191e-18, -8.15199000958143e-35)
 MU_2 = (0.013516016022452526, 3.178279201104934e-19, -4.772058303155615e-36)
 MU_R = (0.0385208965045514, -2.49642603804579e-18, -6.208077310548691e-35)
-W1, W2, U, V, S, FIVE_U, FIVE_V, TEN_U, TEN_V, FOUR_U, FOUR_V, NINE = range(len(FACTORS))
+W1, W2, U, V, S, FIVE_U, FIVE_V, TEN_U, TEN_V, FOUR_U, FOUR_V, NINE = range(len(FORM_FACTORS))
 
 
 @inline
@@ -42,7 +42,7 @@ def store(f, which, number):
 
 @kernel
 def factors(mu, f):
-    """The FACTORS (F1)-(F6) in double-double, f[:, factor]; True where 0 < mu < mu_R, else nothing is done."""
+    """The FORM_FACTORS (F1)-(F6) in double-double, f[:, factor]; True where 0 < mu < mu_R, else nothing is done."""
     square = dd.times(gap(mu, MU_R), -27.0)  # s^2 = 1 - 4x
     if not (mu > 0.0 and square[0] > 0.0):
         return False
@@ -69,7 +69,7 @@ def factors(mu, f):
 
 @inline
 def form(row, f):
-    """One closed form in float64 and its error bar, from the leading parts of the factors."""
+    """One closed form in float64 and its error bound, from the leading parts of the factors."""
     v, last = f[0, V], NUMERATORS.shape[1] - 1
     value, slope = NUMERATORS[row, last], 0.0
     noise = 0.5 * abs(value)
@@ -92,7 +92,7 @@ def form(row, f):
 
 @inline
 def form_double(row, f):
-    """One closed form in double-double, rounded, and its error bar."""
+    """One closed form in double-double, rounded, and its error bound."""
     v, last = (f[0, V], f[1, V]), NUMERATORS.shape[1] - 1
     value, size = (0.0, 0.0), 0.0
     for k in range(last, -1, -1):
@@ -115,7 +115,7 @@ def form_double(row, f):
 @kernel
 def closed_forms(mu, values, bars):
     """The first closed forms (rows of `values` and `bars`) at every mu, in float64; NaN outside 0 < mu < mu_R."""
-    f = np.empty((2, len(FACTORS)))
+    f = np.empty((2, len(FORM_FACTORS)))
     for n in range(len(mu)):
         good = factors(mu[n], f)
         for row in range(len(values)):
@@ -125,7 +125,7 @@ def closed_forms(mu, values, bars):
 @kernel
 def closed_forms_double(mu, values, bars):
     """As `closed_forms`, in double-double: every value within little more than a rounding."""
-    f = np.empty((2, len(FACTORS)))
+    f = np.empty((2, len(FORM_FACTORS)))
     for n in range(len(mu)):
         good = factors(mu[n], f)
         for row in range(len(values)):
@@ -134,7 +134,7 @@ def closed_forms_double(mu, values, bars):
 
 @inline
 def product(k, f):
-    """k . omega = (k1 + k3) - k1 (1 - omega1) - k2 omega2 and its error bar; 1 - omega1 = v / (1 + omega1)."""
+    """k . omega = (k1 + k3) - k1 (1 - omega1) - k2 omega2 and its error bound; 1 - omega1 = v / (1 + omega1)."""
     first = dd.times(dd.div((f[0, V], f[1, V]), dd.shifted((f[0, W1], f[1, W1]), 1.0)), -k[0])
     second = dd.times((f[0, W2], f[1, W2]), -k[1])
     integer = k[0] + k[2]
@@ -149,7 +149,7 @@ def linear(mu, vectors, frequencies, nearest, distance):
 
     The last two are rows of `distance`. NaN and -1 outside 0 < mu < mu_R. Of equals the first counts.
     """
-    f = np.empty((2, len(FACTORS)))
+    f = np.empty((2, len(FORM_FACTORS)))
     near = 64.0 * ROUNDOFF  # |k . omega| in float64 is good to less
     for n in range(len(mu)):
         frequencies[:, n], distance[:, n], nearest[n] = np.nan, np.nan, -1

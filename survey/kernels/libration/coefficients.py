@@ -1,6 +1,6 @@
 """Closed forms of the normal form at L4, as integers: numerators in v = omega2^2, and the powers of their factors.
 
-Each form is numerator(v) / common * product of FACTORS ** powers, with u = omega1^2 = 1 - v, x = u v, s = u - v:
+Each form is numerator(v) / common * product of FORM_FACTORS ** powers, with u = omega1^2 = 1 - v, x = u v, s = u - v:
 the coefficients of orders 4 and 6, their combinations a20, a11, a02 of (3.10), and D4, D6, which are the forms N and
 M of (1.4), (3.14) at (omega2, omega1, 0). For their origin, and how far they are proved, see
 `scenes/libration.md`, section 3; the combinations follow from the coefficients by exact algebra.
@@ -8,8 +8,8 @@ M of (1.4), (3.14) at (omega2, omega1, 0). For their origin, and how far they ar
 
 import numpy as np
 
-FACTORS = ("w1", "w2", "u", "v", "s", "1-5u", "1-5v", "1-10u", "1-10v", "4-u", "4-v", "9-4x")
-# name: (common denominator, powers of the FACTORS, numerator in ascending powers of v)
+FORM_FACTORS = ("w1", "w2", "u", "v", "s", "1-5u", "1-5v", "1-10u", "1-10v", "4-u", "4-v", "9-4x")
+# name: (common denominator, powers of the FORM_FACTORS, numerator in ascending powers of v)
 FORMS = {
     "200": (144, (0, 0, 0, 0, -2, -1, 0, 0, 0, 0, 0, 0), (0, -491, 448, 124)),
     "110": (6, (1, 1, 0, 0, -2, -1, -1, 0, 0, 0, 0, 0), (43, 64, -64)),

@@ -23,7 +23,7 @@ NONE, MINUS_ONE, KREIN = 0, 1, 2
 A, B, C, D, T, A_BAR, B_BAR, C_BAR, D_BAR, T_BAR = range(10)
 RESULTS, INVARIANTS = 10, 5  # columns, and how many of them are values
 SUM, SUM_BAR, PAIRS, PAIRS_BAR = range(4)  # a, b: the sums of the multipliers, and of the products of two
-PLACES = 24  # of a row's series
+NODES = 24  # of a row's series
 TILE = 64
 
 
@@ -31,7 +31,7 @@ TILE = 64
 def measure(results, rtol, overflow, floats, verdict, collision, missed, status):
     """a, its bar, b, its bar (4, N), verdict and collision from `results` (N, RESULTS); who misses `rtol` is `missed`.
 
-    Points whose `status` is not 0 are passed over; those that leave the range of floats get the status `overflow`.
+    Points whose `status` is not 0 are skipped; those that leave the range of floats get the status `overflow`.
     """
     for i in range(len(results)):
         if status[i] == 0:
@@ -136,7 +136,7 @@ def nearest(t, k, t_bar, k_bar):
 
 @kernel
 def dense(series, bars, rows, mu, rtol, overflow, floats, verdict, collision, missed, status):
-    """Answer the `missed` points of `rows` of mu (R, L) from their Chebyshev series in 4 s - 3 (rows, 5, PLACES).
+    """Answer the `missed` points of `rows` of mu (R, L) from their Chebyshev series in 4 s - 3 (rows, 5, NODES).
 
     `bars` (rows, 5) hold for the whole row; `missed` remain those that miss `rtol` or are undecided.
     """
@@ -149,9 +149,9 @@ def dense(series, bars, rows, mu, rtol, overflow, floats, verdict, collision, mi
                 m = mu[rows[r], first + i]
                 x[i] = 4.0 * sqrt(1.0 - 3.0 * m * (1.0 - m)) - 3.0
             for j in range(INVARIANTS):
-                for i in range(count):  # Clenshaw; PLACES is a constant, so that the inner loop is unrolled
+                for i in range(count):  # Clenshaw; NODES is a constant, so that the inner loop is unrolled
                     one = two = 0.0
-                    for n in range(PLACES - 1, 0, -1):
+                    for n in range(NODES - 1, 0, -1):
                         one, two = series[r, j, n] + 2.0 * x[i] * one - two, one
                     here[j, i] = series[r, j, 0] + x[i] * one - two
             for i in range(count):

@@ -31,7 +31,7 @@ from survey.kernels.math import double as dd
 from survey.kernels.math.roundoff import PAIR_ROUNDOFF, ROUNDOFF_UP
 
 MARGIN = 1.01  # for what is of second order in the bars, and for signs told from leading parts
-PLACES = 32  # of a row's series
+NODES = 32  # of a row's series
 
 
 @kernel
@@ -108,15 +108,15 @@ def nearest(t, k, t_bar, k_bar):
 
 @kernel
 def to_series(results, matrix, series, bars):
-    """Chebyshev series (5, 2, PLACES) of A to t and their bars (5) from results (PLACES, 15) at the places.
+    """Chebyshev series (5, 2, NODES) of A to t and their bars (5) from results (NODES, 15) at the nodes.
 
-    `matrix` (2, PLACES, PLACES) makes coefficients of values, row by coefficient.
+    `matrix` (2, NODES, NODES) makes coefficients of values, row by coefficient.
     """
     for j in range(INVARIANTS):
         bars[j] = 0.0
-        for n in range(PLACES):
+        for n in range(NODES):
             s = (0.0, 0.0)
-            for i in range(PLACES):
+            for i in range(NODES):
                 s = dd.add(s, dd.mul((matrix[0, n, i], matrix[1, n, i]), (results[i, j], results[i, LOW + j])))
             series[j, 0, n], series[j, 1, n] = s
             bars[j] = max(bars[j], results[n, BARS + j])
@@ -124,14 +124,14 @@ def to_series(results, matrix, series, bars):
 
 @kernel
 def dense(series, bars, mu, rtol, overflow, floats, verdict, collision, missed, status):
-    """Answer all points mu (N) of a row from its series (5, 2, PLACES) in 4 s - 3; the `bars` (5) hold for the row."""
+    """Answer all points mu (N) of a row from its series (5, 2, NODES) in 4 s - 3; the `bars` (5) hold for the row."""
     r = np.empty(BARS + INVARIANTS)
     for i in range(len(mu)):
         square = dd.shifted(dd.times(dd.square(dd.two_sum(0.5, -mu[i])), 3.0), 0.25)
         x = dd.shifted(dd.scaled(dd.sqrt(square), 4.0), -3.0)
         for j in range(INVARIANTS):
             one, two = (0.0, 0.0), (0.0, 0.0)
-            for n in range(PLACES - 1, -1, -1):  # Clenshaw
+            for n in range(NODES - 1, -1, -1):  # Clenshaw
                 twice = dd.scaled(dd.mul(x, one), 2.0 if n else 1.0)
                 last = dd.add((series[j, 0, n], series[j, 1, n]), dd.sub(twice, two))
                 one, two = last, one

@@ -31,7 +31,7 @@ def rf(x, m, g):
 
 
 @inline
-def rf_whole(above, g):
+def rf_complete(above, g):
     """R_F(0, y, z), from above = m + g, which may be all that is left of them: the first duplication."""
     return 2.0 * rf(g, above, sqrt(2.0 * g) * sqrt(above))
 

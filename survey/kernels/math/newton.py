@@ -12,9 +12,9 @@ from survey.kernels.jit import inline
 def bracketed(residual, solution, given, start, bracket, close, most):
     """The last x in `bracket` at which the residual was evaluated, and the next one, which is the zero.
 
-    residual(solution, given, x) -> (value, slope, does the zero lie above x?). `steps` is a kernel that the residual
-    calls: in the tuple `given`, it would be called by a pointer. A step that leaves the bracket is replaced by its
-    middle. The two are at most close[0] + close[1] |x| apart, or the same after `most` steps.
+    residual(solution, given, x) -> (value, slope, does the zero lie above x?). `solution` is a kernel that the
+    residual calls: within the tuple `given` it would be called through a pointer. A step that leaves the bracket is
+    replaced by its middle. The two are at most close[0] + close[1] |x| apart, or the same after `most` steps.
     """
     x, (low, high) = start, bracket
     for _ in range(most):

@@ -13,6 +13,7 @@ from survey.kernels.math import double as dd
 MEANS = 60
 SMALL = 1e-17
 TINIEST = 1e-34
+FAR = 2.0**40  # p^2 / (x y) from which the sum would take as many steps as p has binary digits more
 
 
 @inline
@@ -33,13 +34,17 @@ def mean(x, y):
 def third(x, y, square):
     """R = 1 + e_0/2 (1 + e_1/2 (1 + ..)), e = (p^2 - x y)/(p^2 + x y), p^2 = `square`, without cancellation.
 
-    Where p^2 < x y the sum that is complementary, with x^2 y^2 / p^2 for p^2.
+    Where p^2 < x y the sum that is complementary, with p' = x y / p for p; where p' is large, what follows once x = y
+    is in closed form: R = 2 p / (x + p), from R_J(0, x^2, x^2, p^2) = 3 pi / (2 (x^2 p + x p^2)) (DLMF 19.20.8).
     """
     low = square < x * y
     if low:
         square = (x * y) * ((x * y) / square)
     p, weight, total = sqrt(square), 1.0, 0.0
+    far = low and square > FAR * (x * y)
     for _ in range(MEANS):
+        if far and abs(x - y) <= 1e-9 * x:
+            return total + weight * (x + y) / (0.5 * (x + y) + p)
         xy = x * y
         size = p * p + xy
         e = (p - sqrt(xy)) * (p + sqrt(xy)) / size
@@ -60,7 +65,12 @@ def third_double(x, y, square):
     if low:
         square = dd.mul(xy, dd.div(xy, square))
     p, weight, total, going = dd.sqrt(square), (1.0, 0.0), (0.0, 0.0), True
+    far = square[0] > FAR * xy[0]
     for _ in range(MEANS):
+        if far and abs(x[0] - y[0]) <= SMALL * x[0]:
+            middle = dd.times(dd.add(x, y), 0.5)
+            rest = dd.div(dd.times(middle if low else p, 2.0), dd.add(middle, p))
+            return dd.add(total, dd.mul(weight, rest)), middle
         if going:
             squared = dd.mul(p, p)
             size = dd.add(squared, xy)

@@ -101,15 +101,22 @@ def measure(row, start, c, u, theta, p_theta):
     There P = (sin theta p_theta)^2 = (u - ul)(uh - u) Q, and P' gives ul + uh - 2 u: (uh - ul)^2 by positive terms.
     """
     k, width, done, left = row[K], row[WIDTH], start[rc.DONE], start[rc.LEFT]
-    q = row[Q_LOW] * left + row[Q_HIGH] * done - k * width * width * left * done
-    height = (2.0 * sin(0.5 * theta) * cos(0.5 * theta) * p_theta) ** 2
-    offset = (slope(c, u)[0] - height * k * (2.0 * u[0] + row[SUM]) / q) / q
-    square = offset * offset + 4.0 * height / q
+    height, steep = (2.0 * sin(0.5 * theta) * cos(0.5 * theta) * p_theta) ** 2, slope(c, u)[0]
+    q = offset = square = 0.0
+    for _ in range(2):  # the first round tells better than `start` where in the well it lies
+        q = row[Q_LOW] * left + row[Q_HIGH] * done - k * width * width * left * done
+        offset = (steep - height * k * (2.0 * u[0] + row[SUM]) / q) / q
+        square = offset * offset + 4.0 * height / q
+        if square > 0.0:
+            share = 0.5 * offset / sqrt(square)
+            done, left = 0.5 - share, 0.5 + share
+    bends = (abs(row[Q_HIGH] - row[Q_LOW]) + abs(k) * width * width) / q
     terms = abs(c[1][0]) + abs(u[0]) * (4.0 * abs(c[2][0]) + 8.0 * abs(k))
     bar = PAIR_SUM_ROUNDOFF * terms / q + 8.0 * ROUNDOFF * abs(offset)
-    noise = (
-        16.0 * ROUNDOFF + row[NOISE_LOW] + row[NOISE_HIGH] + bar * (abs(offset) + bar) / square if square > 0.0 else 1.0
-    )
+    noise = 1.0
+    if square > 0.0:
+        noise = 16.0 * ROUNDOFF + row[NOISE_LOW] + row[NOISE_HIGH] + bar * (abs(offset) + bar) / square
+        noise += bends * bends * start[rc.START_BAR] / width
     if noise < row[NOISE_WIDTH]:
         row[WIDTH], row[NOISE_WIDTH] = sqrt(square), noise
 

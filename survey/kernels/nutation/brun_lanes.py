@@ -1,4 +1,4 @@
-"""As `kernels/nutation/brun.py` and `methods/agm.py`, in lanes: with few steps, with more, or in double-double at last.
+"""As `kernels/nutation/brun.py` and `methods/agm.py`, in lanes: with few steps, with more, lastly in double-double.
 
 Points are columns of GIVEN numbers: A, C, epsilon, theta0, p_theta0, b, a; or l, the sign of k, -1 for the lower of two
 wells and 1 for the upper one, C/A, nothing, b, a.

@@ -115,7 +115,7 @@ def first_step(c0, c1, c2, at):
 
 @inline
 def chart(work, row, at, here, slope, i):
-    """P by a pole's distance less `at`: `at`, P there, its slope, half its curvature; and the place to go on from."""
+    """P by a pole's distance less `at`: `at`, P there, its slope, half its curvature; and where to start."""
     k, u = work[K + i], 1.0 - at
     bend = (k - work[L + i]) - 6.0 * k * u * u
     work[row + i], work[row + TILE + i], work[row + 2 * TILE + i], work[row + 3 * TILE + i] = at, here, slope, bend
@@ -133,7 +133,7 @@ def step(method, work, row, i):
 
 @inline
 def between(c0, c1, c2, c3, c4, work, row, i):
-    """As `laguerre`, from the place in `work` towards a root between a pole and `top`, where c > 0: never beyond."""
+    """As `laguerre`, from the point in `work` towards a root between a pole and `top`, where c > 0: never beyond."""
     y, low, high = work[row + i], work[row + TILE + i], work[row + 2 * TILE + i]
     value = c0 + y * (c1 + y * (c2 + y * (c3 + y * c4)))
     low, high = y if value <= 0.0 else low, y if value > 0.0 else high
@@ -295,8 +295,8 @@ def last_sum(work, row, i):
 
 
 @inline
-def go_on(work, row, i):
-    """A term of the sum R."""
+def add_term(work, row, i):
+    """Add a term to the sum R."""
     rest, weight = work[row + i], work[row + TILE + i]
     work[row + 2 * TILE + i] += weight * rest if work[row + 3 * TILE + i] == 1.0 else weight
     work[row + TILE + i] = 0.5 * weight * (1.0 - rest)
@@ -308,7 +308,7 @@ def take_mean(work, weight, i):
     """A step of the mean; e of both sums: with r = (1 - e^2) (x + y)/(2 sqrt(x y)) the next is (1 - r)/(1 + r)."""
     x, y = work[X + i], work[Y + i]
     middle, root = 0.5 * (x + y), sqrt(x * y)
-    up, down = middle * go_on(work, UP, i), middle * go_on(work, DOWN, i)
+    up, down = middle * add_term(work, UP, i), middle * add_term(work, DOWN, i)
     above, below = root + up, root + down
     inverse = 2.0 / (above * below)
     work[UP + i], work[DOWN + i] = up * below * inverse, down * above * inverse
@@ -459,7 +459,7 @@ def approach(work, steps):
 
 @kernel
 def approach_slowly(work, steps):
-    """As `approach`, where Laguerre's method has gone astray or would have to go on for long."""
+    """As `approach`, where Laguerre's method has gone astray or would take many steps."""
     for i in range(TILE):
         for row, top in ((UP, 1.0 - work[U + i]), (DOWN, 1.0 + work[U + i])):
             work[row + i], work[row + TILE + i] = 0.0, 0.0

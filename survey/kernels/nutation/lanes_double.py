@@ -82,8 +82,8 @@ def prepare(work, i):
 
 
 @inline
-def go_on(work, row, low_row, middle, root, i):
-    """A term of the sum R (S12), see `lanes.take_mean`."""
+def add_term(work, row, low_row, middle, root, i):
+    """Add a term to the sum R (S12), see `lanes.take_mean`."""
     rest, weight, total = pair(work, row + REST, i), pair(work, row + WEIGHT, i), pair(work, row + TOTAL, i)
     lower, e = dd.neg(rest), dd.shifted(dd.neg(rest), 1.0)
     term = dd.mul(weight, rest)
@@ -98,8 +98,8 @@ def go_on(work, row, low_row, middle, root, i):
 def take_mean(work, i):
     x, y = pair(work, X, i), pair(work, Y, i)
     middle, root = dd.scaled(dd.loose(x, y), 0.5), dd.positive_root(dd.mul(x, y))
-    go_on(work, UP, LOW_UP, middle, root, i)
-    go_on(work, DOWN, LOW_DOWN, middle, root, i)
+    add_term(work, UP, LOW_UP, middle, root, i)
+    add_term(work, DOWN, LOW_DOWN, middle, root, i)
     store(work, X, i, middle)
     store(work, Y, i, root)
 
@@ -158,7 +158,7 @@ def end(work):
 
 @splice
 def fill(work, means):
-    """Fill the rows FINE of `work` (ALL), where so many means suffice float64."""
+    """Fill the rows FINE of `work` (ALL); `means` is the number of means that suffices in float64."""
     begin(work)
     go(work, means + FURTHER)
     end(work)

@@ -25,7 +25,7 @@ def first_kind(sine, cosine, kc):
 
 @inline
 def since(far, near, middle, spread, ratio, rest, q_origin, root, width):
-    """The integral of dt/(distance from a pole) since u was at the turning point `origin`, less t/far.
+    """The integral of dt/(distance from a pole) since u was at a turning point, less t/far.
 
     far, near: the distances from the pole of that turning point and of u; ratio = |u - that|/width, rest = 1 - ratio;
     root = sqrt Q(u). middle = X0 + s, next to 0 where the motion nearly stops; spread = g^2 - s^2.

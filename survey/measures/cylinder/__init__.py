@@ -2,13 +2,13 @@
 
 METHODS lists what a method that serves the family "cylinder" offers; one that answers only some questions says so in
 WHEN, and leaves out what the others need. A method that has one step is made complete by `survey.kernels.cylinder`:
-`along`, `returns` and `fate` take its `flow_setting`, `flow_begin` and `flow_at`.
+`steps`, `returns` and `fate` take its `flow_setting`, `flow_begin` and `flow_at`.
 
 P (rows, 10) holds the columns B12 to BOUND_DDG of `survey.kernels.cylinder.flow`, p is one row of it; `starts`
 (rows, 2) holds phi0 and w0. `tolerance` bounds the truncation error of one step (of phi, and of w relative to 1 + |w|),
 `limit` is a budget of steps. The columns of `floats`, of starts with error bounds and of fates are those of `records`
 in `survey.kernels.cylinder`; the tables of equilibria and of cycles are described in `equilibria` and `returns` there,
-the codes of `status` in `along`. phi is in radians; t and w are in the units of the parameters.
+the codes of `status` in `steps`. phi is in radians; t and w are in the units of the parameters.
 """
 
 from survey.contract import Function, Value

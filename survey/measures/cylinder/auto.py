@@ -20,7 +20,7 @@ FINEST = 3e-16  # no float64 can be known better
 
 
 def trajectories(method, rows, times, rtol):
-    """As `cylinder.trajectories`: in closed form, and by `method` where that has no answer or too wide a bound."""
+    """As `solution.trajectories`: in closed form, and by `method` where that has no answer or too wide a bound."""
     results = solution.trajectories(closed, rows, times, rtol)
     missed, uncounted = solution.missed(results, rtol), results[1] == UNDETERMINED
     if uncounted.any():
@@ -36,7 +36,7 @@ def trajectories(method, rows, times, rtol):
 
 
 def abel(method, rows, targets, rtol, before=False):
-    """As `cylinder.abel`, likewise."""
+    """As `solution.abel`, likewise."""
     results = solution.abel(closed, rows, targets, rtol, before)
     missed = solution.missed(results, rtol) & (results[-1] != EQUILIBRIUM)
     if not missed.any():

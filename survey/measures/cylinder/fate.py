@@ -134,7 +134,7 @@ def _remembered(method, six):
 
 @dataclass(frozen=True)
 class Skeleton:
-    """What decides the fates at one parameter point; tables with the columns of `kernels/equilibria`, `returns`."""
+    """What decides the fates at one parameter point; tables as in `kernels.cylinder.equilibria` and `returns`."""
 
     p: np.ndarray
     stratum: int
@@ -320,10 +320,10 @@ def _free(s, starts):
             row[rc.VERDICT], row[rc.TURNINGS], row[rc.STATUS] = kf.UNDECIDED, kf.UNDETERMINED, SEPARATRIX
         elif abs(y) > b:
             row[rc.VERDICT] = kf.PERIODIC_ROTATION
-        else:  # the next root of y + b cos(phi - axis) ahead
+        else:  # the next root of y + b cos(phi - axis)
             half = math.acos(-y / b)
-            ahead = [((axis + side * half - phi) * np.sign(w)) % (2.0 * math.pi) for side in (1, -1)]
-            row[rc.LIMIT_PHI] = phi + np.sign(w) * min(ahead)
+            distances = [((axis + side * half - phi) * np.sign(w)) % (2.0 * math.pi) for side in (1, -1)]
+            row[rc.LIMIT_PHI] = phi + np.sign(w) * min(distances)
             row[rc.LIMIT_PHI_BAR] = 2.0 * noise / math.sqrt(b * b - y * y) + 1e-15 * (1.0 + abs(row[rc.LIMIT_PHI]))
             row[rc.NET_TURNS] = math.trunc((row[rc.LIMIT_PHI] - phi) / (2.0 * math.pi))
     return out

@@ -20,7 +20,7 @@ from survey.measures.cylinder import solution
 from survey.measures.cylinder.fate import EXACT, I0, G, followed, outline, remembered, sizes
 from survey.status import NO_CONVERGENCE, OK
 
-# As many are kept: surveys of random points found no more than 4 cycles, and g has 4 roots at most.
+# Numbers that are kept: surveys of random points found at most 4 cycles, and g has at most 4 roots.
 CYCLES, EQUILIBRIA = 8, eq.MOST
 NONE, ROTATION_PLUS, ROTATION_MINUS, LIBRATION = range(4)
 TOO_MANY, UNKNOWN_CYCLES = 20, 21  # as in the STATUS of scenes/gyrostat.py

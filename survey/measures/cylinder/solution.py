@@ -10,6 +10,7 @@ from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.flow import BOUND_DDG, spread
 from survey.kernels.cylinder.steps import OK, TURNING, UNDETERMINED
 
+LEAST_BAR = 1e-150  # bars are carried on by their squares, which underflow below
 STEPS = 200_000  # budget of one solution; about 0.1 s with the Taylor method
 SHARE = 1e-3  # of the asked accuracy, for the truncation error of one step
 ATTEMPTS = (3e-4, 1e-5, 1e-7)  # the same for trajectories: most of what misses the accuracy misses it by little
@@ -90,6 +91,8 @@ def _in_time(method, rows, times, rtol):
         ends = np.zeros(len(P), dtype=np.int64)
         method.flow_trajectories(P, starts, at, tolerance, budget, floats, turnings, ends)
         np.copyto(status, ends[:, None], where=~np.isfinite(floats[..., rc.PHI]))  # else OK
+        lost = (floats[..., rc.W] != 0) & (floats[..., rc.W_BAR] < LEAST_BAR)
+        floats[..., rc.W_BAR][lost] = LEAST_BAR
         return floats, turnings, status
 
     asked = np.isfinite(times)

@@ -6,7 +6,7 @@ import numpy as np
 
 from survey import status
 from survey.kernels.hill import answers as kernels
-from survey.kernels.jit import wait_for_ahead
+from survey.kernels.jit import wait_for_other_compiler
 from survey.measures import answers
 
 NONE = np.zeros(0, np.int8)
@@ -40,5 +40,5 @@ class Answers(answers.Answers):
         rule = NONE if rule is None else rule
         kernels.measure(results, squares, rule, asked.wanted, asked.rtol, asked.full_period, status.OVERFLOW, *own)
         if asked.wanted[kernels.EXPONENT // 2 :].any():
-            wait_for_ahead()
+            wait_for_other_compiler()
             kernels.transcendental(results, squares, asked.wanted, asked.rtol, asked.full_period, *own)

@@ -56,7 +56,7 @@ def solve(problem, asked, answers, decide=True):
 
 
 def _exactly(problem, answers, points, asked, most):
-    """Solve the `points` in double-double, where at most so many steps do; those without an answer stay."""
+    """Solve the `points` in double-double, where at most `most` steps suffice; the others keep their answers."""
     if not points.size:
         return
     phase, distance = taylor_double.hill_density()

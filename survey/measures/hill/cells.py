@@ -87,8 +87,8 @@ def find(solve, x, y, each=in_turn, report=None):
     """The Cells of the rectangle of the Sides x and y.
 
     `solve(x, y)` gives the four factors with their error bounds at broadcast arrays of both parameters,
-    NaN where there are none; `each`: see `measures.tasks`. `report(part, points)` hears which part of the
-    rectangle is settled, and how many points were solved for it. Raises OverflowError if there are more
+    NaN where there are none; `each`: see `measures.tasks`. `report(part, points)` is called with the part of
+    the rectangle that is settled, and the number of points solved for it. Raises OverflowError if there are more
     than MOST cells.
     """
     depth = np.array([x.depth, y.depth])

@@ -23,7 +23,7 @@ from survey.measures.tasks import in_turn
 
 LONGEST, SHORTEST = 0.02, 1e-9  # steps
 BEND = 0.15  # radians per step
-TURN = np.cos(2 * BEND)  # a step that turns more is taken again
+TURN = np.cos(2 * BEND)  # a step that turns more is repeated
 OFF = 0.05  # of a step: how long the corrector may be
 STEPS = 10_000
 NEAR = 0.02  # of a step: how far a seed may lie from the curve that goes through it

@@ -3,7 +3,7 @@
 D is an entire function of p (z is a polynomial in p), so its series on the axis converges faster than any power; where
 p -> -p exchanges y1 and y2', D is a series in p^2 and its nodes those of one half axis. Where the rows are an axis too,
 D's coefficients are series across it, solved at its nodes; a panel of rows on which they do not converge is halved,
-and what is left over is served row by row.
+and the rest is served row by row.
 
 The error bound of D: those at the nodes times the Lebesgue constants, the tails of the series, and rounding. Points
 whose verdict or accuracy it leaves open count as `missed`, and are solved one by one from their factors. All depends on
@@ -20,7 +20,7 @@ import numpy as np
 
 from survey.kernels.hill import answers as kernels
 from survey.kernels.hill.series import TERMS, discriminants
-from survey.kernels.jit import wait_for_ahead
+from survey.kernels.jit import wait_for_other_compiler
 from survey.kernels.lanes import RESULTS
 from survey.kernels.math import chebyshev
 from survey.measures.hill import pointwise
@@ -118,7 +118,7 @@ def _rows(problem, method, asked, answers, chosen, axis, open_points):
 
 
 def _answer(problem, asked, answers, rows, series, bars, axis, open_points):
-    wait_for_ahead()
+    wait_for_other_compiler()
     x = (problem.p[rows[0]] - axis.middle) / axis.radius  # all rows have the same points
     _discriminants(answers, rows, series, bars, 2 * x * x - 1 if axis.even else x)
     if asked.wanted[kernels.EXPONENT // 2]:

@@ -7,7 +7,7 @@ import numpy as np
 from survey.measures import linear_motion
 from survey.scene import Trajectory
 
-PERIODS, GROWTH = 6, 7.0  # so many periods, but not beyond e^7
+PERIODS, GROWTH = 6, 7.0  # number of periods, unless the solution grows beyond e^7
 PHASE, LEAST, MOST = 0.05, 240, 20_000  # radians per step; steps per period, and half of them, are even
 
 
@@ -39,7 +39,7 @@ def solve(problem, answer, time, name="t"):
 
 
 def _number(exponent):
-    """How many periods suit a solution that grows by so much in each."""
+    """The number of periods that suits a solution with this growth exponent per period."""
     return int(np.clip(GROWTH / exponent if exponent > 0 else PERIODS, 1, PERIODS))
 
 

@@ -71,7 +71,7 @@ def _numbers(values):
     mp = context()
     if isinstance(values, (list, tuple)) and all(isinstance(v, (int, float, mp.mpf)) for v in values):
         return [mp.mpf(value) for value in values]
-    raise Unsupported(f"it returns {type(values).__name__}, no real number")
+    raise Unsupported(f"it returns {type(values).__name__}, which is not a real number")
 
 
 class _Refused:

@@ -75,7 +75,7 @@ def _solve(problem, method, asked, answers, chosen):
 
 
 def _first_steps(problem, method, asked):
-    """The first rung (R, L) with so many steps as the method asks for; above the top where none has; UNTRIED at NaN."""
+    """The first rung (R, L) with as many steps as the method asks for; above the top where none has; UNTRIED at NaN."""
     phase, distance = method.hill_density(asked.rtol)
     phase = max(phase, 1 / LONGEST)
     if not asked.together:
@@ -119,7 +119,7 @@ def _chain(problem, method, rung, out):
         else:
             method.hill_chain(samples, problem.c2, h, p, order, first, last, out)
 
-    if jit.ahead:  # by calls on nothing, compile this while another process compiles the rest
+    if jit.other_compiler:  # compile this, by calls on nothing, while that process compiles the rest
         compose(np.empty((0, 0, 2, nodes.size)), np.empty((0, 0)), starts[:0], ends[:0])
         row, none = np.empty(0), np.empty((0, 2), np.int64)
         first_rungs(np.empty((0, 2)), np.empty((0, 3)), row, row, 1.0, 1.0, STEPS.rungs, none)

@@ -6,7 +6,7 @@ z is sampled at Chebyshev points on each piece between its breaks. From the coef
             geometrically, the highest frequency that matters where z is entire
     noise   what does not fall: the rounding of z and of u, and what is too fine to be resolved
 
-The noise enters the bounds: z is handed on as (z - B) + B, so that its rounding counts relative to B >= max |z|, and
+The noise enters the bounds: z is passed on as (z - B) + B, so that its rounding counts relative to B >= max |z|, and
 B is as large as the noise asks. All depends on the point alone.
 
 Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 3, 7 and 8.
@@ -25,25 +25,25 @@ from survey.measures.hill import monodromy, multiprecision, pointwise
 from survey.methods import dop853
 
 SIZES = (65, 513, 4097)
-# z is probed at so many evenly spread points of the part that is solved, however smooth it seems, and at so many when a
-# scene is checked; at so many at least between two breaks.
+# Evenly spread points of the part that is solved at which z is probed, however smooth it seems; those when a scene is
+# checked; and the least number between two breaks.
 PROBES, CHECKED, LEAST_PROBES = 128, 16384, 8
 # Relative to max |z|: z is resolved where its last coefficients are below the first, rough where above the second.
 RESOLVED, ROUGH = 1e-14, 1e-8
-# An even z may differ from its mirror image by so much, which then counts as noise.
+# An even z may differ from its mirror image by this much, which then counts as noise.
 MIRRORED = 1e-8
 # What the bars of every method allow at least for the rounding of z, relative to B.
 ROUNDING = 8.8e-16
 # z is asked for no nearer to a break than this share of the period: rounding decides there on which side.
 SLACK = 2.0**-50
-# Steps are dealt out by rate, and by frequency at this share of it.
+# Steps are distributed by rate, and by frequency at this share of it.
 BY_PHASE = 0.15
 # DOP853 makes no step longer than this share of the distance to a singularity: it would pass a spike unseen.
 STRIDE = 0.5
 CALL_SAMPLES = 4_000_000
 # The most steps in double-double: 20 ms a hundred.
 EXACT_STEPS = 2000
-# z in float64 and with more digits may differ by so many times the rounding that the bars allow for.
+# z in float64 and with more digits may differ by this many times the rounding that the bounds allow for.
 SAME_Z = 1000
 
 
@@ -134,7 +134,7 @@ def problem(z, points, edges, period, slack, even, exact=None):
     length, end = np.diff(edges, axis=1), edges[:, -1]
     pieces = np.count_nonzero(length > 0, axis=1)
     frequency, more = np.sqrt(size), np.where(pieces > 1, pieces, 0) / end
-    # Each piece gets steps by its weight: so many in all that each has what it needs, and one more.
+    # Each piece gets steps by its weight: enough in all that each has what it needs, and one more.
     weight = length * np.maximum(np.maximum(BY_PHASE * frequency, rate), 1 / end[:, None])
     total = np.cumsum(weight, axis=1)[:, -1:]
     need = length * total / (np.where(weight > 0, weight, 1) * end[:, None])

@@ -5,7 +5,7 @@ The monodromy's characteristic polynomial is l^4 - a l^3 + b l^2 - a l + 1. By t
 error bounds of these; A B = 0 means multipliers -1, K = 0 two pairs that meet.
 
 Points climb a ladder of steps (`survey.measures.answers`). A dense row (one e, many mu) is five Chebyshev series in
-s = sqrt(1 - 3 mu (1 - mu)), of which A to t are entire functions: they are solved at PLACES values of s in [1/2, 1],
+s = sqrt(1 - 3 mu (1 - mu)), of which A to t are entire functions: they are solved at NODES values of s in [1/2, 1],
 and what they leave undecided or too inaccurate is solved point by point. e = 0 has its closed form, and so has mu = 0.
 What float64 leaves open, or not as accurate as asked, is solved in double-double (`measures.libration.danby_double`).
 """
@@ -20,8 +20,8 @@ from survey.kernels.libration.traces import (
     INVARIANTS,
     KREIN,
     MINUS_ONE,
+    NODES,
     NONE,
-    PLACES,
     RESULTS,
     STABLE,
     UNDECIDED,
@@ -49,12 +49,13 @@ _NUMBERS = np.array([2, 3, 4, 5, 6, 7, 8, *((5 + i % 4) << (i // 4 + 1) for i in
 STEPS = Ladder(_NUMBERS, np.arange(_NUMBERS.size) + 3, slice(INVARIANTS, RESULTS), most=5)
 TOLERANCES = Ladder(10.0 ** -np.arange(4.0, 16.0), np.arange(12) + 1, slice(INVARIANTS, RESULTS), most=5)
 FINEST = 1e-14
-# A series pays from so many points in the row on; of the asked accuracy for its values.
-DENSE, SHARE, HARD = 3 * PLACES, 0.05, 0.25
+# The least number of points in a row for which a series pays; the share of the asked accuracy for its values; the share
+# of its nodes that miss it in a hard row.
+DENSE, SHARE, HARD = 3 * NODES, 0.05, 0.25
 # Keep a kernel call below about a second: steps, or points of an adaptive method.
 CALL_WORK, WALKS = 3_000_000, 500
-TO_SERIES = to_coefficients(np.cos(np.outer(np.arange(PLACES), angles(PLACES))))
-LEBESGUE = lebesgue(PLACES - 1)
+TO_SERIES = to_coefficients(np.cos(np.outer(np.arange(NODES), angles(NODES))))
+LEBESGUE = lebesgue(NODES - 1)
 
 
 def solve(e, mu, method="auto", rtol=1e-10, dense=False):
@@ -106,19 +107,19 @@ def _by_series(e, mu, rtol, answers, left):
     Hard is a row where float64 misses `rtol` at a quarter of the nodes: points of other rows are few in double-double.
     """
     rows = np.flatnonzero(left.any(axis=1))
-    s = 0.75 + 0.25 * nodes(PLACES)
+    s = 0.75 + 0.25 * nodes(NODES)
     d1, d2 = np.tile(1.5 * (1.0 + s), rows.size), np.tile(1.5 * (1.0 - s), rows.size)
-    results = np.empty((rows.size * PLACES, RESULTS))
-    own = _point_by_point(np.repeat(e[rows], PLACES), d1, d2, taylor16, max(SHARE * rtol, 1e-13), results)
-    results = results.reshape(rows.size, PLACES, RESULTS)
+    results = np.empty((rows.size * NODES, RESULTS))
+    own = _point_by_point(np.repeat(e[rows], NODES), d1, d2, taylor16, max(SHARE * rtol, 1e-13), results)
+    results = results.reshape(rows.size, NODES, RESULTS)
     series = np.ascontiguousarray(np.swapaxes(TO_SERIES @ results[..., :INVARIANTS], 1, 2))
     tail = abs(series[..., -2:]).sum(axis=-1)
     with np.errstate(over="ignore"):  # then the points miss what was asked
         bars = LEBESGUE * results[..., INVARIANTS:].max(axis=1) + tail + 16 * EPS * abs(series).sum(axis=-1)
-    sound = (own.status == status.OK).reshape(rows.size, PLACES).all(axis=1)
+    sound = (own.status == status.OK).reshape(rows.size, NODES).all(axis=1)
     answers.missed |= left.reshape(-1)
     traces.dense(series[sound], bars[sound], rows[sound], mu, rtol, status.OVERFLOW, *answers.all)
-    hard = own.inaccurate(rtol).reshape(rows.size, PLACES).mean(axis=1) >= HARD
+    hard = own.inaccurate(rtol).reshape(rows.size, NODES).mean(axis=1) >= HARD
     return answers.missed.reshape(mu.shape) & left, rows[hard]
 
 

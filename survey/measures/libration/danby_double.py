@@ -12,16 +12,16 @@ import numpy as np
 from survey import status
 from survey.kernels.libration import danby_double, traces_double
 from survey.kernels.libration.traces import INVARIANTS
-from survey.kernels.libration.traces_double import PLACES
+from survey.kernels.libration.traces_double import NODES
 from survey.kernels.math.chebyshev import lebesgue
 from survey.kernels.math.roundoff import PAIR_ROUNDOFF
 from survey.measures.libration.answers import Answers
 
 POINTS, VALUES = 1000, 50_000  # of a kernel call, to keep it below about a second
-LEBESGUE = lebesgue(PLACES - 1)
+LEBESGUE = lebesgue(NODES - 1)
 # Of Clenshaw's sum at the ends of its interval: n rounds |c_n| up to n + 1 times, each with a weight up to n + 1
-CLENSHAW = 4.0 * PAIR_ROUNDOFF * np.arange(1.0, PLACES + 1) ** 3
-TRANSFORM = 16.0 * PAIR_ROUNDOFF * PLACES  # of the sums that make coefficients of values
+CLENSHAW = 4.0 * PAIR_ROUNDOFF * np.arange(1.0, NODES + 1) ** 3
+TRANSFORM = 16.0 * PAIR_ROUNDOFF * NODES  # of the sums that make coefficients of values
 DIGITS = 40
 
 
@@ -58,8 +58,8 @@ def _results(e, both):
 def _by_series(e, mu, rtol):
     """Answers of points mu of one row."""
     both, matrix = tables()
-    results = _results(np.full(PLACES, e), both)
-    series, bars = np.empty((INVARIANTS, 2, PLACES)), np.empty(INVARIANTS)
+    results = _results(np.full(NODES, e), both)
+    series, bars = np.empty((INVARIANTS, 2, NODES)), np.empty(INVARIANTS)
     traces_double.to_series(results, matrix, series, bars)
     sizes = abs(series[:, 0])
     # what the series leaves out falls faster than by a half from each coefficient to the next
@@ -76,39 +76,39 @@ def _by_series(e, mu, rtol):
 
 @lru_cache
 def tables():
-    """The rates at the nodes (PLACES, 4), and the matrix that makes coefficients of values (2, PLACES, PLACES)."""
+    """The rates at the nodes (NODES, 4), and the matrix that makes coefficients of values (2, NODES, NODES)."""
     with localcontext() as context:
         context.prec = DIGITS
-        cosines = [_cosine(k) for k in range(4 * PLACES)]  # of k pi / (2 PLACES)
-        at = range(1, 2 * PLACES, 2)
+        cosines = [_cosine(k) for k in range(4 * NODES)]  # of k pi / (2 NODES)
+        at = range(1, 2 * NODES, 2)
         one = Decimal(1)
         # d1, d2 = (3 / 2)(1 +- s), s = (3 + cos) / 4, and 1 - cos without cancellation
         both = [
             (*_pair((7 + cosines[k]) * 3 / 8), *_pair((1 - cosines[k]) * 3 / 8 if cosines[k] < one / 2 else _less(k)))
             for k in at
         ]
-        matrix = [[_pair(cosines[k * n % (4 * PLACES)] * (2 if n else 1) / PLACES) for k in at] for n in range(PLACES)]
+        matrix = [[_pair(cosines[k * n % (4 * NODES)] * (2 if n else 1) / NODES) for k in at] for n in range(NODES)]
     return np.array(both), np.ascontiguousarray(np.moveaxis(np.array(matrix), 2, 0))
 
 
 def _cosine(k):
-    """cos(k pi / (2 PLACES)) in decimals, by its series at an angle below pi / 4."""
-    k %= 4 * PLACES
-    if k > 2 * PLACES:
-        return _cosine(4 * PLACES - k)
-    if k > PLACES:
-        return -_cosine(2 * PLACES - k)
-    return _sum(k, 0) if 2 * k <= PLACES else _sum(PLACES - k, 1)
+    """cos(k pi / (2 NODES)) in decimals, by its series at an angle below pi / 4."""
+    k %= 4 * NODES
+    if k > 2 * NODES:
+        return _cosine(4 * NODES - k)
+    if k > NODES:
+        return -_cosine(2 * NODES - k)
+    return _sum(k, 0) if 2 * k <= NODES else _sum(NODES - k, 1)
 
 
 def _less(k):
-    """(3 / 8)(1 - cos(k pi / (2 PLACES))) = (3 / 4) sin^2 of half the angle."""
+    """(3 / 8)(1 - cos(k pi / (2 NODES))) = (3 / 4) sin^2 of half the angle."""
     return Decimal("0.75") * _sum(Decimal(k) / 2, 1) ** 2
 
 
 def _sum(k, first):
-    """cos (first 0) or sin (first 1) of k pi / (2 PLACES)."""
-    x = k * Decimal(PI) / (2 * PLACES)
+    """cos (first 0) or sin (first 1) of k pi / (2 NODES)."""
+    x = k * Decimal(PI) / (2 * NODES)
     term = total = x if first else Decimal(1)
     for n in range(first + 2, 60, 2):
         term = -term * x * x / (n * (n - 1))

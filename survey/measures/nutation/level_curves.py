@@ -8,7 +8,7 @@ On such a map there is no closed form. Its curves are zeros of functions that ar
 
 with b = p_psi, a = p_phi. They are searched for on LINES lines of the map each way by marching squares, and every
 point is bracketed on its line by certain signs. A closed curve narrower than a LINES-th of the map may be missed,
-and a curve may end as much before the cusp where its saddle ends. No curve shows where a well begins in which the
+and a curve may end as far before the cusp at which its saddle ends. No curve shows where a well begins in which the
 motion is not. A precession is stable where its squared frequency (S18) is positive, else it is the saddle itself.
 
 Positions are those of `survey.measures.square`.

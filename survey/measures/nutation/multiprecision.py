@@ -20,7 +20,7 @@ CLOSE = Decimal("1e-20")  # relative to 1 + |value|, of answers that agree
 LEAST = 5e-324
 HALF, ONE, TWO, FOUR = Decimal("0.5"), Decimal(1), Decimal(2), Decimal(4)
 CUSP = Decimal("0.15")  # saddles need |a b| < 4 k / 27
-FAR = Decimal("1e38")  # as in `nutation.distance`
+FAR = Decimal("1e38")  # as in `wells.distance`
 
 
 class Unclear(ArithmeticError):

@@ -48,7 +48,7 @@ def _solve(out, i, point, solver, everything):
     except multiprecision.NoMotion:
         answer = None
         if everything:
-            _put(out, i, [{}], wells.NO_MOTION, wells.UNDECIDED, 0)
+            _store(out, i, [{}], wells.NO_MOTION, wells.UNDECIDED, 0)
     if answer is None:
         return
     passes, number, found = answer
@@ -56,10 +56,10 @@ def _solve(out, i, point, solver, everything):
         if name in out:
             out[name][i] = found[0].get(name, np.nan)
     if everything:
-        _put(out, i, found, OK, nu.PASSAGE if passes else nu.NUTATION, number)
+        _store(out, i, found, OK, nu.PASSAGE if passes else nu.NUTATION, number)
 
 
-def _put(out, i, found, status, verdict, number):
+def _store(out, i, found, status, verdict, number):
     """One point's answers, of each of its wells."""
     numbers = [value for well in found for value in well.values()]
     out["status"][i] = status if np.isfinite(numbers).all() else OVERFLOW

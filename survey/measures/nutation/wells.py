@@ -15,7 +15,7 @@ from survey.kernels.nutation.lanes import NAMES, OUTPUTS
 TRUST = 0.03  # relative errors beyond are no errors of first order
 UNDECIDED = -1
 NO_MOTION = 16  # the status of integrals without a motion
-FAR = 1e38  # distances in units of |k| beyond this say no more than that there is next to no field
+FAR = 1e38  # distances in units of |k| beyond this only say that there is next to no field
 
 
 def of_states(points):

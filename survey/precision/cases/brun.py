@@ -99,7 +99,7 @@ def system(point, options):
         start=np.column_stack([u, -sine * p, zero, zero]),
         parameters=np.column_stack([2.0 * k, k - level, a * b, 0.5 * (b - a), 0.5 * (b + a)]),
         span=period,
-        effort=period * np.sqrt(abs(k) + abs(level)),
+        steps=period * np.sqrt(abs(k) + abs(level)),
     )
 
 

@@ -64,7 +64,7 @@ def system(point, options):
         start=np.ascontiguousarray(rows[:, 6:]),
         parameters=np.ascontiguousarray(rows[:, :6]),
         span=span.ravel().astype(float),
-        effort=span.ravel() * (abs(rows).sum(axis=1) - abs(rows[:, 6])),
+        steps=span.ravel() * (abs(rows).sum(axis=1) - abs(rows[:, 6])),
     )
 
 

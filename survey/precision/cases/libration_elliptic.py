@@ -54,7 +54,7 @@ def system(point, options):
         start=np.tile(start, (e.size, 1)),
         parameters=np.column_stack([e, *danby.rates(mu)]),
         span=np.full(e.size, np.pi),
-        effort=e + mu,
+        steps=e + mu,
     )
 
 

@@ -48,7 +48,7 @@ def system(point, options):
     w'' = (2 k^2 - 1) w - 2 w^3 for librations and rotations alike: no elliptic function is needed.
     """
     oblate = options.get("body", "prolate") == "oblate"
-    rows = np.atleast_1d(point["k"])  # a row's period is worked out once
+    rows = np.atleast_1d(point["k"])  # a row's period is computed once
     halves = Motion(*moduli({"k": rows.ravel()}), oblate).period.reshape(rows.shape) / 2
     k, rho, span = (np.ravel(values) for values in np.broadcast_arrays(rows, point["rho"], halves))
     zero, one = np.zeros(k.size), np.ones(k.size)
@@ -58,7 +58,7 @@ def system(point, options):
         start=np.column_stack([np.sqrt(2) * k, zero, one, zero, zero, one]),
         parameters=np.column_stack([2 * k * k - 1, np.sqrt(2) * rho, constant]),
         span=span,
-        effort=span * (abs(rho) + k + 1),
+        steps=span * (abs(rho) + k + 1),
     )
 
 

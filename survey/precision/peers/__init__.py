@@ -19,18 +19,18 @@ class System:
     """An autonomous system of ODEs at many points, each over its own span from 0.
 
     `slope(state, parameters, sin, cos)` gives a tuple; it only indexes, adds, multiplies, squares and calls the sine
-    and cosine of the peer, so that every peer can take it as it is: as Python, compiled, traced or as symbols. Points
-    of like `effort` take about as many steps.
+    and cosine of the peer, so that every peer can take it as it is: as Python, compiled, traced or as symbols. `steps`
+    estimates the number of steps at each point, up to a common factor.
     """
 
     slope: Callable
     start: np.ndarray
     parameters: np.ndarray
     span: np.ndarray
-    effort: np.ndarray
+    steps: np.ndarray
 
 
 def batches(system, lanes):
-    """Indices (batches, lanes) of points, like efforts together; the last points fill up the last batch."""
-    order = np.argsort(system.effort, kind="stable")
+    """Indices (batches, lanes) of points, like numbers of steps together; the last points fill up the last batch."""
+    order = np.argsort(system.steps, kind="stable")
     return np.append(order, np.repeat(order[-1:], -order.size % lanes)).reshape(-1, lanes)

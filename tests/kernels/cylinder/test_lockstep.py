@@ -43,13 +43,13 @@ def drawn(count, seed, scale=(1, 1, 1, 1, 1, 1, 3, 1)):
 
 
 def agree(rows, times, tolerance=1e-13):
-    """Where both solve them, values agree within both bars, and turnings wherever they are told; returns that share."""
-    mine, told, status = solved(rows, times, tolerance)
+    """Where both solve them, values agree within both bars, and turnings where they are known; returns that share."""
+    mine, turns, status = solved(rows, times, tolerance)
     best, counted, _ = solved(rows, times, 1e-17, one_by_one)
     both = np.isfinite(mine[..., 0]) & np.isfinite(best[..., 0])
     assert (np.abs(mine - best)[both][:, :2] <= mine[both][:, 2:] + best[both][:, 2:]).all()
-    both &= (told != steps.UNDETERMINED) & (counted != steps.UNDETERMINED)
-    assert np.array_equal(told[both], counted[both])
+    both &= (turns != steps.UNDETERMINED) & (counted != steps.UNDETERMINED)
+    assert np.array_equal(turns[both], counted[both])
     assert ((status == steps.OK) == np.isfinite(mine[:, -1, 0])).all()
     return both.mean()
 

@@ -120,7 +120,7 @@ def test_dop853_beside_saddles_as_mpmath_has_it(six, phi, w, t):
 @pytest.mark.slow
 @pytest.mark.parametrize("still", [True, False])
 def test_thousands_beside_separatrices_rests_and_double_roots(still):
-    """Bars of closed forms and of Taylor series hold, and turnings agree wherever they are told."""
+    """Bars of closed forms and of Taylor series hold, and turnings agree wherever they are known."""
     random = np.random.default_rng(7)
     rows, n = random.normal(size=(6000, 8)), 6000
     rows[:, :2] *= 0.0 if still else 1.0
@@ -145,10 +145,10 @@ def test_thousands_beside_separatrices_rests_and_double_roots(still):
     times = random.uniform(0, 20, (n, 1))
     truth, counted, fine = solution.trajectories(taylor_double, rows, times, 0.0)
     for measure in (solution, auto):
-        found, told, status = measure.trajectories(taylor, rows, times, 1e-10)
+        found, turns, status = measure.trajectories(taylor, rows, times, 1e-10)
         both = (status == OK) & (fine == OK)
         assert both.mean() > 0.95
         error, bars = np.abs(found - truth)[both][:, :2], (found + truth)[both][:, 2:]
         assert (error <= bars).all()
-        sure = both & (told >= 0) & (counted >= 0)
-        assert np.array_equal(told[sure], counted[sure])
+        sure = both & (turns >= 0) & (counted >= 0)
+        assert np.array_equal(turns[sure], counted[sure])

@@ -133,13 +133,13 @@ def test_bars_hold_where_61_is_met_within_rounding(mu):
 @pytest.mark.parametrize("mu", [3.0, 0.52, 0.5, 0.03])
 def test_on_61_hundreds_agree_with_taylor_series_within_both_bars(mu, gap):
     rows, times = curved(200, 5, mu, gap), [0.5, 4.0, 20.0]
-    mine, told, status = solved(rows, times)
+    mine, turns, status = solved(rows, times)
     other, counted, fine = solved(rows, times, taylor)
     both = (status == OK) & (fine == OK)
     assert both.mean() > 0.5
     assert (np.abs(mine - other)[both][:, :2] <= mine[both][:, 2:] + other[both][:, 2:]).all()
-    both &= (told >= 0) & (counted >= 0)
-    assert np.array_equal(told[both], counted[both])
+    both &= (turns >= 0) & (counted >= 0)
+    assert np.array_equal(turns[both], counted[both])
 
 
 def test_numbers_that_meet_61_exactly_have_no_part_in_the_bar():

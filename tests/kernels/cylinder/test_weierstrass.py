@@ -114,13 +114,13 @@ def test_bars_hold_against_multiprecision(scale):
 )
 def test_thousands_agree_with_taylor_series_within_both_bars(scale, unit):
     rows, times = drawn(1000, 3, scale), unit * np.array([0.01, 0.5, 3.0, 20.0])
-    mine, told, status = solved(rows, times)
+    mine, turns, status = solved(rows, times)
     other, counted, fine = solved(rows, times, taylor)
     both = (status == OK) & (fine == OK)
     assert both.mean() > 0.99
     assert (np.abs(mine - other)[both][:, :2] <= mine[both][:, 2:] + other[both][:, 2:]).all()
-    both &= (told != UNDETERMINED) & (counted != UNDETERMINED)
-    assert both.mean() > 0.99 and np.array_equal(told[both], counted[both])
+    both &= (turns != UNDETERMINED) & (counted != UNDETERMINED)
+    assert both.mean() > 0.99 and np.array_equal(turns[both], counted[both])
 
 
 def test_the_same_bits_in_any_lane_beside_any_neighbour():

@@ -38,7 +38,7 @@ def test_beside_lames_edge_the_verdict_is_given(body, rho):
 
 
 def test_both_sides_of_the_edge_of_a_tongue_two_ulp_apart():
-    """An edge of the prolate tongue n = 4 at k = 0.3, closed in by mpmath to 1e-30: its neighbours are told."""
+    """An edge of the prolate tongue n = 4 at k = 0.3, closed in by mpmath to 1e-30: its neighbours are decided."""
     k = 0.3
     with mp.workdps(40):
         rho = mp.findroot(lambda x: mp_factors("PL", k, x, digits=40)[2], (mpf("1.66"), mpf("1.67")), solver="anderson")

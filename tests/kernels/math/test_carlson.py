@@ -40,6 +40,19 @@ def test_integrals():
             assert abs((mpf(out[7]) + mpf(out[8])) / middle - 1) < 1e-29
 
 
+def test_the_third_kind_where_its_parameter_is_extreme():
+    """p from 1e-80 to 1e80 times x y, as beside poles that a motion nearly aims at: a closed form ends the sum."""
+    random, out = np.random.default_rng(2), np.empty(9)
+    with mp.workdps(100):
+        for _ in range(200):
+            a, b = 10 ** random.uniform(-3, 3, 2)
+            p = a * b * 10 ** random.uniform(-80, 80)
+            all_of(1.0, 1.0, 1.0, p, a, b, out)
+            ratio = mp.elliprj(0, mpf(a) ** 2, mpf(b) ** 2, p) * 4 * mp.agm(a, b) * p / (3 * mp.pi)
+            assert abs(out[4] / ratio - 1) < 4e-15
+            assert abs((mpf(out[5]) + mpf(out[6])) / ratio - 1) < 1e-30
+
+
 def test_sine_and_cosine():
     random = np.random.default_rng(1)
     small, ends = 10 ** random.uniform(-20, 0, 100), np.pi - 10 ** random.uniform(-16, 0, 100)

@@ -59,7 +59,7 @@ def test_sum(well):
 @pytest.mark.parametrize("well", WELLS)
 @pytest.mark.parametrize("place", range(3))
 def test_what_errors_change(well, place):
-    """By no more than is told, and near separatrices by next to nothing."""
+    """By no more than the bound, and near separatrices by next to nothing."""
     noise, factor = np.zeros(3), 1.0 + 1e-4
     noise[place] = 1e-4
     width, (low, high), square, *ends = well

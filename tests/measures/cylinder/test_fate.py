@@ -129,8 +129,8 @@ def test_symmetries_carry_fates(seed):
             mine = np.array([EXCHANGED[v] for v in one["verdict"]]) if exchanged else one["verdict"]
             both = (mine >= 0) & (two["verdict"] >= 0)
             assert np.array_equal(mine[both], two["verdict"][both]), six.tolist()
-            told = both & (one["turnings"] > -2) & (two["turnings"] > -2)
-            assert np.array_equal(one["turnings"][told], two["turnings"][told])
+            known = both & (one["turnings"] > -2) & (two["turnings"] > -2)
+            assert np.array_equal(one["turnings"][known], two["turnings"][known])
             turns = both & (one["net_turns"] != cf.NO_TURNS)
             assert np.array_equal((-1 if exchanged else 1) * one["net_turns"][turns], two["net_turns"][turns])
             gap = np.abs(one["multiplier"] - two["multiplier"])
@@ -282,14 +282,14 @@ def test_beside_a_separatrix_fates_are_those_of_its_sides():
     starts = [nearest - 1e-9, *(nearest + i * np.spacing(nearest) for i in (-1, 0, 1)), nearest + 1e-9]
     found = fates(SIX, [[phi, w] for w in starts])
     assert (found["verdict"] >= 0).all() and (found["status"] == 0).all()
-    told = list(zip(*(found[name].tolist() for name in ("verdict", "turnings", "net_turns")), strict=True))
+    known = list(zip(*(found[name].tolist() for name in ("verdict", "turnings", "net_turns")), strict=True))
     passed = [exact(SIX, phi, w, 25.0, 40)[0] > saddle for w in starts]
-    assert told[0] != told[-1] and passed[-1] and not passed[0]
-    assert told == [told[-1] if beyond else told[0] for beyond in passed]
+    assert known[0] != known[-1] and passed[-1] and not passed[0]
+    assert known == [known[-1] if beyond else known[0] for beyond in passed]
 
 
 def test_beside_separatrices_without_barnett_london_effect():
-    """H = w^2/2 - cos phi is 1 on the separatrix of the pendulum: doubles next to it are told from it."""
+    """H = w^2/2 - cos phi is 1 on the separatrix of the pendulum: doubles next to it are distinguished."""
     phi = np.array([0.1, 1.0, -2.0, 3.0])
     starts = [[x, w] for x in phi for w in 2 * math.cos(x / 2) * (1 + np.arange(-2, 3) * 2e-16)]
     found = fates((0, 0, 0, 0, 0, 1.0), starts)

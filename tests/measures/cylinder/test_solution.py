@@ -309,5 +309,5 @@ def test_many_against_dop853():
     both = (ok == OK) & (fine == OK)
     assert both.mean() > 0.95
     assert (np.abs(a - b)[both][:, :2] <= a[both][:, 2:] + b[both][:, 2:]).all()
-    told = both & (n >= 0) & (m >= 0)
-    assert np.array_equal(n[told], m[told])
+    known = both & (n >= 0) & (m >= 0)
+    assert np.array_equal(n[known], m[known])

@@ -74,9 +74,9 @@ def test_the_rotation_number_counts_the_edges_of_random_rows(scene, lane, name, 
     x = np.linspace(*span, 401)
     band = hill_edges._band(solve(np.arange(rows.size), np.tile(x, (rows.size, 1)), hill_edges.COUNTS))
     for row in range(rows.size):
-        told = np.flatnonzero(np.isfinite(band[row]))
+        known = np.flatnonzero(np.isfinite(band[row]))
         own = edges.row == row
-        for a, b in pairwise(told):
+        for a, b in pairwise(known):
             between = own & (edges.position > x[a]) & (edges.position < x[b])
             # each edge is half a step of the staircase, up or down; between neighbours of the scan it is climbed once
             assert between.sum() == 2 * abs(band[row, b] - band[row, a])

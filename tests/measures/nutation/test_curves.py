@@ -250,6 +250,6 @@ def test_a_logarithmic_axis():
 )  # fmt: skip
 def test_what_cannot_be_is_refused(changes, words):
     axes = {"l": {"values": [0.1, 0.2]}, "beta": {"values": [0.1, 0.2]}, "alpha": 0.1}
-    with pytest.raises(survey.BadInput, match=words) as told:
+    with pytest.raises(survey.BadInput, match=words) as refused:
         check({"scene": "brun", "axes": axes, "boundaries": {}} | changes)
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(refused.value)

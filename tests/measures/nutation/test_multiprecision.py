@@ -93,7 +93,7 @@ def test_regular_precessions(y, z, sign):
 
 
 def test_cusps():
-    """There is a separatrix where F = F' = 0 has been passed, told at every one of the consecutive numbers."""
+    """There is a separatrix where F = F' = 0 has been passed, decided at every one of the consecutive numbers."""
     for u in (0.1, -0.25, 0.32):
         minus, plus = np.sqrt((1 - u) ** 3 * (1 + 3 * u)), np.sqrt((1 + u) ** 3 * (1 - 3 * u))
         alpha, line = 0.5 * (plus - minus), beside(0.5 * (plus + minus))

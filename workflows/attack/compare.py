@@ -1,4 +1,4 @@
-"""One batch of points solved and judged: what was said of each, held against a truth of higher accuracy.
+"""One batch of points solved and compared: the answer at each against a truth of higher accuracy.
 
 A lie is a value farther from the truth than its error bar and the truth's own doubt together; a wrong verdict one that
 the truth contradicts beyond its doubt. Silent is what the contract forbids without a word: a value or bar that is not
@@ -22,7 +22,7 @@ COUNTS = ("points", "undecided", "missed", "refused", "unchecked", "lies", "wron
 FAULTS = ("lies", "wrong", "silent", "tracebacks")
 SLOW, HALF = 5.0, 0.5  # seconds of a batch, and for each of its points
 TINY = 1e-200
-SHOWN = 6  # faults of a kind told of a batch
+SHOWN = 6  # faults of a kind that are described for a batch
 
 
 @dataclass
@@ -43,16 +43,16 @@ class Batch:
     rtol: float = 1e-10
     how: str = ""
     cross: tuple = ()  # parameters that are axes of their own, not taken point by point
-    places: object = None  # of a map: the points that are judged
+    chosen: object = None  # of a map: the points that are compared
 
     @property
     def size(self):
-        return int(np.prod(shape(self))) if self.places is None else len(self.places)
+        return int(np.prod(shape(self))) if self.chosen is None else len(self.chosen)
 
     def each(self):
-        """The parameters of each point that is judged."""
+        """The parameters of each point that is compared."""
         grids = np.indices(shape(self)).reshape(1 + len(self.cross), -1)
-        grids = grids if self.places is None else grids[:, self.places]
+        grids = grids if self.chosen is None else grids[:, self.chosen]
         return {key: values if not np.ndim(values) else
                 np.asarray(values, float)[grids[1 + self.cross.index(key)] if key in self.cross else grids[0]]
                 for key, values in self.given.items()}  # fmt: skip
@@ -85,7 +85,7 @@ def shape(batch):
     return (shared, *(np.size(batch.given[k]) for k in batch.cross))
 
 
-def judge(batch):
+def compare(batch):
     """(counts, worst error over bar, faults as a list of dicts) of a batch."""
     counts, faults, began = Counter(points=batch.size), [], time.perf_counter()
     compiled = _compile_seconds()
@@ -93,11 +93,11 @@ def judge(batch):
         ds = solve(batch)
     except survey.BadInput as error:
         if "\n" in str(error) or len(str(error)) > 400:
-            _tell(batch, counts, faults, "silent", [0], "refusal of several lines", str(error))
+            _report(batch, counts, faults, "silent", [0], "refusal of several lines", str(error))
         counts["refused"] += batch.size
         return counts, 0.0, faults
     except Exception:
-        _tell(batch, counts, faults, "tracebacks", [0], "traceback", traceback.format_exc(limit=-3))
+        _report(batch, counts, faults, "tracebacks", [0], "traceback", traceback.format_exc(limit=-3))
         return counts, 0.0, faults
     counts["seconds"] = seconds = time.perf_counter() - began - (_compile_seconds() - compiled)
     if seconds > SLOW + HALF * np.prod(shape(batch)):  # again, as the first call loads what was compiled
@@ -105,20 +105,20 @@ def judge(batch):
         solve(batch)
         counts["seconds"] = seconds = time.process_time() - began
         if seconds > SLOW + HALF * np.prod(shape(batch)):
-            _tell(batch, counts, faults, "slow", [0], "seconds a point", f"{seconds / np.prod(shape(batch)):.3g}")
+            _report(batch, counts, faults, "slow", [0], "seconds a point", f"{seconds / np.prod(shape(batch)):.3g}")
     answer = {name: _flat(batch, ds[name]) for name in ds.data_vars}
     _, module = user_scene.find(batch.scene or batch.name)
     _silent(batch, module, answer, counts, faults)
     worst = _truth(batch, answer, counts, faults)
     if batch.size > 2 and batch.method in ("auto", "taylor16", "agm", "taylor"):
-        _again(batch, answer, counts, faults)
+        _solved_again(batch, answer, counts, faults)
     return counts, worst, faults
 
 
 def failed(batch):
-    """The same where judging itself ended in an exception, which is being handled."""
+    """The same where the comparison itself ended in an exception, which is being handled."""
     counts, faults = Counter(points=batch.size), []
-    _tell(batch, counts, faults, "tracebacks", [0], "while it was judged", traceback.format_exc(limit=-3))
+    _report(batch, counts, faults, "tracebacks", [0], "in the comparison", traceback.format_exc(limit=-3))
     return counts, 0.0, faults
 
 
@@ -135,7 +135,7 @@ def _flat(batch, array):
     array = array.transpose(*here, ...)
     size = int(np.prod([array.sizes[d] for d in here]))
     values = array.values.reshape((size, *(array.sizes[d] for d in array.dims if d not in here)))
-    return values if batch.places is None else values[batch.places]
+    return values if batch.chosen is None else values[batch.chosen]
 
 
 def _silent(batch, module, answer, counts, faults):
@@ -169,10 +169,10 @@ def _silent(batch, module, answer, counts, faults):
             wrong |= ~real & _as(ok, values)
         wrong |= real & _as(said == status.INVALID_PARAMETERS, values)
         if wrong.any():
-            _tell(batch, counts, faults, "silent", np.flatnonzero(_any(wrong)), f"{o.name} or its bar", "")
+            _report(batch, counts, faults, "silent", np.flatnonzero(_any(wrong)), f"{o.name} or its bar", "")
     counts["missed"] += int(missed.sum())
     if bad.any():
-        _tell(batch, counts, faults, "silent", np.flatnonzero(bad), "status or flag", "")
+        _report(batch, counts, faults, "silent", np.flatnonzero(bad), "status or flag", "")
 
 
 def _defaults(module, batch):
@@ -194,7 +194,7 @@ def _truth(batch, answer, counts, faults):
         mask = np.broadcast_to(mask, answer["status"].shape)
         if mask.any():
             verdicts = answer.get("verdict", answer["status"])
-            _tell(batch, counts, faults, "wrong", np.flatnonzero(mask), what, lambda i, v=verdicts: f"said {v[i]}")
+            _report(batch, counts, faults, "wrong", np.flatnonzero(mask), what, lambda i, v=verdicts: f"said {v[i]}")
     checked = np.zeros(answer["status"].shape, bool) | truth.pop("checked", False)
     for name, (value, low, doubt) in truth.items():
         said, bar = answer[name], answer[f"{name}_error"].astype(float)
@@ -210,25 +210,25 @@ def _truth(batch, answer, counts, faults):
         if lie.any():
             true = np.broadcast_to(value, off.shape)
 
-            def told(i, name=name, said=said, bar=bar, off=off, true=true, ratio=ratio):
+            def described(i, name=name, said=said, bar=bar, off=off, true=true, ratio=ratio):
                 j = np.nanargmax(ratio[i]) if ratio[i].ndim else ()
-                place = np.unravel_index(j, ratio[i].shape) if ratio[i].ndim else ()
+                at = np.unravel_index(j, ratio[i].shape) if ratio[i].ndim else ()
                 return (
-                    f"{name} = {said[i][place]!r} +- {bar[i][place]:.3g}, truth {true[i][place]!r}: off by "
-                    f"{off[i][place]:.3g}, {ratio[i][place]:.3g} bars"
+                    f"{name} = {said[i][at]!r} +- {bar[i][at]:.3g}, truth {true[i][at]!r}: off by "
+                    f"{off[i][at]:.3g}, {ratio[i][at]:.3g} bars"
                 )
 
-            _tell(batch, counts, faults, "lies", np.flatnonzero(_any(lie)), name, told)
+            _report(batch, counts, faults, "lies", np.flatnonzero(_any(lie)), name, described)
     counts["unchecked"] += int((~checked & (answer["status"] == status.OK)).sum())
     return worst
 
 
-def _again(batch, answer, counts, faults):
+def _solved_again(batch, answer, counts, faults):
     """Some of the points in another order, alone, at another rtol: within the sum of both bars, no other verdict."""
     random = np.random.default_rng(int(batch.rtol * 1e16))
     part = random.permutation(batch.size)[:3]
     each = {key: values[part] if np.ndim(values) else values for key, values in batch.each().items()}
-    other = replace(batch, given=each, cross=(), places=None, rtol=float(10.0 ** -random.uniform(6, 13)))
+    other = replace(batch, given=each, cross=(), chosen=None, rtol=float(10.0 ** -random.uniform(6, 13)))
     ds = solve(other)
     ok = (answer["status"][part] == status.OK) & (ds["status"].values == status.OK)
     for name in ds.data_vars:
@@ -239,20 +239,19 @@ def _again(batch, answer, counts, faults):
             apart = np.abs(a - b) > answer[f"{name}_error"][part] + _flat(other, ds[f"{name}_error"]).astype(float)
         apart = _any(apart) & ok
         if apart.any():
-            places = np.flatnonzero(apart)
-            _tell(other, counts, faults, "lies", places, f"{name} alone or at another rtol",
+            _report(other, counts, faults, "lies", np.flatnonzero(apart), f"{name} alone or at another rtol",
                   lambda i, a=a, b=b: f"{a[i]!r} in its batch at rtol {batch.rtol!r}, {b[i]!r} alone")  # fmt: skip
     if "verdict" in ds:
         a, b = answer["verdict"][part], _flat(other, ds["verdict"])
         apart = ok & (a >= 0) & (b >= 0) & (a != b) & ~((batch.name == "brun states") & (np.minimum(a, b) >= 1))
         if apart.any():
-            _tell(other, counts, faults, "wrong", np.flatnonzero(apart), "verdict alone or at another rtol",
+            _report(other, counts, faults, "wrong", np.flatnonzero(apart), "verdict alone or at another rtol",
                   lambda i, a=a, b=b: f"{a[i]} in its batch at rtol {batch.rtol!r}, {b[i]} alone")  # fmt: skip
 
 
-def _tell(batch, counts, faults, kind, places, what, words):
-    counts[kind] += len(places)
-    for i in places[:SHOWN]:
+def _report(batch, counts, faults, kind, points, what, words):
+    counts[kind] += len(points)
+    for i in points[:SHOWN]:
         said = words(i) if callable(words) else words
         faults.append({"kind": kind, "scene": batch.name, "region": batch.region, "what": what, "said": said,
                        "line": line(batch, i)})  # fmt: skip
