@@ -80,3 +80,19 @@ def zeros_beside_a_focus(six, phi, w, times):
                     t_eval=late, rtol=1e-12, atol=1e-12)  # fmt: skip
     base = int(np.count_nonzero(np.diff(sign)))
     return counts + [base + int(abs(math.floor(a / math.pi) - math.floor(angle / math.pi))) for a in run.y[0]]
+
+
+def roots(six):
+    """The complex angles at which g = 0, a root as often as its multiplicity says: from a polynomial in exp(i phi)."""
+    with mp.workdps(60):
+        d, c23, s2, s3 = map(mp.mpf, six[2:])
+        a, b = mp.mpc(-c23, d / 2) / 2, mp.mpc(s2, s3) / 2
+        row = [a, b, 0, mp.conj(b), mp.conj(a)] if a != 0 else [b, 0, mp.conj(b)]
+        if a == b == 0:
+            return []
+        return [mp.mpc(0, -1) * mp.log(z) for z in mp.polyroots(row, maxsteps=2000, extraprec=600)]
+
+
+def is_real(phi):
+    """Is the imaginary part of a root no more than what is left of 60 digits at a triple one?"""
+    return abs(phi.imag) < mp.mpf(10) ** -18

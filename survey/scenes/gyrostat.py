@@ -44,8 +44,10 @@ A portrait is what the fates of a system share: ends, equilibria, cycles, and wh
 keep them all. It is structurally stable where, by the error bars, K is off zero (L, where K = 0 exactly), no
 equilibrium is degenerate or a Hopf point, no multiplier is 1, the signs of the return maps fit together (so the parity
 law holds), and every unstable branch of a saddle ends elsewhere than in a saddle; near saddle connections it is -1.
-Where an equilibrium is degenerate or a Hopf point within the error bar, the verdict is 0 and the status is
-`degenerate_equilibrium`: the ends are given, numbers of equilibria and cycles are not.
+Where an equilibrium is degenerate or a Hopf point within the rounding of binary64, the verdict is 0 and the status is
+`degenerate_equilibrium`: ends and equilibria are given, numbers of cycles are not. The roots of g are then found in
+double-double arithmetic, in disjoint discs that are proven to hold them; an equilibrium of the type `degenerate` stands
+for the two or three roots within its error bar, a pair of which may be complex.
 
 Questions: `trajectory` (phi and w at t), `abel` (w and t at phi), `fate` (where the solution ends) and `portrait` (of
 the system, without an initial state).
@@ -103,8 +105,8 @@ STATUS = {
     "separatrix": "the error bar leaves it open on which side of a separatrix the solution passes",
     "no_closed_form": "no closed form applies (they need b = 0, g = 0 or (61)): try another method",
     "too_many_cycles": "there are more cycles than the file has room for: the first are given",
-    "degenerate_equilibrium": "within the error bar g = g' = 0 at an equilibrium, or f = g = 0 at one that is no "
-    "saddle: the numbers of equilibria and of cycles are unknown; K, L, the stratum and the ends are given",
+    "degenerate_equilibrium": "within rounding g = g' = 0 at an angle, or f = g = 0 at an equilibrium that is no "
+    "saddle: the numbers of cycles are unknown; K, L, the stratum, the ends and the equilibria are given",
 }
 _TURNING = 16
 _MOST_TURNINGS = 2**31 - 1  # are kept as int32
@@ -153,9 +155,12 @@ OUTPUTS = (
     Output("equilibria", "number of equilibria on the circle", integer=True, when=_PORTRAIT,
            applies="but in stratum I0, where every angle is one"),
     Output("saddles", "number of saddles", integer=True, when=_PORTRAIT, applies="but in stratum I0"),
-    Output("rotations_plus", "number of isolated rotation cycles with w > 0", integer=True, when=_PORTRAIT),
-    Output("rotations_minus", "number of isolated rotation cycles with w < 0", integer=True, when=_PORTRAIT),
-    Output("librations", "number of isolated libration cycles", integer=True, when=_PORTRAIT),
+    Output("rotations_plus", "number of isolated rotation cycles with w > 0", integer=True, when=_PORTRAIT,
+           applies="but beside a degenerate equilibrium or a Hopf point"),
+    Output("rotations_minus", "number of isolated rotation cycles with w < 0", integer=True, when=_PORTRAIT,
+           applies="but beside a degenerate equilibrium or a Hopf point"),
+    Output("librations", "number of isolated libration cycles", integer=True, when=_PORTRAIT,
+           applies="but beside a degenerate equilibrium or a Hopf point"),
     Output("equilibrium_phi", "angle of the equilibrium, ascending in [0, 2 pi)", r"\varphi_e", units="rad",
            when=_PORTRAIT, dims=("equilibrium",), applies="for as many entries as there are equilibria"),
     Output("equilibrium_type", "type of the equilibrium", flags={name: i for i, name in enumerate(_TYPES)},

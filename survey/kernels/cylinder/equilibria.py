@@ -5,19 +5,37 @@ import math
 import numpy as np
 
 from survey.kernels.cylinder.flow import BOUND_DDG, BOUND_DG, BOUND_F, BOUND_G, C23, S2, TWO_PI, values
+from survey.kernels.cylinder.roots import CENTRE, MOST_DISCS, NO_REAL, RADIUS, ROOTS, SLOPE, discs
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.newton import bracketed
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
-MOST = 12  # rows of a table of equilibria: 4 at most, and degenerate ones
+MOST = 4  # g has 4 roots at most
+MOST_PIECES = 20_000  # of the circle: more are needed next to a triple root only
+HIDDEN, LONG = -1, -2
+NARROW = 1e-6  # rad: two complex roots in so small a disc leave |g| below 1e-13 of its bound
 ANGLE, F, DG, BAR, KIND, STABLE, VAA, VAB, VBB, LEVEL = range(10)
 SADDLE, NODE, FOCUS, DEGENERATE = range(4)
 
 
 @kernel
 def equilibria(p, table):
-    """Fill the rows of `table` (MOST, 10) with the equilibria in [0, 2 pi), ascending; returns their number."""
-    found = np.empty(64)
+    """Fill the rows of `table` (MOST, 10) with the equilibria in [0, 2 pi), ascending.
+
+    Returns their number, and whether the roundings of float64 hide one, or that there is none: g' beside it, or g where
+    it comes near 0 without reaching it. Then the rows are those of `clustered`.
+    """
+    count = bisected(p, table)
+    if count >= 0:
+        return count, False
+    found, hidden = clustered(p, table)
+    return found, hidden or count == HIDDEN
+
+
+@kernel
+def bisected(p, table):
+    """As `equilibria`; or HIDDEN, or LONG where it would take long to tell."""
+    found = np.empty(MOST + 1)
     lows, highs = np.empty(4096), np.empty(4096)
     count, top, pieces, start = 0, 0, 16, 0.123456
     for i in range(pieces - 1, -1, -1):
@@ -25,6 +43,7 @@ def equilibria(p, table):
         top += 1
     while top > 0:  # |g'| <= BOUND_DG excludes a root, |g''| <= BOUND_DDG shows that g is monotone
         top -= 1
+        pieces += 1
         low, high = lows[top], highs[top]
         half, middle = 0.5 * (high - low), 0.5 * (low + high)
         _f, g, dg = values(p, middle)
@@ -36,23 +55,68 @@ def equilibria(p, table):
                 count += 1
         elif half < 1e-13:
             if count == 0 or abs(middle - found[count - 1]) > 1e-6:
-                found[count] = middle
-                count += 1
+                return HIDDEN
         elif top + 2 < len(lows):
             lows[top], highs[top], lows[top + 1], highs[top + 1] = middle, high, low, middle
             top += 2
-        if count >= MOST:
-            break
+        if count > MOST:
+            return HIDDEN
+        if pieces > MOST_PIECES:
+            return LONG
     for i in range(count):  # into [0, 2 pi), by insertion
-        x = max(found[i] - TWO_PI, 0.0) if found[i] >= TWO_PI else found[i]
-        k = i
-        while k > 0 and found[k - 1] > x:
-            found[k] = found[k - 1]
-            k -= 1
-        found[k] = x
+        insert(found, i, max(found[i] - TWO_PI, 0.0) if found[i] >= TWO_PI else found[i])
     for i in range(count):
-        describe(p, found[i], table[i])
+        f, _g, dg = values(p, found[i])
+        bar, hidden = blurred(p, found[i], dg)
+        if hidden:
+            return HIDDEN
+        describe(p, found[i], f, dg, bar, table[i])
     return count
+
+
+@inline
+def blurred(p, x, dg):
+    """How far rounding may move a root that float64 finds at x, and does that reach to g' = 0?"""
+    bar = 4e-16 * (1.0 + abs(x)) + 4.0 * ROUNDOFF_UP * p[BOUND_G] / max(abs(dg), 1e-300)
+    return bar, abs(dg) <= p[BOUND_DDG] * bar + 8.0 * ROUNDOFF_UP * p[BOUND_DG]
+
+
+@kernel
+def clustered(p, table):
+    """As `equilibria`, by `discs` in double-double: a cluster that these cannot take apart is one degenerate row."""
+    found, order, at = np.empty((MOST_DISCS, 5)), np.empty(MOST, dtype=np.int64), np.empty(MOST)
+    size, count, hidden = discs(p, found), 0, False
+    for i in range(size):
+        if found[i, ROOTS] == NO_REAL or count == MOST:
+            hidden = hidden or found[i, RADIUS] < NARROW
+            continue
+        x = found[i, CENTRE]
+        x = x + TWO_PI if x < 0.0 else x
+        k = insert(at, count, 0.0 if x >= TWO_PI else x)
+        for j in range(count, k, -1):
+            order[j] = order[j - 1]
+        order[k] = i
+        count += 1
+    for i in range(count):
+        disc, row, x = found[order[i]], table[i], at[i]
+        describe(p, x, values(p, x)[0], disc[SLOPE], 4e-16 * (1.0 + x) + disc[RADIUS], row)
+        hidden = hidden or blurred(p, x, disc[SLOPE])[1]
+        if p[BOUND_DDG] * row[BAR] > 1e-3 * abs(row[DG]):  # g' has not the digits to prove a region
+            row[LEVEL] = 0.0
+        if disc[ROOTS] != 1.0:
+            row[KIND], row[STABLE], hidden = DEGENERATE, 0.0, True
+    return count, hidden
+
+
+@inline
+def insert(sorted_, size, x):
+    """Put x where it belongs among the first `size`, ascending; returns its place."""
+    k = size
+    while k > 0 and sorted_[k - 1] > x:
+        sorted_[k] = sorted_[k - 1]
+        k -= 1
+    sorted_[k] = x
+    return k
 
 
 @kernel
@@ -70,22 +134,16 @@ def _acceleration(flow, given, x):
 
 
 @kernel
-def describe(p, x, row):
-    """Type, error bound and region of attraction of the equilibrium at x."""
-    f, _g, dg = values(p, x)
-    row[ANGLE], row[F], row[DG] = x, f, dg
-    noise = 4.0 * ROUNDOFF_UP * p[BOUND_G]
-    row[BAR] = 4e-16 * (1.0 + abs(x)) + noise / max(abs(dg), 1e-300)
+def describe(p, x, f, dg, bar, row):
+    """Type and region of attraction of the equilibrium at x, known within `bar`."""
+    row[ANGLE], row[F], row[DG], row[BAR] = x, f, dg, bar
     row[VAA], row[VAB], row[VBB], row[LEVEL] = 0.0, 0.0, 0.0, 0.0
-    row[STABLE] = 0.0 if abs(f) <= 16.0 * ROUNDOFF_UP * p[BOUND_F] + p[BOUND_F] * row[BAR] else math.copysign(1.0, f)
-    if row[BAR] > 1e-7 or dg == 0.0:
-        row[KIND], row[STABLE] = DEGENERATE, 0.0
-        row[BAR] = max(1e-6, 2.0 * math.sqrt(noise / max(p[BOUND_DDG], 1e-300)))
-    elif dg > 0.0:
+    row[STABLE] = 0.0 if abs(f) <= 16.0 * ROUNDOFF_UP * p[BOUND_F] + p[BOUND_F] * bar else math.copysign(1.0, f)
+    if dg > 0.0:
         row[KIND] = SADDLE
     else:
         row[KIND] = NODE if f * f + 4.0 * dg >= 0.0 else FOCUS
-        if row[STABLE] < 0.0:
+        if row[STABLE] < 0.0 and dg < 0.0:
             attracted(p, f, dg, row)
 
 

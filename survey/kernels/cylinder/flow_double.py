@@ -57,19 +57,8 @@ from survey.kernels.cylinder.steps import (
 )
 from survey.kernels.cylinder.winding import ends, zeros
 from survey.kernels.jit import inline, kernel
-from survey.kernels.math.double import (
-    HALF_PI,
-    HALF_PI_REST,
-    add,
-    convolved,
-    mul,
-    neg,
-    over,
-    shifted,
-    square,
-    times,
-    two_prod,
-)
+from survey.kernels.math.angles_double import centred, radians, sine_cosine
+from survey.kernels.math.double import add, convolved, mul, neg, over, shifted, square, times, two_prod
 from survey.kernels.math.newton import bracketed
 from survey.kernels.math.roundoff import PAIR_ROUNDOFF, ROUNDOFF_UP
 
@@ -79,7 +68,6 @@ ROUGH = 16.0 * PAIR_ROUNDOFF  # rounding of a sum or a product of the series, re
 FALL = 1.0 / 50.0  # by more, two terms further on, no series is trusted to fall
 LIMIT = 20_000  # steps; about 0.4 s
 SLOWER = 3.0  # steps may grow by this factor: what needs more than LIMIT even then is given up at once
-TERMS = 15  # of the sine and of the cosine of an eighth of a turn at most
 _S, _C, _W = range(3)
 
 
@@ -87,36 +75,6 @@ _S, _C, _W = range(3)
 def scratch():
     """The series of S, C and w."""
     return np.zeros((3, 2, ORDER + 1))
-
-
-@inline
-def radians(turns):
-    """2 pi turns."""
-    high, low = two_prod(4.0 * turns, HALF_PI[0])
-    return add(add((high, low), two_prod(4.0 * turns, HALF_PI[1])), (4.0 * turns * HALF_PI_REST, 0.0))
-
-
-@inline
-def centred(phi):
-    """phi in about [-pi, pi], and the turns taken out of it."""
-    turns = math.floor(phi[0] / (4.0 * HALF_PI[0]) + 0.5)
-    return add(phi, neg(radians(turns))), turns
-
-
-@kernel
-def sine_cosine(phi):
-    """sin and cos of |phi| < 4, to a few units of double-double."""
-    quarter = math.floor(phi[0] / HALF_PI[0] + 0.5)
-    x = add(phi, neg(radians(0.25 * quarter)))
-    z = square(x)
-    s, c = (1.0, 0.0), (1.0, 0.0)
-    for n in range(TERMS, 0, -1):
-        s = shifted(neg(over(mul(z, s), 2.0 * n * (2.0 * n + 1.0))), 1.0)
-        c = shifted(neg(over(mul(z, c), 2.0 * n * (2.0 * n - 1.0))), 1.0)
-    s = mul(s, x)
-    for _ in range(int(quarter) % 4):
-        s, c = c, neg(s)
-    return s, c
 
 
 @inline
@@ -218,7 +176,7 @@ def clean(p, phi, w, bar_phi, bar_w):
 def trajectory(p, phi0, w0, asked, floats, turnings):
     """As `steps.trajectory`, and `winding.counts`."""
     A, T, eqs, end = scratch(), table(), np.zeros((MOST, 10)), np.zeros(5)
-    size = equilibria(p, eqs)
+    size, _hidden = equilibria(p, eqs)
     phi, turns = centred((phi0, 0.0))
     w, t, ellipse = (w0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.0)
     sign, count, j, unsure = side(p, phi, w0), 0, 0, 0

@@ -84,7 +84,7 @@ def zeros(end, dt):
 def counts(setting, begin, at, p, phi0, w0, times, tolerance, limit, out):
     """Fill out[j] with the number of turning points before the ascending times[j] >= 0 where it is UNDETERMINED."""
     eqs, end, T = np.zeros((MOST, 10)), np.zeros(5), table()
-    count = equilibria(p, eqs)
+    count, _hidden = equilibria(p, eqs)
     if p[BOUND_G] == 0.0 or rests(p, phi0, w0):
         out[: len(times)] = 0
         return

@@ -6,7 +6,7 @@ parameters alone and is computed once for all initial states.
 
 import math
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -148,6 +148,7 @@ class Skeleton:
     librations: np.ndarray
     thresholds: np.ndarray  # (w_c, w_d) of the two rotation maps; NaN where every turn from w > 0 is completed
     conclusive: bool  # do the signs of D fit together (so the parity law holds), and did every map answer?
+    folded: bool  # is an equilibrium degenerate, or so nearly that float64 hides it, and with it cycles?
 
 
 def sizes(b12, b31, d, c23, s2, s3):
@@ -177,6 +178,20 @@ def stratum_of(b12, b31, d, c23, s2, s3):
 
 def skeleton(method, six):
     """The skeleton of one parameter point (six numbers)."""
+    s = outline(six)
+    if s.stratum != G:
+        return s
+    six, eqs, thresholds = list(s.p[:6]), s.equilibria, s.thresholds.copy()
+    plus, thresholds[0], first = _rotations(method, six, eqs, s.section, s.K, s.L)
+    mirrored = [six[0], -six[1], six[2], -six[3], -six[4], six[5]]
+    minus, thresholds[1], second = _rotations(method, mirrored, _mirrored(eqs), -s.section, s.K, -s.L)
+    librations, third = _librations(method, s.p, eqs, s.folded)
+    conclusive = first and second and third
+    return replace(s, plus=plus, minus=minus, librations=librations, thresholds=thresholds, conclusive=conclusive)
+
+
+def outline(six):
+    """The skeleton without its cycles, which take almost all of the time."""
     six = [float(value) for value in six]
     p = np.ascontiguousarray(coefficients(*six))
     K, L = constants(*six)
@@ -184,17 +199,10 @@ def skeleton(method, six):
     sign = np.sign(K) if K != 0.0 else np.sign(L)
     ends = np.array([sign, sign if K != 0.0 else -sign])
     table = np.zeros((eq.MOST, 10))
-    eqs = table[: eq.equilibria(p, table)] if stratum != I0 else table[:0]
-    section = _section(p, eqs)
+    count, folded = eq.equilibria(p, table) if stratum != I0 else (0, False)
+    eqs = table[:count]
     none, thresholds = np.zeros((0, 10)), np.full((2, 2), np.nan)
-    if stratum != G:
-        return Skeleton(p, stratum, K, L, ends, section, eqs, none, none, none, thresholds, True)
-    plus, thresholds[0], first = _rotations(method, six, eqs, section, K, L)
-    mirrored = [six[0], -six[1], six[2], -six[3], -six[4], six[5]]
-    minus, thresholds[1], second = _rotations(method, mirrored, _mirrored(eqs), -section, K, -L)
-    librations, third = _librations(method, p, eqs)
-    conclusive = first and second and third
-    return Skeleton(p, stratum, K, L, ends, section, eqs, plus, minus, librations, thresholds, conclusive)
+    return Skeleton(p, stratum, K, L, ends, _section(p, eqs), eqs, none, none, none, thresholds, True, folded)
 
 
 def _section(p, eqs):
@@ -259,12 +267,14 @@ def _far_cycle(p, section, K, L, scale):
     return np.array([w, 1.0 + slope, 2 * math.pi / w, 10.0 * scale, abs(slope) + 1e-15, 0.0, 1.0, 0, -side, side])
 
 
-def _librations(method, p, eqs):
+def _librations(method, p, eqs, folded):
     """Libration cycles, by their right turning point, of every interval where g < 0; are they conclusive?"""
     table, edges, fine, found = np.zeros((rt.MOST_CYCLES, 10)), np.zeros(7), max(FINE, method.FLOW_FINEST), 0
     share, sure = 1.0 / (1.0 + np.exp(-np.linspace(-11.0, 11.0, 56))), True
     for i, row in enumerate(eqs):
         if row[eq.DG] < 0.0 and row[eq.KIND] != eq.DEGENERATE:
+            if folded and eq.blurred(p, row[eq.ANGLE], row[eq.DG])[1]:
+                continue  # in float64 motions beside it stand still
             high = eqs[i + 1, eq.ANGLE] if i + 1 < len(eqs) else eqs[0, eq.ANGLE] + 2.0 * math.pi
             xs = row[eq.ANGLE] + share * (high - row[eq.ANGLE])
             found = method.flow_cycles(rt.LIBRATION, p, eqs, len(eqs), high, i, xs, fine, table, found, edges)

@@ -14,17 +14,16 @@ from survey.kernels.cylinder import equilibria as eq
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder import returns as rt
 from survey.kernels.cylinder.branches import unstable
-from survey.kernels.cylinder.flow import BOUND_DDG, BOUND_DG, BOUND_F
+from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F
 from survey.kernels.cylinder.steps import TURNING
-from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.measures.cylinder import solution
-from survey.measures.cylinder.fate import EXACT, I0, G, followed, remembered, sizes
+from survey.measures.cylinder.fate import EXACT, I0, G, followed, outline, remembered, sizes
 from survey.status import NO_CONVERGENCE, OK
 
 # Numbers that are kept: surveys of random points found at most 4 cycles, and g has at most 4 roots.
-CYCLES, EQUILIBRIA = 8, 4
+CYCLES, EQUILIBRIA = 8, eq.MOST
 NONE, ROTATION_PLUS, ROTATION_MINUS, LIBRATION = range(4)
-TOO_MANY, UNKNOWN_RESTS = 20, 21  # as in the STATUS of scenes/gyrostat.py
+TOO_MANY, UNKNOWN_CYCLES = 20, 21  # as in the STATUS of scenes/gyrostat.py
 UNDECIDED, DEGENERATE, STABLE = -1, 0, 1
 COUNTS = ("equilibria", "saddles", "rotations_plus", "rotations_minus", "librations")
 ROUNDING = 4e-16  # of K and L, relative to the sizes of their terms
@@ -47,14 +46,17 @@ def solve(method, systems, rtol):
     """Every output for rows of six finite parameters."""
     result, listed = empty(len(systems), OK), []
     for i, six in enumerate(systems):
-        s = remembered(method, six)
+        s = outline(six)
         _ends(s, six, result, i)
-        if any(_is_degenerate(s, row) for row in s.equilibria):
-            # then the error bounds leave open how many equilibria and cycles there are
-            result["verdict"][i], result["status"][i] = DEGENERATE, UNKNOWN_RESTS
-            continue
-        result["verdict"][i] = _verdict(method, s, rtol)
         _rests(s, result, i)
+        if s.folded or any(_is_hopf(s, row) for row in s.equilibria):
+            # then the error bounds leave open how many cycles there are
+            result["verdict"][i], result["status"][i] = DEGENERATE, UNKNOWN_CYCLES
+            continue
+        s = remembered(method, six)
+        result["verdict"][i] = _verdict(method, s, rtol)
+        for name, table in zip(COUNTS[2:], (s.plus, s.minus, s.librations), strict=True):
+            result[name][i] = len(table)
         cycles = [(kind, row) for kind, table in enumerate((s.plus, s.minus, s.librations), 1) for row in table]
         if len(cycles) > CYCLES:
             result["verdict"][i], result["status"][i] = UNDECIDED, TOO_MANY
@@ -76,13 +78,11 @@ def _ends(s, six, result, i):
 
 
 def _rests(s, result, i):
-    """Equilibria with their types, and the counts, of point i; in the stratum I0 every angle is one."""
+    """Equilibria with their types, and their numbers, of point i; in the stratum I0 every angle is one."""
     kinds = s.equilibria[:, eq.KIND]
-    cycles = len(s.plus), len(s.minus), len(s.librations)
-    rests = (-1, -1) if s.stratum == I0 else (len(kinds), np.count_nonzero(kinds == eq.SADDLE))
-    for name, number in zip(COUNTS, (*rests, *cycles), strict=True):
-        result[name][i] = number
-    for at, row in enumerate(s.equilibria[:EQUILIBRIA]):
+    if s.stratum != I0:
+        result["equilibria"][i], result["saddles"][i] = len(kinds), np.count_nonzero(kinds == eq.SADDLE)
+    for at, row in enumerate(s.equilibria):
         result["equilibrium_phi"][i, at] = row[eq.ANGLE]
         result["equilibrium_phi_error"][i, at] = row[eq.BAR] + 1e-15
         result["equilibrium_type"][i, at] = _type(row)
@@ -118,11 +118,8 @@ def _is_exact(p):
     return b12 * s3 == b31 * s2
 
 
-def _is_degenerate(s, row):
-    """Does the bound of an equilibrium reach g' = 0, or f = 0 where it is no saddle (in stratum G a Hopf point)?"""
-    p = s.p
-    if row[eq.KIND] == eq.DEGENERATE or abs(row[eq.DG]) <= p[BOUND_DDG] * row[eq.BAR] + 8.0 * ROUNDOFF_UP * p[BOUND_DG]:
-        return True
+def _is_hopf(s, row):
+    """Is in stratum G f = g = 0 at an equilibrium that is no saddle, within its bound?"""
     return s.stratum == G and row[eq.KIND] != eq.SADDLE and row[eq.STABLE] == 0.0
 
 

@@ -1,16 +1,15 @@
 """Portraits: K, L and equilibria in multiprecision, cycles by another integrator, symmetries, laws, exact strata."""
 
 import math
-from types import SimpleNamespace
 
 import mpmath
 import numpy as np
 import pytest
+from flow_truth import is_real, roots
 from scipy.integrate import solve_ivp
 
 from survey.kernels.cylinder import branches
 from survey.kernels.cylinder import equilibria as eq
-from survey.kernels.cylinder.flow import coefficients
 from survey.measures.cylinder import fate as cf
 from survey.measures.cylinder import portrait as cp
 from survey.methods import dop853, taylor
@@ -252,47 +251,42 @@ def test_where_K_is_zero_within_its_rounding_only_the_verdict_is_degenerate():
         (0.0, 0.5, 0.25, 0.75, 0.75, 1.0),  # f = g = 0: a Hopf point
     ],
 )
-def test_at_degenerate_equilibria_nothing_is_counted(six, off):
+def test_at_degenerate_equilibria_no_cycles_are_counted(six, off):
     """g = -c23 + s2, g' = -d - s3 and f = b12 at phi = 0; `off` splits or lifts the roots, by 1e-16 to 1e-5 rad."""
     six = np.array(six)
     six[5 if six[5] < 0 else 0] += off
     found = portraits(six)
-    assert found["status"][0] == cp.UNKNOWN_RESTS and found["verdict"][0] == 0
-    assert all(found[name][0] == -1 for name in cp.COUNTS)
-    assert np.isnan(found["equilibrium_phi"]).all() and np.isnan(found["cycle_w"]).all()
+    assert found["status"][0] == cp.UNKNOWN_CYCLES and found["verdict"][0] == 0
+    assert all(found[name][0] == -1 for name in cp.COUNTS[2:])
+    assert np.isnan(found["cycle_w"]).all()
+    size, bars = found["equilibria"][0], found["equilibrium_phi_error"][0]
+    assert np.isfinite(bars).sum() == size
+    inside = np.zeros(size)
+    for angle in filter(is_real, roots(six)):
+        slips = [abs(mpmath.expj(angle) - mpmath.expj(phi)) for phi in found["equilibrium_phi"][0, :size]]
+        home = np.flatnonzero(np.array(slips) <= bars[:size])
+        assert len(home) == 1
+        inside[home] += 1
+    assert (inside >= 1).all() and ((inside > 1) == (found["equilibrium_type"][0, :size] == 8)).all()
     assert found["K"][0] == pytest.approx(six[0] * six[5] - six[1] * six[4], abs=1e-15)
     assert found["stratum"][0] == (3 if six[1] else 1)
 
 
 def test_beside_degenerate_equilibria_roots_are_counted_right():
-    """Double and triple roots taken apart by 1e-18 to 1e-6 of a parameter: counted as mpmath does, or not at all."""
+    """Double and triple roots taken apart by 1e-18 to 1e-6 of a parameter: counted as mpmath does."""
     random = np.random.default_rng(5)
-    p, table, counted = np.empty(10), np.zeros((eq.MOST, 10)), 0
+    rows = []
     for i in range(200):
         six = random.integers(-8, 9, 6) / 4.0
         six[5] = -six[2]  # g' = 0
         six[4] = six[3] = six[3] * (i % 2)  # g = 0, of g'' too
-        six[4 + i // 2 % 2] += random.choice([-1, 1]) * 10.0 ** random.uniform(-18, -6)
-        p[:] = coefficients(*six)
-        rows = table[: eq.equilibria(p, table)]
-        s = SimpleNamespace(p=p, stratum=cf.I1)
-        if not rows.size or any(cp._is_degenerate(s, row) for row in rows):
-            continue
-        counted += 1
-        assert len(rows) == roots(six)
-    assert counted > 20
-
-
-def roots(six):
-    """Number of zeros of g: of a polynomial in exp(i phi) on the unit circle."""
-    with mpmath.workdps(60):
-        d, c23, s2, s3 = map(mpmath.mpf, six[2:])
-        a, b = mpmath.mpc(-c23, d / 2) / 2, mpmath.mpc(s2, s3) / 2
-        if a == 0 and b == 0:
-            return 0
-        row = [a, b, 0, mpmath.conj(b), mpmath.conj(a)] if a != 0 else [b, 0, mpmath.conj(b)]
-        found = mpmath.polyroots(row, maxsteps=500, extraprec=600)
-        return sum(abs(abs(z) - 1) < mpmath.mpf(10) ** -25 for z in found)
+        six[4 + i // 2 % 2] += random.choice([-1, 1]) * 10.0 ** random.uniform(-16, -6)
+        rows.append([0.0, 0.0, *six[2:]])  # without Barnett-London effect there are no maps to follow
+    found = portraits(rows)
+    told = found["equilibria"] >= 0
+    for i in np.flatnonzero(told & ~(found["equilibrium_type"] == 8).any(axis=1)):
+        assert found["equilibria"][i] == sum(map(is_real, roots(rows[i])))
+    assert told.sum() > 180
 
 
 def test_beside_a_saddle_connection_nothing_is_claimed():
