@@ -313,7 +313,11 @@ def doubts(A, k, L, a, b, c, low, high, u0, e, work, found, o):
         x = (found[j, 0], found[j, 1])
         u = add(u0, x)[0]
         if value(square, x)[0] > 0.0 and abs(u) < 1.0:
-            o[13] = max(o[13], rounds * (1.0 - u * u) / abs(value(c, x)[0]))
+            height = abs(value(c, x)[0]) + 1e-300
+            size = 0.0
+            for n in range(4, -1, -1):
+                size = size * abs(x[0]) + abs(c[n, 0])
+            o[13] = max(o[13], rounds * (1.0 - u * u) / height, 10.0 * ROUNDS * size / height)
             o[16] = max(o[16], (abs(b - a * u) + abs(a - b * u)) / (1.0 - u * u) / A)
     for side in range(2):
         u = e[side, 0]
@@ -373,8 +377,11 @@ def states(points, most, out):
                 elif upper < 0:
                     upper = j
         if number < 1 or (lower < 0 and b[0] != -a[0]) or (upper < 0 and b[0] != a[0]) or (p[0] == 0.0):
-            known = 1e-28 * (abs(cos[0]) * (2.0 * abs(energy[0]) + 8.0 * abs(k[0])) + abs(a[0] * X[0]))
-            if p[0] != 0.0 or abs(c[1, 0]) <= known:
+            size = abs(energy[0]) + abs(k[0]) + a[0] * a[0] + b[0] * b[0]
+            if p[0] != 0.0 or abs(c[1, 0]) <= 1e-30 * size:
+                continue
+            slope = level[0] if b[0] == a[0] else below[0]
+            if abs(b[0]) == abs(a[0]) and abs(slope) <= 1e-12 * size:  # two roots beside a pole look like one
                 continue
             # at rest: the start is a root itself, exactly
             if c[1, 0] > 0.0:

@@ -116,15 +116,23 @@ def _fate(given, answer):
 
 
 def _same(given, answer, options, mirror):
-    """Where the exact mirror image (S2), scaled by powers of two (S5), has another verdict: a mask."""
+    """Where the exact mirror image (S2), scaled by powers of two (S5), has another fate, or portrait: a mask.
+
+    Verdict 0 of a portrait, degenerate within its bars, contradicts no other: where both are 1, they have the same
+    numbers of equilibria and of cycles.
+    """
     image = {}
     for name, values in given.items():
         k = 4.0 if name in ("b12", "b31", "w0") else 16.0 if name in SYSTEM else 1.0
         sign = -1.0 if mirror and name in ("phi0", "w0", "b31", "c23", "s2") else 1.0
         image[name] = np.asarray(values) * (k * sign)
-    other = _solved(image, options)["verdict"].values
-    said = answer["verdict"]
-    turned = np.array([MIRROR.get(int(v), int(v)) for v in said]) if options["question"] == "fate" else said
+    solved, said = _solved(image, options), answer["verdict"]
+    other = solved["verdict"].values
+    if options["question"] == "portrait":
+        two = np.array([[x[name] for name in ("equilibria", "saddles", "librations")] for x in (answer, solved)])
+        rotations = [x["rotations_plus"] + x["rotations_minus"] for x in (answer, solved)]
+        return (said == 1) & (other == 1) & ((two[0] != two[1]).any(axis=0) | (rotations[0] != np.array(rotations[1])))
+    turned = np.array([MIRROR.get(int(v), int(v)) for v in said])
     return (said >= 0) & (other >= 0) & (turned != other)
 
 
