@@ -100,7 +100,7 @@ def test_a_point_is_the_nearest_one_with_its_bars_and_reasons(mathieu):
     [
         ("mathieu", {"a": 4.0, "q": 0.0}, "exact rule"),
         ("mathieu", {"a": 0.5, "q": 0.1}, "times their error bars"),
-        ("mathieu", {"a": 0.5, "q": 0.1, "variables": ["verdict"]}, "does not hold"),
+        ("mathieu", {"a": 0.5, "q": 0.1, "variables": ["verdict"]}, "does not contain"),
         ("satellite", {"k": [0.5, 1.0], "rho": 1.0}, "invalid_parameters"),
         ("libration", {"mu": 0.012}, "M_ray = -148."),
         ("libration", {"mu": 0.01}, "have one sign"),

@@ -363,7 +363,7 @@ def test_a_full_disk_is_one_line_and_the_run_can_go_on(folder, unbroken):
         program = PROGRAM.replace("from", "survey.sweep.engine.refuse_too_large = lambda _: None; from")
         command = [sys.executable, "-c", program, "run", "sweep.toml", "--quiet"]
         done = subprocess.run(command, cwd=disk, capture_output=True, text=True, timeout=60)
-        assert done.returncode == 4 and "are free" in done.stderr and done.stderr.count("\n") == 1, done.stderr
+        assert done.returncode == 4 and "bytes free" in done.stderr and done.stderr.count("\n") == 1, done.stderr
         kept = len(blocks(disk))
         subprocess.run(["mount", "-o", "remount,size=20m", disk], check=True)
         code, stderr = resume(disk)

@@ -92,7 +92,7 @@ def test_a_large_file_is_opened_lazily_and_checked_piece_by_piece(small, tmp_pat
 
 def test_what_compiling_kernels_and_file_took_is_told_apart(surveyed, small, tmp_path):
     finished = engine.run(workflow.read(small, output=tmp_path / "o.nc"))
-    assert min(finished.compiling, finished.computing, finished.beside, finished.writing) >= 0
+    assert min(finished.compiling, finished.computing, finished.edges_and_cells, finished.writing) >= 0
     assert 0 <= xr.load_dataset(surveyed).attrs["compile_time_s"] <= xr.load_dataset(surveyed).attrs["wall_time_s"]
 
 

@@ -273,7 +273,7 @@ def test_without_the_token_there_is_nothing_and_from_elsewhere_nobody():
         assert taken.returncode == 2 and taken.stderr.startswith(f"survey: --port {port}: Address already in use")
         process.send_signal(signal.SIGINT)
         assert process.wait(timeout=20) == 0
-        assert process.stderr.read().endswith("ended\n")
+        assert process.stderr.read().endswith("stopped\n")
 
 
 @served

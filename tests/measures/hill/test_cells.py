@@ -136,7 +136,7 @@ def test_what_is_not_finite_stays_undecided():
 def test_threads_give_the_same_bits():
     solve, axes = solver(mathieu, "a", "q"), (Side(-2, 12, 7), Side(0, 5, 6))
     with ThreadPoolExecutor(3) as pool:
-        threaded = hill_cells.find(solve, *axes, each=lambda task, items: list(pool.map(task, items)))
+        threaded = hill_cells.find(solve, *axes, each=lambda task, items, what: list(pool.map(task, items)))
     alone = hill_cells.find(solve, *axes)
     np.testing.assert_array_equal(alone.box, threaded.box)
     np.testing.assert_array_equal(alone.verdict, threaded.verdict)
