@@ -187,7 +187,7 @@ def write(output, found, identity, complete):
     for fault in _spread(faults):
         words = f"{fault['kind']}, {fault['scene']}, {fault['region']}: {fault['what']} {fault['said']}"
         shown = [f"  {line}" for line in fault["line"].splitlines()]
-        page += [f"- {words} (chunk {fault['chunk']})", "", "  ```python", *shown, "  ```"]
+        page += [f"- {words} (chunk {fault['chunk']})", "", "  ```text", *shown, "  ```"]
     output.parent.mkdir(parents=True, exist_ok=True)
     output.write_text("\n".join(page) + "\n")
     return count
