@@ -2,7 +2,7 @@
 
 from survey.kernels.jit import inline
 
-ROUNDING = 2.2e-16  # about two roundings; `rounding` takes it twice
+ROUNDING = 2.2e-16  # about two roundings; `rounding` takes it twice, for z four times
 
 
 @inline
