@@ -18,6 +18,7 @@ from survey.file import disk, reading, schema
 from survey.file.labels import count, counts, describe, flag_codes, layout, percent
 from survey.grid import Grid, lines
 from survey.request import trust, user_scene
+from survey.request.abel_scene import AbelScene
 from survey.request.checks import check_options, check_parameters, check_request, methods_of
 from survey.request.hill_scene import HillScene, is_number
 from survey.request.workflow import check, read
@@ -38,7 +39,8 @@ def run(
 
     Parameters
     ----------
-    workflow : path of a workflow file, or a mapping with the same tables (its scene may be what `survey.hill` returns).
+    workflow : path of a workflow file, or a mapping with the same tables (its scene may be what `survey.hill` or
+        `survey.abel` returns).
     output : path of the netCDF file, instead of the workflow's.
     workers : number of worker processes; by default threads of this process.
     scheduler : address or scheduler file of a dask.distributed cluster.
@@ -87,7 +89,7 @@ def draw(ds: xr.Dataset, workflow: Any) -> list[Path]:
 
 
 def evaluate(
-    scene: str | os.PathLike[str] | HillScene,
+    scene: str | os.PathLike[str] | HillScene | AbelScene,
     *,
     method: str = "auto",
     rtol: float = 1e-10,
@@ -99,7 +101,8 @@ def evaluate(
     Parameters
     ----------
     scene : name of a scene, such as "satellite" (`survey.scenes()` lists them, `survey scenes NAME` explains one); the
-        path of a file with your own Hill equation (see `survey/request/user_scene.py`); or what `survey.hill` returns.
+        path of a file with your own Hill or Abel equation (see `survey/request/user_scene.py`); or what `survey.hill`
+        or `survey.abel` returns.
     method : "auto" or the name of a method.
     rtol : requested accuracy, |error| <= rtol (1 + |value|); the `X_error` variables hold the error bounds reached.
     variables : names of the requested outputs; all by default. Errors and status are always included.
@@ -147,7 +150,7 @@ def evaluate(
 def open(path: str | os.PathLike[str], *, trust_scene: bool = False) -> xr.Dataset:
     """The dataset in the netCDF file `path`: in memory and the file closed; or lazy, if it takes more than 256 MiB.
 
-    Opening a file runs no code from it. A survey of your own Hill equation names a Python file, which has to run where
+    Opening a file runs no code from it. A survey of your own equation names a Python file, which has to run where
     points are solved (`ds.survey.trajectory`, `zoom`, the reason for a verdict): it does if you have run the same text
     here before; `trust_scene=True` allows it in this process.
 

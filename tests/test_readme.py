@@ -81,6 +81,20 @@ def test_the_scene_of_ones_own_runs(tmp_path, monkeypatch):
     assert int(ds.verdict) == 1 and ds.attrs["title"].startswith("Mathieu's equation with a second harmonic")
 
 
+def test_the_abel_equations_of_ones_own_run(capsys):
+    scope = {}
+    exec(fenced("python")[3], scope)
+    assert capsys.readouterr().out == "[0 1]\n" and (scope["ds"].status == 0).all()
+
+
+def test_the_example_of_the_josephson_junction_runs(tmp_path):
+    small = ["axes.a={values=[0.1, 0.5]}", "axes.I={values=[0.1, 0.3, 0.9]}", "output.figures=[]"]
+    checked = workflow.read(ROOT / "workflows/josephson.toml", small, tmp_path / "small.nc")
+    engine.run(checked)
+    ds = survey.open(checked.path)
+    assert ds.rotations_plus.values.tolist() == [[0, 1, 1], [0, 0, 1]] and (ds.verdict == 1).all()
+
+
 @pytest.mark.parametrize("name", ["whittaker_hill", "meissner"])
 def test_the_examples_of_own_scenes_run(name, tmp_path):
     axes = {"whittaker_hill": "m", "meissner": "q"}

@@ -76,8 +76,8 @@ def drift(path, old, new, changed, workflow):
         causes.append(f"from another version of the code ({_code(old, new)})")
         ways_back.append("that version")
     if "scene_hash" in changed:
-        causes.append("from another z(u, p)")
-        ways_back.append("that z")
+        causes.append("from another z(u, p), or other f and g")
+        ways_back.append("those functions")
     differences = _differences(folder, workflow)
     if not causes and not differences:
         differences = [f"{key} {_short(old.get(key))} -> {_short(new[key])}" for key in changed]

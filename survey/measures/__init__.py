@@ -21,6 +21,7 @@ QUESTIONS = {
             ("square", "axes", "fixed", "options"),
         ),
         "refusal": Function("why there are no curves on a map of these axes, in words; None if there are", ("axes",)),
+        "seconds": Function("estimated seconds of `closed` on one thread; a tenth of a second if missing", ("axes",)),
         "CLASSES": Value("{name: code} of the curves' classes", dict),
         "TITLE": Value("what a class is, one line", str),
         "ALONG": Value("survey.scene.Output of what is known at each point of a curve", tuple),

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from survey.kernels import lanes
+from survey.kernels.body import motion
 from survey.kernels.cylinder import fate, returns, steps
 from survey.kernels.cylinder.flow import (
     BOUND_DG,
@@ -36,8 +37,9 @@ from survey.kernels.math.dop853 import E3, E5, STAGES, A, B, C, combined
 from survey.kernels.math.runge_kutta import fundamental
 
 ORDER = 8
-SERVES = ("cylinder", "danby", "hill")
-COST = {"cylinder": 60.0, "danby": 2500.0, "hill": 80.0}  # time, relative to the default of each family
+SERVES = ("abel", "body", "cylinder", "danby", "hill")
+# time, relative to the default of each family
+COST = {"abel": 20.0, "body": 60.0, "cylinder": 60.0, "danby": 2500.0, "hill": 80.0}
 FLOW_FINEST = 1e-16  # useful tolerance for flows on the cylinder
 FLOW_WORK = 4  # steps, relative to the Taylor method
 _FIRST = LOW + 1  # stages lie in the lines of the table after the low series
@@ -237,6 +239,49 @@ def flow_fates(p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance
     fate.fates(
         flow_setting, flow_begin, flow_at, p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out
     )
+
+
+@kernel
+def _body_at(G, T, dt, state):
+    """The state at dt after the start of the step: one step of size dt."""
+    start = motion.state_of(T[0])
+    for i in range(STAGES):
+        motion.put(state, start)
+        for j in range(i):
+            for k in range(motion.STATE):
+                state[k] += dt * A[i, j] * T[motion.STAGE + j, k]
+        motion.put(T[motion.STAGE + i], motion.slope(G, 0.0, motion.state_of(state)))
+    for k in range(motion.STATE):
+        change = 0.0
+        for i in range(STAGES):
+            change += B[i] * T[motion.STAGE + i, k]
+        state[k] = T[0, k] + dt * change
+
+
+@kernel
+def _body_begin(G, state, tolerance, T, V):
+    """Start a step at `state` and find its size, from that of the step before."""
+    longest, new = motion.expanded(G, state, T, V), np.empty(motion.STATE)
+    h = min(T[LAST, motion.STEP] if T[LAST, motion.STEP] > 0.0 else 0.1 * longest, longest)
+    for _ in range(50):
+        _body_at(G, T, h, new)
+        doubt, error = 8.0 * _DOUBT * (h / longest) ** 3, 0.0
+        for k in range(motion.STATE):
+            share = motion.size_of(state) if k < 3 else 1.0
+            error = max(error, _flow_estimate(T, h, k, doubt) / share)
+        factor = min(max(0.9 * (error / tolerance + 1e-30) ** -0.125, 0.2), 4.0)
+        if error <= tolerance:
+            break
+        h *= factor
+    # the stages pass through sums that cancel
+    T[LAST, motion.STEP], T[LAST, motion.ERROR] = h * factor, error + 4e-16 * _WEIGHT * h / longest
+    return h if math.isfinite(new[0] + new[1] + new[2]) else math.nan
+
+
+@kernel
+def body_trajectories(G, starts, times, tolerance, limit, floats, status):
+    """See `kernels.body.motion.trajectories`."""
+    motion.trajectories(_body_begin, _body_at, G, starts, times, tolerance, limit, floats, status)
 
 
 @inline

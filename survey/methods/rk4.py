@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from survey.kernels.body import motion
 from survey.kernels.cylinder import fate, returns, steps
 from survey.kernels.cylinder.flow import (
     BOUND_DG,
@@ -33,8 +34,13 @@ from survey.kernels.math.runge_kutta import classical
 from survey.kernels.unroll import unroll
 
 ORDER = 4
-SERVES = ("cylinder", "danby", "hill")
-COST = {"cylinder": 3000.0, "danby": 5000.0, "hill": 13.0}  # time, relative to the default of each family
+SERVES = ("body", "cylinder", "danby", "hill")
+COST = {
+    "body": 3000.0,
+    "cylinder": 3000.0,
+    "danby": 5000.0,
+    "hill": 13.0,
+}  # time, relative to the default of each family
 FLOW_FINEST = 1e-13  # useful tolerance for flows on the cylinder
 FLOW_WORK = 50  # steps, relative to the Taylor method
 NODES = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -155,6 +161,32 @@ def flow_fates(p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance
     fate.fates(
         flow_setting, flow_begin, flow_at, p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out
     )
+
+
+@kernel
+def _body_at(G, T, dt, state):
+    """The state at dt after the start of the step: two half steps."""
+    middle = classical(motion.slope, G, (0.0, 0.0, 0.0), motion.state_of(T[0]), 0.5 * dt)
+    motion.put(state, classical(motion.slope, G, (0.0, 0.0, 0.0), middle, 0.5 * dt))
+
+
+@kernel
+def _body_begin(G, state, tolerance, T, V):
+    """Start a step; its error is that of two half steps, by Richardson, with a margin of 2."""
+    h = motion.expanded(G, state, T, V) * min(1.0, (100.0 * tolerance) ** 0.25)
+    one, two, error = np.empty(motion.STATE), np.empty(motion.STATE), 0.0
+    motion.put(one, classical(motion.slope, G, (0.0, 0.0, 0.0), motion.state_of(state), h))
+    _body_at(G, T, h, two)
+    for k in range(motion.STATE):
+        error = max(error, abs(two[k] - one[k]) / (motion.size_of(state) if k < 3 else 1.0))
+    T[LAST, motion.ERROR] = error / 7.5
+    return h
+
+
+@kernel
+def body_trajectories(G, starts, times, tolerance, limit, floats, status):
+    """See `kernels.body.motion.trajectories`."""
+    motion.trajectories(_body_begin, _body_at, G, starts, times, tolerance, limit, floats, status)
 
 
 _ENDS = OWN + len(NODES)

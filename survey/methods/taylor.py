@@ -7,13 +7,25 @@ Mathematics 14 (2005) 99-117. Domain: every parameter value; explicit, so steps 
 
 import math
 
-from survey.kernels.cylinder import fate, lockstep, returns, steps, winding
-from survey.kernels.cylinder.flow import LAST, PHI, TRUNC_PHI, TRUNC_W, E, W, Y, longest_step, series
+from survey.kernels.body import motion
+from survey.kernels.cylinder import (
+    connections,
+    fate,
+    gyrostat,
+    lines,
+    lockstep,
+    lockstep_abel,
+    returns,
+    steps,
+    winding,
+)
+from survey.kernels.cylinder.flow import LAST, PHI, TRUNC_PHI, TRUNC_W, W, inside, longest_step, series
 from survey.kernels.cylinder.flow import ORDER as _ORDER
+from survey.kernels.cylinder.program import COLUMNS
 from survey.kernels.jit import inline, kernel
 
 ORDER = 20
-SERVES = ("cylinder",)
+SERVES = ("abel", "body", "cylinder")
 _FALL = 1.0 / 50.0  # by more, two terms further on, no series is trusted to fall
 FLOW_FINEST = 1e-17  # useful truncation error of a step
 FLOW_WORK = 1  # steps, relative to this method
@@ -46,16 +58,23 @@ def flow_begin(p, phi, w, tolerance, T):
 @kernel
 def flow_at(p, T, dt):
     """(phi, w, integral of f, integral of g) at dt after the start of the step."""
-    phi, w, e, y = T[_ORDER, PHI], T[_ORDER, W], T[_ORDER, E], T[_ORDER, Y]
-    for n in range(_ORDER - 1, -1, -1):
-        phi, w, e, y = phi * dt + T[n, PHI], w * dt + T[n, W], e * dt + T[n, E], y * dt + T[n, Y]
-    return phi, w, e, y
+    return inside(T, dt)
+
+
+def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
+    """See `lockstep.trajectories`, and for programs `steps.trajectories`: each is compiled when it is needed."""
+    solve = _in_lockstep if P.shape[1] == COLUMNS else _one_by_one
+    return solve(P, starts, times, tolerance, limit, floats, turnings, status)
 
 
 @kernel
-def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
-    """See `lockstep.trajectories`."""
+def _in_lockstep(P, starts, times, tolerance, limit, floats, turnings, status):
     return lockstep.trajectories(P, starts, times, tolerance, limit, floats, turnings, status)
+
+
+@kernel
+def _one_by_one(P, starts, times, tolerance, limit, floats, turnings, status):
+    steps.trajectories(flow_setting, flow_begin, flow_at, P, starts, times, tolerance, limit, floats, turnings, status)
 
 
 @kernel
@@ -64,9 +83,19 @@ def flow_turnings(P, starts, times, tolerance, limit, turnings):
     winding.turnings(flow_setting, flow_begin, flow_at, P, starts, times, tolerance, limit, turnings)
 
 
-@kernel
 def flow_abels(P, starts, targets, tolerance, limit, floats, status):
-    """See `steps.abels`."""
+    """See `lockstep_abel.abels`, and for programs `steps.abels`."""
+    solve = _abels_in_lockstep if P.shape[1] == COLUMNS else _abels_one_by_one
+    solve(P, starts, targets, tolerance, limit, floats, status)
+
+
+@kernel
+def _abels_in_lockstep(P, starts, targets, tolerance, limit, floats, status):
+    lockstep_abel.abels(P, starts, targets, tolerance, limit, floats, status)
+
+
+@kernel
+def _abels_one_by_one(P, starts, targets, tolerance, limit, floats, status):
     steps.abels(flow_setting, flow_begin, flow_at, P, starts, targets, tolerance, limit, floats, status)
 
 
@@ -88,3 +117,26 @@ def flow_fates(p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance
     fate.fates(
         flow_setting, flow_begin, flow_at, p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out
     )
+
+
+@kernel
+def flow_line(p, start, window, eqs, count, section, kind, tolerance, out):
+    """See `lines.line`."""
+    return lines.line(flow_setting, flow_begin, flow_at, p, start, window, eqs, count, section, kind, tolerance, out)
+
+
+@kernel
+def flow_connections(P, wanted, tolerance, out):
+    """See `connections.connections`."""
+    connections.connections(flow_setting, flow_begin, flow_at, P, wanted, tolerance, out)
+
+
+@kernel
+def _body_at(G, T, dt, state):
+    gyrostat.at(T, dt, state)
+
+
+@kernel
+def body_trajectories(G, starts, times, tolerance, limit, floats, status):
+    """See `kernels.body.motion.trajectories`."""
+    motion.trajectories(gyrostat.begin, _body_at, G, starts, times, tolerance, limit, floats, status)

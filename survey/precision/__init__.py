@@ -11,6 +11,10 @@ Everything specific to a scene is in the file of its name in `cases/`:
     LIMITED                the method whose operations, at the machine's peak rate, give the least time in the chart
     operations_of(run)     its operations while `run()` solves a work with it (both optional)
     MOST                   {method: number of points that it is timed on}, for slow ones (optional)
+    SCENE                  the scene, where a scene has several charts and the file another name (optional)
+
+Where a parameter for which one solution serves all values (times, angles) varies along the last axis, samples of the
+work keep whole rows.
 """
 
 import csv
@@ -75,7 +79,6 @@ class Least:
 def write(scene, directory, peers=False, say=lambda line: None):
     """Measure and write precision_SCENE.json, .csv and .png into `directory`; returns the three paths."""
     directory = Path(directory)
-    scenes.load(scene)
     case = modules.load(cases, scene, "scene with a precision chart")
     try:
         directory.mkdir(parents=True, exist_ok=True)
@@ -101,7 +104,7 @@ def measure(scene, case, peers=False, say=lambda line: None):
 
     A method is left out of a work if it has no answer for one of its references (closed forms, where there is none).
     """
-    module = scenes.load(scene)
+    module = _scene(scene, case)
     methods = ["auto", *methods_of(module, next(iter(case.works().values()))[1])]
     fewer = getattr(case, "MOST", {})
     runs = {(method, ""): (_solver(module, method, case.ERROR), fewer.get(method)) for method in methods}
@@ -111,17 +114,18 @@ def measure(scene, case, peers=False, say=lambda line: None):
     for name in sorted(set(modules.names(programs)) - set(absent)) if peers else ():
         peer = modules.load(programs, name, "peer")
         runs["", name] = _peer(case, peer), peer.POINTS
-    full = case.works()
+    full, shared = case.works(), _shared(module)
     thinned = {work: (_thinned(point), options) for work, (point, options) in full.items()}
     records = []
     for (method, peer), (solve, most) in runs.items():
         works = full if peer or method == "auto" else thinned
-        compile_seconds = _first_call(solve, works, most) if peer else _cold(scene, method)
-        for point, options in works.values() if method else ():  # every path is compiled before it is timed
+        timed = {work: (_sample(point, most, shared), options) for work, (point, options) in works.items()}
+        compile_seconds = _first_call(solve, *timed[_smallest(works)]) if peer else _cold(scene, method)
+        for point, options in timed.values():  # every path is compiled before it is timed
             solve(point, options, SETTINGS[0])
         for setting in SETTINGS:
             errors = {}
-            for work, (point, options) in works.items():
+            for work, (point, _options) in works.items():
                 references = case.references(work)
                 if method == "auto":  # it treats a dense row as a whole: its error is the one within such a row
                     errors, references = {}, [_within(reference, point) for reference in references]
@@ -130,10 +134,15 @@ def measure(scene, case, peers=False, say=lambda line: None):
                 error, wrong = errors[id(references)]
                 if np.isnan(error):
                     continue
-                seconds = _per_point(solve, point, options, setting, most)
+                seconds = _per_point(solve, *timed[work], setting)
                 records.append(Record(work, method, peer, setting, error, seconds, wrong, compile_seconds))
         say(f"{scene}: {method or peer} measured")
     return records
+
+
+def _scene(chart, case):
+    """The module of a chart's scene."""
+    return scenes.load(getattr(case, "SCENE", chart))
 
 
 def missing(peers):
@@ -146,7 +155,7 @@ def limit(scene, case):
     rates = flops.rates()
     if not hasattr(case, "LIMITED"):
         return {"rates": rates, "least": []}
-    solve = _solver(scenes.load(scene), case.LIMITED, case.ERROR)
+    solve = _solver(_scene(scene, case), case.LIMITED, case.ERROR)
     least = []
     for work, (point, options) in case.works().items():
         point = _thinned(point)
@@ -214,14 +223,24 @@ def _cold(scene, method):
 def first_call(scene, method):
     """Seconds of the first call of a scene's method in this process, minus those of the second."""
     case = modules.load(cases, scene, "scene with a precision chart")
-    solve = _solver(scenes.load(scene), method, case.ERROR)
-    return _first_call(solve, case.works(), getattr(case, "MOST", {}).get(method))
+    module, works = _scene(scene, case), case.works()
+    point, options = works[_smallest(works)]
+    point = _sample(point, getattr(case, "MOST", {}).get(method), _shared(module))
+    return _first_call(_solver(module, method, case.ERROR), point, options)
 
 
-def _first_call(solve, works, most=None):
-    """Seconds of the first call minus those of the second, on the smallest work."""
-    point, options = min(works.values(), key=lambda work: _points(work[0]))
-    point = _sample(point, most)
+def _smallest(works):
+    """The name of the work with the fewest points."""
+    return min(works, key=lambda work: _points(works[work][0]))
+
+
+def _shared(module):
+    """The parameters for which one solution serves all values, such as times."""
+    return {parameter.name for parameter in module.PARAMETERS if parameter.uncut}
+
+
+def _first_call(solve, point, options):
+    """Seconds of the first call minus those of the second."""
     times = []
     for _ in range(2):
         start = time.perf_counter()
@@ -245,9 +264,8 @@ def _against(solve, references, name, rtol):
     return worst, wrong
 
 
-def _per_point(solve, point, options, rtol, most=None):
-    """Median seconds per point of a few calls, on at most `most` points of the work."""
-    point = _sample(point, most)
+def _per_point(solve, point, options, rtol):
+    """Median seconds per point of a few calls."""
     times, begin = [], time.perf_counter()
     while len(times) < REPEATS and (not times or time.perf_counter() - begin < ENOUGH_SECONDS):
         start = time.perf_counter()
@@ -262,10 +280,18 @@ def _thinned(point):
     return {name: values[::every] if np.ndim(values) > 1 else values for name, values in point.items()}
 
 
-def _sample(point, most):
-    """At most `most` random points of the work."""
+def _sample(point, most, shared=()):
+    """At most `most` random points of the work, or about as many in whole rows where one of `shared` varies along them.
+
+    The parameters of `shared` are those for which one solution serves all values.
+    """
     if most is None or _points(point) <= most:
         return point
+    if any(name in shared and np.shape(values)[-1:] > (1,) for name, values in point.items() if np.ndim(values) > 1):
+        columns = max(np.shape(values)[-1] for values in point.values())
+        rows = max(np.shape(values)[0] for values in point.values() if np.ndim(values) > 1)
+        chosen = np.random.default_rng(0).permutation(rows)[: max(1, most // columns)]
+        return {name: values[chosen] if len(values) == rows else values for name, values in point.items()}
     names, flat = list(point), [values.ravel() for values in np.broadcast_arrays(*point.values())]
     chosen = np.random.default_rng(0).permutation(flat[0].size)[:most]
     return {name: values[chosen] for name, values in zip(names, flat, strict=True)}

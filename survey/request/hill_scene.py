@@ -1,15 +1,15 @@
 """The scene of a user's z(u, p): what a module of `survey.scenes` offers, as an object (see `user_scene`)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from survey import status
-from survey.errors import BadInput
 from survey.kernels.math.roundoff import EPS
 from survey.measures.hill import monodromy, motion, multiprecision, user_equation, why
+from survey.request.function_scene import FunctionScene
 from survey.scene import Parameter
 
 LONG_NAMES = {
@@ -23,7 +23,6 @@ SYMBOLS = {"y1": "y_1(T)", "y2": "y_2(T)", "dy1": "y_1'(T)", "dy2": "y_2'(T)"}
 SAME = 8 * user_equation.SLACK
 # Beginnings of those lines of numba's messages that do not say what is wrong.
 CHATTER = ("Failed in", "During", "This error", "There are", "- Of which", "Overload", "File ", "Unknown", "^", "[1]")
-_known = {}  # by hash: a worker process compiles a scene once, for all of its blocks
 # Meaning of two of the common codes here.
 STATUS = {
     "invalid_parameters": "outside the domain, or z or T is not finite there, or z is not even although EVEN = True",
@@ -32,7 +31,7 @@ STATUS = {
 
 
 @dataclass(frozen=True, eq=False)
-class HillScene:
+class HillScene(FunctionScene):
     """What a scene's module offers (see `survey.scenes`), for a user's z; `about` is its docstring."""
 
     z: Callable
@@ -51,11 +50,10 @@ class HillScene:
     OPTIONS = ()
     STATUS = STATUS
 
-    def __post_init__(self):
-        object.__setattr__(self, "__doc__", self.about)
-
-    def __reduce__(self):
-        return _restored, (self.HASH, [getattr(self, field.name) for field in fields(self)])
+    @property
+    def own(self):
+        """The parameters of z: all that there are."""
+        return self.PARAMETERS
 
     @property
     def OUTPUTS(self):
@@ -237,10 +235,7 @@ class HillScene:
         except Exception as error:
             failed = error
         if isinstance(failed, IndexError):
-            n = len(self.PARAMETERS)
-            if "only integers" in str(failed):
-                self._refuse("z(u, p) accesses a parameter by name, but p is an array", "write p[0], p[1], ...")
-            self._refuse(f"z(u, p) indexes beyond an array ({failed})", f"PARAMETERS names {n}: p[0] to p[{n - 1}]")
+            self._refuse_index("z(u, p)", failed)
         try:
             user_equation.at(self.z, np.empty((0, len(self.PARAMETERS))), np.empty((0, 1)))
         except user_equation.Raised as error:
@@ -271,17 +266,6 @@ class HillScene:
             return function(*arguments)
         except user_equation.Raised as error:
             self._refuse(f"z(u, p) raises {error.__cause__!r}", "make it return nan there")
-
-    def _where(self, point):
-        return ", ".join(f"{p.name} = {value:g}" for p, value in zip(self.PARAMETERS, point, strict=True))
-
-    def _refuse(self, what, remedy):
-        raise BadInput(f"{self.NAME}: {what}; {remedy}")
-
-
-def _restored(digest, values):
-    """The scene with these values; the same object for the same hash, so that its kernels are compiled once."""
-    return _known.setdefault(digest, HillScene(*values))
 
 
 def _at_full_period(output):

@@ -1,6 +1,6 @@
-"""A user's own Hill equation y'' + z(u, p) y = 0, surveyed like a built-in scene: from one file, or one function.
+"""A user's own equation, surveyed like a built-in scene: from one file, or from functions.
 
-The file holds
+The file of a Hill equation y'' + z(u, p) y = 0 holds
 
     z(u, p)      a function, plain or numba's, for 0 <= u <= T; p is the float64 array of the parameters, in order
     PARAMETERS   their names, or `survey.scene.Parameter`s, which have a domain, a unit and a default
@@ -8,19 +8,31 @@ The file holds
     EVEN         True if z(T - u) = z(u), which halves the work and makes edges certain; False by default
     BREAKS       where z or a derivative jumps, in [0, T]: number(s), or a function of p; none by default
 
-and optionally a docstring, TITLE and REFERENCES. It is executed like any Python file: use only files that you trust.
-A file that is named only by a survey runs if this user has run it here before, or allows it (see `trust.py`). Changes
-in what it imports are not noticed when a run is resumed. z is continued with period T. [boundaries] and [refine]
-assume that z is analytic in the parameters.
+that of an Abel equation w w' = f(phi, p) w + g(phi, p), or phi' = w, w' = f(phi, p) w + g(phi, p) in time,
+
+    f(phi, p), g(phi, p)    functions, plain or numba's; p as above
+    PARAMETERS              as above
+    PERIOD                  2 pi, if f and g have that period, which is checked; None by default
+
+and both optionally a docstring, TITLE and REFERENCES. It is executed like any Python file: use only files that you
+trust. A file that is named only by a survey runs if this user has run it here before, or allows it (see `trust.py`).
+Changes in what it imports are not noticed when a run is resumed. z is continued with period T. [boundaries] and
+[refine] assume that z is analytic in the parameters.
 
 z is known by samples. Every point has one at least every T/128 (T/256 if EVEN), stored as `z_resolved_width`; at the
 ends and middles of the axes there is one every T/16384 (T/32768), and a spike that only these show is refused. Features
 narrower than both may go unseen; near BREAKS the samples are as dense as necessary.
 
-Where float64 cannot decide a verdict, the point is solved again in double-double, as in built-in scenes: z is run once
-more, as Python, with mpmath's functions in place of those of math and numpy. Numbers in the code, PERIOD and BREAKS are
-taken as exact binary64 numbers (math.pi is not quite pi), and if EVEN, z is used up to T/2 and mirrored. Where z cannot
-be run like this, the attribute `z_more_digits` of the file says why, and float64's answer stays.
+f and g are run once at every set of parameters, as Python, to record their operations on phi; the record gives their
+Taylor series, bounds of them and of their rounding. So what depends on phi must be analytic: + - * / ** and functions
+of math or numpy (sin to atanh, exp to log10, sqrt, erf, hypot); what depends on p alone may branch and loop. Numbers in
+the code are taken as exact binary64 numbers.
+
+Where float64 cannot decide a verdict of a Hill equation, the point is solved again in double-double, as in built-in
+scenes: z is run once more, as Python, with mpmath's functions in place of those of math and numpy. Numbers in the code,
+PERIOD and BREAKS are taken as exact binary64 numbers (math.pi is not quite pi), and if EVEN, z is used up to T/2 and
+mirrored. Where z cannot be run like this, the attribute `z_more_digits` of the file says why, and float64's answer
+stays.
 """
 
 import hashlib
@@ -40,12 +52,15 @@ import numpy.typing as npt
 from survey.errors import BadInput, Untrusted
 from survey.measures.hill import monodromy
 from survey.request import trust
+from survey.request.abel_scene import AbelScene
 from survey.request.hill_scene import SAME, HillScene, is_number, reason
 from survey.scene import Parameter
-from survey.scenes import load
+from survey.scenes import gyrostat, load
 from survey.wording import reason_of, short, shown
 
 EXAMPLES = {
+    "f": "def f(phi, p): return -p[0]",
+    "g": "def g(phi, p): return p[1] - sin(phi)",
     "z": "def z(u, p): return p[0] + p[1] * cos(2 * u)",
     "PERIOD": "PERIOD = 3.14 (its length in u), or a function of p",
     "PARAMETERS": 'PARAMETERS = ("a", "b"), the names of p[0], p[1]',
@@ -53,6 +68,10 @@ EXAMPLES = {
 _made: Any = {}  # by hash: what `hill` has made in this process
 MAX_BYTES = 2**20  # of a scene's file
 REFERENCES = ("W. Magnus, S. Winkler, Hill's Equation, Interscience 1966",)
+ABEL_REFERENCES = (
+    "A. D. Polyanin, V. F. Zaitsev, Handbook of Exact Solutions for Ordinary Differential Equations, 2003",
+)
+OWN = (HillScene, AbelScene)
 
 
 def hill(
@@ -95,9 +114,50 @@ def hill(
     return scene
 
 
+def abel(
+    f: Callable[[Any, Any], Any],
+    g: Callable[[Any, Any], Any],
+    *,
+    parameters: str | Parameter | Iterable[str | Parameter],
+    period: float | None = None,
+    title: str | None = None,
+) -> AbelScene:
+    """The scene of Abel's equation w w' = f(phi, p) w + g(phi, p), for `survey.evaluate` and `survey.run`.
+
+    In time it is phi' = w, w' = f(phi, p) w + g(phi, p), so that turning points (w = 0) are passed.
+
+    Parameters
+    ----------
+    f, g : functions of phi and p, plain Python or numba's: p is the float64 array of the parameters, in order. What
+        depends on phi must be analytic: + - * / ** and functions such as sin, exp, sqrt of math or numpy.
+    parameters : their names, or `survey.scene.Parameter`s; phi0, w0, and t or phi are added to them.
+    period : 2 pi if f and g have that period, which is checked, else None.
+
+    Raises survey.BadInput with one line that names what is wrong.
+
+    Examples
+    --------
+    >>> import survey
+    >>> van_der_pol = survey.abel(lambda phi, p: p[0] * (1 - phi**2), lambda phi, p: -phi, parameters="mu")
+    >>> ds = survey.evaluate(van_der_pol, mu=1.0, phi0=2.0, t=[0.0, 5.0], question="trajectory")
+    >>> float(ds.phi[1].round(6))
+    -0.836907
+    """
+    functions = [getattr(h, "py_func", h) for h in (f, g)]
+    names = [getattr(h, "__name__", "f").strip("<>") for h in functions]
+    try:
+        text = "\n".join(dict.fromkeys(inspect.getsource(h) for h in functions))
+    except (OSError, TypeError):
+        text = ""
+    about = inspect.getdoc(functions[0])
+    scene = _abel(f, g, period, parameters, f"abel({', '.join(names)})", text, title, about, ())
+    _made[scene.HASH] = scene
+    return scene
+
+
 def find(scene: Any, near: str | Path | None = None) -> tuple[str, Any]:
-    """(name, scene) for a scene's name, a file `*.py` (relative to this folder, or else `near`), or `hill`'s scene."""
-    if isinstance(scene, HillScene):
+    """(name, scene) for a scene's name, a file `*.py` (relative to this folder, or else `near`), or an own scene."""
+    if isinstance(scene, OWN):
         return scene.NAME, scene
     if callable(scene):
         raise BadInput(
@@ -113,13 +173,14 @@ def find(scene: Any, near: str | Path | None = None) -> tuple[str, Any]:
 
 def check(scene: Any, grid: Any = None) -> None:
     """Raise BadInput if `scene` is a user's and is wrong at the ends and middles of the grid's axes."""
-    if not isinstance(scene, HillScene):
+    if not isinstance(scene, OWN):
         return
     along = [sorted({0, size // 2, size - 1}) for size in grid.sizes.values()] if grid else []
     points = [grid.point(tuple(slice(i, i + 1) for i in index)) for index in product(*along)] if grid else []
-    names = [p.name for p in scene.PARAMETERS]
+    own = scene.own
+    names = [p.name for p in own]
     values = np.array([[float(np.ravel(point[name])[0]) for name in names] for point in points])
-    inside = [all(p.holds(v) for p, v in zip(scene.PARAMETERS, row, strict=True)) for row in values]
+    inside = [all(p.holds(v) for p, v in zip(own, row, strict=True)) for row in values]
     with np.errstate(all="ignore"):  # values that are not finite are found by the check
         scene.check(values.reshape(-1, len(names))[np.array(inside, bool)])
 
@@ -140,11 +201,11 @@ def of_dataset(ds: Any) -> Any:
         return _made[digest]
     raise BadInput(
         f"scene = {name!r} was a function in Python: points cannot be solved again without it; "
-        "pass it to survey.hill again first"
+        "pass it to survey.hill or survey.abel again first"
     )
 
 
-def _from_file(name: str, digest: Any, near: Path) -> HillScene:
+def _from_file(name: str, digest: Any, near: Path) -> HillScene | AbelScene:
     """The scene in the file that a dataset names; none of it runs before its hash is compared and trusted."""
     try:
         path, text = _read(name, near)
@@ -169,9 +230,7 @@ def _read(name: str | os.PathLike[str], near: str | Path | None) -> tuple[Path, 
         raise BadInput(f"scene = {shown(str(name), 120)}: no file can have this name ({reason_of(error)})") from None
     if path is None:
         tried = " or ".join(dict.fromkeys(short(path, 120) for path in paths))
-        raise BadInput(
-            f"scene = {shown(str(name), 120)}: there is no file {tried}; name the file of your own Hill equation"
-        )
+        raise BadInput(f"scene = {shown(str(name), 120)}: there is no file {tried}; name the file of your own equation")
     try:
         with open(path, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK)) as file:
             regular = stat.S_ISREG(os.fstat(file.fileno()).st_mode)
@@ -186,7 +245,7 @@ def _read(name: str | os.PathLike[str], near: str | Path | None) -> tuple[Path, 
 
 
 @lru_cache(maxsize=32)
-def _from_text(name: str, text: str) -> HillScene:
+def _from_text(name: str, text: str) -> HillScene | AbelScene:
     """The scene in the text of a file."""
     module = ModuleType(Path(name).stem)
     module.__file__ = name
@@ -194,10 +253,14 @@ def _from_text(name: str, text: str) -> HillScene:
         exec(compile(text, name, "exec"), module.__dict__)
     except Exception as error:
         raise BadInput(f"{name}: the scene file failed to run ({type(error).__name__}: {reason(error)})") from None
-    for needed in ("z", "PERIOD", "PARAMETERS"):
+    is_abel = hasattr(module, "f") and hasattr(module, "g") and not hasattr(module, "z")
+    for needed in ("f", "g", "PARAMETERS") if is_abel else ("z", "PERIOD", "PARAMETERS"):
         if not hasattr(module, needed):
             raise BadInput(f"{name}: {needed} is missing; write {EXAMPLES[needed]}")
     title, references = getattr(module, "TITLE", None), getattr(module, "REFERENCES", ())
+    if is_abel:
+        about, period = module.__doc__ or inspect.getdoc(module.f), getattr(module, "PERIOD", None)
+        return _abel(module.f, module.g, period, module.PARAMETERS, name, text, title, about, references)
     optional = getattr(module, "EVEN", False), getattr(module, "BREAKS", ())
     about = module.__doc__ or inspect.getdoc(getattr(module.z, "py_func", module.z))
     return _hill(module.z, module.PERIOD, module.PARAMETERS, *optional, name, text, title, about, references)
@@ -214,19 +277,8 @@ def _hill(
 
     if not callable(z) or _arguments(z) != 2:
         refuse("z must be a function of two arguments, z(u, p); the parameters are p[0], p[1], ...")
-    if isinstance(parameters, (str, Parameter)) or not isinstance(parameters, Iterable):
-        parameters = (parameters,)
-    parameters = tuple(
-        p if isinstance(p, Parameter) else Parameter(str(p), str(p), _symbol(str(p))) for p in parameters
-    )
+    parameters = _parameters(parameters, monodromy.OUTPUTS, (), refuse)
     names = [p.name for p in parameters]
-    taken = {o.name for o in monodromy.OUTPUTS} | {"status", "method", "rtol", "variables", "scene"}
-    bad = [n for n in names if not n.isidentifier() or n in taken or names.count(n) > 1]
-    if not names or bad:
-        refuse(
-            f"PARAMETERS = {names!r}: give at least one name, each once, as an identifier that is neither an output "
-            "nor a keyword"
-        )
     if not isinstance(even, (bool, np.bool_)):
         refuse(f"EVEN = {even!r}: it must be True or False")
     if not callable(period) and not (is_number(period) and 0 < period < np.inf):
@@ -246,6 +298,50 @@ def _hill(
         HASH=hashlib.sha256(bits).hexdigest(), TITLE=title or about.splitlines()[0].rstrip("."), about=about,
         REFERENCES=tuple(references) or REFERENCES,
     )  # fmt: skip
+
+
+def _abel(
+    f: Any, g: Any, period: Any, parameters: Any,
+    name: str, text: str, title: str | None, about: str | None, references: Iterable[str],
+) -> AbelScene:  # fmt: skip
+    """The checked scene; raises BadInput."""
+
+    def refuse(message: str) -> NoReturn:
+        raise BadInput(f"{name}: {message}")
+
+    for letter, function in (("f", f), ("g", g)):
+        if not callable(function) or _arguments(function) != 2:
+            refuse(
+                f"{letter} must be a function of two arguments, {letter}(phi, p); the parameters are p[0], p[1], ..."
+            )
+    parameters = _parameters(parameters, gyrostat.OUTPUTS, ("phi0", "w0", "question", "branch"), refuse)
+    if period is not None and not (is_number(period) and abs(period - 2 * np.pi) <= 1e-15 * period):
+        refuse(f"PERIOD = {period!r}: it must be 2 pi, to which phi can be scaled, or None")
+    names = ", ".join(p.name for p in parameters)
+    about = inspect.cleandoc(about or f"w w' = f(phi, p) w + g(phi, p), p = ({names}).")
+    bits = text.encode() if name.endswith(".py") else _bits((f, g, period, parameters))
+    return AbelScene(
+        f=f, g=g, period=period, own=parameters, NAME=name, TEXT=text, HASH=hashlib.sha256(bits).hexdigest(),
+        TITLE=title or about.splitlines()[0].rstrip("."), about=about,
+        REFERENCES=tuple(references) or ABEL_REFERENCES,
+    )  # fmt: skip
+
+
+def _parameters(
+    given: Any, outputs: Iterable[Any], more: Iterable[str], refuse: Callable[[str], NoReturn]
+) -> tuple[Parameter, ...]:
+    """The parameters; refused where a name is that of an output, a keyword, or one of `more`."""
+    if isinstance(given, (str, Parameter)) or not isinstance(given, Iterable):
+        given = (given,)
+    parameters = tuple(p if isinstance(p, Parameter) else Parameter(str(p), str(p), _symbol(str(p))) for p in given)
+    names = [p.name for p in parameters]
+    taken = {o.name for o in outputs} | {"status", "method", "rtol", "variables", "scene", *more}
+    if not names or any(not n.isidentifier() or n in taken or names.count(n) > 1 for n in names):
+        refuse(
+            f"PARAMETERS = {names!r}: give at least one name, each once, as an identifier that is neither an output "
+            "nor a keyword"
+        )
+    return parameters
 
 
 def _symbol(name: str) -> str:

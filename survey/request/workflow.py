@@ -88,7 +88,7 @@ def check(data, text="", output=None, default_path="survey.nc", near=None):
     if not isinstance(data, Mapping):
         raise BadInput(f"{shown(data)} is neither the path of a workflow file nor a mapping with its tables")
     given_scene = data.get("scene")
-    if isinstance(given_scene, user_scene.HillScene):
+    if isinstance(given_scene, user_scene.OWN):
         data = {**data, "scene": given_scene.NAME}
     try:
         file = File.model_validate(data)

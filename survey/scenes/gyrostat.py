@@ -27,6 +27,14 @@ two branches, w ~ +-sqrt(2 g (phi - phi0)), both on the side of phi0 to which g 
 that the motion takes at t > 0, on which w has the sign of g(phi0); `branch = "before"` takes the other, by which the
 motion came: there w has the other sign and t < 0. Where w0 != 0 there is one branch, and the option changes nothing.
 
+With `saddle` instead of w0 the solution lies on a separatrix, exactly: on a branch of the saddle of that number (by
+angle in [0, 2 pi)), one that leaves it (`separatrix = "unstable"`) or runs into it ("stable"), on the `side` where
+phi0 is; of the saddle's copies, one a turn, that next to phi0. t = 0 where the branch, followed from the saddle,
+first passes phi0, before it turns; `w_start` is w there. Where there is no such saddle, or the branch turns before
+phi0, the status is `invalid_parameters`. For b = 0 these are closed forms at any t, also into a second saddle of the
+same energy. Degenerate equilibria count as saddles: they have branches here where b = 0 and the root of g is exactly
+multiple.
+
 An Abel solution has status `ok` where it certainly reaches phi, `turning` where it turns before phi or so near to it
 that phi lies within `phi_turning_error` of `phi_turning`.
 
@@ -49,6 +57,10 @@ Where an equilibrium is degenerate or a Hopf point within the rounding of binary
 double-double arithmetic, in disjoint discs that are proven to hold them; an equilibrium of the type `degenerate` stands
 for the two or three roots within its error bar, a pair of which may be complex.
 
+[boundaries] draws, over phi0 and w0, the stable manifolds of the saddles, cycles and equilibria; over two parameters of
+the system, where portraits change: folds and Hopf curves of equilibria, K = 0, saddle connections (see
+`measures/cylinder/curves.py`).
+
 Questions: `trajectory` (phi and w at t), `abel` (w and t at phi), `fate` (where the solution ends) and `portrait` (of
 the system, without an initial state).
 """
@@ -56,12 +68,10 @@ the system, without an initial state).
 import numpy as np
 
 from survey import methods
-from survey.kernels.cylinder import records as rc
-from survey.measures.cylinder import auto, fate, portrait, solution
+from survey.measures.cylinder import auto, blocks, orbit, portrait, separatrix, solution
 from survey.measures.cylinder.fate import NO_TURNS
 from survey.modules import load
-from survey.scene import Option, Output, Parameter, Request, Trajectory, named, plus_minus
-from survey.status import INVALID_PARAMETERS, OK
+from survey.scene import Option, Output, Parameter, Request, named, plus_minus
 
 TITLE = "Gyrostat with Barnett-London effect, rotation about axis 1"
 FAMILY = "cylinder"
@@ -77,6 +87,7 @@ _LARGE, _FAR = (
 _SYSTEM = ("b12", "b31", "d", "c23", "s2", "s3")
 _QUESTIONS = ("fate", "trajectory", "abel", "portrait")
 _FATE, _TIME, _ABEL, _PORTRAIT = ({"question": (name,)} for name in _QUESTIONS)
+_BRANCH = {"separatrix": ("unstable", "stable")}
 _STARTS = {"question": _QUESTIONS[:3]}
 
 PARAMETERS = (
@@ -89,6 +100,8 @@ PARAMETERS = (
     Parameter("phi0", "initial angle of rotation", r"\varphi_0", units="rad", default=0.0, when=_STARTS,
               **_FAR),
     Parameter("w0", "initial angular velocity", "w_0", default=0.0, when=_STARTS, **_LARGE),
+    Parameter("saddle", "number of the saddle on a separatrix of which the solution lies, by angle in [0, 2 pi)", "n_S",
+              instead_of="w0", minimum=1.0, maximum=4.0, when={"question": _QUESTIONS[1:3]}),
     Parameter("t", "time from the initial state (negative: before it)", "t", when=_TIME, uncut=True, **_LARGE),
     Parameter("phi", "angle of rotation at which w and t are asked, unwrapped", r"\varphi", units="rad", when=_ABEL,
               uncut=True, **_FAR),
@@ -97,6 +110,9 @@ OPTIONS = (
     Option("question", _QUESTIONS, "what is asked of the solution, or of the system"),
     Option("branch", ("after", "before"), "where w0 = 0, the branch w(phi) that the motion takes at t > 0 or at t < 0",
            only_with="phi"),
+    Option("separatrix", ("unstable", "stable"), "the branches that leave the saddle, or those that run into it",
+           only_with="saddle"),
+    Option("side", ("right", "left"), "the side of the saddle on which phi0 is", only_with="saddle"),
 )  # fmt: skip
 STATUS = {
     "turning": "the solution turns back before it reaches phi, or within phi_turning_error of it: phi_turning and "
@@ -108,8 +124,6 @@ STATUS = {
     "degenerate_equilibrium": "within rounding g = g' = 0 at an angle, or f = g = 0 at an equilibrium that is no "
     "saddle: the numbers of cycles are unknown; K, L, the stratum, the ends and the equilibria are given",
 }
-_TURNING = 16
-_MOST_TURNINGS = 2**31 - 1  # are kept as int32
 _FATES = {
     "undecided": -1, "focus_or_node": 0, "saddle": 1, "rotation_plus": 2, "rotation_minus": 3, "libration": 4,
     "spin_up_plus": 5, "spin_up_minus": 6, "periodic_rotation": 7, "periodic_libration": 8, "equilibrium_start": 9,
@@ -117,7 +131,6 @@ _FATES = {
 _ENDS = {"repelling": 0, "neutral": 1, "attracting": 2}
 _TYPES = ("none", "saddle", "attracting_node", "weak_node", "repelling_node", "attracting_focus", "weak_focus",
           "repelling_focus", "degenerate")  # fmt: skip
-_AROUND, _ORBIT_POINTS = np.arange(0, 2 * np.pi, np.pi / 3), 2001  # of the phase portrait
 DIMENSIONS = {
     "equilibrium": np.arange(1, portrait.EQUILIBRIA + 1),
     "cycle": np.arange(1, portrait.CYCLES + 1),
@@ -146,6 +159,10 @@ OUTPUTS = (
            applies="where the solution turns before it reaches phi"),
     Output("t_turning", "time of the turning point", "t_T", when=_ABEL,
            applies="where the solution turns before it reaches phi"),
+    Output("phi_saddle", "angle of the saddle, in [0, 2 pi)", r"\varphi_S", units="rad", when=_BRANCH,
+           applies="where the branch passes phi0 before it turns"),
+    Output("w_start", "angular velocity at phi0 on the separatrix", r"w(\varphi_0)", when=_BRANCH,
+           applies="where the branch passes phi0 before it turns"),
     Output("K", "K = b12 s3 - b31 s2, which decides the ends", "K", when=_PORTRAIT),
     Output("L", "L = (pi/2)(c23 (b12^2 - b31^2) - d b12 b31), which decides them where K = 0", "L", when=_PORTRAIT),
     Output("stratum", "g = 0 (I0), b = 0 (I1), K = L = 0 (I2), or none of them (G)", when=_PORTRAIT,
@@ -184,8 +201,12 @@ def cost(options, sizes):
     """Seconds per point, rough: one solution serves its dense outputs, one set of cycles all fates of a system."""
     if options["question"] == "portrait":
         return 8e-3
-    if options["question"] != "fate":
-        return 7e-6 / sizes.get("t", sizes.get("phi", 1)) + 2e-7
+    if "separatrix" in options:  # in double-double arithmetic, but where b = 0
+        return 2e-3 / sizes.get("t", sizes.get("phi")) + 4e-6
+    if options["question"] == "trajectory":
+        return 6.5e-6 / sizes["t"] + 2e-7
+    if options["question"] == "abel":
+        return 3e-6 / sizes["phi"] + 3e-7
     return 1.3e-4 + 6e-3 / (sizes["phi0"] * sizes["w0"])
 
 
@@ -194,11 +215,15 @@ def solve(point, request):
     method = load(methods, "taylor" if request.method == "auto" else request.method, "method")
     question = request.options.get("question", "fate")
     if question in ("fate", "portrait"):
-        return {"fate": _fate, "portrait": _portrait}[question](point, method, request.rtol)
-    measure = auto if request.method == "auto" else solution
+        answers = blocks.fates if question == "fate" else blocks.portraits
+        return answers(point, _SYSTEM, np.asarray, method, request.rtol)
+    if "separatrix" in request.options:
+        return _separatrix(point, request, question)
+    measure, start = auto if request.method == "auto" else solution, (*_SYSTEM, "phi0", "w0")
     if question == "trajectory":
-        return _trajectory(point, measure, method, request.rtol)
-    return _abel(point, measure, method, request.rtol, request.options.get("branch") == "before")
+        return blocks.trajectories(*blocks.dense(point, start, "t"), measure, method, request.rtol)
+    before = request.options.get("branch") == "before"
+    return blocks.abel(*blocks.dense(point, start, "phi"), measure, method, request.rtol, before)
 
 
 def why(answer):
@@ -237,108 +262,33 @@ def _why_portrait(answer):
 
 def trajectory(point, answer, options, time=None):
     """The orbit on the cylinder and some of its neighbours, from `phi0`, `w0` (see `survey.scenes`)."""
-    time = 40.0 if time is None else float(time)
-    own = point.get("phi0", 0.0), point.get("w0", 1.0)
-    starts = np.array([own, *[(phi, w) for phi in _AROUND for w in (-1.5, -0.5, 0.0, 0.5, 1.5)]])
-    t = np.linspace(0.0, time, _ORBIT_POINTS)
-    asked = {name: np.full((1, 1), point[name]) for name in _SYSTEM} | {"t": t[None]}
-    asked |= {
-        "phi0": starts[:, :1],
-        "w0": starts[:, 1:] * np.where(np.arange(len(starts)) > 0, max(1.0, abs(own[1])), 1)[:, None],
-    }
-    out = solve(asked, Request({"question": "trajectory"}, rtol=1e-9))
-    named = {o.name: {"long_name": o.long_name, "symbol": o.symbol, "units": o.units} for o in OUTPUTS if o.name in out}
-    data = {"t": ("t", t, {"long_name": "time", "symbol": "t", "units": "1"})}
-    for name in ("phi", "w"):
-        data[name], data[f"{name}_error"] = (
-            ("t", out[name][0], named[name]),
-            ("t", out[f"{name}_error"][0], named[name] | {"long_name": f"error bound of {name}"}),
-        )
-        data[f"{name}_nearby"] = (("start", "t"), out[name][1:], named[name])
-    return Trajectory(data, (("cylinder", "phi", "w"), ("lines", "t", "w")))
+
+    def motions(asked):
+        out = solve(asked, Request({"question": "trajectory"}, rtol=1e-9))
+        if "saddle" in point:  # its own orbit follows the separatrix exactly
+            alone = {name: asked[name] for name in (*_SYSTEM, "t")}
+            alone |= {"phi0": asked["phi0"][:1], "saddle": np.full((1, 1), point["saddle"])}
+            branch = solve(alone, Request({**options, "question": "trajectory"}))
+            for name in ("phi", "w", "phi_error", "w_error"):
+                out[name][0] = branch[name][0]
+        return out
+
+    start = {"w0": answer["w_start"]} if "saddle" in point else {}
+    return orbit.solve(motions, OUTPUTS, _SYSTEM, {**point, **start}, time)
 
 
-def _dense(point, name):
-    """(rows of eight numbers, values of `name`, function that brings results back into the block's shape).
-
-    The dimensions along which only `name` varies become columns: one solution serves them all.
-    """
-    arrays = [np.asarray(point[key], dtype=float) for key in (*_SYSTEM, "phi0", "w0", name)]
-    shape = np.broadcast_shapes(*(array.shape for array in arrays))
-    dense = [i for i in range(len(shape)) if all(array.shape[i] == 1 for array in arrays[:-1])]
-    points = [i for i in range(len(shape)) if i not in dense]
-    order = points + dense
-    columns = int(np.prod([shape[i] for i in dense], dtype=int))
-    last = np.broadcast_to(arrays[-1], shape).transpose(order).reshape(-1, columns)
-    small = [shape[i] if i in points else 1 for i in range(len(shape))]
-    rows = np.stack([np.broadcast_to(array, small).ravel() for array in arrays[:-1]], axis=-1)
-
-    def back(values):
-        return values.reshape([shape[i] for i in order]).transpose(np.argsort(order))
-
-    return rows, last, back
-
-
-def _valid(rows, columns):
-    """Rows and columns with NaN made harmless, and where all are numbers."""
-    numbers, fine = np.isfinite(rows), np.isfinite(columns)
-    if numbers.all() and fine.all():
-        return rows, columns, fine
-    numbers = numbers.all(axis=1)[:, None]
-    good = numbers & fine
-    return np.where(numbers, rows, 0.0), np.where(good, columns, 0.0), good
-
-
-def _trajectory(point, measure, method, rtol):
-    rows, times, back = _dense(point, "t")
-    rows, times, good = _valid(rows, times)
-    floats, turnings, status = measure.trajectories(method, rows, times, rtol)
-    status = np.where(good, status, INVALID_PARAMETERS)
-    lost = status != OK
-    floats[lost], turnings[lost | (turnings > _MOST_TURNINGS)] = np.nan, -2
-    columns = {"phi": rc.PHI, "w": rc.W, "phi_error": rc.PHI_BAR, "w_error": rc.W_BAR}
-    results = {name: back(floats[..., at]) for name, at in columns.items()}
-    return results | {"turnings": back(turnings), "status": back(status)}
-
-
-def _abel(point, measure, method, rtol, before):
-    rows, targets, back = _dense(point, "phi")
-    rows, targets, good = _valid(rows, targets)
-    floats, status = measure.abel(method, rows, targets, rtol, before)
-    status = np.where(good, status, INVALID_PARAMETERS)
-    results = {"status": back(status)}
-    for names, code in ((("w", "t"), OK), (("phi_turning", "t_turning"), _TURNING)):
-        here = np.where((status == code)[..., None], floats, np.nan)
-        for name, value, bar in zip(names, (rc.VALUE, rc.TIME), (rc.VALUE_BAR, rc.TIME_BAR), strict=True):
-            results[name], results[f"{name}_error"] = back(here[..., value]), back(here[..., bar])
+def _separatrix(point, request, question):
+    """The questions `trajectory` and `abel`, of solutions that start on a separatrix."""
+    in_time = question == "trajectory"
+    rows, columns, back = blocks.dense(point, (*_SYSTEM, "phi0", "saddle"), "t" if in_time else "phi")
+    rows, columns, good = blocks.valid(rows, columns)
+    method = None if request.method == "auto" else load(methods, request.method, "method")
+    stable, left = request.options["separatrix"] == "stable", request.options["side"] == "left"
+    measure = separatrix.trajectories if in_time else separatrix.abel
+    *results, heads = measure(method, rows, columns, request.rtol, stable, left)
+    results = (blocks.at_times if in_time else blocks.at_angles)(results, good, back)
+    for name, value, bar in (("phi_saddle", separatrix.SADDLE, separatrix.SADDLE_BAR),
+                             ("w_start", separatrix.START, separatrix.START_BAR)):  # fmt: skip
+        for key, at in ((name, value), (f"{name}_error", bar)):
+            results[key] = back(np.broadcast_to(heads[:, at, None], columns.shape))
     return results
-
-
-def _fate(point, method, rtol):
-    """One skeleton for each set of the six parameters, then its initial states."""
-    arrays = [np.asarray(point[key], dtype=float) for key in (*_SYSTEM, "phi0", "w0")]
-    shape = np.broadcast_shapes(*(array.shape for array in arrays))
-    systems = np.stack(np.broadcast_arrays(*arrays[:6]), axis=-1)
-    group = np.arange(systems[..., 0].size).reshape(systems.shape[:-1])
-    group = np.broadcast_to(group, shape).ravel()
-    starts = np.stack([np.broadcast_to(array, shape).ravel() for array in arrays[6:]], axis=-1)
-    result = fate.empty(len(starts), INVALID_PARAMETERS)
-    order = np.argsort(group, kind="stable")
-    cuts = np.flatnonzero(np.diff(group[order])) + 1
-    for members in np.split(order, cuts):
-        six = systems.reshape(-1, 6)[group[members[0]]]
-        good = members[np.isfinite(starts[members]).all(axis=1)]
-        if np.isfinite(six).all() and len(good):
-            fate.solve(method, six, starts[good], rtol, result, good)
-    return {name: values.reshape(shape) for name, values in result.items()}
-
-
-def _portrait(point, method, rtol):
-    """One portrait for each set of the six parameters."""
-    systems = np.stack(np.broadcast_arrays(*(np.asarray(point[key], dtype=float) for key in _SYSTEM)), axis=-1)
-    rows = systems.reshape(-1, 6)
-    good = np.isfinite(rows).all(axis=1)
-    result = portrait.empty(len(rows), INVALID_PARAMETERS)
-    for name, values in portrait.solve(method, rows[good], rtol).items():
-        result[name][good] = values
-    return {name: values.reshape(systems.shape[:-1] + values.shape[1:]) for name, values in result.items()}

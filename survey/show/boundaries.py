@@ -10,6 +10,7 @@ from survey.show.marks import widened
 
 _EDGES = "edges: even dark, odd grey;\nperiodic solid, antiperiodic dashed"
 _RIM = withStroke(linewidth=2.0, foreground="#444444")
+_PALE = {"color": "#FFFFFF", "lw": 1.2, "path_effects": [_RIM]}
 _POINT = {"ls": "none", "mec": "#000000", "mew": 0.8}
 # boundaries by class: label in the legend, and properties of matplotlib's line
 CURVES = {
@@ -20,6 +21,24 @@ CURVES = {
     "pole_passage": ("pole passages", {"color": "#FFFFFF", "ls": (0, (4, 2)), "lw": 1.0, "path_effects": [_RIM]}),
     "stable_precession": ("stable regular precessions", {"color": "#000000", "ls": "-", "lw": 1.2}),
     "separatrix": ("separatrices", {"color": "#D55E00", "ls": "-", "lw": 1.4}),
+    "stable_manifold": ("stable manifolds of saddles", {"color": "#000000", "ls": "-", "lw": 0.5}),
+    "stable_cycle": ("stable cycles", {"color": "#000000", "ls": "-", "lw": 2.0}),
+    "unstable_cycle": ("unstable cycles", {"color": "#000000", "ls": (0, (4, 1.5)), "lw": 2.0}),
+    "ends": ("K = 0 (or L = 0): ends", {"color": "#000000", "ls": (0, (1, 1.5)), "lw": 1.6}),
+    "homoclinic": ("homoclinic connections", {"color": "#D40000", "ls": "-", "lw": 1.2}),
+    "heteroclinic": ("heteroclinic connections", {"color": "#D40000", "ls": (0, (4, 1.5)), "lw": 1.2}),
+    "fold": ("folds of equilibria", {"color": "#000000", "ls": "-", "lw": 1.2}),
+    "supercritical_hopf": ("supercritical Hopf", {"ls": "-"} | _PALE),
+    "subcritical_hopf": (
+        "subcritical Hopf",
+        {"color": "#FFFFFF", "ls": (0, (4, 2)), "lw": 1.2, "path_effects": [_RIM]},
+    ),
+    "bogdanov_takens": ("Bogdanov-Takens", {"marker": "s", "ms": 5, "mfc": "#FFFFFF"} | _POINT),
+    "generalised_hopf": ("generalised Hopf (reversible)", {"marker": "^", "ms": 6, "mfc": "#FFFFFF"} | _POINT),
+    "saddle": ("saddles", {"marker": "X", "ms": 7, "mfc": "#FFFFFF"} | _POINT),
+    "sink": ("attracting equilibria", {"marker": "o", "ms": 6, "mfc": "#000000"} | _POINT),
+    "centre": ("centres", {"marker": "o", "ms": 6, "mfc": "#999999"} | _POINT),
+    "source": ("repelling equilibria", {"marker": "o", "ms": 6, "mfc": "#FFFFFF"} | _POINT),
     "cusp": ("cusps", {"marker": "D", "ms": 5, "mfc": "#FFFFFF"} | _POINT),
     "stable_upright": ("stable upright rotations", {"marker": "o", "ms": 5, "mfc": "#000000"} | _POINT),
     "unstable_upright": ("unstable upright rotations", {"marker": "o", "ms": 6, "mfc": "#D55E00"} | _POINT),

@@ -47,6 +47,7 @@ def label_of(variable):
     symbol, units = variable.attrs.get("symbol", ""), variable.attrs.get("units", "1")
     text = literal(variable.attrs.get("long_name", variable.name))
     shown = _is_formula(symbol) and "flag_values" not in variable.attrs
+    shown = shown and not (symbol == variable.name and "_" in symbol)  # a name, not a formula with a subscript
     text = (
         "$$" if text == symbol else f"{text}, $$" if shown else text
     )  # TeX is longer than what it shows: inserted last

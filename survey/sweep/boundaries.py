@@ -61,9 +61,11 @@ def plan(workflow, cost):
     `cost` is the scene's estimate for a point, in seconds.
     """
     measure = _measure(workflow, "curves")
-    if hasattr(measure, "closed"):  # measured: about a tenth of a second per map
-        size = 8 * (1 + len(workflow.grid.sizes) + 2 * len(measure.ALONG))
-        return {"bytes_per_curve_point": size}, 0.1 * prod(list(workflow.grid.sizes.values())[2:])
+    if hasattr(measure, "closed"):
+        sizes = workflow.grid.sizes
+        seconds = measure.seconds(list(sizes)) if hasattr(measure, "seconds") else 0.1  # measured, per map
+        size = 8 * (1 + len(sizes) + 2 * len(measure.ALONG))
+        return {"bytes_per_curve_point": size}, seconds * prod(list(sizes.values())[2:])
     sizes = [size for dim, size in workflow.grid.sizes.items() if dim != workflow.boundaries and size > 1]
     # measured: ten to twenty edges per row; about five hundred points of curves
     seconds = prod(sizes) * (2e-3 + 250 * cost) + (0.2 + 1e4 * cost if sizes else 0.0)

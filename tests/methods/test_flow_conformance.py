@@ -44,7 +44,7 @@ def wide_end(method, span, steps):
     """The state after equal steps of the widened method."""
     values = widened(flow.values)
     series = widened(flow.series)
-    inner = {"values": values}
+    inner = {"values": values, "inside": widened(flow.inside)}
     if hasattr(method, "_flow_classical"):
         slope = widened(method._flow_slope, values=values)
         step = widened(runge_kutta.classical)

@@ -5,7 +5,7 @@ import pytest
 
 import survey.precision.peers
 from survey import modules
-from survey.precision.cases import satellite
+from survey.precision.cases import gyrostat_abel, satellite
 from survey.precision.peers import System, batches
 
 
@@ -39,3 +39,13 @@ def test_batches_hold_every_point_and_like_numbers_of_steps():
     system = System(None, np.zeros((5, 1)), np.zeros((5, 1)), steps, steps)
     assert batches(system, 2).tolist() == [[1, 3], [4, 2], [0, 0]]
     assert batches(system, 8).tolist() == [[1, 3, 4, 2, 0, 0, 0, 0]]
+
+
+def test_a_peer_s_dense_output_holds_the_references(peer):
+    for point, options, exact, _verdict in gyrostat_abel.references("121 angles of a turn")[:8]:
+        if point["phi"] > 0.0:
+            dense = {name: np.full((1, 1), value) for name, value in point.items()}
+            dense |= {"phi": np.linspace(0.0, point["phi"], 4)[None]}
+            found = gyrostat_abel.outcome(peer.integrate(gyrostat_abel.system(dense, options), 1e-11))["w"]
+            assert found.shape == (4,) and abs(found[0] - point["w0"]) < 1e-12
+            np.testing.assert_allclose(found[3], exact["w"], rtol=1e-9)

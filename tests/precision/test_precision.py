@@ -85,7 +85,7 @@ def test_a_folder_that_cannot_be_or_a_missing_chart_is_refused(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(BadInput, match="cannot make this folder"):
         precision.write("satellite", tmp_path / "file" / "below")
-    with pytest.raises(BadInput, match="unknown scene 'satelite'"):
+    with pytest.raises(BadInput, match="unknown scene with a precision chart 'satelite'"):
         precision.write("satelite", tmp_path)
 
 
@@ -101,4 +101,22 @@ def test_what_a_method_does_not_answer_is_not_in_the_chart(monkeypatch):
     methods = {method for method, _ in found}
     assert {"auto", "taylor", "dop853", "rk4", "closed", "full"} <= methods
     assert found == {(method, work) for method in methods for work in works} - {("closed", "trajectory")}
+    assert all(record.error <= record.setting for record in records)
+
+
+def test_a_scene_has_several_charts_and_samples_keep_the_rows_that_one_solution_serves(monkeypatch):
+    case = modules.load(folder, "gyrostat_abel", "chart")
+    works = case.works()
+    dense, _options = works["121 angles of a turn"]
+    sample = precision._sample(dense, 500, {"phi", "t"})
+    assert sample["phi"].shape == (1, 121) and sample["w0"].shape == (4, 1) and sample["phi0"].shape == (1, 1)
+    chosen = [np.flatnonzero(dense["w0"][:, 0] == w) for w in sample["w0"][:, 0]]
+    assert all(np.array_equal(dense["d"][at], sample["d"][i : i + 1]) for i, at in enumerate(chosen))
+    some = {name: (precision._sample(point, 242, {"phi", "t"}), options) for name, (point, options) in works.items()}
+    monkeypatch.setattr(precision, "SETTINGS", (1e-8,))
+    monkeypatch.setattr(precision, "REPEATS", 1)
+    monkeypatch.setattr(precision, "_cold", lambda *_: 0.0)
+    monkeypatch.setattr(case, "works", lambda: some)
+    records = precision.measure("gyrostat_abel", case)
+    assert {(r.method, r.work) for r in records} == {(m, w) for m in ("auto", "taylor", "dop853", "rk4") for w in works}
     assert all(record.error <= record.setting for record in records)

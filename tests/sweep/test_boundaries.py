@@ -229,8 +229,8 @@ def test_a_row_of_its_own(tmp_path):
         ({"boundaries": {"axes": "rho"}}, r"unknown key boundaries.axes; did you mean 'axis'"),
         ({"axes": {"k": 0.5, "rho": 1.0}}, r"boundaries: they are drawn on one axis or two"),
         (
-            {"scene": "gyrostat", "axes": {"w0": {"values": [1.0, 2.0]}}, "options": {}},
-            r"no boundary curves are known for the scene gyrostat",
+            {"scene": "libration", "axes": {"mu": {"values": [0.01, 0.02]}}, "options": {}},
+            r"no boundary curves are known for the scene libration",
         ),
     ],
 )

@@ -6,6 +6,7 @@ import numpy as np
 
 from survey.kernels.cylinder.equilibria import ANGLE, BAR, KIND, SADDLE
 from survey.kernels.cylinder.flow import B12, B31, BOUND_DDG, BOUND_DG, BOUND_F, C23, S2, S3, D, values
+from survey.kernels.cylinder.program import COLUMNS, in_angle
 from survey.kernels.cylinder.records import START_PHI, START_PHI_BAR, START_W, START_W_BAR
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
@@ -18,6 +19,10 @@ FURTHEST = 0.1  # rad from the saddle
 @inline
 def forces(p, phi, f, g):
     """Taylor coefficients of f and of g about phi, where g = 0."""
+    if len(p) > COLUMNS:
+        in_angle(p, phi, f, g)
+        g[0] = 0.0
+        return
     s, c = math.sin(phi), math.cos(phi)
     s2, c2 = 2.0 * s * c, (c - s) * (c + s)
     one, two = 1.0, 1.0  # 1/n! and 2^n/n!
@@ -30,8 +35,11 @@ def forces(p, phi, f, g):
 
 
 @kernel
-def unstable(p, eqs, count, starts):
-    """Fill `starts` (START_PHI to START_W_BAR) with a point of each unstable branch, two per saddle; their number."""
+def unstable(p, eqs, count, starts, furthest=FURTHEST):
+    """Fill `starts` (START_PHI to START_W_BAR) with a point of each unstable branch, two per saddle; their number.
+
+    They are at most `furthest` (rad) from the saddle.
+    """
     f, g, a = np.zeros(ORDER + 1), np.zeros(ORDER + 1), np.zeros(ORDER + 1)
     size = 0
     for i in range(count):
@@ -49,7 +57,7 @@ def unstable(p, eqs, count, starts):
             for j in range(2, n):
                 known -= a[j] * (n + 1 - j) * a[n + 1 - j]
             a[n] = known / ((n + 1) * a[1] - f[0])
-        reach = FURTHEST
+        reach = furthest
         for n in (ORDER - 1, ORDER):
             reach = min(reach, (TRUNCATION * a[1] / (abs(a[n]) + 1e-300)) ** (1.0 / (n - 1)))
         slope = slip * (p[BOUND_F] * a[1] + p[BOUND_DDG]) + 4.0 * ROUNDOFF_UP * (p[BOUND_F] * a[1] + p[BOUND_DG])

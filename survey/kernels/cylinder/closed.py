@@ -133,6 +133,13 @@ def applies(p, phi0, w0):
 
 
 @kernel
+def served(P, starts, which):
+    """Note for which solutions a closed form applies."""
+    for i in range(len(P)):
+        which[i] = applies(P[i], starts[i, 0], starts[i, 1])[0] != NONE
+
+
+@kernel
 def start(p, phi0, w0, data):
     """Fill data for the solution from (phi0, w0); returns (kind, side): multiply x and w by side."""
     kind, mu, other = applies(p, phi0, w0)

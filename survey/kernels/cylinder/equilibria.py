@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from survey.kernels.cylinder.flow import BOUND_DDG, BOUND_DG, BOUND_F, BOUND_G, C23, S2, TWO_PI, values
+from survey.kernels.cylinder.program import COLUMNS
 from survey.kernels.cylinder.roots import CENTRE, MOST_DISCS, NO_REAL, RADIUS, ROOTS, SLOPE, discs
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.newton import bracketed
@@ -28,6 +29,8 @@ def equilibria(p, table):
     count = bisected(p, table)
     if count >= 0:
         return count, False
+    if len(p) > COLUMNS:  # the discs know the gyrostat's g alone
+        return 0, True
     found, hidden = clustered(p, table)
     return found, hidden or count == HIDDEN
 
@@ -35,7 +38,7 @@ def equilibria(p, table):
 @kernel
 def bisected(p, table):
     """As `equilibria`; or HIDDEN, or LONG where it would take long to tell."""
-    found = np.empty(MOST + 1)
+    found = np.empty(len(table) + 1)
     lows, highs = np.empty(4096), np.empty(4096)
     count, top, pieces, start = 0, 0, 16, 0.123456
     for i in range(pieces - 1, -1, -1):
@@ -59,7 +62,7 @@ def bisected(p, table):
         elif top + 2 < len(lows):
             lows[top], highs[top], lows[top + 1], highs[top + 1] = middle, high, low, middle
             top += 2
-        if count > MOST:
+        if count > len(table):
             return HIDDEN
         if pieces > MOST_PIECES:
             return LONG

@@ -5,13 +5,18 @@ g = -d cos phi sin phi - c23 cos 2phi + s2 cos phi - s3 sin phi = -V'           
 
 A step keeps its work in one table T[n, row]: the coefficient of (t - t_n)^n of each quantity (rows below), and in
 the last line T[LAST] what a method notes about the step (its truncation error, its step size).
+
+A row p with more than COLUMNS columns holds any other f and g, as a `program`; on a line, where `on_circle` is False,
+phi is not taken mod 2 pi, and the bounds in p are those near the angle of the last `series`.
 """
 
 import math
 
 import numpy as np
 
-from survey.kernels.cylinder.records import PHI0, START_PHI, START_W, W0
+from survey.kernels.cylinder import program
+from survey.kernels.cylinder.program import COLUMNS, ON_CIRCLE
+from survey.kernels.cylinder.records import GIVEN, PHI0, START_PHI, START_W, W0
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
@@ -37,20 +42,34 @@ def coefficients(b12, b31, d, c23, s2, s3):
     return np.stack([b12, b31, d, c23, s2, s3, b, c + s, 2.0 * c + s, 4.0 * c + s], axis=-1)
 
 
+@inline
+def on_circle(p):
+    """Do f and g have the period 2 pi?"""
+    return len(p) == COLUMNS or p[ON_CIRCLE] > 0.0
+
+
 @kernel
 def spread(rows, P, starts):
     """Fill P with the `coefficients` of rows of GIVEN numbers (see `records`), and starts with their phi0, w0."""
     for i in range(len(rows)):
+        starts[i, START_PHI], starts[i, START_W] = rows[i, PHI0], rows[i, W0]
         for k in range(6):
             P[i, k] = rows[i, k]
+        if P.shape[1] > COLUMNS:
+            for k in range(6, P.shape[1]):
+                P[i, k] = rows[i, k + GIVEN - 6]
+            if not on_circle(P[i]):
+                program.bound_near(P[i], rows[i, PHI0])
+            continue
         b, c, s = math.hypot(P[i, 0], P[i, 1]), math.hypot(0.5 * P[i, 2], P[i, 3]), math.hypot(P[i, 4], P[i, 5])
         P[i, BOUND_F], P[i, BOUND_G], P[i, BOUND_DG], P[i, BOUND_DDG] = b, c + s, 2.0 * c + s, 4.0 * c + s
-        starts[i, START_PHI], starts[i, START_W] = rows[i, PHI0], rows[i, W0]
 
 
 @kernel
 def values(p, phi):
     """f, g, g' at phi."""
+    if len(p) > COLUMNS:
+        return program.values(p, phi)
     s, c = math.sin(phi), math.cos(phi)
     s2, c2 = 2.0 * s * c, (c - s) * (c + s)
     f = p[B12] * c - p[B31] * s
@@ -69,6 +88,11 @@ def potential(p, phi):
 @kernel
 def series(p, phi, w, T, order):
     """Fill rows PHI..Y of T with the series through (phi, w) up to t^order."""
+    if len(p) > COLUMNS:
+        if not on_circle(p):
+            program.bound_near(p, phi)
+        program.in_time(p, phi, w, order, T[:, PHI], T[:, W], T[:, E], T[:, Y])
+        return
     s, c = math.sin(phi), math.cos(phi)
     T[0, PHI], T[0, W], T[0, SIN], T[0, COS] = phi, w, s, c
     T[0, SIN2], T[0, COS2] = 2.0 * s * c, (c - s) * (c + s)
@@ -94,10 +118,13 @@ def series(p, phi, w, T, order):
 @kernel
 def variation(p, T):
     """Fill rows U1..DG up to t^LOW: u' = f u + z, z' = g' u, from the series of sin and cos in T."""
-    for n in range(LOW):
-        T[n, F_] = p[B12] * T[n, COS] - p[B31] * T[n, SIN]
-        T[n, DG] = -p[D] * T[n, COS2] + 2.0 * p[C23] * T[n, SIN2] - p[S2] * T[n, SIN] - p[S3] * T[n, COS]
-    T[LOW, F_] = p[B12] * T[LOW, COS] - p[B31] * T[LOW, SIN]
+    if len(p) > COLUMNS:
+        program.along(p, T[: LOW + 1, PHI], T[: LOW + 1, F_], T[: LOW + 1, DG])
+    else:
+        for n in range(LOW):
+            T[n, F_] = p[B12] * T[n, COS] - p[B31] * T[n, SIN]
+            T[n, DG] = -p[D] * T[n, COS2] + 2.0 * p[C23] * T[n, SIN2] - p[S2] * T[n, SIN] - p[S3] * T[n, COS]
+        T[LOW, F_] = p[B12] * T[LOW, COS] - p[B31] * T[LOW, SIN]
     T[0, U1], T[0, Z1], T[0, U2], T[0, Z2] = 1.0, -T[0, F_], 0.0, 1.0
     for n in range(LOW):
         a0 = a1 = a2 = a3 = 0.0
@@ -110,6 +137,15 @@ def variation(p, T):
         r = 1.0 / (n + 1)
         T[n + 1, U1], T[n + 1, Z1] = (a0 + T[n, Z1]) * r, a1 * r
         T[n + 1, U2], T[n + 1, Z2] = (a2 + T[n, Z2]) * r, a3 * r
+
+
+@inline
+def inside(T, dt):
+    """(phi, w, integral of f, integral of g) at dt after the start of the step in T, of which `series` has ORDER."""
+    phi, w, e, y = T[ORDER, PHI], T[ORDER, W], T[ORDER, E], T[ORDER, Y]
+    for n in range(ORDER - 1, -1, -1):
+        phi, w, e, y = phi * dt + T[n, PHI], w * dt + T[n, W], e * dt + T[n, E], y * dt + T[n, Y]
+    return phi, w, e, y
 
 
 @kernel
@@ -156,4 +192,5 @@ def longest_step(p, w):
     w'' - f w' - (f' w + g') w = 0; without its damping the restoring force is Q = -g' - f^2/4 - f' w/2, so by Sturm
     zeros of w are pi / sqrt(max Q) apart at least. Here a third of that.
     """
-    return 1.0 / math.sqrt(p[BOUND_DG] + p[BOUND_F] * (abs(w) + 0.25 * p[BOUND_F]) + 1e-300)
+    step = 1.0 / math.sqrt(p[BOUND_DG] + p[BOUND_F] * (abs(w) + 0.25 * p[BOUND_F]) + 1e-300)
+    return step if on_circle(p) else min(step, program.longest_step(p, w))

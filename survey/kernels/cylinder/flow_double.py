@@ -64,6 +64,7 @@ from survey.kernels.math.roundoff import PAIR_ROUNDOFF, ROUNDOFF_UP
 
 ORDER = 30
 TOLERANCE = 1e-30  # truncation of one step, relative to 1 + |w|
+FLAT = 1e-22  # nearer to an equilibrium than this, relative, the direction of the flow has no digits
 ROUGH = 16.0 * PAIR_ROUNDOFF  # rounding of a sum or a product of the series, relative
 FALL = 1.0 / 50.0  # by more, two terms further on, no series is trusted to fall
 LIMIT = 20_000  # steps; about 0.4 s
@@ -141,18 +142,53 @@ def at(phi, A, dt):
     return add(phi, mul(x, dt)), w
 
 
+@inline
+def round_about(ellipse):
+    """The error ellipse (phi phi, phi w, w w) as `carried` takes it."""
+    a, b, c = ellipse
+    return a, b, c, 1.0, 0.0, False
+
+
+@inline
+def spread(ellipse):
+    """(phi phi, phi w, w w), and w w at a given phi, of what `carried` returns."""
+    pp, pq, qq, x, y, _on = ellipse
+    a, c = x * x * pp - 2.0 * x * y * pq + y * y * qq, y * y * pp + 2.0 * x * y * pq + x * x * qq
+    return max(a, 0.0), x * y * (pp - qq) + (x * x - y * y) * pq, max(c, 0.0), qq / (x * x)
+
+
 @kernel
-def carried(p, T, dt, w, ellipse):
-    """The error ellipse (phi phi, phi w, w w) after dt of the current step, as `steps.carried`."""
-    saa, sab, sbb = ellipse
+def carried(p, A, T, dt, w, ellipse):
+    """The error ellipse after dt of the current step: as `steps.carried`, along (x, y) and across it.
+
+    (x, y) is the direction of the flow, of (w, w'), once `on` it. The flow carries its own direction with it: what errs
+    along it, in time, never comes across it, and only that grows where solutions part, at saddles. In other axes
+    rounding would mix the two.
+    """
+    pp, pq, qq, x, y, on = ellipse
     a, b, c, d = jacobian(T, dt)
-    rate = p[BOUND_F] * abs(w) + p[BOUND_G]
-    e = TOLERANCE + ROUGH * (4.0 + 3.0 * dt * (abs(w) + dt * rate))
-    f = TOLERANCE * (1.0 + abs(w)) + ROUGH * (1.5 * abs(w) + 8.0 * dt * rate)
+    rate = 0.0
+    for n in range(ORDER, 0, -1):
+        rate = rate * dt + n * A[_W, 0, n]
+    size, along_w, along_v = math.hypot(w, rate), a * x + b * y, c * x + d * y
+    known = size > FLAT * (abs(w) + p[BOUND_G])
+    if not known:
+        size = math.hypot(along_w, along_v)
+    u, v = (w / size, rate / size) if known else (along_w / size, along_v / size)
+    across_w, across_v = b * x - a * y, d * x - c * y
+    one, shear, two = u * along_w + v * along_v, u * across_w + v * across_v, u * across_v - v * across_w
+    leak = 0.0 if on or not known else u * along_v - v * along_w
+    bound = p[BOUND_F] * abs(w) + p[BOUND_G]
+    e = TOLERANCE + ROUGH * (4.0 + 3.0 * dt * (abs(w) + dt * bound))
+    f = TOLERANCE * (1.0 + abs(w)) + ROUGH * (1.5 * abs(w) + 8.0 * dt * bound)
+    e, f = e * e, f * f
     return (
-        a * a * saa + 2.0 * a * b * sab + b * b * sbb + e * e,
-        a * c * saa + (a * d + b * c) * sab + b * d * sbb,
-        c * c * saa + 2.0 * c * d * sab + d * d * sbb + f * f,
+        one * one * pp + 2.0 * one * shear * pq + shear * shear * qq + u * u * e + v * v * f,
+        one * leak * pp + (one * two + shear * leak) * pq + shear * two * qq + u * v * (f - e),
+        leak * leak * pp + 2.0 * leak * two * pq + two * two * qq + v * v * e + u * u * f,
+        u,
+        v,
+        on or known,
     )
 
 
@@ -175,13 +211,23 @@ def clean(p, phi, w, bar_phi, bar_w):
 @kernel
 def trajectory(p, phi0, w0, asked, floats, turnings):
     """As `steps.trajectory`, and `winding.counts`."""
+    phi, turns = centred((phi0, 0.0))
+    start, still = (phi, (w0, 0.0), (0.0, 0.0, 0.0)), rests(p, phi0, w0)
+    return followed(p, start, turns, (0.0, 0.0), side(p, phi, w0), still, asked, floats, turnings)
+
+
+@kernel
+def followed(p, start, turns, origin, sign, still, asked, floats, turnings):
+    """`trajectory` from `start`: phi and w (double-doubles) and their error ellipse.
+
+    `origin` is the time there, and its error; `sign` that of w just after it, and `still` whether it is an equilibrium.
+    """
     A, T, eqs, end = scratch(), table(), np.zeros((MOST, 10)), np.zeros(5)
     size, _hidden = equilibria(p, eqs)
-    phi, turns = centred((phi0, 0.0))
-    w, t, ellipse = (w0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.0)
-    sign, count, j, unsure = side(p, phi, w0), 0, 0, 0
+    phi, w, ellipse = start[0], start[1], round_about(start[2])
+    t, at_rest, late = (origin[0], 0.0), w[0] == 0.0, origin[1]
+    count, j, unsure = 0, 0, 0
     known, since = False, (0.0, 0.0)  # `end` gives the turnings after that time
-    still = rests(p, phi0, w0)
     for n in range(1, LIMIT):
         h = begin(p, phi, w, A, T)
         if not (h > 0.0 and math.isfinite(h)):
@@ -193,8 +239,8 @@ def trajectory(p, phi0, w0, asked, floats, turnings):
             if dt[0] >= h:
                 break
             x, v = at(phi, A, dt)
-            a, _b, c = carried(p, T, dt[0], v[0], ellipse)
-            delay = n * ROUGH * asked[j]  # error of the time
+            a, _b, c, _d = spread(carried(p, A, T, dt[0], v[0], ellipse))
+            delay = n * ROUGH * (asked[j] - min(origin[0], 0.0)) + late  # error of the time
             wide, high = bar(n, a) + abs(v[0]) * delay, bar(n, c) + (p[BOUND_F] * abs(v[0]) + p[BOUND_G]) * delay
             if not (wide < TRUST and high < TRUST * (1.0 + abs(v[0]))):
                 return NO_CONVERGENCE
@@ -203,7 +249,7 @@ def trajectory(p, phi0, w0, asked, floats, turnings):
                 wide + ROUNDOFF_UP * abs(floats[j, rc.PHI]),
                 high + ROUNDOFF_UP * abs(v[0]),
             )
-            from_rest = n == 1 and w0 == 0.0
+            from_rest = n == 1 and at_rest
             if still:
                 turnings[j] = 0
             elif known:
@@ -215,15 +261,16 @@ def trajectory(p, phi0, w0, asked, floats, turnings):
         if j == len(asked):
             return OK
         x, v = at(phi, A, (h, 0.0))
-        ellipse = carried(p, T, h, v[0], ellipse)
+        ellipse = carried(p, A, T, h, v[0], ellipse)
+        saa, _b, sbb, _d = spread(ellipse)
         t = shifted(t, h)
         phi, w = x, v
         if abs(phi[0]) > math.pi:
             phi, k = centred(phi)
             turns += k
-        if not trusted(ellipse[0], ellipse[2], w[0]):
+        if not trusted(saa, sbb, w[0]):
             return NO_CONVERGENCE if math.isfinite(w[0]) else OVERFLOW
-        bar_phi, bar_w = bar(n, ellipse[0]), bar(n, ellipse[2])
+        bar_phi, bar_w = bar(n, saa), bar(n, sbb)
         if known or still or abs(w[0]) <= bar_w:
             unsure += not known
             continue
@@ -300,10 +347,8 @@ def sharpened(residual, given, dt, h):
 @kernel
 def abel(p, phi0, w0, targets, floats, status):
     """As `steps.abel`."""
-    A, T = scratch(), table()
     phi, turns = centred((phi0, 0.0))
-    w, t, ellipse, n, started = (w0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.0), 0, w0 > 0.0
-    j, size, doubt, ending = 0, len(targets), -1, OK  # doubt: the first target in doubt
+    j, size = 0, len(targets)
     while j < size and targets[j] == phi0:
         floats[j, rc.VALUE], status[j] = w0, OK
         floats[j, rc.TIME] = floats[j, rc.VALUE_BAR] = floats[j, rc.TIME_BAR] = 0.0
@@ -315,6 +360,16 @@ def abel(p, phi0, w0, targets, floats, status):
             floats[i, rc.VALUE] = phi0
             floats[i, rc.TIME] = floats[i, rc.VALUE_BAR] = floats[i, rc.TIME_BAR] = 0.0
         return
+    passed(p, (phi, (w0, 0.0), (0.0, 0.0, 0.0)), turns, 0.0, j, targets, floats, status)
+
+
+@kernel
+def passed(p, start, turns, origin, first, targets, floats, status):
+    """`abel` from `start`, as that of `followed`, at the time `origin`, for the targets from number `first` on."""
+    A, T = scratch(), table()
+    phi, w, ellipse = start[0], start[1], round_about(start[2])
+    t, n, started = (origin, 0.0), 0, w[0] > 0.0
+    j, size, doubt, ending = first, len(targets), -1, OK  # doubt: the first target in doubt
     while j < size or doubt >= 0:
         if n >= LIMIT:
             ending = STEP_LIMIT
@@ -336,16 +391,18 @@ def abel(p, phi0, w0, targets, floats, status):
                 break
             when = passage(phi, A, target, dt[0])
             _x, there = at(phi, A, when)
-            a, b, c = carried(p, T, when[0], there[0], ellipse)
-            a += (ROUGH * (abs(targets[j]) + h * there[0])) ** 2
-            fill(p, floats[j], n, target, there[0], add(t, when)[0], a, b, c)
+            a, _b, c, d = spread(carried(p, A, T, when[0], there[0], ellipse))
+            more = (ROUGH * (abs(targets[j]) + h * there[0])) ** 2
+            fill(p, floats[j], n, target, there[0], add(t, when)[0], a + more, c, d, more)
             usable = bar(n, a) < TRUST and floats[j, rc.VALUE_BAR] < TRUST * (1.0 + abs(there[0]))
-            status[j] = OK if usable and floats[j, rc.TIME_BAR] < TRUST * (1.0 + floats[j, rc.TIME]) else NO_CONVERGENCE
+            usable = usable and floats[j, rc.TIME_BAR] < TRUST * (1.0 + abs(floats[j, rc.TIME]))
+            status[j] = OK if usable else NO_CONVERGENCE
             if doubt < 0 and not certain(floats[j]):
                 doubt = j
             j += 1
-        ellipse = carried(p, T, dt[0], v[0], ellipse)
-        bar_phi, bar_w = bar(n, ellipse[0]), bar(n, ellipse[2])
+        ellipse = carried(p, A, T, dt[0], v[0], ellipse)
+        saa, _b, sbb, _d = spread(ellipse)
+        bar_phi, bar_w = bar(n, saa), bar(n, sbb)
         edge = 1.1 * bar_phi + ROUGH * (1.0 + abs(x[0] + turns * TWO_PI))
         # from here on a turning point lies beyond x
         while 0 <= doubt < j and add(x, neg(add((targets[doubt], 0.0), neg(radians(turns)))))[0] > edge:
@@ -369,7 +426,7 @@ def abel(p, phi0, w0, targets, floats, status):
         if phi[0] > math.pi:
             phi, k = centred(phi)
             turns += k
-        if not trusted(ellipse[0], ellipse[2], w[0]):
+        if not trusted(saa, sbb, w[0]):
             ending = NO_CONVERGENCE if math.isfinite(w[0]) else OVERFLOW
             break
         started = started or w[0] > 2.0 * bar_w
@@ -383,13 +440,13 @@ def abel(p, phi0, w0, targets, floats, status):
 
 
 @inline
-def fill(p, row, n, phi, w, t, a, b, c):
-    """w, t and their bars where phi is passed, as `steps.fill_crossing`."""
+def fill(p, row, n, phi, w, t, a, c, d, more):
+    """w, t and their bars where phi, off by the root of `more`, is passed, as `steps.fill_crossing`; d: w w there."""
     n += 1  # the target errs too
     row[rc.VALUE], row[rc.TIME] = max(w, 0.0), t
     f, g = values(p, phi[0])[0], acceleration(p, phi)[0]
     slope = (f * w + g) / w if w > 0.0 else math.inf
-    spread = bar(n, abs(c - 2.0 * slope * b + slope * slope * a)) if w > 0.0 else math.inf
+    spread = bar(n, d + slope * slope * more) if w > 0.0 else math.inf
     bar_phi, bar_w = bar(n, a), bar(n, c)
     if not spread < 0.1 * w:
         spread = 2.0 * (bar_w + math.sqrt(abs(2.0 * (abs(g) + abs(f) * bar_w) * bar_phi))) + w

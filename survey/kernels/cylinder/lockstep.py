@@ -51,27 +51,27 @@ LOW = 6
 LANES = 32
 
 # Rows of the series: S, C, w and U1, Z1, U2, Z2 (variations), f, g'.
-_S, _C, _W = 0, ORDER + 1, 2 * (ORDER + 1)
+SIN, COS, W = 0, ORDER + 1, 2 * (ORDER + 1)
 _SERIES = 3 * (ORDER + 1)
-_U1, _Z1, _U2, _Z2, _F, _DG = (_SERIES + i * (LOW + 1) for i in range(6))
-_TABLE = _DG + LOW + 1
+U1, Z1, U2, Z2, F_, DG = (_SERIES + i * (LOW + 1) for i in range(6))
+TABLE = DG + LOW + 1
 # Rows of the state that a step changes, ...
-(_PSI, _TURNS, _V, _T, _T_LOW, _RATE, _SAA, _SAB, _SBB, _STEPS, _SIGN, _UNSURE, _COUNT) = range(13)
-_STATE = 13
+(PSI, TURNS, V, TIME, TIME_LOW, RATE, SAA, SAB, SBB, STEPS, SIGN, UNSURE, COUNT) = range(13)
+STATE = 13
 # ... and of what it does not: the coefficients, their bounds, the next requested time, a.
-(_P12, _P31, _PD, _P2, _P3, _PF, _PG, _PDG, _NEXT, _TURN) = range(10)
-_FIXED = 10
-ROWS = _TABLE + 2 * _STATE + _FIXED + 1
+(P12, P31, PD, P2, P3, PF, PG, PDG, NEXT, TURN) = range(10)
+FIXED = 10
+ROWS = TABLE + 2 * STATE + FIXED + 1
 
 _GOING, _AT, _LOST = 0.0, 1.0, 2.0  # what a step has made of a lane
 # Shorter steps have only a share of the tolerance, so that many short ones add up to what a few long ones do.
 _SHORT = 1.0 / 8.0
-_COARSEST = 1e-11  # per step: above, the terms that follow the last two may be no smaller than these
-_FALL = 1.0 / 50.0  # by more, two terms further on, no series is trusted to fall
+COARSEST = 1e-11  # per step: above, the terms that follow the last two may be no smaller than these
+FALL = 1.0 / 50.0  # by more, two terms further on, no series is trusted to fall
 _MANY = -1e9  # a count that stays below zero
 
 # Cody and Waite's reduction, and the polynomials of fdlibm's kernels for sin and cos in [-pi/4, pi/4].
-_NEAREST = 6755399441055744.0  # 1.5 * 2^52: adding and subtracting it rounds to an integer
+NEAREST = 6755399441055744.0  # 1.5 * 2^52: adding and subtracting it rounds to an integer
 _HALF_PI, _HALF_PI_LOW = 0.5 * math.pi, 6.123233995736766e-17
 _S1, _S2, _S3 = -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04
 _S4, _S5, _S6 = 2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10
@@ -82,7 +82,7 @@ _C4, _C5, _C6 = -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.1359
 @inline
 def sine_cosine(x):
     """sin and cos of x in [-3.2, 3.2], to 1 ulp; branch-free and without libm."""
-    k = (x * (1.0 / _HALF_PI) + _NEAREST) - _NEAREST
+    k = (x * (1.0 / _HALF_PI) + NEAREST) - NEAREST
     first = x - k * _HALF_PI  # exact
     r = first - k * _HALF_PI_LOW
     low = (first - r) - k * _HALF_PI_LOW
@@ -106,8 +106,8 @@ def _orders(first, last):
 
     @unroll
     def expand(T, fixed, i):
-        p12, p31, p2, p3, pd = (fixed[row, i] for row in (_P12, _P31, _P2, _P3, _PD))
-        s, c, w = ([T[row + n, i] for n in range(first + 1)] for row in (_S, _C, _W))
+        p12, p31, p2, p3, pd = (fixed[row, i] for row in (P12, P31, P2, P3, PD))
+        s, c, w = ([T[row + n, i] for n in range(first + 1)] for row in (SIN, COS, W))
         for n in range(first, last):
             r = 1.0 / (n + 1)
             cw, sw, cs = _product(c, w, n), _product(s, w, n), _product(c, s, n)
@@ -115,7 +115,7 @@ def _orders(first, last):
             s.append(cw * r)
             c.append(-sw * r)
             w.append((p12 * cw - p31 * sw + g) * r)
-            T[_S + n + 1, i], T[_C + n + 1, i], T[_W + n + 1, i] = s[n + 1], c[n + 1], w[n + 1]
+            T[SIN + n + 1, i], T[COS + n + 1, i], T[W + n + 1, i] = s[n + 1], c[n + 1], w[n + 1]
 
     return expand
 
@@ -131,13 +131,13 @@ def _product(a, b, n):
 def _begin(T, state):
     """Take whole turns out of psi; the first coefficients."""
     for i in range(LANES):
-        psi = state[_PSI, i]
-        k = (psi * (1.0 / TWO_PI) + _NEAREST) - _NEAREST
+        psi = state[PSI, i]
+        k = (psi * (1.0 / TWO_PI) + NEAREST) - NEAREST
         psi = (psi - k * TWO_PI) - k * TWO_PI_LOW
         s, c = sine_cosine(psi)
-        state[_PSI, i] = psi
-        state[_TURNS, i] += k
-        T[_S, i], T[_C, i], T[_W, i] = s, c, state[_V, i]
+        state[PSI, i] = psi
+        state[TURNS, i] += k
+        T[SIN, i], T[COS, i], T[W, i] = s, c, state[V, i]
 
 
 _low_orders, _middle_orders, _high_orders = _orders(0, 7), _orders(7, 12), _orders(12, ORDER)
@@ -146,16 +146,16 @@ _low_orders, _middle_orders, _high_orders = _orders(0, 7), _orders(7, 12), _orde
 @unroll
 def _vary(T, fixed, i):
     """Series of f and g', and of the variations: u' = f u + z, z' = g' u; of lane i."""
-    p12, p31, p2, p3, pd = (fixed[row, i] for row in (_P12, _P31, _P2, _P3, _PD))
-    s, c = [T[_S + n, i] for n in range(LOW + 1)], [T[_C + n, i] for n in range(LOW + 1)]
+    p12, p31, p2, p3, pd = (fixed[row, i] for row in (P12, P31, P2, P3, PD))
+    s, c = [T[SIN + n, i] for n in range(LOW + 1)], [T[COS + n, i] for n in range(LOW + 1)]
     f, dg = [], []
     for n in range(LOW + 1):
         squares = _product(s, s, n)
         double = 1.0 - 2.0 * squares if n == 0 else -2.0 * squares  # cos 2 psi
         f.append(p12 * c[n] - p31 * s[n])
         dg.append(-pd * double - p2 * s[n] - p3 * c[n])
-        T[_F + n, i], T[_DG + n, i] = f[n], dg[n]
-    for first, u, z in ((_U1, [1.0], [-f[0]]), (_U2, [0.0], [1.0])):
+        T[F_ + n, i], T[DG + n, i] = f[n], dg[n]
+    for first, u, z in ((U1, [1.0], [-f[0]]), (U2, [0.0], [1.0])):
         for n in range(LOW):
             r = 1.0 / (n + 1)
             fu = sum((f[k] * u[n - k] for k in range(1, n + 1)), f[0] * u[n])
@@ -167,7 +167,7 @@ def _vary(T, fixed, i):
 
 
 @inline
-def _series(T, state, fixed):
+def series(T, state, fixed):
     """All coefficients of all lanes; in several loops, since one has more numbers than there are registers."""
     _begin(T, state)
     for i in range(LANES):
@@ -183,67 +183,67 @@ def _series(T, state, fixed):
 @inline
 def split(work):
     """The parts of the work array: series, state, state before the step, what stays fixed, what became of lanes."""
-    first, second = _TABLE + _STATE, _TABLE + 2 * _STATE
-    return work[:_TABLE], work[_TABLE:first], work[first:second], work[second : second + _FIXED], work[second + _FIXED]
+    first, second = TABLE + STATE, TABLE + 2 * STATE
+    return work[:TABLE], work[TABLE:first], work[first:second], work[second : second + FIXED], work[second + FIXED]
 
 
 @inline
 def step(T, state, before, fixed, fate, tolerance):
     """One step of every lane."""
-    _series(T, state, fixed)
-    _advance(T, state, before, fixed, fate, tolerance)
+    series(T, state, fixed)
+    advance(T, state, before, fixed, fate, tolerance)
     _turnings(state)
 
 
 @inline
-def _advance(T, state, before, fixed, fate, tolerance):
+def advance(T, state, before, fixed, fate, tolerance):
     """One step of every lane, to its next time where that lies within the step; `before` keeps the state before it."""
-    for k in range(_STATE):
+    for k in range(STATE):
         for i in range(LANES):
             before[k, i] = state[k, i]
     for i in range(LANES):
-        w, last, previous = state[_V, i], abs(T[_W + ORDER, i]), abs(T[_W + ORDER - 1, i])
+        w, last, previous = state[V, i], abs(T[W + ORDER, i]), abs(T[W + ORDER - 1, i])
         # a term that vanishes, as every second does where the motion starts at rest, proves nothing: two more count
-        fall = _FALL * state[_RATE, i] * state[_RATE, i]
-        size = max(last, fall * abs(T[_W + ORDER - 2, i]))
-        size = max(size, max(previous, fall * abs(T[_W + ORDER - 3, i])) * state[_RATE, i])
-        size = size * max(1.0, _SHORT * state[_RATE, i])
+        fall = FALL * state[RATE, i] * state[RATE, i]
+        size = max(last, fall * abs(T[W + ORDER - 2, i]))
+        size = max(size, max(previous, fall * abs(T[W + ORDER - 3, i])) * state[RATE, i])
+        size = size * max(1.0, _SHORT * state[RATE, i])
         size = size / (tolerance * (1.0 + abs(w)))
         # within `flow.longest_step` w has one zero at most
-        square = fixed[_PDG, i] + fixed[_PF, i] * (abs(w) + 0.25 * fixed[_PF, i])
+        square = fixed[PDG, i] + fixed[PF, i] * (abs(w) + 0.25 * fixed[PF, i])
         rate = math.sqrt(max(math.sqrt(math.sqrt(math.sqrt(size))), square) + 1e-300)
         h = 1.0 / rate
-        rest = (fixed[_NEXT, i] - state[_T, i]) - state[_T_LOW, i]
+        rest = (fixed[NEXT, i] - state[TIME, i]) - state[TIME_LOW, i]
         at = rest < h
         dt = rest if at else h
-        x, v = T[_W + ORDER, i] * (1.0 / (ORDER + 1)), T[_W + ORDER, i]
+        x, v = T[W + ORDER, i] * (1.0 / (ORDER + 1)), T[W + ORDER, i]
         for k in range(ORDER - 1, 0, -1):
-            x, v = x * dt + T[_W + k, i] * (1.0 / (k + 1)), v * dt + T[_W + k, i]
-        x, v = state[_PSI, i] + (x * dt + w) * dt, w + v * dt
-        u1, z1, u2, z2, f = T[_U1 + LOW, i], T[_Z1 + LOW, i], T[_U2 + LOW, i], T[_Z2 + LOW, i], T[_F + LOW, i]
+            x, v = x * dt + T[W + k, i] * (1.0 / (k + 1)), v * dt + T[W + k, i]
+        x, v = state[PSI, i] + (x * dt + w) * dt, w + v * dt
+        u1, z1, u2, z2, f = T[U1 + LOW, i], T[Z1 + LOW, i], T[U2 + LOW, i], T[Z2 + LOW, i], T[F_ + LOW, i]
         for k in range(LOW - 1, -1, -1):
-            u1, z1 = u1 * dt + T[_U1 + k, i], z1 * dt + T[_Z1 + k, i]
-            u2, z2, f = u2 * dt + T[_U2 + k, i], z2 * dt + T[_Z2 + k, i], f * dt + T[_F + k, i]
+            u1, z1 = u1 * dt + T[U1 + k, i], z1 * dt + T[Z1 + k, i]
+            u2, z2, f = u2 * dt + T[U2 + k, i], z2 * dt + T[Z2 + k, i], f * dt + T[F_ + k, i]
         z1, z2 = z1 + f * u1, z2 + f * u2
         # the last terms, and what follows them
         d2 = dt * dt
         d4 = d2 * d2
         d13 = d4 * d4 * d4 * dt
-        last = max(last * d2, _FALL * abs(T[_W + ORDER - 2, i]))
-        cut = d13 * max(last * dt, max(previous * d2, _FALL * abs(T[_W + ORDER - 3, i])))
-        speed = fixed[_PF, i] * abs(v) + fixed[_PG, i]
+        last = max(last * d2, FALL * abs(T[W + ORDER - 2, i]))
+        cut = d13 * max(last * dt, max(previous * d2, FALL * abs(T[W + ORDER - 3, i])))
+        speed = fixed[PF, i] * abs(v) + fixed[PG, i]
         e = cut * dt * (1.0 / ORDER) + ROUNDOFF_UP * (4.0 + 3.0 * dt * (abs(v) + dt * speed))
         g = cut + ROUNDOFF_UP * (1.5 * abs(v) + 8.0 * dt * speed)
-        saa, sab, sbb = state[_SAA, i], state[_SAB, i], state[_SBB, i]
-        state[_SAA, i] = u1 * u1 * saa + 2.0 * u1 * u2 * sab + u2 * u2 * sbb + e * e
-        state[_SAB, i] = u1 * z1 * saa + (u1 * z2 + u2 * z1) * sab + u2 * z2 * sbb
+        saa, sab, sbb = state[SAA, i], state[SAB, i], state[SBB, i]
+        state[SAA, i] = u1 * u1 * saa + 2.0 * u1 * u2 * sab + u2 * u2 * sbb + e * e
+        state[SAB, i] = u1 * z1 * saa + (u1 * z2 + u2 * z1) * sab + u2 * z2 * sbb
         sbb = z1 * z1 * saa + 2.0 * z1 * z2 * sab + z2 * z2 * sbb + g * g
-        n = state[_STEPS, i] + 1.0
-        state[_SBB, i], state[_STEPS, i] = sbb, n
-        high = state[_T, i] + h
-        state[_T_LOW, i] += h - (high - state[_T, i])
-        state[_T, i], state[_PSI, i], state[_V, i], state[_RATE, i] = high, x, v, rate
-        good = state[_SAA, i] < TRUST and sbb < (1.0 + abs(v)) * (1.0 + abs(v))
+        n = state[STEPS, i] + 1.0
+        state[SBB, i], state[STEPS, i] = sbb, n
+        high = state[TIME, i] + h
+        state[TIME_LOW, i] += h - (high - state[TIME, i])
+        state[TIME, i], state[PSI, i], state[V, i], state[RATE, i] = high, x, v, rate
+        good = state[SAA, i] < TRUST and sbb < (1.0 + abs(v)) * (1.0 + abs(v))
         fate[i] = _AT if at else (_GOING if good else _LOST)
 
 
@@ -251,17 +251,17 @@ def _advance(T, state, before, fixed, fate, tolerance):
 def _turnings(state):
     """Count the sign changes of w; where the bar reaches zero for more than two steps the count is lost."""
     for i in range(LANES):
-        v, sign, unsure, count = state[_V, i], state[_SIGN, i], state[_UNSURE, i], state[_COUNT, i]
-        near = not v * v > 2.0402 * state[_STEPS, i] * state[_SBB, i]
+        v, sign, unsure, count = state[V, i], state[SIGN, i], state[UNSURE, i], state[COUNT, i]
+        near = not v * v > 2.0402 * state[STEPS, i] * state[SBB, i]
         lost = unsure > 2.0
         passed = count + (1.0 if v * sign < 0.0 else 0.0)
-        state[_COUNT, i] = count if near else (_MANY if lost else passed)
-        state[_SIGN, i] = sign if near else (1.0 if v > 0.0 else -1.0)
-        state[_UNSURE, i] = unsure + 1.0 if near else 0.0
+        state[COUNT, i] = count if near else (_MANY if lost else passed)
+        state[SIGN, i] = sign if near else (1.0 if v > 0.0 else -1.0)
+        state[UNSURE, i] = unsure + 1.0 if near else 0.0
 
 
 @inline
-def _enter(p, phi0, w0, state, fixed, i):
+def enter(p, phi0, w0, state, fixed, i):
     """Set lane i to the start of a solution, in axes where c23 = 0."""
     angle, wide, tall = 0.0, p[D] + 0.0, 2.0 * p[C23]  # no negative zero: its sign is taken
     if tall != 0.0:
@@ -269,32 +269,32 @@ def _enter(p, phi0, w0, state, fixed, i):
         wide = math.copysign(math.sqrt(wide * wide + tall * tall), wide)
     s, c = math.sin(angle), math.cos(angle)
     rest, turns = reduced(phi0)
-    fixed[_P12, i], fixed[_P31, i] = p[B12] * c - p[B31] * s, p[B12] * s + p[B31] * c
-    fixed[_P2, i], fixed[_P3, i], fixed[_PD, i] = p[S2] * c - p[S3] * s, p[S2] * s + p[S3] * c, wide
-    fixed[_PF, i], fixed[_PG, i], fixed[_PDG, i], fixed[_TURN, i] = p[BOUND_F], p[BOUND_G], p[BOUND_DG], angle
-    for k in range(_STATE):
+    fixed[P12, i], fixed[P31, i] = p[B12] * c - p[B31] * s, p[B12] * s + p[B31] * c
+    fixed[P2, i], fixed[P3, i], fixed[PD, i] = p[S2] * c - p[S3] * s, p[S2] * s + p[S3] * c, wide
+    fixed[PF, i], fixed[PG, i], fixed[PDG, i], fixed[TURN, i] = p[BOUND_F], p[BOUND_G], p[BOUND_DG], angle
+    for k in range(STATE):
         state[k, i] = 0.0
-    state[_PSI, i], state[_TURNS, i], state[_V, i] = rest - angle, turns, w0
+    state[PSI, i], state[TURNS, i], state[V, i] = rest - angle, turns, w0
     slip = ROUNDOFF_UP * 4.0 * (turns != 0.0 or angle != 0.0)
-    state[_SAA, i] = slip * slip
-    state[_RATE, i] = abs(w0) + math.sqrt(p[BOUND_DG] + p[BOUND_F] * (abs(w0) + 0.25 * p[BOUND_F]))
-    state[_SIGN, i] = start_sign(p, rest, w0)
+    state[SAA, i] = slip * slip
+    state[RATE, i] = abs(w0) + math.sqrt(p[BOUND_DG] + p[BOUND_F] * (abs(w0) + 0.25 * p[BOUND_F]))
+    state[SIGN, i] = start_sign(p, rest, w0)
 
 
 @inline
 def _record(state, before, fixed, i, floats, turnings):
     """Record lane i at its next time and return to where the step began; False where the bar is too wide."""
-    n, v, turns, angle = state[_STEPS, i], state[_V, i], state[_TURNS, i], fixed[_TURN, i]
-    wide, high = bar(n, state[_SAA, i]), bar(n, state[_SBB, i])
+    n, v, turns, angle = state[STEPS, i], state[V, i], state[TURNS, i], fixed[TURN, i]
+    wide, high = bar(n, state[SAA, i]), bar(n, state[SBB, i])
     if not (wide < TRUST and high < TRUST * (1.0 + abs(v))):
         return False
-    floats[rc.PHI], floats[rc.W] = (state[_PSI, i] + angle) + turns * TWO_PI, v
+    floats[rc.PHI], floats[rc.W] = (state[PSI, i] + angle) + turns * TWO_PI, v
     floats[rc.PHI_BAR], floats[rc.W_BAR] = wide + 3e-16 * (abs(turns) * TWO_PI + abs(angle)), high
-    from_rest = before[_STEPS, i] == 0.0 and before[_V, i] == 0.0  # then w is 0 at the start and nowhere else
-    sure = before[_UNSURE, i] < 3.0 and before[_COUNT, i] >= 0.0 and (abs(v) > high or from_rest)
-    passed = before[_SIGN, i] * v < 0.0 and not from_rest
-    turnings[0] = int(before[_COUNT, i]) + passed if sure else UNDETERMINED
-    for k in range(_STATE):
+    from_rest = before[STEPS, i] == 0.0 and before[V, i] == 0.0  # then w is 0 at the start and nowhere else
+    sure = before[UNSURE, i] < 3.0 and before[COUNT, i] >= 0.0 and (abs(v) > high or from_rest)
+    passed = before[SIGN, i] * v < 0.0 and not from_rest
+    turnings[0] = int(before[COUNT, i]) + passed if sure else UNDETERMINED
+    for k in range(STATE):
         state[k, i] = before[k, i]
     return True
 
@@ -307,8 +307,8 @@ def _refill(P, starts, times, waiting, state, fixed, row, column, status):
             if finite(times[waiting]) == 0:
                 status[waiting] = OK
             else:
-                _enter(P[waiting], starts[waiting, 0], starts[waiting, 1], state, fixed, i)
-                fixed[_NEXT, i], row[i], column[i] = times[waiting, 0], waiting, 0
+                enter(P[waiting], starts[waiting, 0], starts[waiting, 1], state, fixed, i)
+                fixed[NEXT, i], row[i], column[i] = times[waiting, 0], waiting, 0
             waiting += 1
     return waiting
 
@@ -318,7 +318,7 @@ def _collect(times, limit, state, before, fixed, fate, row, column, floats, turn
     """Record what the lanes have reached and free those that have ended; returns whether any has."""
     freed = False
     for i in range(LANES):
-        if row[i] < 0 or (fate[i] == _GOING and state[_STEPS, i] < limit):
+        if row[i] < 0 or (fate[i] == _GOING and state[STEPS, i] < limit):
             continue
         r, j = row[i], column[i]
         ending = -1
@@ -329,11 +329,11 @@ def _collect(times, limit, state, before, fixed, fate, row, column, floats, turn
                 ending = OK
             else:
                 column[i] = j + 1
-                fixed[_NEXT, i] = times[r, j + 1]
+                fixed[NEXT, i] = times[r, j + 1]
         elif fate[i] == _GOING:
             ending = STEP_LIMIT
         else:
-            ending = NO_CONVERGENCE if math.isfinite(state[_V, i]) else OVERFLOW
+            ending = NO_CONVERGENCE if math.isfinite(state[V, i]) else OVERFLOW
         if ending >= 0:
             status[r], row[i], freed = ending, -1, True
     return freed
@@ -347,7 +347,7 @@ def trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
     """
     work = np.zeros((ROWS, LANES))  # one array: LLVM sees that its rows do not overlap
     T, state, before, fixed, fate = split(work)
-    tolerance = min(tolerance, _COARSEST)
+    tolerance = min(tolerance, COARSEST)
     row, column = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
     waiting, steps = _refill(P, starts, times, 0, state, fixed, row, column, status), 0
     while row.max() >= 0:

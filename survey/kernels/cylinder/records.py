@@ -3,7 +3,8 @@
 Angles are in radians; a name with _BAR is the error bound of the value named before it.
 """
 
-# A solution in the order of the parameters: six of the system (columns B12 to S3 of `flow`), then its initial state.
+# A solution in the order of the parameters: six of the system (columns B12 to S3 of `flow`), then its initial state; of
+# a flow of one's own the further columns of its `program`, from BOUND_F on, follow.
 PHI0, W0 = 6, 7
 GIVEN = 8
 # A start: phi0 and w0, and what they may be off.

@@ -12,8 +12,10 @@ import numpy as np
 
 from survey.kernels.cylinder.equilibria import ANGLE, captured
 from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, BOUND_G, TWO_PI, table, values
+from survey.kernels.cylinder.program import COLUMNS, MEAN
 from survey.kernels.cylinder.steps import bar, carried, expand, local_error, passage, time_of_turning
 from survey.kernels.jit import inline, kernel, splice
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 ROTATION, LIBRATION = 0, 1
 NO_IMAGE, UNKNOWN = 0, -1  # classes without an image
@@ -54,9 +56,13 @@ def rotation(setting, begin, at, p, eqs, count, section, w0, tolerance, node):
             f, g, _dg = values(p, section)
             slope = f + g / w
             own = bar(n, max(sbb - 2.0 * slope * sab + slope * slope * saa, 0.0))
-            fast = w0 / (p[BOUND_F] + math.sqrt(p[BOUND_DG]) + 1e-300) > 10.0
+            change, balanced = y, len(p) == COLUMNS or p[MEAN] == 0.0
+            if not balanced:  # then w - F is not periodic
+                change = w - w0
+                own += 2.0 * ROUNDOFF_UP * (w + w0)
+            fast = balanced and w0 / (p[BOUND_F] + math.sqrt(p[BOUND_DG]) + 1e-300) > 10.0
             other = y_error + 7.0 * (own * p[BOUND_G] / w0 + bar(n, saa) * p[BOUND_DG]) / w0
-            node[CLASS], node[CHANGE], node[SLOPE], node[TIME] = 1.0, y, math.exp(e) * w0 / (w0 + y), t
+            node[CLASS], node[CHANGE], node[SLOPE], node[TIME] = 1.0, change, math.exp(e) * w0 / (w0 + change), t
             node[ERROR] = min(own, other) if fast else own
             return
         if n % 4 == 0 and captured(eqs, count, phi, w, bar(n, saa) + bar(n, sbb)) >= 0:

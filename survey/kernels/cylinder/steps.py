@@ -29,11 +29,13 @@ from survey.kernels.cylinder.flow import (
     W,
     jacobian,
     longest_step,
+    on_circle,
     reduced,
     table,
     values,
     variation,
 )
+from survey.kernels.cylinder.program import RADIUS
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.newton import bracketed
 from survey.kernels.math.roundoff import ROUNDOFF_UP
@@ -56,7 +58,8 @@ def local_error(p, T, w, dt):
     many, phi_in_step = max(1.0, weight), abs(T[0, PHI]) + dt * abs(w)
     rate = many * (p[BOUND_F] * abs(w) + p[BOUND_G])
     rate += 0.25 * weight * (p[BOUND_F] * abs(w) + p[BOUND_DG]) * phi_in_step
-    phi = T[LAST, TRUNC_PHI] + ROUNDOFF_UP * (4.0 + 3.0 * dt * (many * abs(w) + dt * rate))
+    size = 4.0 if on_circle(p) else max(4.0, 2.0 * phi_in_step)
+    phi = T[LAST, TRUNC_PHI] + ROUNDOFF_UP * (size + 3.0 * dt * (many * abs(w) + dt * rate))
     return phi, T[LAST, TRUNC_W] + ROUNDOFF_UP * (1.5 * abs(w) + 4.0 * dt * rate)
 
 
@@ -119,7 +122,7 @@ def trajectory(setting, begin, at, p, phi0, w0, times, tolerance, limit, floats,
     """Fill floats[j] (PHI to W_BAR) and turnings[j] at the ascending times[j] >= 0; returns a status."""
     T = table()
     how = setting(p, w0, tolerance)
-    phi, turns = reduced(phi0)
+    phi, turns = reduced(phi0) if on_circle(p) else (phi0, 0.0)
     w, t, t_low, n = w0, 0.0, 0.0, 0
     slip = ROUNDOFF_UP * 4.0 * (turns != 0.0)
     saa, sab, sbb = slip * slip, 0.0, 0.0
@@ -153,8 +156,9 @@ def trajectory(setting, begin, at, p, phi0, w0, times, tolerance, limit, floats,
         saa, sab, sbb = carried(p, T, h, v, saa, sab, sbb)
         phi, w = x, v
         t, t_low = later(t, t_low, h)
-        phi, k = wrapped(phi)
-        turns += k
+        if on_circle(p):
+            phi, k = wrapped(phi)
+            turns += k
         if not trusted(saa, sbb, w):
             return NO_CONVERGENCE if math.isfinite(w) else OVERFLOW
         if abs(w) <= bar(n, sbb):
@@ -215,11 +219,12 @@ def rests(p, phi, w):
 @inline
 def passage(at, p, T, target, up, h):
     """dt in [0, h] where phi = target, w without a zero inside the step; `up`: phi increases there."""
-    return bracketed(_to_target, at, (p, T, target, up), 0.5 * h, (0.0, h), (1e-17 + 1e-16 * h, 0.0), 60)[1]
+    return bracketed(to_target, at, (p, T, target, up), 0.5 * h, (0.0, h), (1e-17 + 1e-16 * h, 0.0), 60)[1]
 
 
 @inline
-def _to_target(at, given, dt):
+def to_target(at, given, dt):
+    """The residual of `passage`."""
     p, T, target, up = given
     phi, w, _e, _y = at(p, T, dt)
     return phi - target, w, (phi < target) == up
@@ -229,11 +234,12 @@ def _to_target(at, given, dt):
 def time_of_turning(at, p, T, h):
     """dt in [0, h] where w, which changes sign on the step, is 0."""
     first = T[0, W] > 0.0 or (T[0, W] == 0.0 and T[1, W] > 0.0)
-    return bracketed(_to_rest, at, (p, T, first), 0.5 * h, (0.0, h), (1e-17 + 1e-16 * h, 0.0), 60)[1]
+    return bracketed(to_rest, at, (p, T, first), 0.5 * h, (0.0, h), (1e-17 + 1e-16 * h, 0.0), 60)[1]
 
 
 @inline
-def _to_rest(at, given, dt):
+def to_rest(at, given, dt):
+    """The residual of `time_of_turning`."""
     p, T, first = given
     phi, w, _e, _y = at(p, T, dt)
     f, g, _dg = values(p, phi)
@@ -262,6 +268,8 @@ def node_ahead(p, phi, w):
     gap = x - phi
     if not (dg < 0.0 and f < 0.0 and abs(g) < 1e-13 * p[BOUND_G] and 1e-11 < gap < 0.3):
         return -1.0
+    if not on_circle(p) and gap > p[RADIUS]:
+        return -1.0
     return gap if settled(p, f, dg, -gap, w) else -1.0
 
 
@@ -283,6 +291,21 @@ def conclude(ending, doubt, j, floats, status):
 
 
 @inline
+def at_rest(p, phi, phi0, w0, targets, floats, status):
+    """Has a solution that starts at w0 = 0 turned there, or does it stay? Then all its targets are filled."""
+    if w0 != 0.0 or start_sign(p, phi, w0) > 0:
+        return False
+    # within rounding of an equilibrium the side on which the solution leaves it is open
+    ending = TURNING if start_sign(p, phi, w0) < 0 else (EQUILIBRIUM if rests(p, phi0, w0) else SEPARATRIX)
+    for i in range(len(targets)):
+        here = targets[i] == phi0
+        status[i] = OK if here else ending
+        floats[i, rc.VALUE] = 0.0 if here else phi0
+        floats[i, rc.TIME] = floats[i, rc.VALUE_BAR] = floats[i, rc.TIME_BAR] = 0.0
+    return True
+
+
+@inline
 def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, status):
     """The solution from (phi0, w0 >= 0) at ascending targets >= phi0, forward in time.
 
@@ -293,23 +316,12 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
     """
     T = table()
     how = setting(p, w0, tolerance)
-    phi, turns = reduced(phi0)
+    phi, turns = reduced(phi0) if on_circle(p) else (phi0, 0.0)
     w, t, t_low, n, started = w0, 0.0, 0.0, 0, w0 > 0.0
     slip = ROUNDOFF_UP * 4.0 * (turns != 0.0)
     saa, sab, sbb = slip * slip, 0.0, 0.0
     j, size, doubt = 0, len(targets), -1  # doubt: the first target in doubt
-    ending = OK
-    if w0 == 0.0 and start_sign(p, phi, w0) <= 0:
-        # within rounding of an equilibrium the side on which the solution leaves it is open
-        ending = TURNING if start_sign(p, phi, w0) < 0 else (EQUILIBRIUM if rests(p, phi0, w0) else SEPARATRIX)
-        while j < size and targets[j] == phi0:
-            floats[j, rc.VALUE] = floats[j, rc.TIME] = floats[j, rc.VALUE_BAR] = floats[j, rc.TIME_BAR] = 0.0
-            status[j] = OK
-            j += 1
-        for i in range(j, size):
-            status[i] = ending
-            floats[i, rc.VALUE] = phi0
-            floats[i, rc.TIME] = floats[i, rc.VALUE_BAR] = floats[i, rc.TIME_BAR] = 0.0
+    if at_rest(p, phi, phi0, w0, targets, floats, status):
         return
     while j < size or doubt >= 0:
         if n >= limit:
@@ -362,8 +374,9 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
             return
         phi, w = x1, v1
         t, t_low = later(t, t_low, h)
-        phi, k = wrapped(phi)
-        turns += k
+        if on_circle(p):
+            phi, k = wrapped(phi)
+            turns += k
         if not trusted(saa, sbb, w):
             ending = NO_CONVERGENCE if math.isfinite(w) else OVERFLOW
             break
@@ -385,19 +398,26 @@ def certain(row):
 
 @inline
 def fill_crossing(floats, j, n, v, t, a, b, c, f, g):
+    """See `crossing`."""
+    floats[j, rc.VALUE], floats[j, rc.TIME], floats[j, rc.VALUE_BAR], floats[j, rc.TIME_BAR] = crossing(
+        n, v, t, a, b, c, f, g
+    )
+
+
+@inline
+def crossing(n, v, t, a, b, c, f, g):
     """w, t and their bars where phi passes a target: the error of phi along the flow goes into w and t.
 
     Near a turning point w^2 is smooth in phi while w is not; there the bar is that of w^2.
     """
     n += 2  # the initial phi, the target and the time at which it is reached have errors too: at most four terms
-    floats[j, rc.VALUE], floats[j, rc.TIME] = max(v, 0.0), t
-    slope = (f * v + g) / v if v > 0.0 else math.inf
-    spread = bar(n, c - 2.0 * slope * b + slope * slope * a) if v > 0.0 else math.inf
+    moving = v > 0.0
+    safe = v if moving else 1.0
+    slope = (f * v + g) / safe
     bar_phi, bar_w = bar(n, a), bar(n, c)
-    if not spread < 0.1 * v:
-        spread = 2.0 * (bar_w + math.sqrt(abs(2.0 * (abs(g) + abs(f) * bar_w) * bar_phi))) + v
-    floats[j, rc.VALUE_BAR] = spread
+    spread = bar(n, c - 2.0 * slope * b + slope * slope * a)
+    beside = 2.0 * (bar_w + math.sqrt(abs(2.0 * (abs(g) + abs(f) * bar_w) * bar_phi))) + v
+    spread = spread if moving and spread < 0.1 * v else beside
     accel = max(abs(f * v + g), 1e-300)
-    floats[j, rc.TIME_BAR] = min(
-        bar_phi / v if v > 0.0 else math.inf, spread / accel + bar_w / accel
-    ) * 1.2 + 4e-16 * abs(t)
+    gone = bar_phi / safe if moving else math.inf
+    return max(v, 0.0), t, spread, min(gone, spread / accel + bar_w / accel) * 1.2 + 4e-16 * abs(t)

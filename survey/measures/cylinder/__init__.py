@@ -1,8 +1,9 @@
 """Flows on the cylinder, phi' = w, w' = f(phi) w + g(phi): solutions, fates, portraits.
 
-METHODS lists what a method that serves the family "cylinder" offers; one that answers only some questions says so in
-WHEN, and leaves out what the others need. A method that has one step is made complete by `survey.kernels.cylinder`:
-`steps`, `returns` and `fate` take its `flow_setting`, `flow_begin` and `flow_at`.
+METHODS lists what a method that serves the family "cylinder" (the gyrostat) or "abel" (a user's f and g) offers; one
+that answers only some questions says so in WHEN, and leaves out what the others need. A method that has one step is
+made complete by `survey.kernels.cylinder`: `steps`, `returns` and `fate` take its `flow_setting`, `flow_begin` and
+`flow_at`.
 
 P (rows, 10) holds the columns B12 to BOUND_DDG of `survey.kernels.cylinder.flow`, p is one row of it; `starts`
 (rows, 2) holds phi0 and w0. `tolerance` bounds the truncation error of one step (of phi, and of w relative to 1 + |w|),
@@ -44,6 +45,14 @@ METHODS = {
             "fill out (rows, FATE) for initial states, see `kernels.cylinder.fate.fates`",
             ("p", "section", "ends", "sizes", "eqs", "plus", "minus", "lib", "starts", "tolerance", "limit", "out"),
         ),
+        "flow_line": Function(
+            "fill out (m, POINT) with the points of a branch or a cycle in a window, see `kernels.cylinder.lines.line`",
+            ("p", "start", "window", "eqs", "count", "section", "kind", "tolerance", "out"),
+        ),
+        "flow_connections": Function(
+            "fill out (rows, 4, 2, ROW) with branches of the saddles, see `kernels.cylinder.connections.connections`",
+            ("P", "wanted", "tolerance", "out"),
+        ),
         "flow_setting": Function("what controls the steps of one solution", ("p", "w", "tolerance")),
         "flow_begin": Function(
             "expand at (phi, w) into the table T of `kernels.cylinder.flow`, controlled by `flow_setting`; returns the "
@@ -55,3 +64,5 @@ METHODS = {
         ),
     }
 }
+# Flows of one's own, whose rows of P go on (see `survey.kernels.cylinder.program`), take the same from a method.
+METHODS["abel"] = METHODS["cylinder"]

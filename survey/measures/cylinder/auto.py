@@ -9,8 +9,11 @@ bound is no wider. dop853, rk4 or full alone serve 5 points of 4776. What still 
 arithmetic.
 """
 
+from functools import partial
+
 import numpy as np
 
+from survey.kernels.cylinder import closed as forms
 from survey.kernels.cylinder import taylor_double
 from survey.kernels.cylinder.steps import EQUILIBRIUM, NO_CONVERGENCE, OK, SEPARATRIX, TURNING, UNDETERMINED
 from survey.measures.cylinder import solution
@@ -21,29 +24,53 @@ FINEST = 3e-16  # no float64 can be known better
 
 def trajectories(method, rows, times, rtol):
     """As `solution.trajectories`: in closed form, and by `method` where that has no answer or too wide a bound."""
-    results = solution.trajectories(closed, rows, times, rtol)
-    missed, uncounted = solution.missed(results, rtol), results[1] == UNDETERMINED
-    if uncounted.any():
-        missed |= uncounted
-        results[0][uncounted] = np.nan
-        results[2][uncounted & (results[2] == OK)] = closed.NO_CONVERGENCE
-    if not missed.any():
-        return results
-    results = _completed(results, missed, lambda some, at: solution.trajectories(method, some, at, rtol), rows, times)
-    left = _left_open(results, rtol) | ((results[1] == UNDETERMINED) & (results[2] == OK))
-    exact = taylor_double
-    return _completed(results, left, lambda some, at: solution.trajectories(exact, some, at, rtol), rows, times)
+    return _by_rows(rows, times, partial(_trajectories, method, rtol))
 
 
 def abel(method, rows, targets, rtol, before=False):
     """As `solution.abel`, likewise."""
-    results = solution.abel(closed, rows, targets, rtol, before)
-    missed = solution.missed(results, rtol) & (results[-1] != EQUILIBRIUM)
-    if not missed.any():
-        return results
-    results = _completed(results, missed, lambda some, at: solution.abel(method, some, at, rtol, before), rows, targets)
-    left, exact = _left_open(results, rtol), taylor_double
-    return _completed(results, left, lambda some, at: solution.abel(exact, some, at, rtol, before), rows, targets)
+    return _by_rows(rows, targets, partial(_abel, method, rtol, before))
+
+
+def _by_rows(rows, columns, solve):
+    """`solve(rows, columns, served)` for those that a closed form serves and for the others."""
+    served = np.empty(len(rows), dtype=np.bool_)
+    forms.served(*solution.split(rows), served)
+    if served.all() or not served.any():
+        return solve(rows, columns, served.any())
+    parts = [solve(rows[pick], columns[pick], known) for pick, known in ((served, True), (~served, False))]
+    results = tuple(np.empty((len(rows), *result.shape[1:]), result.dtype) for result in parts[0])
+    for pick, part in zip((served, ~served), parts, strict=True):
+        for result, new in zip(results, part, strict=True):
+            result[pick] = new
+    return results
+
+
+def _trajectories(method, rtol, rows, times, served):
+    solve = partial(solution.trajectories, rtol=rtol)
+    results = solve(closed if served else method, rows, times)
+    if served:
+        missed, uncounted = solution.missed(results, rtol), results[1] == UNDETERMINED
+        if uncounted.any():
+            missed |= uncounted
+            results[0][uncounted] = np.nan
+            results[2][uncounted & (results[2] == OK)] = closed.NO_CONVERGENCE
+        if not missed.any():
+            return results
+        results = _completed(results, missed, partial(solve, method), rows, times)
+    left = _left_open(results, rtol) | ((results[1] == UNDETERMINED) & (results[2] == OK))
+    return _completed(results, left, partial(solve, taylor_double), rows, times)
+
+
+def _abel(method, rtol, before, rows, targets, served):
+    solve = partial(solution.abel, rtol=rtol, before=before)
+    results = solve(closed if served else method, rows, targets)
+    if served:
+        missed = solution.missed(results, rtol) & (results[-1] != EQUILIBRIUM)
+        if not missed.any():
+            return results
+        results = _completed(results, missed, partial(solve, method), rows, targets)
+    return _completed(results, _left_open(results, rtol), partial(solve, taylor_double), rows, targets)
 
 
 def _left_open(results, rtol):

@@ -16,9 +16,11 @@ from survey.kernels.cylinder import fate as kf
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder import returns as rt
 from survey.kernels.cylinder import taylor_double
-from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, coefficients
+from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, BOUND_G, coefficients
 from survey.kernels.cylinder.flow_double import energy as energy_beside
+from survey.kernels.cylinder.program import COLUMNS, MEAN
 from survey.kernels.cylinder.steps import OK, SEPARATRIX, STEP_LIMIT
+from survey.measures.cylinder import ends
 from survey.measures.cylinder.solution import tolerances, trajectories
 
 NO_TURNS = kf.NO_TURNS
@@ -29,6 +31,9 @@ MORE = 10  # times the budget for those that use it up
 MOST = 2_000_000  # steps in all
 BATCH = 50  # fates per kernel call, so that a call stays below a second
 HANDED_OVER = np.geomspace(0.5, 2000.0, 28)  # times, in those of the system, at which float64 takes over again
+MIRROR = np.array([1.0, -1.0, 1.0, -1.0, -1.0, 1.0])  # S2, see `solution`
+MOST_OF_PROGRAM = 16  # equilibria
+UNKNOWN, NO_ENDS = 21, 22  # as in the STATUS of scenes/gyrostat.py and of request/abel_scene.py
 LEAST = 1e-6  # slowest rotation of the lattice, in velocities of the system
 FINE = 1e-16  # truncation per step for cycles, or the finest of the method
 
@@ -65,7 +70,9 @@ def followed(method, s, starts, rtol):
         open_ = out[:, rc.STATUS] == code
         if open_.any():
             out[open_] = fates(method, s, starts[open_], tolerance, MORE)
-    if s.stratum not in (I0, I1) and starts.shape[1] == 2:  # no better than the bars of a start can its fate be
+    if (
+        s.stratum not in (I0, I1) and starts.shape[1] == 2 and len(s.p) == COLUMNS
+    ):  # no better than the bars of a start can its fate be
         for i in np.flatnonzero(out[:, rc.STATUS] == SEPARATRIX):
             _handed_over(method, s, starts[i], first, out[i])
     return out
@@ -149,6 +156,7 @@ class Skeleton:
     thresholds: np.ndarray  # (w_c, w_d) of the two rotation maps; NaN where every turn from w > 0 is completed
     conclusive: bool  # do the signs of D fit together (so the parity law holds), and did every map answer?
     folded: bool  # is an equilibrium degenerate, or so nearly that float64 hides it, and with it cycles?
+    unknown: bool = False  # does that hide how many equilibria there are?
 
 
 def sizes(b12, b31, d, c23, s2, s3):
@@ -179,20 +187,48 @@ def stratum_of(b12, b31, d, c23, s2, s3):
 def skeleton(method, six):
     """The skeleton of one parameter point (six numbers)."""
     s = outline(six)
-    if s.stratum != G:
+    if s.stratum != G or s.unknown:
         return s
-    six, eqs, thresholds = list(s.p[:6]), s.equilibria, s.thresholds.copy()
-    plus, thresholds[0], first = _rotations(method, six, eqs, s.section, s.K, s.L)
-    mirrored = [six[0], -six[1], six[2], -six[3], -six[4], six[5]]
-    minus, thresholds[1], second = _rotations(method, mirrored, _mirrored(eqs), -s.section, s.K, -s.L)
+    eqs, thresholds = s.equilibria, s.thresholds.copy()
+    plus, thresholds[0], first = _rotations(method, s.p, eqs, s.section, s.ends[0], s.K, s.L)
+    mirrored = flow_of(_signed(s.p, MIRROR))
+    minus, thresholds[1], second = _rotations(method, mirrored, _mirrored(eqs), -s.section, s.ends[1], s.K, -s.L)
     librations, third = _librations(method, s.p, eqs, s.folded)
     conclusive = first and second and third
     return replace(s, plus=plus, minus=minus, librations=librations, thresholds=thresholds, conclusive=conclusive)
 
 
+def flow_of(six):
+    """The row p of the kernels for six parameters, or for a program, which is that row."""
+    return np.ascontiguousarray(six if len(six) > COLUMNS else coefficients(*six[:6]))
+
+
+def _signed(six, signs):
+    return np.concatenate([np.asarray(six[:6]) * signs, six[6:]])
+
+
+def _outline_of_program(p):
+    """As `outline`: the strata, where nothing decides fates, are I0 for g = 0, I1 for f = 0, I2 for neutral ends."""
+    known = ends.of(p)
+    p[MEAN] = known.mean_f
+    f_is_0, g_is_0 = p[BOUND_F] == 0.0, p[BOUND_G] == 0.0
+    stratum = I0 if g_is_0 else I1 if f_is_0 else G if known.attract.all() else I2
+    table = np.zeros((MOST_OF_PROGRAM, 10))
+    count = eq.bisected(p, table) if not g_is_0 else 0
+    eqs = table[: max(count, 0)]
+    saddles = eqs[eqs[:, eq.KIND] == eq.SADDLE, eq.ANGLE]
+    highest = float(saddles[np.argmax(ends.potential(p, saddles))]) if len(saddles) else 0.0
+    section = highest - 2.0 * math.pi if highest > math.pi else highest
+    none, thresholds = np.zeros((0, 10)), np.full((2, 2), np.nan)
+    return Skeleton(p, stratum, 0.0, 0.0, known.attract, section, eqs, none, none, none, thresholds, True, count < 0,
+                    count < 0)  # fmt: skip
+
+
 def outline(six):
     """The skeleton without its cycles, which take almost all of the time."""
-    six = [float(value) for value in six]
+    if len(six) > COLUMNS:
+        return _outline_of_program(np.array(six, dtype=float))
+    six = [float(value) for value in six[:6]]
     p = np.ascontiguousarray(coefficients(*six))
     K, L = constants(*six)
     stratum = stratum_of(*six)
@@ -223,15 +259,13 @@ def _mirrored(eqs):
     return turned
 
 
-def _rotations(method, six, eqs, section, K, L):
-    """Cycles with w > 0 of the system `six`, ascending in w; (w_c, w_d); are they conclusive?"""
-    p = np.ascontiguousarray(coefficients(*six))
+def _rotations(method, p, eqs, section, end, K, L):
+    """Cycles with w > 0 of the flow p, ascending in w; (w_c, w_d); are they conclusive?"""
     scale = p[BOUND_F] + math.sqrt(p[BOUND_DG])
     table, edges, fine = np.zeros((rt.MOST_CYCLES, 10)), np.zeros(7), max(FINE, method.FLOW_FINEST)
     xs = scale * np.geomspace(LEAST, 30.0, 80)
     found = method.flow_cycles(rt.ROTATION, p, eqs, len(eqs), section, 0, xs, fine, table, 0, edges)
     border, start, unknown = edges[:2].copy(), edges[4], edges[6]
-    end = np.sign(K) if K != 0.0 else np.sign(L)
     top, change, error, last = xs[-1], edges[2], edges[3], 0.0
     while change * end < 0.0 and abs(change) > 4.0 * error and top < 1e5 * scale and found < len(table) - 1:
         last = np.sign(change)
@@ -285,6 +319,10 @@ def _librations(method, p, eqs, folded):
 
 def fates(method, skeleton, starts, tolerance, more=1):
     """The fates (VERDICT to STATUS of `records`) of starts phi0, w0 (and their error bounds)."""
+    if len(skeleton.p) > COLUMNS and (skeleton.stratum != G or skeleton.unknown):
+        out = np.zeros((len(starts), rc.FATE))
+        out[:] = kf.UNDECIDED, -1, kf.UNDETERMINED, kf.NO_TURNS, NO_ENDS if skeleton.stratum != G else UNKNOWN
+        return out
     if skeleton.stratum in (I0, I1):
         return (_free if skeleton.stratum == I0 else _conservative)(skeleton, starts)
     out = np.zeros((len(starts), rc.FATE))

@@ -15,9 +15,10 @@ from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder import returns as rt
 from survey.kernels.cylinder.branches import unstable
 from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F
+from survey.kernels.cylinder.program import COLUMNS, MEAN
 from survey.kernels.cylinder.steps import TURNING
-from survey.measures.cylinder import solution
-from survey.measures.cylinder.fate import EXACT, I0, G, followed, outline, remembered, sizes
+from survey.measures.cylinder import ends, solution
+from survey.measures.cylinder.fate import EXACT, I0, MOST_OF_PROGRAM, NO_ENDS, G, followed, outline, remembered, sizes
 from survey.status import NO_CONVERGENCE, OK
 
 # Numbers that are kept: surveys of random points found at most 4 cycles, and g has at most 4 roots.
@@ -26,29 +27,37 @@ NONE, ROTATION_PLUS, ROTATION_MINUS, LIBRATION = range(4)
 TOO_MANY, UNKNOWN_CYCLES = 20, 21  # as in the STATUS of scenes/gyrostat.py
 UNDECIDED, DEGENERATE, STABLE = -1, 0, 1
 COUNTS = ("equilibria", "saddles", "rotations_plus", "rotations_minus", "librations")
+MEANS = ("mean_f", "mean_g")
 ROUNDING = 4e-16  # of K and L, relative to the sizes of their terms
 TINY = 1e-300
 
 
-def empty(count, status):
-    """The outputs of `solve` for `count` parameter points, filled with what does not apply."""
-    floats = {"K": (), "L": (), "equilibrium_phi": (EQUILIBRIA,)}
+def empty(count, status, columns=0):
+    """The outputs of `solve` for `count` rows of so many columns, filled with what does not apply."""
+    own = columns > COLUMNS
+    equilibria = MOST_OF_PROGRAM if own else EQUILIBRIA
+    floats = {"K": (), "L": (), "equilibrium_phi": (equilibria,)} | (dict.fromkeys(MEANS, ()) if own else {})
     floats |= {f"cycle_{name}": (CYCLES,) for name in ("w", "multiplier", "period")}
     result = {name + end: np.full((count, *extra), np.nan) for name, extra in floats.items() for end in ("", "_error")}
     for name in ("stratum", "end_plus", "end_minus", *COUNTS, "verdict"):
         result[name] = np.full(count, -1, dtype=np.int64)
-    for name, size in (("equilibrium_type", EQUILIBRIA), ("cycle_kind", CYCLES)):
+    for name, size in (("equilibrium_type", equilibria), ("cycle_kind", CYCLES)):
         result[name] = np.full((count, size), NONE, dtype=np.int64)
     return result | {"status": np.full(count, status, dtype=np.int64)}
 
 
 def solve(method, systems, rtol):
-    """Every output for rows of six finite parameters."""
-    result, listed = empty(len(systems), OK), []
+    """Every output for rows of six finite parameters, or of programs, for which K and L are those of `ends`."""
+    own = systems.shape[1] > COLUMNS
+    result, listed = empty(len(systems), OK, systems.shape[1]), []
     for i, six in enumerate(systems):
         s = outline(six)
-        _ends(s, six, result, i)
-        _rests(s, result, i)
+        (_ends_of_program if own else _ends)(s, six, result, i)
+        if not s.unknown:
+            _rests(s, result, i)
+        if own and s.stratum != G:
+            result["verdict"][i], result["status"][i] = DEGENERATE, NO_ENDS
+            continue
         if s.folded or any(_is_hopf(s, row) for row in s.equilibria):
             # then the error bounds leave open how many cycles there are
             result["verdict"][i], result["status"][i] = DEGENERATE, UNKNOWN_CYCLES
@@ -77,6 +86,17 @@ def _ends(s, six, result, i):
     result["end_plus"][i], result["end_minus"][i] = s.ends + 1
 
 
+def _ends_of_program(s, p, result, i):
+    """As `_ends`, and the means of f and g."""
+    known = ends.of(p)
+    for name, value, bar in zip(
+        (*MEANS, "K", "L"), (known.mean_f, known.mean_g, known.K, known.L), known.bars, strict=True
+    ):
+        result[name][i], result[f"{name}_error"][i] = value, bar
+    result["stratum"][i] = s.stratum
+    result["end_plus"][i], result["end_minus"][i] = s.ends + 1
+
+
 def _rests(s, result, i):
     """Equilibria with their types, and their numbers, of point i; in the stratum I0 every angle is one."""
     kinds = s.equilibria[:, eq.KIND]
@@ -99,7 +119,8 @@ def _type(row):
 def _verdict(method, s, rtol):
     """Is the point structurally stable, by the error bounds?"""
     scale = s.p[BOUND_F] + math.sqrt(s.p[BOUND_DG])
-    degenerate = s.stratum != G or (s.K == 0.0 and not _is_exact(s.p))
+    neutral = s.p[MEAN] == 0.0 if len(s.p) > COLUMNS else s.K == 0.0 and not _is_exact(s.p)
+    degenerate = s.stratum != G or neutral
     degenerate = degenerate or any(not _hyperbolic(row) for row in s.librations)
     for cycles in (s.plus, s.minus):
         degenerate = degenerate or any(not (_hyperbolic(row) or _far(row, s.K, scale)) for row in cycles)
@@ -107,7 +128,7 @@ def _verdict(method, s, rtol):
         return DEGENERATE
     if not s.conclusive or 2 * np.count_nonzero(s.equilibria[:, eq.KIND] == eq.SADDLE) != len(s.equilibria):
         return UNDECIDED
-    starts = np.zeros((2 * eq.MOST, 4))
+    starts = np.zeros((2 * max(eq.MOST, len(s.equilibria)), 4))
     starts = starts[: unstable(s.p, s.equilibria, len(s.equilibria), starts)]
     return STABLE if (followed(method, s, starts, rtol)[:, rc.VERDICT] >= 0).all() else UNDECIDED
 
@@ -145,7 +166,7 @@ def _rotations(method, cycles, rtol):
     six = np.array([six for *_, six in cycles])
 
     def period(x):
-        rows = np.column_stack([six, section, side * np.maximum(x, 0.0)])
+        rows = solution.rows(six, section, side * np.maximum(x, 0.0))
         floats, status = solution.abel(method, rows, (section + 2.0 * math.pi * side)[:, None], rtol)
         return np.where(status[:, 0] == OK, floats[:, 0, rc.TIME], np.nan), floats[:, 0, rc.TIME_BAR]
 
@@ -163,7 +184,8 @@ def _librations(method, cycles, rtol):
     angle = rests[:, eq.ANGLE]
 
     def half(x, b):
-        rows = np.column_stack([six * [b, b, 1, 1, 1, 1], x, np.zeros(len(x))])
+        rows = solution.rows(six, x, np.zeros(len(x)))
+        rows[:, :2] *= b
         floats, status = solution.abel(method, rows, np.column_stack([angle, angle - 2.0 * math.pi]), rtol)
         met = (status[:, 0] == OK) & (status[:, 1] == TURNING)
         return np.where(met[:, None, None], floats, np.nan)

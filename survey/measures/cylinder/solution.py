@@ -8,6 +8,7 @@ import numpy as np
 
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.flow import BOUND_DDG, spread
+from survey.kernels.cylinder.program import ON_CIRCLE
 from survey.kernels.cylinder.steps import OK, TURNING, UNDETERMINED
 
 LEAST_BAR = 1e-150  # bars are carried on by their squares, which underflow below
@@ -18,13 +19,22 @@ FINEST = 2e-16  # of a step: below, the truncation is lost in the rounding
 
 
 def reverse(rows):
-    """S1: (b, w, t) -> -(b, w, t); rows of GIVEN numbers (see `records`)."""
-    return rows * np.array([-1, -1, 1, 1, 1, 1, 1, -1.0])
+    """S1: (b, w, t) -> -(b, w, t); rows of GIVEN numbers (see `records`), and a program after them or none."""
+    return _signed(rows, [-1, -1, 1, 1, 1, 1, 1, -1.0])
 
 
 def mirror(rows):
     """S2: (phi, w, b31, c23, s2) -> -(phi, w, b31, c23, s2)."""
-    return rows * np.array([1, -1, 1, -1, -1, 1, -1, -1.0])
+    return _signed(rows, [1, -1, 1, -1, -1, 1, -1, -1.0])
+
+
+def _signed(rows, signs):
+    return rows * np.pad(signs, (0, rows.shape[1] - rc.GIVEN), constant_values=1.0)
+
+
+def rows(flows, phi0, w0):
+    """Solutions from six parameters, or programs (N, n) of `equation.flows`, and their initial states (N)."""
+    return np.column_stack([flows[:, :6], phi0, w0, flows[:, 6:]])
 
 
 def tolerances(method, rtol):
@@ -41,7 +51,7 @@ def attempts(method, rtol):
 
 def split(rows):
     """Rows of GIVEN numbers (see `records`) as the kernels take them: coefficients and initial states."""
-    P, starts = np.empty((len(rows), BOUND_DDG + 1)), np.empty((len(rows), 2))
+    P, starts = np.empty((len(rows), max(BOUND_DDG + 1, rows.shape[1] - 2))), np.empty((len(rows), 2))
     spread(np.ascontiguousarray(rows, dtype=float), P, starts)
     return P, starts
 
@@ -97,7 +107,7 @@ def _in_time(method, rows, times, rtol):
 
     asked = np.isfinite(times)
     results = _repeated(run, asked, attempts(method, rtol), rtol)
-    if hasattr(method, "flow_turnings"):
+    if hasattr(method, "flow_turnings") and (rows.shape[1] == rc.GIVEN or rows[0, ON_CIRCLE] > 0):
         _count(method, rows, times, attempts(method, rtol)[-1], asked, results)
     return back(results)
 
@@ -128,18 +138,31 @@ def abel(method, rows, targets, rtol, before=False):
             picked = onward.any(axis=1) & (((rows[:, rc.W0] * side < 0) | back) == past)
             if not picked.any():
                 continue
-            part = reverse(rows[picked]) if past else rows[picked]
-            part = mirror(part) if side < 0 else part
-            part[:, rc.W0] = np.abs(part[:, rc.W0])
-            f, s = _in_phi(method, part, np.where(onward[picked], side * targets[picked], np.inf), rtol)
-            first = np.where(s == TURNING, side, side * (-1.0 if past else 1.0))
-            f[..., rc.VALUE] *= first
-            f[..., rc.TIME] *= -1.0 if past else 1.0
-            f += 0.0  # no negative zeros
-            for result, new in ((floats, f), (status, s)):
+            mine = onward[picked]
+            same = np.flatnonzero(mine[0])
+            if (mine == mine[0]).all() and same[-1] - same[0] < same.size:  # as a rule; picking costs more than solving
+                at = slice(same[0], same[-1] + 1)
+                some = slice(None) if picked.all() else picked
+                floats[some, at], status[some, at] = _branch(method, rows[some], targets[some, at], rtol, side, past)
+                continue
+            found = _branch(method, rows[picked], np.where(mine, targets[picked], side * np.inf), rtol, side, past)
+            for result, new in zip((floats, status), found, strict=True):
                 held = result[picked]
-                held[onward[picked]] = new[onward[picked]]
+                held[mine] = new[mine]
                 result[picked] = held
+    return floats, status
+
+
+def _branch(method, rows, targets, rtol, side, past):
+    """As `abel`, for targets on one side of phi0 (1 or -1), which the motion reaches at t < 0 if `past`."""
+    rows = reverse(rows) if past else rows
+    rows = mirror(rows) if side < 0 else rows.copy()
+    rows[:, rc.W0] = np.abs(rows[:, rc.W0])
+    floats, status = _in_phi(method, rows, side * targets if side < 0 else targets, rtol)
+    if side < 0 or past:
+        floats[..., rc.VALUE] *= np.where(status == TURNING, side, side * (-1.0 if past else 1.0))
+        floats[..., rc.TIME] *= -1.0 if past else 1.0
+    floats += 0.0  # no negative zeros
     return floats, status
 
 
@@ -195,6 +218,8 @@ def _sorted(columns):
     """`columns` (rows, n) in ascending order, and the function that brings results back into their order."""
     if (columns[:, 1:] >= columns[:, :-1]).all():
         return columns, lambda results: results
+    if (columns[:, 1:] <= columns[:, :-1]).all():
+        return columns[:, ::-1], lambda results: tuple(result[:, ::-1] for result in results)
     order = np.argsort(columns, axis=1, kind="stable")
     back = np.argsort(order, axis=1)
 

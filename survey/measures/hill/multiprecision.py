@@ -51,8 +51,7 @@ def context():
 
 def lifted(function):
     """The same function on numbers of `context`; raises Unsupported when it is made or called."""
-    made = _lift(function, {})
-    mp = context()
+    made, mp = lift(function, context()), context()
 
     def call(*arguments):
         try:
@@ -64,6 +63,11 @@ def lifted(function):
             raise Unsupported(f"{type(error).__name__}: {error}") from None
 
     return call
+
+
+def lift(function, mp):
+    """The same function on the numbers that the context `mp` makes: with its functions, named as mpmath names them."""
+    return _lift(function, {}, mp)
 
 
 def _numbers(values):
@@ -90,15 +94,15 @@ class _Refused:
 class _Module:
     """math or numpy, with mpmath's functions."""
 
-    def __init__(self, module):
-        self._module = module
+    def __init__(self, module, mp):
+        self._module, self._mp = module, mp
 
     def __getattr__(self, name):
-        return _lift(getattr(self._module, name), {})
+        return _lift(getattr(self._module, name), {}, self._mp)
 
 
-def _lift(value, seen):
-    """The value as code on numbers of `context` may use it."""
+def _lift(value, seen, mp):
+    """The value as code on numbers of `mp` may use it."""
     value = getattr(value, "py_func", value) if isinstance(value, DISPATCHER) else value
     if id(value) in seen:
         return seen[id(value)]
@@ -107,17 +111,17 @@ def _lift(value, seen):
     if isinstance(value, (np.number, np.ndarray)):
         return value.item() if np.ndim(value) == 0 else value.tolist()
     if isinstance(value, (tuple, list)):
-        return type(value)(_lift(item, seen) for item in value)
+        return type(value)(_lift(item, seen, mp) for item in value)
     if isinstance(value, FunctionType):
-        return _function(value, seen)
+        return _function(value, seen, mp)
     if value in (math, np):
-        return _Module(value)
-    return _named(value)
+        return _Module(value, mp)
+    return _named(value, mp)
 
 
-def _named(value):
-    """mpmath's function instead of one of math, numpy or Python."""
-    mp, name = context(), getattr(value, "__name__", type(value).__name__)
+def _named(value, mp):
+    """The function of `mp` instead of one of math, numpy or Python."""
+    name = getattr(value, "__name__", type(value).__name__)
     if isinstance(value, ModuleType):
         return _Refused(f"it uses the module {name}")
     if value in (float, np.float64):
@@ -129,44 +133,42 @@ def _named(value):
         if named in SAME:
             return getattr(mp, named)
         if name in OTHERS:
-            return OTHERS[name]
+            return OTHERS[name](mp)
     return _Refused(f"it uses {name}")
 
 
-def _truncated(x, y):
-    mp = context()
-    rest = mp.fmod(abs(x), abs(y))
-    return rest if x >= 0 else -rest
+def _truncated(mp):
+    def fmod(x, y):
+        rest = mp.fmod(abs(x), abs(y))
+        return rest if x >= 0 else -rest
+
+    return fmod
 
 
-def _square(x):
-    return x * x
-
-
-OTHERS = {
-    "pow": lambda x, y: context().power(x, y),
+OTHERS = {  # of a context
+    "pow": lambda mp: mp.power,
     "fmod": _truncated,
-    "copysign": lambda x, y: abs(x) if y >= 0 else -abs(x),
-    "maximum": max,
-    "minimum": min,
-    "square": _square,
-    "where": lambda condition, x, y: x if condition else y,
+    "copysign": lambda mp: lambda x, y: abs(x) if y >= 0 else -abs(x),
+    "maximum": lambda mp: max,
+    "minimum": lambda mp: min,
+    "square": lambda mp: lambda x: x * x,
+    "where": lambda mp: lambda condition, x, y: x if condition else y,
 }
 
 
-def _function(function, seen):
+def _function(function, seen, mp):
     """A copy of a Python function whose names mean lifted values."""
     code, scope = function.__code__, {"__builtins__": {name: getattr(builtins, name) for name in BUILTINS}}
-    scope["__builtins__"]["float"] = context().mpf
+    scope["__builtins__"]["float"] = mp.mpf
     cells = tuple(CellType() for _ in function.__closure__ or ())
     made = FunctionType(code, scope, function.__name__, None, cells)
     seen[id(function)] = made
     for name in _names(code):
         if name in function.__globals__:
-            scope[name] = _lift(function.__globals__[name], seen)
+            scope[name] = _lift(function.__globals__[name], seen, mp)
     for cell, own in zip(cells, function.__closure__ or (), strict=True):
-        cell.cell_contents = _lift(own.cell_contents, seen)
-    made.__defaults__ = _lift(function.__defaults__, seen)
+        cell.cell_contents = _lift(own.cell_contents, seen, mp)
+    made.__defaults__ = _lift(function.__defaults__, seen, mp)
     made.__kwdefaults__ = function.__kwdefaults__
     return made
 

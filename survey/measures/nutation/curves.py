@@ -11,7 +11,6 @@ l the motion passes the pole, where the advances jump. Equation numbers: `scenes
 Curves are sampled until chords are short and near them, cut where they leave the map or become unstable.
 """
 
-from dataclasses import dataclass
 from itertools import pairwise, product
 
 import numpy as np
@@ -20,6 +19,7 @@ from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.nutation.wells import TINY
 from survey.measures.nutation import level_curves
 from survey.measures.nutation.regular_precessions import parts, surface
+from survey.measures.sampled import Curves, changes, sampled
 from survey.scene import Output
 
 CLASSES = {
@@ -37,24 +37,6 @@ ALONG = (
     Output("nutation_square", "squared frequency of small nutations, times A^2 / |k|; negative: unstable",
            r"\omega_n^2", applies="not to curves of the class pole_passage"),
 )  # fmt: skip
-FIRST = 65
-LONGEST, FLAT = 0.02, 3e-5  # of the map: chords, and how far a curve may lie off them
-ROUNDS = 60
-
-
-@dataclass
-class Curves:
-    """Curves one after another: `count` points each, of class `kind`.
-
-    Per point its `parameters` (m, 2), its `error` (m), in the unit square of the map, and `along`: {name of
-    ALONG: (values, errors)}.
-    """
-
-    count: np.ndarray
-    kind: np.ndarray
-    parameters: np.ndarray
-    error: np.ndarray
-    along: dict
 
 
 def refusal(axes):
@@ -126,8 +108,8 @@ def _traced(part, square, axes, s):
     def stable(t):
         return s < 0.0 or surface(*part.at(t), s)["nutation_square"][0] >= 0.0
 
-    t = _sampled(part, position)
-    borders, cusps = _changes(inside, t), _changes(stable, t) if s > 0.0 else np.array([])
+    t = sampled(position, part.low, part.high)
+    borders, cusps = changes(inside, t), changes(stable, t) if s > 0.0 else np.array([])
     t = np.unique(np.concatenate([t, borders, cusps]))
     cuts = np.unique(np.concatenate([t[[0, -1]], borders, cusps]))
     found = [(CUSP, _points(part, cusps[[i]], s)) for i in np.flatnonzero(inside(cusps))]
@@ -146,40 +128,6 @@ def _points(part, t, s):
 def _positive(values, square):
     """Values that have a logarithm where one is taken."""
     return np.where(square.log, np.maximum(values, TINY), values)
-
-
-def _sampled(part, position):
-    """Parameters of a part so close that on the map chords are short and near the curve."""
-    if part.low == part.high:
-        return np.array([part.low])
-    t = np.linspace(part.low, part.high, FIRST)
-    for _ in range(ROUNDS):
-        middle = 0.5 * (t[:-1] + t[1:])
-        x, between = position(t), position(middle)
-        chord, half = x[1:] - x[:-1], between - x[:-1]
-        path = np.hypot(*half.T) + np.hypot(*(x[1:] - between).T)
-        with np.errstate(all="ignore"):
-            off = abs(chord[:, 0] * half[:, 1] - chord[:, 1] * half[:, 0]) / np.hypot(*chord.T)
-        away = np.maximum(np.maximum(-x, x - 1.0), 0.0).max(axis=1)
-        split = (np.minimum(away[1:], away[:-1]) <= path) & ((path > LONGEST) | ~(off <= FLAT) & (path > FLAT))
-        split &= (middle > t[:-1]) & (middle < t[1:])
-        if not split.any():
-            break
-        t = np.sort(np.concatenate([t, middle[split]]))
-    return t
-
-
-def _changes(test, t):
-    """The last parameters where the test holds, beside those where it does not."""
-    holds = test(t)
-    at = np.flatnonzero(holds[1:] != holds[:-1])
-    yes, no = np.where(holds[at], t[at], t[at + 1]), np.where(holds[at], t[at + 1], t[at])
-    while True:
-        middle = 0.5 * (yes + no)
-        if ((middle == yes) | (middle == no)).all():
-            return yes
-        good = test(middle)
-        yes, no = np.where(good, middle, yes), np.where(good, no, middle)
 
 
 def _uprights(third, value, s, square, axes):

@@ -14,18 +14,16 @@ motion is not. A precession is stable where its squared frequency (S18) is posit
 Positions are those of `survey.measures.square`.
 """
 
-import contourpy
 import numpy as np
 
 from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.nutation import brun
 from survey.kernels.nutation.wells import HIGH, LOW, PASSAGE
-from survey.measures.hill.edges import close_in
+from survey.measures import contours
 from survey.measures.nutation import wells
 
 STATE = ("A", "C", "epsilon", "theta0", "p_theta0", "p_psi", "p_phi")
-LINES, HALVINGS = 513, 30
-SURE = 1e-9  # half the width of what brackets a point
+LINES = 513
 
 
 def traced(square, axes, fixed):
@@ -40,7 +38,7 @@ def traced(square, axes, fixed):
         def on_map(x, function=function):
             return function(states(square, axes, fixed, x))
 
-        for x, error in _lines(on_map, square.grain):
+        for x, error in contours.lines(on_map, square.grain, LINES):
             found.append((function, x, error, states(square, axes, fixed, x)))
     return [(function, *part) for function, *rest in found for part in _reaching(function, *rest)]
 
@@ -83,46 +81,6 @@ def lower_pole(columns):
     return columns[5] + columns[6], ROUNDOFF * abs(columns[5] + columns[6])
 
 
-def _lines(function, grain):
-    """[(positions (m, 2), errors (m))] of the curves where `function` is 0, from border to border or round."""
-    ticks = np.linspace(0.0, 1.0, LINES)
-    first, second = np.meshgrid(ticks, ticks, indexing="ij")
-    values = function(np.stack([first.ravel(), second.ravel()], axis=1))[0].reshape(LINES, LINES)
-    lines = contourpy.contour_generator(second, first, np.ma.masked_invalid(values)).lines(0.0)
-    return [part for line in lines for part in _closed_in(function, np.asarray(line)[:, ::-1], grain)]
-
-
-def _closed_in(function, x, grain):
-    """The curve through the positions x, each between two crossings of lines; cut where one cannot be made certain."""
-    step, rows = (LINES - 1) * x, np.arange(len(x))
-    along = np.argmax(abs(step - np.rint(step)), axis=1)
-    x[rows, 1 - along] = np.rint(step)[rows, 1 - along] / (LINES - 1)
-    low = np.floor(step)[rows, along] / (LINES - 1)
-    high = np.minimum(low + 1.0 / (LINES - 1), 1.0)
-
-    def at(who, t):
-        here = np.repeat(x[who][:, None], t.shape[1], axis=1)
-        here[np.arange(len(t)), :, along[who]] = t
-        value, bar = function(here.reshape(-1, 2))
-        return value.reshape(t.shape), bar.reshape(t.shape)
-
-    sign = np.sign(at(rows, low[:, None])[0][:, 0])
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        same = np.sign(at(rows, middle[:, None])[0][:, 0]) == sign
-        low, high = np.where(same, middle, low), np.where(same, high, middle)
-    t, width, sure = close_in(at, 0.5 * (low + high), high - low, np.full(len(x), grain))
-    sure &= (width < SURE) & (t >= 0.0) & (t <= 1.0)
-    x[rows, along] = t
-    return [(x[part], width[part] + grain) for part in _runs(sure)]
-
-
-def _runs(good):
-    """Index arrays of the runs of at least two that are good."""
-    parts = np.split(np.arange(good.size), 1 + np.flatnonzero(np.diff(good)))
-    return [part for part in parts if part.size > 1 and good[part[0]]]
-
-
 def _reaching(function, x, error, columns):
     """The curve's runs that count: of p_psi = +-p_phi those on which the motion passes that pole."""
     good = np.ones(len(x), bool)
@@ -133,7 +91,7 @@ def _reaching(function, x, error, columns):
         rows, kinds, *_ = wells.of_states(columns.T)
         reached = rows[:, HIGH] if side > 0.0 else -rows[:, LOW]
         good = (kinds == PASSAGE) & (reached == 1.0)
-    return [(x[part], error[part], columns[:, part]) for part in _runs(good)]
+    return [(x[part], error[part], columns[:, part]) for part in contours.runs(good)]
 
 
 def along(function, columns):

@@ -15,10 +15,14 @@ POINTS = 600
 
 
 def integrate(system, rtol):
-    ends = np.empty_like(system.start)
-    address = _compiled(system.slope).address
-    _loop(address, system.start, np.ascontiguousarray(system.parameters), system.span, rtol, ends)
-    return ends
+    address, parameters = _compiled(system.slope).address, np.ascontiguousarray(system.parameters)
+    if system.samples is None:
+        ends = np.empty_like(system.start)
+        _loop(address, system.start, parameters, system.span, rtol, ends)
+        return ends
+    states = np.full((len(system.span), system.samples.size, system.start.shape[1]), np.nan)
+    _sampled(address, system.start, parameters, system.span, system.samples, rtol, states)
+    return states
 
 
 @cache
@@ -40,4 +44,14 @@ def _loop(address, start, parameters, span, rtol, ends):
         solved = nbsolve2_ivp(address, (0.0, span[i]), start[i], method="DOP853", args=parameters[i],
                               rtol=rtol, atol=rtol, force_retain_solver=False)  # fmt: skip
         ends[i] = solved.y[:, -1]
+        solved.free()
+
+
+@numba.njit(error_model="numpy")
+def _sampled(address, start, parameters, span, samples, rtol, states):
+    for i in range(len(span)):
+        solved = nbsolve2_ivp(address, (0.0, span[i]), start[i], method="DOP853", t_eval=samples * span[i],
+                              args=parameters[i], rtol=rtol, atol=rtol, force_retain_solver=False)  # fmt: skip
+        values = solved.y
+        states[i, : values.shape[1]] = values.T
         solved.free()

@@ -3,7 +3,7 @@
 One file per peer, found by its name, which is that of the package it imports:
 
     POINTS                      how many points of a work it is timed on, so that a chart takes minutes
-    integrate(system, rtol)     states (points, n) at the end of every point's span
+    integrate(system, rtol)     states (points, n) at the end of every point's span, or (points, samples, n)
 
 A peer is imported only when it is measured; `[bench]` in pyproject.toml installs them all.
 """
@@ -18,7 +18,7 @@ import numpy as np
 class System:
     """An autonomous system of ODEs at many points, each over its own span from 0.
 
-    `slope(state, parameters, sin, cos)` gives a tuple; it only indexes, adds, multiplies, squares and calls the sine
+    `slope(state, parameters, sin, cos)` gives a tuple; it only indexes, adds, multiplies, divides and calls the sine
     and cosine of the peer, so that every peer can take it as it is: as Python, compiled, traced or as symbols. `steps`
     estimates the number of steps at each point, up to a common factor.
     """
@@ -28,6 +28,7 @@ class System:
     parameters: np.ndarray
     span: np.ndarray
     steps: np.ndarray
+    samples: np.ndarray | None = None  # the shares of the span, ascending from 0, after which states are wanted, if any
 
 
 def batches(system, lanes):

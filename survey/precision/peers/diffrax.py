@@ -26,14 +26,15 @@ jax.config.update("jax_enable_x64", True)
 def integrate(system, rtol):
     order = batches(system, LANES)
     start, parameters = (list(values.T[:, order]) for values in (system.start, system.parameters))
-    reached = np.asarray(_compiled(system.slope)(start, parameters, system.span[order], rtol))
-    ends = np.empty_like(system.start)
-    ends[order] = reached.transpose(1, 2, 0)
-    return ends
+    shares = None if system.samples is None else tuple(system.samples)
+    reached = np.asarray(_compiled(system.slope, shares)(start, parameters, system.span[order], rtol))
+    states = np.empty((len(system.start), reached.shape[-1], system.start.shape[1]))
+    states[order] = reached.transpose(1, 2, 3, 0)
+    return states[:, 0] if shares is None else states
 
 
 @cache
-def _compiled(slope):
+def _compiled(slope, shares):
     def field(_, state, parameters):
         return list(slope(state, parameters, jax.numpy.sin, jax.numpy.cos))
 
@@ -41,9 +42,10 @@ def _compiled(slope):
         solved = diffrax.diffeqsolve(
             diffrax.ODETerm(field), diffrax.Dopri8(), 0.0, span, None, start,
             args=parameters, stepsize_controller=diffrax.PIDController(rtol=rtol, atol=rtol),
-            saveat=diffrax.SaveAt(t1=True), max_steps=MOST_STEPS, throw=False,
+            saveat=diffrax.SaveAt(t1=True) if shares is None else diffrax.SaveAt(ts=jax.numpy.array(shares) * span),
+            max_steps=MOST_STEPS, throw=False,
         )  # fmt: skip
-        return [values[0] for values in solved.ys]
+        return solved.ys
 
     @jax.jit
     def run(start, parameters, span, rtol):

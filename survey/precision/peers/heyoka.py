@@ -22,6 +22,8 @@ def integrate(system, rtol):
         np.ascontiguousarray(values[order].swapaxes(1, 2)) for values in (system.start, system.parameters)
     )
     span, reached = system.span[order], np.empty_like(start)
+    if system.samples is not None:
+        return _sampled(integrator, start, parameters, span, order, system)
     # views of the integrator's memory, taken once
     state, pars = integrator.state, integrator.pars
     for i in range(len(order)):
@@ -32,6 +34,16 @@ def integrate(system, rtol):
     ends = np.empty_like(system.start)
     ends[order] = reached.swapaxes(1, 2)
     return ends
+
+
+def _sampled(integrator, start, parameters, span, order, system):
+    """States (points, samples, n) from the integrator's dense output."""
+    states = np.empty((len(system.start), system.samples.size, system.start.shape[1]))
+    for i in range(len(order)):
+        integrator.set_time(0.0)
+        integrator.state[...], integrator.pars[...] = start[i], parameters[i]
+        states[order[i]] = integrator.propagate_grid(np.outer(system.samples, span[i]))[1].transpose(2, 0, 1)
+    return states
 
 
 @cache

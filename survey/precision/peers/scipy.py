@@ -9,11 +9,13 @@ POINTS = 30
 
 
 def integrate(system, rtol):
-    ends = np.empty_like(system.start)
+    shares = np.ones(1) if system.samples is None else system.samples
+    states = np.full((len(system.span), shares.size, system.start.shape[1]), np.nan)
     for i, (start, parameters, span) in enumerate(zip(system.start, system.parameters, system.span, strict=True)):
-        solved = solve_ivp(_slope, (0.0, span), start, "DOP853", args=(system.slope, parameters), rtol=rtol, atol=rtol)
-        ends[i] = solved.y[:, -1]
-    return ends
+        solved = solve_ivp(_slope, (0.0, span), start, "DOP853", shares * span, args=(system.slope, parameters),
+                           rtol=rtol, atol=rtol)  # fmt: skip
+        states[i, : len(solved.t)] = np.transpose(solved.y)
+    return states[:, 0] if system.samples is None else states
 
 
 def _slope(_, state, slope, parameters):

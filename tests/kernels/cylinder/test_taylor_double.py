@@ -152,3 +152,16 @@ def test_thousands_beside_separatrices_rests_and_double_roots(still):
         assert (error <= bars).all()
         sure = both & (turns >= 0) & (counted >= 0)
         assert np.array_equal(turns[sure], counted[sure])
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-12, -1e-9])
+@pytest.mark.parametrize(("six", "phi0", "w0"), [((0, 0, 1.1, 0.3, 0.5, -0.2), 1.5, 0.5145879417558026),
+                                                 ((0, 0, 0, 0, 0, 4.0), 0.25, 3.968790668917316)])  # fmt: skip
+def test_bars_stay_narrow_from_one_passage_of_a_saddle_to_the_next(six, phi0, w0, off):
+    """What errs along the flow must not come across it: at each saddle it would grow by as much as solutions part."""
+    row, times = np.array([[*six, phi0, w0 * (1.0 + off)]]), np.array([[40.0, 90.0]])
+    floats, turnings, status = solution.trajectories(taylor_double, row, times, 0.0)
+    assert (status == OK).all() and (turnings >= 0).all()
+    assert (floats[0, :, 2:] <= (1e-8 if off == 0.0 else 1e-12)).all()
+    wanted = exact(six, phi0, row[0, 7], 40.0, 50, float_out=False)
+    assert within(floats[0, 0], wanted)

@@ -1,0 +1,132 @@
+"""Motions of a gyrostat in its own axes, (w, nu) at given times with error bars: the steps of any method.
+
+The equations, their series and how errors are carried along are those of `kernels.cylinder.gyrostat`, in whose tables
+T and V a step lies; a method brings `begin` (expand at a state; the step) and `at` (the state within the step).
+"""
+
+import math
+
+import numpy as np
+
+from survey.kernels.cylinder.flow import LOW
+from survey.kernels.cylinder.gyrostat import FIRST_ORDER, LAST, carry, series, variation
+from survey.kernels.cylinder.steps import NO_CONVERGENCE, OK, OVERFLOW, STEP_LIMIT, TRUST, bar, finite
+from survey.kernels.jit import inline, kernel
+from survey.kernels.math.roundoff import ROUNDOFF_UP
+
+STATE, FLOATS = 6, 12  # w and nu; and then their bars
+_PAIRS = 3  # of components, in each of which a step and the initial state err; `bar` counts two for each step
+_FIRST = 4.0 * ROUNDOFF_UP  # rounding of nu, of length 1
+STAGE = LOW + 1  # the first line of T that a Runge-Kutta method, whose series are short, may use for its stages
+ERROR, STEP = 0, 5  # columns of T[LAST]: truncation error of the step, relative to `size_of`; what a method notes
+
+
+@kernel
+def expanded(G, state, T, V):
+    """Fill T and V as far as error bars need them; returns the step that keeps the variational equation accurate."""
+    series(G, state, T, LOW)
+    variation(G, T, V)
+    size, tangent = 1.0, 1e-300
+    for i in range(3):
+        size = max(size, abs(state[i]))
+    for i in range(STATE):
+        for c in range(STATE):
+            tangent = max(tangent, abs(V[LOW, c, i]) * (1.0 / size if i < 3 else 1.0) * (size if c < 3 else 1.0))
+    return (FIRST_ORDER / tangent) ** (1.0 / LOW)
+
+
+@inline
+def slope(G, t, y):
+    """(w', nu') at y = (w, nu), tuples of six."""
+    p, q, r, x, u, v = y
+    k0 = G[12, 0] + G[0, 0] * p + G[0, 1] * q + G[0, 2] * r
+    k1 = G[12, 1] + G[1, 0] * p + G[1, 1] * q + G[1, 2] * r
+    k2 = G[12, 2] + G[2, 0] * p + G[2, 1] * q + G[2, 2] * r
+    f0 = G[13, 0] + G[6, 0] * p + G[6, 1] * q + G[6, 2] * r - (G[9, 0] * x + G[9, 1] * u + G[9, 2] * v)
+    f1 = G[13, 1] + G[7, 0] * p + G[7, 1] * q + G[7, 2] * r - (G[10, 0] * x + G[10, 1] * u + G[10, 2] * v)
+    f2 = G[13, 2] + G[8, 0] * p + G[8, 1] * q + G[8, 2] * r - (G[11, 0] * x + G[11, 1] * u + G[11, 2] * v)
+    a = k1 * r - k2 * q + f1 * v - f2 * u
+    b = k2 * p - k0 * r + f2 * x - f0 * v
+    c = k0 * q - k1 * p + f0 * u - f1 * x
+    return (
+        G[3, 0] * a + G[3, 1] * b + G[3, 2] * c,
+        G[4, 0] * a + G[4, 1] * b + G[4, 2] * c,
+        G[5, 0] * a + G[5, 1] * b + G[5, 2] * c,
+        u * r - v * q,
+        v * p - x * r,
+        x * q - u * p,
+    )
+
+
+@inline
+def state_of(row):
+    """The first six numbers of a row as a tuple."""
+    return row[0], row[1], row[2], row[3], row[4], row[5]
+
+
+@inline
+def put(row, y):
+    """Write a tuple of six into the first places of a row."""
+    row[0], row[1], row[2], row[3], row[4], row[5] = y
+
+
+@inline
+def size_of(state):
+    """What errors of w are relative to."""
+    return 1.0 + max(abs(state[0]), max(abs(state[1]), abs(state[2])))
+
+
+@inline
+def _written(state, squares, n, row):
+    """state and its bars into `row`; are they small enough to be carried on to first order?"""
+    good, size = True, size_of(state)
+    for i in range(STATE):
+        width = bar(_PAIRS * (n + 1), squares[i, i]) + ROUNDOFF_UP * abs(state[i])
+        row[i], row[STATE + i] = state[i], width
+        good = good and width < TRUST * (size if i < 3 else 1.0)
+    return good
+
+
+@inline
+def trajectories(begin, at, G, starts, times, tolerance, limit, floats, status):
+    """Fill floats (rows, n, FLOATS) and status (rows) at ascending times (rows, n) >= 0 of systems G (rows, 14, 3)."""
+    for i in range(len(G)):
+        size = finite(times[i])
+        status[i] = _trajectory(begin, at, G[i], starts[i], times[i, :size], tolerance, limit, floats[i])
+
+
+@inline
+def _trajectory(begin, at, G, start, times, tolerance, limit, floats):
+    T, V, squares, there = np.zeros((LAST + 1, 12)), np.zeros((LOW + 1, 6, 12)), np.zeros((6, 6)), np.empty((6, 6))
+    state, new, J, work, row = start.copy(), np.empty(6), np.empty((6, 6)), np.empty((6, 6)), np.empty(FLOATS)
+    for i in range(3):
+        squares[3 + i, 3 + i] = _FIRST * _FIRST
+    t, t_low, j, size = 0.0, 0.0, 0, len(times)
+    for n in range(1, limit + 1):
+        if j == size:
+            return OK
+        h = begin(G, state, tolerance, T, V)
+        if not (h > 0.0 and math.isfinite(h)):
+            return OVERFLOW
+        while j < size and (times[j] - t) - t_low < h:
+            dt = (times[j] - t) - t_low
+            at(G, T, dt, new)
+            for i in range(6):  # an assignment of arrays takes seconds to compile
+                for k in range(6):
+                    there[i, k] = squares[i, k]
+            carry(G, T, V, dt, there, J, work)
+            if not _written(new, there, n, row):
+                return NO_CONVERGENCE
+            for i in range(FLOATS):
+                floats[j, i] = row[i]
+            j += 1
+        at(G, T, h, new)
+        carry(G, T, V, h, squares, J, work)
+        for i in range(6):
+            state[i] = new[i]
+        if not _written(state, squares, n, row):
+            return NO_CONVERGENCE if math.isfinite(state[0] + state[1] + state[2]) else OVERFLOW
+        high = t + h
+        t_low += h - (high - t)
+        t = high
+    return STEP_LIMIT

@@ -1,0 +1,126 @@
+"""Branches of the saddles up to their first turning points: what shows whether one saddle is connected with another.
+
+Each branch is followed as an unstable one that leaves to the right, w > 0, in one of four systems: the system itself;
+that of S1, (b, w, t) -> -(b, w, t), where branches are stable; that of S2, (phi, w, b31, c23, s2) -> -(...), where they
+leave to the left; that of both.
+"""
+
+import math
+
+import numpy as np
+
+from survey.kernels.cylinder import records as rc
+from survey.kernels.cylinder.branches import unstable
+from survey.kernels.cylinder.equilibria import ANGLE, BAR, KIND, MOST, SADDLE, equilibria
+from survey.kernels.cylinder.flow import B12, B31, BOUND_DG, BOUND_F, BOUND_G, C23, S2, TWO_PI, potential, table, values
+from survey.kernels.cylinder.steps import bar, carried, expand, passage, time_of_turning
+from survey.kernels.jit import inline, kernel
+
+ITSELF, REVERSED, MIRRORED, BOTH = range(4)
+# w and its error bound at the next equilibria to the right, the last of them the saddle itself, a turn further; then
+# the turning point, its bound, the number of those equilibria before it, the angle of the saddle, its bound,
+# their number, and how far to the right of the saddle they are.
+TURN, TURN_BAR, PASSED, FROM, FROM_BAR, COLUMNS, OFFSETS = range(2 * MOST, 2 * MOST + 7)
+ROW = OFFSETS + MOST
+LIMIT = 600  # steps
+SAME = 1e-12  # difference of V, in units of its own, up to which the first of two saddles counts as the higher
+NEAR = 1e-10  # velocities, in those of the system, at which a branch counts as stopped
+
+
+@inline
+def first_turn(setting, begin, at, p, start, tolerance, row):
+    """Fill w, TURN and PASSED of `row`, whose other columns are filled."""
+    T = table()
+    how = setting(p, start[rc.START_W], tolerance)
+    phi, w, n, k = start[rc.START_PHI], start[rc.START_W], 0, 0
+    saa, sab, sbb = start[rc.START_PHI_BAR] ** 2, 0.0, start[rc.START_W_BAR] ** 2
+    least = NEAR * (p[BOUND_F] + math.sqrt(p[BOUND_DG]))
+    while n < LIMIT and k < row[COLUMNS]:
+        h = expand(begin, p, phi, w, how, T)
+        n += 1
+        x1, w1, _e, _y = at(p, T, h)
+        if not (h > 0.0 and math.isfinite(w1)):
+            return
+        turned = w1 <= 0.0
+        if turned:
+            h = time_of_turning(at, p, T, h)
+            x1, w1, _e, _y = at(p, T, h)
+        while k < row[COLUMNS] and row[FROM] + row[OFFSETS + k] <= x1:
+            dt = passage(at, p, T, row[FROM] + row[OFFSETS + k], True, h)
+            x, v, _e, _y = at(p, T, dt)
+            aa, ab, bb = carried(p, T, dt, v, saa, sab, sbb)
+            f, g, _dg = values(p, x)
+            slope = (f * v + g) / v
+            row[2 * k] = v
+            row[2 * k + 1] = bar(n + 1, max(bb - 2.0 * slope * ab + slope * slope * aa, 0.0)) + 4e-16 * abs(slope)
+            k += 1
+        saa, sab, sbb = carried(p, T, h, w1, saa, sab, sbb)
+        phi, w = x1, w1
+        if turned:
+            row[TURN], row[TURN_BAR], row[PASSED] = x1 - row[FROM], bar(n, saa) + 1e-15, k
+            return
+        if w < least:
+            return
+
+
+@kernel
+def changed(p, system, q):
+    """Fill q with the coefficients of one of the four systems."""
+    for i in range(len(p)):
+        q[i] = p[i]
+    if system == REVERSED or system == BOTH:
+        q[B12], q[B31] = -q[B12], -q[B31]
+    if system == MIRRORED or system == BOTH:
+        q[B31], q[C23], q[S2] = -q[B31], -q[C23], -q[S2]
+
+
+@inline
+def connections(setting, begin, at, P, wanted, tolerance, out):
+    """Fill out (rows, 4, 2, ROW) for the four systems and the saddles of higher and of lower V.
+
+    Only branches that are `wanted` (4, 2) are followed. Rows are NaN where there are none, or an equilibrium is
+    degenerate.
+    """
+    eqs, turned, starts = np.zeros((MOST, 10)), np.zeros((MOST, 10)), np.zeros((2 * MOST, 4))
+    q = np.zeros(P.shape[1])
+    for i in range(len(P)):
+        for system in range(4):
+            for label in range(2):
+                for k in range(ROW):
+                    out[i, system, label, k] = math.nan
+        count, hidden = equilibria(P[i], eqs)
+        saddles, high = 0, -1
+        for k in range(count):
+            if eqs[k, KIND] == SADDLE:
+                saddles += 1
+                if (
+                    high < 0
+                    or potential(P[i], eqs[k, ANGLE]) - potential(P[i], eqs[high, ANGLE]) > SAME * P[i, BOUND_G]
+                ):
+                    high = k
+        if hidden or count == 0 or 2 * saddles != count:
+            continue
+        for system in range(4):
+            mirrored = system == MIRRORED or system == BOTH
+            changed(P[i], system, q)
+            for k in range(count):
+                for j in range(10):
+                    turned[k, j] = eqs[k, j]
+                if mirrored:
+                    turned[k, ANGLE] = TWO_PI - eqs[k, ANGLE]
+            unstable(q, turned, count, starts)
+            branch = 0
+            for k in range(count):
+                if eqs[k, KIND] != SADDLE:
+                    continue
+                label = 0 if k == high else 1
+                row = out[i, system, label]
+                row[FROM], row[FROM_BAR], row[COLUMNS] = turned[k, ANGLE], turned[k, BAR], count
+                for j in range(count):
+                    other = (k - 1 - j if mirrored else k + 1 + j) % count
+                    away = turned[other, ANGLE] - turned[k, ANGLE]
+                    away = away if away > 0.0 else away + TWO_PI
+                    row[OFFSETS + j] = away if j < count - 1 else TWO_PI
+                if wanted[system, label] > 0.0:
+                    first_turn(setting, begin, at, q, starts[2 * branch + 1], tolerance, row)
+                branch += 1

@@ -1,0 +1,349 @@
+"""Solutions w(phi) of Abel's equation (57) for many systems in lock step: w and t at given angles.
+
+The steps are those of `lockstep`, in time. A step's series serves all the angles that it passes, BLOCK of them at once:
+Newton's method gives the times, then come w, t and their error bars. What follows from these (turning points, targets
+in doubt, how a solution ends) is as in `steps.abel`.
+"""
+
+import math
+
+import numpy as np
+
+from survey.kernels.cylinder import records as rc
+from survey.kernels.cylinder.flow import BOUND_DDG, TWO_PI, TWO_PI_LOW, reduced
+from survey.kernels.cylinder.lockstep import (
+    COARSEST,
+    F_,
+    FALL,
+    LANES,
+    LOW,
+    NEAREST,
+    NEXT,
+    ORDER,
+    P2,
+    P3,
+    P12,
+    P31,
+    PD,
+    PDG,
+    PF,
+    PG,
+    PSI,
+    RATE,
+    ROWS,
+    SAA,
+    SAB,
+    SBB,
+    STEPS,
+    TIME,
+    TIME_LOW,
+    TURN,
+    TURNS,
+    U1,
+    U2,
+    Z1,
+    Z2,
+    V,
+    W,
+    advance,
+    enter,
+    series,
+    sine_cosine,
+    split,
+)
+from survey.kernels.cylinder.steps import (
+    EQUILIBRIUM,
+    NO_CONVERGENCE,
+    OK,
+    OVERFLOW,
+    SEPARATRIX,
+    STEP_LIMIT,
+    TRUST,
+    TURNING,
+    at_rest,
+    bar,
+    certain,
+    clean_turning,
+    conclude,
+    crossing,
+    finite,
+    runs_into_node,
+    to_rest,
+    to_target,
+    trusted,
+    unturned,
+    values,
+)
+from survey.kernels.jit import inline, kernel
+from survey.kernels.math.newton import bracketed
+from survey.kernels.math.roundoff import ROUNDOFF_UP
+from survey.kernels.unroll import unroll
+
+BLOCK = 8
+NEWTON = 1  # further steps; one more, by the derivatives, and most are at rounding
+# Where the columns of a block begin: psi, the time in the step, the square of psi's error; what `steps.crossing` makes
+# of them; what Newton's method has left. One flat array: LLVM sees that they do not overlap.
+_SIZE = 8 * BLOCK
+GOAL, DT, SQUARE, VALUE, TIMES, VALUE_BAR, TIME_BAR, MISS = range(0, _SIZE, BLOCK)
+_GOING = -1
+
+
+@unroll
+def _coefficients(T, i):
+    return tuple(T[W + n, i] for n in range(ORDER + 1))
+
+
+@unroll
+def _variations(T, i):
+    return tuple(T[row + n, i] for row in (U1, Z1, U2, Z2, F_) for n in range(LOW + 1))
+
+
+@unroll
+def _moved(c, dt):
+    """The change of psi, and w, at dt."""
+    square = dt * dt  # even and odd powers apart: half as long a chain
+    x = [c[n] * (1.0 / (n + 1)) for n in range(ORDER + 1)]
+    rise, v = (_polynomial(a[2::2], square) * dt + _polynomial(a[1::2], square) for a in (x, c))
+    return (rise * dt + c[0]) * dt, c[0] + v * dt
+
+
+@unroll
+def _varied(series_of, dt):
+    """The Jacobian (psi_psi, psi_w, w_psi, w_w) at dt, as in `flow.jacobian`."""
+    u1, z1, u2, z2, f = (_polynomial(series_of[row * (LOW + 1) : (row + 1) * (LOW + 1)], dt) for row in range(5))
+    return u1, u2, z1 + f * u1, z2 + f * u2
+
+
+def _polynomial(coefficients, x):
+    *lower, total = coefficients
+    for coefficient in reversed(lower):
+        total = total * x + coefficient
+    return total
+
+
+@inline
+def _nearer(c, rise, dt, reach):
+    """One step of Newton's method from dt to where psi has risen by `rise`; with w and the residual at dt."""
+    x, v = _moved(c, dt)
+    miss = rise - x
+    return min(max(dt + miss / max(v, 1e-300), 0.0), reach), v, miss
+
+
+@inline
+def _last_terms(T, i):
+    """The size of the last four terms of w; what follows the last two is bounded with the help of the others."""
+    last, previous = abs(T[W + ORDER, i]), abs(T[W + ORDER - 1, i])
+    return last, previous, FALL * abs(T[W + ORDER - 2, i]), FALL * abs(T[W + ORDER - 3, i])
+
+
+@inline
+def _ellipse(carried, jacobian, dt, v, ends, most_f, most_g):
+    """The error ellipse at dt in the step, where w = v, from the one at its start; as in `lockstep.advance`."""
+    saa, sab, sbb = carried
+    last, previous, third, fourth = ends
+    d2 = dt * dt
+    d4 = d2 * d2
+    d13 = d4 * d4 * d4 * dt
+    cut = d13 * max(max(last * d2, third) * dt, max(previous * d2, fourth))
+    speed = most_f * abs(v) + most_g
+    e = cut * dt * (1.0 / ORDER) + ROUNDOFF_UP * (4.0 + 3.0 * dt * (abs(v) + dt * speed))
+    g = cut + ROUNDOFF_UP * (1.5 * abs(v) + 8.0 * dt * speed)
+    u1, u2, z1, z2 = jacobian
+    return (
+        u1 * u1 * saa + 2.0 * u1 * u2 * sab + u2 * u2 * sbb + e * e,
+        u1 * z1 * saa + (u1 * z2 + u2 * z1) * sab + u2 * z2 * sbb,
+        z1 * z1 * saa + 2.0 * z1 * z2 * sab + z2 * z2 * sbb + g * g,
+    )
+
+
+@inline
+def _at(_p, given, dt):
+    """(psi, w, 0, 0) at dt of a step: stands for a method's `flow_at`."""
+    psi, c = given
+    x, v = _moved(c, dt)
+    return psi + x, v, 0.0, 0.0
+
+
+@kernel
+def _cross(T, state, before, fixed, i, reach, end, block, size):
+    """Fill the block from its GOALs, the first `size` of which count, at up to `reach` in the step; there w = `end`."""
+    c, vary = _coefficients(T, i), _variations(T, i)
+    psi, w, n, t, t_low = before[PSI, i], before[V, i], state[STEPS, i], before[TIME, i], before[TIME_LOW, i]
+    carried = before[SAA, i], before[SAB, i], before[SBB, i]
+    p12, p31, p2, p3, pd, most_f, most_g = (
+        fixed[P12, i], fixed[P31, i], fixed[P2, i], fixed[P3, i], fixed[PD, i], fixed[PF, i], fixed[PG, i]
+    )  # fmt: skip
+    ends = _last_terms(T, i)
+    bend = (end - w) / reach
+    for j in range(BLOCK):
+        rise = max(block[GOAL + j] - psi, 0.0)
+        dt = min(2.0 * rise / (w + math.sqrt(max(w * w + 2.0 * bend * rise, 0.0)) + 1e-300), reach)
+        block[DT + j] = _nearer(c, rise, dt, reach)[0]
+    for _ in range(NEWTON):
+        for j in range(BLOCK):
+            block[DT + j], v, miss = _nearer(c, block[GOAL + j] - psi, block[DT + j], reach)
+            # what two more steps leave of psi is to be less than a share of its rounding
+            left, speed = miss * miss * (most_f * v + most_g), v * v
+            block[MISS + j] = left * left * (most_f * v + most_g) - 1e-17 * speed * speed * speed
+    for j in range(size):
+        if not block[MISS + j] <= 0.0:
+            given = (0.0, (psi, c), block[GOAL + j], True)
+            block[DT + j] = bracketed(to_target, _at, given, 0.5 * reach, (0.0, reach), (1e-17 + 1e-16 * reach, 0.0),
+                                     60)[1]  # fmt: skip
+    for j in range(BLOCK):
+        dt = block[DT + j]
+        x, v = _moved(c, dt)
+        x += psi
+        a, b, d = _ellipse(carried, _varied(vary, dt), dt, v, ends, most_f, most_g)
+        a += block[SQUARE + j] + (4e-16 * dt * v) * (4e-16 * dt * v)
+        k = (x * (1.0 / TWO_PI) + NEAREST) - NEAREST
+        sine, cosine = sine_cosine((x - k * TWO_PI) - k * TWO_PI_LOW)
+        f, g = p12 * cosine - p31 * sine, p2 * cosine - p3 * sine - pd * (sine * cosine)
+        more = min(max((block[GOAL + j] - x) / max(v, 1e-300), -dt), reach - dt)
+        v, dt = v + more * (f * v + g), dt + more
+        value, time, value_bar, time_bar = crossing(n, v, t + (dt + t_low), a, b, d, f, g)
+        block[VALUE + j], block[TIMES + j] = value, time
+        block[VALUE_BAR + j], block[TIME_BAR + j] = value_bar, time_bar
+        block[SQUARE + j] = a
+
+
+@kernel
+def _pass(T, state, before, fixed, q, i, block, targets, j, doubt, started, floats, status):
+    """Note what the step of lane i passes; returns (next target, first in doubt, has it left w = 0?, how it ends)."""
+    size, turns, angle, n = len(targets), before[TURNS, i], fixed[TURN, i], state[STEPS, i]
+    x1, v1, reach = state[PSI, i], state[V, i], 1.0 / state[RATE, i]
+    if not (math.isfinite(x1) and math.isfinite(v1)):
+        return j, doubt, started, OVERFLOW
+    saa, sbb = state[SAA, i], state[SBB, i]
+    turned = v1 <= 0.0
+    if turned:
+        c = _coefficients(T, i)
+        given = (q, (before[PSI, i], c), True)
+        reach = bracketed(to_rest, _at, given, 0.5 * reach, (0.0, reach), (1e-17 + 1e-16 * reach, 0.0), 60)[1]
+        x, v1 = _moved(c, reach)
+        x1 = before[PSI, i] + x
+        carried = before[SAA, i], before[SAB, i], before[SBB, i]
+        jacobian = _varied(_variations(T, i), reach)
+        saa, _sab, sbb = _ellipse(carried, jacobian, reach, v1, _last_terms(T, i), fixed[PF, i], fixed[PG, i])
+    while j < size and unturned(targets[j], turns) - angle <= x1:
+        count = 0
+        while count < BLOCK and j + count < size and unturned(targets[j + count], turns) - angle <= x1:
+            target = targets[j + count]
+            block[GOAL + count] = unturned(target, turns) - angle
+            block[SQUARE + count] = (3e-16 * target) ** 2 + (5e-16 * (angle != 0.0)) ** 2
+            count += 1
+        for k in range(count, BLOCK):
+            block[GOAL + k], block[SQUARE + k] = block[GOAL + count - 1], 0.0
+        _cross(T, state, before, fixed, i, reach, v1, block, count)
+        for k in range(count):
+            row = floats[j]
+            row[rc.VALUE], row[rc.TIME] = block[VALUE + k], block[TIMES + k]
+            row[rc.VALUE_BAR], row[rc.TIME_BAR] = block[VALUE_BAR + k], block[TIME_BAR + k]
+            usable = bar(n, block[SQUARE + k]) < TRUST and row[rc.VALUE_BAR] < TRUST * (1.0 + abs(row[rc.VALUE]))
+            usable = usable and row[rc.TIME_BAR] < TRUST * (1.0 + row[rc.TIME])
+            status[j] = OK if usable else NO_CONVERGENCE
+            if doubt < 0 and not certain(row):
+                doubt = j
+            j += 1
+    bar_phi, bar_w = bar(n, saa), bar(n, sbb)
+    edge = bar_phi * 1.1 + 4e-16 * abs(x1 + turns * TWO_PI) + 5e-16 * (angle != 0.0)
+    # from here on a turning point lies beyond x1
+    while doubt >= 0 and doubt < j and x1 - (unturned(targets[doubt], turns) - angle) > edge:
+        doubt += 1
+    if doubt == j:
+        doubt = -1
+    if turned:
+        ending = TURNING if clean_turning(q, x1, bar_phi, bar_w) else SEPARATRIX
+        t = before[TIME, i]
+        bar_t = bar_w / abs(values(q, x1)[1]) + 3e-16 * t if ending == TURNING else 0.0
+        for k in range(doubt if doubt >= 0 else j, size):
+            if k >= j or not certain(floats[k]):
+                status[k] = ending
+                floats[k, rc.VALUE] = (x1 + angle) + turns * TWO_PI
+                floats[k, rc.TIME] = t + (reach + before[TIME_LOW, i])
+                floats[k, rc.VALUE_BAR] = edge + 4e-16 * abs(floats[k, rc.VALUE])
+                floats[k, rc.TIME_BAR] = bar_t * 1.2
+        return size, -1, started, OK
+    if not trusted(saa, sbb, v1):
+        return j, doubt, started, NO_CONVERGENCE
+    if started and not v1 > 2.0 * bar_w:
+        return j, doubt, started, SEPARATRIX
+    started = started or v1 > 2.0 * bar_w
+    if j < size and runs_into_node(q, x1, v1, unturned(targets[j], turns) - angle):
+        return j, doubt, started, EQUILIBRIUM
+    return j, doubt, started, (_GOING if j < size or doubt >= 0 else OK)
+
+
+@kernel
+def _refill(P, starts, targets, waiting, state, fixed, axes, row, sizes, floats, status):
+    """Give free lanes the rows that wait; returns the first that still waits."""
+    for i in range(LANES):
+        while waiting < len(P) and row[i] < 0:
+            p, phi0, w0, size = P[waiting], starts[waiting, 0], starts[waiting, 1], finite(targets[waiting])
+            at, rows, codes = targets[waiting, :size], floats[waiting, :size], status[waiting, :size]
+            if size > 0 and not at_rest(p, reduced(phi0)[0], phi0, w0, at, rows, codes):
+                enter(p, phi0, w0, state, fixed, i)
+                fixed[NEXT, i], row[i], sizes[i] = math.inf, waiting, size
+                axes[i, :6] = fixed[P12, i], fixed[P31, i], fixed[PD, i], 0.0, fixed[P2, i], fixed[P3, i]
+                axes[i, 6:9], axes[i, BOUND_DDG] = (fixed[PF, i], fixed[PG, i], fixed[PDG, i]), p[BOUND_DDG]
+            waiting += 1
+    return waiting
+
+
+@inline
+def _calm(state, fixed, goal, doubt, started, calm):
+    """Where a step has passed no target and is far from any ending: `_pass` would note nothing but that w has risen."""
+    for i in range(LANES):
+        v, square = state[V, i], state[SBB, i]
+        x = state[PSI, i] + state[TURNS, i] * TWO_PI
+        quiet = x + 1e-9 * (1.0 + abs(x)) < goal[i]
+        quiet = quiet & (v * fixed[PF, i] > 0.3 * fixed[PG, i]) & (v * v > 9.0 * state[STEPS, i] * square) & (v > 0.0)
+        calm[i] = quiet & (doubt[i] < 0) & (state[SAA, i] < TRUST) & (square < (1.0 + v) * (1.0 + v))
+        started[i] = started[i] | calm[i]
+
+
+@inline
+def abels(P, starts, targets, tolerance, limit, floats, status):
+    """w and t at the ascending targets >= phi0 of each row, which end at its first infinity; as `steps.abels`.
+
+    P (rows, 10) from `flow.coefficients`.
+    """
+    work, block = np.zeros((ROWS, LANES)), np.zeros(_SIZE)
+    T, state, before, fixed, fate = split(work)
+    axes = np.zeros((LANES, BOUND_DDG + 1))  # coefficients and bounds in the axes of the lane
+    tolerance = min(tolerance, COARSEST)
+    row, sizes = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
+    column, doubt = np.zeros(LANES, dtype=np.int64), np.full(LANES, -1)
+    goal, started, calm = np.zeros(LANES), np.zeros(LANES, dtype=np.bool_), np.zeros(LANES, dtype=np.bool_)
+    waiting, free = 0, True
+    while True:
+        if free:
+            for i in range(LANES):
+                if row[i] < 0:
+                    column[i], doubt[i] = 0, -1
+            waiting = _refill(P, starts, targets, waiting, state, fixed, axes, row, sizes, floats, status)
+            if row.max() < 0:
+                return
+            for i in range(LANES):
+                if row[i] >= 0 and state[STEPS, i] == 0.0:
+                    started[i], goal[i] = state[V, i] > 0.0, targets[row[i], 0] - fixed[TURN, i]
+        series(T, state, fixed)
+        advance(T, state, before, fixed, fate, tolerance)
+        _calm(state, fixed, goal, doubt, started, calm)
+        free = False
+        for i in range(LANES):
+            if row[i] < 0 or (calm[i] and state[STEPS, i] < limit):
+                continue
+            r, size = row[i], sizes[i]
+            column[i], doubt[i], started[i], ending = _pass(
+                T, state, before, fixed, axes[i], i, block, targets[r, :size], column[i], doubt[i], started[i],
+                floats[r, :size], status[r, :size]
+            )  # fmt: skip
+            if column[i] < size:
+                goal[i] = targets[r, column[i]] - fixed[TURN, i]
+            if ending == _GOING and state[STEPS, i] >= limit:
+                ending = STEP_LIMIT
+            if ending != _GOING:
+                if ending != OK:
+                    conclude(ending, doubt[i], column[i], floats[r, :size], status[r, :size])
+                row[i], free = -1, True

@@ -1,0 +1,63 @@
+"""Curves on a map where a function that is known everywhere is zero, each point bracketed by certain signs.
+
+They are searched for on so many lines of the map each way, by marching squares. A closed curve narrower than the
+distance of two lines may be missed. Positions are those of `survey.measures.square`.
+"""
+
+import contourpy
+import numpy as np
+
+from survey.measures.hill.edges import close_in
+
+HALVINGS = 30
+SURE = 1e-9  # half the width of what brackets a point
+
+
+def lattice(number):
+    """Positions (number^2, 2) of the crossings of the lines, the second axis running fastest."""
+    ticks = np.linspace(0.0, 1.0, number)
+    first, second = np.meshgrid(ticks, ticks, indexing="ij")
+    return np.stack([first.ravel(), second.ravel()], axis=1)
+
+
+def lines(function, grain, number, values=None, halvings=HALVINGS):
+    """[(positions (m, 2), errors (m))] of the curves function(x) = 0, from border to border or round.
+
+    function(positions (m, 2)) -> (values, error bounds), NaN where there is none; `values`: those on the `lattice`,
+    where they are known.
+    """
+    first, second = lattice(number).T.reshape(2, number, number)
+    values = (function(lattice(number))[0] if values is None else values).reshape(number, number)
+    found = contourpy.contour_generator(second, first, np.ma.masked_invalid(values)).lines(0.0)
+    return [part for line in found for part in closed_in(function, np.asarray(line)[:, ::-1], grain, number, halvings)]
+
+
+def closed_in(function, x, grain, number, halvings):
+    """The curve through the positions x, each between two crossings of lines; cut where one cannot be made certain."""
+    step, rows = (number - 1) * x, np.arange(len(x))
+    along = np.argmax(abs(step - np.rint(step)), axis=1)
+    x[rows, 1 - along] = np.rint(step)[rows, 1 - along] / (number - 1)
+    low = np.floor(step)[rows, along] / (number - 1)
+    high = np.minimum(low + 1.0 / (number - 1), 1.0)
+
+    def at(who, t):
+        here = np.repeat(x[who][:, None], t.shape[1], axis=1)
+        here[np.arange(len(t)), :, along[who]] = t
+        value, bar = function(here.reshape(-1, 2))
+        return value.reshape(t.shape), bar.reshape(t.shape)
+
+    sign = np.sign(at(rows, low[:, None])[0][:, 0])
+    for _ in range(halvings):
+        middle = 0.5 * (low + high)
+        same = np.sign(at(rows, middle[:, None])[0][:, 0]) == sign
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    t, width, sure = close_in(at, 0.5 * (low + high), high - low, np.full(len(x), grain))
+    sure &= (width < SURE) & (t >= 0.0) & (t <= 1.0)
+    x[rows, along] = t
+    return [(x[part], width[part] + grain) for part in runs(sure)]
+
+
+def runs(good):
+    """Index arrays of the runs of at least two that are good."""
+    parts = np.split(np.arange(good.size), 1 + np.flatnonzero(np.diff(good)))
+    return [part for part in parts if part.size > 1 and good[part[0]]]

@@ -1,0 +1,111 @@
+"""Blocks as rows for the measures of this folder, and their results as outputs of a scene in the block's shape."""
+
+import numpy as np
+
+from survey.kernels.cylinder import records as rc
+from survey.kernels.cylinder.steps import TURNING
+from survey.measures.cylinder import fate, portrait
+from survey.status import INVALID_PARAMETERS, OK
+
+MOST_TURNINGS = 2**31 - 1  # are kept as int32
+
+
+def dense(point, names, name):
+    """(rows of the numbers `names`, values of `name`, function that brings results back into the block's shape).
+
+    The dimensions along which only `name` varies become columns: one solution serves them all.
+    """
+    arrays = [np.asarray(point[key], dtype=float) for key in (*names, name)]
+    shape = np.broadcast_shapes(*(array.shape for array in arrays))
+    dense = [i for i in range(len(shape)) if all(array.shape[i] == 1 for array in arrays[:-1])]
+    points = [i for i in range(len(shape)) if i not in dense]
+    order = points + dense
+    columns = int(np.prod([shape[i] for i in dense], dtype=int))
+    last = np.broadcast_to(arrays[-1], shape).transpose(order).reshape(-1, columns)
+    small = [shape[i] if i in points else 1 for i in range(len(shape))]
+    rows = np.stack([np.broadcast_to(array, small).ravel() for array in arrays[:-1]], axis=-1)
+
+    def back(values):
+        return values.reshape([shape[i] for i in order]).transpose(np.argsort(order))
+
+    return rows, last, back
+
+
+def valid(rows, columns):
+    """Rows and columns with NaN made harmless, and where all are numbers."""
+    numbers, fine = np.isfinite(rows), np.isfinite(columns)
+    if numbers.all() and fine.all():
+        return rows, columns, fine
+    numbers = numbers.all(axis=1)[:, None]
+    good = numbers & fine
+    return np.where(numbers, rows, 0.0), np.where(good, columns, 0.0), good
+
+
+def trajectories(rows, times, back, measure, method, rtol):
+    """phi, w, turnings and status at the times; `measure` is `solution` or `auto`."""
+    rows, times, good = valid(rows, times)
+    return at_times(measure.trajectories(method, rows, times, rtol), good, back)
+
+
+def at_times(results, good, back):
+    """The outputs of the question `trajectory`, from floats, turnings and status where the input is `good`."""
+    floats, turnings, status = results
+    status = np.where(good, status, INVALID_PARAMETERS)
+    lost = status != OK
+    floats[lost], turnings[lost | (turnings > MOST_TURNINGS)] = np.nan, -2
+    columns = {"phi": rc.PHI, "w": rc.W, "phi_error": rc.PHI_BAR, "w_error": rc.W_BAR}
+    results = {name: back(floats[..., at]) for name, at in columns.items()}
+    return results | {"turnings": back(turnings), "status": back(status)}
+
+
+def abel(rows, targets, back, measure, method, rtol, before):
+    """w, t, the turning point and status at the angles; `measure` is `solution` or `auto`."""
+    rows, targets, good = valid(rows, targets)
+    return at_angles(measure.abel(method, rows, targets, rtol, before), good, back)
+
+
+def at_angles(results, good, back):
+    """The outputs of the question `abel`, from floats and status where the input is `good`."""
+    floats, status = results
+    status = np.where(good, status, INVALID_PARAMETERS)
+    results = {"status": back(status)}
+    for names, code in ((("w", "t"), OK), (("phi_turning", "t_turning"), TURNING)):
+        here = status == code
+        for name, value, bar in zip(names, (rc.VALUE, rc.TIME), (rc.VALUE_BAR, rc.TIME_BAR), strict=True):
+            results[name] = back(np.where(here, floats[..., value], np.nan))
+            results[f"{name}_error"] = back(np.where(here, floats[..., bar], np.nan))
+    return results
+
+
+def _systems(point, names, flows):
+    """`flows` of the parameters `names`, which it is given as rows, and their shape in the block."""
+    given = np.stack(np.broadcast_arrays(*(np.asarray(point[key], dtype=float) for key in names)), axis=-1)
+    return flows(given.reshape(-1, len(names))), given.shape[:-1]
+
+
+def fates(point, names, flows, method, rtol):
+    """The fates of phi0, w0: one skeleton for each set of the parameters `names`, then its initial states."""
+    starts = [np.asarray(point[key], dtype=float) for key in ("phi0", "w0")]
+    systems, own = _systems(point, names, flows)
+    shape = np.broadcast_shapes(own, *(array.shape for array in starts))
+    group = np.broadcast_to(np.arange(len(systems)).reshape(own), shape).ravel()
+    starts = np.stack([np.broadcast_to(array, shape).ravel() for array in starts], axis=-1)
+    result = fate.empty(len(starts), INVALID_PARAMETERS)
+    order = np.argsort(group, kind="stable")
+    cuts = np.flatnonzero(np.diff(group[order])) + 1
+    for members in np.split(order, cuts):
+        system = systems[group[members[0]]]
+        good = members[np.isfinite(starts[members]).all(axis=1)]
+        if np.isfinite(system).all() and len(good):
+            fate.solve(method, system, starts[good], rtol, result, good)
+    return {name: values.reshape(shape) for name, values in result.items()}
+
+
+def portraits(point, names, flows, method, rtol):
+    """One portrait for each set of the parameters `names`."""
+    systems, shape = _systems(point, names, flows)
+    good = np.isfinite(systems).all(axis=1)
+    result = portrait.empty(len(systems), INVALID_PARAMETERS, systems.shape[1])
+    for name, values in portrait.solve(method, systems[good], rtol).items():
+        result[name][good] = values
+    return {name: values.reshape(shape + values.shape[1:]) for name, values in result.items()}

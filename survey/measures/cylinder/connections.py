@@ -1,0 +1,146 @@
+"""Saddle connections on a map of two parameters: where an unstable branch of a saddle is a stable one of a saddle.
+
+Two kinds are looked for: those on which w keeps its sign, over at most a turn, and those with one turning point (a
+loop, or a way back to another saddle). Of either a function of the parameters says by how much both branches miss each
+other: the difference of w where they pass the same equilibrium, or of their turning points. It is continuous, and
+beyond the angle that a branch does not reach it is continued by how far from it the branch turns. Its zeros are found
+as those of `survey.measures.contours`; connections with more turning points are not looked for.
+
+Saddles are told apart by their V; where two have the same the labels change, and a jump there is no zero.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from itertools import product
+
+import numpy as np
+
+from survey.kernels.cylinder import connections as cn
+from survey.kernels.cylinder.flow import coefficients
+from survey.measures import contours
+from survey.methods import taylor
+
+LINES, HALVINGS = 97, 12
+TOLERANCE = 1e-17  # truncation of one step
+BESIDE = 1e-5  # of the map: a jump is as high there as next to the point
+SYSTEM = ("b12", "b31", "d", "c23", "s2", "s3")
+HIGH, LOW = range(2)  # saddles, by V
+# (unstable, stable): the systems in which both branches leave to the right
+UPPER, LOWER = (cn.ITSELF, cn.BOTH), (cn.MIRRORED, cn.REVERSED)
+RIGHT, LEFT = (cn.ITSELF, cn.REVERSED), (cn.MIRRORED, cn.BOTH)
+
+
+@dataclass(frozen=True)
+class Connection:
+    """The branches (system, saddle) of a connection, and miss(rows of both) -> (value, error bound)."""
+
+    branches: tuple
+    miss: Callable
+
+    @property
+    def kind(self):
+        return "homoclinic" if self.branches[0][1] == self.branches[1][1] else "heteroclinic"
+
+
+def _every():
+    """All Connections."""
+    for sides, one, two in product((UPPER, LOWER), (HIGH, LOW), (HIGH, LOW)):
+        yield Connection(((sides[0], one), (sides[1], two)), partial(_passing, one == two))
+    for sides, one, two, wall in product((RIGHT, LEFT), (HIGH, LOW), (HIGH, LOW), (HIGH, LOW)):
+        yield Connection(((sides[0], one), (sides[1], two)), partial(_turning, one == wall, two == wall))
+
+
+def found(plane):
+    """[(class, parameters (m, 2), errors (m), {name: (value, error)})] of the connections on the map."""
+    for connection, x, error in curves(plane):
+        row = _traced(plane, x, np.zeros((4, 2)))[:, cn.ITSELF, connection.branches[0][1]]
+        known = {"equilibrium_phi": (row[:, cn.FROM], row[:, cn.FROM_BAR])}
+        yield connection.kind, plane.square.parameters(x), error, known
+
+
+def curves(plane):
+    """[(Connection, positions (m, 2), errors (m))] of the curves."""
+    if not any(name in plane.axes or plane.fixed[name] for name in ("b12", "b31")):
+        return  # b = 0: every branch is part of a connection, see `separatrices`
+    everything = _traced(plane, contours.lattice(LINES), np.ones((4, 2)))
+    for connection in _every():
+        values = connection.miss(*(everything[:, *branch] for branch in connection.branches))[0]
+        if np.nanmin(values, initial=0.0) < 0.0 < np.nanmax(values, initial=0.0):
+            function = partial(missed, plane, connection)
+            for x, error in contours.lines(function, plane.square.grain, LINES, values, HALVINGS):
+                for part in contours.runs(_smooth(function, x, error)):
+                    yield connection, x[part], error[part]
+
+
+def _traced(plane, x, wanted):
+    """The branches (m, 4, 2, ROW) of the systems at positions x (m, 2)."""
+    system = plane.system(plane.square.parameters(x))
+    columns = np.broadcast_arrays(*(system[name] for name in SYSTEM), x[:, 0])[:-1]
+    out = np.empty((len(x), 4, 2, cn.ROW))
+    P = np.ascontiguousarray(coefficients(*columns))
+    for i in range(0, len(x), 1000):
+        taylor.flow_connections(P[i : i + 1000], wanted, TOLERANCE, out[i : i + 1000])
+    return out
+
+
+def missed(plane, connection, x):
+    """By how much both branches of a connection miss each other at positions x (m, 2), and its error bound."""
+    wanted = np.zeros((4, 2))
+    for branch in connection.branches:
+        wanted[branch] = 1.0
+    out = _traced(plane, x, wanted)
+    return connection.miss(*(out[:, *branch] for branch in connection.branches))
+
+
+def _smooth(function, x, error):
+    """Is the change of sign at positions x a zero, and no jump?"""
+    good = np.ones(len(x), bool)
+    for axis in np.eye(2):
+        near, beside = (
+            abs(np.subtract(*(function(np.clip(x + side * step * axis, 0.0, 1.0))[0] for side in (1.0, -1.0))))
+            for step in (2.0 * error[:, None], BESIDE)
+        )
+        good &= ~(near > 0.5 * beside) | (error > 0.1 * BESIDE)
+    return good
+
+
+def _passing(same, one, two):
+    """Of two branches on which w keeps its sign: w at the centre between their saddles, or at the saddle between."""
+    pair = (one[:, cn.COLUMNS] == 4.0) & (two[:, cn.COLUMNS] == 4.0)
+    single = (one[:, cn.COLUMNS] == 2.0) & (two[:, cn.COLUMNS] == 2.0)
+    at = 1 if same else 0
+    value, bar = np.full(len(one), np.nan), np.full(len(one), np.nan)
+    for here, column in ((pair, at), (single, 0)):
+        if here.any() and (same or here is pair):
+            (v, v_bar), (w, w_bar) = (_level(row[here], column) for row in (one, two))
+            value[here], bar[here] = np.where((v < 0.0) & (w < 0.0), np.nan, v - w), v_bar + w_bar
+    return value, bar
+
+
+def _level(row, column):
+    """w where a branch passes an equilibrium, or less how far it turns before it."""
+    w, short = row[:, 2 * column], row[:, cn.TURN] - row[:, cn.OFFSETS + column]
+    passed = np.isfinite(w)
+    return np.where(passed, w, np.where(short < 0.0, short, np.nan)), np.where(
+        passed, row[:, 2 * column + 1], row[:, cn.TURN_BAR]
+    )
+
+
+def _turning(first_own, second_own, one, two):
+    """Of two branches that turn before the same saddle (their own, a turn further, if so): their turning points."""
+    count = one[:, cn.COLUMNS]
+    (x, x_bar, x_in), (y, y_bar, y_in) = (_beside(row, own) for row, own in ((one, first_own), (two, second_own)))
+    good = (count == two[:, cn.COLUMNS]) & ((count == 4.0) | (first_own & second_own)) & (x_in | y_in)
+    return np.where(good, x - y, np.nan), x_bar + y_bar
+
+
+def _beside(row, own):
+    """The turning point of a branch less the saddle behind it, or beyond that w there; its bar; does it turn before?"""
+    column = np.where(own, row[:, cn.COLUMNS] - 1.0, 1.0)
+    column = np.where(np.isfinite(column), column, 0.0).astype(int)
+    rows = np.arange(len(row))
+    wall, w, bar = (row[rows, first + step * column] for first, step in ((cn.OFFSETS, 1), (0, 2), (1, 2)))
+    turned = row[:, cn.PASSED] == column
+    x = np.where(turned, row[:, cn.TURN] - wall, w)
+    return x, np.where(turned, row[:, cn.TURN_BAR], bar), turned

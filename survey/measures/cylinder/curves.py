@@ -1,0 +1,52 @@
+"""The curves that [boundaries] draws on maps of the flow phi' = w, w' = f w + g on the cylinder.
+
+On a map of initial states they part the fates: see `separatrices`. On a map of two parameters they part the portraits:
+see `bifurcations`.
+"""
+
+from survey.measures.cylinder import bifurcations, separatrices
+from survey.measures.cylinder.separatrices import SYSTEM
+from survey.measures.sampled import joined
+from survey.scene import Output
+
+CLASSES = {
+    "stable_manifold": 0, "unstable_cycle": 1, "stable_cycle": 2, "saddle": 3, "sink": 4, "centre": 5, "source": 6,
+    "fold": 7, "cusp": 8, "supercritical_hopf": 9, "subcritical_hopf": 10, "bogdanov_takens": 11,
+    "generalised_hopf": 12, "ends": 13, "homoclinic": 14, "heteroclinic": 15,
+}  # fmt: skip
+TITLE = "what the curve is"
+_COUNTED = "to some points of each curve on a map of two parameters, where the return maps are conclusive"
+STATE = ("phi0", "w0")
+ALONG = (
+    Output("equilibrium_phi", "angle of the equilibrium, or of the saddle of a stable manifold", r"\varphi_e",
+           units="rad",
+           applies="to stable manifolds, equilibria and their bifurcations"),
+    Output("multiplier", "Floquet multiplier of the cycle", "m", applies="to cycles"),
+    Output("cycles_left", "number of cycles beside the curve, to the left of the order of its points (the first axis "
+           "pointing to the right, the second upward)", applies=_COUNTED),
+    Output("cycles_right", "number of cycles beside the curve, to the right of the order of its points",
+           applies=_COUNTED),
+)  # fmt: skip
+
+
+def refusal(axes):
+    """Why there are no curves on a map of these axes, in words; None if there are."""
+    own = set(axes[:2])
+    if len(axes) in (2, 3) and (own == set(STATE) or own <= set(SYSTEM)) and set(axes[2:]) <= set(SYSTEM):
+        return None
+    return (
+        f"curves are known on two axes of {', '.join(SYSTEM)}, or on {', '.join(STATE)}, and one more of the former "
+        f"behind them, not on {', '.join(axes) or 'none'}"
+    )
+
+
+def closed(square, axes, fixed, options):
+    """The Curves on the map of `axes`, the unit square `square`; `fixed` holds the other parameters."""
+    measure = separatrices if set(axes) == set(STATE) else bifurcations
+    found = [(CLASSES[kind], *rest) for kind, *rest in measure.found(square, axes, fixed)]
+    return joined(found, [output.name for output in ALONG])
+
+
+def seconds(axes):
+    """Estimated seconds on one thread of the curves on one map, measured."""
+    return 0.1 if set(axes[:2]) == set(STATE) else 5.0

@@ -1,0 +1,344 @@
+"""A user's f(phi, p), g(phi, p) as a program of `kernels.cylinder.program`, one for each set of parameters.
+
+Each function is run once at every set of parameters, as Python: phi is a record of operations, the parameters are
+numbers of 128 bits. So what depends on parameters alone may branch and loop; what depends on phi must be analytic:
++ - * / ** and the functions in `FUNCTIONS`. Numbers in the code are taken as exact binary64 numbers.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+
+from survey.kernels.cylinder import program as pg
+from survey.measures.hill import multiprecision
+from survey.measures.hill.multiprecision import LOCK, Unsupported
+
+FUNCTIONS = {name: getattr(pg, name.upper()) for name in (
+    "sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp log sqrt erf"
+).split()}  # fmt: skip
+MOST = 2000  # operations
+HIGHEST = 64  # the largest exponent that is multiplied out
+SAMPLES = np.pi * np.sin(np.arange(1.0, 17.0))  # angles at which periodicity is checked
+
+
+class Angle:
+    """A value that depends on phi: the place of its operation in a list of them."""
+
+    __array_ufunc__ = None  # numpy's numbers leave operators to this class
+
+    def __init__(self, record, place):
+        self.record, self.place = record, place
+
+    def __add__(self, other):
+        return self.record.sum(self, other)
+
+    def __mul__(self, other):
+        return self.record.product(self, other)
+
+    def __neg__(self):
+        return self.record.product(self, -1)
+
+    def __sub__(self, other):
+        return self.record.difference(self, other)
+
+    def __rsub__(self, other):
+        return self.record.difference(other, self)
+
+    def __truediv__(self, other):
+        return self.record.quotient(self, other)
+
+    def __rtruediv__(self, other):
+        return self.record.quotient(other, self)
+
+    def __pow__(self, exponent):
+        return self.record.power(self, exponent)
+
+    def __rpow__(self, base):
+        return self.record.power(base, self)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    def __pos__(self):
+        return self
+
+    def _refused(self, *_others):
+        raise Unsupported("it compares phi, or what depends on it: one branch is not analytic")
+
+    __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = __bool__ = _refused
+    __hash__ = None
+
+    def _rough(self, *_others):
+        raise Unsupported("it takes abs, int, float, // or % of what depends on phi, which is not analytic")
+
+    __abs__ = __int__ = __float__ = __floordiv__ = __mod__ = __rmod__ = __rfloordiv__ = __index__ = _rough
+
+
+class Record:
+    """The operations on phi: a context for `multiprecision.lift`, with the functions of mpmath's where phi is not."""
+
+    def __init__(self):
+        self.mp = multiprecision.context()
+        self.operations = [(-1, 0, 0, 0.0)]
+        self._places, self._slopes, self._begun = {}, {}, set()
+        self.angle = Angle(self, 0)
+
+    def __getattr__(self, name):
+        plain = getattr(self.mp, name)
+        return lambda *given: (
+            self._call(name, plain, given) if any(isinstance(x, Angle) for x in given) else plain(*given)
+        )
+
+    def mpf(self, x):
+        """A number with more digits; what depends on phi stays as it is."""
+        return x if isinstance(x, Angle) else self.mp.mpf(x)
+
+    def _call(self, name, plain, given):
+        if name == "power":
+            return self.power(*given)
+        if name in FUNCTIONS and len(given) == 1:
+            return self.function(FUNCTIONS[name], *given)
+        if name in OTHERS:
+            return OTHERS[name](self, *given)
+        raise Unsupported(f"it uses {name} of what depends on phi")
+
+    def place(self, code, first, second, number=0.0):
+        """The value of this operation: the same for the same operation."""
+        key = (code, first, second, number)
+        if key not in self._places:
+            if len(self.operations) == MOST:
+                raise Unsupported(f"it has more than {MOST:,} operations")
+            self._places[key] = len(self.operations)
+            self.operations.append(key)
+        return Angle(self, self._places[key])
+
+    def with_number(self, code, number, at=None, first=None):
+        """An operation with a number: what binary64 leaves of it stands where no operand does."""
+        number = self.mp.nan if isinstance(number, self.mp.mpc) else self.mp.mpf(number)
+        rounded = float(number)
+        missed = abs(float(number - rounded)) * (1 + 1e-15) if self.mp.isfinite(number) else 0.0
+        if first is None:
+            return self.place(code, missed, at or 0, rounded)
+        return self.place(code, first, missed, rounded)
+
+    def constant(self, x):
+        """The number x as a value, or the value x."""
+        return x if isinstance(x, Angle) else self.with_number(pg.CONSTANT, x)
+
+    def sum(self, x, y):
+        """x + y."""
+        if not isinstance(x, Angle):
+            x, y = y, x
+        if isinstance(y, Angle):
+            return self.place(pg.ADD, *sorted((x.place, y.place)))
+        return x if y == 0 else self.with_number(pg.PLUS, y, first=x.place)
+
+    def difference(self, x, y):
+        """x - y."""
+        if not isinstance(y, Angle):
+            return self.sum(x, -self.mp.mpf(y))
+        if not isinstance(x, Angle):
+            return self.with_number(pg.FROM, x, first=y.place)
+        return self.place(pg.SUBTRACT, x.place, y.place)
+
+    def product(self, x, y):
+        """x y."""
+        if not isinstance(x, Angle):
+            x, y = y, x
+        if isinstance(y, Angle):
+            return self.place(pg.MULTIPLY, *sorted((x.place, y.place)))
+        return x if y == 1 else self.with_number(pg.TIMES, y, first=x.place)
+
+    def quotient(self, x, y):
+        """x / y."""
+        if not isinstance(y, Angle):
+            return self.product(x, 1 / self.mp.mpf(y))
+        if not isinstance(x, Angle):
+            return self.with_number(pg.OVER, x, at=y.place)
+        return self.place(pg.DIVIDE, x.place, y.place)
+
+    def power(self, x, y):
+        """x^y: products where y is a whole number up to HIGHEST."""
+        if isinstance(y, Angle):
+            log = self.function(pg.LOG, x) if isinstance(x, Angle) else self.mp.log(x)
+            return self.function(pg.EXP, self.product(y, log))
+        y = self.mp.mpf(y)
+        if y == int(y) and abs(y) <= HIGHEST:
+            return self._whole(x, int(y))
+        if y == self.mp.mpf(0.5):
+            return self.function(pg.SQRT, x)
+        if y != float(y):
+            return self.function(pg.EXP, self.product(self.function(pg.LOG, x), y))
+        made = self.place(pg.POWER, x.place, None, float(y))
+        return self._known(made, lambda: self.product(self.quotient(made, x), y))
+
+    def _whole(self, x, n):
+        if n <= 0:
+            return self.quotient(1, self._whole(x, -n)) if n else self.constant(1)
+        half = self._whole(x, n // 2) if n > 1 else None
+        return x if n == 1 else half * half * x if n % 2 else half * half
+
+    def function(self, code, x):
+        """The function of this code at x, with its derivative, which its series needs."""
+        made = self.place(code, x.place, None)
+        return self._known(made, lambda: SLOPES[code](self, x, made))
+
+    def _known(self, made, slope):
+        """The value of a function; its derivative is recorded after it."""
+        code, first, _second, number = self.operations[made.place]
+        if made.place not in self._begun:  # sin and cos need each other
+            self._begun.add(made.place)
+            at = self.constant(slope()).place
+            self.operations[made.place] = (code, first, at, number)
+        return made
+
+    def slope(self, place):
+        """The derivative by phi of the value there, or None for 0."""
+        if place not in self._slopes:
+            self._slopes[place] = self._differentiated(place)
+        return self._slopes[place]
+
+    def _differentiated(self, place):
+        code, first, second, number = self.operations[place]
+        if place == 0:
+            return self.constant(1)
+        if code == pg.CONSTANT:
+            return None
+        if code in (pg.PLUS, pg.FROM, pg.TIMES):
+            inner, factor = self.slope(first), {pg.PLUS: 1, pg.FROM: -1, pg.TIMES: number}[code]
+            return None if inner is None else self.product(inner, factor)
+        if code in (pg.ADD, pg.SUBTRACT):
+            one, two = self.slope(first), self.slope(second)
+            if two is None:
+                return one
+            if one is None:
+                return two if code == pg.ADD else -two
+            return one + two if code == pg.ADD else one - two
+        y = Angle(self, place)
+        if code == pg.MULTIPLY:
+            a, b = Angle(self, first), Angle(self, second)
+            return self._total(self._times(self.slope(first), b), self._times(self.slope(second), a))
+        if code in (pg.DIVIDE, pg.OVER):
+            b = Angle(self, second)
+            upper = self.slope(first) if code == pg.DIVIDE else None
+            lower = self._times(self.slope(second), -y)
+            total = self._total(upper, lower)
+            return None if total is None else total / b
+        return self._times(self.slope(first), Angle(self, second))
+
+    def _times(self, slope, factor):
+        return None if slope is None else slope * factor
+
+    def _total(self, one, two):
+        return two if one is None else one if two is None else one + two
+
+
+SLOPES = {
+    pg.SIN: lambda r, x, y: r.function(pg.COS, x),
+    pg.COS: lambda r, x, y: -r.function(pg.SIN, x),
+    pg.TAN: lambda r, x, y: 1 + y * y,
+    pg.ASIN: lambda r, x, y: 1 / r.function(pg.SQRT, 1 - x * x),
+    pg.ACOS: lambda r, x, y: -1 / r.function(pg.SQRT, 1 - x * x),
+    pg.ATAN: lambda r, x, y: 1 / (1 + x * x),
+    pg.SINH: lambda r, x, y: r.function(pg.COSH, x),
+    pg.COSH: lambda r, x, y: r.function(pg.SINH, x),
+    pg.TANH: lambda r, x, y: 1 - y * y,
+    pg.ASINH: lambda r, x, y: 1 / r.function(pg.SQRT, 1 + x * x),
+    pg.ACOSH: lambda r, x, y: 1 / r.function(pg.SQRT, x * x - 1),
+    pg.ATANH: lambda r, x, y: 1 / (1 - x * x),
+    pg.EXP: lambda r, x, y: y,
+    pg.LOG: lambda r, x, y: 1 / x,
+    pg.SQRT: lambda r, x, y: 0.5 / y,
+    pg.ERF: lambda r, x, y: r.function(pg.EXP, -(x * x)) * (2 / r.mp.sqrt(r.mp.pi)),
+}
+OTHERS = {
+    "expm1": lambda r, x: r.function(pg.EXP, x) - 1,
+    "log1p": lambda r, x: r.function(pg.LOG, 1 + x),
+    "log10": lambda r, x: r.function(pg.LOG, x) / r.mp.log(10),
+    "hypot": lambda r, x, y: r.function(pg.SQRT, x * x + y * y),
+    "radians": lambda r, x: x * (r.mp.pi / 180),
+    "degrees": lambda r, x: x * (180 / r.mp.pi),
+}
+
+
+class Raised(Exception):
+    """f or g raised its cause; `name` says which."""
+
+    def __init__(self, name):
+        super().__init__(name)
+        self.name = name
+
+
+def recorded(function, name, record, p):
+    """The place of the function's value; None where it has none; raises Unsupported or Raised."""
+    try:
+        value = multiprecision.lift(function, record)(record.angle, p)
+        if not isinstance(value, (bool, int, float, Angle, record.mp.mpf, record.mp.mpc)):
+            raise Unsupported(f"it returns {type(value).__name__}, which is not a real number")
+        return record.constant(value).place
+    except Unsupported as error:
+        raise Unsupported(f"{name}(phi, p): {error}") from None
+    except NameError as error:  # a builtin that numbers with more digits have not
+        raise Unsupported(f"{name}(phi, p): it uses {error.name}") from None
+    except ArithmeticError:
+        return record.constant(np.nan).place
+    except Exception as error:
+        raise Raised(name) from error
+
+
+@lru_cache(maxsize=4096)
+def program(f, g, point, on_circle):
+    """The row of a flow, less its initial state, for the parameters `point` (a tuple); see `kernels.cylinder.program`.
+
+    NaN where f or g has no value, or not the period 2 pi although `on_circle`. Raises Unsupported or Raised.
+    """
+    with LOCK:
+        record = Record()
+        p = [record.mp.mpf(value) for value in point]
+        found = [recorded(h, name, record, p) for h, name in ((f, "f"), (g, "g"))]
+        forces = len(record.operations)
+        dg = record.slope(found[1])
+        slope = record.constant(0 if dg is None else dg).place
+    table = np.array(record.operations, dtype=float)
+    row = np.zeros(pg.OPERATIONS + table.size)
+    row[pg.OPERATIONS :] = table.ravel()
+    row[[pg.REVERSED, pg.ON_CIRCLE, pg.MIRRORED]] = 1.0, on_circle, 1.0
+    row[[pg.SLOTS, pg.FORCES, pg.F_AT, pg.G_AT, pg.DG_AT]] = len(table), forces, *found, slope
+    row[pg.RADIUS] = 1e300 if on_circle else 1.0
+    if not np.isfinite(table).all():
+        return np.full_like(row, np.nan)
+    row[pg.AT_REST] = (balls(row, 0.0)[found[1]] == 0.0).all()
+    if on_circle:
+        pg.bound_circle(row)
+        if not np.isfinite(row[pg.BOUND_F : pg.BOUND_DDG + 1]).all() or not periodic(row):
+            return np.full_like(row, np.nan)
+    return row
+
+
+def balls(row, phi):
+    """Middle and radius of the ball of every value at phi (SLOTS, 2): what is computed, and what that is rounded."""
+    out = np.zeros((int(row[pg.SLOTS]), 1, 2))
+    pg.ball(row, float(phi), 0.0, 1, out)
+    return out[:, 0]
+
+
+def periodic(row):
+    """Are f and g at angles, and 2 pi further on, the same within their rounding?"""
+    for phi in SAMPLES:
+        near, far = balls(row, phi), balls(row, phi + 2.0 * np.pi)
+        for at, steep in ((pg.F_AT, pg.BOUND_F), (pg.G_AT, pg.BOUND_DG)):
+            one, two = near[int(row[at])], far[int(row[at])]
+            if not abs(one[0] - two[0]) <= 2.0 * (one[1] + two[1]) + 4e-15 * row[steep]:
+                return False
+    return True
+
+
+def flows(f, g, points, on_circle):
+    """The programs (N, n) of the parameters (N, m), padded to one length; NaN where there is none."""
+    own, where = np.unique(points, axis=0, return_inverse=True)
+    found = [
+        program(f, g, tuple(point.tolist()), on_circle) if np.isfinite(point).all() else np.full(pg.OPERATIONS, np.nan)
+        for point in own
+    ]
+    longest = max(map(len, found), default=pg.OPERATIONS)
+    padded = np.array([np.pad(row, (0, longest - len(row))) for row in found]).reshape(-1, longest)
+    return padded[where.reshape(-1)]

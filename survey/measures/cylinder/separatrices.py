@@ -1,0 +1,271 @@
+"""The curves between fates on a map of initial states: stable branches of the saddles, and cycles.
+
+A stable branch is the unstable one of the system that S1, (b, w, t) -> -(b, w, t), makes of it, so it is followed
+forward in time there, where the flow draws neighbours to it; unstable cycles likewise, and stable ones in the system
+itself. It begins at its saddle and ends as `kernels.cylinder.lines` says. Where b = 0 the branches are the level curves
+H = V(saddle) (section 2), and where g = 0 the lines w - F = +-|b|, between which every motion comes to rest.
+"""
+
+import math
+
+import numpy as np
+
+from survey.kernels.cylinder import equilibria as eq
+from survey.kernels.cylinder import lines
+from survey.kernels.cylinder import records as rc
+from survey.kernels.cylinder import returns as rt
+from survey.kernels.cylinder.branches import unstable
+from survey.kernels.cylinder.flow import BOUND_G, coefficients
+from survey.kernels.math.roundoff import ROUNDOFF
+from survey.measures.cylinder.fate import I0, I1, outline, remembered
+from survey.measures.sampled import runs
+from survey.methods import taylor
+
+SYSTEM = ("b12", "b31", "d", "c23", "s2", "s3")
+TOLERANCE = 1e-17  # truncation of one step
+FURTHEST = 2e-3  # from its saddle, of the map: where a branch is begun
+TINY = 1e-300
+TWO_PI = 2.0 * math.pi
+
+
+def found(square, axes, fixed):
+    """[(class, parameters (m, 2), errors (m), {name: (value, error)})] of the curves and the equilibria on the map."""
+    six = [fixed[name] for name in SYSTEM]
+    window = Window(square, axes.index("phi0"))
+    s = outline(six)
+    if s.stratum == I0:
+        return list(_free(window, six))
+    curves = list(_levels(window, s) if s.stratum == I1 else _branches(window, s))
+    if s.stratum != I1 and not s.folded:
+        curves += _cycles(window, remembered(taylor, six))
+    return curves + list(_equilibria(window, s))
+
+
+class Window:
+    """A map of phi0 and w0, the first of which is its axis number `at` of two."""
+
+    def __init__(self, square, at):
+        self.square, self.at = square, at
+        self.low, self.high = (np.roll(end, -at) for end in (square.low, square.high))
+        self.log = np.roll(square.log, -at)
+        low, high = (np.where(self.log, np.log(np.where(self.log, end, 1.0)), end) for end in (self.low, self.high))
+        self.size = high - low
+
+    def for_lines(self, side):
+        """As `kernels.cylinder.lines` takes it, for w of the sign `side` times that of the map."""
+        w = sorted((side * self.low[1], side * self.high[1]))
+        return np.array([self.low[0], self.high[0], *w, *self.size, *self.log])
+
+    def parameters(self, phi, w):
+        return np.roll(np.column_stack(np.broadcast_arrays(phi, w)), self.at, axis=1)
+
+    def positions(self, phi, w):
+        pair = self.parameters(phi, w)
+        return self.square.positions(np.where(self.square.log, np.maximum(pair, TINY), pair))
+
+    def error(self, phi, w, by_phi, by_w, across):
+        """Position errors of points whose gradient (by_phi, by_w) times the distance from the curve is `across`."""
+        a, c = (np.where(log, abs(x), 1.0) * size for x, log, size in zip((phi, w), self.log, self.size, strict=True))
+        return across / np.maximum(np.hypot(by_phi * a, by_w * c), TINY)
+
+    def copies(self, low, high):
+        """The numbers of turns that bring something from low to high into the map."""
+        return range(math.ceil((self.low[0] - high) / TWO_PI), math.floor((self.high[0] - low) / TWO_PI) + 1)
+
+
+def _flipped(p):
+    """S1."""
+    return np.ascontiguousarray(coefficients(-p[0], -p[1], *p[2:6]))
+
+
+def _branches(window, s):
+    """Both stable branches of every saddle."""
+    p, starts = _flipped(s.p), np.zeros((2 * eq.MOST, 4))
+    saddles = s.equilibria[s.equilibria[:, eq.KIND] == eq.SADDLE]
+    if not len(saddles):
+        return
+    steepest = max(0.5 * (abs(row[eq.F]) + math.sqrt(row[eq.F] ** 2 + 4.0 * row[eq.DG])) for row in saddles)
+    reach = min(0.1, FURTHEST * min(window.high[0] - window.low[0], (window.high[1] - window.low[1]) / steepest))
+    size = unstable(p, s.equilibria, len(s.equilibria), starts, reach)
+    for i, start in enumerate(starts[:size]):
+        saddle = saddles[i // 2]
+        known = {"equilibrium_phi": (saddle[eq.ANGLE], saddle[eq.BAR])}
+        points = _followed(window, -1.0, p, start, s, lines.BRANCH)
+        bar = math.hypot(*(saddle[eq.BAR] / window.size))
+        first = np.array([[saddle[eq.ANGLE] - TWO_PI * (saddle[eq.ANGLE] > math.pi), 0.0, 0.0, 0.0, bar]])
+        off = start[rc.START_PHI] - saddle[eq.ANGLE]
+        shift = round((start[rc.START_PHI] - first[0, 0] - off) / TWO_PI)
+        first[0, lines.TURNS] = shift
+        yield from _copied(window, np.vstack([first, points]), "stable_manifold", known)
+
+
+def _cycles(window, s):
+    """Every cycle that is certain, once round."""
+    for side, table in ((1.0, s.plus), (-1.0, s.minus), (0.0, s.librations)):
+        for row in table:
+            if row[rt.CYCLE_CLASS] < 0.0:
+                continue
+            stable = row[rt.MULTIPLIER] < 1.0
+            start = np.array([row[rt.CYCLE_X], 0.0, row[rt.CYCLE_BAR], 0.0])
+            if side:
+                start = np.array([s.section, side * row[rt.CYCLE_X], 0.0, row[rt.CYCLE_BAR]])
+            sign = 1.0 if stable else -1.0
+            start[rc.START_W] *= sign
+            kind = lines.ROTATION if side else lines.LIBRATION
+            points = _followed(window, sign, s.p if stable else _flipped(s.p), start, s, kind)
+            known = {"multiplier": (row[rt.MULTIPLIER], row[rt.MULTIPLIER_BAR])}
+            yield from _copied(window, points, "stable_cycle" if stable else "unstable_cycle", known)
+
+
+def _followed(window, side, p, start, s, kind):
+    """Points (m, POINT) of a line in the system itself; `side`: the sign of its w in the system p."""
+    out = np.zeros((lines.MOST_POINTS, lines.POINT))
+    given = window.for_lines(side), s.equilibria, len(s.equilibria), s.section, kind
+    out = out[: taylor.flow_line(p, start, *given, TOLERANCE, out)]
+    out[:, lines.VELOCITY] *= side
+    if side < 0.0:
+        flipped = np.array([lines.INSIDE, lines.AT_PHI_LOW, lines.AT_PHI_HIGH, lines.AT_W_HIGH, lines.AT_W_LOW])
+        known = np.isfinite(out[:, lines.BORDER])
+        out[known, lines.BORDER] = flipped[out[known, lines.BORDER].astype(int)]
+    return out
+
+
+def _copied(window, points, kind, known):
+    """The runs of a line on the map, in every copy of it: phi is an angle."""
+    phi, w, turns, border, error = points.T
+    if not np.isfinite(phi).any():
+        return
+    unwrapped = phi + TWO_PI * turns
+    loose = 1e-9 * (1.0 + abs(phi))
+    for k in window.copies(np.nanmin(unwrapped), np.nanmax(unwrapped)):
+        x, v = phi + TWO_PI * (turns + k), w.copy()
+        for mark, axis, end in (
+            (lines.AT_PHI_LOW, 0, window.low[0]),
+            (lines.AT_PHI_HIGH, 0, window.high[0]),
+            (lines.AT_W_LOW, 1, window.low[1]),
+            (lines.AT_W_HIGH, 1, window.high[1]),
+        ):
+            own = (border == mark) & ((abs(x - end) < loose) if axis == 0 else True)
+            (x, v)[axis][own] = end
+        good = (x >= window.low[0]) & (x <= window.high[0]) & (v >= window.low[1]) & (v <= window.high[1])
+        for part in np.split(np.arange(x.size), 1 + np.flatnonzero(np.diff(good))):
+            if part.size > 1 and good[part[0]]:
+                shift = ROUNDOFF * (abs(x[part]) + TWO_PI) / window.size[0]
+                yield kind, window.parameters(x[part], v[part]), error[part] + shift, known
+
+
+def _equilibria(window, s):
+    """The equilibria, as points."""
+    for row in s.equilibria:
+        if row[eq.KIND] == eq.DEGENERATE:
+            continue
+        kind = "saddle" if row[eq.KIND] == eq.SADDLE else ("sink", "centre", "source")[1 + int(row[eq.STABLE])]
+        known = {"equilibrium_phi": (row[eq.ANGLE], row[eq.BAR])}
+        for k in window.copies(row[eq.ANGLE], row[eq.ANGLE]):
+            phi = np.array([row[eq.ANGLE] + TWO_PI * k])
+            if window.low[1] <= 0.0 <= window.high[1]:
+                error = (row[eq.BAR] + ROUNDOFF * abs(phi)) / window.size[0]
+                yield kind, window.parameters(phi, 0.0), error, known
+
+
+def _free(window, six):
+    """g = 0: w = F + |b| and w = F - |b|."""
+    b12, b31 = six[:2]
+    b = math.hypot(b12, b31)
+    for side in (1.0, -1.0) if b else ():
+
+        def w(phi, side=side):
+            return b12 * np.sin(phi) + b31 * np.cos(phi) + side * b
+
+        for phi in runs(lambda t, w=w: window.positions(t, w(t)), window.low[0], window.high[0]):
+            slope = b12 * np.cos(phi) - b31 * np.sin(phi)
+            across = 4.0 * ROUNDOFF * b * (2.0 + abs(phi))
+            yield "stable_manifold", window.parameters(phi, w(phi)), window.error(phi, w(phi), slope, 1.0, across), {}
+
+
+def _levels(window, s):
+    """b = 0: H = V(saddle) from each saddle to both sides, up to where it turns or to another saddle."""
+    for row in s.equilibria:
+        if row[eq.KIND] != eq.SADDLE:
+            continue
+        level, known = Level(s.p, row), {"equilibrium_phi": (row[eq.ANGLE], row[eq.BAR])}
+        for side in (1.0, -1.0):
+            far, turns = _far_end(level, s, side)
+            if not turns and side < 0.0 and abs(far) >= TWO_PI:
+                continue  # the same as to the other side
+            for branch in (0.0,) if turns else (1.0, -1.0):
+
+                def point(t, far=far, branch=branch, level=level):
+                    x = 0.5 * far * (1.0 - np.cos(math.pi * t))
+                    return x, (branch or np.sign(1.0 - t)) * level.velocity(x)
+
+                for k in window.copies(level.angle + min(far, 0.0), level.angle + max(far, 0.0)):
+
+                    def position(t, point=point, k=k, level=level):
+                        x, w = point(t)
+                        return window.positions(level.angle + x + TWO_PI * k, w)
+
+                    for t in runs(position, 0.0, 1.0 if branch else 2.0):
+                        x, w = point(t)
+                        phi = level.angle + x + TWO_PI * k
+                        across = level.error(x) + 4.0 * ROUNDOFF * w * w + abs(level.slope(x)) * ROUNDOFF * abs(phi)
+                        error = window.error(phi, w, level.slope(x), w, across)
+                        error[x == 0.0] = row[eq.BAR] / window.size[0] + ROUNDOFF
+                        if not turns:  # a saddle of the same level, within rounding
+                            error[x == far] = math.hypot(*(np.sqrt(level.error(far) * level.reach()) / window.size))
+                        yield "stable_manifold", window.parameters(phi, w), error, known
+
+
+class Level:
+    """V(saddle) - V(saddle + x), as a product that does not cancel next to the saddle."""
+
+    def __init__(self, p, row):
+        self.p, self.angle, self.bar, self.steep = p, row[eq.ANGLE], row[eq.BAR], row[eq.DG]
+        self.size = p[BOUND_G]
+
+    def depth(self, x):
+        """Twice the integral of g: sin(x/2) times what vanishes at x = 0."""
+        d, c23, s2, s3 = self.p[2:6]
+        middle, half = self.angle + 0.5 * x, 0.5 * x
+        whole = 2.0 * np.cos(half) * (0.5 * d * np.sin(2.0 * middle) + c23 * np.cos(2.0 * middle))
+        return -2.0 * np.sin(half) * (whole - 2.0 * s2 * np.cos(middle) + 2.0 * s3 * np.sin(middle))
+
+    def velocity(self, x):
+        return np.sqrt(np.maximum(self.depth(x), 0.0))
+
+    def slope(self, x):
+        """V' there."""
+        phi = self.angle + np.asarray(x, float)
+        d, c23, s2, s3 = self.p[2:6]
+        return 0.5 * d * np.sin(2.0 * phi) + c23 * np.cos(2.0 * phi) - s2 * np.cos(phi) + s3 * np.sin(phi)
+
+    def reach(self):
+        """Squares of how far from a saddle H = V(saddle) + 1 is, along phi and along w, with a margin of 2."""
+        return np.array([8.0 / self.steep, 8.0])
+
+    def error(self, x):
+        """Error bound of half the depth: rounding, and that of the saddle's angle."""
+        return abs(np.sin(0.5 * x)) * (
+            16.0 * ROUNDOFF * self.size * (1.0 + abs(self.angle)) + 4.0 * self.size * self.bar
+        )
+
+
+def _far_end(level, s, side):
+    """(x, does it turn there?): where the level curve from a saddle ends on this side."""
+    others = [side * ((side * (row[eq.ANGLE] - level.angle)) % TWO_PI) for row in s.equilibria]
+    for x in sorted((x for x in others if abs(x) > 1e-12), key=abs):
+        reach = level.depth(x)
+        if abs(reach) <= 4.0 * level.error(x) + ROUNDOFF * level.size:
+            return x, False
+        if reach < 0.0:
+            before = max((y for y in [0.5 * x, *others] if abs(y) < abs(x) and level.depth(y) > 0.0), key=abs)
+            return _zero(level, before, x), True
+    return side * TWO_PI, False
+
+
+def _zero(level, inner, outer):
+    while True:
+        middle = 0.5 * (inner + outer)
+        if middle in (inner, outer):
+            return inner
+        inner, outer = (middle, outer) if level.depth(middle) > 0.0 else (inner, middle)

@@ -1,0 +1,183 @@
+"""Solutions on a separatrix: the stable and unstable branches of the saddles, as exactly as their parameters are given.
+
+A start is a row of eight numbers: the six parameters, phi0, and the number of the saddle, by its angle in [0, 2 pi).
+The branch is that of the saddle next to phi0: on its right side phi0 - 2 pi < phi_s < phi0, on its left phi0 < phi_s <
+phi0 + 2 pi, and phi0 lies between the saddle and the first turning point of the branch, if it turns. There t = 0.
+
+Where b = 0 in closed form (`kernels.cylinder.separatrix`), else by the power series at the saddle and Taylor series in
+double-double arithmetic (`kernels.cylinder.branch_double`); by any other method from the state on the branch at phi0.
+"""
+
+from fractions import Fraction
+
+import numpy as np
+
+from survey.kernels.cylinder import branch_double, separatrix
+from survey.kernels.cylinder import records as rc
+from survey.kernels.cylinder.separatrix import ANGLE, ANGLE_LOW, MULTIPLICITY, SLIP
+from survey.kernels.cylinder.steps import EQUILIBRIUM, NO_CONVERGENCE, OK, TRUST, TURNING, UNDETERMINED
+from survey.measures.cylinder import solution
+from survey.methods import closed
+from survey.status import INVALID_PARAMETERS
+
+HEADS = 4  # of a row: the angle of the saddle, w at phi0, and their bars
+SADDLE, SADDLE_BAR, START, START_BAR = range(HEADS)
+NO_FORM, DEGENERATE = 19, 21  # as in the STATUS of scenes/gyrostat.py
+_ULP = 2.3e-16
+
+
+def trajectories(method, rows, times, rtol, stable, left):
+    """As `solution.trajectories`, and the HEADS of each row; method None takes what serves best."""
+    floats, turnings, status = solution._nothing(times.shape)
+    starts = _Starts(method, rows, stable, left)
+    sign_w, sign_t = (-1.0 if stable != left else 1.0), (-1.0 if stable else 1.0)
+    order = np.argsort(sign_t * times, axis=1, kind="stable")
+    for i in range(len(rows)):
+        status[i] = starts.status[i]
+        if starts.status[i] != OK:
+            continue
+        at = sign_t * times[i, order[i]]
+        at, places = np.ascontiguousarray(at[np.isfinite(at)]), order[i][np.isfinite(at)]
+        found, counts, ending = starts.at(i, at)
+        found[:, rc.PHI] *= -1.0 if left else 1.0
+        found[:, rc.W] *= sign_w
+        found += 0.0  # no negative zeros
+        floats[i, places], turnings[i, places] = found, counts
+        status[i, places] = np.where(np.isfinite(found[:, rc.PHI]), OK, ending)
+    if method in (None, closed):
+        return floats, turnings, status, starts.heads
+    results = _by_steps(starts, rows, lambda some: solution.trajectories(method, some, times, rtol))
+    return *results, starts.heads
+
+
+def abel(method, rows, targets, rtol, stable, left):
+    """As `solution.abel`, and the HEADS of each row; method None takes what serves best."""
+    floats, status = np.full((*targets.shape, rc.STATE), np.nan), np.zeros(targets.shape, np.int64)
+    starts = _Starts(method, rows, stable, left)
+    side, sign_w = (-1.0 if left else 1.0), (-1.0 if stable != left else 1.0)
+    order = np.argsort(side * targets, axis=1, kind="stable")
+    for i in range(len(rows)):
+        status[i] = starts.status[i]
+        if starts.status[i] != OK:
+            continue
+        places = order[i][np.isfinite(targets[i, order[i]])]
+        found, codes = starts.passing(i, np.ascontiguousarray(side * targets[i, places]))
+        found[:, rc.VALUE] *= np.where(codes == TURNING, side, sign_w)
+        found[:, rc.TIME] *= -1.0 if stable else 1.0
+        floats[i, places], status[i, places] = found + 0.0, codes
+    if method in (None, closed):
+        return floats, status, starts.heads
+    results = _by_steps(starts, rows, lambda some: solution.abel(method, some, targets, rtol))
+    return *results, starts.heads
+
+
+class _Starts:
+    """The branches on which rows start, as branches that leave a saddle to the right; their status and HEADS."""
+
+    def __init__(self, method, rows, stable, left):
+        self.heads, self.status = np.full((len(rows), HEADS), np.nan), np.full(len(rows), INVALID_PARAMETERS)
+        plain, _starts = solution.split(rows)
+        turned = solution.reverse(rows) if stable else rows
+        turned = solution.mirror(turned) if left else turned
+        self.P, starts = solution.split(turned)
+        self.phi0, self.branches = starts[:, 0].copy(), [None] * len(rows)
+        for i in range(len(rows)):
+            place = np.zeros(separatrix.SADDLE)
+            if not separatrix.saddle(plain[i], rows[i, 7], place):
+                continue
+            angle, many = place[ANGLE] % (2 * np.pi), place[MULTIPLICITY]
+            self.heads[i, :2] = angle, _ULP * (1.0 + angle) + place[SLIP]
+            if left:
+                place[ANGLE], place[ANGLE_LOW] = -place[ANGLE], -place[ANGLE_LOW]
+            free = rows[i, 0] == 0.0 and rows[i, 1] == 0.0
+            if many > separatrix.ONE and not (free and _multiple(rows[i], many)):
+                self.status[i] = DEGENERATE
+            elif free:
+                self.heads[i, SADDLE_BAR] = _ULP * (1.0 + angle)
+                self._elliptic(i, place, many > separatrix.ONE or _symmetric(rows[i]))
+            elif method is closed:
+                self.status[i] = NO_FORM
+            else:
+                self._series(i, place)
+        self.heads[self.status == INVALID_PARAMETERS] = np.nan
+        if stable != left:
+            self.heads[:, START] *= -1.0
+
+    def _elliptic(self, i, place, exact):
+        data = np.zeros((separatrix.SIZE, 2))
+        status = separatrix.enter(self.P[i], place, exact, self.phi0[i], data)
+        if status >= 0:
+            self.status[i] = status
+        if status == OK:
+            self.heads[i, START], self.heads[i, START_BAR] = separatrix.start(data)
+            self.branches[i] = data, None, None
+
+    def _series(self, i, place):
+        (a, branch), out = branch_double.scratch(), np.zeros(2)
+        status = branch_double.enter(self.P[i], place, self.phi0[i], a, branch, out)
+        self.status[i] = INVALID_PARAMETERS if status in (TURNING, EQUILIBRIUM) else status
+        if status == OK:
+            self.heads[i, START], self.heads[i, START_BAR] = out
+            self.branches[i] = place, a, branch
+
+    def at(self, i, times):
+        """floats, turnings, and the status where there are none, at ascending times of row i."""
+        floats, turnings = np.full((len(times), rc.STATE), np.nan), np.full(len(times), UNDETERMINED)
+        first, a, branch = self.branches[i]
+        if a is not None:
+            status = branch_double.trajectory(self.P[i], first, a, branch, self.phi0[i], times, floats, turnings)
+            return floats, turnings, status
+        for j, t in enumerate(times):
+            turnings[j] = separatrix.at(self.P[i], first, self.phi0[i], t, floats[j])
+        lost = ~((floats[:, rc.PHI_BAR] < TRUST) & (floats[:, rc.W_BAR] < TRUST * (1.0 + np.abs(floats[:, rc.W]))))
+        floats[lost] = np.nan
+        return floats, turnings, NO_CONVERGENCE
+
+    def passing(self, i, targets):
+        """floats and status at ascending targets of row i."""
+        floats, status = np.full((len(targets), rc.STATE), np.nan), np.zeros(len(targets), np.int64)
+        first, a, branch = self.branches[i]
+        if a is not None:
+            branch_double.abel(self.P[i], first, a, branch, self.phi0[i], targets, floats, status)
+        else:
+            for j, target in enumerate(targets):
+                status[j] = separatrix.passing(first, self.phi0[i], target, floats[j])
+        return floats, status
+
+
+def _by_steps(starts, rows, solve):
+    """The results of `solve` from the states at phi0, with bars for what these are rounded by: from two beside them."""
+    good = starts.status == OK
+    given = rows.copy()
+    given[:, rc.W0] = np.where(good, starts.heads[:, START], 0.0)
+    results, beside = solve(given), given.copy()
+    beside[:, rc.W0] += np.where(good, starts.heads[:, START_BAR] + _ULP * np.abs(given[:, rc.W0]), 0.0)
+    others, bars = solve(beside), rc.STATE // 2
+    floats = results[0]
+    with np.errstate(invalid="ignore"):
+        floats[..., bars:] += 2.0 * np.abs(floats - others[0])[..., :bars]
+        lost = ~(floats[..., bars:] < TRUST * (1.0 + np.abs(floats[..., :bars]))).all(axis=-1)
+    lost &= (results[-1] == OK) | (results[-1] == TURNING)
+    floats[lost], results[-1][lost] = np.nan, NO_CONVERGENCE
+    if len(results) == 3:
+        results[1][(results[1] != others[1]) | (np.abs(floats[..., rc.W]) <= floats[..., rc.W_BAR])] = UNDETERMINED
+    results[-1][~good] = starts.status[~good, None]
+    floats[~good] = np.nan
+    return results
+
+
+def _symmetric(row):
+    """Is V exactly even about the direction of s, or are there s = 0? Then saddles beside that axis have one energy."""
+    d, c23, s2, s3 = (Fraction(float(x)) for x in row[2:6])
+    return d * s2 * s3 + c23 * (s3 * s3 - s2 * s2) == 0
+
+
+def _multiple(row, many):
+    """Has g exactly a root of this multiplicity? By the invariants of its quartic in tan(phi/2): I^3 = 27 J^2."""
+    d, c23, s2, s3 = (Fraction(float(x)) for x in row[2:6])
+    a, b, c, e, f = -c23 - s2, (d - s3) / 2, c23, -(d + s3) / 2, s2 - c23
+    first = a * f - 4 * b * e + 3 * c * c
+    second = a * c * f + 2 * b * c * e - a * e * e - b * b * f - c * c * c
+    if many > separatrix.TWO:
+        return first == 0 and second == 0
+    return first**3 == 27 * second**2

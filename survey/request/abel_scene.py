@@ -1,0 +1,167 @@
+"""The scene of a user's f(phi, p), g(phi, p): what a module of `survey.scenes` offers, as an object."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from survey import methods
+from survey.measures.cylinder import blocks, equation, orbit, solution
+from survey.measures.cylinder.fate import MOST_OF_PROGRAM
+from survey.measures.hill.multiprecision import Unsupported
+from survey.modules import load
+from survey.request.function_scene import FunctionScene
+from survey.request.hill_scene import is_number, reason
+from survey.scene import Option, Output, Parameter, Request, named
+from survey.scenes import gyrostat
+
+ON_A_LINE = ("trajectory", "abel")  # the questions without a period
+ON_A_CIRCLE = ("fate", "trajectory", "abel", "portrait")
+_PORTRAIT = {"question": ("portrait",)}
+# What the gyrostat's outputs are for any f and g: see `measures/cylinder/ends.py`.
+LONG_NAMES = {
+    "K": "K = -(1/pi) int g F dphi, F' = f, which decides the ends where f and g have mean 0",
+    "L": "L = int g F^2 dphi, which decides them where K = 0, too",
+    "stratum": "g = 0 (I0), f = 0 (I1), ends that nothing decides (I2), or none of them (G)",
+}
+OUTPUTS = (
+    *(replace(o, long_name=LONG_NAMES.get(o.name, o.long_name)) for o in gyrostat.OUTPUTS),
+    Output("mean_f", "mean of f, whose sign decides both ends", r"\bar f", when=_PORTRAIT),
+    Output("mean_g", "mean of g, which decides them where f has mean 0", r"\bar g", when=_PORTRAIT),
+)
+_BRANCH = next(option for option in gyrostat.OPTIONS if option.name == "branch")
+STATUS = gyrostat.STATUS | {
+    "invalid_parameters": "outside the domain, or f or g has no value there, or not the period 2 pi although PERIOD "
+    "says so",
+    "degenerate_equilibrium": "within rounding g = g' = 0 at an angle, or f = g = 0 at an equilibrium that is no "
+    "saddle, or there are more than 16 equilibria: the numbers of cycles are unknown, and may be those of equilibria",
+    "neutral_ends": "f = 0 or g = 0 throughout, or mean(f), mean(g), K and L vanish within rounding: nothing decides "
+    "the ends, nor fates",
+}
+TRIED = (0.25, -1.5, 2.5)  # angles at which f and g are tried as Python
+
+
+@dataclass(frozen=True, eq=False)
+class AbelScene(FunctionScene):
+    """What a scene's module offers (see `survey.scenes`), for a user's f and g; `about` is its docstring."""
+
+    f: Callable
+    g: Callable
+    period: float | None
+    own: tuple[Parameter, ...]
+    NAME: str
+    TEXT: str
+    HASH: str
+    TITLE: str
+    about: str
+    REFERENCES: tuple[str, ...]
+    FAMILY = "abel"
+    AUDIT = ("dop853",)
+    STATUS = STATUS
+    DIMENSIONS = gyrostat.DIMENSIONS | {"equilibrium": np.arange(1, MOST_OF_PROGRAM + 1)}
+
+    @property
+    def _questions(self):
+        return ON_A_LINE if self.period is None else ON_A_CIRCLE
+
+    @property
+    def OPTIONS(self):
+        return (Option("question", self._questions, "what is asked of the solution"), _BRANCH)
+
+    @property
+    def PARAMETERS(self):
+        starts = [p for p in gyrostat.PARAMETERS if p.name in ("phi0", "w0", "t", "phi")]
+        return (*self.own, *starts)
+
+    @property
+    def OUTPUTS(self):
+        return tuple(o for o in OUTPUTS if set(o.when.get("question", ())) & set(self._questions))
+
+    def cost(self, options, sizes):
+        """Seconds per point, roughly: one solution serves its dense outputs, one set of cycles all fates."""
+        if options["question"] == "portrait":
+            return 1.5e-2
+        if options["question"] == "fate":
+            return 3e-4 + 2e-2 / (sizes["phi0"] * sizes["w0"])
+        return 6e-5 / sizes.get("t", sizes.get("phi", 1)) + 4e-7
+
+    def solve(self, point, request):
+        """The requested outputs of a block (see `survey.scenes`)."""
+        method = load(methods, "taylor" if request.method == "auto" else request.method, "method")
+        question = request.options["question"]
+        names = tuple(p.name for p in self.own)
+        if question in ("fate", "portrait"):
+            measure = blocks.fates if question == "fate" else blocks.portraits
+            return measure(point, names, self._flows, method, request.rtol)
+        names = (*names, "phi0", "w0")
+        given, last, back = blocks.dense(point, names, {"trajectory": "t", "abel": "phi"}[question])
+        rows = solution.rows(self._flows(given[:, :-2]), given[:, -2], given[:, -1])
+        if question == "trajectory":
+            return blocks.trajectories(rows, last, back, solution, method, request.rtol)
+        before = request.options.get("branch") == "before"
+        return blocks.abel(rows, last, back, solution, method, request.rtol, before)
+
+    def why(self, answer):
+        """Why a point has its verdict (see `survey.scenes`)."""
+        if "mean_f" not in answer and not answer["verdict"].startswith("spin_up"):
+            return gyrostat.why(answer)
+        if "mean_f" not in answer:
+            return "the return maps leave no cycle or equilibrium on the way, and w grows: that end attracts"
+        return gyrostat.why(answer).replace(named(answer, "K"), named(answer, "mean_f"))
+
+    def trajectory(self, point, answer, options, time=None):
+        """The motion from `phi0`, `w0`, and some of its neighbours (see `survey.scenes`)."""
+        panels = orbit.ON_PLANE if self.period is None else orbit.ON_CYLINDER
+        request = Request({"question": "trajectory"}, rtol=1e-9)
+        names = [p.name for p in self.own]
+        return orbit.solve(lambda asked: self.solve(asked, request), self.OUTPUTS, names, point, time, panels)
+
+    def _flows(self, points):
+        """The programs of the parameters (N, n)."""
+        try:
+            return equation.flows(self.f, self.g, points, self.period is not None)
+        except Unsupported as error:
+            self._refuse(str(error), "f and g must be analytic in phi: + - * / ** and functions such as sin, exp, sqrt")
+        except equation.Raised as error:
+            self._refuse(f"{error}(phi, p) raises {error.__cause__!r}", "make it return nan there")
+
+    def check(self, points):
+        """Raise BadInput if f or g cannot be used, or contradicts PERIOD at these points (N, n)."""
+        for point in points if len(points) else np.ones((1, len(self.own))):
+            self._try(point)
+        if not len(points):
+            self._flows(np.ones((1, len(self.own))))
+            return
+        flows = self._flows(points)
+        lost = np.flatnonzero(np.isnan(flows[:, 0]))
+        if lost.size and self.period is not None and self._finite(points[lost[0]]):
+            self._refuse(
+                f"f or g has not the period 2 pi at {self._where(points[lost[0]])}, or a pole",
+                "correct it, or set PERIOD = None",
+            )
+        if lost.size == len(points):
+            self._refuse(f"f or g has no value at {self._where(points[0])}", "correct it, or the domains of PARAMETERS")
+
+    def _finite(self, point):
+        """Have f and g values at these parameters?"""
+        with np.errstate(all="ignore"):
+            return all(np.isfinite(float(h(phi, point))) for h in self._plain for phi in TRIED)
+
+    @property
+    def _plain(self):
+        return [getattr(h, "py_func", h) for h in (self.f, self.g)]
+
+    def _try(self, point):
+        """Raise BadInput unless f and g, run as Python, return a real number."""
+        for name, function in zip("fg", self._plain, strict=True):
+            try:
+                with np.errstate(all="ignore"):
+                    value = function(TRIED[0], point)
+            except (ArithmeticError, ValueError):
+                continue
+            except IndexError as error:
+                self._refuse_index(f"{name}(phi, p)", error)
+            except Exception as error:
+                self._refuse(f"{name}(phi, p) fails ({type(error).__name__}: {reason(error)})", "correct it")
+            if not is_number(value):
+                self._refuse(f"{name}(phi, p) returns {value!r}", "it must return a real number")

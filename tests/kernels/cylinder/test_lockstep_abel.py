@@ -1,0 +1,149 @@
+"""Abel solutions in lock step against order 20 one by one, closed forms and mpmath; bits whatever the lane."""
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+from survey.kernels.cylinder import lockstep, lockstep_abel, steps
+from survey.kernels.jit import fresh
+from survey.measures.cylinder import solution
+from survey.methods import closed, taylor
+
+MANY = lockstep.LANES + 3  # more rows than lanes
+
+
+@fresh
+def one_by_one(P, starts, targets, tolerance, limit, floats, status):
+    steps.abels(taylor.flow_setting, taylor.flow_begin, taylor.flow_at, P, starts, targets, tolerance, limit,
+                floats, status)  # fmt: skip
+
+
+def solved(rows, over, tolerance=1e-13, run=taylor.flow_abels, limit=solution.STEPS):
+    """floats and status of `run` at the same angles beyond phi0 for every row."""
+    rows = np.asarray(rows, float)
+    P, starts = solution.split(rows)
+    targets = rows[:, 6:7] + np.asarray(over, float)
+    floats, status = np.full((*targets.shape, 4), np.nan), np.full(targets.shape, 99)
+    run(P, starts, targets, tolerance, limit, floats, status)
+    return floats, status
+
+
+def drawn(count, seed, scale=(1, 1, 1, 1, 1, 1, 3, 1)):
+    rows = np.random.default_rng(seed).normal(size=(count, 8)) * scale
+    rows[:, 7] = np.abs(rows[:, 7])
+    return rows
+
+
+def agree(rows, over, tolerance=1e-13):
+    """Where both solve them, values agree within both bars; returns the share of answers, theirs and both's."""
+    mine, status = solved(rows, over, tolerance)
+    best, other = solved(rows, over, 1e-17, one_by_one)
+    good, theirs = ((codes == steps.OK) | (codes == steps.TURNING) for codes in (status, other))
+    same = good & theirs & (status == other)
+    # where one says that it turns and the other does not, the target lies within the bar of the turning point
+    differ = good & theirs & (status != other)
+    edge = np.where(status == steps.TURNING, mine[..., 2], best[..., 2])
+    turn = np.where(status == steps.TURNING, mine[..., 0], best[..., 0])
+    assert (np.abs(turn - (rows[:, 6:7] + np.asarray(over)))[differ] <= edge[differ]).all()
+    assert (np.abs(mine - best)[same][:, :2] <= mine[same][:, 2:] + best[same][:, 2:]).all()
+    return theirs.mean(), same.mean()
+
+
+@pytest.mark.parametrize("tolerance", [1e-11, 1e-13, 1e-16])
+def test_bars_hold_on_random_systems(tolerance):
+    theirs, both = agree(drawn(2000, 3), np.linspace(0.0, 9.0, 40), tolerance)
+    assert theirs > 0.9 and both > theirs - 0.01
+
+
+@pytest.mark.parametrize(
+    "scale",
+    [
+        (40, 40, 1, 1, 1, 1, 3, 1),  # stiff
+        (1, 1, 1, 1, 1, 1, 3, 300),  # fast
+        (0, 0, 9, 9, 9, 9, 3, 3),  # conserves H
+        (1, 1, 0, 0, 0, 0, 3, 1),  # g = 0
+        (1, 1, 1, 1, 1, 1, 1e6, 1),  # many turns from 0
+        (1e-9, 1e-9, 1e-9, 1e-9, 1e-9, 1e-9, 3, 1),
+        (1, 1, 1, 1, 1, 1, 3, 0),  # from rest
+        (0, 0, 0, 0, 0, 0, 3, 1),
+    ],
+)
+def test_bars_hold_on_hard_systems(scale):
+    theirs, both = agree(drawn(100, 4, scale), [0.0, 1e-9, 0.01, 1.0, 5.0, 30.0])
+    assert both > theirs - 0.02
+
+
+def test_every_angle_beside_a_turning_point():
+    """w^2 = 2 (cos phi - cos 1) for a pendulum: near phi = 1, w is a square root, and where it ends is known."""
+    row = [[0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 2.0 * np.sin(0.5)]]
+    places = np.concatenate([np.linspace(0.0, 1.0, 300), 1.0 + np.linspace(-1e-9, 1e-9, 201)])
+    places.sort()
+    floats, status = solved(row, places)
+    assert set(status[0]) == {steps.OK, steps.TURNING}
+    assert (status[0] == steps.OK)[places < 1.0 - 1e-11].all()
+    assert (status[0] == steps.TURNING)[places > 1.0 + 1e-11].all()
+    with mp.workdps(30):
+        # what the rounding of w0 moves: w^2 by 2 w0 dw
+        start = mp.mpf(row[0][7]) ** 2
+        for place, (value, _time, bar, _), code in zip(places, floats[0], status[0], strict=True):
+            square = start - 4 * mp.sin(mp.mpf(place) / 2) ** 2
+            if code == steps.OK:
+                assert abs(mp.sqrt(max(square, 0)) - mp.mpf(value)) <= bar
+            else:
+                assert abs(2 * mp.asin(mp.sqrt(start) / 2) - mp.mpf(value)) <= bar
+
+
+def test_closed_forms_of_g_0_lie_within_the_bars():
+    rows = drawn(300, 11, (1, 1, 0, 0, 0, 0, 3, 1))
+    over = np.linspace(0.0, 7.0, 50)
+    (mine, status), (exact, known) = solved(rows, over), solved(rows, over, run=closed.flow_abels)
+    both = (status == steps.OK) & (known == steps.OK)
+    assert both.mean() > 0.5
+    assert (np.abs(mine - exact)[both][:, :2] <= mine[both][:, 2:] + exact[both][:, 2:]).all()
+
+
+def test_the_same_bits_in_any_lane_beside_any_neighbour():
+    rows, over = drawn(3 * MANY, 5), np.linspace(0.0, 7.0, 30)
+    whole = solved(rows, over)
+    order = np.random.default_rng(6).permutation(len(rows))
+    for pick in (order, order[: MANY // 2], order[:1]):
+        for part, all_of_them in zip(solved(rows[pick], over), whole, strict=True):
+            assert np.array_equal(part, all_of_them[pick], equal_nan=True)
+
+
+def test_an_angle_is_served_alike_alone_and_among_others():
+    """Blocks hold the targets of a step: another target in the block changes no bit of this one."""
+    rows, over = drawn(MANY, 5, (1, 1, 1, 1, 1, 1, 3, 9)), np.linspace(0.0, 7.0, 400)
+    floats, status = solved(rows, over)
+    for k in (0, 1, 7, 123, 399):
+        alone = solved(rows, over[k : k + 1])
+        sure = status[:, k] == steps.OK
+        assert np.array_equal(alone[0][sure, 0], floats[sure, k]) and (alone[1][sure, 0] == steps.OK).all()
+
+
+@pytest.mark.parametrize("column", range(8))
+def test_a_row_of_nan_affects_itself_alone(column):
+    rows = drawn(MANY, 7)
+    good = solved(rows, [5.0])
+    rows[3, column] = np.nan
+    bad = solved(rows, [5.0])
+    assert bad[1][3, 0] not in (steps.OK, steps.TURNING)
+    for one, other in zip(good, bad, strict=True):
+        assert np.array_equal(np.delete(one, 3, axis=0), np.delete(other, 3, axis=0), equal_nan=True)
+
+
+def test_a_row_ends_at_its_first_infinity_and_a_budget_ends_it():
+    rows = drawn(MANY, 8, (1, 1, 1, 1, 1, 1, 3, 9))
+    rows[:, 7] += 5.0
+    floats, status = solved(rows, [2.0, np.inf, 3.0])
+    assert np.isfinite(floats[:, 0]).all() and np.isnan(floats[:, 1:]).all() and (status[:, 0] == steps.OK).all()
+    assert (solved(rows, [np.inf])[1] == 99).all()
+    assert (solved(rows, [1e5], limit=5)[1] == steps.STEP_LIMIT).all()
+
+
+def test_a_block_serves_more_angles_than_it_holds():
+    assert lockstep_abel.BLOCK < 1000
+    rows = drawn(3, 9, (0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 3, 1))
+    rows[:, 7] = 30.0
+    floats, status = solved(rows, np.linspace(0.0, 0.1, 1000))
+    assert (status == steps.OK).all() and (np.diff(floats[..., 1], axis=1) > 0).all()

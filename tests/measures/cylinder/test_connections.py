@@ -1,0 +1,107 @@
+"""Saddle connections: branches traced with mpmath miss each other to either side; cycles appear at homoclinic ones."""
+
+import mpmath as mp
+import numpy as np
+import pytest
+from flow_truth import series
+
+from survey.kernels.cylinder import connections as cn
+from survey.measures.cylinder import bifurcations, connections, curves
+from survey.measures.square import Square
+
+FIXED = {"b12": 0.7, "b31": -0.4, "c23": 0.3, "s3": -0.2}
+SQUARE = Square(np.array([-2.0, -4.0]), np.array([2.0, 4.0]), np.array([False, False]))
+PLANE = bifurcations.Plane(SQUARE, ("s2", "d"), FIXED)
+
+
+def of_system(six, system):
+    b12, b31, d, c23, s2, s3 = six
+    if system in (cn.REVERSED, cn.BOTH):
+        b12, b31 = -b12, -b31
+    if system in (cn.MIRRORED, cn.BOTH):
+        b31, c23, s2 = -b31, -c23, -s2
+    return b12, b31, d, c23, s2, s3
+
+
+def forces(six, x):
+    """f, g and their derivatives, at x."""
+    b12, b31, d, c23, s2, s3 = six
+    s, c, ds, dc = mp.sin(x), mp.cos(x), mp.sin(2 * x), mp.cos(2 * x)
+    f, df = b12 * c - b31 * s, -b12 * s - b31 * c
+    return f, df, -d * ds / 2 - c23 * dc + s2 * c - s3 * s, -d * dc + 2 * c23 * ds - s2 * s - s3 * c, (
+        2 * d * ds + 4 * c23 * dc - s2 * c + s3 * s
+    )  # fmt: skip
+
+
+def first_turn(six, row):
+    """The row of a branch as the kernel describes it, traced with mpmath; the kernel's row has the angles."""
+    new = row.copy()
+    new[: cn.PASSED + 1] = np.nan
+    saddle = mp.findroot(lambda x: forces(six, x)[2], mp.mpf(row[cn.FROM]))
+    columns = [mp.findroot(lambda x: forces(six, x)[2], mp.mpf(row[cn.FROM] + away)) for away in
+               row[cn.OFFSETS : cn.OFFSETS + int(row[cn.COLUMNS])]]  # fmt: skip
+    f, df, _, dg, ddg = forces(six, saddle)
+    a, x = (f + mp.sqrt(f * f + 4 * dg)) / 2, mp.mpf(10) ** -12
+    phi, w, k = saddle + x, a * x + (ddg / 2 + df * a) / (3 * a - f) * x * x, 0
+    while k < len(columns):
+        rows = series(six, phi, w, 30)
+        step = 1 / (10 * max(abs(r[-1]) ** (mp.mpf(1) / 30) for r in rows))
+        at = [lambda t, r=r: mp.polyval(r, t, asc=True) for r in rows]
+        turned = at[1](step) <= 0
+        if turned:
+            step = mp.findroot(at[1], (0, step), solver="anderson", tol=1e-60)
+        end = at[0](step)
+        while k < len(columns) and columns[k] <= end:
+            t = mp.findroot(lambda t, k=k, at=at: at[0](t) - columns[k], (0, step), solver="anderson", tol=1e-60)
+            new[2 * k], k = float(at[1](t)), k + 1
+        phi, w = end, at[1](step)
+        if turned:
+            new[cn.TURN], new[cn.PASSED] = float(end - saddle), k
+            break
+    return new
+
+
+def miss(connection, x):
+    out = connections._traced(PLANE, x[None], np.ones((4, 2)))[0]
+    s2, d = SQUARE.parameters(x)
+    six = [mp.mpf(v) for v in (0.7, -0.4, float(d), 0.3, float(s2), -0.2)]
+    rows = [first_turn(of_system(six, branch[0]), out[branch])[None] for branch in connection.branches]
+    return connection.miss(*rows)[0][0]
+
+
+@pytest.fixture(autouse=True)
+def coarse(monkeypatch):
+    monkeypatch.setattr(connections, "LINES", 41)
+    monkeypatch.setattr(bifurcations, "COUNTED", 2)
+
+
+def test_branches_miss_each_other_to_either_side():
+    kinds = set()
+    with mp.workdps(35):
+        for connection, x, error in connections.curves(PLANE):
+            if len(x) < 8 or (connection.miss.func, connection.kind) in kinds:
+                continue
+            kinds.add((connection.miss.func, connection.kind))
+            for i in (len(x) // 4, len(x) // 2):
+                assert error[i] < 1e-11
+                sides = [
+                    [miss(connection, x[i] + side * 1.01 * error[i] * axis) for side in (1, -1)] for axis in np.eye(2)
+                ]
+                assert any(one * two < 0 for one, two in sides)
+    assert len(kinds) == 4
+
+
+def test_a_cycle_is_born_in_a_homoclinic_connection():
+    square = Square(np.array([-2.0, -4.0]), np.array([0.2, 4.0]), np.array([False, False]))
+    found = curves.closed(square, ["s2", "d"], FIXED, {})
+    kinds = np.repeat(found.kind, found.count)
+    left, right = (found.along[name][0] for name in ("cycles_left", "cycles_right"))
+    names = "homoclinic", "supercritical_hopf", "subcritical_hopf"
+    known = np.isin(kinds, [curves.CLASSES[name] for name in names]) & np.isfinite(left) & np.isfinite(right)
+    assert known.sum() > 8
+    assert np.mean(abs(left - right)[known] == 1) > 0.9
+
+
+def test_without_friction_there_are_no_curves_of_connections():
+    plane = bifurcations.Plane(SQUARE, ("s2", "d"), FIXED | {"b12": 0.0, "b31": 0.0})
+    assert not list(connections.curves(plane))

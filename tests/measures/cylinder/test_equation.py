@@ -1,0 +1,200 @@
+"""A user's f and g as programs: their series and balls against mpmath, and solutions against series in 30 digits."""
+
+import math
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+from survey.kernels.cylinder import program as pg
+from survey.kernels.cylinder.steps import OK, TURNING
+from survey.measures.cylinder import equation, solution
+from survey.measures.hill.multiprecision import Unsupported
+from survey.methods import dop853, taylor
+
+RNG = np.random.default_rng(20)
+
+
+def everything(x, p):
+    """All operations and functions, within their domains for |x| < 2."""
+    y = math.sin(x) * p[0] - np.cos(2 * x) / (3 + x * x) + 2 ** (x / 3) + (2 + x**2) ** 1.3 - 1 / (x + 4) ** 3
+    y += math.atan(x) * math.asin(x / 3) + math.acos(x / 4) - math.tanh(x) * math.sinh(x) + math.cosh(x / 2)
+    y += math.asinh(x) + math.acosh(3 + x * x) + math.atanh(x / 5) + math.log(3 + x) * math.exp(-x) + math.erf(x)
+    return (
+        y + math.tan(x / 3) * math.sqrt(5 - x) + math.hypot(x, 2.0) + np.expm1(x) - np.log1p(x / 9) + (-x) ** 2 + p[1]
+    )
+
+
+def plain(x, p):
+    return -p[0] + 0.0 * x
+
+
+def truth(x, p, order):
+    """Taylor coefficients of `everything`, by mpmath."""
+    p = [mp.mpf(value) for value in p]
+
+    def f(x):
+        y = mp.sin(x) * p[0] - mp.cos(2 * x) / (3 + x * x) + 2 ** (x / 3) + (2 + x**2) ** mp.mpf(1.3) - 1 / (x + 4) ** 3
+        y += mp.atan(x) * mp.asin(x / 3) + mp.acos(x / 4) - mp.tanh(x) * mp.sinh(x) + mp.cosh(x / 2)
+        y += mp.asinh(x) + mp.acosh(3 + x * x) + mp.atanh(x / 5) + mp.log(3 + x) * mp.exp(-x) + mp.erf(x)
+        return y + mp.tan(x / 3) * mp.sqrt(5 - x) + mp.hypot(x, 2) + mp.exp(x) - 1 - mp.log(1 + x / 9) + x**2 + p[1]
+
+    return mp.taylor(f, mp.mpf(x), order)
+
+
+@pytest.mark.parametrize("x", [0.0, 0.3, -1.7, 1.9])
+def test_series_and_balls_hold_mpmaths(x):
+    p = (0.7, -1.3)
+    row = equation.program(everything, everything, p, False)
+    with mp.workdps(60):
+        wanted = truth(x, p, 8)
+        f, g = np.zeros(9), np.zeros(9)
+        pg.in_angle(row, x, f, g)
+        assert np.allclose(f, [float(c) for c in wanted], rtol=1e-12, atol=1e-12) and (f == g).all()
+        assert pg.values(row, x)[2] == pytest.approx(float(wanted[1]), rel=1e-12)
+        middle, radius = equation.balls(row, x)[int(row[pg.G_AT])]
+        assert abs(middle - wanted[0]) <= radius < 1e-13
+        out = np.zeros(4)
+        pg.bounds(row, x, 0.05, np.empty((int(row[pg.SLOTS]), 3, 2)), out)
+        for y in np.linspace(x - 0.05, x + 0.05, 5):
+            near = truth(y, p, 2)
+            assert max(abs(near[0]), abs(near[1])) <= out[0] and abs(near[0]) <= out[1]
+            assert abs(near[1]) <= out[2] and 2 * abs(near[2]) <= out[3] < 100
+
+
+def test_what_cancels_is_counted_as_rounding():
+    row = equation.program(plain, lambda x, p: (x + 1e8) - 1e8, (1.0,), False)
+    middle, radius = equation.balls(row, 0.1)[int(row[pg.G_AT])]
+    assert 1e-9 < abs(middle - 0.1) <= radius < 1e-7
+    out = np.zeros(4)
+    pg.bounds(row, 0.1, 0.01, np.empty((int(row[pg.SLOTS]), 3, 2)), out)
+    assert out[1] > 1e7  # the size of the terms
+
+
+def test_what_depends_on_the_parameters_alone_may_branch():
+    def g(x, p):
+        total = 0.0
+        for k in range(int(p[1])):
+            total = total + math.sin((k + 1) * x) / (k + 1)
+        return total if p[0] > 0 else -math.sin(x)
+
+    one, two = (equation.program(plain, g, point, True) for point in ((1.0, 3.0), (-1.0, 3.0)))
+    assert pg.values(one, 0.4)[1] == pytest.approx(sum(math.sin(k * 0.4) / k for k in (1, 2, 3)), rel=1e-15)
+    assert pg.values(two, 0.4)[1] == -math.sin(0.4)
+    assert one[pg.AT_REST] == 1.0  # g(0) = 0 exactly
+
+
+@pytest.mark.parametrize(
+    ("g", "words"),
+    [
+        (lambda x, p: abs(x), "abs"),
+        (lambda x, p: x if x > 0 else -x, "compares"),
+        (lambda x, p: x == 0, "compares"),
+        (lambda x, p: math.floor(x), "floor"),
+        (lambda x, p: np.interp(x, [0, 1], [0, 1]), "interp"),
+        (lambda x, p: [x], "returns list"),
+        (lambda x, p: max(x, 0.0), "compares"),
+        (lambda x, p: x % 2.0, "%"),
+    ],
+)
+def test_what_is_not_analytic_is_refused(g, words):
+    with pytest.raises(Unsupported, match=rf"g\(phi, p\): .*{words}"):
+        equation.program(plain, g, (1.0,), False)
+
+
+def test_periods_are_checked():
+    for g in (lambda x, p: math.sin(x) + 1e-12 * x, lambda x, p: math.sin(0.5 * x), lambda x, p: 1 / math.sin(x)):
+        assert np.isnan(equation.program(plain, g, (1.0,), True)).all()
+    assert np.isnan(equation.program(plain, lambda x, p: math.log(p[0]) + x, (-1.0,), False)).all()
+    assert np.isnan(equation.program(plain, lambda x, p: x / (p[0] - 1), (1.0,), False)).all()
+    peak = equation.program(plain, lambda x, p: 1 / (1.001 + math.cos(x)), (1.0,), True)
+    assert 1e6 < peak[pg.BOUND_G] < 5e6  # roundoffs of 1.001 + cos, 10^6 times as large beside the peak
+
+
+def lienard(x, p):
+    """f = p0 + p1 x^2 + p2 cos x."""
+    return p[0] + p[1] * x * x + p[2] * math.cos(x)
+
+
+def force(x, p):
+    """g = p3 + p4 x + p5 x^3 + p6 sin x."""
+    return p[3] + p[4] * x + p[5] * x**3 + p[6] * math.sin(x)
+
+
+def exactly(p, phi, w, t, digits=24):
+    """phi and w of the Lienard equation at t, in many digits."""
+    with mp.workdps(digits + 8):
+        p, phi, w, left = [mp.mpf(value) for value in p], mp.mpf(phi), mp.mpf(w), mp.mpf(t)
+        while left:
+            x, v, s, c, square = [phi], [w], [mp.sin(phi)], [mp.cos(phi)], [phi * phi]
+            for n in range(digits):
+                f = [p[1] * q + p[2] * y for q, y in zip(square, c, strict=True)]
+                f[0] += p[0]
+                cube = mp.fdot(square, x[::-1])
+                g = p[4] * x[n] + p[5] * cube + p[6] * s[n] + (p[3] if n == 0 else 0)
+                sine, cosine = mp.fdot(c, v[::-1]) / (n + 1), -mp.fdot(s, v[::-1]) / (n + 1)
+                x.append(v[n] / (n + 1))
+                v.append((mp.fdot(f, v[::-1]) + g) / (n + 1))
+                s.append(sine)
+                c.append(cosine)
+                square.append(mp.fdot(x, x[::-1]))
+            largest = max(abs(row[k]) ** (mp.mpf(1) / k) for row in (x, v) for k in (digits - 1, digits))
+            step = mp.sign(left) * min(abs(left), 1 / (12 * largest))
+            phi, w = (mp.fdot(row, [step**n for n in range(digits + 1)]) for row in (x, v))
+            left -= step
+        return phi, w
+
+
+def hard_point(i):
+    """Parameters, start and time: van der Pol, Lienard, Duffing, the pendulum with torque; stiff ones among them."""
+    p = [*RNG.normal(size=3), *RNG.normal(size=4)]
+    if i % 4 == 0:
+        mu = 10.0 ** RNG.uniform(-1, 1.3)
+        p = [mu, -mu, 0.0, 0.0, -1.0, 0.0, 0.0]
+    elif i % 4 == 1:
+        p[1], p[5] = -abs(p[1]), -abs(p[5])
+    elif i % 4 == 2:
+        p[:3], p[5] = [0.3 * p[0], 0.0, 0.0], -1.0
+    else:
+        p[1] = p[2] = p[4] = p[5] = 0.0
+    return p, RNG.normal() * 2, RNG.normal() * 2 * (i % 5 > 0), RNG.uniform(0.2, 8.0)
+
+
+@pytest.mark.parametrize("method", [taylor, dop853], ids=["taylor", "dop853"])
+def test_trajectories_lie_within_their_bars(method):
+    wide = answered = 0
+    for i in range(24):
+        p, phi, w, t = hard_point(i)
+        rows = solution.rows(equation.program(lienard, force, tuple(p), False)[None], [phi], [w])
+        floats, _turnings, status = solution.trajectories(method, rows, np.array([[0.5 * t, t, -0.1 * t]]), 1e-10)
+        for row, code, at in zip(floats[0], status[0], (0.5 * t, t, -0.1 * t), strict=True):
+            if code != OK:
+                continue
+            answered += 1
+            wanted = exactly(p, phi, w, at)
+            errors = [abs(float(row[k] - wanted[k])) for k in (0, 1)]
+            assert errors[0] <= row[2] and errors[1] <= row[3], (p, phi, w, at)
+            wide += row[2] > 1e-9 * (1 + abs(row[0]))
+    assert answered >= 55 and wide <= 0.1 * answered
+
+
+def test_angles_agree_with_times_also_near_turning_points():
+    checked = 0
+    for i in range(40):
+        p, phi, w, t = hard_point(i)
+        phi2, w2 = map(float, exactly(p, phi, w, 0.3 * t))
+        rows = solution.rows(equation.program(lienard, force, tuple(p), False)[None], [phi], [w])
+        floats, status = solution.abel(taylor, rows, np.array([[phi2]]), 1e-10)
+        value, time, value_bar, time_bar = floats[0, 0]
+        if status[0, 0] == OK and abs(time - 0.3 * t) < 1e-3:  # not at a passage before
+            back = exactly(p, phi, w, time)
+            slope = abs(lienard(phi2, p) + force(phi2, p) / w2) if w2 else np.inf
+            doubt = 1e-15 * (1 + abs(phi2)) * slope
+            assert abs(value - w2) <= value_bar + doubt and abs(time - 0.3 * t) <= time_bar + 2e-16 * abs(phi2 / w2)
+            assert abs(float(back[0]) - phi2) <= time_bar * (abs(w2) + value_bar) * 1.1 + 1e-15 * (1 + abs(phi2))
+            checked += 1
+        elif status[0, 0] == TURNING:
+            turned = exactly(p, phi, w, time)
+            assert abs(turned[0] - value) <= value_bar + 1e-15 and abs(turned[1]) < 1e-7
+            checked += 1
+    assert checked >= 20

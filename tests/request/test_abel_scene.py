@@ -1,0 +1,145 @@
+"""A user's own Abel equation goes through every command like a built-in scene; what is wrong is said in one line."""
+
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import survey
+from survey.errors import BadInput
+from survey.request import user_scene
+
+SCENE = '''"""Van der Pol's oscillator of my own.
+
+phi'' = mu (1 - phi^2) phi' - phi."""
+
+PARAMETERS = ("mu",)
+
+
+def f(phi, p):
+    return p[0] * (1 - phi * phi)
+
+
+def g(phi, p):
+    return -phi
+'''
+WORKFLOW = """
+scene = "mine.py"
+[options]
+question = "trajectory"
+[axes]
+mu = { start = 0.2, stop = 3.0, num = 6 }
+t = { start = -1.0, stop = 6.0, num = 8 }
+phi0 = 2.0
+[output]
+figures = ["phi"]
+"""
+
+
+def f(phi, p):
+    return p[0] * (1 - phi**2)
+
+
+def g(phi, p):
+    return -phi
+
+
+def scene(f=f, g=g, **given):
+    return survey.abel(f, g, **({"parameters": "mu"} | given))
+
+
+def test_every_command_takes_it(program, tmp_path, monkeypatch):
+    (tmp_path / "mine.py").write_text(SCENE)
+    (tmp_path / "mine.toml").write_text(WORKFLOW)
+    monkeypatch.chdir(tmp_path)
+    run = program("run", "mine.toml", "-o", "mine.nc", "--workers", "1")
+    assert run.returncode == 0, run.stderr
+    assert (tmp_path / "mine.png").exists()
+    for words in (("plan", "mine.toml"), ("info", "mine.nc"), ("verify", "mine.nc"), ("plot", "mine.nc")):
+        done = program(*words)
+        assert done.returncode == 0, done.stderr
+    assert "Van der Pol's oscillator of my own" in program("scenes", "mine.py").stdout
+    ds = survey.open("mine.nc")
+    assert ds.attrs["scene_text"] == SCENE and ds.attrs["title"] == "Van der Pol's oscillator of my own"
+    same = survey.evaluate(scene(), mu=ds.mu.values, phi0=2.0, t=ds.t.values, question="trajectory")
+    assert (ds.phi.values == same.phi.values).all() and (ds.status == 0).all()
+    motion = ds.survey.trajectory(mu=ds.mu.values[2], t=0.0, time=5.0)
+    assert motion.phi.shape == motion.t.shape
+    (tmp_path / "mine.py").write_text(SCENE + "\n")
+    changed = program("verify", "mine.nc")
+    assert changed.returncode == 2 and "its file has changed since" in changed.stderr
+
+
+def test_the_hash_tells_of_all_that_the_functions_depend_on():
+    first = scene().HASH
+    assert scene().HASH == first
+    others = [scene(g=lambda phi, p: -2 * phi), scene(f=lambda phi, p: -p[0]), scene(parameters="nu")]
+    assert len({first, *(other.HASH for other in others)}) == 4
+    swapped = scene(g, f)
+    assert swapped.HASH != first
+
+
+def test_functions_from_python_run_in_other_processes(tmp_path):
+    given = {"scene": scene(), "axes": {"mu": {"values": [0.5, 1.0]}, "phi0": 2.0, "phi": {"values": [0.0, 1.0]}}}
+    given["options"] = {"question": "abel"}
+    one = survey.run(given, output=tmp_path / "one.nc")
+    two = survey.run(given, output=tmp_path / "two.nc", workers=1)
+    xr.testing.assert_equal(one.drop_attrs(), two.drop_attrs())
+    assert user_scene.of_dataset(one).HASH == one.attrs["scene_hash"]
+
+
+def test_one_solution_serves_all_times_with_the_same_bits():
+    t = np.array([3.0, -1.0, 0.5])
+    whole = survey.evaluate(scene(), mu=[0.5, 2.0], phi0=[1.0, 2.0, 3.0], w0=0.3, t=t, question="trajectory")
+    for i, time in enumerate(t):
+        one = survey.evaluate(scene(), mu=0.5, phi0=2.0, w0=0.3, t=float(time), question="trajectory")
+        for name in ("phi", "w", "phi_error", "turnings"):
+            assert one[name] == whole[name][0, 1, i]
+
+
+def test_a_point_without_a_value_costs_itself_alone():
+    own = scene(lambda phi, p: math.log(p[0]), g)
+    ds = survey.evaluate(own, mu=[1.0, -1.0, 2.0, np.nan], phi0=2.0, t=1.0, question="trajectory")
+    assert ds.status.values.tolist() == [0, 1, 0, 1] and np.isnan(ds.phi.values).tolist() == [False, True, False, True]
+
+
+def bad(phi, p):
+    raise RuntimeError("no")
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"f": 1.0}, "f must be a function of two arguments"),
+        ({"g": lambda phi: 0.0}, "g must be a function of two arguments"),
+        ({"parameters": ()}, "give at least one name"),
+        ({"parameters": ("phi0",)}, "neither an output"),
+        ({"parameters": ("w",)}, "neither an output"),
+        ({"period": 3.0}, "it must be 2 pi"),
+        ({"period": True}, "it must be 2 pi"),
+    ],
+)
+def test_wrong_scenes_are_one_line(given, words):
+    with pytest.raises(BadInput, match=words) as refusal:
+        scene(**given)
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"f": bad}, r"f\(phi, p\) fails \(RuntimeError: no\)"),
+        ({"g": lambda phi, p: p[3]}, r"g\(phi, p\) indexes beyond an array.*p\[0\] to p\[0\]"),
+        ({"g": lambda phi, p: p["mu"]}, "write p"),
+        ({"g": lambda phi, p: [phi]}, r"g\(phi, p\) returns \[0.25\]"),
+        ({"g": lambda phi, p: abs(phi)}, r"g\(phi, p\): it takes abs.*must be analytic"),
+        ({"f": lambda phi, p: 1.0 if phi > 0 else -1.0}, r"f\(phi, p\): it compares phi"),
+        ({"f": lambda phi, p: math.log(-p[0])}, "has no value at mu = 1"),
+        ({"period": 2 * math.pi}, "has not the period 2 pi at mu = 1, or a pole"),
+    ],
+)
+def test_wrong_functions_are_one_line(given, words):
+    with pytest.raises(BadInput, match=words) as refusal:
+        survey.evaluate(scene(**given), mu=1.0, phi0=2.0, t=1.0, question="trajectory")
+    assert "\n" not in str(refusal.value)
