@@ -5,6 +5,7 @@
     ds = survey.evaluate("satellite", k=0.5, rho=1.2)            # some points -> dataset
     survey.evaluate(survey.hill(z, ...), a=1.0)                  # your own Hill equation y'' + z(u, p) y = 0
     survey.evaluate(survey.abel(f, g, ...), t=1.0)               # your own Abel equation w w' = f(phi, p) w + g(phi, p)
+    survey.evaluate(survey.floquet(A, ...), p=1.0)               # your own linear periodic system x' = A(t, p) x
     survey.scenes()                                              # the scenes and what they answer
     ds = survey.open("results/satellite_prolate.nc")             # open and check a file
 
@@ -17,7 +18,7 @@ import sys
 from importlib import import_module
 
 _HOME = {"run": "survey.api", "evaluate": "survey.api", "open": "survey.api", "hill": "survey.request.user_scene"}
-_HOME["abel"] = "survey.request.user_scene"
+_HOME |= {"abel": "survey.request.user_scene", "floquet": "survey.request.user_scene"}
 _HOME |= {
     "SurveyError": "survey.errors",
     "BadInput": "survey.errors",

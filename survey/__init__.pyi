@@ -9,4 +9,5 @@ from survey.errors import Damaged as Damaged
 from survey.errors import Stopped as Stopped
 from survey.errors import SurveyError as SurveyError
 from survey.request.user_scene import abel as abel
+from survey.request.user_scene import floquet as floquet
 from survey.request.user_scene import hill as hill

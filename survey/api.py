@@ -18,9 +18,8 @@ from survey.file import disk, reading, schema
 from survey.file.labels import count, counts, describe, flag_codes, layout, percent
 from survey.grid import Grid, lines
 from survey.request import trust, user_scene
-from survey.request.abel_scene import AbelScene
 from survey.request.checks import check_options, check_parameters, check_request, methods_of
-from survey.request.hill_scene import HillScene, is_number
+from survey.request.hill_scene import is_number
 from survey.request.workflow import check, read
 from survey.scene import Option, Output, Parameter, Request, condition, exists
 from survey.sweep import engine, solve
@@ -39,8 +38,8 @@ def run(
 
     Parameters
     ----------
-    workflow : path of a workflow file, or a mapping with the same tables (its scene may be what `survey.hill` or
-        `survey.abel` returns).
+    workflow : path of a workflow file, or a mapping with the same tables (its scene may be what `survey.hill`,
+        `survey.abel` or `survey.floquet` returns).
     output : path of the netCDF file, instead of the workflow's.
     workers : number of worker processes; by default threads of this process.
     scheduler : address or scheduler file of a dask.distributed cluster.
@@ -89,7 +88,7 @@ def draw(ds: xr.Dataset, workflow: Any) -> list[Path]:
 
 
 def evaluate(
-    scene: str | os.PathLike[str] | HillScene | AbelScene,
+    scene: str | os.PathLike[str] | user_scene.OwnScene,
     *,
     method: str = "auto",
     rtol: float = 1e-10,
@@ -101,8 +100,8 @@ def evaluate(
     Parameters
     ----------
     scene : name of a scene, such as "satellite" (`survey.scenes()` lists them, `survey scenes NAME` explains one); the
-        path of a file with your own Hill or Abel equation (see `survey/request/user_scene.py`); or what `survey.hill`
-        or `survey.abel` returns.
+        path of a file with your own equation (see `survey/request/user_scene.py`); or what `survey.hill`, `survey.abel`
+        or `survey.floquet` returns.
     method : "auto" or the name of a method.
     rtol : requested accuracy, |error| <= rtol (1 + |value|); the `X_error` variables hold the error bounds reached.
     variables : names of the requested outputs; all by default. Errors and status are always included.

@@ -76,7 +76,8 @@ class Output:
     """A result per point. A float comes with `NAME_error`; one with `flags` is an int8 code, else an int32 count.
 
     `applies` states when the output applies; where it does not, a float is NaN and an integer is `fill`.
-    `dims` names extra (padded) dimensions, whose coordinates are the scene's `DIMENSIONS`.
+    `dims` names extra (padded) dimensions, whose coordinates are the scene's `DIMENSIONS`. One that is `on_request` is
+    given only if it is named.
     """
 
     name: str
@@ -89,6 +90,7 @@ class Output:
     applies: str = ""
     when: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     dims: tuple[str, ...] = ()
+    on_request: bool = False
 
     @property
     def dtype(self) -> np.dtype[Any]:

@@ -28,6 +28,7 @@ from survey.kernels.cylinder.flow import (
     series,
     values,
 )
+from survey.kernels.floquet import runge_kutta
 from survey.kernels.hill.matrix import rounding
 from survey.kernels.jit import inline, kernel
 from survey.kernels.lanes import column, relative
@@ -37,9 +38,9 @@ from survey.kernels.math.dop853 import E3, E5, STAGES, A, B, C, combined
 from survey.kernels.math.runge_kutta import fundamental
 
 ORDER = 8
-SERVES = ("abel", "body", "cylinder", "danby", "hill")
+SERVES = ("abel", "body", "cylinder", "danby", "floquet", "hill")
 # time, relative to the default of each family
-COST = {"abel": 20.0, "body": 60.0, "cylinder": 60.0, "danby": 2500.0, "hill": 80.0}
+COST = {"abel": 20.0, "body": 60.0, "cylinder": 60.0, "danby": 2500.0, "floquet": 10.0, "hill": 80.0}
 FLOW_FINEST = 1e-16  # useful tolerance for flows on the cylinder
 FLOW_WORK = 4  # steps, relative to the Taylor method
 _FIRST = LOW + 1  # stages lie in the lines of the table after the low series
@@ -52,6 +53,14 @@ _LONGEST = 2.0
 _STEP_LIMIT = 200_000
 _DOUBT = 0.01
 _OTHER = 0.3
+
+
+floquet_factors = runge_kutta.factors
+
+
+def floquet_reach(rtol):
+    """How far the norm of A times half a step may go for accuracy rtol."""
+    return 0.5 * (1e4 * max(rtol, 1e-13)) ** (1 / (ORDER + 1))
 
 
 @inline

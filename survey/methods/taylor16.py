@@ -4,14 +4,18 @@ On a step z is replaced by its projection on the Legendre polynomials of degree 
 solutions see that error only through their own components of degree >= 10. With x in [-1, 1] the series
 a (even start: a = 1, a' = 0) to x^16 and b (b = 0, b' = 1) to x^17 give Y(+h/2) and Y(-h/2), and
 P = Y(+h/2) Y(-h/2)^-1 has a local error of h^17. Domain: any z smooth on the scale of a step; best up to 1e-13.
+Linear systems of n states likewise, from the power series of A (`kernels/floquet/steps.py`).
 
 Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, I.8 (Taylor series) and
 II.7 (why Gauss points give twice the order).
 """
 
+import math
+
 import numpy as np
 from numpy.polynomial import legendre
 
+from survey.kernels.floquet import steps
 from survey.kernels.jit import kernel, splice
 from survey.kernels.lanes import chain, scatter
 from survey.kernels.libration import danby
@@ -19,7 +23,7 @@ from survey.kernels.libration.danby import COLUMN, COLUMNS, D1, D2, OWN, TILE, E
 from survey.kernels.unroll import largest, unroll
 
 ORDER = 16
-SERVES = ("danby", "hill")
+SERVES = ("danby", "floquet", "hill")
 COST = {"danby": 10.0}  # time, relative to the default of each family
 
 _DEGREE = 9
@@ -39,6 +43,14 @@ _TAIL, _SIZE, _ALIAS = _DEGREE + 1, _DEGREE + 2, _DEGREE + 3
 _SLOWEST = 0.02  # a faster fall than this of two Legendre coefficients to the next two is not trusted
 _ROUNDING = 4.4e-16  # of an entry of one step, about four roundings
 _ENDS = OWN + WIDTH
+
+
+floquet_factors = steps.factors
+
+
+def floquet_reach(rtol):
+    """How far the norm of A times half a step may go for accuracy rtol; bounds of what is missing are far larger."""
+    return (1e-5 * max(rtol, 1e-14) * math.factorial(ORDER + 1)) ** (1 / (ORDER + 1))
 
 
 def hill_density(rtol):

@@ -82,11 +82,13 @@ def check_request(scene, options, method, rtol, variables, tables=("", "")):
     _check_method(scene, options, method, tables[0])
     if isinstance(rtol, bool) or not isinstance(rtol, Real) or not 0 < rtol < 1:
         raise BadInput(f"{tables[0]}rtol = {shown(rtol)}: it must lie between 0 and 1, such as 1e-10")
-    outputs = [output.name for output in scene.OUTPUTS if exists(output, options)]
+    existing = [output for output in scene.OUTPUTS if exists(output, options)]
+    outputs = [output.name for output in existing]
     for variable in variables or ():
         if not isinstance(variable, str) or variable not in outputs:
             raise BadInput(f"{tables[1]}variables: {modules.unknown('variable', variable, outputs)}")
-    return Request(options, method, float(rtol), frozenset(outputs if variables is None else variables))
+    wanted = [output.name for output in existing if not output.on_request] if variables is None else variables
+    return Request(options, method, float(rtol), frozenset(wanted))
 
 
 def _check_method(scene, options, method, table):

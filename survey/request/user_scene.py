@@ -14,7 +14,18 @@ that of an Abel equation w w' = f(phi, p) w + g(phi, p), or phi' = w, w' = f(phi
     PARAMETERS              as above
     PERIOD                  2 pi, if f and g have that period, which is checked; None by default
 
-and both optionally a docstring, TITLE and REFERENCES. It is executed like any Python file: use only files that you
+that of a linear periodic system x' = A(t, p) x, or M q'' + C q' + K q = 0,
+
+    A(t, p, out)    a function that fills the n x n matrix out, which holds zeros, at the time t; p as above
+    K(t, p, out)    instead of A: fills the m x m stiffness matrix, and so do M (the identity if not given) and C (0)
+    STATES          the names of the n states, or of the m coordinates q, to which their velocities are added
+    PARAMETERS      as above
+    PERIOD          T, a number or a function of p
+    STRUCTURE       "none" by default; "symplectic": J A is symmetric, J = (0 1; -1 0), the states being coordinates,
+                    then momenta (with K: M q' + C q / 2); "reversible": R A(-t) R = -A(t) with signs R. It is checked
+    BREAKS          times in [0, T] at which A jumps or has a kink: number(s), or a function of p; none by default
+
+and all optionally a docstring, TITLE and REFERENCES. It is executed like any Python file: use only files that you
 trust. A file that is named only by a survey runs if this user has run it here before, or allows it (see `trust.py`).
 Changes in what it imports are not noticed when a run is resumed. z is continued with period T. [boundaries] and
 [refine] assume that z is analytic in the parameters.
@@ -22,6 +33,10 @@ Changes in what it imports are not noticed when a run is resumed. z is continued
 z is known by samples. Every point has one at least every T/128 (T/256 if EVEN), stored as `z_resolved_width`; at the
 ends and middles of the axes there is one every T/16384 (T/32768), and a spike that only these show is refused. Features
 narrower than both may go unseen; near BREAKS the samples are as dense as necessary.
+
+A (or M, C, K) is run once, as Python, to record its operations on t and p; the record gives the power series of A in
+every step, for all points, and bounds of the rounding. Branches are followed as the code takes them: points that take
+others are recorded on their own. What depends on t must be analytic between BREAKS.
 
 f and g are run once at every set of parameters, as Python, to record their operations on phi; the record gives their
 Taylor series, bounds of them and of their rounding. So what depends on phi must be analytic: + - * / ** and functions
@@ -50,9 +65,11 @@ import numpy as np
 import numpy.typing as npt
 
 from survey.errors import BadInput, Untrusted
+from survey.measures.floquet import stability
 from survey.measures.hill import monodromy
 from survey.request import trust
 from survey.request.abel_scene import AbelScene
+from survey.request.floquet_scene import LARGEST, FloquetScene
 from survey.request.hill_scene import SAME, HillScene, is_number, reason
 from survey.scene import Parameter
 from survey.scenes import gyrostat, load
@@ -62,6 +79,7 @@ EXAMPLES = {
     "f": "def f(phi, p): return -p[0]",
     "g": "def g(phi, p): return p[1] - sin(phi)",
     "z": "def z(u, p): return p[0] + p[1] * cos(2 * u)",
+    "STATES": 'STATES = ("x", "v"), the names of the states',
     "PERIOD": "PERIOD = 3.14 (its length in u), or a function of p",
     "PARAMETERS": 'PARAMETERS = ("a", "b"), the names of p[0], p[1]',
 }
@@ -71,7 +89,11 @@ REFERENCES = ("W. Magnus, S. Winkler, Hill's Equation, Interscience 1966",)
 ABEL_REFERENCES = (
     "A. D. Polyanin, V. F. Zaitsev, Handbook of Exact Solutions for Ordinary Differential Equations, 2003",
 )
-OWN = (HillScene, AbelScene)
+FLOQUET_REFERENCES = (
+    "V. A. Yakubovich, V. M. Starzhinskii, Linear Differential Equations with Periodic Coefficients, 1975",
+)
+OWN = (HillScene, AbelScene, FloquetScene)
+OwnScene = HillScene | AbelScene | FloquetScene
 
 
 def hill(
@@ -155,6 +177,60 @@ def abel(
     return scene
 
 
+def floquet(
+    A: Callable[[Any, Any, Any], Any] | None = None,
+    *,
+    period: float | Callable[[Any], float],
+    parameters: str | Parameter | Iterable[str | Parameter],
+    states: str | Iterable[str],
+    structure: str = "none",
+    breaks: npt.ArrayLike | Callable[[Any], npt.ArrayLike] = (),
+    M: Callable[[Any, Any, Any], Any] | None = None,
+    C: Callable[[Any, Any, Any], Any] | None = None,
+    K: Callable[[Any, Any, Any], Any] | None = None,
+    title: str | None = None,
+) -> FloquetScene:
+    """The scene of x' = A(t, p) x, or of M q'' + C q' + K q = 0, for `survey.evaluate` and `survey.run`.
+
+    Parameters
+    ----------
+    A : function of t, p and out, plain Python or numba's: fills the n x n matrix out, which holds zeros; p is the
+        float64 array of the parameters, in order. What depends on t must be analytic between `breaks`.
+    period : T, a number or a function of p.
+    parameters : their names, or `survey.scene.Parameter`s.
+    states : names of the n states x, or of the coordinates q.
+    structure : "none"; "symplectic" if J A is symmetric, the states being coordinates, then momenta; "reversible" if
+        R A(-t) R = -A(t) with a diagonal matrix R of signs. It is checked, and allows verdicts on the unit circle.
+    breaks : where A or a derivative jumps, in [0, T]: number(s), or a function of p.
+    M, C, K : instead of A, functions that fill the matrices of mass (default: the identity), damping with gyroscopic
+        terms (default: 0) and stiffness; the states are then q and q', or, if symplectic, q and M q' + C q / 2.
+
+    Raises survey.BadInput with one line that names what is wrong.
+
+    Examples
+    --------
+    >>> import math, survey
+    >>> def K(t, p, out):
+    ...     out[0, 0] = p[0] + p[1] * math.cos(2 * t)
+    >>> def C(t, p, out):
+    ...     out[0, 0] = 2 * p[2]
+    >>> mathieu = survey.floquet(K=K, C=C, period=math.pi, parameters=("delta", "epsilon", "zeta"), states="x")
+    >>> int(survey.evaluate(mathieu, delta=1.0, epsilon=0.3, zeta=0.2).verdict)
+    1
+    """
+    given = {name: function for name, function in (("A", A), ("M", M), ("C", C), ("K", K)) if function is not None}
+    first = getattr(given.get("A", given.get("K")), "py_func", given.get("A", given.get("K")))
+    name = f"floquet({', '.join(getattr(h, '__name__', name).strip('<>') for name, h in given.items())})"
+    try:
+        text = "\n".join(dict.fromkeys(inspect.getsource(getattr(h, "py_func", h)) for h in given.values()))
+    except (OSError, TypeError):
+        text = ""
+    about = inspect.getdoc(first) if first is not None else None
+    scene = _floquet(given, period, parameters, states, structure, breaks, name, text, title, about, ())
+    _made[scene.HASH] = scene
+    return scene
+
+
 def find(scene: Any, near: str | Path | None = None) -> tuple[str, Any]:
     """(name, scene) for a scene's name, a file `*.py` (relative to this folder, or else `near`), or an own scene."""
     if isinstance(scene, OWN):
@@ -201,11 +277,11 @@ def of_dataset(ds: Any) -> Any:
         return _made[digest]
     raise BadInput(
         f"scene = {name!r} was a function in Python: points cannot be solved again without it; "
-        "pass it to survey.hill or survey.abel again first"
+        "pass it to survey.hill, survey.abel or survey.floquet again first"
     )
 
 
-def _from_file(name: str, digest: Any, near: Path) -> HillScene | AbelScene:
+def _from_file(name: str, digest: Any, near: Path) -> OwnScene:
     """The scene in the file that a dataset names; none of it runs before its hash is compared and trusted."""
     try:
         path, text = _read(name, near)
@@ -245,7 +321,7 @@ def _read(name: str | os.PathLike[str], near: str | Path | None) -> tuple[Path, 
 
 
 @lru_cache(maxsize=32)
-def _from_text(name: str, text: str) -> HillScene | AbelScene:
+def _from_text(name: str, text: str) -> OwnScene:
     """The scene in the text of a file."""
     module = ModuleType(Path(name).stem)
     module.__file__ = name
@@ -254,13 +330,21 @@ def _from_text(name: str, text: str) -> HillScene | AbelScene:
     except Exception as error:
         raise BadInput(f"{name}: the scene file failed to run ({type(error).__name__}: {reason(error)})") from None
     is_abel = hasattr(module, "f") and hasattr(module, "g") and not hasattr(module, "z")
-    for needed in ("f", "g", "PARAMETERS") if is_abel else ("z", "PERIOD", "PARAMETERS"):
+    matrices = {name: getattr(module, name) for name in "AMCK" if callable(getattr(module, name, None))}
+    is_floquet = bool(matrices.keys() & {"A", "K"}) and not hasattr(module, "z") and not is_abel
+    needs = ("STATES", "PERIOD", "PARAMETERS") if is_floquet else ("z", "PERIOD", "PARAMETERS")
+    for needed in ("f", "g", "PARAMETERS") if is_abel else needs:
         if not hasattr(module, needed):
             raise BadInput(f"{name}: {needed} is missing; write {EXAMPLES[needed]}")
     title, references = getattr(module, "TITLE", None), getattr(module, "REFERENCES", ())
     if is_abel:
         about, period = module.__doc__ or inspect.getdoc(module.f), getattr(module, "PERIOD", None)
         return _abel(module.f, module.g, period, module.PARAMETERS, name, text, title, about, references)
+    if is_floquet:
+        about = module.__doc__ or inspect.getdoc(matrices.get("A", matrices.get("K")))
+        more = getattr(module, "STRUCTURE", "none"), getattr(module, "BREAKS", ())
+        given = module.PERIOD, module.PARAMETERS, module.STATES, *more
+        return _floquet(matrices, *given, name, text, title, about, references)
     optional = getattr(module, "EVEN", False), getattr(module, "BREAKS", ())
     about = module.__doc__ or inspect.getdoc(getattr(module.z, "py_func", module.z))
     return _hill(module.z, module.PERIOD, module.PARAMETERS, *optional, name, text, title, about, references)
@@ -283,14 +367,7 @@ def _hill(
         refuse(f"EVEN = {even!r}: it must be True or False")
     if not callable(period) and not (is_number(period) and 0 < period < np.inf):
         refuse(f"PERIOD = {period!r}: it must be a positive number, or a function of p that returns one")
-    if not callable(breaks):
-        try:
-            breaks = tuple(float(u) for u in np.atleast_1d(breaks))
-        except (TypeError, ValueError):
-            refuse(f"BREAKS = {breaks!r}: it must be number(s) in [0, PERIOD], or a function of p that returns them")
-        outside = [b for b in breaks if not 0 <= b <= (np.inf if callable(period) else period * (1 + SAME))]
-        if outside:
-            refuse(f"BREAKS: {outside[0]:g} lies outside 0 <= u <= T; name positions within one period")
+    breaks = _checked_breaks(breaks, period, refuse)
     about = inspect.cleandoc(about or f"y'' + z(u, p) y = 0, p = ({', '.join(names)}).")
     bits = text.encode() if name.endswith(".py") else _bits((z, period, breaks, parameters, even))
     return HillScene(
@@ -325,6 +402,60 @@ def _abel(
         TITLE=title or about.splitlines()[0].rstrip("."), about=about,
         REFERENCES=tuple(references) or ABEL_REFERENCES,
     )  # fmt: skip
+
+
+def _floquet(
+    matrices: dict[str, Any], period: Any, parameters: Any, states: Any, structure: Any, breaks: Any,
+    name: str, text: str, title: str | None, about: str | None, references: Iterable[str],
+) -> FloquetScene:  # fmt: skip
+    """The checked scene; raises BadInput."""
+
+    def refuse(message: str) -> NoReturn:
+        raise BadInput(f"{name}: {message}")
+
+    if ("A" in matrices) == ("K" in matrices) or (len(matrices) > 1 and "A" in matrices):
+        refuse("give either A(t, p, out), or K(t, p, out) with or without M and C")
+    for letter, function in matrices.items():
+        if not callable(function) or _arguments(function) != 3:
+            refuse(f"{letter} must be a function of three arguments, {letter}(t, p, out), that fills the matrix out")
+    parameters = _parameters(parameters, stability.OUTPUTS, ("multiplier", "row", "column"), refuse)
+    names = (states,) if isinstance(states, str) else tuple(states)
+    if not names or any(not isinstance(n, str) or not n.isidentifier() or names.count(n) > 1 for n in names):
+        refuse(f"STATES = {states!r}: give the names of the states, each once, as identifiers")
+    if "K" in matrices:
+        names += tuple(f"{'p_' if structure == 'symplectic' else 'd'}{n}" for n in names)
+    if len(names) > LARGEST:
+        refuse(f"STATES names {len(names)} states; at most {LARGEST} are allowed")
+    if structure not in stability.STRUCTURES:
+        refuse(f"STRUCTURE = {structure!r}: it must be one of {', '.join(map(repr, stability.STRUCTURES))}")
+    if structure == "symplectic" and len(names) % 2:
+        refuse(f"STRUCTURE = 'symplectic', but STATES names {len(names)} states; it must name an even number")
+    if not callable(period) and not (is_number(period) and 0 < period < np.inf):
+        refuse(f"PERIOD = {period!r}: it must be a positive number, or a function of p that returns one")
+    breaks = _checked_breaks(breaks, period, refuse)
+    equation = "x' = A(t, p) x" if "A" in matrices else "M q'' + C q' + K q = 0"
+    about = inspect.cleandoc(about or f"{equation}, p = ({', '.join(p.name for p in parameters)}).")
+    given = (*matrices.items(), period, breaks, parameters, names, structure)
+    bits = text.encode() if name.endswith(".py") else _bits(given)
+    return FloquetScene(
+        matrices=matrices, period=period, breaks=breaks, states=names, structure=structure, PARAMETERS=parameters,
+        NAME=name, TEXT=text, HASH=hashlib.sha256(bits).hexdigest(), TITLE=title or about.splitlines()[0].rstrip("."),
+        about=about, REFERENCES=tuple(references) or FLOQUET_REFERENCES,
+    )  # fmt: skip
+
+
+def _checked_breaks(breaks: Any, period: Any, refuse: Callable[[str], NoReturn]) -> Any:
+    """Positions in [0, T] as a tuple, or the function that returns them."""
+    if callable(breaks):
+        return breaks
+    try:
+        breaks = tuple(float(u) for u in np.atleast_1d(breaks))
+    except (TypeError, ValueError):
+        refuse(f"BREAKS = {breaks!r}: it must be number(s) in [0, PERIOD], or a function of p that returns them")
+    outside = [b for b in breaks if not 0 <= b <= (np.inf if callable(period) else period * (1 + SAME))]
+    if outside:
+        refuse(f"BREAKS: {outside[0]:g} lies outside 0 <= u <= T; name positions within one period")
+    return breaks
 
 
 def _parameters(

@@ -1,0 +1,1 @@
+"""Linear periodic systems of n states: power series of a matrix, steps, and their products."""

@@ -1,0 +1,323 @@
+"""The propagators of linear systems x' = A(t) x over many steps, by Taylor series about their middles.
+
+U(tau), U = 1 at the middle of a step, takes the state from there; F = U(1) U(-1)^-1 takes it over the step: so a series
+serves twice its reach. Each (point, step) is a task, and LANES of them are solved at once.
+
+The bound of |F - exact| counts, in the maximum norm of rows: the terms beyond the last, whose recurrence is continued
+with norms for the coefficients; the rounding of every operation, carried along by the same recurrence; that of A's
+values, `noise` (N) in the same norm; and what the inverse leaves.
+"""
+
+import math
+
+import numpy as np
+
+from survey.kernels.floquet.program import BASIS, COLUMN, NUMBER, ONE, ROW, extend
+from survey.kernels.jit import inline, kernel
+from survey.kernels.math.roundoff import ROUNDOFF_UP
+
+ORDER = 16
+BEYOND = 3  # terms of the bound of what is cut off
+
+
+@inline
+def lanes_of(n):
+    """How many steps are solved at once: what fits into the cache."""
+    return 32 if n <= 4 else 16 if n <= 6 else 8
+
+
+@kernel
+def factors(
+    operations, signs, inside, order, used, terms, numbers, scale, noise, n, point, middle, half, F, error, doubt
+):
+    """Fill F (tasks, n, n), bounds `error` (tasks) of their entries, and `doubt` (tasks), their relative size.
+
+    Task k is the step of `point[k]` from middle[k] - half[k] to middle[k] + half[k]. numbers (N, count), scale (N, n):
+    A_ij is taken times scale_j / scale_i, powers of 2.
+    """
+    lanes = lanes_of(n)
+    places, size = len(operations), n * n
+    S, X = np.zeros((places, ORDER + 1, lanes)), np.empty((ORDER + 1, size, lanes))
+    C, V = np.zeros((places, size, lanes)), np.empty((numbers.shape[1], lanes))
+    W = np.empty((len(terms), lanes))
+    a, w, e = np.zeros((ORDER + 1, lanes)), np.empty((ORDER + 1 + BEYOND, lanes)), np.empty((ORDER + 1, lanes))
+    rows, t, s, own = np.empty((n, lanes)), np.empty(lanes), np.empty(lanes), np.empty(lanes)
+    plus, minus = np.empty((size, lanes)), np.empty((size, lanes))
+    U, inverse, work = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+    per_row = np.zeros(n)
+    for k in range(len(terms)):
+        per_row[terms[k, ROW]] += 1.0
+    most = per_row.max() if n else 0.0
+    for start in range(0, len(point), lanes):
+        for lane in range(lanes):
+            task = min(start + lane, len(point) - 1)
+            i = point[task]
+            t[lane], s[lane], own[lane] = middle[task], half[task], noise[i]
+            for k in range(numbers.shape[1]):
+                V[k, lane] = numbers[i, k]
+            for k in range(len(terms)):
+                W[k, lane] = numbers[i, terms[k, NUMBER]] * (scale[i, terms[k, COLUMN]] / scale[i, terms[k, ROW]])
+        X[0] = 0.0
+        for i in range(n):
+            X[0, i * n + i] = 1.0
+        w[0], e[0] = 1.0, 0.0
+        for k in range(ORDER):
+            extend(operations, signs, inside, order, V, t, s, S, k)
+            _norm(S, W, terms, k, rows, a[k])
+            _next(S, W, terms, used, k, n, s, C, X)
+            _row_sums(X[k + 1], n, rows, w[k + 1])
+            _rounded(a, w, e, own, s, k, most)
+        extend(operations, signs, inside, order, V, t, s, S, ORDER)
+        _norm(S, W, terms, ORDER, rows, a[ORDER])
+        _ends(X, plus, minus)
+        for lane in range(min(lanes, len(point) - start)):
+            cut, rounding, total = _missing(a, w, e, s, lane)
+            delta = cut + rounding + 2.0 * ROUNDOFF_UP * total
+            error[start + lane] = _over(plus, minus, lane, n, delta, U, inverse, work, F[start + lane])
+            doubt[start + lane] = n * error[start + lane] * total * total
+
+
+@kernel
+def _norm(S, W, terms, k, rows, out):
+    """The maximum norm of A's coefficient of order k, by rows."""
+    rows[:] = 0.0
+    for q in range(len(terms)):
+        if terms[q, BASIS] == ONE and k > 0:
+            continue
+        row, basis, weight = rows[terms[q, ROW]], S[terms[q, BASIS], k], W[q]
+        for lane in range(len(out)):
+            row[lane] += abs(basis[lane] * weight[lane])
+    out[:] = 0.0
+    for i in range(len(rows)):
+        row = rows[i]
+        for lane in range(len(out)):
+            out[lane] = max(out[lane], row[lane])
+
+
+@kernel
+def _next(S, W, terms, used, k, n, s, C, X):
+    """Fill X[k + 1] = half / (k + 1) * sum over j of A_j X[k - j]."""
+    lanes, size = X.shape[2], n * n
+    for at in range(len(used)):
+        m = used[at]
+        if m == ONE:
+            continue
+        sums = C[m]
+        for j in range(k + 1):
+            basis, before = S[m, j], X[k - j]
+            for q in range(size):
+                one, two = sums[q], before[q]
+                if j == 0:
+                    for lane in range(lanes):
+                        one[lane] = basis[lane] * two[lane]
+                else:
+                    for lane in range(lanes):
+                        one[lane] += basis[lane] * two[lane]
+    new = X[k + 1]
+    new[:] = 0.0
+    for q in range(len(terms)):
+        row, column, weight = terms[q, ROW] * n, terms[q, COLUMN] * n, W[q]
+        for c in range(n):
+            two = X[k, column + c] if terms[q, BASIS] == ONE else C[terms[q, BASIS], column + c]
+            one = new[row + c]
+            for lane in range(lanes):
+                one[lane] += weight[lane] * two[lane]
+    for q in range(size):
+        one = new[q]
+        for lane in range(lanes):
+            one[lane] *= s[lane] / (k + 1)
+
+
+@kernel
+def _row_sums(X, n, rows, out):
+    """The maximum norm by rows of the matrix X (n n, lanes)."""
+    out[:] = 0.0
+    for i in range(n):
+        row = rows[i]
+        row[:] = 0.0
+        for c in range(n):
+            one = X[i * n + c]
+            for lane in range(len(out)):
+                row[lane] += abs(one[lane])
+        for lane in range(len(out)):
+            out[lane] = max(out[lane], row[lane])
+
+
+@kernel
+def _rounded(a, w, e, own, s, k, most):
+    """Fill e[k + 1], a bound of the rounding of X[k + 1], from the norms a of A's and w of X's coefficients."""
+    new = e[k + 1]
+    for lane in range(len(new)):
+        new[lane] = own[lane] * w[k, lane]
+    for j in range(k + 1):
+        one, two, before = a[j], w[k - j], e[k - j]
+        count = ROUNDOFF_UP * (k + j + 6.0 + most)  # a basis function's coefficient j, products, k - j sums, a row
+        for lane in range(len(new)):
+            new[lane] += one[lane] * (before[lane] + count * two[lane])
+    for lane in range(len(new)):
+        new[lane] *= s[lane] / (k + 1)
+
+
+@kernel
+def _ends(X, plus, minus):
+    """Fill the sums of the series at tau = 1 and -1."""
+    for q in range(X.shape[1]):
+        one, two = plus[q], minus[q]
+        one[:] = X[ORDER, q]  # of even orders
+        two[:] = X[ORDER - 1, q]
+        for k in range(ORDER - 2, -1, -2):
+            even = X[k, q]
+            for lane in range(X.shape[2]):
+                one[lane] += even[lane]
+            if k > 0:
+                odd = X[k - 1, q]
+                for lane in range(X.shape[2]):
+                    two[lane] += odd[lane]
+        for lane in range(X.shape[2]):
+            sum_of, difference = one[lane] + two[lane], one[lane] - two[lane]
+            one[lane], two[lane] = sum_of, difference
+
+
+@kernel
+def _missing(a, w, e, s, lane):
+    """What the series lacks beyond its last term, its rounding, and the sum of its terms' norms, in lane lane."""
+    total = rounding = 0.0
+    for k in range(ORDER + 1):
+        total += w[k, lane]
+        rounding += e[k, lane]
+    # A's own coefficients beyond the last known are taken to fall as the last four did
+    last, before = a[ORDER, lane] + a[ORDER - 1, lane], a[ORDER - 2, lane] + a[ORDER - 3, lane]
+    fall = math.sqrt(last / before) if before > 0.0 else 0.0
+    rest = 2.0 * last * fall / (1.0 - fall) if fall < 0.95 else (0.0 if last == 0.0 else math.inf)
+    cut = 0.0
+    for k in range(ORDER, ORDER + BEYOND):
+        new = 0.0
+        for j in range(min(k, ORDER) + 1):
+            new += a[j, lane] * w[k - j, lane]
+        w[k + 1, lane] = new * s[lane] / (k + 1)
+        cut += w[k + 1, lane]
+    ratio = w[ORDER + BEYOND, lane] / w[ORDER + BEYOND - 1, lane] if w[ORDER + BEYOND - 1, lane] > 0.0 else 0.0
+    cut = cut + w[ORDER + BEYOND, lane] * ratio / (1.0 - ratio) if ratio < 0.95 else math.inf
+    return cut + s[lane] * rest * total / (ORDER + 1), rounding, total
+
+
+@kernel
+def _over(plus, minus, lane, n, delta, U, inverse, work, F):
+    """Fill F = U(1) U(-1)^-1 of lane lane; returns the bound of its entries, `delta` being that of the rows of U."""
+    up = down = 0.0
+    for i in range(n):
+        total = other = 0.0
+        for j in range(n):
+            U[i, j] = work[i, j] = minus[i * n + j, lane]
+            inverse[i, j] = 1.0 if i == j else 0.0
+            total += abs(plus[i * n + j, lane])
+            other += abs(minus[i * n + j, lane])
+        up, down = max(up, total), max(down, other)
+    if not _invert(work, inverse, n) or not math.isfinite(delta):
+        F[:] = math.nan
+        return math.inf
+    widest = left = tall = 0.0
+    for i in range(n):
+        row = 0.0
+        for j in range(n):
+            sum_of, residual = 0.0, (-1.0 if i == j else 0.0)
+            for k in range(n):
+                sum_of += plus[i * n + k, lane] * inverse[k, j]
+                residual += U[i, k] * inverse[k, j]
+            F[i, j] = sum_of
+            row += abs(sum_of)
+            left = max(left, abs(residual))
+            widest = max(widest, abs(inverse[i, j]))
+        tall = max(tall, row)
+    rounding = (n + 2.0) * ROUNDOFF_UP * (up + tall * down)
+    return widest * (delta * (1.0 + tall) + rounding) + tall * left
+
+
+@kernel
+def _invert(work, inverse, n):
+    """Gauss-Jordan elimination with partial pivoting; `work` is used up. False where a pivot vanishes."""
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(work[i, k]) > abs(work[best, k]):
+                best = i
+        pivot = work[best, k]
+        if not abs(pivot) > 0.0:
+            return False
+        if best != k:
+            for j in range(n):
+                work[k, j], work[best, j] = work[best, j], work[k, j]
+                inverse[k, j], inverse[best, j] = inverse[best, j], inverse[k, j]
+        factor = 1.0 / pivot
+        for j in range(n):
+            work[k, j] *= factor
+            inverse[k, j] *= factor
+        for i in range(n):
+            if i != k and work[i, k] != 0.0:
+                factor = work[i, k]
+                for j in range(n):
+                    work[i, j] -= factor * work[k, j]
+                    inverse[i, j] -= factor * inverse[k, j]
+    return True
+
+
+@kernel
+def products(F, error, doubt, first, n, M, E):
+    """Fill M (N, n, n), the product of the steps first[i] to first[i + 1] of each point, and bounds E of its entries.
+
+    To first order the error is the sum over the steps of (F_last ... F_k+1) d_k (F_k-1 ... F_1), |d_k| <= error[k] in
+    every entry; `doubt` bounds the relative size of what is left out.
+    """
+    longest = 0
+    for i in range(len(M)):
+        longest = max(longest, first[i + 1] - first[i])
+    before = np.empty((longest + 1, n))  # sums of the columns of |F_k-1 ... F_1|
+    A, B = np.empty((n, n)), np.empty((n, n))
+    for i in range(len(M)):
+        steps = first[i + 1] - first[i]
+        A[:] = 0.0
+        for j in range(n):
+            A[j, j] = 1.0
+        more = 0.0
+        for k in range(steps):
+            largest = 0.0
+            for c in range(n):
+                total = 0.0
+                for j in range(n):
+                    total += abs(A[j, c])
+                before[k, c] = total
+            step = F[first[i] + k]
+            for j in range(n):
+                for c in range(n):
+                    total = 0.0
+                    for m in range(n):
+                        total += step[j, m] * A[m, c]
+                    B[j, c] = total
+                    largest = max(largest, abs(step[j, c]))
+            A[:] = B
+            error[first[i] + k] += n * ROUNDOFF_UP * largest
+            more += doubt[first[i] + k]
+        M[i] = A
+        E[i] = 0.0
+        A[:] = 0.0
+        for j in range(n):
+            A[j, j] = 1.0
+        for k in range(steps - 1, -1, -1):
+            step, own = F[first[i] + k], error[first[i] + k]
+            for j in range(n):
+                total = 0.0
+                for m in range(n):
+                    total += abs(A[j, m])
+                for c in range(n):
+                    E[i, j, c] += own * total * before[k, c]
+            for j in range(n):
+                for c in range(n):
+                    total = 0.0
+                    for m in range(n):
+                        total += A[j, m] * step[m, c]
+                    B[j, c] = total
+            A[:] = B
+        factor = math.exp(min(2.0 * more, 700.0))
+        for j in range(n):
+            for c in range(n):
+                E[i, j, c] *= factor

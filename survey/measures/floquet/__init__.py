@@ -1,0 +1,24 @@
+"""Linear periodic systems x' = A(t) x of n states: monodromy, multipliers, verdict.
+
+METHODS lists what a method that serves the family "floquet" offers. A step is taken over by its propagator F; steps of
+all points are tasks, in no particular order. A and t have the units of the user's functions.
+"""
+
+from survey.contract import Function
+
+METHODS = {
+    "floquet": {
+        "floquet_reach": Function(
+            "how far the maximum norm of A times half the length of a step may go at first, for accuracy rtol",
+            ("rtol",),
+        ),
+        "floquet_factors": Function(
+            "fill F (tasks, n, n), bounds `error` (tasks) of the errors of its entries and `doubt` (tasks), how large "
+            "these are relative to F; task k is the step of length 2 half[k] about middle[k] of the point point[k]. "
+            "The first six say how A is computed from numbers (N, count), see `kernels.floquet.program`; A_ij is taken "
+            "times scale_j / scale_i, from scale (N, n), and `noise` (N) bounds the rounding of its rows",
+            ("operations", "signs", "inside", "order", "used", "terms", "numbers", "scale", "noise", "n", "point",
+             "middle", "half", "F", "error", "doubt"),
+        ),
+    }
+}  # fmt: skip

@@ -1,0 +1,189 @@
+"""The monodromy matrix of a linear periodic system, each entry with its error bound.
+
+The period is cut at the breaks, and each piece into steps of equal length: as many as the norm of A, in units of
+the states that balance it, and the rate at which A varies ask for; points whose bounds miss the accuracy climb a
+ladder of more steps (`measures.answers`).
+"""
+
+import numpy as np
+
+from survey import measures
+from survey.kernels.floquet import steps
+from survey.kernels.math.roundoff import ROUNDOFF_UP
+from survey.measures.answers import Ladder
+
+# Times at which A is looked at, as shares of a piece.
+TIMES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(12) + 0.5) / 12)
+WEIGHTS = np.cos(1.0 + 7.0 * np.arange(64)) + 1.5  # of entries, in a sum that stands for all: no special ones
+TRANSFORM = np.array([[np.cos(np.pi * j * (k + 0.5) / 12) / 6 for k in range(12)] for j in range(12)])
+RESOLVED = 1e-12  # relative to the largest Chebyshev coefficient: smaller ones do not count
+BY_RATE = 0.6  # what a step may span of 1 / rate, relative to the reach
+DIGITS = 48  # bits of the ends of steps
+GROWTH = 1.5  # steps, from rung to rung
+LADDER_LENGTH = 16
+SWEEPS = 3  # of balancing
+CALL_WORK = 4_000_000  # keeps a kernel call below about a second: steps n^2
+MOST_STEPS = 100_000  # of a point
+
+
+class Points:
+    """Points of a System as a method's steps need them: sizes, noise, and the units that balance A."""
+
+    def __init__(self, system, points):
+        self.system, self.n, self.points = system, system.n, points
+        self.period, edges = system.ranges(points)
+        valid = np.isfinite(points).all(axis=1) & np.isfinite(edges).all(axis=1)
+        self.rough = valid.copy()
+        self.edges = edges
+        pieces = edges.shape[1] - 1
+        self.size, self.noise, self.rate = np.zeros((3, len(points), pieces))
+        self.scale = np.ones((len(points), self.n))
+        self.groups = []
+        where = np.flatnonzero(valid)
+        for inside, programs in system.traced(points[where], edges[where]):
+            self._measure(where[inside], programs)
+        self.valid = valid & np.isfinite(self.size).all(axis=1) & ~self.rough
+
+    def _measure(self, own, programs):
+        """Norm and noise of A on each piece of the points `own`, and the units of their states."""
+        self.rough[own] = False
+        largest = np.zeros((len(own), self.n, self.n))
+        spread = []
+        for k, program in enumerate(programs):
+            low, high = self.edges[own, k, None], self.edges[own, k + 1, None]
+            numbers = program.numbers(self.points[own])
+            A, E = program.at(self.points[own], low + (high - low) * TIMES, self.n, numbers)
+            largest = np.maximum(largest, abs(A).max(axis=1))
+            spread.append((numbers[0], A, E.max(axis=1)))
+        scale = balanced(largest)
+        ratio = scale[:, None, :] / scale[:, :, None]
+        for k, (_numbers, A, errors) in enumerate(spread):
+            A = A * ratio[:, None]
+            length = self.edges[own, k + 1] - self.edges[own, k]
+            self.rate[own, k] = rates(A) / np.where(length > 0, length, 1.0)
+            self.size[own, k] = abs(A).sum(axis=-1).max(axis=(1, 2))
+            self.noise[own, k] = 2.0 * (errors * ratio).sum(axis=-1).max(axis=-1)
+        self.scale[own] = scale
+        self.groups.append((own, programs, [numbers for numbers, _sizes, _errors in spread]))
+
+    def steps(self, reach, factor, those):
+        """Numbers of steps (K, P) of some points, `factor` (K) times what norm and rate ask for."""
+        length = np.diff(self.edges[those], axis=1)
+        with np.errstate(invalid="ignore"):
+            least = 0.5 * length / reach * (self.size[those] + BY_RATE * self.rate[those])
+            count = np.ceil(factor[:, None] * np.maximum(least, 1.0))
+        return np.where(length > 0, np.clip(np.nan_to_num(count, nan=1.0), 1, MOST_STEPS), 0).astype(np.int64)
+
+
+def rates(A):
+    """How fast A (N, 12, n, n) at TIMES varies on a piece of length 1 (N): 1 / distance of a singularity, or frequency.
+
+    The largest k / (1 + ln(max |c| / |c_k|)) of its Chebyshev coefficients c_k, twice (see `hill.user_equation`).
+    """
+    N, times, n, _ = A.shape
+    one, c = np.zeros((times, N)), np.zeros((times, N))
+    for i in range(n):
+        for j in range(n):
+            one += WEIGHTS[(i * n + j) % 64] * A[:, :, i, j].T
+    for k in range(times):
+        for j in range(times):
+            c[k] += TRANSFORM[k, j] * one[j]
+    with np.errstate(all="ignore"):
+        c = abs(c)
+        share = c / c.max(axis=0)
+        rate = np.arange(times)[:, None] / (1.0 - np.log(share))
+        return 2.0 * np.where(share > RESOLVED, rate, 0.0).max(axis=0)
+
+
+def balanced(matrices):
+    """Units of the states (N, n), powers of 2, in which rows and columns of |A| (N, n, n) are of one size (Osborne)."""
+    work, scale = matrices.copy(), np.ones(matrices.shape[:2])
+    n = matrices.shape[1]
+    diagonal = np.arange(n)
+    work[:, diagonal, diagonal] = 0.0
+    with np.errstate(all="ignore"):
+        for _ in range(SWEEPS):
+            for i in range(n):
+                row, column = work[:, i].sum(axis=1), work[:, :, i].sum(axis=1)
+                power = np.rint(0.5 * np.log2(row / column))
+                power = np.where(np.isfinite(power), np.clip(power, -500, 500), 0.0)
+                factor = np.exp2(power)
+                scale[:, i] *= factor
+                work[:, i] /= factor[:, None]
+                work[:, :, i] *= factor[:, None]
+    return scale
+
+
+def solve(points, method, rtol, factor, those):
+    """M and bounds of its entries (K, n, n each) of some of the Points, `factor` (K) times the steps asked for."""
+    n = points.n
+    count = points.steps(method.floquet_reach(rtol), factor, those)
+    M, E = np.empty((2, len(those), n, n))
+    group = np.full(len(points.points), -1)
+    for g, (own, _programs, _numbers) in enumerate(points.groups):
+        group[own] = g
+    for g, (own, programs, numbers) in enumerate(points.groups):
+        mine = np.flatnonzero(group[those] == g)
+        place = np.empty(len(points.points), dtype=np.int64)
+        place[own] = np.arange(len(own))
+        work = np.cumsum(count[mine].sum(axis=1)) * n * n
+        for some in np.split(
+            mine, np.searchsorted(work, np.arange(CALL_WORK, work[-1], CALL_WORK)) if len(work) else []
+        ):
+            if some.size:
+                M[some], E[some] = _call(
+                    points, method, those[some], place[those[some]], programs, numbers, count[some]
+                )
+    return M, E
+
+
+def _call(points, method, those, place, programs, numbers, count):
+    n, total = points.n, count.sum(axis=1)
+    first = np.concatenate([[0], np.cumsum(total)])
+    F, error, doubt = np.empty((first[-1], n, n)), np.empty(first[-1]), np.empty(first[-1])
+    offset = first[:-1].copy()
+    scale = np.ascontiguousarray(points.scale[those])
+    for k, program in enumerate(programs):
+        steps_of = count[:, k]
+        point = np.repeat(np.arange(len(those)), steps_of)
+        if not point.size:
+            continue
+        index = np.arange(point.size) - np.repeat(np.cumsum(steps_of) - steps_of, steps_of)
+        low, high = points.edges[those, k], points.edges[those, k + 1]
+        start, end = (_ends(low, high, steps_of, point, index + shift) for shift in (0, 1))
+        middle, half = 0.5 * (start + end), 0.5 * (end - start)
+        # all is exact but the first and the last step of the piece, which meet others within their rounding
+        share = points.edges[those, -1] / np.where(high > low, high - low, 1.0)
+        noise = points.noise[those, k] + 4 * ROUNDOFF_UP * points.size[those, k] * share
+        found = np.empty((point.size, n, n)), np.empty(point.size), np.empty(point.size)
+        method.floquet_factors(
+            program.operations, program.signs, program.inside, program.order, program.used, program.terms,
+            np.ascontiguousarray(numbers[k][place]), scale, noise, n, point, middle, half, *found,
+        )  # fmt: skip
+        where = np.repeat(offset, steps_of) + index
+        F[where], error[where], doubt[where] = found
+        offset += steps_of
+    M, E = np.empty((2, len(those), n, n))
+    steps.products(F, error, doubt, first, n, M, E)
+    back = scale[:, :, None] / scale[:, None, :]
+    return M * back, E * back
+
+
+def _ends(low, high, steps, point, index):
+    """Ends of steps, but for those of the piece with so few digits that their sums and differences are exact."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        unit = np.exp2(np.ceil(np.log2(np.maximum(abs(low), abs(high)))) - DIGITS)[point]
+        t = np.rint((low[point] + (high - low)[point] * (index / steps[point])) / unit) * unit
+    return np.where(index == 0, low[point], np.where(index == steps[point], high[point], t))
+
+
+def ladder(n):
+    """The ladder of steps for results (N, 2 n^2)."""
+    return Ladder(
+        GROWTH ** np.arange(LADDER_LENGTH), np.arange(LADDER_LENGTH) + 1, slice(n * n, 2 * n * n), most=LADDER_LENGTH
+    )
+
+
+def method_of(name):
+    """The method of this name; "auto" is Taylor series about the middles of steps."""
+    return measures.method("taylor16" if name == "auto" else name)

@@ -1,0 +1,292 @@
+"""Multipliers from a monodromy matrix M that is known to within E, and what certainly follows from them.
+
+With any nonsingular V, M is similar to (W V)^-1 W M V, W V = 1 nearly: its diagonal entries, with the sums of the
+moduli of the others of their rows, are Gershgorin's discs, and E widens them. V are the eigenvectors of M, or of M
+plus a small perturbation where they are nearly dependent: any V is allowed, and the narrowest discs are kept. A
+disc, or several that touch, apart from all others holds as many multipliers as it has centres.
+
+Where M is symplectic or reversible, 1 / conj(l) is a multiplier with l. So an isolated disc whose mirror image in the
+unit circle meets no other one holds a multiplier on the circle.
+
+Sources: R. A. Horn, C. R. Johnson, Matrix Analysis (2013), 6.1 and 6.4; V. A. Yakubovich, V. M. Starzhinskii, Linear
+Differential Equations with Periodic Coefficients (1975), III.
+"""
+
+import numpy as np
+
+from survey.kernels.floquet import discs
+from survey.kernels.math.roundoff import EPS
+
+UNDECIDED, UNSTABLE, STABLE, MARGINAL = -1, 0, 1, 2
+NONE, PLUS_ONE, MINUS_ONE, NEIMARK_SACKER, COLLISION = range(5)
+PERTURBED = (1.0, 1e3)  # perturbations of M that are tried, relative to the largest entry of E
+POWERS = 12  # of 2: the highest power of M that is looked at
+
+
+class Discs:
+    """Discs of N matrices: centres and radii (N, n), by descending modulus, then angle; `together` (N, n, n): do they
+    hold their multipliers together? `V` the columns whose discs they are, `coupling` (N, n, n) what couples these.
+    """
+
+    def __init__(self, M, E):
+        N, n = M.shape[:2]
+        self.centre, self.radius = np.zeros((N, n), complex), np.full((N, n), np.inf)
+        self.V, self.coupling = np.zeros((N, n, n), complex), np.full((N, n, n), np.inf)
+        good = np.isfinite(M).all(axis=(1, 2)) & np.isfinite(E).all(axis=(1, 2))
+        self._improve(np.flatnonzero(good), M, E, None)
+        for times in PERTURBED:
+            left = np.flatnonzero(good & self._doubtful())
+            if left.size:
+                self._improve(left, M, E, times)
+        self.together = self._touching()
+        self._narrow()
+        self._sort()
+
+    def _doubtful(self):
+        """Where another V may serve better: discs that are far wider than what M asks for."""
+        with np.errstate(invalid="ignore"):
+            return ~(self.radius.max(axis=1) < 1e-9 * (1 + abs(self.centre).max(axis=1)))
+
+    def _improve(self, which, M, E, perturbation):
+        M, E = M[which], E[which]
+        n = M.shape[1]
+        near = M
+        if perturbation is not None:
+            off = np.cos(1.0 + 7.0 * np.arange(n * n)).reshape(n, n)  # no special direction
+            near = M + perturbation * E.max(axis=(1, 2), keepdims=True) * off
+        with np.errstate(all="ignore"):
+            centre, V = np.linalg.eig(near)
+            coupling = np.empty(V.shape)
+            centre, V = centre.astype(complex), V.astype(complex)
+            discs.couplings(M, E, centre, V, inverse(V), coupling)
+            radius = coupling.sum(axis=2) * (1 + 8 * EPS)
+            radius = np.where(np.isfinite(radius) & np.isfinite(centre), radius, np.inf)
+            better = radius.max(axis=1) < self.radius[which].max(axis=1)
+        some = which[better]
+        self.centre[some], self.radius[some] = centre[better], radius[better]
+        self.V[some], self.coupling[some] = V[better], coupling[better]
+
+    def _touching(self):
+        with np.errstate(invalid="ignore"):
+            gap = abs(self.centre[:, :, None] - self.centre[:, None, :])
+            touch = ~(gap > (self.radius[:, :, None] + self.radius[:, None, :]) * (1 + 8 * EPS))
+        n = touch.shape[1]
+        reach = 1
+        while reach < n:
+            touch = (touch.astype(np.uint8) @ touch.astype(np.uint8)) > 0
+            reach *= 2
+        return touch
+
+    def _narrow(self):
+        """Make isolated discs narrower: in other units of their column, what couples it to others counts t times.
+
+        t is such that the discs of the others, in whose rows it counts 1 / t times, still keep away.
+        """
+        n = self.centre.shape[1]
+        at = np.arange(n)
+        with np.errstate(all="ignore"):
+            own = self.coupling[:, at, at]
+            off = self.radius - own
+            gap = abs(self.centre[:, :, None] - self.centre[:, None, :]) - own[:, :, None] - self.radius[:, None, :]
+            gap[:, at, at] = np.inf
+            share = (2.0 * np.swapaxes(self.coupling, 1, 2) / gap).copy()  # of j, in whose row i counts
+            share[:, at, at] = 0.0
+            t = np.clip(share.max(axis=2), 1e-12, 1.0)
+            clear = self.isolated & (gap.min(axis=2) > 2.0 * t * off)
+            self.radius = np.where(clear, (own + t * off) * (1 + 8 * EPS), self.radius)
+
+    def _sort(self):
+        modulus = abs(self.centre)
+        # what cannot be told apart counts as equal: pairs of conjugates, and all on the unit circle
+        angle = np.angle(self.centre)
+        order = np.lexsort((angle, -np.round(modulus / (1e-9 * (1 + modulus)).max(axis=1, keepdims=True))), axis=1)
+        self.reorder(order)
+
+    def reorder(self, order):
+        """Put the discs into this order (N, n)."""
+        rows = np.arange(len(order))[:, None]
+        self.centre, self.radius = self.centre[rows, order], self.radius[rows, order]
+        self.V = np.take_along_axis(self.V, order[:, None, :], axis=2)
+        for name in ("coupling", "together"):
+            kept = np.take_along_axis(getattr(self, name), order[:, :, None], axis=1)
+            setattr(self, name, np.take_along_axis(kept, order[:, None, :], axis=2))
+
+    @property
+    def isolated(self):
+        """Discs that hold exactly one multiplier (N, n)."""
+        return self.together.sum(axis=2) == 1
+
+    @property
+    def bars(self):
+        """How far the multipliers of a disc's cluster may lie from its centre (N, n)."""
+        with np.errstate(invalid="ignore"):
+            far = abs(self.centre[:, :, None] - self.centre[:, None, :]) + self.radius[:, None, :]
+            far = np.where(self.together, far, 0.0)
+        bars = far.max(axis=2)
+        return np.where(np.isfinite(bars), bars, np.inf)
+
+    @property
+    def moduli(self):
+        """The least and the largest modulus in each disc (N, n) each."""
+        size = abs(self.centre)
+        return np.maximum(size - self.radius, 0.0) * (1 - 4 * EPS), (size + self.radius) * (1 + 4 * EPS)
+
+    @property
+    def on_circle(self):
+        """Discs of symplectic or reversible systems that hold one multiplier, on the unit circle (N, n)."""
+        low, high = self.moduli
+        off = np.maximum(high - 1.0, 1.0 - low)
+        with np.errstate(invalid="ignore"):
+            gap = (
+                abs(self.centre[:, :, None] - self.centre[:, None, :])
+                - self.radius[:, :, None]
+                - self.radius[:, None, :]
+            )
+            n = gap.shape[1]
+            gap[:, np.arange(n), np.arange(n)] = np.inf
+            # z and 1 / conj(z) are apart by | |z| - 1 / |z| | <= 2.2 | |z| - 1 | near the circle
+            return self.isolated & (off < 0.05) & (gap.min(axis=2) > 2.2 * off)
+
+
+def inverse(V):
+    """The inverses (N, n, n); NaN where there is none."""
+    try:
+        return np.linalg.inv(V)
+    except np.linalg.LinAlgError:
+        out = np.full_like(V, np.nan)
+        for i, one in enumerate(V):
+            try:
+                out[i] = np.linalg.inv(one)
+            except np.linalg.LinAlgError:
+                continue
+        return out
+
+
+def radius(own):
+    """The spectral radius and its error bound (N)."""
+    low, high = own.moduli
+    top = high.max(axis=1)
+    least = np.where(own.together, low[:, None, :], np.inf).min(axis=2).max(axis=1)
+    value = abs(own.centre).max(axis=1)
+    return value, np.maximum(top - value, value - least)
+
+
+def verdicts(own, M, E, paired):
+    """The verdict (N); `paired`: with l, 1 / conj(l) is a multiplier (symplectic and reversible systems)."""
+    low, high = own.moduli
+    least = np.where(own.together, low[:, None, :], np.inf).min(axis=2)
+    most = np.where(own.together, high[:, None, :], 0.0).max(axis=2)
+    verdict = np.full(len(M), UNDECIDED, dtype=np.int8)
+    outside = (least > 1.0).any(axis=1)
+    if paired:
+        outside |= (most < 1.0).any(axis=1)
+        verdict[own.on_circle.all(axis=1)] = STABLE
+    else:
+        verdict[(most < 1.0).all(axis=1)] = STABLE
+    verdict[outside] = UNSTABLE
+    left = np.flatnonzero((verdict == UNDECIDED) & np.isfinite(E).all(axis=(1, 2)) & np.isfinite(M).all(axis=(1, 2)))
+    if left.size:
+        verdict[left] = by_powers(M[left], E[left], not paired)
+    return verdict
+
+
+def by_powers(M, E, may_be_stable):
+    """The verdict by powers of M: stable if a norm of one is below 1, unstable if a trace exceeds n.
+
+    Where multipliers are nearly defective this tells what discs cannot.
+    """
+    out = np.full(len(M), UNDECIDED, dtype=np.int8)
+    discs.powers(np.ascontiguousarray(M), np.ascontiguousarray(E), POWERS, may_be_stable, out)
+    return out
+
+
+def krein(own):
+    """The Krein signs (N, n) of multipliers on the unit circle: the sign of i v* J v; 0 where there is none, or is open.
+
+    J = (0 1; -1 0) in blocks: the first half of the states are coordinates, the second their momenta.
+    """
+    V, n = own.V, own.V.shape[1]
+    m = n // 2
+    with np.errstate(all="ignore"):
+        JV = np.concatenate([V[:, m:], -V[:, :m]], axis=1)
+        form = (1j * (V.conj() * JV).sum(axis=1)).real
+        gap = abs(own.centre[:, :, None] - own.centre[:, None, :]) - own.radius[:, :, None] - own.radius[:, None, :]
+        gap[:, np.arange(n), np.arange(n)] = np.inf
+        # to first order the eigenvector i is off by sum over j of V_j coupling_ji / (l_i - l_j)
+        mixed = np.swapaxes(own.coupling, 1, 2) / np.where(gap > 0, gap, 0.0)
+        off = (abs(V)[:, None] * mixed[:, :, None, :]).sum(axis=3)  # (N, i, row)
+        size = np.swapaxes(abs(V), 1, 2)
+        swapped = np.concatenate([size[:, :, m:], size[:, :, :m]], axis=2)
+        other = np.concatenate([off[:, :, m:], off[:, :, :m]], axis=2)
+        doubt = (2.0 * off * swapped + off * other).sum(axis=2) * 1.5 + 8 * n * EPS * (size * swapped).sum(axis=2)
+        sign = np.where(abs(form) > doubt, np.sign(form), 0.0)
+    return np.where(own.on_circle, sign, 0.0).astype(np.int8)
+
+
+def crossing(own, verdict, paired, signs=None):
+    """How stability is lost nearest, or has been lost (N).
+
+    Of multipliers all on the circle, by the shortest arc: to 1, to -1, or between two of opposite Krein sign (of
+    any two if `signs` is None). Otherwise by the leading multiplier, the one of the largest modulus.
+    """
+    centre, bars = own.centre, own.bars
+    N, n = centre.shape
+    out = np.full(N, UNDECIDED, dtype=np.int8)
+    with np.errstate(invalid="ignore"):
+        modulus = abs(centre)
+        lead = modulus.argmax(axis=1)
+        rows = np.arange(N)
+        leader = centre[rows, lead]
+        conjugate = abs(centre - leader.conj()[:, None]) <= bars + bars[rows, lead, None]
+        rivals = (modulus + bars >= (modulus - bars)[rows, lead, None]) & ~conjugate
+        rivals[rows, lead] = False
+        alone = own.isolated[rows, lead] & ~rivals.any(axis=1)
+        complex_ = abs(leader.imag) > bars[rows, lead]
+        kind = np.where(leader.real > 0, PLUS_ONE, MINUS_ONE)
+        kind = np.where(complex_, COLLISION if paired else NEIMARK_SACKER, kind)
+        out[alone] = kind[alone]
+    circle = (verdict == STABLE) & paired
+    if not paired or not circle.any():
+        return out
+    angle, arc_bar = np.angle(centre[circle]), 2 * bars[circle]
+    to_plus, to_minus = 2 * abs(angle), 2 * (np.pi - abs(angle))
+    gaps = abs(np.exp(1j * angle)[:, :, None] - np.exp(1j * angle)[:, None, :])
+    arcs = 2 * np.arcsin(np.clip(gaps / 2, 0, 1))
+    pairs = arc_bar[:, :, None] + arc_bar[:, None, :]
+    upper = (angle > 0)[:, :, None] & (angle > 0)[:, None, :]
+    may = upper & ~np.eye(n, dtype=bool)
+    if signs is not None:
+        may &= signs[circle][:, :, None] * signs[circle][:, None, :] < 0
+    arcs = np.where(may, arcs, np.inf)
+    least = [to_plus.min(axis=1), to_minus.min(axis=1), arcs.min(axis=(1, 2))]
+    doubt = [2 * arc_bar.max(axis=1), 2 * arc_bar.max(axis=1), np.where(may, pairs, 0).max(axis=(1, 2))]
+    least, doubt = np.array(least), np.array(doubt)
+    first = least.argmin(axis=0)
+    columns = np.arange(first.size)
+    second = least.copy()
+    second[first, columns] = np.inf
+    clear = second.min(axis=0) - least[first, columns] > doubt.max(axis=0)
+    out[circle] = np.where(clear, np.array([PLUS_ONE, MINUS_ONE, COLLISION])[first], UNDECIDED)
+    return out
+
+
+def symmetric(own):
+    """Centres and bars of paired multipliers: those outside the circle, and their mirror images in it, exactly."""
+    centre, bars = own.centre.copy(), own.bars.copy()
+    on = own.on_circle
+    with np.errstate(all="ignore"):
+        centre = np.where(on, centre / abs(centre), centre)
+        mirror = 1 / centre.conj()
+        distance = abs(mirror[:, :, None] - centre[:, None, :])  # (N, i, j): the image of i is j
+        n = centre.shape[1]
+        rows = np.arange(len(centre))
+        for i in range(n):
+            outside = (abs(centre[:, i]) > 1) & ~on[:, i] & own.isolated[:, i]
+            j = np.where(np.isfinite(distance[:, i]), distance[:, i], np.inf).argmin(axis=1)
+            ok = outside & (j != i) & own.isolated[rows, j] & (abs(centre[rows, j]) < 1)
+            # |1 / (c + d) - 1 / c| <= r / (|c| (|c| - r))
+            bar = bars[:, i] / (abs(centre[:, i]) * (abs(centre[:, i]) - bars[:, i])) + 2 * EPS / abs(centre[:, i])
+            ok &= (abs(centre[:, i]) > 2 * bars[:, i]) & (distance[rows, i, j] <= bar + bars[rows, j])
+            centre[rows[ok], j[ok]] = mirror[ok, i]
+            bars[rows[ok], j[ok]] = bar[ok]
+    return centre, bars

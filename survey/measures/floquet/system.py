@@ -1,0 +1,229 @@
+"""A user's linear periodic system x' = A(t, p) x, or M q'' + C q' + K q = 0, as programs of its pieces.
+
+With M, C, K the states are (q, q'), or, if the system is symplectic, (q, M q' + C q / 2), M and C constant in t: then
+J A is symmetric where M and K are, C is antisymmetric.
+"""
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from survey.measures.floquet import trace
+from survey.measures.floquet.trace import Graph, Symbol, Unsupported
+
+KEPT = 256  # traces
+LOCK = threading.Lock()
+
+
+class Raised(Exception):
+    """The function `name` raised its cause."""
+
+    def __init__(self, name):
+        super().__init__(name)
+        self.name = name
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """n states; `matrices` {"A"} or {"M", "C", "K"} (M, C optional): functions of t, p and out, the matrix to fill.
+
+    `period` and `breaks` are values, or functions of p.
+    """
+
+    matrices: dict
+    n: int
+    period: float | Callable
+    breaks: tuple | Callable
+    symplectic: bool
+    _traces: list = field(default_factory=list, repr=False)
+
+    @cached_property
+    def _lifted(self):
+        return {name: trace.lifted(function) for name, function in self.matrices.items()}
+
+    def ranges(self, points):
+        """Period (N) and the edges of the pieces (N, P + 1), the last one repeated where a point has fewer."""
+        vary = callable(self.period) or callable(self.breaks)
+        each = points if vary else points[:1]
+        period = np.array([self._number("PERIOD", self.period, p) for p in each])
+        period = np.where(period > 0, period, np.nan)
+        rows = []
+        for p, length in zip(each, period, strict=True):
+            inside = np.atleast_1d(self._value("BREAKS", self.breaks, p)).astype(float)
+            inside = np.unique(inside[(inside > 0) & (inside < length)])
+            rows.append([0.0, *inside, length])
+        most = max(map(len, rows), default=2)
+        edges = np.array([[*row, *[row[-1]] * (most - len(row))] for row in rows]).reshape(len(rows), most)
+        return np.broadcast_to(period, len(points)).copy(), np.broadcast_to(edges, (len(points), most)).copy()
+
+    def _value(self, name, value, p):
+        try:
+            return value(p) if callable(value) else value
+        except Exception as error:
+            raise Raised(f"{name}(p)") from error
+
+    def _number(self, name, value, p):
+        found = self._value(name, value, p)
+        try:
+            return float(found)
+        except (TypeError, ValueError) as error:
+            raise Raised(f"{name}(p)") from error
+
+    def traced(self, points, edges):
+        """[(indices, [program of each piece])] of the points (N, parameters); raises Unsupported or Raised.
+
+        Points in no group, whose branches change within a piece, are rough.
+        """
+        left, found = np.arange(len(points)), []
+        with LOCK:
+            known = list(self._traces)
+        while left.size:
+            for programs in known:
+                if len(programs) != edges.shape[1] - 1 or not left.size:
+                    continue
+                inside = self._holds(programs, points[left], edges[left])
+                if (inside == 1).any():
+                    found.append((left[inside == 1], programs))
+                    left = left[inside != 1]
+            if not left.size:
+                break
+            programs = self._trace(points[left[0]], edges[left[0]])
+            with LOCK:
+                self._traces.append(programs)
+                del self._traces[:-KEPT]
+            own = self._holds(programs, points[left[:1]], edges[left[:1]])[0]
+            if own != 1:  # rough, or on the very edge of a branch
+                if own == 0:
+                    found.append((left[:1], programs))
+                left = left[1:]
+            known = [programs]
+        return found
+
+    def _holds(self, programs, points, edges):
+        out = np.ones(len(points), dtype=np.int8)
+        for k, program in enumerate(programs):
+            out = np.minimum(out, program.holds(points, edges[:, k], edges[:, k + 1]))
+        return out
+
+    def _trace(self, point, edges):
+        """The program of each piece, as the code runs in its middle at this point."""
+        return [self._program(point, 0.5 * (low + high)) for low, high in pairwise(edges)]
+
+    def _program(self, point, time):
+        graph = Graph([float(x) for x in point], time)
+        if "A" in self.matrices:
+            entries = self._filled(graph, "A", self.n)
+        else:
+            entries = self._of_second_order(graph)
+        return graph.compiled({key: graph.lift(x) for key, x in entries.items()})
+
+    def _filled(self, graph, name, size):
+        """{(i, j): value} of the entries that are not 0."""
+        out = np.zeros((size, size), dtype=object)
+        try:
+            value = self._lifted[name](graph.time, graph.parameters, out)
+            if value is not None:
+                out = np.array(value, dtype=object)
+        except Unsupported as error:
+            raise Unsupported(f"{name}(t, p, out): {error}") from None
+        except ArithmeticError as error:
+            raise Unsupported(f"{name}(t, p, out): {error}, while its operations are recorded") from None
+        except Exception as error:
+            raise Raised(f"{name}(t, p, out)") from error
+        if out.shape != (size, size):
+            raise Unsupported(f"{name}(t, p, out) returns an array of shape {out.shape}, not {(size, size)}")
+        return {
+            (i, j): out[i, j]
+            for i in range(size)
+            for j in range(size)
+            if isinstance(out[i, j], Symbol) or graph.lift(out[i, j]).value != 0.0
+        }
+
+    def _of_second_order(self, graph):
+        """The entries of A from those of M, C and K."""
+        m = self.n // 2
+        given = {name: self._filled(graph, name, m) for name in self.matrices}
+        K, C = (dense(given.get(name, {}), m) for name in "KC")
+        inverse = inverted(dense(given["M"], m), graph) if "M" in given else identity(m)
+        entries = {}
+        if not self.symplectic:
+            entries = {(i, m + i): 1.0 for i in range(m)}
+            for left, block in ((0, K), (m, C)):
+                for (i, j), value in times(inverse, block, m).items():
+                    entries[m + i, left + j] = -value
+            return entries
+        for name in "MC":
+            if any(isinstance(x, Symbol) and not x.is_number for x in given.get(name, {}).values()):
+                raise Unsupported(f"{name}(t, p, out) depends on t, so that the momenta are not M q' + C q / 2; give A")
+        half = [[0.5 * x for x in row] for row in C]
+        velocity = times(inverse, half, m)  # q' = M^-1 (p - C q / 2)
+        for (i, j), value in velocity.items():
+            entries[i, j] = -value
+        for i in range(m):
+            for j in range(m):
+                entries[i, m + j] = inverse[i][j]
+        for (i, j), value in times(half, dense(velocity, m), m).items():
+            entries[m + i, j] = value
+        for i in range(m):
+            for j in range(m):
+                entries[m + i, j] = entries.get((m + i, j), 0.0) - K[i][j]
+        for (i, j), value in times(half, inverse, m).items():
+            entries[m + i, m + j] = -value
+        return entries
+
+
+def dense(entries, m):
+    """The rows of an m x m matrix with these entries."""
+    return [[entries.get((i, j), 0.0) for j in range(m)] for i in range(m)]
+
+
+def identity(m):
+    """The rows of the identity."""
+    return [[1.0 * (i == j) for j in range(m)] for i in range(m)]
+
+
+def _is_zero(x):
+    return not isinstance(x, Symbol) and x == 0.0
+
+
+def times(left, right, m):
+    """{(i, j): value} of the product of two matrices of rows, entries that vanish left out."""
+    found = {}
+    for i in range(m):
+        for j in range(m):
+            terms = [left[i][k] * right[k][j] for k in range(m) if not (_is_zero(left[i][k]) or _is_zero(right[k][j]))]
+            if terms:
+                total = terms[0]
+                for term in terms[1:]:
+                    total = total + term
+                found[i, j] = total
+    return found
+
+
+def inverted(rows, graph):
+    """The rows of the inverse matrix, by Gauss-Jordan elimination with the pivots of the example."""
+    m = len(rows)
+    work, out = [list(row) for row in rows], identity(m)
+    for k in range(m):
+        best = max(range(k, m), key=lambda i: abs(graph.lift(work[i][k]).value))
+        if graph.lift(work[best][k]).value == 0.0:
+            raise Unsupported("M(t, p, out) is singular")
+        work[k], work[best], out[k], out[best] = work[best], work[k], out[best], out[k]
+        pivot = work[k][k]
+        if isinstance(pivot, Symbol) or pivot != 1.0:
+            work[k] = [x if _is_zero(x) else x / pivot for x in work[k]]
+            out[k] = [x if _is_zero(x) else x / pivot for x in out[k]]
+        for i in range(m):
+            factor = work[i][k]
+            if i == k or _is_zero(factor):
+                continue
+            for rows_ in (work, out):
+                rows_[i] = [
+                    x if _is_zero(y) else -(factor * y) if _is_zero(x) else x - factor * y
+                    for x, y in zip(rows_[i], rows_[k], strict=True)
+                ]
+    return out

@@ -1,0 +1,247 @@
+"""The scene of a user's A(t, p), or M, C, K: what a module of `survey.scenes` offers, as an object."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from survey.measures.floquet import motion, stability
+from survey.measures.floquet.system import Raised, System
+from survey.measures.floquet.trace import Unsupported
+from survey.request.function_scene import FunctionScene
+from survey.request.hill_scene import reason
+from survey.scene import Parameter, plus_minus
+
+LARGEST = 64  # states
+TRIED = np.array([0.0, 0.11, 0.29, 0.47, 0.62, 0.83])  # of a period: where A is tried as Python
+SAME = 1e-9  # relative to the largest entry: what counts as periodic, as symplectic, as the same
+STATUS = {
+    "invalid_parameters": "outside the domain, or A or T is not finite there, or A has not the stated structure",
+    "no_convergence": "a branch of the code changes between BREAKS: name every time at which A jumps or has a kink",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class FloquetScene(FunctionScene):
+    """What a scene's module offers (see `survey.scenes`), for a user's A, or M, C, K; `about` is its docstring."""
+
+    matrices: dict[str, Callable]
+    period: float | Callable
+    breaks: tuple[float, ...] | Callable
+    states: tuple[str, ...]
+    structure: str
+    PARAMETERS: tuple[Parameter, ...]
+    NAME: str
+    TEXT: str
+    HASH: str
+    TITLE: str
+    about: str
+    REFERENCES: tuple[str, ...]
+    FAMILY = "floquet"
+    AUDIT = ("dop853",)
+    OPTIONS = ()
+    STATUS = STATUS
+
+    @property
+    def own(self):
+        """The parameters of A: all that there are."""
+        return self.PARAMETERS
+
+    @cached_property
+    def _system(self):
+        return System(
+            self.matrices, len(self.states), self.period, self.breaks, symplectic=self.structure == "symplectic"
+        )
+
+    @property
+    def OUTPUTS(self):
+        """The outputs; Krein signs where the system is symplectic."""
+        return tuple(o for o in stability.OUTPUTS if o.name != "krein" or self.structure == "symplectic")
+
+    @property
+    def DIMENSIONS(self):
+        """Coordinates: numbers of multipliers, and the names of the states for rows and columns."""
+        number = np.arange(1, len(self.states) + 1)
+        return {"multiplier": number, "row": number, "column": number}
+
+    @property
+    def NOTES(self):
+        """What the system is, as global attributes of a file."""
+        return {"states": ", ".join(self.states), "structure": self.structure}
+
+    def cost(self, options, sizes):
+        """Seconds per point, roughly."""
+        n = len(self.states)
+        return 1.5e-5 + 1e-6 * n**2 + 1e-7 * n**3
+
+    def solve(self, point, request):
+        """The requested outputs of a block (see `survey.scenes`)."""
+        shape = np.broadcast_shapes(*(np.shape(values) for values in point.values()))
+        columns = [np.broadcast_to(point[p.name], shape).reshape(-1) for p in self.PARAMETERS]
+        points = np.stack(columns, axis=1).astype(float)
+        wanted = set(request.variables) or {o.name for o in self.OUTPUTS}
+        out = self._called(stability.solve, self._system, self.structure, points, request.method, request.rtol, wanted)
+        return {name: values.reshape(*shape, *values.shape[1:]) for name, values in out.items()}
+
+    def why(self, answer):
+        """Why a point has its verdict (see `survey.scenes`)."""
+        value, bar = float(answer["spectral_radius"]), float(answer["spectral_radius_error"])
+        radius = f"spectral radius {plus_minus(value, bar)}"
+        if answer["verdict"] == "unstable":
+            return f"{radius}: it is certainly above 1"
+        if answer["verdict"] == "undecided":
+            return f"{radius}: the error bar allows multipliers outside the unit circle, and inside or on it"
+        if self.structure == "none":
+            return f"{radius}: it is certainly below 1"
+        kind = "symplectic" if self.structure == "symplectic" else "reversible"
+        return f"all multipliers are simple and on the unit circle, within their error bars: the system is {kind}"
+
+    def trajectory(self, point, answer, options, time=None):
+        """A motion and the multipliers of a point (see `survey.scenes`)."""
+        points = np.array([[point[p.name] for p in self.PARAMETERS]])
+        return self._called(motion.solve, self._system, self.states, points, answer, time)
+
+    def check(self, points):
+        """Raise BadInput if A cannot be used, or contradicts the scene's other entries at these points (N, n)."""
+        given = points if len(points) else np.ones((1, len(self.PARAMETERS)))
+        for point in given:
+            self._try(point)
+        system = self._system
+        period, edges = self._called(system.ranges, given)
+        if not len(points):
+            if np.isfinite(edges).all():
+                self._called(system.traced, given, edges)
+            return
+        if np.isnan(period).all():
+            self._refuse(f"PERIOD is not a positive number at {self._where(points[0])}", "make it positive")
+        known = np.flatnonzero(np.isfinite(edges).all(axis=1))
+        groups = self._called(system.traced, given[known], edges[known])
+        followed = np.concatenate([[], *(own for own, _ in groups)]).astype(int)
+        for i in np.setdiff1d(np.arange(known.size), followed):
+            self._refuse(
+                f"a branch of the code changes within a period at {self._where(given[known[i]])}",
+                "name the times in BREAKS",
+            )
+        for own, programs in groups:
+            for i in known[own]:
+                self._compare(programs, given[i], period[i], edges[i])
+
+    def _compare(self, programs, point, period, edges):
+        """Refuse what the recorded operations show: another value than the code's, no period, no structure."""
+        n, size, plain, recorded = len(self.states), 0.0, [], []
+        for k, program in enumerate(programs):
+            t = edges[k] + (edges[k + 1] - edges[k]) * (0.01 + 0.98 * TRIED)
+            A, _E = program.at(point[None], t[None], n)
+            recorded.append(A[0])
+            plain.append(None if "A" not in self.matrices else [self._plain("A", time, point) for time in t])
+        size = max(abs(A).max() for A in recorded)
+        if not np.isfinite(size):
+            self._refuse(f"A has no finite value at {self._where(point)}", "correct it, or the domains of PARAMETERS")
+        for own, other in zip(recorded, plain, strict=True):
+            if other is not None and not (abs(own - np.array(other)) <= SAME * size).all():
+                self._refuse(
+                    f"A(t, p, out) gives other values when its operations are recorded, at {self._where(point)}",
+                    "use + - * / ** and functions of math or numpy alone",
+                )
+        self._check_structure(np.concatenate(recorded), size, point)
+        if self.structure == "reversible":
+            self._check_reversible(programs, point, edges, size)
+        if len(programs) == 1:
+            self._check_period(point, period, size)
+
+    def _check_structure(self, A, size, point):
+        n = len(self.states)
+        if self.structure == "symplectic":
+            JA = np.concatenate([A[:, n // 2 :], -A[:, : n // 2]], axis=1)
+            if not (abs(JA - np.swapaxes(JA, 1, 2)) <= SAME * size).all():
+                self._refuse(
+                    f"STRUCTURE = 'symplectic', but J A is not symmetric at {self._where(point)}",
+                    "order the states as coordinates, then their momenta, or set STRUCTURE = 'none'",
+                )
+
+    def _check_reversible(self, programs, point, edges, size):
+        """Refuse A unless signs r of the states exist with r_i r_j A_ij(-t) = -A_ij(t)."""
+        n, times = len(self.states), edges[-1] * (0.013 + 0.97 * TRIED)
+        there, back = (
+            np.array([self._at(programs, point, edges, t) for t in some]) for some in (times, edges[-1] - times)
+        )
+        odd, even = (abs(back + sign * there).max(axis=0) <= SAME * size for sign in (1, -1))
+        signs = np.zeros(n)
+        for first in range(n):
+            waiting = [first] if not signs[first] else []
+            signs[first] = signs[first] or 1.0
+            while waiting:
+                i = waiting.pop()
+                for j in range(n):
+                    for same, other in ((odd[i, j], even[i, j]), (odd[j, i], even[j, i])):
+                        wanted = None if same and other else signs[i] if same else -signs[i] if other else np.nan
+                        if wanted is None:
+                            continue
+                        if not signs[j]:
+                            signs[j] = wanted
+                            waiting.append(j)
+                        if signs[j] != wanted:
+                            self._refuse(
+                                "STRUCTURE = 'reversible', but no signs R give R A(-t) R = -A(t) at "
+                                f"{self._where(point)}",
+                                "move t = 0 to a centre of symmetry, or set STRUCTURE = 'none'",
+                            )
+
+    def _at(self, programs, point, edges, t):
+        k = min(int(np.searchsorted(edges, t, side="right")) - 1, len(programs) - 1)
+        return programs[k].at(point[None], np.array([[t]]), len(self.states))[0][0, 0]
+
+    def _check_period(self, point, period, size):
+        for name in self.matrices:
+            one, two = ([self._plain(name, t + shift, point) for t in TRIED * period] for shift in (0.0, period))
+            off = abs(np.array(one) - np.array(two)).max()
+            largest = max(size, abs(np.array(one)).max())
+            if not off <= SAME * largest:
+                self._refuse(
+                    f"{name}(t + T) differs from {name}(t) by {off:.2g} at {self._where(point)}, T = {period:g}",
+                    "correct PERIOD, or name 0 in BREAKS if it jumps there",
+                )
+
+    def _size_of(self, name):
+        return len(self.states) if name == "A" else len(self.states) // 2
+
+    def _plain(self, name, time, point):
+        """The matrix of this name, from the code run on numbers."""
+        m = self._size_of(name)
+        out = np.zeros((m, m))
+        function = getattr(self.matrices[name], "py_func", self.matrices[name])
+        with np.errstate(all="ignore"):
+            try:
+                value = function(float(time), point, out)
+            except (ArithmeticError, ValueError):
+                return np.full((m, m), np.nan)
+        return out if value is None else np.asarray(value, dtype=float)
+
+    def _try(self, point):
+        """Raise BadInput unless the functions, run as Python, fill their matrices."""
+        for name in self.matrices:
+            m = self._size_of(name)
+            call = f"{name}(t, p, out)"
+            try:
+                value = self._plain(name, 0.25, point)
+            except IndexError as error:
+                if "only integers" in str(error):
+                    self._refuse_index(call, error)
+                self._refuse(
+                    f"{call} indexes beyond an array ({error})",
+                    f"PARAMETERS names {len(self.own)} and out is {m} x {m}",
+                )
+            except Exception as error:
+                self._refuse(f"{call} fails ({type(error).__name__}: {reason(error)})", "correct it")
+            if value.shape != (m, m):
+                self._refuse(f"{call} returns an array of shape {value.shape}", f"it must fill out, {m} x {m}")
+
+    def _called(self, function, *arguments):
+        try:
+            return function(*arguments)
+        except Unsupported as error:
+            self._refuse(str(error), "use + - * / ** and functions such as sin, exp, sqrt of math or numpy")
+        except Raised as error:
+            cause = error.__cause__
+            self._refuse(f"{error} fails ({type(cause).__name__}: {reason(cause)})", "correct it")

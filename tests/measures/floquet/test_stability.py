@@ -1,0 +1,241 @@
+"""Floquet's question: multipliers and verdicts against exact ones, and what their error bars promise."""
+
+import json
+import math
+from importlib.resources import files
+
+import mpmath
+import numpy as np
+import pytest
+from floquet_truth import evaluated, hard, multipliers
+from scipy.optimize import linear_sum_assignment
+
+import survey
+from survey.measures.floquet import monodromy
+from survey.measures.floquet.multipliers import Discs, verdicts
+from survey.measures.floquet.system import System
+
+CASES = json.loads((files("survey.reference") / "floquet.json").read_text())["cases"]
+each_case = pytest.mark.parametrize("case", CASES, ids=[case["name"] for case in CASES])
+
+
+def numbers(rows):
+    return np.array([[float(x) for x in row] for row in rows])
+
+
+def scene_of(case):
+    """x' = (A0 + A1 cos wt + B1 sin wt) x, in which a parameter only scales a zero."""
+    n, w = case["n"], float(case["w"])
+    A0, A1, B1 = (numbers(case[name]) for name in ("A0", "A1", "B1"))
+
+    def A(t, p, out):
+        for i in range(n):
+            for j in range(n):
+                out[i, j] = A0[i, j] + A1[i, j] * math.cos(w * t) + B1[i, j] * np.sin(w * t)
+
+    states = [f"x{i}" for i in range(n)]
+    return survey.floquet(A, period=2 * math.pi / w, parameters="unused", states=states, structure=case["structure"])
+
+
+def matched(found, exact, bars):
+    """Are the exact multipliers, in some order, within the bars of those found?"""
+    off = np.array([[float(abs(mpmath.mpmathify(complex(x)) - y)) for y in exact] for x in found])
+    rows, columns = linear_sum_assignment(np.minimum(off / np.maximum(bars, 1e-300)[:, None], 1e9))
+    return (off[rows, columns] <= bars[rows]).all()
+
+
+@pytest.mark.parametrize("method", ["auto", "dop853"])
+@each_case
+def test_reference_systems(case, method):
+    names = ["monodromy", "multiplier_re", "multiplier_im", "spectral_radius", "verdict"]
+    ds = survey.evaluate(scene_of(case), unused=1.0, method=method, variables=names)
+    M, bars = numbers(case["M"]), ds.monodromy_error.values
+    assert (abs(ds.monodromy.values - M) <= bars).all()
+    assert (bars <= 1e-10 * (1 + abs(M))).all()
+    exact = [mpmath.mpc(*pair) for pair in case["multipliers"]]
+    found = ds.multiplier_re.values + 1j * ds.multiplier_im.values
+    assert matched(found, exact, ds.multiplier_re_error.values)
+    radius = mpmath.mpf(case["spectral_radius"])
+    assert abs(radius - float(ds.spectral_radius)) <= float(ds.spectral_radius_error)
+    on_circle = case["structure"] == "symplectic" and abs(radius - 1) < 1e-20
+    assert int(ds.verdict) == (1 if radius < 1 or on_circle else 0)
+
+
+@pytest.mark.parametrize("n, number", [(2, 100), (3, 60), (4, 60), (6, 25)])
+def test_random_systems_in_turning_coordinates(n, number):
+    check_random(n, number, seed=n)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("n, number", [(1, 5_000), (2, 40_000), (3, 20_000), (4, 20_000), (6, 10_000), (12, 1_000)])
+def test_very_many_random_systems(n, number):
+    check_random(n, number, seed=100 + n)
+
+
+def check_random(n, number, seed):
+    B = hard(n, number, seed)
+    ds = evaluated(n, B)
+    found = ds.multiplier_re.values + 1j * ds.multiplier_im.values
+    undecided = 0
+    for k in range(number):
+        exact = multipliers(B[k])
+        radius = max(abs(value) for value in exact)
+        verdict = int(ds.verdict[k])
+        assert int(ds.status[k]) == 0
+        assert verdict in (-1, int(radius < 1))
+        assert abs(radius - float(ds.spectral_radius[k])) <= float(ds.spectral_radius_error[k])
+        assert matched(found[k], exact, ds.multiplier_re_error[k].values)
+        # next to the edge, and where multipliers are defective or very sensitive, float64 may leave it open
+        undecided += verdict < 0 and k % 5 in (0, 1) and abs(radius - 1) > 1e-7
+    assert undecided == 0
+
+
+@pytest.mark.parametrize("steps", [3, 7, 50])
+def test_verdicts_do_not_depend_on_the_number_of_steps(steps):
+    B = hard(4, 40, seed=1)
+    fine = evaluated(4, B).verdict.values
+
+    def A(t, p, out):
+        out[:] = np.array(p, dtype=object).reshape(4, 4)
+
+    points = monodromy.Points(System({"A": A}, 4, 2 * math.pi, (), False), B.reshape(40, 16))
+    method = monodromy.method_of("auto")
+    own = points.steps(method.floquet_reach(1e-10), np.ones(40), np.arange(40)).sum(axis=1)
+    M, E = monodromy.solve(points, method, 1e-10, steps / own, np.arange(40))
+    coarse = verdicts(Discs(M, E), M, E, False)
+    assert ((coarse == fine) | (coarse < 0) | (fine < 0)).all()
+    assert (coarse >= 0).any()
+
+
+def mathieu(structure, **more):
+    def K(t, p, out):
+        out[0, 0] = p[0] - 2 * p[1] * math.cos(2 * t)
+
+    def C(t, p, out):
+        out[0, 0] = 2 * p[2]
+
+    damped = {} if structure == "symplectic" else {"C": C}
+    return survey.floquet(
+        K=K, **damped, period=math.pi, parameters=("a", "q", "c"), states="x", structure=structure, **more
+    )
+
+
+def test_mathieus_map():
+    axes = {"a": np.linspace(-0.507, 6.03, 60), "q": np.linspace(0.013, 4.1, 40)}
+    ours = survey.evaluate(mathieu("symplectic"), **axes, c=0.0)
+    known = survey.evaluate("mathieu", **axes)
+    assert (ours.verdict == known.verdict).all()
+    trace = ours.multiplier_re.sum("multiplier")
+    bar = ours.multiplier_re_error.sum("multiplier") + known.discriminant_error + 1e-12 * abs(known.discriminant)
+    assert (abs(trace - known.discriminant) <= bar).all()
+    # l and 1 / conj(l), at every point
+    product = ours.multiplier_re.prod("multiplier") - ours.multiplier_im.prod("multiplier")
+    off = abs(product - 1)
+    assert (off <= 1e-12 * abs(known.discriminant).clip(1)).all()
+    stable = (ours.verdict == 1).values
+    assert (np.sort(ours.krein.values[stable], axis=-1) == [-1, 1]).all()
+    assert (ours.krein.values[~stable] == 0).all()
+    sign = np.sign(known.discriminant)
+    assert (ours.crossing.where(~stable) == xr_where(sign)).values[~stable].all()
+
+
+def xr_where(sign):
+    """The code of plus_one where D > 0, of minus_one where D < 0."""
+    return (sign > 0) * 1 + (sign < 0) * 2
+
+
+def test_damped_mathieu_from_mathieu():
+    """y = exp(-c t) v turns y'' + 2 c y' + (a - 2 q cos 2t) y = 0 into Mathieu's equation at a - c^2."""
+    a, q, c = np.linspace(0.0, 6.0, 50), np.linspace(0.0, 4.0, 30), 0.15
+    ours = survey.evaluate(mathieu("none"), a=a, q=q, c=c)
+    known = survey.evaluate("mathieu", a=a - c * c, q=q)
+    exponent = known.exponent.values / math.pi - c  # known is the growth per period
+    off = abs(ours.exponent.values - exponent)
+    sure = known.verdict.values >= 0
+    assert (off <= ours.exponent_error.values + known.exponent_error.values + 1e-13)[sure].all()
+    agrees = (ours.verdict.values == (exponent < 0)) | (abs(exponent) < 1e-9)
+    assert agrees.all()
+
+
+def test_danbys_map():
+    def A(t, p, out):
+        mu, e = p
+        s = math.sqrt(1 - 3 * mu * (1 - mu))
+        r = 1 / (1 + e * math.cos(t))
+        # canonical: X = xi' - eta, Y = eta' + xi
+        out[0, 1], out[1, 0], out[0, 2], out[1, 3] = 1.0, -1.0, 1.0, 1.0
+        out[2, 0], out[2, 3] = 1.5 * (1 + s) * r - 1.0, 1.0
+        out[3, 1], out[3, 2] = 1.5 * (1 - s) * r - 1.0, -1.0
+
+    scene = survey.floquet(
+        A, period=2 * math.pi, parameters=("mu", "e"), states=("xi", "eta", "X", "Y"), structure="symplectic"
+    )
+    axes = {"mu": np.linspace(0.001, 0.0532, 41), "e": np.linspace(0.0, 0.7, 29)}
+    ours, known = survey.evaluate(scene, **axes), survey.evaluate("libration_elliptic", **axes)
+    decided = ours.verdict >= 0
+    assert float(decided.mean()) > 0.99
+    assert (ours.verdict == known.verdict).where(decided, True).all()
+    same = {1: 2, 2: 4}  # codes of minus_one and of collisions there, which asks for no others, and here
+    stable = (known.verdict == 1).values & (ours.crossing > 1).values & (known.collision > 0).values
+    assert stable.sum() > 50
+    assert (np.vectorize(same.get)(known.collision.values[stable]) == ours.crossing.values[stable]).all()
+
+
+def test_sum_and_difference_resonances():
+    """Yakubovich and Starzhinskii: symmetric coupling loses stability at w1 + w2, antisymmetric at w1 - w2."""
+    w1, w2, eps = 1.3, 0.7, 0.05
+
+    def scene(sign, period):
+        def A(t, p, out):
+            coupling = p[0] * math.cos(2 * math.pi / period * t)
+            out[0, 2] = out[1, 3] = 1.0
+            out[2, 0], out[3, 1] = -w1 * w1, -w2 * w2
+            out[2, 1], out[3, 0] = coupling, sign * coupling
+
+        structure = "symplectic" if sign > 0 else "reversible"
+        return survey.floquet(A, period=period, parameters="eps", states=("x", "y", "u", "v"), structure=structure)
+
+    sums, differences = 2 * math.pi / (w1 + w2), 2 * math.pi / (w1 - w2)
+    verdicts = [
+        int(survey.evaluate(scene(sign, period), eps=eps).verdict)
+        for sign, period in ((1, sums), (1, differences), (-1, sums), (-1, differences))
+    ]
+    assert verdicts == [0, 1, 1, 0]
+
+
+def test_meissner_with_breaks():
+    """A square wave: its trace in closed form."""
+
+    def K(t, p, out):
+        out[0, 0] = p[0] + (p[1] if t < 1.0 else -p[1])
+
+    scene = survey.floquet(K=K, period=2.5, parameters=("a", "b"), states="x", breaks=1.0, structure="symplectic")
+    a, b = np.linspace(1.0, 9.0, 23), np.linspace(0.0, 0.9, 11)
+    ds = survey.evaluate(scene, a=a, b=b)
+    p, q = np.sqrt(a[:, None] + b), np.sqrt(a[:, None] - b)
+    trace = 2 * np.cos(p) * np.cos(1.5 * q) - (p / q + q / p) * np.sin(p) * np.sin(1.5 * q)
+    found = ds.multiplier_re.sum("multiplier").values
+    assert (abs(found - trace) <= ds.multiplier_re_error.sum("multiplier").values + 1e-13).all()
+    assert ((ds.verdict.values == (abs(trace) < 2)) | (abs(abs(trace) - 2) < 1e-9)).all()
+
+
+def test_constant_systems_and_one_state():
+    def A(t, p, out):
+        out[0, 0] = p[0] + p[1] * math.sin(t)
+
+    ds = survey.evaluate(
+        survey.floquet(A, period=2 * math.pi, parameters=("a", "b"), states="x"), a=[-0.2, 0.0, 0.1], b=[0.0, 3.0]
+    )
+    exact = np.exp(2 * math.pi * np.array([-0.2, 0.0, 0.1]))[:, None]
+    assert (abs(ds.spectral_radius - exact) <= ds.spectral_radius_error + 1e-15 * exact).all()
+    assert ds.verdict.values.tolist() == [[1, 1], [-1, -1], [0, 0]]
+
+
+def test_bits_do_not_depend_on_the_block():
+    scene = mathieu("none")
+    a, q = np.linspace(0, 5, 37), np.linspace(0, 3, 17)
+    whole = survey.evaluate(scene, a=a, q=q, c=0.1)
+    for i, k in ((0, 0), (36, 16), (17, 5)):
+        one = survey.evaluate(scene, a=a[i], q=q[k], c=0.1)
+        for name in whole.data_vars:
+            assert np.array_equal(whole[name].isel(a=i, q=k).values, one[name].values, equal_nan=True)
