@@ -71,7 +71,7 @@ class Points:
         length = np.diff(self.edges[those], axis=1)
         with np.errstate(invalid="ignore"):
             least = 0.5 * length / reach * (self.size[those] + BY_RATE * self.rate[those])
-            count = np.ceil(factor[:, None] * np.maximum(least, 1.0))
+            count = np.ceil(factor[:, None] * np.maximum(np.ceil(least), 1.0))  # more on every rung
         return np.where(length > 0, np.clip(np.nan_to_num(count, nan=1.0), 1, MOST_STEPS), 0).astype(np.int64)
 
 
