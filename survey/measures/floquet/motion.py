@@ -54,7 +54,7 @@ def _leading(points):
 def _sampled(points, n):
     """A at the nodes of all steps of a period (steps, 9, n, n), bounds of its rounding, and the steps' lengths."""
     found = []
-    for own, programs, numbers in points.groups:
+    for own, programs, _numbers in points.groups:
         for k, program in enumerate(programs):
             low, high = points.edges[own[0], k : k + 2]
             count = int(np.clip(points.size[0, k] * (high - low) / (2 * REACH), LEAST, MOST)) if high > low else 0
@@ -62,7 +62,7 @@ def _sampled(points, n):
                 continue
             h = (high - low) / count
             t = low + h * (np.arange(count)[:, None] + linear_motion.NODES)
-            A, E = program.at(points.points, np.minimum(t, high).reshape(1, -1), n, numbers[k])
+            A, E = program.at(points.points, np.minimum(t, high).reshape(1, -1), n)
             shape = (count, linear_motion.NODES.size, n, n)
             found.append((A.reshape(shape), E.reshape(shape), np.full(count, h)))
     return (np.concatenate(parts) for parts in zip(*found, strict=True))

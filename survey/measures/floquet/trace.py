@@ -135,32 +135,38 @@ class Symbol:
         """Does it depend on parameters alone?"""
         return all(basis == ONE for basis in self.terms)
 
+    def _with(self, operation, left, right):
+        """The operation of the graph on both; numpy's arrays take it entry by entry."""
+        if any(isinstance(x, np.ndarray) and x.ndim for x in (left, right)):
+            return NotImplemented
+        return operation(left, right)
+
     def __add__(self, other):
-        return self.graph.sum(self, other)
+        return self._with(self.graph.sum, self, other)
 
     def __mul__(self, other):
-        return self.graph.product(self, other)
+        return self._with(self.graph.product, self, other)
 
     def __neg__(self):
         return self.graph.product(self, -1.0)
 
     def __sub__(self, other):
-        return self.graph.sum(self, -other)
+        return self._with(lambda x, y: self.graph.sum(x, -y), self, other)
 
     def __rsub__(self, other):
-        return self.graph.sum(-self, other)
+        return self._with(lambda x, y: self.graph.sum(x, -y), other, self)
 
     def __truediv__(self, other):
-        return self.graph.quotient(self, other)
+        return self._with(self.graph.quotient, self, other)
 
     def __rtruediv__(self, other):
-        return self.graph.quotient(other, self)
+        return self._with(self.graph.quotient, other, self)
 
     def __pow__(self, exponent):
-        return self.graph.power(self, exponent)
+        return self._with(self.graph.power, self, exponent)
 
     def __rpow__(self, base):
-        return self.graph.power(base, self)
+        return self._with(self.graph.power, base, self)
 
     __radd__, __rmul__ = __add__, __mul__
 

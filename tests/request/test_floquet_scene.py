@@ -1,0 +1,268 @@
+"""A user's own linear periodic system goes through every command like a built-in scene; what is wrong is said plainly."""
+
+import math
+
+import numba
+import numpy as np
+import pytest
+import xarray as xr
+
+import survey
+from survey.errors import BadInput
+from survey.request import user_scene
+
+SCENE = '''"""Two pendulums of my own, coupled, on a shaken table."""
+
+from math import cos, pi
+
+PARAMETERS = ("delta", "epsilon", "zeta")
+STATES = ("x", "y")
+PERIOD = pi
+
+
+def K(t, p, out):
+    out[0, 0] = p[0] + p[1] * cos(2 * t)
+    out[1, 1] = 1.7 * p[0] + p[1] * cos(2 * t)
+    out[0, 1] = out[1, 0] = 0.1
+
+
+def C(t, p, out):
+    out[0, 0] = out[1, 1] = 2 * p[2]
+'''
+WORKFLOW = """
+scene = "mine.py"
+[axes]
+delta = { start = 0.5, stop = 3.0, num = 12 }
+epsilon = { start = 0.0, stop = 1.5, num = 9 }
+zeta = 0.02
+[output]
+figures = ["verdict", "spectral_radius"]
+"""
+
+
+def K(t, p, out):
+    out[0, 0] = p[0] + p[1] * math.cos(2 * t)
+
+
+def C(t, p, out):
+    out[0, 0] = 2 * p[2]
+
+
+def scene(**given):
+    usual = {"K": K, "C": C, "period": math.pi, "parameters": ("delta", "epsilon", "zeta"), "states": "x"}
+    return survey.floquet(**(usual | given))
+
+
+def test_every_command_takes_it(program, tmp_path, monkeypatch):
+    (tmp_path / "mine.py").write_text(SCENE)
+    (tmp_path / "mine.toml").write_text(WORKFLOW)
+    monkeypatch.chdir(tmp_path)
+    run = program("run", "mine.toml", "-o", "mine.nc", "--workers", "1")
+    assert run.returncode == 0, run.stderr
+    assert (tmp_path / "mine.png").exists()
+    for words in (("plan", "mine.toml"), ("info", "mine.nc"), ("verify", "mine.nc"), ("plot", "mine.nc")):
+        done = program(*words)
+        assert done.returncode == 0, done.stderr
+    about = program("scenes", "mine.py").stdout
+    assert "Two pendulums of my own" in about and "spectral_radius" in about
+    ds = survey.open("mine.nc")
+    assert ds.attrs["scene_text"] == SCENE and ds.attrs["states"] == "x, y, dx, dy"
+    assert ds.multiplier_re.dims == ("delta", "epsilon", "multiplier") and ds.sizes["multiplier"] == 4
+    assert set(np.unique(ds.verdict)) == {0, 1} and (ds.status == 0).all()
+    motion = ds.survey.trajectory(delta=ds.delta.values[3], epsilon=ds.epsilon.values[4], time=4.0)
+    assert motion.dx.shape == motion.t.shape and motion.sizes["multiplier"] == 4
+    assert "certainly" in str(ds.survey.point(delta=ds.delta.values[3], epsilon=ds.epsilon.values[4]))
+    finer = ds.survey.zoom(delta=(1.0, 1.5), epsilon=(0.5, 1.0), num=3)
+    assert finer.verdict.shape == (3, 3)
+
+
+def test_the_monodromy_matrix_is_given_when_it_is_named():
+    ds = survey.evaluate(scene(), delta=1.0, epsilon=0.2, zeta=0.1, variables=["monodromy"])
+    assert ds.monodromy.dims == ("row", "column") and set(ds.data_vars) == {"monodromy", "monodromy_error", "status"}
+    assert "monodromy" not in survey.evaluate(scene(), delta=1.0, epsilon=0.2, zeta=0.1)
+    # Liouville: det M = exp of the integral of tr A = exp(-2 zeta T)
+    assert np.linalg.det(ds.monodromy.values) == pytest.approx(math.exp(-0.2 * math.pi), rel=1e-12)
+
+
+def test_compiled_functions_closures_and_numpy_are_followed():
+    shape = np.array([[2.0, -0.3], [-0.3, 1.0]])
+
+    @numba.njit
+    def wave(t, frequency):
+        return math.sin(frequency * t) ** 2
+
+    def stiffness(t, p, out):
+        out[:] = p[0] * shape + p[1] * wave(t, 1.0) * np.eye(2)
+
+    def by_hand(t, p, out):
+        value = 0.5 - 0.5 * np.cos(2 * t)
+        for i in range(2):
+            for j in range(2):
+                out[i, j] = p[0] * [[2.0, -0.3], [-0.3, 1.0]][i][j]
+            out[i, i] = out[i, i] + p[1] * value
+
+    ones, others = (
+        survey.evaluate(
+            survey.floquet(K=k, period=math.pi, parameters=("a", "b"), states=("x", "y")), a=[1.0, 2.0], b=[0.3, 0.9]
+        )
+        for k in (stiffness, by_hand)
+    )
+    off = abs(ones.spectral_radius - others.spectral_radius)
+    assert (off <= ones.spectral_radius_error + others.spectral_radius_error).all()
+
+
+def test_a_mass_matrix_and_momenta_give_the_same_multipliers():
+    def M(t, p, out):
+        out[0, 0], out[1, 1], out[0, 1], out[1, 0] = 2.0, 1.0 + p[0], 0.3, 0.3
+
+    def G(t, p, out):
+        out[0, 1], out[1, 0] = 0.7, -0.7
+
+    def K2(t, p, out):
+        out[0, 0], out[1, 1] = 1.5 + p[1] * math.cos(t), 2.5
+        out[0, 1] = out[1, 0] = 0.2 * math.sin(t)
+
+    given = {"M": M, "C": G, "K": K2, "period": 2 * math.pi, "parameters": ("m", "b"), "states": ("x", "y")}
+    free, canonical = (
+        survey.evaluate(survey.floquet(**given, structure=kind), m=[0.0, 1.0], b=[0.1, 0.8])
+        for kind in ("none", "symplectic")
+    )
+    bars = free.spectral_radius_error + canonical.spectral_radius_error
+    assert (abs(free.spectral_radius - canonical.spectral_radius) <= bars).all()
+    assert (canonical.verdict >= 0).all() and (canonical.verdict == 1).any()
+    assert (free.verdict != 1).all()  # on the unit circle no velocity tells that it stays there
+
+
+def test_branches_are_followed_where_points_take_them():
+    def K2(t, p, out):
+        out[0, 0] = (p[0] if p[0] > 1.0 else 2.0 - p[0]) + abs(p[1]) * math.cos(2 * t)
+
+    def plain(t, p, out):
+        out[0, 0] = p[0] + p[1] * math.cos(2 * t)
+
+    ours = survey.evaluate(
+        scene(K=K2, parameters=("a", "b"), C=lambda t, p, out: None), a=[0.3, 1.0, 1.4], b=[-0.2, 0.4]
+    )
+    same = survey.evaluate(
+        scene(K=plain, parameters=("a", "b"), C=lambda t, p, out: None), a=[1.7, 1.0, 1.4], b=[0.2, 0.4]
+    )
+    assert (abs(ours.spectral_radius.values - same.spectral_radius.values) < 1e-7).all()
+    assert (ours.multiplier_re.values == same.multiplier_re.values).all()
+
+
+def test_the_hash_tells_of_all_that_the_functions_depend_on():
+    first = scene().HASH
+    assert scene().HASH == first
+    others = [
+        scene(K=lambda t, p, out: None), scene(C=lambda t, p, out: None), scene(period=2.0),
+        scene(states="y"), scene(structure="reversible"), scene(breaks=1.0), scene(parameters=("a", "b", "c")),
+    ]  # fmt: skip
+    assert len({first, *(other.HASH for other in others)}) == 8
+
+
+def test_functions_from_python_run_in_other_processes(tmp_path):
+    given = {
+        "scene": scene(),
+        "axes": {"delta": {"values": [0.5, 1.0]}, "epsilon": {"values": [0.0, 1.0]}, "zeta": 0.1},
+    }
+    one = survey.run(given, output=tmp_path / "one.nc")
+    two = survey.run(given, output=tmp_path / "two.nc", workers=1)
+    xr.testing.assert_equal(one.drop_attrs(), two.drop_attrs())
+    assert user_scene.of_dataset(one).HASH == one.attrs["scene_hash"]
+
+
+def test_a_point_without_a_value_costs_itself_alone():
+    def K2(t, p, out):
+        out[0, 0] = np.sqrt(p[0]) + math.cos(2 * t)
+
+    own = scene(K=K2, parameters="a", C=lambda t, p, out: None)
+    ds = survey.evaluate(own, a=[1.0, -1.0, 4.0, np.nan])
+    assert ds.status.values.tolist() == [0, 1, 0, 1]
+    assert np.isnan(ds.spectral_radius.values).tolist() == [False, True, False, True]
+
+
+def wrong(t, p, out):
+    raise RuntimeError("no")
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"K": 1.0}, "K must be a function of three arguments"),
+        ({"C": lambda t, p: None}, "C must be a function of three arguments"),
+        ({"A": K}, "give either A"),
+        ({"K": None}, "give either A"),
+        ({"states": ()}, "give the names of the states"),
+        ({"states": ("x", "x")}, "give the names of the states"),
+        ({"structure": "hamiltonian"}, "must be one of 'none', 'symplectic', 'reversible'"),
+        ({"period": 0.0}, "it must be a positive number"),
+        ({"breaks": 9.0}, "lies outside"),
+        ({"parameters": ("spectral_radius",)}, "neither an output"),
+        ({"parameters": ("row",)}, "neither an output"),
+    ],
+)
+def test_wrong_scenes_are_one_line(given, words):
+    with pytest.raises(BadInput, match=words) as refusal:
+        scene(**given)
+    assert "\n" not in str(refusal.value)
+
+
+def jumping(t, p, out):
+    out[0, 0] = p[0] if t < 1.0 else p[1]
+
+
+def larger(t, p, out):
+    out[1, 1] = 1.0
+
+
+def rooted(t, p, out):
+    out[0, 0] = float(p[0])
+
+
+def tabulated(t, p, out):
+    out[0, 0] = np.interp(t, [0.0, 1.0], [1.0, 2.0])
+
+
+def endless(t, p, out):
+    out[0, 0] = math.log(-p[0])
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"K": wrong}, r"K\(t, p, out\) fails \(RuntimeError: no\)"),
+        ({"K": larger}, r"K\(t, p, out\) indexes beyond an array .*out is 1 x 1"),
+        ({"K": lambda t, p, out: p["delta"]}, "accesses a parameter by name"),
+        ({"K": lambda t, p, out: np.zeros((2, 2))}, r"returns an array of shape \(2, 2\)"),
+        ({"K": jumping}, "name the times in BREAKS"),
+        ({"K": rooted}, "needs the value of t or of a parameter"),
+        ({"K": tabulated}, "use .* functions such as sin, exp, sqrt"),
+        ({"K": endless}, "no finite value at delta = 1"),
+        ({"period": 3.0}, r"K\(t \+ T\) differs from K\(t\) by"),
+        ({"period": lambda p: -1.0}, "PERIOD is not a positive number"),
+        ({"period": lambda p: 1 / 0}, r"PERIOD\(p\) fails \(ZeroDivisionError"),
+        ({"structure": "symplectic"}, "J A is not symmetric"),
+        ({"structure": "reversible"}, "no signs R"),
+    ],
+)
+def test_wrong_functions_are_one_line(given, words):
+    with pytest.raises(BadInput, match=words) as refusal:
+        survey.evaluate(scene(**given), delta=[1.0, 2.0], epsilon=0.3, zeta=0.1)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_file_without_its_names_is_one_line(tmp_path):
+    for name in ("STATES", "PERIOD", "PARAMETERS"):
+        path = tmp_path / f"{name}.py"
+        path.write_text("\n".join(line for line in SCENE.splitlines() if not line.startswith(name)))
+        with pytest.raises(BadInput, match=f"{name} is missing; write {name} ="):
+            survey.evaluate(str(path), delta=1.0, epsilon=0.3, zeta=0.1)
+
+
+def test_reversible_systems_of_one_coordinate_are_stable_on_the_circle():
+    ds = survey.evaluate(
+        survey.floquet(K=K, period=math.pi, parameters=("delta", "epsilon"), states="x", structure="reversible"),
+        delta=[0.5, 1.0], epsilon=0.4,
+    )  # fmt: skip
+    known = survey.evaluate("mathieu", a=[0.5, 1.0], q=-0.2)
+    assert ds.verdict.values.tolist() == known.verdict.values.tolist() == [1, 0]
