@@ -50,7 +50,7 @@ floquet_factors = steps.factors
 
 def floquet_reach(rtol):
     """How far the norm of A times half a step may go for accuracy rtol; bounds of what is missing are far larger."""
-    return (1e-5 * max(rtol, 1e-14) * math.factorial(ORDER + 1)) ** (1 / (ORDER + 1))
+    return (1e-7 * max(rtol, 1e-14) * math.factorial(ORDER + 1)) ** (1 / (ORDER + 1))
 
 
 def hill_density(rtol):

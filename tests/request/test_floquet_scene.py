@@ -1,4 +1,4 @@
-"""A user's own linear periodic system goes through every command like a built-in scene; what is wrong is said plainly."""
+"""A user's own linear periodic system goes through every command like a built-in scene; errors are one line."""
 
 import math
 

@@ -36,17 +36,18 @@ def factors(
     A_ij is taken times scale_j / scale_i, powers of 2.
     """
     lanes = lanes_of(n)
-    places, size = len(operations), n * n
-    S, X = np.zeros((places, ORDER + 1, lanes)), np.empty((ORDER + 1, size, lanes))
-    C, V = np.zeros((places, size, lanes)), np.empty((numbers.shape[1], lanes))
-    W = np.empty((len(terms), lanes))
+    places = len(operations)
+    S, X = np.zeros((places, ORDER + 1, lanes)), np.empty((ORDER + 1, n, n * lanes))
+    B, C = np.zeros((places, ORDER + 1, n * lanes)), np.zeros((places, n, n * lanes))
+    V, W = np.empty((numbers.shape[1], lanes)), np.empty((len(terms), n * lanes))
     a, w, e = np.zeros((ORDER + 1, lanes)), np.empty((ORDER + 1 + BEYOND, lanes)), np.empty((ORDER + 1, lanes))
     rows, t, s, own = np.empty((n, lanes)), np.empty(lanes), np.empty(lanes), np.empty(lanes)
-    plus, minus = np.empty((size, lanes)), np.empty((size, lanes))
+    plus, minus = np.empty((n, n * lanes)), np.empty((n, n * lanes))
     U, inverse, work = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
-    per_row = np.zeros(n)
+    per_row, needed = np.zeros(n), np.zeros((places, n), np.bool_)
     for k in range(len(terms)):
         per_row[terms[k, ROW]] += 1.0
+        needed[terms[k, BASIS], terms[k, COLUMN]] = True
     most = per_row.max() if n else 0.0
     for start in range(0, len(point), lanes):
         for lane in range(lanes):
@@ -56,15 +57,17 @@ def factors(
             for k in range(numbers.shape[1]):
                 V[k, lane] = numbers[i, k]
             for k in range(len(terms)):
-                W[k, lane] = numbers[i, terms[k, NUMBER]] * (scale[i, terms[k, COLUMN]] / scale[i, terms[k, ROW]])
+                weight = numbers[i, terms[k, NUMBER]] * (scale[i, terms[k, COLUMN]] / scale[i, terms[k, ROW]])
+                for c in range(n):
+                    W[k, c * lanes + lane] = weight
         X[0] = 0.0
         for i in range(n):
-            X[0, i * n + i] = 1.0
+            X[0, i, i * lanes : (i + 1) * lanes] = 1.0
         w[0], e[0] = 1.0, 0.0
         for k in range(ORDER):
             extend(operations, signs, inside, order, V, t, s, S, k)
             _norm(S, W, terms, k, rows, a[k])
-            _next(S, W, terms, used, k, n, s, C, X)
+            _next(S, W, terms, used, needed, k, n, s, B, C, X)
             _row_sums(X[k + 1], n, rows, w[k + 1])
             _rounded(a, w, e, own, s, k, most)
         extend(operations, signs, inside, order, V, t, s, S, ORDER)
@@ -73,7 +76,7 @@ def factors(
         for lane in range(min(lanes, len(point) - start)):
             cut, rounding, total = _missing(a, w, e, s, lane)
             delta = cut + rounding + 2.0 * ROUNDOFF_UP * total
-            error[start + lane] = _over(plus, minus, lane, n, delta, U, inverse, work, F[start + lane])
+            error[start + lane] = _over(plus, minus, lane, lanes, n, delta, U, inverse, work, F[start + lane])
             doubt[start + lane] = n * error[start + lane] * total * total
 
 
@@ -95,51 +98,53 @@ def _norm(S, W, terms, k, rows, out):
 
 
 @kernel
-def _next(S, W, terms, used, k, n, s, C, X):
-    """Fill X[k + 1] = half / (k + 1) * sum over j of A_j X[k - j]."""
-    lanes, size = X.shape[2], n * n
+def _next(S, W, terms, used, needed, k, n, s, B, C, X):
+    """Fill X[k + 1] = half / (k + 1) * sum over j of A_j X[k - j]; `needed` (basis, row) rows of X are multiplied.
+
+    Each row of X, C and B[basis, order] holds `lanes` numbers for every column, as one long vector.
+    """
+    lanes = len(s)
     for at in range(len(used)):
         m = used[at]
         if m == ONE:
             continue
-        sums = C[m]
-        for j in range(k + 1):
-            basis, before = S[m, j], X[k - j]
-            for q in range(size):
-                one, two = sums[q], before[q]
-                if j == 0:
-                    for lane in range(lanes):
-                        one[lane] = basis[lane] * two[lane]
-                else:
-                    for lane in range(lanes):
-                        one[lane] += basis[lane] * two[lane]
+        for c in range(n):
+            for lane in range(lanes):
+                B[m, k, c * lanes + lane] = S[m, k, lane]
+        for row in range(n):
+            if needed[m, row]:
+                sums = C[m, row]
+                sums[:] = 0.0
+                for j in range(k + 1):
+                    basis, before = B[m, j], X[k - j, row]
+                    for q in range(n * lanes):
+                        sums[q] += basis[q] * before[q]
     new = X[k + 1]
     new[:] = 0.0
     for q in range(len(terms)):
-        row, column, weight = terms[q, ROW] * n, terms[q, COLUMN] * n, W[q]
+        one, weight = new[terms[q, ROW]], W[q]
+        two = X[k, terms[q, COLUMN]] if terms[q, BASIS] == ONE else C[terms[q, BASIS], terms[q, COLUMN]]
+        for i in range(n * lanes):
+            one[i] += weight[i] * two[i]
+    for row in range(n):
+        one = new[row]
         for c in range(n):
-            two = X[k, column + c] if terms[q, BASIS] == ONE else C[terms[q, BASIS], column + c]
-            one = new[row + c]
             for lane in range(lanes):
-                one[lane] += weight[lane] * two[lane]
-    for q in range(size):
-        one = new[q]
-        for lane in range(lanes):
-            one[lane] *= s[lane] / (k + 1)
+                one[c * lanes + lane] *= s[lane] / (k + 1)
 
 
 @kernel
 def _row_sums(X, n, rows, out):
-    """The maximum norm by rows of the matrix X (n n, lanes)."""
+    """The maximum norm by rows of the matrix X (n, n lanes)."""
+    lanes = len(out)
     out[:] = 0.0
     for i in range(n):
-        row = rows[i]
+        row, one = rows[i], X[i]
         row[:] = 0.0
         for c in range(n):
-            one = X[i * n + c]
-            for lane in range(len(out)):
-                row[lane] += abs(one[lane])
-        for lane in range(len(out)):
+            for lane in range(lanes):
+                row[lane] += abs(one[c * lanes + lane])
+        for lane in range(lanes):
             out[lane] = max(out[lane], row[lane])
 
 
@@ -160,22 +165,22 @@ def _rounded(a, w, e, own, s, k, most):
 
 @kernel
 def _ends(X, plus, minus):
-    """Fill the sums of the series at tau = 1 and -1."""
-    for q in range(X.shape[1]):
-        one, two = plus[q], minus[q]
-        one[:] = X[ORDER, q]  # of even orders
-        two[:] = X[ORDER - 1, q]
+    """Fill the sums of the series at tau = 1 and -1, like X[0]."""
+    for i in range(X.shape[1]):
+        one, two = plus[i], minus[i]
+        one[:] = X[ORDER, i]  # of even orders
+        two[:] = X[ORDER - 1, i]
         for k in range(ORDER - 2, -1, -2):
-            even = X[k, q]
-            for lane in range(X.shape[2]):
-                one[lane] += even[lane]
+            even = X[k, i]
+            for q in range(len(one)):
+                one[q] += even[q]
             if k > 0:
-                odd = X[k - 1, q]
-                for lane in range(X.shape[2]):
-                    two[lane] += odd[lane]
-        for lane in range(X.shape[2]):
-            sum_of, difference = one[lane] + two[lane], one[lane] - two[lane]
-            one[lane], two[lane] = sum_of, difference
+                odd = X[k - 1, i]
+                for q in range(len(one)):
+                    two[q] += odd[q]
+        for q in range(len(one)):
+            sum_of, difference = one[q] + two[q], one[q] - two[q]
+            one[q], two[q] = sum_of, difference
 
 
 @kernel
@@ -202,16 +207,16 @@ def _missing(a, w, e, s, lane):
 
 
 @kernel
-def _over(plus, minus, lane, n, delta, U, inverse, work, F):
+def _over(plus, minus, lane, lanes, n, delta, U, inverse, work, F):
     """Fill F = U(1) U(-1)^-1 of lane lane; returns the bound of its entries, `delta` being that of the rows of U."""
     up = down = 0.0
     for i in range(n):
         total = other = 0.0
         for j in range(n):
-            U[i, j] = work[i, j] = minus[i * n + j, lane]
+            U[i, j] = work[i, j] = minus[i, j * lanes + lane]
             inverse[i, j] = 1.0 if i == j else 0.0
-            total += abs(plus[i * n + j, lane])
-            other += abs(minus[i * n + j, lane])
+            total += abs(plus[i, j * lanes + lane])
+            other += abs(minus[i, j * lanes + lane])
         up, down = max(up, total), max(down, other)
     if not _invert(work, inverse, n) or not math.isfinite(delta):
         F[:] = math.nan
@@ -222,7 +227,7 @@ def _over(plus, minus, lane, n, delta, U, inverse, work, F):
         for j in range(n):
             sum_of, residual = 0.0, (-1.0 if i == j else 0.0)
             for k in range(n):
-                sum_of += plus[i * n + k, lane] * inverse[k, j]
+                sum_of += plus[i, k * lanes + lane] * inverse[k, j]
                 residual += U[i, k] * inverse[k, j]
             F[i, j] = sum_of
             row += abs(sum_of)
