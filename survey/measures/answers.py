@@ -40,12 +40,13 @@ class Answers:
 class Ladder:
     """`rungs`, ascending in work; a point of rung i climbs to rung `above[i]` (beyond the last: it stays as it is).
 
-    `bounds` are the columns of the results that hold error bounds; a point climbs at most `most` times.
+    `bounds` are the columns of the results that hold error bounds, None if results tell it by their property `bound`;
+    a point climbs at most `most` times.
     """
 
     rungs: np.ndarray
     above: np.ndarray
-    bounds: slice
+    bounds: slice | None
     most: int
 
     @property
@@ -67,7 +68,8 @@ class Ladder:
             left = left[rung[left] <= self.top]
             before, new = results[left], solve(left, rung[left])
             bound, new_bound = self._bound(before), self._bound(new)
-            results[left] = np.where((new_bound < bound)[:, None], new, before)
+            better = new_bound < bound
+            results[left[better]] = new[better]
             assessed = assess(left, results[left])
             answers.replace(left, assessed)
             # truncation falls by far more than 2 from rung to rung: where the bound does not halve, rounding rules
@@ -76,5 +78,7 @@ class Ladder:
 
     def _bound(self, results):
         """The widest bound of each point; infinite where one is not finite."""
+        if self.bounds is None:
+            return results.bound
         widest = results[:, self.bounds].max(axis=1)
         return np.where(np.isfinite(widest), widest, np.inf)

@@ -14,10 +14,11 @@ ROUNDINGS = 4.0  # of a product of complex numbers
 
 
 @kernel
-def couplings(M, E, centre, V, W, coupling):
+def couplings(M, E, extra, centre, V, W, coupling):
     """Fill coupling (N, n, n), bounds of |V^-1 M* V - diag(centre)| for every M* with |M* - M| <= E; W is V^-1 nearly.
 
-    M, E are real, centre (N, n), V, W (N, n, n) complex. With R = W V - 1, V^-1 = (1 + R)^-1 W, and the entries of
+    `extra` (N, n, n) bounds what |W (M* - M) V| has besides. M, E are real, centre (N, n), V, W (N, n, n) complex. With
+    R = W V - 1, V^-1 = (1 + R)^-1 W, and the entries of
     |(1 + R)^-1 - 1| are below |R| + rho / (1 - rho) max of their column, rho the largest sum of a row of |R|.
     """
     N, n = centre.shape
@@ -49,6 +50,7 @@ def couplings(M, E, centre, V, W, coupling):
                     bound += flat[i, k] * rest[k, j]
                 if i == j:
                     other -= 1.0
+                bound += extra[p, i, j]
                 G[i, j], wide[i, j], R[i, j] = total, bound, abs(other) + u * moduli
                 size[i, j] = abs(total) + bound
                 row += R[i, j]

@@ -267,16 +267,16 @@ def _invert(work, inverse, n):
 
 
 @kernel
-def products(F, error, doubt, first, n, M, E):
+def products(F, error, doubt, first, n, M, E, R):
     """Fill M (N, n, n), the product of the steps first[i] to first[i + 1] of each point, and bounds E of its entries.
 
     To first order the error is the sum over the steps of (F_last ... F_k+1) d_k (F_k-1 ... F_1), |d_k| <= error[k] in
-    every entry; `doubt` bounds the relative size of what is left out.
+    every entry; `doubt` bounds the relative size of what is left out. R is the part of E that multiplying leaves.
     """
     longest = 0
     for i in range(len(M)):
         longest = max(longest, first[i + 1] - first[i])
-    before = np.empty((longest + 1, n))  # sums of the columns of |F_k-1 ... F_1|
+    before, rounding = np.empty((longest + 1, n)), np.empty(longest + 1)  # sums of the columns of |F_k-1 ... F_1|
     A, B = np.empty((n, n)), np.empty((n, n))
     for i in range(len(M)):
         steps = first[i + 1] - first[i]
@@ -300,10 +300,11 @@ def products(F, error, doubt, first, n, M, E):
                     B[j, c] = total
                     largest = max(largest, abs(step[j, c]))
             A[:] = B
-            error[first[i] + k] += n * ROUNDOFF_UP * largest
+            rounding[k] = n * ROUNDOFF_UP * largest
             more += doubt[first[i] + k]
         M[i] = A
         E[i] = 0.0
+        R[i] = 0.0
         A[:] = 0.0
         for j in range(n):
             A[j, j] = 1.0
@@ -314,7 +315,8 @@ def products(F, error, doubt, first, n, M, E):
                 for m in range(n):
                     total += abs(A[j, m])
                 for c in range(n):
-                    E[i, j, c] += own * total * before[k, c]
+                    E[i, j, c] += (own + rounding[k]) * total * before[k, c]
+                    R[i, j, c] += rounding[k] * total * before[k, c]
             for j in range(n):
                 for c in range(n):
                     total = 0.0
@@ -326,3 +328,57 @@ def products(F, error, doubt, first, n, M, E):
         for j in range(n):
             for c in range(n):
                 E[i, j, c] *= factor
+                R[i, j, c] *= factor
+
+
+@kernel
+def carried(F, error, doubt, first, which, n, V, W, B):
+    """Fill B (N, n, n) of the points `which`: bounds of |W e V|, e the error of the product but for multiplying.
+
+    As in `products`, but the errors are carried in the coordinates V, W (complex, N, n, n): where these are nearly the
+    eigenvectors, what grows on the way and shrinks again counts as little as it matters.
+    """
+    longest = 0
+    for i in which:
+        longest = max(longest, first[i + 1] - first[i])
+    before = np.empty((longest + 1, n))
+    A, Z = np.empty((n, n), np.complex128), np.empty((n, n), np.complex128)
+    for i in which:
+        A[:] = V[i]
+        more = 0.0
+        for k in range(first[i + 1] - first[i]):
+            step = F[first[i] + k]
+            for c in range(n):
+                total = 0.0
+                for j in range(n):
+                    total += abs(A[j, c])
+                before[k, c] = total
+            for j in range(n):
+                for c in range(n):
+                    sum_of = 0.0 + 0.0j
+                    for m in range(n):
+                        sum_of += step[j, m] * A[m, c]
+                    Z[j, c] = sum_of
+            A[:] = Z
+            more += doubt[first[i] + k]
+        A[:] = W[i]
+        B[i] = 0.0
+        for k in range(first[i + 1] - first[i] - 1, -1, -1):
+            step, own = F[first[i] + k], error[first[i] + k]
+            for j in range(n):
+                total = 0.0
+                for m in range(n):
+                    total += abs(A[j, m])
+                for c in range(n):
+                    B[i, j, c] += own * total * before[k, c]
+            for j in range(n):
+                for c in range(n):
+                    sum_of = 0.0 + 0.0j
+                    for m in range(n):
+                        sum_of += A[j, m] * step[m, c]
+                    Z[j, c] = sum_of
+            A[:] = Z
+        factor = math.exp(min(2.0 * more, 700.0))
+        for j in range(n):
+            for c in range(n):
+                B[i, j, c] *= factor * (1.0 + 1e-9)  # the last covers the rounding of A here

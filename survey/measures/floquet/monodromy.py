@@ -2,15 +2,16 @@
 
 The period is cut at the breaks, and each piece into steps of equal length: as many as the norm of A, in units of
 the states that balance it, and the rate at which A varies ask for; points whose bounds miss the accuracy climb a
-ladder of more steps (`measures.answers`).
+ladder of more steps, and have their errors carried sharply (`stability`).
 """
+
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from survey import measures
 from survey.kernels.floquet import steps
 from survey.kernels.math.roundoff import ROUNDOFF_UP
-from survey.measures.answers import Ladder
 
 # Times at which A is looked at, as shares of a piece.
 TIMES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(12) + 0.5) / 12)
@@ -20,7 +21,6 @@ RESOLVED = 1e-12  # relative to the largest Chebyshev coefficient: smaller ones 
 BY_RATE = 0.6  # what a step may span of 1 / rate, relative to the reach
 DIGITS = 48  # bits of the ends of steps
 GROWTH = 1.5  # steps, from rung to rung
-LADDER_LENGTH = 16
 SWEEPS = 3  # of balancing
 CALL_WORK = 4_000_000  # keeps a kernel call below about a second: steps n^2
 MOST_STEPS = 100_000  # of a point
@@ -114,11 +114,48 @@ def balanced(matrices):
     return scale
 
 
-def solve(points, method, rtol, factor, those):
-    """M and bounds of its entries (K, n, n each) of some of the Points, `factor` (K) times the steps asked for."""
+@dataclass
+class Matrices:
+    """M of N points and bounds E of its entries (N, n, n); where errors were carried in the coordinates of its
+    eigenvectors V, W = V^-1 nearly, also `extra`, bounds of |W e V|, e the error but for R, bounds of the rest.
+
+    `sharp` (N): were they? V, W and `centre` (N, n), the eigenvalues, are complex.
+    """
+
+    M: np.ndarray
+    E: np.ndarray
+    R: np.ndarray
+    extra: np.ndarray
+    V: np.ndarray
+    W: np.ndarray
+    centre: np.ndarray
+    sharp: np.ndarray
+
+    @classmethod
+    def empty(cls, N, n):
+        """Room for N points, none of them sharp."""
+        real, complex_ = np.full((4, N, n, n), np.nan), np.full((2, N, n, n), np.nan, complex)
+        return cls(*real, *complex_, np.full((N, n), np.nan, complex), np.zeros(N, bool))
+
+    def __getitem__(self, those):
+        return Matrices(*(getattr(self, f.name)[those] for f in fields(self)))
+
+    def __setitem__(self, those, other):
+        for f in fields(self):
+            getattr(self, f.name)[those] = getattr(other, f.name)
+
+    @property
+    def bound(self):
+        """The widest bound of each point (N); those that are sharp count for half, as they serve better."""
+        widest = self.E.max(axis=(1, 2))
+        return np.where(np.isfinite(widest), np.where(self.sharp, 0.4, 1.0) * widest, np.inf)
+
+
+def solve(points, method, rtol, factor, those, sharp):
+    """The Matrices of some of the Points, in `factor` (K) times the steps asked for; `sharp`: see Matrices."""
     n = points.n
     count = points.steps(method.floquet_reach(rtol), factor, those)
-    M, E = np.empty((2, len(those), n, n))
+    found = Matrices.empty(len(those), n)
     group = np.full(len(points.points), -1)
     for g, (own, _programs, _numbers) in enumerate(points.groups):
         group[own] = g
@@ -127,17 +164,15 @@ def solve(points, method, rtol, factor, those):
         place = np.empty(len(points.points), dtype=np.int64)
         place[own] = np.arange(len(own))
         work = np.cumsum(count[mine].sum(axis=1)) * n * n
-        for some in np.split(
-            mine, np.searchsorted(work, np.arange(CALL_WORK, work[-1], CALL_WORK)) if len(work) else []
-        ):
+        cuts = np.searchsorted(work, np.arange(CALL_WORK, work[-1], CALL_WORK)) if work.size else []
+        for some in np.split(mine, cuts):
             if some.size:
-                M[some], E[some] = _call(
-                    points, method, those[some], place[those[some]], programs, numbers, count[some]
-                )
-    return M, E
+                given = programs, numbers, count[some], sharp
+                found[some] = _call(points, method, those[some], place[those[some]], *given)
+    return found
 
 
-def _call(points, method, those, place, programs, numbers, count):
+def _call(points, method, those, place, programs, numbers, count, sharp):
     n, total = points.n, count.sum(axis=1)
     first = np.concatenate([[0], np.cumsum(total)])
     F, error, doubt = np.empty((first[-1], n, n)), np.empty(first[-1]), np.empty(first[-1])
@@ -163,10 +198,34 @@ def _call(points, method, those, place, programs, numbers, count):
         where = np.repeat(offset, steps_of) + index
         F[where], error[where], doubt[where] = found
         offset += steps_of
-    M, E = np.empty((2, len(those), n, n))
-    steps.products(F, error, doubt, first, n, M, E)
+    found = Matrices.empty(len(those), n)
+    steps.products(F, error, doubt, first, n, found.M, found.E, found.R)
+    if sharp:
+        which = np.flatnonzero(np.isfinite(found.M).all(axis=(1, 2)) & np.isfinite(found.E).all(axis=(1, 2)))
+        found.centre[which], found.V[which] = np.linalg.eig(found.M[which])
+        found.W[which] = inverse(found.V[which])
+        steps.carried(F, error, doubt, first, which, n, found.V, found.W, found.extra)
+        found.sharp[:] = np.isfinite(found.extra).all(axis=(1, 2))
     back = scale[:, :, None] / scale[:, None, :]
-    return M * back, E * back
+    for matrix in (found.M, found.E, found.R):
+        matrix *= back
+    found.V *= scale[:, :, None]
+    found.W /= scale[:, None, :]
+    return found
+
+
+def inverse(V):
+    """The inverses (N, n, n); NaN where there is none."""
+    try:
+        return np.linalg.inv(V)
+    except np.linalg.LinAlgError:
+        out = np.full_like(V, np.nan)
+        for i, one in enumerate(V):
+            try:
+                out[i] = np.linalg.inv(one)
+            except np.linalg.LinAlgError:
+                continue
+        return out
 
 
 def _ends(low, high, steps, point, index):
@@ -175,13 +234,6 @@ def _ends(low, high, steps, point, index):
         unit = np.exp2(np.ceil(np.log2(np.maximum(abs(low), abs(high)))) - DIGITS)[point]
         t = np.rint((low[point] + (high - low)[point] * (index / steps[point])) / unit) * unit
     return np.where(index == 0, low[point], np.where(index == steps[point], high[point], t))
-
-
-def ladder(n):
-    """The ladder of steps for results (N, 2 n^2)."""
-    return Ladder(
-        GROWTH ** np.arange(LADDER_LENGTH), np.arange(LADDER_LENGTH) + 1, slice(n * n, 2 * n * n), most=LADDER_LENGTH
-    )
 
 
 def method_of(name):

@@ -44,7 +44,8 @@ def solve(system, states, point, answer, time):
 
 def _leading(points):
     """The real part of the eigenvector of the leading multiplier, its largest component 1."""
-    M, _E = monodromy.solve(points, monodromy.method_of("auto"), 1e-10, np.ones(1), np.zeros(1, dtype=np.int64))
+    first = np.zeros(1, dtype=np.int64)
+    M = monodromy.solve(points, monodromy.method_of("auto"), 1e-10, np.ones(1), first, sharp=False).M
     values, vectors = np.linalg.eig(M[0])
     vector = vectors[:, abs(values).argmax()]
     vector = (vector / vector[abs(vector).argmax()]).real

@@ -16,6 +16,7 @@ import numpy as np
 
 from survey.kernels.floquet import discs
 from survey.kernels.math.roundoff import EPS
+from survey.measures.floquet.monodromy import inverse
 
 UNDECIDED, UNSTABLE, STABLE, MARGINAL = -1, 0, 1, 2
 NONE, PLUS_ONE, MINUS_ONE, NEIMARK_SACKER, COLLISION = range(5)
@@ -28,16 +29,24 @@ class Discs:
     hold their multipliers together? `V` the columns whose discs they are, `coupling` (N, n, n) what couples these.
     """
 
-    def __init__(self, M, E):
+    def __init__(self, matrices):
+        M, E, known = matrices.M, matrices.E, matrices
         N, n = M.shape[:2]
         self.centre, self.radius = np.zeros((N, n), complex), np.full((N, n), np.inf)
         self.V, self.coupling = np.zeros((N, n, n), complex), np.full((N, n, n), np.inf)
         good = np.isfinite(M).all(axis=(1, 2)) & np.isfinite(E).all(axis=(1, 2))
-        self._improve(np.flatnonzero(good), M, E, None)
+        some = np.flatnonzero(good & known.sharp)
+        if some.size:
+            own = known[some]
+            self._improve(some, own.M, own.R, own.extra, own.centre, own.V, own.W)
+        some = np.flatnonzero(good & ~known.sharp)
+        if some.size:
+            self._coordinates(some, M, E, M[some])
         for times in PERTURBED:
             left = np.flatnonzero(good & self._doubtful())
             if left.size:
-                self._improve(left, M, E, times)
+                off = np.cos(1.0 + 7.0 * np.arange(n * n)).reshape(n, n)  # no special direction
+                self._coordinates(left, M, E, M[left] + times * E[left].max(axis=(1, 2), keepdims=True) * off)
         self.together = self._touching()
         self._narrow()
         self._sort()
@@ -47,18 +56,17 @@ class Discs:
         with np.errstate(invalid="ignore"):
             return ~(self.radius.max(axis=1) < 1e-9 * (1 + abs(self.centre).max(axis=1)))
 
-    def _improve(self, which, M, E, perturbation):
-        M, E = M[which], E[which]
-        n = M.shape[1]
-        near = M
-        if perturbation is not None:
-            off = np.cos(1.0 + 7.0 * np.arange(n * n)).reshape(n, n)  # no special direction
-            near = M + perturbation * E.max(axis=(1, 2), keepdims=True) * off
+    def _coordinates(self, which, M, E, near):
+        """Try the eigenvectors of `near`."""
+        centre, V = np.linalg.eig(near)
+        V = V.astype(complex)
+        self._improve(which, M[which], E[which], np.zeros(V.shape), centre.astype(complex), V, inverse(V))
+
+    def _improve(self, which, M, E, extra, centre, V, W):
+        """Take the discs in the coordinates V where they are narrower; see `discs.couplings`."""
         with np.errstate(all="ignore"):
-            centre, V = np.linalg.eig(near)
             coupling = np.empty(V.shape)
-            centre, V = centre.astype(complex), V.astype(complex)
-            discs.couplings(M, E, centre, V, inverse(V), coupling)
+            discs.couplings(*map(np.ascontiguousarray, (M, E, extra, centre, V, W)), coupling)
             radius = coupling.sum(axis=2) * (1 + 8 * EPS)
             radius = np.where(np.isfinite(radius) & np.isfinite(centre), radius, np.inf)
             better = radius.max(axis=1) < self.radius[which].max(axis=1)
@@ -146,20 +154,6 @@ class Discs:
             gap[:, np.arange(n), np.arange(n)] = np.inf
             # z and 1 / conj(z) are apart by | |z| - 1 / |z| | <= 2.2 | |z| - 1 | near the circle
             return self.isolated & (off < 0.05) & (gap.min(axis=2) > 2.2 * off)
-
-
-def inverse(V):
-    """The inverses (N, n, n); NaN where there is none."""
-    try:
-        return np.linalg.inv(V)
-    except np.linalg.LinAlgError:
-        out = np.full_like(V, np.nan)
-        for i, one in enumerate(V):
-            try:
-                out[i] = np.linalg.inv(one)
-            except np.linalg.LinAlgError:
-                continue
-        return out
 
 
 def radius(own):

@@ -49,6 +49,8 @@ OUTPUTS = (
            "passes the circle (neimark_sacker), or two on the circle meet (collision)", flags=CROSSINGS),
     Output("verdict", "stability of the linear motion", flags=VERDICTS),
 )  # fmt: skip
+# Factors of the number of steps; from the second on, errors are carried sharply.
+LADDER = answers.Ladder(1.5 ** np.arange(16), np.arange(16) + 1, None, most=16)
 CHUNK = 65536  # points n^2 that are solved together: bounds the memory
 
 
@@ -65,11 +67,12 @@ class Answers(answers.Answers):
         self.signs[:, points] = other.signs[:, those]
 
 
-def assess(M, E, structure, rtol, asked):
-    """The Answers of points from their monodromy matrices; `asked` holds the names of the outputs that are wanted."""
+def assess(matrices, structure, rtol, asked):
+    """The Answers of points from their Matrices; `asked` holds the names of the outputs that are wanted."""
+    M, E = matrices.M, matrices.E
     N, n = M.shape[:2]
     found, paired = Answers(N, n), structure != "none"
-    discs = multipliers.Discs(M, E)
+    discs = multipliers.Discs(matrices)
     found.verdict = multipliers.verdicts(discs, M, E, paired)
     signs = multipliers.krein(discs) if structure == "symplectic" else None
     found.crossing = multipliers.crossing(discs, found.verdict, paired, signs)
@@ -109,26 +112,24 @@ def solve(system, structure, points, method, rtol, wanted):
 def _chunk(system, structure, given, method, rtol, wanted):
     n = system.n
     points = monodromy.Points(system, given)
-    answer, results = Answers(len(given), n), np.full((len(given), 2 * n * n), np.nan)
-    ladder = monodromy.ladder(n)
+    answer, results = Answers(len(given), n), monodromy.Matrices.empty(len(given), n)
     where = np.flatnonzero(points.valid)
     asked = wanted | ({"multiplier_re"} if wanted & {"multiplier_im", "krein"} else set())
     asked |= {"spectral_radius"} if "exponent" in wanted else set()
     asked |= {"verdict"} if wanted & {"crossing", "verdict"} else set()
 
     def solved(those, rung):
-        M, E = monodromy.solve(points, method, rtol, ladder.rungs[rung], where[those])
-        return np.concatenate([M.reshape(len(those), n * n), E.reshape(len(those), n * n)], axis=1)
+        sharp = bool(rung.size and rung.min() > 0)  # all are on the first rung, or none is
+        return monodromy.solve(points, method, rtol, LADDER.rungs[rung], where[those], sharp)
 
-    def assessed(those, found):
-        M, E = found[:, : n * n].reshape(-1, n, n), found[:, n * n :].reshape(-1, n, n)
-        return assess(M, E, structure, rtol, asked)
+    def assessed(_those, found):
+        return assess(found, structure, rtol, asked)
 
     if where.size:
         rung = np.zeros(where.size, dtype=np.int64)
         own = solved(np.arange(where.size), rung)
         best = assessed(None, own)
-        ladder.climb(rung, own, best, solved, assessed)
+        LADDER.climb(rung, own, best, solved, assessed)
         answer.replace(where, best)
         results[where] = own
     answer.status[~points.valid] = np.where(
@@ -138,8 +139,8 @@ def _chunk(system, structure, given, method, rtol, wanted):
 
 
 def outputs(answer, results, period, computed, wanted):
-    """The wanted outputs from the Answers and the matrices and their bounds (N, 2 n^2)."""
-    n, N = answer.n, len(results)
+    """The wanted outputs from the Answers and the Matrices."""
+    n = answer.n
     ok = answer.status == status.OK
     answer.floats[:, ~ok] = np.nan
     re, im, bars = (answer.floats[k * n : (k + 1) * n].T for k in range(3))
@@ -149,12 +150,12 @@ def outputs(answer, results, period, computed, wanted):
         exponent = np.where(positive, np.log(value) / period, np.nan)
         exponent_bar = np.where(positive, -np.log1p(-bar / value) / period, np.nan) * (1 + 4 * EPS)
         exponent_bar += 4 * EPS * abs(exponent)
-    matrix = np.where(ok[:, None], results, np.nan)
+    M, E = (np.where(ok[:, None, None], matrix, np.nan) for matrix in (results.M, results.E))
     period = np.where(ok, period, np.nan)
     out = {
         "multiplier_re": re, "multiplier_re_error": bars, "multiplier_im": im, "multiplier_im_error": bars,
         "spectral_radius": value, "spectral_radius_error": bar, "exponent": exponent, "exponent_error": exponent_bar,
-        "monodromy": matrix[:, : n * n].reshape(N, n, n), "monodromy_error": matrix[:, n * n :].reshape(N, n, n),
+        "monodromy": M, "monodromy_error": E,
         "period": period, "period_error": (4 if computed else 1) * EPS * period,
         "krein": np.where(ok, answer.signs, 0).T.astype(np.int8), "crossing": answer.crossing,
         "verdict": answer.verdict,

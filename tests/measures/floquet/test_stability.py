@@ -101,9 +101,10 @@ def test_verdicts_do_not_depend_on_the_number_of_steps(steps):
     points = monodromy.Points(System({"A": A}, 4, 2 * math.pi, (), False), B.reshape(40, 16))
     method = monodromy.method_of("auto")
     own = points.steps(method.floquet_reach(1e-10), np.ones(40), np.arange(40)).sum(axis=1)
-    M, E = monodromy.solve(points, method, 1e-10, steps / own, np.arange(40))
-    coarse = verdicts(Discs(M, E), M, E, False)
-    assert ((coarse == fine) | (coarse < 0) | (fine < 0)).all()
+    for sharp in (False, True):
+        found = monodromy.solve(points, method, 1e-10, steps / own, np.arange(40), sharp)
+        coarse = verdicts(Discs(found), found.M, found.E, False)
+        assert ((coarse == fine) | (coarse < 0) | (fine < 0)).all()
     assert (coarse >= 0).any()
 
 
