@@ -38,15 +38,14 @@ OUTPUTS = (
            dims=("multiplier",)),
     Output("multiplier_im", "imaginary part of the Floquet multiplier", r"\Im\lambda", dims=("multiplier",)),
     Output("spectral_radius", "largest modulus of the multipliers", r"\rho"),
-    Output("exponent", "largest characteristic exponent: the logarithm of the spectral radius over the period", r"\mu",
+    Output("exponent", "largest real part of the characteristic exponents", r"\mu",
            applies="where the spectral radius is certainly positive"),
     Output("monodromy", "monodromy matrix: the states after one period, from the columns of the identity", "M",
            dims=("row", "column"), on_request=True),
     Output("period", "period of the coefficients", "T"),
     Output("krein", "Krein sign of a multiplier on the unit circle: that of i v* J v, v its eigenvector", flags=SIGNS,
            dims=("multiplier",)),
-    Output("crossing", "how stability is lost nearest, or has been lost: a multiplier passes 1 or -1, a complex pair "
-           "passes the circle (neimark_sacker), or two on the circle meet (collision)", flags=CROSSINGS),
+    Output("crossing", "where multipliers leave, or have left, the unit circle first", flags=CROSSINGS),
     Output("verdict", "stability of the linear motion", flags=VERDICTS),
 )  # fmt: skip
 # Factors of the number of steps; from the second on, errors are carried sharply.
