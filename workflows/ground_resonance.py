@@ -25,7 +25,7 @@ REFERENCES = (
 PARAMETERS = (
     Parameter("omega", "rotor speed", r"\Omega", units="rad s-1", minimum=0.0, open_minimum=True),
     Parameter("damping", "damping of a blade's lag", "c_k", units="N m s", minimum=0.0),
-    Parameter("lost", "share of its damping that one blade has lost", r"\lambda", minimum=0.0, maximum=1.0),
+    Parameter("lost", "share of its damping that one blade has lost", r"\ell", minimum=0.0, maximum=1.0),
 )
 STATES = ("x", "y", "zeta1", "zeta2", "zeta3", "zeta4")
 BLADES = 4
