@@ -1,7 +1,7 @@
-"""Curves on a map where a function that is known everywhere is zero, each point bracketed by certain signs.
+"""Zero curves on a map of a function that can be evaluated anywhere, each point bracketed by certain signs.
 
-They are searched for on so many lines of the map each way, by marching squares. A closed curve narrower than the
-distance of two lines may be missed. Positions are those of `survey.measures.square`.
+They are searched for on a lattice of lines, by marching squares. A closed curve narrower than the distance between two
+lines may be missed. Positions are those of `survey.measures.square`.
 """
 
 import contourpy
@@ -33,7 +33,7 @@ def lines(function, grain, number, values=None, halvings=HALVINGS):
 
 
 def closed_in(function, x, grain, number, halvings):
-    """The curve through the positions x, each between two crossings of lines; cut where one cannot be made certain."""
+    """The curve through positions x, each between two crossings of lines; cut where a sign cannot be made certain."""
     step, rows = (number - 1) * x, np.arange(len(x))
     along = np.argmax(abs(step - np.rint(step)), axis=1)
     x[rows, 1 - along] = np.rint(step)[rows, 1 - along] / (number - 1)

@@ -1,4 +1,4 @@
-"""Curves on a map: what measures hand to [boundaries], and points of a parametrised curve, so close that it is seen."""
+"""Curves on a map: what measures hand to [boundaries]; parametrised curves, sampled closely enough to be drawn."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -26,7 +26,7 @@ class Curves:
 
 
 def sampled(position, low, high, first=FIRST):
-    """Numbers t from low to high so close that on the map chords are short and near the curve position(t) (m, 2)."""
+    """Numbers t from low to high, spaced so that chords on the map are short and near the curve position(t) (m, 2)."""
     if low == high:
         return np.array([low])
     t = np.linspace(low, high, first)
@@ -47,7 +47,7 @@ def sampled(position, low, high, first=FIRST):
 
 
 def changes(test, t):
-    """The last numbers where the test holds, beside those where it does not; t is sampled."""
+    """The numbers next to a change of the test, on the side where it holds; t is sampled."""
     holds = test(t)
     at = np.flatnonzero(holds[1:] != holds[:-1])
     yes, no = np.where(holds[at], t[at], t[at + 1]), np.where(holds[at], t[at + 1], t[at])

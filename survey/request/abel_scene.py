@@ -18,11 +18,11 @@ from survey.scenes import gyrostat
 ON_A_LINE = ("trajectory", "abel")  # the questions without a period
 ON_A_CIRCLE = ("fate", "trajectory", "abel", "portrait")
 _PORTRAIT = {"question": ("portrait",)}
-# What the gyrostat's outputs are for any f and g: see `measures/cylinder/ends.py`.
+# What these outputs of the gyrostat mean for any f and g: see `measures/cylinder/ends.py`.
 LONG_NAMES = {
     "K": "K = -(1/pi) int g F dphi, F' = f, which decides the ends where f and g have mean 0",
     "L": "L = int g F^2 dphi, which decides them where K = 0, too",
-    "stratum": "g = 0 (I0), f = 0 (I1), ends that nothing decides (I2), or none of them (G)",
+    "stratum": "g = 0 (I0), f = 0 (I1), ends that are not decided (I2), or none of them (G)",
 }
 OUTPUTS = (
     *(replace(o, long_name=LONG_NAMES.get(o.name, o.long_name)) for o in gyrostat.OUTPUTS),
@@ -31,12 +31,12 @@ OUTPUTS = (
 )
 _BRANCH = next(option for option in gyrostat.OPTIONS if option.name == "branch")
 STATUS = gyrostat.STATUS | {
-    "invalid_parameters": "outside the domain, or f or g has no value there, or not the period 2 pi although PERIOD "
-    "says so",
-    "degenerate_equilibrium": "within rounding g = g' = 0 at an angle, or f = g = 0 at an equilibrium that is no "
-    "saddle, or there are more than 16 equilibria: the numbers of cycles are unknown, and may be those of equilibria",
-    "neutral_ends": "f = 0 or g = 0 throughout, or mean(f), mean(g), K and L vanish within rounding: nothing decides "
-    "the ends, nor fates",
+    "invalid_parameters": "outside the domain, or f or g is undefined there, or does not have the period 2 pi that "
+    "PERIOD promises",
+    "degenerate_equilibrium": "within rounding g = g' = 0 at an angle, or f = g = 0 at an equilibrium that is not a "
+    "saddle, or there are more than 16 equilibria: the numbers of cycles, and perhaps of equilibria, are unknown",
+    "neutral_ends": "f or g is identically 0, or mean(f), mean(g), K and L all vanish within rounding: whether the "
+    "ends attract is not decided, and so no fate is",
 }
 TRIED = (0.25, -1.5, 2.5)  # angles at which f and g are tried as Python
 
@@ -106,7 +106,7 @@ class AbelScene(FunctionScene):
         if "mean_f" not in answer and not answer["verdict"].startswith("spin_up"):
             return gyrostat.why(answer)
         if "mean_f" not in answer:
-            return "the return maps leave no cycle or equilibrium on the way, and w grows: that end attracts"
+            return "the return maps show no cycle or equilibrium on the way, and w grows: that end is attracting"
         return gyrostat.why(answer).replace(named(answer, "K"), named(answer, "mean_f"))
 
     def trajectory(self, point, answer, options, time=None):
@@ -136,11 +136,11 @@ class AbelScene(FunctionScene):
         lost = np.flatnonzero(np.isnan(flows[:, 0]))
         if lost.size and self.period is not None and self._finite(points[lost[0]]):
             self._refuse(
-                f"f or g has not the period 2 pi at {self._where(points[lost[0]])}, or a pole",
+                f"f or g does not have the period 2 pi at {self._where(points[lost[0]])}, or has a pole",
                 "correct it, or set PERIOD = None",
             )
         if lost.size == len(points):
-            self._refuse(f"f or g has no value at {self._where(points[0])}", "correct it, or the domains of PARAMETERS")
+            self._refuse(f"f or g is undefined at {self._where(points[0])}", "correct it, or the domains of PARAMETERS")
 
     def _finite(self, point):
         """Have f and g values at these parameters?"""

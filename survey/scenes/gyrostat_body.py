@@ -20,15 +20,15 @@ tells whether the limit is stable on the set, `observable` whether it is beside 
 equations at an equilibrium, by the multipliers along a cycle. Those that belong to the integrals k (7) and |nu| (8)
 are trivial and taken out; two remain in case B, three in case A, where k varies along the set, four about the vertical.
 
-What is known. In case B the divergence beside the set is (B12, B31) S^-1 (-cos phi, sin phi), S = (A22 A23; A23 A33),
+What is known. In case B the divergence of deviations is (B12, B31) S^-1 (-cos phi, sin phi), S = (A22 A23; A23 A33),
 whatever the other parameters. If S = a 1 it is -(A11 / a) f, f that of the scene `gyrostat`: where the reduced flow
-contracts, the motion beside it expands, so that no attracting equilibrium or cycle of a body with A22 = A33, A23 = 0 is
-observable. Where B12 = B31 = 0 it is 0, and what does not grow does not fall either: such limits count as observable
+contracts, deviations from the set grow, so that no attracting equilibrium or cycle of a body with A22 = A33, A23 = 0 is
+observable. Where B12 = B31 = 0 it is 0, and what does not grow does not decay either: such limits count as observable
 where the exponents are purely imaginary. A spin-up is not observable if axis 1 is that of the middle moment of inertia;
 else it is left open.
 
 Source: M. E. Lesina, Ya. V. Zinovyeva, "The gyrostat with Barnett-London effect" (2004), corrected in `gyrostat.md`;
-`gyrostat_body.md` beside this file derives the conditions again, and what is beside the set.
+`gyrostat_body.md` beside this file derives the conditions again, and the equations of the deviations.
 
 Questions: `fate` (where the motion on the set ends, and what is beside that), `portrait` (equilibria and cycles on the
 set, and the positions of rest of the whole body, whether it is on the set or not), `trajectory` (w and nu of any body

@@ -42,9 +42,12 @@ def widened(function, **names):
 
 def wide_end(method, span, steps):
     """The state after equal steps of the widened method."""
-    values = widened(flow.values)
+    gyrostat = widened(flow.gyrostat)
+    values = widened(flow.values, gyrostat=gyrostat)
     series = widened(flow.series)
-    inner = {"values": values, "inside": widened(flow.inside)}
+    inner = {"gyrostat": gyrostat, "inside": widened(flow.inside)}
+    if hasattr(method, "_flow_at"):
+        inner["_flow_at"] = widened(method._flow_at)
     if hasattr(method, "_flow_classical"):
         slope = widened(method._flow_slope, values=values)
         step = widened(runge_kutta.classical)

@@ -133,10 +133,10 @@ def test_wrong_scenes_are_one_line(given, words):
         ({"g": lambda phi, p: p[3]}, r"g\(phi, p\) indexes beyond an array.*p\[0\] to p\[0\]"),
         ({"g": lambda phi, p: p["mu"]}, "write p"),
         ({"g": lambda phi, p: [phi]}, r"g\(phi, p\) returns \[0.25\]"),
-        ({"g": lambda phi, p: abs(phi)}, r"g\(phi, p\): it takes abs.*must be analytic"),
+        ({"g": lambda phi, p: abs(phi)}, r"g\(phi, p\): it applies abs.*must be analytic"),
         ({"f": lambda phi, p: 1.0 if phi > 0 else -1.0}, r"f\(phi, p\): it compares phi"),
-        ({"f": lambda phi, p: math.log(-p[0])}, "has no value at mu = 1"),
-        ({"period": 2 * math.pi}, "has not the period 2 pi at mu = 1, or a pole"),
+        ({"f": lambda phi, p: math.log(-p[0])}, "is undefined at mu = 1"),
+        ({"period": 2 * math.pi}, "does not have the period 2 pi at mu = 1, or has a pole"),
     ],
 )
 def test_wrong_functions_are_one_line(given, words):

@@ -16,6 +16,7 @@ import math
 
 import numpy as np
 
+from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.flow import B12, B31, C23, S2, S3, TWO_PI, D
 from survey.kernels.cylinder.trigonometric import deviation, drift, misfit
 from survey.kernels.jit import inline, kernel
@@ -133,10 +134,10 @@ def applies(p, phi0, w0):
 
 
 @kernel
-def served(P, starts, which):
-    """Note for which solutions a closed form applies."""
-    for i in range(len(P)):
-        which[i] = applies(P[i], starts[i, 0], starts[i, 1])[0] != NONE
+def served(rows, which):
+    """Note for which rows of GIVEN numbers (see `records`) a closed form applies."""
+    for i in range(len(rows)):
+        which[i] = applies(rows[i], rows[i, rc.PHI0], rows[i, rc.W0])[0] != NONE
 
 
 @kernel

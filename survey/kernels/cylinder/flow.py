@@ -68,8 +68,12 @@ def spread(rows, P, starts):
 @kernel
 def values(p, phi):
     """f, g, g' at phi."""
-    if len(p) > COLUMNS:
-        return program.values(p, phi)
+    return program.values(p, phi) if len(p) > COLUMNS else gyrostat(p, phi)
+
+
+@inline
+def gyrostat(p, phi):
+    """f, g, g' at phi, where p is no program."""
     s, c = math.sin(phi), math.cos(phi)
     s2, c2 = 2.0 * s * c, (c - s) * (c + s)
     f = p[B12] * c - p[B31] * s

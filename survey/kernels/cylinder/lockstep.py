@@ -225,19 +225,9 @@ def advance(T, state, before, fixed, fate, tolerance):
             u1, z1 = u1 * dt + T[U1 + k, i], z1 * dt + T[Z1 + k, i]
             u2, z2, f = u2 * dt + T[U2 + k, i], z2 * dt + T[Z2 + k, i], f * dt + T[F_ + k, i]
         z1, z2 = z1 + f * u1, z2 + f * u2
-        # the last terms, and what follows them
-        d2 = dt * dt
-        d4 = d2 * d2
-        d13 = d4 * d4 * d4 * dt
-        last = max(last * d2, FALL * abs(T[W + ORDER - 2, i]))
-        cut = d13 * max(last * dt, max(previous * d2, FALL * abs(T[W + ORDER - 3, i])))
-        speed = fixed[PF, i] * abs(v) + fixed[PG, i]
-        e = cut * dt * (1.0 / ORDER) + ROUNDOFF_UP * (4.0 + 3.0 * dt * (abs(v) + dt * speed))
-        g = cut + ROUNDOFF_UP * (1.5 * abs(v) + 8.0 * dt * speed)
-        saa, sab, sbb = state[SAA, i], state[SAB, i], state[SBB, i]
-        state[SAA, i] = u1 * u1 * saa + 2.0 * u1 * u2 * sab + u2 * u2 * sbb + e * e
-        state[SAB, i] = u1 * z1 * saa + (u1 * z2 + u2 * z1) * sab + u2 * z2 * sbb
-        sbb = z1 * z1 * saa + 2.0 * z1 * z2 * sab + z2 * z2 * sbb + g * g
+        ends = last, previous, FALL * abs(T[W + ORDER - 2, i]), FALL * abs(T[W + ORDER - 3, i])
+        carried, jacobian = (state[SAA, i], state[SAB, i], state[SBB, i]), (u1, u2, z1, z2)
+        state[SAA, i], state[SAB, i], sbb = ellipse(carried, jacobian, dt, v, ends, fixed[PF, i], fixed[PG, i])
         n = state[STEPS, i] + 1.0
         state[SBB, i], state[STEPS, i] = sbb, n
         high = state[TIME, i] + h
@@ -245,6 +235,30 @@ def advance(T, state, before, fixed, fate, tolerance):
         state[TIME, i], state[PSI, i], state[V, i], state[RATE, i] = high, x, v, rate
         good = state[SAA, i] < TRUST and sbb < (1.0 + abs(v)) * (1.0 + abs(v))
         fate[i] = _AT if at else (_GOING if good else _LOST)
+
+
+@inline
+def ellipse(carried, jacobian, dt, v, ends, most_f, most_g):
+    """The error ellipse at dt in a step, where w = v, from the one at its start.
+
+    `ends`: the sizes of the last term of w, of the one before, and those of the two before these, times FALL: what
+    follows the last two is bounded with the help of the others.
+    """
+    saa, sab, sbb = carried
+    u1, u2, z1, z2 = jacobian
+    last, previous, third, fourth = ends
+    d2 = dt * dt
+    d4 = d2 * d2
+    d13 = d4 * d4 * d4 * dt
+    cut = d13 * max(max(last * d2, third) * dt, max(previous * d2, fourth))
+    speed = most_f * abs(v) + most_g
+    e = cut * dt * (1.0 / ORDER) + ROUNDOFF_UP * (4.0 + 3.0 * dt * (abs(v) + dt * speed))
+    g = cut + ROUNDOFF_UP * (1.5 * abs(v) + 8.0 * dt * speed)
+    return (
+        u1 * u1 * saa + 2.0 * u1 * u2 * sab + u2 * u2 * sbb + e * e,
+        u1 * z1 * saa + (u1 * z2 + u2 * z1) * sab + u2 * z2 * sbb,
+        z1 * z1 * saa + 2.0 * z1 * z2 * sab + z2 * z2 * sbb + g * g,
+    )
 
 
 @inline
@@ -340,6 +354,15 @@ def _collect(times, limit, state, before, fixed, fate, row, column, floats, turn
 
 
 @inline
+def busy(row):
+    """Has any lane a row?"""
+    for i in range(LANES):
+        if row[i] >= 0:
+            return True
+    return False
+
+
+@inline
 def trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
     """phi, w, their bars and turnings at the ascending times >= 0 of each row, which end at its first infinity.
 
@@ -350,7 +373,7 @@ def trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
     tolerance = min(tolerance, COARSEST)
     row, column = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
     waiting, steps = _refill(P, starts, times, 0, state, fixed, row, column, status), 0
-    while row.max() >= 0:
+    while busy(row):
         step(T, state, before, fixed, fate, tolerance)
         steps += LANES
         if _collect(times, limit, state, before, fixed, fate, row, column, floats, turnings, status):

@@ -1,8 +1,8 @@
 """Solutions w(phi) of Abel's equation (57) for many systems in lock step: w and t at given angles.
 
 The steps are those of `lockstep`, in time. A step's series serves all the angles that it passes, BLOCK of them at once:
-Newton's method gives the times, then come w, t and their error bars. What follows from these (turning points, targets
-in doubt, how a solution ends) is as in `steps.abel`.
+Newton's method gives the times, then come w, t and their error bars. Turning points, targets in doubt and the
+ends of solutions are treated as in `steps.abel`.
 """
 
 import math
@@ -10,7 +10,21 @@ import math
 import numpy as np
 
 from survey.kernels.cylinder import records as rc
-from survey.kernels.cylinder.flow import BOUND_DDG, TWO_PI, TWO_PI_LOW, reduced
+from survey.kernels.cylinder.flow import (
+    B12,
+    B31,
+    BOUND_DDG,
+    BOUND_DG,
+    BOUND_F,
+    BOUND_G,
+    C23,
+    S2,
+    S3,
+    TWO_PI,
+    TWO_PI_LOW,
+    D,
+    reduced,
+)
 from survey.kernels.cylinder.lockstep import (
     COARSEST,
     F_,
@@ -46,6 +60,8 @@ from survey.kernels.cylinder.lockstep import (
     V,
     W,
     advance,
+    busy,
+    ellipse,
     enter,
     series,
     sine_cosine,
@@ -76,7 +92,6 @@ from survey.kernels.cylinder.steps import (
 )
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.newton import bracketed
-from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.kernels.unroll import unroll
 
 BLOCK = 8
@@ -131,29 +146,9 @@ def _nearer(c, rise, dt, reach):
 
 @inline
 def _last_terms(T, i):
-    """The size of the last four terms of w; what follows the last two is bounded with the help of the others."""
+    """`ends` of `lockstep.ellipse`."""
     last, previous = abs(T[W + ORDER, i]), abs(T[W + ORDER - 1, i])
     return last, previous, FALL * abs(T[W + ORDER - 2, i]), FALL * abs(T[W + ORDER - 3, i])
-
-
-@inline
-def _ellipse(carried, jacobian, dt, v, ends, most_f, most_g):
-    """The error ellipse at dt in the step, where w = v, from the one at its start; as in `lockstep.advance`."""
-    saa, sab, sbb = carried
-    last, previous, third, fourth = ends
-    d2 = dt * dt
-    d4 = d2 * d2
-    d13 = d4 * d4 * d4 * dt
-    cut = d13 * max(max(last * d2, third) * dt, max(previous * d2, fourth))
-    speed = most_f * abs(v) + most_g
-    e = cut * dt * (1.0 / ORDER) + ROUNDOFF_UP * (4.0 + 3.0 * dt * (abs(v) + dt * speed))
-    g = cut + ROUNDOFF_UP * (1.5 * abs(v) + 8.0 * dt * speed)
-    u1, u2, z1, z2 = jacobian
-    return (
-        u1 * u1 * saa + 2.0 * u1 * u2 * sab + u2 * u2 * sbb + e * e,
-        u1 * z1 * saa + (u1 * z2 + u2 * z1) * sab + u2 * z2 * sbb,
-        z1 * z1 * saa + 2.0 * z1 * z2 * sab + z2 * z2 * sbb + g * g,
-    )
 
 
 @inline
@@ -194,7 +189,7 @@ def _cross(T, state, before, fixed, i, reach, end, block, size):
         dt = block[DT + j]
         x, v = _moved(c, dt)
         x += psi
-        a, b, d = _ellipse(carried, _varied(vary, dt), dt, v, ends, most_f, most_g)
+        a, b, d = ellipse(carried, _varied(vary, dt), dt, v, ends, most_f, most_g)
         a += block[SQUARE + j] + (4e-16 * dt * v) * (4e-16 * dt * v)
         k = (x * (1.0 / TWO_PI) + NEAREST) - NEAREST
         sine, cosine = sine_cosine((x - k * TWO_PI) - k * TWO_PI_LOW)
@@ -224,7 +219,7 @@ def _pass(T, state, before, fixed, q, i, block, targets, j, doubt, started, floa
         x1 = before[PSI, i] + x
         carried = before[SAA, i], before[SAB, i], before[SBB, i]
         jacobian = _varied(_variations(T, i), reach)
-        saa, _sab, sbb = _ellipse(carried, jacobian, reach, v1, _last_terms(T, i), fixed[PF, i], fixed[PG, i])
+        saa, _sab, sbb = ellipse(carried, jacobian, reach, v1, _last_terms(T, i), fixed[PF, i], fixed[PG, i])
     while j < size and unturned(targets[j], turns) - angle <= x1:
         count = 0
         while count < BLOCK and j + count < size and unturned(targets[j + count], turns) - angle <= x1:
@@ -284,8 +279,11 @@ def _refill(P, starts, targets, waiting, state, fixed, axes, row, sizes, floats,
             if size > 0 and not at_rest(p, reduced(phi0)[0], phi0, w0, at, rows, codes):
                 enter(p, phi0, w0, state, fixed, i)
                 fixed[NEXT, i], row[i], sizes[i] = math.inf, waiting, size
-                axes[i, :6] = fixed[P12, i], fixed[P31, i], fixed[PD, i], 0.0, fixed[P2, i], fixed[P3, i]
-                axes[i, 6:9], axes[i, BOUND_DDG] = (fixed[PF, i], fixed[PG, i], fixed[PDG, i]), p[BOUND_DDG]
+                # number by number: an assignment to a slice would take a second to compile
+                axes[i, B12], axes[i, B31], axes[i, D] = fixed[P12, i], fixed[P31, i], fixed[PD, i]
+                axes[i, C23], axes[i, S2], axes[i, S3] = 0.0, fixed[P2, i], fixed[P3, i]
+                axes[i, BOUND_F], axes[i, BOUND_G], axes[i, BOUND_DG] = fixed[PF, i], fixed[PG, i], fixed[PDG, i]
+                axes[i, BOUND_DDG] = p[BOUND_DDG]
             waiting += 1
     return waiting
 
@@ -322,7 +320,7 @@ def abels(P, starts, targets, tolerance, limit, floats, status):
                 if row[i] < 0:
                     column[i], doubt[i] = 0, -1
             waiting = _refill(P, starts, targets, waiting, state, fixed, axes, row, sizes, floats, status)
-            if row.max() < 0:
+            if not busy(row):
                 return
             for i in range(LANES):
                 if row[i] >= 0 and state[STEPS, i] == 0.0:

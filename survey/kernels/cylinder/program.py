@@ -1,10 +1,10 @@
-"""A flow of one's own, phi' = w, w' = f(phi) w + g(phi): f, g and g' as a program, run on power series and on balls.
+"""A user's flow, phi' = w, w' = f(phi) w + g(phi): f, g and g' as a program, run on power series and on balls.
 
 A program is a list of operations, each of which makes one value from earlier ones; the first value is phi itself. It
 stands in the row p of a flow after the columns of `flow`: SLOTS to RADIUS, then WIDTH numbers an operation: its code,
-the places of its two operands, and a number. Where a number is an operand, what binary64 leaves of it stands in the
-place that is not used. The series of a function h(y) follows from h' y': its second operand is h'. p[REVERSED] is the
-sign of f, p[MIRRORED] that of phi and of g: -1 under the symmetries S1 and S2 of `solution`.
+the indices of its two operands, and a number. Where a number is an operand, the rest that binary64 does not hold stands
+in the column that is not used. The series of a function h(y) follows from h' y': its second operand is h'. p[REVERSED]
+is the sign of f, p[MIRRORED] that of phi and of g: -1 under the symmetries S1 and S2 of `solution`.
 
 A ball is a middle and a radius that covers the range and every rounding: of radius 0 at phi, it bounds the roundings of
 f and g alone; over an interval, it bounds f, f', g, g', g'' there.
@@ -72,7 +72,7 @@ def function(code, x, number):
 
 @inline
 def _count(p, column):
-    """How many operations: one at least, also in a row of zeros, which stands where there is no program."""
+    """The number of operations: at least one, even in a row of zeros, which stands for no program."""
     return max(1, int(p[column]))
 
 
@@ -192,7 +192,7 @@ def _quotient(a, r, b, s):
 
 @kernel
 def _function_ball(code, x, r, number):
-    """The ball of the function over (x, r): all but sin, cos, cosh are monotone, and no convex one dips further."""
+    """The ball of the function over (x, r): all but sin, cos, cosh are monotone, and cosh dips less than it rises."""
     value = function(code, x, number)
     if r == 0.0:
         spread = 0.0

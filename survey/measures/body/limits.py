@@ -29,7 +29,7 @@ def verdict(reduced, beside):
 
 
 def of_fate(method, placed, rtol):
-    """The fate of the reduced motion of a Placed (not OFF), as `measures.cylinder.fate` has it, and what is beside it.
+    """The fate of the reduced motion of a Placed (not OFF), as in `measures.cylinder.fate`; its transversal stability.
 
     (result {name: array (1)}, reduced stability, Beside).
     """

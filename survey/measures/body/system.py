@@ -1,4 +1,4 @@
-"""A body and its initial state in numbers, turned into the frame of its axis of rotation, and its place by the paper.
+"""A body and its initial state in numbers, turned into the frame of its axis of rotation, and its case in the paper.
 
 In that frame w = (w, 0, 0) and nu = (cos theta, sin theta sin phi, sin theta cos phi). The set w2 = w3 = 0,
 nu1 = cos theta is invariant if and only if on it, for all phi and w,
@@ -99,7 +99,7 @@ def read(numbers):
 
 
 def _positive(matrix):
-    """Is the symmetric matrix positive definite, and not only by its rounding?"""
+    """Is the symmetric matrix positive definite, by more than its rounding?"""
     low, *_rest, high = np.linalg.eigvalsh(matrix)
     return low > 1e-12 * high
 
@@ -139,14 +139,14 @@ class Placed:
 
 
 def place(system):
-    """The Placed of a System: of the axes that it may turn about, the one on which it misses the set by least."""
+    """The Placed of a System: of its possible axes of rotation, the one on which it misses the set by least."""
     return min(
         (_placed(system, axis) for axis in _axes(system)), key=lambda p: (p.case == OFF, p.residuals @ p.residuals)
     )
 
 
 def _axes(system):
-    """The axis of rotation: that of w, or where w = 0 of w', or at rest every principal axis of A."""
+    """The axis of rotation: the direction of w, of w' if w = 0, or at rest every principal axis of A."""
     if system.w.any():
         return [system.w]
     spin = np.linalg.solve(system.A, system.torque())

@@ -57,7 +57,7 @@ class Linear:
 
 
 def linear(placed):
-    """The Linear equations beside the set (case A or B)."""
+    """The Linear equations of deviations from the set (case A or B)."""
     b, theta = placed.system, placed.theta
     sin, cos = (1.0, 0.0) if placed.case == CASE_B else (math.sin(theta), math.cos(theta))
     unit = _rate(placed)
@@ -84,7 +84,7 @@ def _rate(placed):
 
 
 def at_rest(placed, phi, bar):
-    """Beside the equilibrium at phi, known within its bar."""
+    """Of the equilibrium at phi, known within its bar."""
     beside = linear(placed)
     matrix = beside.at(phi, 0.0)
     off = beside.slip * beside.size(0.0) + bar * sum(np.linalg.norm(m, np.inf) for m in beside.M[2:])
@@ -108,7 +108,7 @@ def _minors(matrix):
 
 
 def _negative(numbers, bars, neutral):
-    """Are all numbers negative? The first may be exactly 0 where that is `neutral`: nothing grows or falls."""
+    """Are all numbers negative? The first may be exactly 0 where that is `neutral`: nothing grows or decays."""
     pairs = list(zip(numbers, bars, strict=True))
     if any(x - bar > 0.0 for x, bar in pairs):
         return UNSTABLE
@@ -116,7 +116,7 @@ def _negative(numbers, bars, neutral):
 
 
 def quadratic(total, product, total_bar, product_bar):
-    """Both roots of x^2 - total x + product, with bars that hold beside a double root too."""
+    """Both roots of x^2 - total x + product, with bars that hold near a double root too."""
     middle, square = 0.5 * total, 0.25 * total * total - product
     root = np.sqrt(complex(square))
     large = middle + (root if middle * root.real >= 0.0 else -root)
@@ -160,7 +160,7 @@ def of_matrix(matrix, off):
 
 
 def along(placed, start, rotates):
-    """Beside the periodic motion from `start` (phi, w and their bars): multipliers over a period; growth per unit time.
+    """Of the periodic motion from `start` (phi, w and their bars): multipliers over a period; growth per unit time.
 
     Where the motion does not close within the bars, NOTHING.
     """
@@ -223,7 +223,7 @@ def _timed(values, bars, stable, lasting):
 
 
 def fast(placed):
-    """Beside a spin-up, w -> +-inf: unstable where axis 1 has the middle one of the moments about it, else undecided.
+    """Of a spin-up, w -> +-inf: unstable where A11 lies between the other two principal moments, else undecided.
 
     To leading order d(w2, w3)/dt = w S^-1 J (S - A11) (w2, w3): the squares of its exponents are -det(S - A11)/det S.
     """
@@ -234,7 +234,7 @@ def fast(placed):
 
 
 def steady(system, w, nu, off=0.0):
-    """Beside a fixed point (w, nu) of the whole body at its k and |nu| = 1: four exponents.
+    """Of a fixed point (w, nu) of the whole body at its k and |nu| = 1: four exponents.
 
     `off` is what the state may be off. Where A nu vanishes it cannot: k always moves with w.
     """

@@ -35,7 +35,7 @@ def abel(method, rows, targets, rtol, before=False):
 def _by_rows(rows, columns, solve):
     """`solve(rows, columns, served)` for those that a closed form serves and for the others."""
     served = np.empty(len(rows), dtype=np.bool_)
-    forms.served(*solution.split(rows), served)
+    forms.served(np.ascontiguousarray(rows, dtype=float), served)
     if served.all() or not served.any():
         return solve(rows, columns, served.any())
     parts = [solve(rows[pick], columns[pick], known) for pick, known in ((served, True), (~served, False))]

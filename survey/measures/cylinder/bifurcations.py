@@ -75,7 +75,7 @@ def force(system, phi):
 
 
 def size(system):
-    """The sum of the magnitudes of what g consists of."""
+    """The sum of the magnitudes of the terms of g."""
     return sum(abs(system[name]) for name in FORCES)
 
 
@@ -174,7 +174,7 @@ def _marks(plane, curve, kind, function):
 
 
 def _special(plane, xy):
-    """Is a point on the map, and neither f = 0 nor g = 0 throughout there?"""
+    """Is a point on the map, with neither f nor g identically 0 there?"""
     system = plane.system(xy)
     least = 1e-9 * min(plane.square.high - plane.square.low)
     return inside(plane.positions(xy))[0] and min(size(system), abs(system["b12"]) + abs(system["b31"])) > least
@@ -225,7 +225,7 @@ def _bend(plane, curve, phi):
 
 
 def _all_at(plane, phi):
-    """Where one equation is void at an angle and the other is not, as by symmetry: its solutions, a straight line."""
+    """Where at an angle one equation is 0 = 0, as by symmetry, and the other is not: its solutions, a straight line."""
     g, dg, _, (a, da, b, db) = _pair(plane, phi)
     noise, own = 8.0 * ROUNDOFF, size(_rest(plane))
     first, second = max(abs(a), abs(b)) > noise, max(abs(da), abs(db)) > noise
@@ -236,7 +236,7 @@ def _all_at(plane, phi):
 
 
 def _folds_of_one(plane, name):
-    """Straight lines, where the other axis plays no part in g."""
+    """Straight lines, where g does not depend on the other axis."""
     at, rest = plane.axes.index(name), _rest(plane)
 
     def mixed(phi):
@@ -339,7 +339,7 @@ def _hopf(plane, curve):
 
 
 def _ends(plane):
-    """K = 0; where that is so throughout, L = 0."""
+    """K = 0; where K is identically 0, L = 0."""
     rest = _rest(plane)
     slopes = {"b12": rest["s3"], "b31": -rest["s2"], "s3": rest["b12"], "s2": -rest["b31"]}
     a, b = (slopes.get(name, 0.0) for name in plane.axes)

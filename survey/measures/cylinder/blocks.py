@@ -32,7 +32,7 @@ def dense(point, names, name):
 
 
 def valid(rows, columns):
-    """Rows and columns with NaN made harmless, and where all are numbers."""
+    """Rows and columns with NaN replaced by numbers, and where none was replaced."""
     numbers, fine = np.isfinite(rows), np.isfinite(columns)
     if numbers.all() and fine.all():
         return rows, columns, fine

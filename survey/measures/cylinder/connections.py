@@ -1,4 +1,4 @@
-"""Saddle connections on a map of two parameters: where an unstable branch of a saddle is a stable one of a saddle.
+"""Saddle connections on a map of two parameters: where an unstable branch of a saddle is a stable branch of a saddle.
 
 Two kinds are looked for: those on which w keeps its sign, over at most a turn, and those with one turning point (a
 loop, or a way back to another saddle). Of either a function of the parameters says by how much both branches miss each
@@ -94,7 +94,7 @@ def missed(plane, connection, x):
 
 
 def _smooth(function, x, error):
-    """Is the change of sign at positions x a zero, and no jump?"""
+    """Is the change of sign at positions x a zero rather than a jump?"""
     good = np.ones(len(x), bool)
     for axis in np.eye(2):
         near, beside = (
@@ -119,7 +119,7 @@ def _passing(same, one, two):
 
 
 def _level(row, column):
-    """w where a branch passes an equilibrium, or less how far it turns before it."""
+    """w where a branch passes an equilibrium; if it turns before, minus the distance by which it does."""
     w, short = row[:, 2 * column], row[:, cn.TURN] - row[:, cn.OFFSETS + column]
     passed = np.isfinite(w)
     return np.where(passed, w, np.where(short < 0.0, short, np.nan)), np.where(

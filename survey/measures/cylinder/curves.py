@@ -35,8 +35,8 @@ def refusal(axes):
     if len(axes) in (2, 3) and (own == set(STATE) or own <= set(SYSTEM)) and set(axes[2:]) <= set(SYSTEM):
         return None
     return (
-        f"curves are known on two axes of {', '.join(SYSTEM)}, or on {', '.join(STATE)}, and one more of the former "
-        f"behind them, not on {', '.join(axes) or 'none'}"
+        f"curves are known on two axes of {', '.join(SYSTEM)}, or on {', '.join(STATE)}, in either case with at most "
+        f"one more axis of the former after them, not on {', '.join(axes) or 'none'}"
     )
 
 

@@ -1,4 +1,4 @@
-"""The ends w -> +-inf of a flow of one's own, phi' = w, w' = f(phi) w + g(phi), with f, g of the period 2 pi.
+"""The ends w -> +-inf of a user's flow, phi' = w, w' = f(phi) w + g(phi), with f, g of the period 2 pi.
 
 With F' = f and y = w - F, y' = dy/dphi = g / (y + F): over a turn w grows by 2 pi mean(f), and where that is 0 by
 
@@ -28,7 +28,7 @@ class Ends:
     K: float
     L: float
     bars: tuple[float, float, float, float]
-    attract: np.ndarray  # w -> +inf, w -> -inf: 1, -1, or 0 where nothing decides
+    attract: np.ndarray  # w -> +inf, w -> -inf: 1, -1, or 0 where that is not decided
 
 
 def of(row):

@@ -22,7 +22,7 @@ SAMPLES = np.pi * np.sin(np.arange(1.0, 17.0))  # angles at which periodicity is
 
 
 class Angle:
-    """A value that depends on phi: the place of its operation in a list of them."""
+    """A value that depends on phi: the index of its operation in the list of all."""
 
     __array_ufunc__ = None  # numpy's numbers leave operators to this class
 
@@ -62,19 +62,19 @@ class Angle:
         return self
 
     def _refused(self, *_others):
-        raise Unsupported("it compares phi, or what depends on it: one branch is not analytic")
+        raise Unsupported("it compares phi, or an expression in phi: what it branches to is not analytic")
 
     __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = __bool__ = _refused
     __hash__ = None
 
     def _rough(self, *_others):
-        raise Unsupported("it takes abs, int, float, // or % of what depends on phi, which is not analytic")
+        raise Unsupported("it applies abs, int, float, // or % to an expression in phi, which is not analytic")
 
     __abs__ = __int__ = __float__ = __floordiv__ = __mod__ = __rmod__ = __rfloordiv__ = __index__ = _rough
 
 
 class Record:
-    """The operations on phi: a context for `multiprecision.lift`, with the functions of mpmath's where phi is not."""
+    """The operations on phi: a context for `multiprecision.lift`, with mpmath's functions where phi does not enter."""
 
     def __init__(self):
         self.mp = multiprecision.context()
@@ -99,7 +99,7 @@ class Record:
             return self.function(FUNCTIONS[name], *given)
         if name in OTHERS:
             return OTHERS[name](self, *given)
-        raise Unsupported(f"it uses {name} of what depends on phi")
+        raise Unsupported(f"it applies {name} to an expression in phi")
 
     def place(self, code, first, second, number=0.0):
         """The value of this operation: the same for the same operation."""
@@ -112,7 +112,7 @@ class Record:
         return Angle(self, self._places[key])
 
     def with_number(self, code, number, at=None, first=None):
-        """An operation with a number: what binary64 leaves of it stands where no operand does."""
+        """An operation with a number; the rest that binary64 does not hold stands where no operand does."""
         number = self.mp.nan if isinstance(number, self.mp.mpc) else self.mp.mpf(number)
         rounded = float(number)
         missed = abs(float(number - rounded)) * (1 + 1e-15) if self.mp.isfinite(number) else 0.0
@@ -261,7 +261,7 @@ OTHERS = {
 
 
 class Raised(Exception):
-    """f or g raised its cause; `name` says which."""
+    """f or g, as `name` says, raised the cause of this."""
 
     def __init__(self, name):
         super().__init__(name)
@@ -269,7 +269,7 @@ class Raised(Exception):
 
 
 def recorded(function, name, record, p):
-    """The place of the function's value; None where it has none; raises Unsupported or Raised."""
+    """The index of the function's value; None where it has none; raises Unsupported or Raised."""
     try:
         value = multiprecision.lift(function, record)(record.angle, p)
         if not isinstance(value, (bool, int, float, Angle, record.mp.mpf, record.mp.mpc)):
@@ -315,7 +315,7 @@ def program(f, g, point, on_circle):
 
 
 def balls(row, phi):
-    """Middle and radius of the ball of every value at phi (SLOTS, 2): what is computed, and what that is rounded."""
+    """Middle and radius of the ball of every value at phi (SLOTS, 2): what is computed, and its rounding error."""
     out = np.zeros((int(row[pg.SLOTS]), 1, 2))
     pg.ball(row, float(phi), 0.0, 1, out)
     return out[:, 0]

@@ -208,7 +208,7 @@ def _signed(six, signs):
 
 
 def _outline_of_program(p):
-    """As `outline`: the strata, where nothing decides fates, are I0 for g = 0, I1 for f = 0, I2 for neutral ends."""
+    """As `outline`: the strata in which no fate is decided are I0 for g = 0, I1 for f = 0, I2 for neutral ends."""
     known = ends.of(p)
     p[MEAN] = known.mean_f
     f_is_0, g_is_0 = p[BOUND_F] == 0.0, p[BOUND_G] == 0.0

@@ -140,7 +140,7 @@ def _is_exact(p):
 
 
 def _is_hopf(s, row):
-    """Is in stratum G f = g = 0 at an equilibrium that is no saddle, within its bound?"""
+    """In stratum G, is f = g = 0 within its bound at an equilibrium that is not a saddle?"""
     return s.stratum == G and row[eq.KIND] != eq.SADDLE and row[eq.STABLE] == 0.0
 
 

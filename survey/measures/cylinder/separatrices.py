@@ -42,7 +42,7 @@ def found(square, axes, fixed):
 
 
 class Window:
-    """A map of phi0 and w0, the first of which is its axis number `at` of two."""
+    """A map of phi0 and w0; `at` (0 or 1) is the axis of phi0."""
 
     def __init__(self, square, at):
         self.square, self.at = square, at
@@ -100,7 +100,7 @@ def _branches(window, s):
 
 
 def _cycles(window, s):
-    """Every cycle that is certain, once round."""
+    """One period of every cycle that is certain."""
     for side, table in ((1.0, s.plus), (-1.0, s.minus), (0.0, s.librations)):
         for row in table:
             if row[rt.CYCLE_CLASS] < 0.0:

@@ -27,7 +27,7 @@ _ULP = 2.3e-16
 
 
 def trajectories(method, rows, times, rtol, stable, left):
-    """As `solution.trajectories`, and the HEADS of each row; method None takes what serves best."""
+    """As `solution.trajectories`, and the HEADS of each row; with None the best method is chosen."""
     floats, turnings, status = solution._nothing(times.shape)
     starts = _Starts(method, rows, stable, left)
     sign_w, sign_t = (-1.0 if stable != left else 1.0), (-1.0 if stable else 1.0)
@@ -51,7 +51,7 @@ def trajectories(method, rows, times, rtol, stable, left):
 
 
 def abel(method, rows, targets, rtol, stable, left):
-    """As `solution.abel`, and the HEADS of each row; method None takes what serves best."""
+    """As `solution.abel`, and the HEADS of each row; with None the best method is chosen."""
     floats, status = np.full((*targets.shape, rc.STATE), np.nan), np.zeros(targets.shape, np.int64)
     starts = _Starts(method, rows, stable, left)
     side, sign_w = (-1.0 if left else 1.0), (-1.0 if stable != left else 1.0)
@@ -146,7 +146,7 @@ class _Starts:
 
 
 def _by_steps(starts, rows, solve):
-    """The results of `solve` from the states at phi0, with bars for what these are rounded by: from two beside them."""
+    """The results of `solve` from the states at phi0, whose rounding two states next to each add to the bars."""
     good = starts.status == OK
     given = rows.copy()
     given[:, rc.W0] = np.where(good, starts.heads[:, START], 0.0)
@@ -167,7 +167,7 @@ def _by_steps(starts, rows, solve):
 
 
 def _symmetric(row):
-    """Is V exactly even about the direction of s, or are there s = 0? Then saddles beside that axis have one energy."""
+    """Is V exactly even about the direction of s, or s = 0? Then saddles on both sides of it have the same energy."""
     d, c23, s2, s3 = (Fraction(float(x)) for x in row[2:6])
     return d * s2 * s3 + c23 * (s3 * s3 - s2 * s2) == 0
 
