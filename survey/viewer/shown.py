@@ -154,7 +154,10 @@ class Map:
 
 
 def _check(path, ds):
-    """Raise Damaged unless the cells are consistent and the first two axes monotonic: else points cannot be located."""
+    """Raise BadInput or Damaged unless the axes have values, the first two monotonic, and the cells are consistent."""
+    for dim in ds.status.dims:
+        if dim not in ds.coords:
+            raise BadInput(f"{path}: the axis {dim} has no values, so there is no map to view")
     if "cell_verdict" in ds:
         schema.cells(ds)
     for dim in ds.status.dims[:2]:

@@ -321,10 +321,12 @@ def test_what_cannot_be_viewed_is_one_line(tmp_path):
     with netCDF4.Dataset(tmp_path / "other.nc", "w") as file:
         file.createDimension("x", 3)
     xr.open_dataset(MAP).isel(k=0).to_netcdf(tmp_path / "line.nc")
+    xr.open_dataset(MAP).drop_vars("k").to_netcdf(tmp_path / "bare.nc")
     for name, message in (
         ("absent.nc", "there is no such file"),
         ("other.nc", "this netCDF file was not written by survey"),
         ("line.nc", "this survey has fewer than two axes"),
+        ("bare.nc", "the axis k has no values, so there is no map to view"),
     ):
         with pytest.raises(BadInput, match=message) as refused:
             Map(tmp_path / name)
