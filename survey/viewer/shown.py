@@ -128,7 +128,10 @@ class Map:
         return {dim: float(self.ds[dim].values[indices[dim]]) for dim in self.ds.status.dims}
 
     def under(self, view, point):
-        """Yield lines about the point at these two indices, the view's variable first."""
+        """Lines of plain text about the point at these two indices, the view's variable first."""
+        return map(plain, self._under(view, point))
+
+    def _under(self, view, point):
         ds = self.ds
         names = dict.fromkeys([view.name, *(["verdict"] if "verdict" in ds else []), *self.names])
         names = [name for name in names if name != "status"][:LINES]
