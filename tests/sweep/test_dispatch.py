@@ -195,7 +195,7 @@ def test_a_cluster_replaces_a_worker_that_is_frozen(cluster, in_time, monkeypatc
     assert heard.dead == [] and sorted(heard.results) == [n * n for n in NUMBERS]
 
 
-def test_a_cluster_stops_for_a_task_without_end(cluster, in_time, monkeypatch):
+def test_a_cluster_stops_for_a_task_without_end(cluster, in_time, monkeypatch, caplog):
     monkeypatch.setattr(dispatch, "COMPILE_SECONDS", 3.0)
 
     def endless(number):
@@ -209,6 +209,7 @@ def test_a_cluster_stops_for_a_task_without_end(cluster, in_time, monkeypatch):
         )
         with pytest.raises(Stopped, match=words):  # the second where dask does not restart a worker it has killed
             clusters.on_cluster(endless, NUMBERS, heard.finished, heard.died, client, dispatch.Patience(1.0))
+    assert "finished no block for more than 1 s" in caplog.text  # so it was this program that killed the worker
     assert heard.dead == [] and len(heard.results) >= 9
 
 
