@@ -94,6 +94,7 @@ def mutate(source, path, seed):
     rng = np.random.default_rng(seed)
     kinds = [attribute, attribute, attribute, lost, lost, variable, variable, axis, dimension]
     changed = []
+    path.unlink(missing_ok=True)  # HDF5 knows an open file by its inode, and would go on showing the one before
     shutil.copy(source, path)
     for _ in range(1 + int(rng.integers(5) == 0)):
         changed.append(kinds[rng.integers(len(kinds))](path, rng))

@@ -457,7 +457,7 @@ RULE = """1. A closed form where one applies. With b = 0 it meets rtol at {close
    meet it at {lost} points where any method does. `rk4` runs out of steps on stiff systems and of digits first, the error of `dop853` is
    {dop853:.1f} times that of `taylor` (median over all points), and `full` also pays for the instability of its set.
 4. Near enough to a stable separatrix or a turning point every method in binary64 fails: errors grow there as the solutions
-   themselves part. No rule helps; the bars and `status` say so.
+   themselves part; the bars and `status` say so. There `auto` solves in double-double arithmetic, and meets rtol again.
 """
 
 

@@ -59,7 +59,8 @@ def _of_cells(ds):
     bar = ds.area_error.values.astype(float)
     values, bars = [*ds.area.values, total * undecided_share(ds)], [*bar, 1e-13 * total]
     comment = "from cells that are decided as a whole; the area of the undecided cells is the others' error bar"
-    return _described([*names, "undecided"], np.array(values), np.array(bars), total, ds.area.attrs["units"], comment)
+    units = ds.area.attrs.get("units", "1")
+    return _described([*names, "undecided"], np.array(values), np.array(bars), total, units, comment)
 
 
 def _counted(ds, codes):

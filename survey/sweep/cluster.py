@@ -20,6 +20,7 @@ from survey.wording import reason_of
 SCHEDULER_SECONDS = 10
 WORKERLESS_SECONDS = 60
 RESTART_SECONDS = 10
+PAUSED_SECONDS = 20  # that a worker short of memory may hold blocks without working on one
 TRIES = 3  # workers that may take too long for the same block
 STRIKES = 3  # workers that killed a block in a row, with no block finished in between, before the run stops
 ENCRYPTED = ("tls", "wss")
@@ -120,6 +121,7 @@ def _results(task, numbers, client, watch):
     """Yield (number, result, None) as results arrive; or (number, None, address of the last worker that it killed)."""
     from dask.distributed import KilledWorker
 
+    task = _Signed(task)
     ready = queue.SimpleQueue()
 
     async def fetch(future):
@@ -128,7 +130,7 @@ def _results(task, numbers, client, watch):
         except Exception as error:
             ready.put((future.key, None, error))
 
-    futures = client.map(task, numbers, pure=False, allow_other_workers=False)
+    futures = client.map(task, numbers, key="survey-block", pure=False, allow_other_workers=False)
     waiting = {future.key: (future, number) for future, number in zip(futures, numbers, strict=True)}
     for future in futures:
         client.loop.add_callback(fetch, future)  # so only the fetch of a result on a stuck worker waits
@@ -147,9 +149,22 @@ def _results(task, numbers, client, watch):
                     "command again to resume"
                 )
             if not killed:
-                watch.finished()
+                worker, result = result
+                watch.finished(worker)
             yield number, result, killed
         watch.check(waiting)
+
+
+class _Signed:
+    """The task; its result comes with the address of the worker that computed it."""
+
+    def __init__(self, task):
+        self.task = task
+
+    def __call__(self, number):
+        from dask.distributed import get_worker
+
+        return get_worker().address, self.task(number)
 
 
 class _Watch:
@@ -167,17 +182,18 @@ class _Watch:
         """Seconds between two checks."""
         return min(max(self.patience.limit / 10, 0.1), 5.0)
 
-    def finished(self):
-        """A block is finished: the workers are able to work."""
+    def finished(self, worker):
+        """This worker has finished a block: it has compiled what it needs, and the workers are able to work."""
         self.struck_by.clear()
+        self.proven.add(worker)
 
     def struck(self, worker):
-        """A block has killed this worker as the last of several."""
+        """A block has killed this worker as the last of several, or left it without memory."""
         self.struck_by.add(worker)
         if len(self.struck_by) >= STRIKES:
             raise Stopped(
-                f"the workers of the dask cluster at {self.address} keep dying without finishing a block; "
-                "give them more memory (see their logs) and run the command again to resume"
+                f"the workers of the dask cluster at {self.address} keep dying, or pausing for lack of memory, without "
+                "finishing a block; give them more memory (see their logs) and run the command again to resume"
             )
 
     def check(self, waiting):
@@ -187,10 +203,7 @@ class _Watch:
             return
         self.checked = now
         try:
-            at_work, finished = (
-                self.client.sync(ask, callback_timeout=SCHEDULER_SECONDS)
-                for ask in (self.client.scheduler.processing, self.client.scheduler.has_what)
-            )
+            at_work, finished = self._ask("processing"), self._ask("has_what")
         except (OSError, TimeoutError, ValueError):
             return  # a lost scheduler shows in the futures
         # also what is finished but not yet fetched: its worker may be stuck by now
@@ -198,22 +211,28 @@ class _Watch:
             worker: frozenset(key for key in (*keys, *finished.get(worker, ())) if key in waiting)
             for worker, keys in at_work.items()
         }
-        stuck = [worker for worker, keys in held.items() if self._is_stuck(worker, keys, waiting, now)]
-        self.held = {worker: self.held[worker] for worker in held}
+        self.held = {worker: self._since(worker, keys, now) for worker, keys in held.items()}
         self._check_staff(held, now)
+        long = {worker: now - since for worker, (keys, since) in self.held.items() if keys}
+        starved = self._starved([worker for worker, seconds in long.items() if seconds > PAUSED_SECONDS])
+        if starved:
+            self._feed(starved)
+        stuck = [worker for worker, seconds in long.items() if seconds > self._limit(worker) and worker not in starved]
         if stuck:
             self._replace(stuck, waiting)
 
-    def _is_stuck(self, worker, keys, waiting, now):
-        """Has the worker held the same blocks for too long?"""
+    def _ask(self, what):
+        """Call this method of the scheduler."""
+        return self.client.sync(getattr(self.client.scheduler, what), callback_timeout=SCHEDULER_SECONDS)
+
+    def _limit(self, worker):
+        """Seconds that the worker may hold the same blocks."""
+        return self.patience.limit if worker in self.proven else self.patience.first
+
+    def _since(self, worker, keys, now):
+        """The keys that a worker holds, and since when it has held just these."""
         before, since = self.held.get(worker, (keys, now))
-        if keys != before:
-            since = now
-            if any(key not in waiting for key in before):
-                self.proven.add(worker)  # it has compiled what it needs
-        self.held[worker] = keys, since
-        limit = self.patience.limit if worker in self.proven else self.patience.first
-        return bool(keys) and now - since > limit
+        return keys, since if keys == before else now
 
     def _check_staff(self, held, now):
         """Raise Stopped where no worker takes a block; only warn where none has arrived yet: a queue may start some."""
@@ -252,10 +271,30 @@ class _Watch:
                 )
         message = "%d of the workers of %s finished no block for more than %.0f s; their blocks go to others"
         logging.getLogger("survey").warning(message, len(stuck), self.address, limit)
+        self._restart(stuck)
+
+    def _starved(self, workers):
+        """Those of the workers that have paused for lack of memory, with no block in progress."""
+        known = {}
+        if workers:
+            with contextlib.suppress(OSError, TimeoutError, ValueError):
+                known = self._ask("identity")["workers"]
+        paused = [worker for worker in workers if worker in known and known[worker]["status"] == "paused"]
+        return [worker for worker in paused if not known[worker]["metrics"]["task_counts"].get("executing")]
+
+    def _feed(self, starved):
+        """Restart workers that wait for memory, which a process seldom gives back."""
+        for worker in starved:
+            self.struck(worker)
+        message = "%d of the workers of %s paused for lack of memory; they are restarted"
+        logging.getLogger("survey").warning(message, len(starved), self.address)
+        self._restart(starved)
+
+    def _restart(self, workers):
         with contextlib.suppress(OSError, TimeoutError, ValueError):
             self.client.sync(
                 self.client.scheduler.restart_workers,
-                workers=stuck,
+                workers=workers,
                 timeout=RESTART_SECONDS,
                 wait_for_workers=False,
                 on_error="return",

@@ -128,7 +128,10 @@ class Map:
         return {dim: float(self.ds[dim].values[indices[dim]]) for dim in self.ds.status.dims}
 
     def under(self, view, point):
-        """Yield lines about the point at these two indices, the view's variable first."""
+        """Lines of plain text about the point at these two indices, the view's variable first."""
+        return map(plain, self._under(view, point))
+
+    def _under(self, view, point):
         ds = self.ds
         names = dict.fromkeys([view.name, *(["verdict"] if "verdict" in ds else []), *self.names])
         names = [name for name in names if name != "status"][:LINES]
@@ -154,7 +157,10 @@ class Map:
 
 
 def _check(path, ds):
-    """Raise Damaged unless the cells are consistent and the first two axes monotonic: else points cannot be located."""
+    """Raise BadInput or Damaged unless the axes have values, the first two monotonic, and the cells are consistent."""
+    for dim in ds.status.dims:
+        if dim not in ds.coords:
+            raise BadInput(f"{path}: the axis {dim} has no values, so there is no map to view")
     if "cell_verdict" in ds:
         schema.cells(ds)
     for dim in ds.status.dims[:2]:

@@ -28,15 +28,16 @@ def points(mu, e, **more):
 
 @pytest.mark.parametrize(("method", "rtol"), [("auto", 1e-6), ("auto", 1e-12), ("dop853", 2e-9), ("rk4", 1e-6)])
 def test_references_lie_within_the_bars(method, rtol):
+    """At e < 0.7 the bars of dop853 come down to 1.4e-9, whatever is asked; hence its rtol here."""
     ds = points([row["mu"] for row in POINTS], [row["e"] for row in POINTS], method=method, rtol=rtol)
     with mp.workdps(30):
         for name in "ab":
             exact = [mpf(row[name]) for row in POINTS]
             error = [abs(float(mpf(v) - x)) for v, x in zip(ds[name].values.tolist(), exact, strict=True)]
-            assert (error <= ds[f"{name}_error"].values).all()
+            assert 1e-4 < max(error / ds[f"{name}_error"].values) <= 1
             size = np.array([1 + abs(float(x)) for x in exact])
             near = np.array([row["e"] < 0.7 for row in POINTS])
-            assert (ds[f"{name}_error"].values < max(rtol, 1e-10) * size)[near].all()
+            assert (ds[f"{name}_error"].values < rtol * size)[near].all()
     decided = ds.verdict.values != -1
     assert (ds.verdict.values == [row["stable"] for row in POINTS])[decided].all()
     assert decided.all() or method != "auto"

@@ -3,10 +3,12 @@
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 import time
 
 import dask
+import psutil
 import pytest
 
 from survey.errors import BadInput, Stopped
@@ -134,9 +136,9 @@ def test_patience_is_measured_from_other_tasks_and_has_a_floor():
     assert dispatch.Patience(7.0).limit == 7.0
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def cluster():
-    """Two workers; a task is set aside after two deaths, not four: each costs seconds."""
+    """Two workers, new for each test: not every nanny replaces one that dies. A task is set aside after two deaths."""
     distributed = pytest.importorskip("distributed")
     with dask.config.set({"distributed.scheduler.allowed-failures": 1}):
         with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
@@ -193,7 +195,7 @@ def test_a_cluster_replaces_a_worker_that_is_frozen(cluster, in_time, monkeypatc
     assert heard.dead == [] and sorted(heard.results) == [n * n for n in NUMBERS]
 
 
-def test_a_cluster_stops_for_a_task_without_end(cluster, in_time, monkeypatch):
+def test_a_cluster_stops_for_a_task_without_end(cluster, in_time, monkeypatch, caplog):
     monkeypatch.setattr(dispatch, "COMPILE_SECONDS", 3.0)
 
     def endless(number):
@@ -207,6 +209,7 @@ def test_a_cluster_stops_for_a_task_without_end(cluster, in_time, monkeypatch):
         )
         with pytest.raises(Stopped, match=words):  # the second where dask does not restart a worker it has killed
             clusters.on_cluster(endless, NUMBERS, heard.finished, heard.died, client, dispatch.Patience(1.0))
+    assert "finished no block for more than 1 s" in caplog.text  # so it was this program that killed the worker
     assert heard.dead == [] and len(heard.results) >= 9
 
 
@@ -216,9 +219,109 @@ def test_a_cluster_whose_workers_all_die_stops_and_blames_no_task(cluster, in_ti
     monkeypatch.setattr(clusters, "WORKERLESS_SECONDS", 5)
     heard = Heard()
     with clusters.client_of(cluster.scheduler_address) as client:
-        with pytest.raises(Stopped, match=r"keep dying without finishing a block; give|lost its last worker"):
+        with pytest.raises(Stopped, match=r"keep dying, or pausing .* give|lost its last worker"):
             clusters.on_cluster(lambda _: die(), NUMBERS, heard.finished, heard.died, client, dispatch.Patience(20.0))
     assert heard.dead == [] and heard.results == []
+
+
+LIMIT = 700  # MB; a worker that holds more than 80 % of it takes no further tasks, its nanny kills it at 95 %
+
+
+@pytest.fixture
+def short_of_memory():
+    """The address of a cluster of two workers with little memory."""
+    distributed = pytest.importorskip("distributed")
+    small = {"n_workers": 2, "threads_per_worker": 1, "memory_limit": f"{LIMIT}MB", "dashboard_address": None}
+    with dask.config.set({"distributed.scheduler.allowed-failures": 1}), distributed.LocalCluster(**small) as cluster:
+        yield cluster.scheduler_address
+
+
+def fill(share):
+    """Let this process hold this share of its worker's memory, for good."""
+    missing = share * LIMIT * 10**6 - psutil.Process().memory_info().rss
+    sys.modules.setdefault("filled", []).append(b"x" * max(int(missing), 0))
+
+
+def test_a_task_that_needs_too_much_memory_costs_itself_alone(short_of_memory, in_time):
+    def greedy(number):
+        if number == 4:
+            fill(1.5)
+            time.sleep(10_000)  # the nanny looks every 0.1 s
+        return number * number
+
+    heard = Heard()
+    with clusters.client_of(short_of_memory) as client:
+        clusters.on_cluster(greedy, NUMBERS, heard.finished, heard.died, client)
+    assert heard.dead == [4] and sorted(heard.results) == sorted(n * n if n != 4 else -4 for n in NUMBERS)
+
+
+def test_tasks_that_all_need_too_much_memory_stop_the_run(short_of_memory, in_time, monkeypatch):
+    monkeypatch.setattr(clusters, "WORKERLESS_SECONDS", 5)
+
+    def greedy(number):
+        if number >= 6:
+            fill(1.5)
+            time.sleep(10_000)
+        return number * number
+
+    heard = Heard()
+    words = r"keep dying, or pausing for lack of memory, without finishing a block; give .* again|lost its last worker"
+    with clusters.client_of(short_of_memory) as client:
+        with pytest.raises(Stopped, match=words):
+            clusters.on_cluster(greedy, range(24), heard.finished, heard.died, client, dispatch.Patience(20.0))
+    assert heard.dead == [] and set(heard.results) and set(heard.results) <= {n * n for n in range(6)}
+
+
+def test_a_worker_that_pauses_for_lack_of_memory_is_restarted(short_of_memory, in_time, monkeypatch, caplog):
+    monkeypatch.setattr(clusters, "PAUSED_SECONDS", 1)
+
+    def leaky(number):
+        fill(0.87)
+        return number * number
+
+    heard = Heard()
+    with clusters.client_of(short_of_memory) as client:
+        clusters.on_cluster(leaky, NUMBERS[:6], heard.finished, heard.died, client, dispatch.Patience(10.0))
+    assert heard.dead == [] and sorted(heard.results) == [n * n for n in NUMBERS[:6]]
+    assert "paused for lack of memory; they are restarted" in caplog.text
+
+
+class Starving:
+    """A cluster as its client sees it, whose one worker, started again and again, pauses before it begins a task."""
+
+    address, starts = "tcp://starving", 1
+
+    @property
+    def scheduler(self):
+        return self
+
+    def sync(self, ask, callback_timeout, **given):
+        return ask(**given)
+
+    def processing(self):
+        return {f"worker-{self.starts}": ["key"]}
+
+    def has_what(self):
+        return {}
+
+    def identity(self):
+        return {
+            "workers": {worker: {"status": "paused", "metrics": {"task_counts": {}}} for worker in self.processing()}
+        }
+
+    def restart_workers(self, workers, **_):
+        assert workers == list(self.processing())
+        self.starts += 1
+
+
+def test_workers_that_never_have_memory_stop_the_run(in_time, monkeypatch):
+    monkeypatch.setattr(clusters, "PAUSED_SECONDS", 0.1)
+    starving = Starving()
+    watch = clusters._Watch(starving, dispatch.Patience(1.0))
+    with pytest.raises(Stopped, match=r"keep dying, or pausing for lack of memory, without finishing a block; give"):
+        while True:
+            watch.check({"key": (None, 0)})
+    assert starving.starts == clusters.STRIKES
 
 
 def test_a_cluster_without_workers_is_told_and_waited_for(in_time, monkeypatch, caplog):

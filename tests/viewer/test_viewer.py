@@ -11,6 +11,7 @@ import urllib.error
 import urllib.request
 from pathlib import Path
 
+import hostile
 import netCDF4
 import numpy as np
 import pytest
@@ -321,10 +322,12 @@ def test_what_cannot_be_viewed_is_one_line(tmp_path):
     with netCDF4.Dataset(tmp_path / "other.nc", "w") as file:
         file.createDimension("x", 3)
     xr.open_dataset(MAP).isel(k=0).to_netcdf(tmp_path / "line.nc")
+    xr.open_dataset(MAP).drop_vars("k").to_netcdf(tmp_path / "bare.nc")
     for name, message in (
         ("absent.nc", "there is no such file"),
         ("other.nc", "this netCDF file was not written by survey"),
         ("line.nc", "this survey has fewer than two axes"),
+        ("bare.nc", "the axis k has no values, so there is no map to view"),
     ):
         with pytest.raises(BadInput, match=message) as refused:
             Map(tmp_path / name)
@@ -387,3 +390,56 @@ def test_in_a_browser_a_point_is_told_and_clicked_and_its_link_shows_the_same(tm
             line for line in driver.get_log("browser") if line["level"] == "SEVERE" and "favicon" not in line["message"]
         ]
         assert not grave
+
+
+BUTTONS = """
+const found = []
+const search = root => root.querySelectorAll("*").forEach(element => {
+  if (element.shadowRoot) search(element.shadowRoot)
+  if (element.tagName == arguments[0] && element.getClientRects().length) found.push(element)
+})
+search(document)
+return found
+"""  # or other elements that are seen
+READ, RUN = "Show the file", "I have read it: allow it to run until survey view ends"
+
+
+@served
+@browsed
+def test_in_a_browser_a_strange_scene_runs_only_once_its_text_was_shown_and_allowed(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    (tmp_path / "files").mkdir()
+    ran = hostile.base(tmp_path / "files")
+    with picture.served(tmp_path / "files/base.nc") as (address, _), picture.browser() as driver:
+
+        def seen(tag="BUTTON"):
+            return [element.text for element in driver.execute_script(BUTTONS, tag)]
+
+        def press(label):
+            (button,) = (button for button in driver.execute_script(BUTTONS, "BUTTON") if button.text == label)
+            button.click()
+
+        def choose(a, q):
+            before = driver.current_url
+            picture.act(driver, a, q, click=True)
+            picture.wait(driver, lambda: driver.current_url != before)
+
+        driver.get(address)
+        picture.wait(driver)
+        assert seen() == []
+        for a in (3.5, 6.5):  # another point hides the text again
+            choose(a, 2.5)
+            picture.wait(driver, lambda: any("Read it first" in text for text in driver.execute_script(TEXTS)))
+            picture.wait(driver, lambda: seen() == [READ])
+            assert seen("PRE") == []
+            press(READ)
+            picture.wait(driver, lambda: seen() == [RUN])
+            assert seen("PRE") == [(tmp_path / "files/evil.py").read_text().rstrip()]
+            assert not ran.exists()
+        press(RUN)
+        picture.wait(driver, ran.exists)
+        for a in (6.5, 3.5):  # the second without a question
+            picture.wait(driver, lambda: any("<img class='motion'" in text for text in driver.execute_script(TEXTS)))
+            assert seen() == [] == seen("PRE")
+            choose(a, 5.0)
+    assert not (tmp_path / "state").exists(), "allowed once, not for good"

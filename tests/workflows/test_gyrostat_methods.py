@@ -43,8 +43,12 @@ def replace_rows(plane, rows, abscissae, **more):
 def test_every_error_lies_within_its_bar(maps, true, method):
     for name, plane in maps.items():
         j = workflow.compared(plane, method, true[name])
-        assert not j.wrong.any() and j.ratio.max() < 1 and j.doubtful.max() < 1e-3, name  # bars of double-double, too
-        assert (j.error[j.met] < workflow.RTOL).all()
+        assert not j.wrong.any() and j.ratio.max() < 1, name
+        # the truth has about 30 digits; where `auto` solves in double-double its bars have nearly as many
+        assert j.doubtful.max() < (1e-3 if method == "auto" else 1e-14), name
+        assert (j.error[j.met] < workflow.RTOL).all() and (method != "auto" or j.met.all()), name
+        some = j.ratio[j.met & (j.error > 0.0)]
+        assert not some.size or np.median(some) > 1e-4, f"{name}: bars ten thousand times the errors"
 
 
 def test_beside_turning_points_of_random_systems():
