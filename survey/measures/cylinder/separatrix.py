@@ -94,7 +94,7 @@ class _Starts:
                 self.status[i] = DEGENERATE
             elif free:
                 self.heads[i, SADDLE_BAR] = _ULP * (1.0 + angle)
-                self._elliptic(i, place, many > separatrix.ONE or _symmetric(rows[i]))
+                self._elliptic(i, place, many > separatrix.ONE or symmetric(rows[i]))
             elif method is closed:
                 self.status[i] = NO_FORM
             else:
@@ -166,7 +166,7 @@ def _by_steps(starts, rows, solve):
     return results
 
 
-def _symmetric(row):
+def symmetric(row):
     """Is V exactly even about the direction of s, or are there s = 0? Then saddles beside that axis have one energy."""
     d, c23, s2, s3 = (Fraction(float(x)) for x in row[2:6])
     return d * s2 * s3 + c23 * (s3 * s3 - s2 * s2) == 0
