@@ -32,7 +32,8 @@ angle in [0, 2 pi)), one that leaves it (`separatrix = "unstable"`) or runs into
 phi0 is; of the saddle's copies, one a turn, that next to phi0. t = 0 where the branch, followed from the saddle,
 first passes phi0, before it turns; `w_start` is w there. Where there is no such saddle, or the branch turns before
 phi0, the status is `invalid_parameters`. For b = 0 these are closed forms at any t, also into a second saddle of the
-same energy. Degenerate equilibria count as saddles: they have branches here where b = 0 and the root of g is exactly
+same energy; so are motions whose phi0 = 0 and w0 give exactly the energy of a saddle (at no other phi0 can binary64
+do that). Degenerate equilibria count as saddles: they have branches here where b = 0 and the root of g is exactly
 multiple.
 
 An Abel solution has status `ok` where it certainly reaches phi, `turning` where it turns before phi or so near to it
@@ -230,6 +231,7 @@ def solve(point, request):
     if "separatrix" in request.options:
         return _separatrix(point, request, question)
     measure, start = auto if request.method == "auto" else solution, (*_SYSTEM, "phi0", "w0")
+    measure = separatrix.Aware(measure) if request.method in ("auto", "closed") else measure
     if question == "trajectory":
         return blocks.trajectories(*blocks.dense(point, start, "t"), measure, method, request.rtol)
     before = request.options.get("branch") == "before"
