@@ -58,7 +58,7 @@ def _parting(flow, followed, time, named):
     if s.folded or s.unknown:
         return data
     s = remembered(taylor, flow)
-    lines = [(states, times, kind) for states, times, kind in (*_branches(s, time), _cycles(s)) if len(states)]
+    lines = [(states, times, kind) for states, times, kind in (*_branches(s, time), cycles(s)) if len(states)]
     if not lines:
         return data
     found = [followed(states, times) for states, times, _ in lines]
@@ -83,7 +83,7 @@ def _branches(s, time):
         yield states, sign * np.linspace(0.0, time, ALONG)[None], kind
 
 
-def _cycles(s):
+def cycles(s):
     """(states, times, kinds) of one turn of every cycle."""
     rows = [(s.section, row[rt.CYCLE_X], row) for row in s.plus]
     rows += [(s.section, -row[rt.CYCLE_X], row) for row in s.minus]
