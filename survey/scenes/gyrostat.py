@@ -211,7 +211,7 @@ OUTPUTS = (
 def cost(options, sizes):
     """Seconds per point, rough: one solution serves its dense outputs, one set of cycles all fates of a system."""
     if options["question"] == "portrait":
-        return 8e-3
+        return 2e-2
     if "separatrix" in options:  # in double-double arithmetic, but where b = 0
         return 2e-3 / sizes.get("t", sizes.get("phi")) + 4e-6
     if options["question"] == "trajectory":
