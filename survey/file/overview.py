@@ -25,15 +25,17 @@ class Points:
     """One variable of a survey over two of its axes, and its status `state`: DataArrays, possibly lazy.
 
     `kinds` names what a point may be: the variable's flags, if it has any, the scene's own statuses (`statuses`,
-    {name: code}), then the other reasons why it has no value. Bit i of a mask means that the i-th of them occurs.
+    {name: code}), then the other reasons why it has no value. Bit i of a mask means that the i-th of them occurs. Of
+    numbers, statuses are told apart only `with_statuses`: they hide the values in their cell.
     """
 
-    def __init__(self, variable, state, statuses):
+    def __init__(self, variable, state, statuses, with_statuses=False):
         self.variable, self.status, self.shape = variable, state, variable.shape
         self.flagged = "flag_values" in variable.attrs
         self.flags = flag_codes(variable.attrs) if self.flagged else {}
         self.fill = np.nan if self.flagged or fill_of(variable) is None else fill_of(variable)
-        self.statuses = statuses if "undecided" in self.flags else {}
+        told = "undecided" in self.flags or (with_statuses and not self.flagged)
+        self.statuses = statuses if told else {}
         self.kinds = [*self.flags, *self.statuses, *NO_ANSWER, UNREAD]
         self.dtype = next((dtype for dtype in MASKS if len(self.kinds) <= np.iinfo(dtype).bits), None)
         if self.dtype is None:
@@ -59,6 +61,9 @@ class Points:
                 flags = np.where(flags == self._of_open[0], self._of_open[state.view(np.uint8)], flags)
             return np.where(mask == 0, flags, mask) if state.any() else flags, None
         value = array.astype(np.float32)
+        if self.statuses and state.any():
+            without = (mask == 0) & ((array == self.fill) | ~np.isfinite(value))
+            mask = np.where(without, self._of_open[state.view(np.uint8)], mask)
         value[(mask != 0) | (array == self.fill) | ~np.isfinite(value)] = np.nan
         return mask, _ranked(value)
 

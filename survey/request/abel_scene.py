@@ -114,7 +114,8 @@ class AbelScene(FunctionScene):
         panels = orbit.ON_PLANE if self.period is None else orbit.ON_CYLINDER
         request = Request({"question": "trajectory"}, rtol=1e-9)
         names = [p.name for p in self.own]
-        return orbit.solve(lambda asked: self.solve(asked, request), self.OUTPUTS, names, point, time, panels)
+        flow = None if self.period is None else self._flows(np.array([[point[name] for name in names]]))[0]
+        return orbit.solve(lambda asked: self.solve(asked, request), self.OUTPUTS, names, point, time, panels, flow)
 
     def _flows(self, points):
         """The programs of the parameters (N, n)."""

@@ -109,8 +109,11 @@ def _check_method(scene, options, method, table):
 def methods_of(scene, options=None):
     """Names of the methods that serve the scene's family (and these option values), found by walking their folder."""
     found = {name: measures.method(name) for name in modules.names(survey.methods)}
-    return [name for name, m in found.items() if scene.FAMILY in m.SERVES and (options is None or _fits(m, options))]
+    return [name for name, m in found.items() if scene.FAMILY in m.SERVES and _fits(scene, m, options)]
 
 
-def _fits(method, options):
-    return all(options.get(name, "") in allowed for name, allowed in getattr(method, "WHEN", {}).items())
+def _fits(scene, method, options):
+    when, own = getattr(method, "WHEN", {}), {option.name for option in scene.OPTIONS}
+    if options is None:
+        return all(name in own or "" in allowed for name, allowed in when.items())
+    return all(options.get(name, "") in allowed for name, allowed in when.items())

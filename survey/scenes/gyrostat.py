@@ -32,7 +32,8 @@ angle in [0, 2 pi)), one that leaves it (`separatrix = "unstable"`) or runs into
 phi0 is; of the saddle's copies, one a turn, that next to phi0. t = 0 where the branch, followed from the saddle,
 first passes phi0, before it turns; `w_start` is w there. Where there is no such saddle, or the branch turns before
 phi0, the status is `invalid_parameters`. For b = 0 these are closed forms at any t, also into a second saddle of the
-same energy. Degenerate equilibria count as saddles: they have branches here where b = 0 and the root of g is exactly
+same energy; so are motions whose phi0 = 0 and w0 give exactly the energy of a saddle (at no other phi0 can binary64
+do that). Degenerate equilibria count as saddles: they have branches here where b = 0 and the root of g is exactly
 multiple.
 
 An Abel solution has status `ok` where it certainly reaches phi, `turning` where it turns before phi or so near to it
@@ -68,7 +69,7 @@ the system, without an initial state).
 import numpy as np
 
 from survey import methods
-from survey.measures.cylinder import auto, blocks, orbit, portrait, separatrix, solution
+from survey.measures.cylinder import auto, blocks, destinations, orbit, portrait, separatrix, solution
 from survey.measures.cylinder.fate import NO_TURNS
 from survey.modules import load
 from survey.scene import Option, Output, Parameter, Request, named, plus_minus
@@ -128,12 +129,15 @@ _FATES = {
     "undecided": -1, "focus_or_node": 0, "saddle": 1, "rotation_plus": 2, "rotation_minus": 3, "libration": 4,
     "spin_up_plus": 5, "spin_up_minus": 6, "periodic_rotation": 7, "periodic_libration": 8, "equilibrium_start": 9,
 }  # fmt: skip
+_BRANCH_ENDS = {"undecided": -1, "none": 0, "equilibrium": 1, "rotation_plus": 2, "rotation_minus": 3, "libration": 4,
+                "plus_infinity": 5, "minus_infinity": 6}  # fmt: skip
 _ENDS = {"repelling": 0, "neutral": 1, "attracting": 2}
 _TYPES = ("none", "saddle", "attracting_node", "weak_node", "repelling_node", "attracting_focus", "weak_focus",
           "repelling_focus", "degenerate")  # fmt: skip
 DIMENSIONS = {
     "equilibrium": np.arange(1, portrait.EQUILIBRIA + 1),
     "cycle": np.arange(1, portrait.CYCLES + 1),
+    "branch": np.array(destinations.BRANCHES),
 }
 
 OUTPUTS = (
@@ -192,6 +196,13 @@ OUTPUTS = (
            applies="for as many entries as there are cycles"),
     Output("cycle_period", "period of the cycle", "T", when=_PORTRAIT, dims=("cycle",),
            applies="for as many entries as there are cycles"),
+    Output("cycle_inside", "number of equilibria that the cycle surrounds", integer=True, when=_PORTRAIT,
+           dims=("cycle",), applies="to librations"),
+    Output("branch_end", "where the branch of the saddle goes: the unstable ones for t -> +inf, the stable ones for "
+           "t -> -inf", flags=_BRANCH_ENDS, when=_PORTRAIT, dims=("equilibrium", "branch"), fill=0,
+           applies="to saddles, of as many entries as there are equilibria; infinities are those of w"),
+    Output("branch_limit", "number of the equilibrium, or of the cycle, where the branch goes", integer=True, fill=0,
+           when=_PORTRAIT, dims=("equilibrium", "branch"), applies="where the branch goes to one of the two"),
     Output("verdict", "is the portrait structurally stable?", when=_PORTRAIT,
            flags={"undecided": -1, "degenerate": 0, "structurally_stable": 1}),
 )  # fmt: skip
@@ -200,7 +211,7 @@ OUTPUTS = (
 def cost(options, sizes):
     """Seconds per point, rough: one solution serves its dense outputs, one set of cycles all fates of a system."""
     if options["question"] == "portrait":
-        return 8e-3
+        return 2e-2
     if "separatrix" in options:  # in double-double arithmetic, but where b = 0
         return 2e-3 / sizes.get("t", sizes.get("phi")) + 4e-6
     if options["question"] == "trajectory":
@@ -220,6 +231,7 @@ def solve(point, request):
     if "separatrix" in request.options:
         return _separatrix(point, request, question)
     measure, start = auto if request.method == "auto" else solution, (*_SYSTEM, "phi0", "w0")
+    measure = separatrix.Aware(measure) if request.method in ("auto", "closed") else measure
     if question == "trajectory":
         return blocks.trajectories(*blocks.dense(point, start, "t"), measure, method, request.rtol)
     before = request.options.get("branch") == "before"
@@ -274,7 +286,8 @@ def trajectory(point, answer, options, time=None):
         return out
 
     start = {"w0": answer["w_start"]} if "saddle" in point else {}
-    return orbit.solve(motions, OUTPUTS, _SYSTEM, {**point, **start}, time)
+    flow = [point[name] for name in _SYSTEM]
+    return orbit.solve(motions, OUTPUTS, _SYSTEM, {**point, **start}, time, flow=flow)
 
 
 def _separatrix(point, request, question):

@@ -11,7 +11,7 @@ from survey.file.labels import options_of, scene_statuses
 from survey.grid import logarithmic
 from survey.show.layout import add_legend
 from survey.show.palette import greys
-from survey.show.text import label_of, spaced
+from survey.show.text import WIDE, label_of, spaced
 
 ANGLE = "phi"
 AT_TURNING = {"w": None, "t": "t_turning"}  # what is drawn as curves, and its value at a turning point (None: 0)
@@ -64,7 +64,7 @@ def draw_family(axes, ds, variable, paper):
     handles += _turning_points(axes, turning, there, ends)
     handles += _unknown_ends(axes, ds, states, lines, ends, paper)
     add_legend(axes, handles)
-    axes.set(xlabel=label_of(phi), ylabel=label_of(variable))
+    axes.set(xlabel=label_of(phi, WIDE), ylabel=label_of(variable))
     if phi.attrs.get("units") == "rad":
         _ticks(axes, angles)
 

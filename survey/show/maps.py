@@ -1,6 +1,7 @@
 """A variable over two axes: a colour per verdict or flag, or a colour bar."""
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
@@ -15,9 +16,10 @@ from survey.show.layout import add_legend
 from survey.show.marks import hatched, marks, marks_without_answer
 from survey.show.palette import UNDECIDED, greys, hatch_of, kinds_of
 from survey.show.style import style_named
-from survey.show.text import label_of, spaced
+from survey.show.text import WIDE, label_of, spaced
 
 MAX_DRAWN = 2000  # points along an axis: in a picture of a larger map a cell stands for several points
+MOST_COUNTS = 10  # that have a colour each
 MAX_CELLS = 1000  # along an axis of such a picture: each costs a hundred bytes
 CELLS_PER_PIXEL = 0.8  # of the axes, before legend and labels take their share
 
@@ -37,10 +39,11 @@ def draw_map(axes, ds, variable, state, boundaries, paper):
         handles += marks_without_answer(axes, x, y, failed, outside, number, paper)
     else:
         shown = np.ma.masked_invalid(np.where(failed | outside, np.nan, variable.values.astype(float)))
-        drawn = axes.pcolormesh(
-            x, y, shown.T, cmap="viridis", shading="nearest", rasterized=True, **colour_limits(shown)
-        )
+        colours = counts(shown) if ticks else None
+        colours = colours or {"cmap": "viridis"} | colour_limits(shown)
+        drawn = axes.pcolormesh(x, y, shown.T, shading="nearest", rasterized=True, **colours)
         if not shown.mask.all():
+            ticks = np.unique(shown.compressed()) if "norm" in colours else ticks
             axes.figure.colorbar(drawn, ax=axes, label=label_of(variable), ticks=ticks)
         axes.set_facecolor("#dddddd")
         missing = shown.mask & ~(failed | outside)
@@ -52,7 +55,7 @@ def draw_map(axes, ds, variable, state, boundaries, paper):
         handles += draw_boundaries(axes, in_plane(ds, variable), x, y)
     if handles:
         add_legend(axes, handles)
-    axes.set(xlabel=label_of(x), ylabel=label_of(y))
+    axes.set(xlabel=label_of(x, WIDE), ylabel=label_of(y))
     for setting, scale in zip((axes.set_xscale, axes.set_yscale), scales, strict=True):
         if scale == "log":
             setting(scale)
@@ -62,7 +65,7 @@ def _shown(axes, ds, variable, state, dpi):
     """(variable, status, {}) in memory; for a large map those of the picture's cells, and {kind: number of points}."""
     if max(variable.shape) <= MAX_DRAWN:
         return variable.compute(), state.compute(), {}
-    box, points = axes.get_window_extent(), Points(variable, state, scene_statuses(ds))
+    box, points = axes.get_window_extent(), Points(variable, state, scene_statuses(ds), with_statuses=True)
     pixels = np.array([box.width, box.height]) * dpi / axes.figure.dpi
     overview = Overview(points, np.clip(CELLS_PER_PIXEL * pixels, 1, MAX_CELLS).astype(int)).complete
     values, states = points.cells(overview)
@@ -116,6 +119,15 @@ def _undefined(axes, x, y, ds, state, missing, number, paper):
             axes.pcolormesh(x, y, cells.T, cmap=ListedColormap([grey]), shading="nearest", rasterized=True)
             handles += marks(axes, x, y, here, spaced(name), number, paper, grey)
     return handles
+
+
+def counts(shown):
+    """A colour for each count, where they are few; else None."""
+    values = shown.compressed()
+    if values.size == 0 or np.ptp(values) >= MOST_COUNTS:
+        return None
+    edges = np.arange(values.min() - 0.5, values.max() + 1.0)
+    return {"cmap": colormaps["viridis"].resampled(len(edges) - 1), "norm": BoundaryNorm(edges, len(edges) - 1)}
 
 
 def colour_limits(shown):

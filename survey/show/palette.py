@@ -9,6 +9,7 @@ from survey.file.labels import flag_codes, scene_statuses
 # black is kept for undecided, white with hatching for failed
 COLOURS = ("#D55E00", "#A6D8F5", "#E69F00", "#F0E442", "#009E73", "#CC79A7", "#0072B2", "#999999", "#B8E0D2", "#5D3A9B")
 UNDECIDED = "#000000"
+NOTHING = "#EDEDED"  # the flag "none"
 # where the outputs are undefined, by the scene's own statuses: in print between unstable, stable and black
 GREYS = ("#808080", "#B3B3B3", "#5E5E5E")
 LIGHT_GREYS = ("#C6C6C6", "#A6A6A6", "#868686")  # the same in a map with a colour bar
@@ -29,10 +30,10 @@ def kinds_of(ds, variable, state):
 
 
 def colours_of(table):
-    """A colour per meaning; "ok" takes that of stable."""
-    meant = [name for name in table if name not in ("undecided", "ok")]
+    """A colour per meaning; "ok" takes that of stable, "none" stays pale."""
+    meant = [name for name in table if name not in ("undecided", "ok", "none")]
     first = [c for c in COLOURS if "ok" not in table or c != COLOURS[1]]
-    return {"undecided": UNDECIDED, "ok": COLOURS[1]} | dict(zip(meant, first, strict=False))
+    return {"undecided": UNDECIDED, "ok": COLOURS[1], "none": NOTHING} | dict(zip(meant, first, strict=False))
 
 
 def greys_of(ds, table):

@@ -1,10 +1,12 @@
 """A trajectory -> its picture: panels side by side, each of a kind that the scene names.
 
 Kinds: `lines t y1 y2`, values against time; `multipliers`, on the unit circle; `cylinder phi w`, an orbit on the
-cylinder among its neighbours; `plane x y`, a path; `sphere x y z`, a path on the unit sphere.
+cylinder among its neighbours, with equilibria, cycles and separatrices if the data hold them; `plane x y`, a path;
+`sphere x y z`, a path on the unit sphere.
 """
 
 import numpy as np
+from matplotlib.lines import Line2D
 
 from survey.show.layout import wrap
 from survey.show.palette import COLOURS
@@ -12,6 +14,18 @@ from survey.show.text import label_of, literal
 
 LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 GREY = "#999999"
+# what parts the motions on a cylinder: properties of matplotlib's line
+PARTING = {
+    "unstable_branch": {"color": LINES[1], "lw": 1.0},
+    "stable_branch": {"color": "black", "lw": 1.0},
+    "unstable_cycle": {"color": LINES[2], "lw": 2.0, "ls": (0, (4, 1.5))},
+    "stable_cycle": {"color": LINES[2], "lw": 2.0},
+}
+RESTS = {
+    "saddle": {"marker": "X", "mfc": "white"},
+    "attracting equilibrium": {"marker": "o", "mfc": "black"},
+    "other equilibrium": {"marker": "o", "mfc": "white"},
+}
 
 
 def draw(ds, figure):
@@ -66,13 +80,40 @@ def _cylinder(axes, ds, x, y):
     nearby = ds[[f"{x}_nearby", f"{y}_nearby"]].isel(part)
     for orbit, speed in zip(*(v.values for v in nearby.data_vars.values()), strict=True):
         axes.plot(*_wrapped(orbit, speed), lw=0.6, color=GREY)
-    axes.plot(*_wrapped(ds[x].values, ds[y].values), lw=1.8, color=LINES[0])
+    handles = _parting(axes, ds, x, y)
+    axes.plot(*_wrapped(ds[x].values, ds[y].values), lw=1.8, color=LINES[0], zorder=2.5)
     axes.plot(np.mod(ds[x].values[0], 2 * np.pi), ds[y].values[0], "o", color=LINES[1], mec="black", ms=6)
     axes.set_xlim(0, 2 * np.pi)
     size = 1.3 * max(1.0, np.nanmax(np.abs(ds[y].values), initial=0))
+    if "line_kind" in ds:  # cycles are shown too, unless they are far
+        cycles = np.abs(ds[f"{y}_line"].transpose("line", "place").values[ds.line_kind.values > 1])
+        size = max(size, min(1.1 * np.nanmax(cycles, initial=0), 4.0 * size))
     axes.set_ylim(-min(size, 50), min(size, 50))
     axes.set_xticks(np.arange(5) * np.pi / 2, ["0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$"])
     axes.set(xlabel=f"${ds[x].attrs['symbol']}$ mod $2\\pi$ (rad)", ylabel=label_of(ds[y]))
+    if handles:
+        axes.legend(handles=list(handles.values()), fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.13),
+                    ncols=3, frameon=False)  # fmt: skip
+
+
+def _parting(axes, ds, x, y):
+    """What parts the motions on a cylinder, where it is known: branches of the saddles, cycles and equilibria."""
+    handles = {}
+    if "line_kind" in ds:
+        names = ds.line_kind.attrs["flag_meanings"].split()
+        lines = ds[["line_kind", f"{x}_line", f"{y}_line"]].transpose("line", "place")
+        for kind, orbit, speed in zip(*(v.values for v in lines.data_vars.values()), strict=True):
+            style = PARTING[names[kind]]
+            axes.plot(*_wrapped(orbit, speed), **style)
+            handles[names[kind]] = Line2D([], [], label=names[kind].replace("_", " "), **style)
+    if f"equilibrium_{x}" in ds:
+        rests = (ds[name].values for name in (f"equilibrium_{x}", "equilibrium_saddle", "equilibrium_stable"))
+        for angle, saddle, stable in zip(*rests, strict=True):
+            name = "saddle" if saddle else "attracting equilibrium" if stable else "other equilibrium"
+            style = RESTS[name] | {"ls": "none", "mec": "black", "ms": 6, "zorder": 3}
+            axes.plot(angle, 0.0, clip_on=False, **style)
+            handles[name] = Line2D([], [], label=name, **style)
+    return handles
 
 
 def _wrapped(angle, value):

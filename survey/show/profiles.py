@@ -9,7 +9,7 @@ from survey.file.labels import flag_codes
 from survey.grid import logarithmic
 from survey.show.layout import add_legend
 from survey.show.palette import kinds_of
-from survey.show.text import formula, label_of, literal, spaced
+from survey.show.text import WIDE, formula, label_of, literal, spaced
 
 
 def draw_profile(axes, ds, variable, state, paper):
@@ -33,7 +33,7 @@ def draw_profile(axes, ds, variable, state, paper):
     bad = np.isin(state.values, list(status.UNANSWERED))
     if bad.any():
         axes.plot(x.values[bad], np.full(bad.sum(), axes.get_ylim()[0]), "x", color="#D55E00", label="no answer")
-    axes.set(xlabel=label_of(x), ylabel=label_of(variable))
+    axes.set(xlabel=label_of(x, WIDE), ylabel=label_of(variable))
     handles = axes.get_legend_handles_labels()[0]
     if handles and paper:
         add_legend(axes, handles)

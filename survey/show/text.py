@@ -9,6 +9,7 @@ from matplotlib.mathtext import MathTextParser
 from survey.wording import plain
 
 MAX_TEXT, MAX_FORMULA = 300, 120  # characters of a text and of a formula in a file
+WIDE = 80  # characters of a line below axes, where `layout.fit` breaks what is wider
 MAX_DEPTH = 6  # of nested braces in a formula
 WITH_LENGTHS = ("\\hspace", "\\genfrac")  # TeX that takes lengths, which may be miles
 
@@ -42,8 +43,8 @@ def _depth(symbol):
     return int(depth.max(initial=0))
 
 
-def label_of(variable):
-    """`long name, symbol (unit)`."""
+def label_of(variable, width=40):
+    """`long name, symbol (unit)`, in lines of at most so many characters."""
     symbol, units = variable.attrs.get("symbol", ""), variable.attrs.get("units", "1")
     text = literal(variable.attrs.get("long_name", variable.name))
     shown = _is_formula(symbol) and "flag_values" not in variable.attrs
@@ -52,7 +53,7 @@ def label_of(variable):
         "$$" if text == symbol else f"{text}, $$" if shown else text
     )  # TeX is longer than what it shows: inserted last
     text += "" if units in ("1", "") else f" ({literal(units)})"
-    wrapped = textwrap.fill(text, 40, break_long_words=False)
+    wrapped = textwrap.fill(text, width, break_long_words=False)
     return wrapped.replace("$$", f"${symbol}$") if shown else wrapped
 
 

@@ -34,6 +34,7 @@ HANDED_OVER = np.geomspace(0.5, 2000.0, 28)  # times, in those of the system, at
 MIRROR = np.array([1.0, -1.0, 1.0, -1.0, -1.0, 1.0])  # S2, see `solution`
 MOST_OF_PROGRAM = 16  # equilibria
 UNKNOWN, NO_ENDS = 21, 22  # as in the STATUS of scenes/gyrostat.py and of request/abel_scene.py
+COARSEST = 1e-9  # rtol: with wider bars more fates stay open, and to decide these costs more than smaller steps
 LEAST = 1e-6  # slowest rotation of the lattice, in velocities of the system
 FINE = 1e-16  # truncation per step for cycles, or the finest of the method
 
@@ -64,7 +65,7 @@ def solve(method, six, starts, rtol, result, where):
 
 def followed(method, s, starts, rtol):
     """`fates` of the skeleton s, solved again with a greater budget or finer steps where they are not decided."""
-    first, second = tolerances(method, rtol)
+    first, second = tolerances(method, min(rtol, COARSEST))
     out = fates(method, s, starts, first)
     for code, tolerance in ((STEP_LIMIT, first), (SEPARATRIX, second)):
         open_ = out[:, rc.STATUS] == code
@@ -137,6 +138,11 @@ def remembered(method, six):
 @lru_cache(maxsize=256)
 def _remembered(method, six):
     return skeleton(sys.modules[method], six)
+
+
+def forget():
+    """Forget all skeletons, so that the next call is timed with its own."""
+    _remembered.cache_clear()
 
 
 @dataclass(frozen=True)

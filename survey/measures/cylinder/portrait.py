@@ -1,8 +1,8 @@
 """Portraits of the flow phi' = w, w' = f w + g on the cylinder: what does not depend on the initial state, in numbers.
 
 Ends, equilibria and cycles are those of the skeleton that decides the fates (`fate`). Here each cycle is
-followed again for its period, and the unstable branches of the saddles are followed to their ends: where none of them
-ends in a saddle there is no saddle connection.
+followed again for its period, and the branches of the saddles are followed to their ends (`destinations`): where no
+unstable one ends in a saddle there is no saddle connection.
 """
 
 import math
@@ -13,12 +13,11 @@ import numpy as np
 from survey.kernels.cylinder import equilibria as eq
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder import returns as rt
-from survey.kernels.cylinder.branches import unstable
 from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F
 from survey.kernels.cylinder.program import COLUMNS, MEAN
 from survey.kernels.cylinder.steps import TURNING
-from survey.measures.cylinder import ends, solution
-from survey.measures.cylinder.fate import EXACT, I0, MOST_OF_PROGRAM, NO_ENDS, G, followed, outline, remembered, sizes
+from survey.measures.cylinder import destinations, ends, solution
+from survey.measures.cylinder.fate import EXACT, I0, MOST_OF_PROGRAM, NO_ENDS, G, outline, remembered, sizes
 from survey.status import NO_CONVERGENCE, OK
 
 # Numbers that are kept: surveys of random points found at most 4 cycles, and g has at most 4 roots.
@@ -36,13 +35,16 @@ def empty(count, status, columns=0):
     """The outputs of `solve` for `count` rows of so many columns, filled with what does not apply."""
     own = columns > COLUMNS
     equilibria = MOST_OF_PROGRAM if own else EQUILIBRIA
+    branches = equilibria, len(destinations.BRANCHES)
     floats = {"K": (), "L": (), "equilibrium_phi": (equilibria,)} | (dict.fromkeys(MEANS, ()) if own else {})
     floats |= {f"cycle_{name}": (CYCLES,) for name in ("w", "multiplier", "period")}
     result = {name + end: np.full((count, *extra), np.nan) for name, extra in floats.items() for end in ("", "_error")}
     for name in ("stratum", "end_plus", "end_minus", *COUNTS, "verdict"):
         result[name] = np.full(count, -1, dtype=np.int64)
-    for name, size in (("equilibrium_type", equilibria), ("cycle_kind", CYCLES)):
-        result[name] = np.full((count, size), NONE, dtype=np.int64)
+    for name, size in (("equilibrium_type", (equilibria,)), ("cycle_kind", (CYCLES,)), ("branch_end", branches),
+                       ("branch_limit", branches)):  # fmt: skip
+        result[name] = np.full((count, *size), NONE, dtype=np.int64)
+    result["cycle_inside"] = np.full((count, CYCLES), -1, dtype=np.int64)
     return result | {"status": np.full(count, status, dtype=np.int64)}
 
 
@@ -63,7 +65,9 @@ def solve(method, systems, rtol):
             result["verdict"][i], result["status"][i] = DEGENERATE, UNKNOWN_CYCLES
             continue
         s = remembered(method, six)
-        result["verdict"][i] = _verdict(method, s, rtol)
+        end, limit = destinations.table(method, s, rtol)
+        result["branch_end"][i, : len(end)], result["branch_limit"][i, : len(end)] = end, limit
+        result["verdict"][i] = _verdict(s, end)
         for name, table in zip(COUNTS[2:], (s.plus, s.minus, s.librations), strict=True):
             result[name][i] = len(table)
         cycles = [(kind, row) for kind, table in enumerate((s.plus, s.minus, s.librations), 1) for row in table]
@@ -116,7 +120,7 @@ def _type(row):
     return 1 if kind == eq.SADDLE else 8
 
 
-def _verdict(method, s, rtol):
+def _verdict(s, ends_of_branches):
     """Is the point structurally stable, by the error bounds?"""
     scale = s.p[BOUND_F] + math.sqrt(s.p[BOUND_DG])
     neutral = s.p[MEAN] == 0.0 if len(s.p) > COLUMNS else s.K == 0.0 and not _is_exact(s.p)
@@ -128,9 +132,8 @@ def _verdict(method, s, rtol):
         return DEGENERATE
     if not s.conclusive or 2 * np.count_nonzero(s.equilibria[:, eq.KIND] == eq.SADDLE) != len(s.equilibria):
         return UNDECIDED
-    starts = np.zeros((2 * max(eq.MOST, len(s.equilibria)), 4))
-    starts = starts[: unstable(s.p, s.equilibria, len(s.equilibria), starts)]
-    return STABLE if (followed(method, s, starts, rtol)[:, rc.VERDICT] >= 0).all() else UNDECIDED
+    unstable = ends_of_branches[:, :2]
+    return UNDECIDED if (unstable == destinations.UNDECIDED).any() else STABLE
 
 
 def _is_exact(p):
@@ -211,6 +214,8 @@ def _write(cycles, columns, result):
     """Write |w|, period and multiplier of cycles; a cycle that could not be followed has no answer."""
     for (i, at, kind, row, _s, _six), (w, w_bar, period, period_bar) in zip(cycles, columns, strict=True):
         result["cycle_kind"][i, at] = kind
+        if kind == LIBRATION:
+            result["cycle_inside"][i, at] = abs(row[rt.CYCLE_CLASS])
         values = (w, w_bar), (row[rt.MULTIPLIER], row[rt.MULTIPLIER_BAR]), (period, period_bar)
         for name, (value, bar) in zip(("w", "multiplier", "period"), values, strict=True):
             if math.isfinite(value) and math.isfinite(bar):

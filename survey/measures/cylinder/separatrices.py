@@ -190,7 +190,7 @@ def _levels(window, s):
             continue
         level, known = Level(s.p, row), {"equilibrium_phi": (row[eq.ANGLE], row[eq.BAR])}
         for side in (1.0, -1.0):
-            far, turns = _far_end(level, s, side)
+            far, turns = far_end(level, s, side)
             if not turns and side < 0.0 and abs(far) >= TWO_PI:
                 continue  # the same as to the other side
             for branch in (0.0,) if turns else (1.0, -1.0):
@@ -250,7 +250,7 @@ class Level:
         )
 
 
-def _far_end(level, s, side):
+def far_end(level, s, side):
     """(x, does it turn there?): where the level curve from a saddle ends on this side."""
     others = [side * ((side * (row[eq.ANGLE] - level.angle)) % TWO_PI) for row in s.equilibria]
     for x in sorted((x for x in others if abs(x) > 1e-12), key=abs):

@@ -16,7 +16,7 @@ from survey.kernels.cylinder import branch_double, separatrix
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.separatrix import ANGLE, ANGLE_LOW, MULTIPLICITY, SLIP
 from survey.kernels.cylinder.steps import EQUILIBRIUM, NO_CONVERGENCE, OK, TRUST, TURNING, UNDETERMINED
-from survey.measures.cylinder import solution
+from survey.measures.cylinder import quartic, solution
 from survey.methods import closed
 from survey.status import INVALID_PARAMETERS
 
@@ -94,7 +94,7 @@ class _Starts:
                 self.status[i] = DEGENERATE
             elif free:
                 self.heads[i, SADDLE_BAR] = _ULP * (1.0 + angle)
-                self._elliptic(i, place, many > separatrix.ONE or _symmetric(rows[i]))
+                self._elliptic(i, place, many > separatrix.ONE or symmetric(rows[i]))
             elif method is closed:
                 self.status[i] = NO_FORM
             else:
@@ -166,7 +166,7 @@ def _by_steps(starts, rows, solve):
     return results
 
 
-def _symmetric(row):
+def symmetric(row):
     """Is V exactly even about the direction of s, or s = 0? Then saddles on both sides of it have the same energy."""
     d, c23, s2, s3 = (Fraction(float(x)) for x in row[2:6])
     return d * s2 * s3 + c23 * (s3 * s3 - s2 * s2) == 0
@@ -181,3 +181,71 @@ def _multiple(row, many):
     if many > separatrix.TWO:
         return first == 0 and second == 0
     return first**3 == 27 * second**2
+
+
+def branch_of(row):
+    """(number of the saddle, stable?, left?) of the branch on which a motion without Barnett-London effect starts.
+
+    `row` holds six parameters, phi0 and w0 != 0, of which it is known that H(phi0, w0) is exactly that of a saddle.
+    None if that saddle is not found, or phi0 is not reached from it.
+    """
+    p, place = solution.split(np.array([row]))[0][0], np.zeros(separatrix.SADDLE)
+    d, c23, s2, s3, phi0, w0 = row[2:8]
+    level = w0 * w0 - quartic.square_of_w(d, c23, s2, s3, phi0)[0]
+    missed = []
+    for number in range(1, 5):
+        if separatrix.saddle(p, float(number), place):
+            missed.append((abs(level + quartic.square_of_w(d, c23, s2, s3, place[ANGLE])[0]), number))
+    size = w0 * w0 + abs(d) + abs(c23) + abs(s2) + abs(s3)
+    for off, number in sorted(missed):
+        for stable in (False, True):
+            left = (w0 < 0.0) != stable
+            if off < 1e-9 * size and _Starts(closed, np.array([[*row[:7], number]]), stable, left).status[0] == OK:
+                return number, stable, left
+    return None
+
+
+def through(rows, columns, rtol, branches, measure=trajectories):
+    """As `solution.trajectories` (or `abel`) of rows that start on the `branches` (of `branch_of`) of saddles."""
+    found = []
+    for i, (number, stable, left) in enumerate(branches):
+        given = np.array([[*rows[i, :7], number]])
+        found.append(measure(closed, given, columns[i : i + 1], rtol, stable, left)[:-1])
+    return tuple(np.concatenate(parts) for parts in zip(*found, strict=True))
+
+
+def exact_starts(rows):
+    """{row: its branch, of `branch_of`} of those that start exactly on a separatrix, b = 0.
+
+    phi0 is 0 there: of any other angle of binary64 sine and cosine are transcendental, but the energies of saddles are
+    algebraic.
+    """
+    still = (rows[:, 0] == 0.0) & (rows[:, 1] == 0.0) & (rows[:, rc.PHI0] == 0.0) & (rows[:, rc.W0] != 0.0)
+    found = {}
+    for i in np.flatnonzero(still & np.isfinite(rows[:, : rc.GIVEN]).all(axis=1)):
+        exact = [Fraction(float(x)) for x in (*rows[i, 2:6], rows[i, rc.W0])]
+        if quartic.is_degenerate(quartic.at_zero(*exact)):
+            branch = branch_of(rows[i])
+            found |= {int(i): branch} if branch else {}
+    return found
+
+
+class Aware:
+    """A measure of single solutions, as `solution`, which takes those that start exactly on a separatrix from here."""
+
+    def __init__(self, measure):
+        self.measure = measure
+
+    def trajectories(self, method, rows, times, rtol):
+        return self._replaced(self.measure.trajectories(method, rows, times, rtol), rows, times, rtol, trajectories)
+
+    def abel(self, method, rows, targets, rtol, before=False):
+        return self._replaced(self.measure.abel(method, rows, targets, rtol, before), rows, targets, rtol, abel)
+
+    def _replaced(self, results, rows, columns, rtol, measure):
+        own = exact_starts(rows)
+        if own:
+            at = list(own)
+            for result, new in zip(results, through(rows[at], columns[at], rtol, own.values(), measure), strict=True):
+                result[at] = new
+        return results

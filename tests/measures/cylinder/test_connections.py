@@ -75,14 +75,15 @@ def coarse(monkeypatch):
     monkeypatch.setattr(bifurcations, "COUNTED", 2)
 
 
-def test_branches_miss_each_other_to_either_side():
+@pytest.mark.parametrize("places", [(2,), pytest.param((2, 4), marks=pytest.mark.slow)], ids=["short", "long"])
+def test_branches_miss_each_other_to_either_side(places):
     kinds = set()
     with mp.workdps(35):
         for connection, x, error in connections.curves(PLANE):
             if len(x) < 8 or (connection.miss.func, connection.kind) in kinds:
                 continue
             kinds.add((connection.miss.func, connection.kind))
-            for i in (len(x) // 4, len(x) // 2):
+            for i in (len(x) // place for place in places):
                 assert error[i] < 1e-11
                 sides = [
                     [miss(connection, x[i] + side * 1.01 * error[i] * axis) for side in (1, -1)] for axis in np.eye(2)

@@ -7,9 +7,11 @@ import xarray as xr
 from flow_truth import series
 
 import survey
+from survey.errors import Stopped
 from survey.measures.cylinder import curves
 from survey.measures.cylinder.separatrices import SYSTEM
 from survey.measures.square import Square
+from survey.scenes import gyrostat
 
 BASE = {"b12": 0.7, "b31": -0.4, "d": 1.1, "c23": 0.3, "s2": 0.5, "s3": -0.2}
 SYSTEMS = [BASE, BASE | {"s2": 1.5, "d": 2.0}, {"b12": -0.6, "b31": 0.5, "d": 1.4, "c23": -0.3, "s2": 0.4, "s3": 0.9}]
@@ -153,3 +155,21 @@ def test_maps_of_both_orders_and_stacks_have_the_same_curves():
     one, two = curves.closed(SQUARE, ["phi0", "w0"], BASE, {}), curves.closed(swapped, ["w0", "phi0"], BASE, {})
     assert (one.parameters == two.parameters[:, ::-1]).all()
     assert (one.error == two.error).all()
+
+
+def test_a_run_that_stops_at_its_curves_goes_on_from_its_points(tmp_path, monkeypatch):
+    axes = {"phi0": {"start": -3.0, "stop": 3.0, "num": 7}, "w0": {"start": -3.0, "stop": 3.0, "num": 5}} | BASE
+    workflow = {"scene": "gyrostat", "axes": axes, "boundaries": {}, "output": {"variables": ["verdict"]}}
+    whole = survey.run(workflow, output=tmp_path / "whole.nc")
+
+    def stop(*_args, **_more):
+        raise Stopped("a power cut")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(curves, "closed", stop)
+        with pytest.raises(Stopped, match="power cut"):
+            survey.run(workflow, output=tmp_path / "map.nc")
+    monkeypatch.setattr(gyrostat, "solve", stop)  # no point is solved again
+    again = survey.run(workflow, output=tmp_path / "map.nc")
+    xr.testing.assert_equal(again.drop_attrs(), whole.drop_attrs())
+    assert again.sizes["curve"] > 4

@@ -131,10 +131,11 @@ def test_cycles_close_with_their_periods_and_multipliers(some):
     assert min(checked.values()) >= 2
 
 
-def test_bars_of_cycles_by_another_method(some):
+@pytest.mark.parametrize("number", [4, pytest.param(12, marks=pytest.mark.slow)])
+def test_bars_of_cycles_by_another_method(some, number):
     """DOP853 at another accuracy: the cycles differ by no more than both bars."""
     rows, found = some
-    picked = np.flatnonzero(np.isfinite(found["cycle_w"][:, 0]))[:12]
+    picked = np.flatnonzero(np.isfinite(found["cycle_w"][:, 0]))[:number]
     other = portraits(rows[picked], dop853, 1e-12)
     for name in FLOATS:
         gap = np.abs(found[name][picked] - other[name])
