@@ -97,7 +97,7 @@ def _closed_in(function, x, spline, grain):
         left = np.flatnonzero(error == np.inf)
         start = x[left, along[left]]
         t, width, sure = close_in(lambda who, t, left=left: at(left[who], t), start, 0.0 * start + near, grain + 0.0 * start)
-        sure &= (width < SURE) & (t >= 0.0) & (t <= 1.0) & (abs(t - start) < 2.0 / (FINER * (LINES - 1)))
+        sure &= (width < SURE) & (t >= 0.0) & (t <= 1.0) & (abs(t - start) < 0.5 / (LINES - 1))
         found[left[sure], along[left[sure]]], error[left[sure]] = t[sure], width[sure] + grain
     return [(found[part], error[part]) for part in contours.runs(np.isfinite(error))]
 
