@@ -21,9 +21,7 @@ QUESTIONS = {
             "(comes with `refusal`, CLASSES, TITLE and ALONG)",
             ("square", "axes", "fixed", "options"),
         ),
-        "searched": Function(
-            "the same from the outputs of the `scene`", ("scene", "square", "axes", "fixed")
-        ),
+        "searched": Function("the same from the outputs of the `scene`", ("scene", "square", "axes", "fixed")),
         "refusal": Function("why there are no curves on a map of these axes, in words; None if there are", ("axes",)),
         "seconds": Function("estimated seconds of `closed` on one thread; a tenth of a second if missing", ("axes",)),
         "CLASSES": Value("{name: code} of the curves' classes", dict),

@@ -4,8 +4,8 @@ Contiguous ragged arrays (CF 9.3.3): `edge_count` edges of each row lie one afte
 `curve_count` points of each curve along `curve_point`.
 
 A scene has boundaries where its family has a module `curves` (see QUESTIONS of `survey.measures`). One that finds its
-curves without the map's rows has `closed` or `searched`; of the others `edges` finds the edges of each row, `curves` follows them over the
-map, and `folds` finds where they turn back.
+curves without the map's rows has `closed` or `searched`; of the others `edges` finds the edges of each row, `curves`
+follows them over the map, and `folds` finds where they turn back.
 """
 
 from itertools import pairwise
@@ -65,7 +65,7 @@ def plan(workflow, cost):
         sizes = workflow.grid.sizes
         seconds = measure.seconds(list(sizes)) if hasattr(measure, "seconds") else 0.1  # measured, per map
         if hasattr(measure, "searched"):
-            seconds = 5e4 * cost
+            seconds = 1e5 * cost  # measured: some ten points solved for each point of a curve, and a lattice
         size = 8 * (1 + len(sizes) + 2 * len(measure.ALONG))
         return {"bytes_per_curve_point": size}, seconds * prod(list(sizes.values())[2:])
     sizes = [size for dim, size in workflow.grid.sizes.items() if dim != workflow.boundaries and size > 1]

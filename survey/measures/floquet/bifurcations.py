@@ -20,6 +20,7 @@ from survey.kernels.math.roundoff import EPS
 from survey.measures.floquet import monodromy
 from survey.measures.floquet.multipliers import COLLISION, MINUS_ONE, NEIMARK_SACKER, PLUS_ONE, Discs
 
+CLOSE = 1e-2  # far more than two s differ, next to a collision, by the error bounds of M
 CHUNK = 2_000_000  # entries of matrices that are treated together
 
 
@@ -53,9 +54,7 @@ def neimark_sacker(M, E):
         return a * d - b * c, bar + EPS * (abs(a * d) + abs(b * c))
 
     size = max(1, CHUNK // one.size**2)
-    parts = [
-        determinant(*_shifted(*minors(M[i : i + size], E[i : i + size]), -1.0)) for i in range(0, len(M), size)
-    ]
+    parts = [determinant(*_shifted(*minors(M[i : i + size], E[i : i + size]), -1.0)) for i in range(0, len(M), size)]
     return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
 
 
@@ -111,6 +110,15 @@ def determinant(A, E):
     return value, bar
 
 
+def _distances(s, some):
+    """Between the s (N, n) of `some` multipliers (N, n); infinite elsewhere."""
+    return np.where(
+        some[:, :, None] & some[:, None, :] & ~np.eye(s.shape[1], dtype=bool),
+        abs(s[:, :, None] - s[:, None, :]),
+        np.inf,
+    )
+
+
 def passing(M, E, kind, structure):
     """What passes at points (N) of a curve of the class `kind`: (does it?, angle, its bound, outside).
 
@@ -137,11 +145,11 @@ def passing(M, E, kind, structure):
                 left[:, np.arange(n), np.arange(n)] = np.inf
                 sure = abs(abs(centre[rows, first]) ** 2 - 1) <= 1.01 * left.min(axis=(1, 2)) + 4 * EPS
             else:
-                apart = abs(centre[:, :, None] - centre[:, None, :])
-                apart[~(upper[:, :, None] & upper[:, None, :]) | np.eye(n, dtype=bool)] = np.inf
+                real = (abs(centre.imag) <= bars) & (abs(centre) > 1.0)
+                apart, other = (_distances(centre + 1.0 / centre, some) for some in (upper, real))
                 first, second = np.unravel_index(apart.reshape(len(M), -1).argmin(axis=1), (n, n))
-                # two s that meet elsewhere, as beyond -2 and 2, have not the least distance here
-                sure = apart[rows, first, second] <= 2 * (bars[rows, first] + bars[rows, second]) + 1e-6
+                # it is not two beyond -2 and 2 that meet
+                sure = (apart[rows, first, second] < CLOSE) & (apart[rows, first, second] < other.min(axis=(1, 2)))
             sure &= upper[rows, first] & upper[rows, second]
             angle = np.angle(centre[rows, first] + centre[rows, second])
             # |arg z - arg c| <= asin(r / |c|) <= (pi / 2) r / |c|

@@ -7,6 +7,8 @@ of two of the dense lines may be missed there, and one that the splines do not s
 multiplier passes, also where another one is outside the circle already: `outside` counts those.
 """
 
+from functools import partial
+
 import contourpy
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
@@ -26,7 +28,8 @@ ALONG = (
            applies="where the error bounds allow one number alone"),
 )  # fmt: skip
 LINES, FINER = 97, 8
-NEAR = (3e-5, 7e-5, 2e-4)  # of the map: how near curves of splines are, tried one after another
+NEAR = 3e-5  # of the map: how near curves of splines are
+TRIED = ((1.0, 0), (2.3, 0), (1.0, 1), (2.3, 1))  # one after another: times NEAR, along the best axis or the other
 SURE = 1e-6  # the widest bracket of a point, half of it, that is drawn
 RTOL = 1e-13
 MOST_OPEN = 0.2  # of the map's crossings of lines: a function that is 0 on more of them may be 0 throughout
@@ -59,8 +62,7 @@ def searched(scene, square, axes, fixed):
 
         for x, error in _lines(on_map, square.grain, values.reshape(LINES, LINES)):
             sure, angle, bar, outside = bifurcations.passing(*matrices(x), kind, scene.structure)
-            same = np.where(sure, np.nan_to_num(outside, nan=-1.0), -2.0)
-            for part in _parts(same):
+            for part in contours.runs(sure):
                 known = {"angle": (angle[part], bar[part]), "outside": (outside[part], 0.0 * bar[part])}
                 found.append((kind, square.parameters(x[part]), error[part], known))
     return joined(found, [output.name for output in ALONG])
@@ -86,19 +88,20 @@ def _closed_in(function, x, spline, grain):
     border = (x == 0.0) | (x == 1.0)
     along = np.argmax(np.where(border, -1.0, slope), axis=1)
 
-    def at(who, t):
-        here = np.repeat(x[who][:, None], t.shape[1], axis=1)
-        here[np.arange(len(t)), :, along[who]] = t
+    def at(left, axis, who, t):
+        here = np.repeat(x[left[who], None], t.shape[1], axis=1)
+        here[np.arange(len(t)), :, axis[who]] = t
         value, bar = function(here.reshape(-1, 2))
         return value.reshape(t.shape), bar.reshape(t.shape)
 
     found, error = x.copy(), np.full(len(x), np.inf)
-    for near in NEAR:
+    for times, other in TRIED:
         left = np.flatnonzero(error == np.inf)
-        start = x[left, along[left]]
-        t, width, sure = close_in(lambda who, t, left=left: at(left[who], t), start, 0.0 * start + near, grain + 0.0 * start)
+        axis = abs(along[left] - other)
+        start, same = x[left, axis], np.ones(left.size)
+        t, width, sure = close_in(partial(at, left, axis), start, times * NEAR * same, grain * same)
         sure &= (width < SURE) & (t >= 0.0) & (t <= 1.0) & (abs(t - start) < 0.5 / (LINES - 1))
-        found[left[sure], along[left[sure]]], error[left[sure]] = t[sure], width[sure] + grain
+        found[left[sure], axis[sure]], error[left[sure]] = t[sure], width[sure] + grain
     return [(found[part], error[part]) for part in contours.runs(np.isfinite(error))]
 
 
@@ -117,9 +120,3 @@ def _thinned(x):
             kept.add(middle)
             left += [(first, middle), (middle, last)]
     return x[sorted(kept)]
-
-
-def _parts(same):
-    """Index arrays of the runs of at least two points with the same number, which is not -2."""
-    parts = np.split(np.arange(same.size), 1 + np.flatnonzero(np.diff(same)))
-    return [part for part in parts if part.size > 1 and same[part[0]] > -2]

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 import xarray as xr
 from danby_exact import factors
 from floquet_truth import PERIOD
@@ -10,6 +11,8 @@ from mpmath import mp, mpf
 from scipy.special import mathieu_a, mathieu_b
 
 import survey
+from survey.errors import BadInput
+from survey.measures.floquet.bifurcations import determinant
 from survey.measures.floquet.curves import CLASSES
 from survey.request.workflow import check
 from survey.sweep import boundaries
@@ -172,7 +175,7 @@ def test_danbys_curves():
 
 
 def circle(t, p, out):
-    """A complex pair of growth x^2 + y^2 - 1/4, a real multiplier with (x - 0.2) / 2 and one with -0.1, in turning axes."""
+    """A complex pair of growth x^2 + y^2 - 1/4, real multipliers with (x - 0.2) / 2 and -0.1, in turning axes."""
     x, y = p
     B = np.zeros((4, 4), dtype=object)
     B[0, 0] = B[1, 1] = x * x + y * y - 0.25
@@ -209,3 +212,71 @@ def test_neimark_sacker():
     assert (abs(line[:, 0] - 0.2) <= errors[:, 0]).all()
     assert line[:, 1].min() == -0.6 and line[:, 1].max() == 0.7
     assert not curves(ds, "minus_one", *axes) and not curves(ds, "collision", *axes)
+
+
+def test_gyroscopic_stabilisation():
+    """x'' - 2 g y' - a x = 0, y'' + 2 g x' - b y = 0: frequencies meet at 2 g = sqrt(a) + sqrt(b); and z."""
+    b, period = 0.4, 1.1
+
+    def K(t, p, out):
+        out[0, 0], out[1, 1], out[2, 2] = -p[1], -b, 2.9
+
+    def C(t, p, out):
+        out[0, 1], out[1, 0] = -2 * p[0], 2 * p[0]
+
+    parameters, states = ("g", "a"), ("x", "y", "z")
+    scene = survey.floquet(K=K, C=C, period=period, parameters=parameters, states=states, structure="symplectic")
+    axes = (("g", 0.2, 1.2), ("a", -0.3, 0.9))
+    ds = found(scene, g=axes[0][1:], a=axes[1][1:])
+    [(x, errors)] = curves(ds, "collision", *axes)
+    assert_zero_within(lambda p: 2 * p[:, 0] - np.sqrt(abs(p[:, 1])) - math.sqrt(b), x, errors + 1e-16)
+    assert x[:, 1].min() < 0.03 and x[:, 1].max() == 0.9
+    points = np.repeat(ds.curve_class.values == CLASSES["collision"], ds.curve_count.values)
+    assert (ds.curve_outside.values[points] == 0).all()
+    angle = (x[:, 1] * b) ** 0.25 * period
+    off, bars = abs(ds.curve_angle.values[points] - angle), ds.curve_angle_error.values[points]
+    assert (off <= bars + 1e-9).all() and np.median(bars) < 1e-3
+    line, errors = all_of(curves(ds, "plus_one", *axes))
+    assert (abs(line[:, 1]) <= errors[:, 1]).all()
+    assert not curves(ds, "minus_one", *axes)
+
+
+@pytest.mark.parametrize("n, rank", [(1, 1), (2, 1), (4, 3), (6, 5), (6, 6)])
+def test_bounds_of_determinants(n, rank):
+    """Of the exact determinants of matrices within E, next to singular ones."""
+    rng = np.random.default_rng(10 * n + rank)
+    low = rng.normal(size=(200, n, rank)) @ rng.normal(size=(200, rank, n))
+    A = low + 10.0 ** rng.uniform(-15, -1, (200, 1, 1)) * rng.normal(size=(200, n, n))
+    E = 10.0 ** rng.uniform(-14, -6, (200, n, n))
+    near = A + E * rng.choice([-1.0, 1.0], A.shape)
+    value, bar = determinant(A, E)
+    for k in range(200):
+        with mp.workdps(60):
+            size = mp.sqrt(mp.det(mp.eye(n) + mp.matrix(A[k].T.tolist()) * mp.matrix(A[k].tolist())))
+            exact, other = (mp.det(mp.matrix(X[k].tolist())) / size for X in (A, near))
+            assert max(abs(exact - value[k]), abs(other - value[k])) <= bar[k] * (1 + 1e-9)
+    assert np.median(bar) < 1e-5
+
+
+def test_conserved_quantities_and_three_axes():
+    """A multiplier that is 1 everywhere makes no curve; each plane of a third axis has its own."""
+
+    def A(t, p, out):
+        out[0, 1], out[1, 0] = 1.0, -(p[0] + p[1] * math.cos(2 * t))
+        out[1, 1] = -2 * p[2]
+        out[2, 0] = 1.0  # z' = x
+
+    scene = survey.floquet(A, period=math.pi, parameters=("a", "q", "c"), states=("x", "v", "z"))
+    ds = found(scene, a=(0.2, 2.5), q=(0.0, 1.5), c=(0.1, 0.3))
+    assert set(ds.curve_class.values) == {CLASSES["minus_one"]}
+    tips = [float(ds.curve_q.values[ds.curve_c.values == c].min()) for c in (0.1, 0.2, 0.3)]
+    assert tips == pytest.approx([0.4, 0.8, 1.2], rel=0.03)
+    assert np.isnan(ds.curve_outside.values).all()  # a multiplier at 1 is neither outside nor inside
+
+
+def test_refusals():
+    with pytest.raises(BadInput, match="two axes, or three"):
+        found(mathieu("symplectic"), a=(0.0, 1.0), q=0.3)
+    with pytest.raises(BadInput, match=r"boundaries\.axis"):
+        table = {name: {"start": 0.0, "stop": 1.0, "num": 3} for name in ("a", "q")}
+        check({"scene": mathieu("symplectic"), "axes": table, "boundaries": {"axis": "a"}})
