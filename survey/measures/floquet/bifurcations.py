@@ -50,8 +50,9 @@ def neimark_sacker(M, E):
     def minors(chunk, bars):
         (a, b), (c, d) = ([chunk[:, row, column] for column in columns] for row in rows)
         (ea, eb), (ec, ed) = ([bars[:, row, column] for column in columns] for row in rows)
-        bar = abs(a) * ed + abs(d) * ea + ea * ed + abs(b) * ec + abs(c) * eb + eb * ec
-        return a * d - b * c, bar + EPS * (abs(a * d) + abs(b * c))
+        with np.errstate(all="ignore"):
+            bar = abs(a) * ed + abs(d) * ea + ea * ed + abs(b) * ec + abs(c) * eb + eb * ec
+            return a * d - b * c, bar + EPS * (abs(a * d) + abs(b * c))
 
     size = max(1, CHUNK // one.size**2)
     parts = [determinant(*_shifted(*minors(M[i : i + size], E[i : i + size]), -1.0)) for i in range(0, len(M), size)]
@@ -65,8 +66,9 @@ def collision(M, E):
     traces, bars = np.full((2, 2 * m - 1, len(M)), float(2 * m))
     bars[0] = 0.0
     for k in range(1, 2 * m - 1):
-        bar = abs(power) @ (E + n * EPS * abs(M)) + bar @ (abs(M) + E)
-        power = power @ M
+        with np.errstate(all="ignore"):
+            bar = abs(power) @ (E + n * EPS * abs(M)) + bar @ (abs(M) + E)
+            power = power @ M
         # an odd number of states leaves one multiplier 1
         traces[k] = np.trace(power, axis1=1, axis2=2) - n % 2
         bars[k] = np.trace(bar, axis1=1, axis2=2) + n * EPS * np.trace(abs(power), axis1=1, axis2=2)
@@ -78,7 +80,8 @@ def collision(M, E):
 def _shifted(A, E, by):
     """A + by times the identity, and its bounds."""
     one = np.eye(A.shape[1])
-    return A + by * one, E + EPS * (abs(A) + 1.0) * one
+    with np.errstate(all="ignore"):
+        return A + by * one, E + EPS * (abs(A) + 1.0) * one
 
 
 def determinant(A, E):

@@ -12,6 +12,7 @@ from functools import partial
 import contourpy
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
+from scipy.ndimage import binary_erosion
 
 from survey.measures import contours
 from survey.measures.floquet import bifurcations
@@ -31,8 +32,7 @@ LINES, FINER = 97, 8
 NEAR = 3e-5  # of the map: how near curves of splines are
 TRIED = ((1.0, 0), (2.3, 0), (1.0, 1), (2.3, 1))  # one after another: times NEAR, along the best axis or the other
 SURE = 1e-6  # the widest bracket of a point, half of it, that is drawn
-RTOL = 1e-13
-MOST_OPEN = 0.2  # of the map's crossings of lines: a function that is 0 on more of them may be 0 throughout
+RTOL, ROUGH = 1e-13, 1e-9  # of M for points of curves, and to see where these are
 
 
 def refusal(axes):
@@ -43,19 +43,20 @@ def refusal(axes):
 def searched(scene, square, axes, fixed):
     """The Curves on the map of `axes`, the unit square `square`; `fixed` holds the other parameters."""
 
-    def matrices(x):
+    def matrices(x, rtol=RTOL):
         values = square.parameters(x)
         point = fixed | {name: values[:, k] for k, name in enumerate(axes)}
-        request = Request({}, "auto", RTOL, frozenset(["monodromy"]))
+        request = Request({}, "auto", rtol, frozenset(["monodromy"]))
         with np.errstate(all="ignore"):
             out = scene.solve(point, request)
         return out["monodromy"], out["monodromy_error"]
 
-    found, on_lattice = [], matrices(contours.lattice(LINES))
+    found, on_lattice = [], matrices(contours.lattice(LINES), ROUGH)
     for kind, function in bifurcations.functions(len(scene.states), scene.structure).items():
         values, bars = function(*on_lattice)
-        if not (abs(values) <= bars).mean() <= MOST_OPEN:
-            continue
+        # where no sign is certain all around, as where the function is 0 throughout, there is only noise
+        open_ = ~(abs(values) > bars).reshape(LINES, LINES)
+        values = np.where(binary_erosion(open_, np.ones((3, 3)), border_value=1).ravel(), np.nan, values)
 
         def on_map(x, function=function):
             return function(*matrices(x))
