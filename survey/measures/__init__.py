@@ -13,13 +13,15 @@ from survey.contract import Function, Value
 
 # {question: what `measures/FAMILY/QUESTION.py` must offer}; a family that has no such file does not answer it.
 QUESTIONS = {
-    # The curves that [boundaries] draws on a map: `closed` where they are known without a search, else `trace`.
+    # The curves that [boundaries] draws on a map: `closed` where they are known without a search, `searched` where
+    # the scene's outputs at any points of the map tell, else `trace`.
     "curves": {
         "closed": Function(
             "the Curves on the map of two `axes`, a Square, where `fixed` holds the other parameters "
             "(comes with `refusal`, CLASSES, TITLE and ALONG)",
             ("square", "axes", "fixed", "options"),
         ),
+        "searched": Function("the same from the outputs of the `scene`", ("scene", "square", "axes", "fixed")),
         "refusal": Function("why there are no curves on a map of these axes, in words; None if there are", ("axes",)),
         "seconds": Function("estimated seconds of `closed` on one thread; a tenth of a second if missing", ("axes",)),
         "CLASSES": Value("{name: code} of the curves' classes", dict),

@@ -18,7 +18,7 @@ def check_boundaries(scene, name, table, given):
     measure = measures.question(scene.FAMILY, "curves")
     if measure is None:
         raise BadInput(f"boundaries: no boundary curves are known for the scene {name}; leave the table out")
-    if hasattr(measure, "closed"):
+    if hasattr(measure, "refusal"):
         return _check_closed(measure, name, table, {key: given[key].size for key in axes})
     _check_even(scene, name, "boundaries")
     if not 1 <= len(axes) <= 2:
@@ -38,7 +38,9 @@ def _check_closed(measure, name, table, sizes):
     if refusal:
         raise BadInput(f"boundaries: of {name} {refusal}; change the axes, or leave the table out")
     if table.axis is not None:
-        raise BadInput(f"boundaries.axis: the curves of {name} have closed forms and no axis is searched; leave it out")
+        raise BadInput(
+            f"boundaries.axis: the curves of {name} are found without rows, and no axis is searched; leave it out"
+        )
     for key in axes[:2]:
         if sizes[key] < 2:
             raise BadInput(f"boundaries: the axis {key} has one value, but curves need a range; give two or more")

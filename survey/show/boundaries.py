@@ -1,4 +1,4 @@
-"""The boundaries drawn over a map: edges of tongues and curves in closed form, by class."""
+"""The boundaries drawn over a map: edges of tongues and other curves, by class."""
 
 import numpy as np
 from matplotlib.lines import Line2D
@@ -18,6 +18,10 @@ CURVES = {
     "odd_periodic": (_EDGES, {"color": "#707070", "ls": "-", "lw": 0.8}),
     "even_antiperiodic": (_EDGES, {"color": "#000000", "ls": (0, (5, 2)), "lw": 0.8}),
     "odd_antiperiodic": (_EDGES, {"color": "#707070", "ls": (0, (5, 2)), "lw": 0.8}),
+    "plus_one": ("a multiplier passes 1", {"color": "#000000", "ls": "-", "lw": 1.0}),
+    "minus_one": ("a multiplier passes -1", {"color": "#000000", "ls": (0, (5, 2)), "lw": 1.0}),
+    "neimark_sacker": ("a complex pair passes the circle", {"color": "#D40000", "ls": "-", "lw": 1.2}),
+    "collision": ("multipliers collide on the circle", {"color": "#D40000", "ls": (0, (4, 1.5)), "lw": 1.2}),
     "pole_passage": ("pole passages", {"color": "#FFFFFF", "ls": (0, (4, 2)), "lw": 1.0, "path_effects": [_RIM]}),
     "stable_precession": ("stable regular precessions", {"color": "#000000", "ls": "-", "lw": 1.2}),
     "separatrix": ("separatrices", {"color": "#D55E00", "ls": "-", "lw": 1.4}),

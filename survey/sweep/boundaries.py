@@ -1,11 +1,11 @@
-"""The boundaries on a map: the edges of tongues, row by row and as curves, or curves in closed form -> variables.
+"""The boundaries on a map: the edges of tongues, row by row and as curves, or curves found without rows -> variables.
 
 Contiguous ragged arrays (CF 9.3.3): `edge_count` edges of each row lie one after another along `edge`, and
 `curve_count` points of each curve along `curve_point`.
 
-A scene has boundaries where its family has a module `curves` (see QUESTIONS of `survey.measures`). One that knows its
-curves without a search has `closed`; of the others `edges` finds the edges of each row, `curves` follows them over the
-map, and `folds` finds where they turn back.
+A scene has boundaries where its family has a module `curves` (see QUESTIONS of `survey.measures`). One that finds its
+curves without the map's rows has `closed` or `searched`; of the others `edges` finds the edges of each row, `curves`
+follows them over the map, and `folds` finds where they turn back.
 """
 
 from itertools import pairwise
@@ -34,7 +34,7 @@ def find(workflow, each=in_turn, once=lambda name, make: make()):
     earlier run has kept under this name.
     """
     measure = _measure(workflow, "curves")
-    if hasattr(measure, "closed"):
+    if hasattr(measure, "refusal"):
         return xr.Dataset(_closed(workflow, measure), attrs={"boundaries": workflow.boundaries})
     grid, axis = workflow.grid, workflow.boundaries
     other = [dim for dim in grid.sizes if dim != axis]
@@ -61,9 +61,11 @@ def plan(workflow, cost):
     `cost` is the scene's estimate for a point, in seconds.
     """
     measure = _measure(workflow, "curves")
-    if hasattr(measure, "closed"):
+    if hasattr(measure, "refusal"):
         sizes = workflow.grid.sizes
         seconds = measure.seconds(list(sizes)) if hasattr(measure, "seconds") else 0.1  # measured, per map
+        if hasattr(measure, "searched"):
+            seconds = 1e5 * cost  # measured: some ten points solved for each point of a curve, and a lattice
         size = 8 * (1 + len(sizes) + 2 * len(measure.ALONG))
         return {"bytes_per_curve_point": size}, seconds * prod(list(sizes.values())[2:])
     sizes = [size for dim, size in workflow.grid.sizes.items() if dim != workflow.boundaries and size > 1]
@@ -78,7 +80,7 @@ def _measure(workflow, question):
 
 
 def _closed(workflow, measure):
-    """The variables of curves in closed form: on one map, or on each map of the stack along a third axis."""
+    """The variables of curves found without rows: on one map, or on each map of the stack along a third axis."""
     grid = workflow.grid
     names, fixed = (
         list(grid.sizes),
@@ -86,7 +88,10 @@ def _closed(workflow, measure):
     )
     square, third = _square(workflow, *names[:2]), names[2:]
     planes = [{third[0]: float(value)} for value in grid.parameters[third[0]][1]] if third else [{}]
-    found = [measure.closed(square, names[:2], fixed | plane, workflow.request.options) for plane in planes]
+    if hasattr(measure, "searched"):
+        found = [measure.searched(workflow.scene, square, names[:2], fixed | plane) for plane in planes]
+    else:
+        found = [measure.closed(square, names[:2], fixed | plane, workflow.request.options) for plane in planes]
     count, kind, flat, error = (
         np.concatenate([getattr(curves, name) for curves in found]) for name in ("count", "kind", "parameters", "error")
     )

@@ -1,0 +1,123 @@
+"""The curves that [boundaries] draws on a map of two parameters: where multipliers reach the unit circle or leave it.
+
+They are zeros of the functions of `bifurcations`. These are known on LINES lines of the map each way, and their
+splines, on lines FINER times as dense, show where to look (marching squares). Every point is then bracketed along an
+axis by signs of the function itself that are certain within the error bounds of M. A tongue narrower than the distance
+of two of the dense lines may be missed there, and one that the splines do not show. Curves are drawn wherever a
+multiplier passes, also where another one is outside the circle already: `outside` counts those.
+"""
+
+from functools import partial
+
+import contourpy
+import numpy as np
+from scipy.interpolate import RectBivariateSpline
+from scipy.ndimage import binary_erosion
+
+from survey.measures import contours
+from survey.measures.floquet import bifurcations
+from survey.measures.floquet.stability import CROSSINGS
+from survey.measures.hill.edges import close_in
+from survey.measures.sampled import FLAT, LONGEST, joined
+from survey.scene import Output, Request
+
+CLASSES = {name: CROSSINGS[name] for name in ("plus_one", "minus_one", "neimark_sacker", "collision")}
+TITLE = "how a multiplier passes the unit circle"
+ALONG = (
+    Output("angle", "argument of the multiplier on the unit circle", r"\theta", units="rad"),
+    Output("outside", "number of other multipliers outside the unit circle: stability is lost or gained where it is 0",
+           applies="where the error bounds allow one number alone"),
+)  # fmt: skip
+LINES, FINER = 97, 8
+NEAR = 3e-5  # of the map: how near curves of splines are
+TRIED = ((1.0, 0), (2.3, 0), (1.0, 1), (2.3, 1))  # one after another: times NEAR, along the best axis or the other
+SURE = 1e-6  # the widest bracket of a point, half of it, that is drawn
+RTOL, ROUGH = 1e-13, 1e-9  # of M for points of curves, and to see where these are
+
+
+def refusal(axes):
+    """Why there are no curves on a map of these axes, in words; None if there are."""
+    return None if len(axes) in (2, 3) else f"curves are drawn on two axes, or three, not on {len(axes)}"
+
+
+def searched(scene, square, axes, fixed):
+    """The Curves on the map of `axes`, the unit square `square`; `fixed` holds the other parameters."""
+
+    def matrices(x, rtol=RTOL):
+        values = square.parameters(x)
+        point = fixed | {name: values[:, k] for k, name in enumerate(axes)}
+        request = Request({}, "auto", rtol, frozenset(["monodromy"]))
+        with np.errstate(all="ignore"):
+            out = scene.solve(point, request)
+        return out["monodromy"], out["monodromy_error"]
+
+    found, on_lattice = [], matrices(contours.lattice(LINES), ROUGH)
+    for kind, function in bifurcations.functions(len(scene.states), scene.structure).items():
+        values, bars = function(*on_lattice)
+        # where no sign is certain all around, as where the function is 0 throughout, there is only noise
+        open_ = ~(abs(values) > bars).reshape(LINES, LINES)
+        values = np.where(binary_erosion(open_, np.ones((3, 3)), border_value=1).ravel(), np.nan, values)
+
+        def on_map(x, function=function):
+            return function(*matrices(x))
+
+        for x, error in _lines(on_map, square.grain, values.reshape(LINES, LINES)):
+            sure, angle, bar, outside = bifurcations.passing(*matrices(x), kind, scene.structure)
+            for part in contours.runs(sure):
+                known = {"angle": (angle[part], bar[part]), "outside": (outside[part], 0.0 * bar[part])}
+                found.append((kind, square.parameters(x[part]), error[part], known))
+    return joined(found, [output.name for output in ALONG])
+
+
+def _lines(function, grain, values):
+    """[(positions (m, 2), errors (m))] of the curves function(x) = 0, from its values on the lattice (LINES, LINES)."""
+    number, known = (LINES - 1) * FINER + 1, np.isfinite(values)
+    ticks, fine = np.linspace(0.0, 1.0, LINES), np.linspace(0.0, 1.0, number)
+    spline = RectBivariateSpline(ticks, ticks, np.where(known, values, 0.0))
+    dense = spline(fine, fine)
+    if not known.all():
+        hole = RectBivariateSpline(ticks, ticks, np.where(known, 0.0, 1.0), kx=1, ky=1)(fine, fine) > 0.0
+        dense = np.ma.masked_array(dense, hole)
+    found = contourpy.contour_generator(fine, fine, dense).lines(0.0)
+    parts = [_thinned(np.asarray(line)[:, ::-1]) for line in found]
+    return [curve for x in parts for curve in _closed_in(function, x, spline, grain)]
+
+
+def _closed_in(function, x, spline, grain):
+    """The curve near the positions x, moved along the axis that crosses it best; cut where one is not certain."""
+    slope = abs(np.stack([spline.ev(*x.T, dx=1), spline.ev(*x.T, dy=1)], axis=1))
+    border = (x == 0.0) | (x == 1.0)
+    along = np.argmax(np.where(border, -1.0, slope), axis=1)
+
+    def at(left, axis, who, t):
+        here = np.repeat(x[left[who], None], t.shape[1], axis=1)
+        here[np.arange(len(t)), :, axis[who]] = t
+        value, bar = function(here.reshape(-1, 2))
+        return value.reshape(t.shape), bar.reshape(t.shape)
+
+    found, error = x.copy(), np.full(len(x), np.inf)
+    for times, other in TRIED:
+        left = np.flatnonzero(error == np.inf)
+        axis = abs(along[left] - other)
+        start, same = x[left, axis], np.ones(left.size)
+        t, width, sure = close_in(partial(at, left, axis), start, times * NEAR * same, grain * same)
+        sure &= (width < SURE) & (t >= 0.0) & (t <= 1.0) & (abs(t - start) < 0.5 / (LINES - 1))
+        found[left[sure], axis[sure]], error[left[sure]] = t[sure], width[sure] + grain
+    return [(found[part], error[part]) for part in contours.runs(np.isfinite(error))]
+
+
+def _thinned(x):
+    """So many of the positions (m, 2) of a curve that chords are short, and all others are near them."""
+    kept, left = {0, len(x) - 1}, [(0, len(x) - 1)]
+    while left:
+        first, last = left.pop()
+        if last - first < 2:
+            continue
+        chord, rest = x[last] - x[first], x[first + 1 : last] - x[first]
+        length = np.hypot(*chord)
+        off = abs(chord[0] * rest[:, 1] - chord[1] * rest[:, 0]) / length if length > 0 else np.hypot(*rest.T)
+        if length > LONGEST or off.max() > FLAT:
+            middle = (first + last) // 2
+            kept.add(middle)
+            left += [(first, middle), (middle, last)]
+    return x[sorted(kept)]
