@@ -1,6 +1,6 @@
 """Linear periodic systems x' = A(t) x of n states: monodromy, multipliers, verdict.
 
-METHODS lists what a method that serves the family "floquet" offers. A step is taken over by its propagator F; steps of
+METHODS lists what a method that serves the family "floquet", or "orbit" (periodic orbits of x' = f(t, x)), offers. A step is taken over by its propagator F; steps of
 all points are tasks, in no particular order. A and t have the units of the user's functions.
 """
 
@@ -22,3 +22,4 @@ METHODS = {
         ),
     }
 }  # fmt: skip
+METHODS["orbit"] = METHODS["floquet"]  # for the linear system along an orbit, whose series begin with its states
