@@ -1,4 +1,4 @@
-"""The scene of the periodic orbits of a user's x' = f(t, x, p): what a module of `survey.scenes` offers, as an object."""
+"""The scene of periodic orbits of a user's x' = f(t, x, p): what a module of `survey.scenes` offers, as an object."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from survey.scene import Parameter, plus_minus
 
 LARGEST = 16  # states
 STATUS = {
-    "invalid_parameters": "outside the domain, or the start or the period is not finite there, or the period not positive",
+    "invalid_parameters": "outside the domain, or the start or the period is not finite, or the period not positive",
     "no_orbit": "Newton's method does not converge from the start, or no orbit is shown to exist near where it ends: "
     "give a better start",
 }
@@ -140,9 +140,7 @@ class OrbitScene(FunctionScene):
         f = f[:, :, 0]
         size = abs(f).max()
         if not np.isfinite(size):
-            self._refuse(
-                f"f has no finite value at the start, {here}", "correct it, START or the domains of PARAMETERS"
-            )
+            self._refuse(f"f has no finite value at the start, {here}", "correct it, or START")
         plain = np.array([self._plain(self.f, time, x, point, n) for time in t])
         if not (abs(plain - f) <= SAME * size).all():
             self._refuse(

@@ -270,7 +270,7 @@ def orbit(
 
     Parameters
     ----------
-    f : function of t, x, p and out, plain Python or numba's: fills out, n numbers, with x'; x are the n states, p is the
+    f : function of t, x, p and out, plain Python or numba's: fills out, n numbers, with x'; x are the n states, p the
         float64 array of the parameters, in order. It must be analytic in t and x: no abs, maximum or if of these.
     states : names of the n states.
     period : T, a number or a function of p; None: f does not depend on t, and T is found.

@@ -17,8 +17,8 @@ import math
 from survey.kernels.jit import kernel
 
 _NAMES = (
-    "one time combination product quotient sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp log sqrt erf "
-    "state"
+    "one time combination product quotient sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp log sqrt "
+    "erf state"
 )
 CODES = {name: code for code, name in enumerate(_NAMES.split())}
 OF_LINE = 32

@@ -201,7 +201,7 @@ def by_powers(M, E, may_be_stable):
 
 
 def krein(own):
-    """The Krein signs (N, n) of multipliers on the unit circle: the sign of i v* J v; 0 where there is none, or is open.
+    """Krein signs (N, n) of multipliers on the unit circle: the sign of i v* J v; 0 where none, or open.
 
     J = (0 1; -1 0) in blocks: the first half of the states are coordinates, the second their momenta.
     """

@@ -2,18 +2,19 @@
 
 Newton's method on x(T) - x(0) = 0, damped, from `start`; the derivative M = dx(T)/dx(0) is the monodromy matrix. Where
 f does not depend on t, T is unknown too, and x(0) stays in the plane through the start that f is normal to there.
+Where it does not converge, it begins again from the state RELAXED periods later, on the attracting orbit perhaps.
 
 Existence. Let X(t) be the Taylor series of all steps, off from the solution by its defect X' - f(t, X), which is
 sampled at NODES, and by the jumps from step to step; y = x(0), or (x(0), T); G(y) = x(T) - x(0) and the plane's
 equation; B nearly the inverse of G'. If |1 - B G'| <= q < 1 for all y of a ball of radius r about the computed y, and
 |B G(y)| <= (1 - q) r, there is one periodic orbit in the ball (Banach; Krawczyk), and it is within |B G(y)| / (1 - q).
-All solutions that begin in the ball are in a tube about X, twice as wide as the linear equation says, which is
-checked with the second-order terms. A = df/dx changes within the tube by no more than `noise`: its operations are
-evaluated with the tube's width as the error of the states. So the bounds of M, which include `noise`, hold for all of
-them, and for the orbit: verdicts need nothing else.
+All solutions that begin in the ball are in a tube about X, WIDER than the linear equation says, which is checked with
+the second-order terms. A = df/dx changes within the tube by no more than `noise`: its operations are evaluated with
+the tube's width as the error of the states. So the bounds of M, which include `noise`, hold for all of them, and for
+the orbit: verdicts need nothing else.
 
 What is no strict bound: samples at NODES stand for all times (taken SAMPLED times), widths of the tube enter to first
-order (taken TWICE), and the series of A is cut off as in `kernels.floquet.steps`.
+order (taken WIDER), and the series of A is cut off as in `kernels.floquet.steps`.
 
 The autonomous system's multiplier +1 is not given or judged: the others are those of M in the coordinates
 x_i - (f_i / f_k) x_k, i not k, of the space in which f counts as 0.
@@ -23,7 +24,7 @@ Sources: R. Krawczyk, Computing 4 (1969) 187; W. Tucker, Validated Numerics (201
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
@@ -39,14 +40,17 @@ from survey.scene import Output
 NO_ORBIT = status.FIRST_OF_SCENE
 NODES = np.array([0.0, 0.25, 0.5, 0.75, 0.875, 1.0])  # of a step; sums with the ends of steps are exact
 MIDDLE = 2  # of NODES
-SAMPLED, TWICE = 1.5, 2.0
+SAMPLED = 1.25  # samples within a step, whose length is a small part of the radius of convergence
+WIDER = 1.1  # the tube than the linear equation says, and bounds to first order in its width
+RADII = (1.1, 2.1)  # of the ball, relative to |B G|: the first that serves
 WIDEST = 1e-3  # of the tube, relative to the largest state
 CHUNK = 2048  # points that are solved together
 CALL = 200_000  # numbers of a series that are recorded together
 MOST_STEPS = 20_000
 TRIALS, LEAST_DAMPING = 60, 1e-4  # of Newton's method
 CONVERGED = 1e-8  # relative: the last step, whose square is beyond float64
-PERIODS = (0.2, 5.0)  # a period may change by these factors at once
+FARTHEST = 0.5  # a step of it, relative to the orbit and the period
+RELAXED, RETURN, NEAR = 32.0, 3.0, 0.2  # periods; the time in which an orbit comes back; how near, relative to it
 LOCK = threading.Lock()
 
 _of_floquet = {o.name: o for o in stability.OUTPUTS}
@@ -179,7 +183,7 @@ class Programs:
         return tuple(one[:, 0, :, 0] for one in out)
 
     def along(self, program, numbers, t, x, width):
-        """Values (N, m, n, n) of a program at times t (N, m), states x (N, n, m) known to within `width`, and bounds."""
+        """A program's values (N, m, n, n) at times t (N, m), states x (N, n, m) known to within `width`, and bounds."""
         return program.at(t, t, x.shape[1], numbers, (x.swapaxes(0, 1), width.swapaxes(0, 1)))
 
 
@@ -205,11 +209,9 @@ def _chunk(equation, points, method, rtol, wanted):
         own = where[inside]
         numbers = programs.numbers(points[own])
         reach = method.floquet_reach(rtol)
-        phase = None
-        if free:
-            phase = programs.slopes(numbers, np.zeros(own.size), guess[own])[0]
-        orbits = Newton(programs, numbers, reach, guess[own], period[own], phase)
+        orbits = Newton(programs, numbers, reach, guess[own], period[own], free)
         good = orbits.solve()
+        good = np.sort(np.concatenate([good, orbits.again(np.setdiff1d(np.arange(own.size), good))]))
         step_counts = programs.flow(
             _of(numbers, good), orbits.x[good], orbits.T[good], reach, derived=False
         )[3]  # fmt: skip
@@ -220,7 +222,7 @@ def _chunk(equation, points, method, rtol, wanted):
                 those = good[some]
                 shown = _certified(
                     programs, _of(numbers, those), orbits.x[those], orbits.T[those],
-                    None if phase is None else (phase[those], guess[own][those]), step_counts[some], method, reach,
+                    orbits.guess[those], orbits.plane(those), step_counts[some], method, reach,
                 )  # fmt: skip
                 found.put(own[those], shown)
     return found.outputs(known, rtol, wanted, callable(equation.period))
@@ -231,11 +233,50 @@ def _of(numbers, those):
 
 
 class Newton:
-    """Newton's method for N points, from states x (N, n) and periods T (N), in the plane normal to `phase` or None."""
+    """Newton's method for N points, from states x (N, n) and periods T (N), which are unknown too if `free`."""
 
-    def __init__(self, programs, numbers, reach, x, T, phase):
+    def __init__(self, programs, numbers, reach, x, T, free):
         self.programs, self.numbers, self.reach = programs, numbers, reach
-        self.x, self.T, self.guess, self.phase = x.copy(), T.copy(), x, phase
+        self.x, self.T, self.guess, self.period = x.copy(), T.copy(), x.copy(), T
+        self.phase = programs.slopes(numbers, np.zeros(len(x)), x)[0] if free else None
+
+    def plane(self, those):
+        """Normals and points of the planes in which x of these points stays; None if T is known."""
+        return None if self.phase is None else (self.phase[those], self.guess[those])
+
+    def again(self, those):
+        """As `solve`, for some points, from the state after a long time."""
+        numbers, free = _of(self.numbers, those), self.phase is not None
+        x = self.programs.flow(numbers, self.guess[those], RELAXED * self.period[those], self.reach, derived=False)[0]
+        T = self.period[those].copy()
+        there = np.flatnonzero(np.isfinite(x).all(axis=1))
+        if free and there.size:
+            T[there] = self._return(_of(numbers, there), x[there], T[there])
+            there = there[np.isfinite(T[there])]
+        if not there.size:
+            return those[:0]
+        other = Newton(self.programs, _of(numbers, there), self.reach, x[there], T[there], free)
+        found, to = other.solve(), those[there]
+        for name in ("x", "T", "guess", *(("phase",) if free else ())):
+            getattr(self, name)[to[found]] = getattr(other, name)[found]
+        return to[found]
+
+    def _return(self, numbers, x, T):
+        """When the motions from x (N, n) first come back near x, from behind; NaN: not in RETURN T."""
+        steps = self.programs.flow(numbers, x, RETURN * T, self.reach, derived=False)[3]
+        first = np.concatenate([[0], np.cumsum(steps)])
+        _X, begin, _length, series = self.programs.flow(numbers, x, RETURN * T, self.reach, False, first)
+        f, found = self.programs.slopes(numbers, np.zeros(len(x)), x)[0], np.full(len(x), np.nan)
+        for i in range(len(x)):
+            t, states = begin[first[i] : first[i + 1]], series[first[i] : first[i + 1], :, 0]
+            along = ((states - x[i]) * f[i]).sum(axis=1)
+            for k in np.flatnonzero((along[:-1] < 0) & (along[1:] >= 0)):
+                share = along[k] / (along[k] - along[k + 1])
+                off = abs(states[k] + share * (states[k + 1] - states[k]) - x[i])
+                if (off <= NEAR * np.ptp(states, axis=0)).all():
+                    found[i] = t[k] + share * (t[k + 1] - t[k])
+                    break
+        return found
 
     def solve(self):
         """The points where it converges; their x and T are the orbit's, nearly."""
@@ -245,7 +286,7 @@ class Newton:
         step = -_applied(inverse, value)
         live = live[np.isfinite(step).all(axis=1)]
         for _ in range(TRIALS):
-            done = self._norm(step, size)[live] <= CONVERGED
+            done = self._norm(step[live], size[live], live) <= CONVERGED
             if done.any():
                 last = live[done]
                 x, T = self._moved(last, step[last])
@@ -253,11 +294,12 @@ class Newton:
                 live = live[~done]
             if not live.size:
                 break
+            damping[live] = np.minimum(damping[live], FARTHEST / self._norm(step[live], size[live], live))
             x, T = self._moved(live, damping[live, None] * step[live])
             new, new_inverse, new_size = self._linearised(live, x, T)
             with np.errstate(all="ignore"):
                 simplified = -_applied(inverse[live], new)
-                ratio = self._norm(simplified, size[live]) / self._norm(step[live], size[live])
+                ratio = self._norm(simplified, size[live], live) / self._norm(step[live], size[live], live)
                 better = (ratio <= 1.0 - 0.5 * damping[live]) & np.isfinite(new_inverse).all(axis=(1, 2))
             took = live[better]
             self.x[took], self.T[took] = x[better], T[better]
@@ -273,8 +315,7 @@ class Newton:
         if self.phase is None:
             return x, self.T[those]
         T = self.T[those]
-        with np.errstate(invalid="ignore"):
-            return x, np.clip(T + step[:, -1], PERIODS[0] * T, PERIODS[1] * T)
+        return x, T + step[:, -1]
 
     def _linearised(self, those, x, T):
         """G, the inverse of its derivative, and the sizes of the unknowns."""
@@ -289,10 +330,11 @@ class Newton:
         slope[~np.isfinite(value).all(axis=1)] = np.nan
         return value, _inverse(slope), size
 
-    def _norm(self, step, size):
+    def _norm(self, step, size, those):
         with np.errstate(all="ignore"):
-            own = size if self.phase is None else size[:, :-1]
-            least = 1e-3 * own.max(axis=1, keepdims=True) + 1e-300  # a state that is 0 all the time has no size
+            # a state that is 0 all the time has no size
+            own = np.concatenate([size[:, : self.x.shape[1]], abs(self.guess[those])], axis=1)
+            least = 1e-3 * own.max(axis=1, keepdims=True) + 1e-300
             return (abs(step) / np.maximum(size, least)).max(axis=1)
 
 
@@ -335,13 +377,24 @@ class Shown:
     others: np.ndarray
     d_others: np.ndarray
 
+    def improve(self, other):
+        """Take those over that only `other` shows."""
+        those = ~self.good & other.good
+        for one in fields(self):
+            getattr(self, one.name)[those] = getattr(other, one.name)[those]
 
-def _certified(programs, numbers, x, T, plane, counts, method, reach):
+
+def _certified(programs, numbers, x, T, guess, plane, counts, method, reach):
     """Shown, of orbits near (x, T); see the head of the module. All is in the units that balance A, but the results."""
     with np.errstate(all="ignore"):
         path = Path(programs, numbers, x, T, counts, reach)
+        path.enough = WIDEST * np.maximum(path.extent, (abs(guess) / path.scale).max(axis=1))
         path.propagate(method)
-        return path.certify(x, T, plane)
+        shown = path.certify(x, T, plane, RADII[0])
+        for factor in RADII[1:]:
+            if not shown.good.all():
+                shown.improve(path.certify(x, T, plane, factor))
+        return shown
 
 
 class Path:
@@ -363,7 +416,7 @@ class Path:
         dX = _sum((series * k)[:, :, 1:]) / self.h[:, None, None]
         noise = ROUNDOFF_UP * _sum((moduli * k * (2 * k + 2))[:, :, 1:]) / self.h[:, None, None]
         f, df = (one[..., 0].swapaxes(1, 2) for one in self._along(programs.f, self.noise_X))
-        self.defect = SAMPLED * self.h[:, None] * (abs(dX - f) + TWICE * df + noise).max(axis=2)
+        self.defect = SAMPLED * self.h[:, None] * (abs(dX - f) + df + noise).max(axis=2)
         # a series begins where the one before it ends, as it is summed
         end, begins = self.X[:-1, :, -1], series[1:, :, 0]
         self.defect[:-1] += np.where((self.point[1:] == self.point[:-1])[:, None], abs(end - begins), 0.0)
@@ -374,7 +427,9 @@ class Path:
         self.scale = monodromy.balanced(largest)
         self.ratio = (self.scale[:, None, :] / self.scale[:, :, None])[self.point]
         self.norm = SAMPLED * (abs(A).max(axis=1) * self.ratio).sum(axis=2).max(axis=1)
-        self.noise = TWICE * self._rows(dA)
+        self.noise = SAMPLED * self._rows(dA)
+        size = (abs(self.X).max(axis=2) / self.scale[self.point]).max(axis=1)
+        self.extent = np.maximum.reduceat(size, self.first[:-1])
         self.end = X
 
     def _along(self, program, width):
@@ -400,8 +455,8 @@ class Path:
         spread(self.F, np.ascontiguousarray(delta), self.first, wide, off)
         return wide, off
 
-    def certify(self, x, T, plane):
-        """Shown of the orbits near x (N, n), T (N)."""
+    def certify(self, x, T, plane, factor):
+        """Shown of the orbits near x (N, n), T (N), within `factor` |B G|."""
         n, N, point, last, s = self.n, len(x), self.point, self.last, self.scale
         delta = self.defect / s[point]
         wide, off = self._spread(delta)
@@ -423,27 +478,26 @@ class Path:
         B = _inverse(slope)
         size = abs(B)
         near = (size * off_G[:, None, :]).sum(axis=2).max(axis=1)
-        radius = 2.02 * near
+        radius = factor * near
         # the tube, in the maximum norm of balanced units
         begins = np.concatenate([[0.0], (wide[:-1] * radius[point[:-1], None] + off[:-1]).max(axis=1)])
         begins[self.first[:-1]] = radius
-        tube = TWICE * (np.exp(self.h * self.norm) * begins + delta.max(axis=1))
+        tube = WIDER * (np.exp(self.h * self.norm) * begins + delta.max(axis=1))
         width = self.noise_X + (tube[:, None] * s[point])[:, :, None]
-        noise = TWICE * self._rows(self._along(self.programs.A, width)[1])
+        noise = WIDER * SAMPLED * self._rows(self._along(self.programs.A, width)[1])
         error = self.error + self.h * noise * np.exp(self.h * (self.norm + noise))
         doubt = self.doubt * (error / self.error)
-        second = self._spread(np.repeat((n * error * TWICE * begins)[:, None], n, axis=1))[1].max(axis=1)
+        second = self._spread(np.repeat((n * error * WIDER * begins)[:, None], n, axis=1))[1].max(axis=1)
         first_order = (wide * radius[point, None] + off).max(axis=1)
-        extent = np.maximum.reduceat((abs(self.X).max(axis=2) / s[point]).max(axis=1), self.first[:-1])
-        stays = (second <= first_order) & (tube <= WIDEST * extent[point])
+        stays = (second <= (WIDER - 1.0) * first_order) & (tube <= self.enough[point])
         stays = np.logical_and.reduceat(stays, self.first[:-1])
         products(self.F, error, doubt, self.first, n, M, E)
         shift = dT if plane is None else dT + radius * unit
-        E = E + (TWICE * shift * a_end)[:, None, None] * (abs(M) + E).max(axis=1, keepdims=True)
+        E = E + (WIDER * shift * a_end)[:, None, None] * (abs(M) + E).max(axis=1, keepdims=True)
         bounds = E
         if plane is not None:
-            moved = a_end * (TWICE * first_order[last] + shift * fastest) + 4 * EPS * fastest
-            bounds = _bordered(E, np.repeat((TWICE * unit * moved)[:, None], n, axis=1), 4 * EPS * abs(row))
+            moved = a_end * (WIDER * first_order[last] + shift * fastest) + 4 * EPS * fastest
+            bounds = _bordered(E, np.repeat((WIDER * unit * moved)[:, None], n, axis=1), 4 * EPS * abs(row))
         m = n if plane is None else n + 1
         residual = abs(_product(B, slope) - np.eye(m)) + (m + 4) * EPS * _product(size, abs(slope))
         q = (residual + _product(size, bounds)).sum(axis=2).max(axis=1)
@@ -456,7 +510,7 @@ class Path:
         if plane is not None:
             dT = final * unit * (1 + 4 * EPS) + EPS * T
             f, df = self.programs.slopes(self.own, np.zeros(N), x, dx)
-            df = TWICE * df + 8 * EPS * abs(f)
+            df = WIDER * df + 8 * EPS * abs(f)
             others, d_others = deflated(M, E, f / s, df / s)
         back = s[:, :, None] / s[:, None, :]
         return Shown(shown, x, dx + EPS * abs(x), T, dT, M * back, E * back, others, d_others)
@@ -522,7 +576,7 @@ class Found:
 
     def outputs(self, known, rtol, wanted, computed):
         """The wanted outputs; `known`: the points that have a start and a period."""
-        N, n, m = len(self.good), self.n, self.m
+        N, m = len(self.good), self.m
         answer = stability.assess(self.others[:, 0], self.others[:, 1], "none", rtol, wanted)
         answer.status[~self.good] = NO_ORBIT
         answer.status[~known] = status.INVALID_PARAMETERS
