@@ -47,9 +47,10 @@ WIDEST = 1e-3  # of the tube, relative to the largest state
 CHUNK = 2048  # points that are solved together
 CALL = 200_000  # numbers of a series that are recorded together
 MOST_STEPS = 20_000
-TRIALS, LEAST_DAMPING = 60, 1e-4  # of Newton's method
+TRIALS, LEAST_DAMPING = 40, 1e-4  # of Newton's method
 CONVERGED = 1e-8  # relative: the last step, whose square is beyond float64
-FARTHEST = 0.5  # a step of it, relative to the orbit and the period
+FARTHEST = 0.2  # a step of it, relative to the orbit and the period
+ACROSS = 0.1  # how fast the plane is passed, relative to the start: equilibria are no orbits
 RELAXED, RETURN, NEAR = 32.0, 3.0, 0.2  # periods; the time in which an orbit comes back; how near, relative to it
 LOCK = threading.Lock()
 
@@ -327,6 +328,8 @@ class Newton:
             plane = (c * (x - self.guess[those])).sum(axis=1)
             value, slope = np.concatenate([value, plane[:, None]], axis=1), _bordered(slope, f, c)
             size = np.concatenate([size, T[:, None]], axis=1)
+            across = (c * self.programs.slopes(numbers, T, x)[0]).sum(axis=1)
+            slope[~(across >= ACROSS * (c * c).sum(axis=1))] = np.nan
         slope[~np.isfinite(value).all(axis=1)] = np.nan
         return value, _inverse(slope), size
 

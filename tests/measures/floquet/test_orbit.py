@@ -148,7 +148,7 @@ def test_limit_cycle_in_closed_form():
         circle, states=("x", "y", "z"), period=None, parameters=("a", "w"),
         start=lambda p: (*start, 2 * math.pi / p[1] * 1.02),
     )  # fmt: skip
-    a, w = [-0.4, 0.3, 1.0], [0.7, 2.0]
+    a, w = [-0.1, 0.3, 1.0], [0.7, 2.0]
     ds = survey.evaluate(scene, a=a, w=w)
     assert set(status(ds)) == {0}
     for i, rate in enumerate(a):
@@ -330,4 +330,4 @@ def test_a_file_and_a_run(tmp_path):
     ds = survey.run(workflow)
     assert (ds.status == 0).all()
     assert ds.state.values.tolist() == ["x", "v"]
-    assert "certainly" in ds.survey.point(F=0.1, w=1.3).attrs["why"]
+    assert "certainly" in ds.survey.point(F=0.1, w=1.3).why
