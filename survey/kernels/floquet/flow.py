@@ -19,7 +19,7 @@ from survey.kernels.math.roundoff import ROUNDOFF
 ORDER = 20
 DIGITS = 2.0**48  # of the ends of steps, so that sums and differences of them are exact
 WIDEST = 16.0  # a step, relative to that for which its series was made
-SHORTER, MOST_TRIES = 0.1, 60  # where a series is not finite
+SHORTER, SHORTEST = 0.1, 1e-9  # where a series is not finite; of the span: steps as short end at a singularity
 
 
 @kernel
@@ -40,12 +40,12 @@ def flow(
     W, rows, a = np.zeros((len(terms), lanes)), np.zeros((n, lanes)), np.zeros(lanes)
     x, D, F = np.zeros((n, lanes)), np.zeros((n * n, lanes)), np.zeros((n * n, lanes))
     t, s, shares = np.zeros(lanes), np.zeros(lanes), np.zeros(lanes)
-    tries, busy, held = np.zeros(lanes, np.int64), np.zeros(lanes, np.bool_), order[:n]
+    busy, held = np.zeros(lanes, np.bool_), order[:n]
     for start in range(0, len(x0), lanes):
         count = min(lanes, len(x0) - start)
         for lane in range(lanes):
             i = start + min(lane, count - 1)
-            busy[lane], t[lane], s[lane], tries[lane] = lane < count, 0.0, span[i] / 32.0, 0
+            busy[lane], t[lane], s[lane] = lane < count, 0.0, span[i] / 32.0
             V[:, lane] = numbers[i]
             for k in range(len(terms)):
                 W[k, lane] = numbers[i, terms[k, NUMBER]]
@@ -77,10 +77,10 @@ def flow(
                     continue
                 i = start + lane
                 share = _share(S, held, lane)
-                if not math.isfinite(share) or steps[i] >= most:
-                    tries[lane] += 1
+                lost = steps[i] >= most or min(share, 1.0) * s[lane] < SHORTEST * span[i]
+                if lost or not math.isfinite(share):
                     s[lane] *= SHORTER
-                    if tries[lane] > MOST_TRIES or steps[i] >= most:
+                    if lost or s[lane] < SHORTEST * span[i]:
                         busy[lane], X[i] = False, math.nan
                         left -= 1
                     shares[lane] = 0.0
