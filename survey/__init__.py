@@ -6,6 +6,7 @@
     survey.evaluate(survey.hill(z, ...), a=1.0)                  # your own Hill equation y'' + z(u, p) y = 0
     survey.evaluate(survey.abel(f, g, ...), t=1.0)               # your own Abel equation w w' = f(phi, p) w + g(phi, p)
     survey.evaluate(survey.floquet(A, ...), p=1.0)               # your own linear periodic system x' = A(t, p) x
+    survey.evaluate(survey.orbit(f, ...), p=1.0)                 # periodic orbits of your own system x' = f(t, x, p)
     survey.scenes()                                              # the scenes and what they answer
     ds = survey.open("results/satellite_prolate.nc")             # open and check a file
 
@@ -18,7 +19,7 @@ import sys
 from importlib import import_module
 
 _HOME = {"run": "survey.api", "evaluate": "survey.api", "open": "survey.api", "hill": "survey.request.user_scene"}
-_HOME |= {"abel": "survey.request.user_scene", "floquet": "survey.request.user_scene"}
+_HOME |= {name: "survey.request.user_scene" for name in ("abel", "floquet", "orbit")}
 _HOME |= {
     "SurveyError": "survey.errors",
     "BadInput": "survey.errors",

@@ -11,3 +11,4 @@ from survey.errors import SurveyError as SurveyError
 from survey.request.user_scene import abel as abel
 from survey.request.user_scene import floquet as floquet
 from survey.request.user_scene import hill as hill
+from survey.request.user_scene import orbit as orbit

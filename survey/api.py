@@ -39,7 +39,7 @@ def run(
     Parameters
     ----------
     workflow : path of a workflow file, or a mapping with the same tables (its scene may be what `survey.hill`,
-        `survey.abel` or `survey.floquet` returns).
+        `survey.abel`, `survey.floquet` or `survey.orbit` returns).
     output : path of the netCDF file, instead of the workflow's.
     workers : number of worker processes; by default threads of this process.
     scheduler : address or scheduler file of a dask.distributed cluster.
@@ -100,8 +100,8 @@ def evaluate(
     Parameters
     ----------
     scene : name of a scene, such as "satellite" (`survey.scenes()` lists them, `survey scenes NAME` explains one); the
-        path of a file with your own equation (see `survey/request/user_scene.py`); or what `survey.hill`, `survey.abel`
-        or `survey.floquet` returns.
+        path of a file with your own equation (see `survey/request/user_scene.py`); or what `survey.hill`,
+        `survey.abel`, `survey.floquet` or `survey.orbit` returns.
     method : "auto" or the name of a method.
     rtol : requested accuracy, |error| <= rtol (1 + |value|); the `X_error` variables hold the error bounds reached.
     variables : names of the requested outputs; all by default. Errors and status are always included.

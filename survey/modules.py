@@ -20,7 +20,7 @@ def load(package, name, what):
         raise BadInput(unknown(what, name, names(package)))
     path = f"{package.__name__}.{name}"
     if str(name).isidentifier() and path in sys.modules:  # the folder is not read again for every block
-        return sys.modules[path]
+        return import_module(path)  # waits for another thread that has begun to import it
     known = names(package)
     if name not in known:
         raise BadInput(unknown(what, name, known))

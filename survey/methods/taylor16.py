@@ -23,7 +23,7 @@ from survey.kernels.libration.danby import COLUMN, COLUMNS, D1, D2, OWN, TILE, E
 from survey.kernels.unroll import largest, unroll
 
 ORDER = 16
-SERVES = ("danby", "floquet", "hill")
+SERVES = ("danby", "floquet", "hill", "orbit")
 COST = {"danby": 10.0}  # time, relative to the default of each family
 
 _DEGREE = 9

@@ -8,7 +8,7 @@ _known = {}  # by hash: a worker process compiles a scene once, for all of its b
 
 
 class FunctionScene:
-    """Base of `HillScene`, `AbelScene` and `FloquetScene`; `own` are the parameters that the functions take."""
+    """Base of `HillScene`, `AbelScene`, `FloquetScene` and `OrbitScene`; `own`: parameters of the functions."""
 
     def __post_init__(self):
         object.__setattr__(self, "__doc__", self.about)

@@ -25,6 +25,15 @@ that of a linear periodic system x' = A(t, p) x, or M q'' + C q' + K q = 0,
                     then momenta (with K: M q' + C q / 2); "reversible": R A(-t) R = -A(t) with signs R. It is checked
     BREAKS          times in [0, T] at which A jumps or has a kink: number(s), or a function of p; none by default
 
+that of the periodic orbits of x' = f(t, x, p)
+
+    f(t, x, p, out)    a function that fills the array out, which holds zeros, with x' at the time t in the state x
+    STATES, PARAMETERS as above
+    PERIOD             T, a number or a function of p; None: f does not depend on t, and T is found
+    START              where Newton's method begins: the n states at t = 0, or a function of p that returns them; if
+                       PERIOD is None, a guess of the period after them
+    jacobian(t, x, p, out)    optional: fills the n x n matrix df/dx, and is compared with that of the record
+
 and all optionally a docstring, TITLE and REFERENCES. It is executed like any Python file: use only files that you
 trust. A file that is named only by a survey runs if this user has run it here before, or allows it (see `trust.py`).
 Changes in what it imports are not noticed when a run is resumed. z is continued with period T. [boundaries] and
@@ -37,6 +46,9 @@ narrower than both may go unseen; near BREAKS the samples are as dense as necess
 A (or M, C, K) is run once, as Python, to record its operations on t and p; the record gives the power series of A in
 every step, for all points, and bounds of the rounding. Branches are followed as the code takes them: points that take
 others are recorded on their own. What depends on t must be analytic between BREAKS.
+
+f(t, x, p, out) is recorded likewise, and its derivatives by x are those of the record; it must be analytic in t and x:
+branches may depend on parameters alone.
 
 f and g are run once at every set of parameters, as Python, to record their operations on phi; the record gives their
 Taylor series, bounds of them and of their rounding. So what depends on phi must be analytic: + - * / ** and functions
@@ -65,12 +77,15 @@ import numpy as np
 import numpy.typing as npt
 
 from survey.errors import BadInput, Untrusted
+from survey.measures.floquet import orbit as orbits
 from survey.measures.floquet import stability
 from survey.measures.hill import monodromy
 from survey.request import trust
 from survey.request.abel_scene import AbelScene
 from survey.request.floquet_scene import LARGEST, FloquetScene
 from survey.request.hill_scene import SAME, HillScene, is_number, reason
+from survey.request.orbit_scene import LARGEST as MOST_STATES
+from survey.request.orbit_scene import OrbitScene
 from survey.scene import Parameter
 from survey.scenes import gyrostat, load
 from survey.wording import reason_of, short, shown
@@ -80,6 +95,7 @@ EXAMPLES = {
     "g": "def g(phi, p): return p[1] - sin(phi)",
     "z": "def z(u, p): return p[0] + p[1] * cos(2 * u)",
     "STATES": 'STATES = ("x", "v"), the names of the states',
+    "START": "START = (1.0, 0.0), or def START(p): return 1.0, 0.0",
     "PERIOD": "PERIOD = 3.14 (its length in u), or a function of p",
     "PARAMETERS": 'PARAMETERS = ("a", "b"), the names of p[0], p[1]',
 }
@@ -92,8 +108,12 @@ ABEL_REFERENCES = (
 FLOQUET_REFERENCES = (
     "V. A. Yakubovich, V. M. Starzhinskii, Linear Differential Equations with Periodic Coefficients, 1975",
 )
-OWN = (HillScene, AbelScene, FloquetScene)
-OwnScene = HillScene | AbelScene | FloquetScene
+ORBIT_REFERENCES = (
+    "W. Tucker, Validated Numerics, Princeton 2011",
+    "A. Jorba, M. Zou, Experimental Mathematics 14 (2005) 99",
+)
+OWN = (HillScene, AbelScene, FloquetScene, OrbitScene)
+OwnScene = HillScene | AbelScene | FloquetScene | OrbitScene
 
 
 def hill(
@@ -231,6 +251,59 @@ def floquet(
     return scene
 
 
+def orbit(
+    f: Callable[[Any, Any, Any, Any], Any],
+    *,
+    states: str | Iterable[str],
+    period: float | Callable[[Any], float] | None,
+    parameters: str | Parameter | Iterable[str | Parameter],
+    start: npt.ArrayLike | Callable[[Any], npt.ArrayLike],
+    jacobian: Callable[[Any, Any, Any, Any], Any] | None = None,
+    title: str | None = None,
+) -> OrbitScene:
+    """The scene of the periodic orbits of x' = f(t, x, p), for `survey.evaluate` and `survey.run`.
+
+    Outputs are the state `x0` at t = 0, the period, and those of `survey.floquet` for motions next to the orbit.
+    Every orbit is shown to exist within its error bars; `status` is no_orbit where that fails. Where f does not
+    depend on t, x0 is in the plane through the start that f is normal to there, and the multipliers do not include the
+    +1 that every orbit has then. Where there are several orbits, the start decides.
+
+    Parameters
+    ----------
+    f : function of t, x, p and out, plain Python or numba's: fills out, n numbers, with x'; x are the n states, p the
+        float64 array of the parameters, in order. It must be analytic in t and x: no abs, maximum or if of these.
+    states : names of the n states.
+    period : T, a number or a function of p; None: f does not depend on t, and T is found.
+    parameters : their names, or `survey.scene.Parameter`s.
+    start : where Newton's method begins, the n states at t = 0, or a function of p that returns them; if `period` is
+        None, a guess of the period follows them.
+    jacobian : function that fills the n x n matrix df/dx. It need not be given: the operations of f are recorded and
+        differentiated. If it is, it is compared with that.
+
+    Raises survey.BadInput with one line that names what is wrong.
+
+    Examples
+    --------
+    >>> import survey
+    >>> def f(t, x, p, out):
+    ...     out[0], out[1] = x[1], p[0] * (1 - x[0] ** 2) * x[1] - x[0]
+    >>> van_der_pol = survey.orbit(f, states=("x", "v"), period=None, parameters="mu", start=(2.0, 0.0, 6.5))
+    >>> ds = survey.evaluate(van_der_pol, mu=1.0)
+    >>> float(ds.period.round(9)), int(ds.verdict)
+    (6.663286859, 1)
+    """
+    function = getattr(f, "py_func", f)
+    try:
+        text = inspect.getsource(function)
+    except (OSError, TypeError):
+        text = ""
+    name = f"orbit({getattr(function, '__name__', 'f').strip('<>')})"
+    about = inspect.getdoc(function)
+    scene = _orbit(f, period, parameters, states, start, jacobian, name, text, title, about, ())
+    _made[scene.HASH] = scene
+    return scene
+
+
 def find(scene: Any, near: str | Path | None = None) -> tuple[str, Any]:
     """(name, scene) for a scene's name, a file `*.py` (relative to this folder, or else `near`), or an own scene."""
     if isinstance(scene, OWN):
@@ -277,7 +350,7 @@ def of_dataset(ds: Any) -> Any:
         return _made[digest]
     raise BadInput(
         f"scene = {name!r} was a function in Python: points cannot be solved again without it; "
-        "pass it to survey.hill, survey.abel or survey.floquet again first"
+        "pass it to survey.hill, survey.abel, survey.floquet or survey.orbit again first"
     )
 
 
@@ -332,7 +405,11 @@ def _from_text(name: str, text: str) -> OwnScene:
     is_abel = hasattr(module, "f") and hasattr(module, "g") and not hasattr(module, "z")
     matrices = {name: getattr(module, name) for name in "AMCK" if callable(getattr(module, name, None))}
     is_floquet = bool(matrices.keys() & {"A", "K"}) and not hasattr(module, "z") and not is_abel
+    is_orbit = (
+        hasattr(module, "f") and hasattr(module, "STATES") and not (is_abel or is_floquet or hasattr(module, "z"))
+    )
     needs = ("STATES", "PERIOD", "PARAMETERS") if is_floquet else ("z", "PERIOD", "PARAMETERS")
+    needs = ("PERIOD", "PARAMETERS", "START") if is_orbit else needs
     for needed in ("f", "g", "PARAMETERS") if is_abel else needs:
         if not hasattr(module, needed):
             raise BadInput(f"{name}: {needed} is missing; write {EXAMPLES[needed]}")
@@ -345,6 +422,10 @@ def _from_text(name: str, text: str) -> OwnScene:
         more = getattr(module, "STRUCTURE", "none"), getattr(module, "BREAKS", ())
         given = module.PERIOD, module.PARAMETERS, module.STATES, *more
         return _floquet(matrices, *given, name, text, title, about, references)
+    if is_orbit:
+        about = module.__doc__ or inspect.getdoc(getattr(module.f, "py_func", module.f))
+        given = module.PERIOD, module.PARAMETERS, module.STATES, module.START, getattr(module, "jacobian", None)
+        return _orbit(module.f, *given, name, text, title, about, references)
     optional = getattr(module, "EVEN", False), getattr(module, "BREAKS", ())
     about = module.__doc__ or inspect.getdoc(getattr(module.z, "py_func", module.z))
     return _hill(module.z, module.PERIOD, module.PARAMETERS, *optional, name, text, title, about, references)
@@ -419,9 +500,7 @@ def _floquet(
         if not callable(function) or _arguments(function) != 3:
             refuse(f"{letter} must be a function of three arguments, {letter}(t, p, out), that fills the matrix out")
     parameters = _parameters(parameters, stability.OUTPUTS, ("multiplier", "row", "column"), refuse)
-    names = (states,) if isinstance(states, str) else tuple(states)
-    if not names or any(not isinstance(n, str) or not n.isidentifier() or names.count(n) > 1 for n in names):
-        refuse(f"STATES = {states!r}: give the names of the states, each once, as identifiers")
+    names = _state_names(states, refuse)
     if "K" in matrices:
         names += tuple(f"{'p_' if structure == 'symplectic' else 'd'}{n}" for n in names)
     if len(names) > LARGEST:
@@ -442,6 +521,54 @@ def _floquet(
         NAME=name, TEXT=text, HASH=hashlib.sha256(bits).hexdigest(), TITLE=title or about.splitlines()[0].rstrip("."),
         about=about, REFERENCES=tuple(references) or FLOQUET_REFERENCES,
     )  # fmt: skip
+
+
+def _orbit(
+    f: Any, period: Any, parameters: Any, states: Any, start: Any, jacobian: Any,
+    name: str, text: str, title: str | None, about: str | None, references: Iterable[str],
+) -> OrbitScene:  # fmt: skip
+    """The checked scene; raises BadInput."""
+
+    def refuse(message: str) -> NoReturn:
+        raise BadInput(f"{name}: {message}")
+
+    for letter, function in (("f", f), ("jacobian", jacobian)):
+        if not callable(function) or _arguments(function) != 4:
+            if function is not None or letter == "f":
+                refuse(f"{letter} must be a function of four arguments, {letter}(t, x, p, out), that fills out")
+    parameters = _parameters(parameters, orbits.OUTPUTS, ("state", "multiplier", "row", "column"), refuse)
+    names = _state_names(states, refuse)
+    if len(names) > MOST_STATES:
+        refuse(f"STATES names {len(names)} states; at most {MOST_STATES} are allowed")
+    if period is None and len(names) < 2:
+        refuse("STATES names one state: without a PERIOD, orbits need two")
+    if period is not None and not callable(period) and not (is_number(period) and 0 < period < np.inf):
+        refuse(f"PERIOD = {period!r}: it must be a positive number, a function of p that returns one, or None")
+    needed = len(names) + (period is None)
+    if not callable(start):
+        try:
+            start = tuple(float(x) for x in np.atleast_1d(start))
+        except (TypeError, ValueError):
+            start = ()
+        if len(start) != needed or not np.isfinite(start).all():
+            guess = " and a guess of the period" if period is None else ""
+            refuse(f"START must be {needed} numbers, the states{guess}, or a function of p that returns them")
+    about = inspect.cleandoc(
+        about or f"Periodic orbits of x' = f(t, x, p), p = ({', '.join(p.name for p in parameters)})."
+    )
+    bits = text.encode() if name.endswith(".py") else _bits((f, period, parameters, names, start, jacobian))
+    return OrbitScene(
+        f=f, period=period, start=start, jacobian=jacobian, states=names, PARAMETERS=parameters, NAME=name, TEXT=text,
+        HASH=hashlib.sha256(bits).hexdigest(), TITLE=title or about.splitlines()[0].rstrip("."), about=about,
+        REFERENCES=tuple(references) or ORBIT_REFERENCES,
+    )  # fmt: skip
+
+
+def _state_names(states: Any, refuse: Callable[[str], NoReturn]) -> tuple[str, ...]:
+    names = (states,) if isinstance(states, str) else tuple(states) if isinstance(states, Iterable) else ()
+    if not names or any(not isinstance(n, str) or not n.isidentifier() or names.count(n) > 1 for n in names):
+        refuse(f"STATES = {states!r}: give the names of the states, each once, as identifiers")
+    return names
 
 
 def _checked_breaks(breaks: Any, period: Any, refuse: Callable[[str], NoReturn]) -> Any:

@@ -4,7 +4,8 @@ A matrix is a sum of `terms` (basis, row, column, number): number * basis functi
 it of a user's code. `operations` (count, 5) are the rows (code, a, b, first, last) of the basis functions: a and b
 those that they are made of, first to last the rows (basis, number) of `inside` that a combination adds. The series
 of a function h(y) follows from h' y': b is h', with the sign in `signs`; where y is linear in t its code is larger
-by OF_LINE.
+by OF_LINE. A state of a nonlinear system x' = f(t, x) begins with the number a; first to last are the rows of `inside`
+that make up its f, whose lower orders give its own (`measures.floquet.orbit`).
 
 S[basis, n, lane] is the coefficient of tau^n, t = middle + tau * half; V[number, lane] are the numbers.
 
@@ -16,12 +17,13 @@ import math
 from survey.kernels.jit import kernel
 
 _NAMES = (
-    "one time combination product quotient sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp log sqrt erf"
+    "one time combination product quotient sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp log sqrt "
+    "erf state"
 )
 CODES = {name: code for code, name in enumerate(_NAMES.split())}
 OF_LINE = 32
 ONE, TIME, COMBINATION, PRODUCT, QUOTIENT, SIN, COS, TAN, ASIN, ACOS, ATAN, SINH, COSH = range(13)
-TANH, ASINH, ACOSH, ATANH, EXP, LOG, SQRT, ERF = range(13, 21)
+TANH, ASINH, ACOSH, ATANH, EXP, LOG, SQRT, ERF, STATE = range(13, 22)
 BASIS, ROW, COLUMN, NUMBER = range(4)  # columns of `terms`
 
 
@@ -80,6 +82,17 @@ def extend(operations, signs, inside, order, V, middle, half, S, n):
                 one, number = S[inside[k, 0], n], V[inside[k, 1]]
                 for lane in range(lanes):
                     own[lane] += one[lane] * number[lane]
+        elif code == STATE:
+            if n == 0:
+                own[:] = V[a]
+            else:
+                own[:] = 0.0
+                for k in range(operations[i, 3], operations[i, 4]):
+                    one, number = S[inside[k, 0], n - 1], V[inside[k, 1]]
+                    for lane in range(lanes):
+                        own[lane] += one[lane] * number[lane]
+                for lane in range(lanes):
+                    own[lane] *= half[lane] / n
         elif code == PRODUCT:
             own[:] = 0.0
             for k in range(n + 1):

@@ -66,12 +66,12 @@ def factors(
         w[0], e[0] = 1.0, 0.0
         for k in range(ORDER):
             extend(operations, signs, inside, order, V, t, s, S, k)
-            _norm(S, W, terms, k, rows, a[k])
-            _next(S, W, terms, used, needed, k, n, s, B, C, X)
+            norm_of(S, W, terms, k, rows, a[k])
+            next_term(S, W, terms, used, needed, k, n, s, B, C, X)
             _row_sums(X[k + 1], n, rows, w[k + 1])
             _rounded(a, w, e, own, s, k, most)
         extend(operations, signs, inside, order, V, t, s, S, ORDER)
-        _norm(S, W, terms, ORDER, rows, a[ORDER])
+        norm_of(S, W, terms, ORDER, rows, a[ORDER])
         _ends(X, plus, minus)
         for lane in range(min(lanes, len(point) - start)):
             cut, rounding, total = _missing(a, w, e, s, lane)
@@ -81,7 +81,7 @@ def factors(
 
 
 @kernel
-def _norm(S, W, terms, k, rows, out):
+def norm_of(S, W, terms, k, rows, out):
     """The maximum norm of A's coefficient of order k, by rows."""
     rows[:] = 0.0
     for q in range(len(terms)):
@@ -98,7 +98,7 @@ def _norm(S, W, terms, k, rows, out):
 
 
 @kernel
-def _next(S, W, terms, used, needed, k, n, s, B, C, X):
+def next_term(S, W, terms, used, needed, k, n, s, B, C, X):
     """Fill X[k + 1] = half / (k + 1) * sum over j of A_j X[k - j]; `needed` (basis, row) rows of X are multiplied.
 
     Each row of X, C and B[basis, order] holds `lanes` numbers for every column, as one long vector.

@@ -128,7 +128,7 @@ def passing(M, E, kind, structure):
     The angle is the argument of the multiplier, from 0 to pi, and `outside` the number of the others that are
     certainly outside the unit circle, NaN where the error bounds allow several.
     """
-    discs, rows = Discs(M, E), np.arange(len(M))
+    discs, rows = Discs(monodromy.Matrices.plain(M, E)), np.arange(len(M))
     centre, bars, n = discs.centre, discs.bars, M.shape[1]
     own = np.zeros(centre.shape, bool)
     paired = structure != "none"

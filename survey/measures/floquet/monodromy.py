@@ -137,6 +137,13 @@ class Matrices:
         real, complex_ = np.full((4, N, n, n), np.nan), np.full((2, N, n, n), np.nan, complex)
         return cls(*real, *complex_, np.full((N, n), np.nan, complex), np.zeros(N, bool))
 
+    @classmethod
+    def plain(cls, M, E):
+        """Those of which no more is known than M and E."""
+        found = cls.empty(*M.shape[:2])
+        found.M, found.E = M, E
+        return found
+
     def __getitem__(self, those):
         return Matrices(*(getattr(self, f.name)[those] for f in fields(self)))
 

@@ -7,6 +7,9 @@ is a power series in each step: a `Graph` records how both follow from the param
 be analytic: + - * / ** and FUNCTIONS. Branches are followed as they go at one example point; each comparison that
 decided one becomes a *guard*, and other points for which a guard decides otherwise are traced on their own.
 
+The states x of a nonlinear system x' = f(t, x, p) are basis functions, too, whose series follow from that of f; the
+derivatives of f by them are those of the recorded operations.
+
 Numbers in the code are taken as exact binary64 numbers. With every value goes a bound of its rounding error.
 """
 
@@ -259,8 +262,14 @@ class Graph:
         self._number_places, self._series_places = {}, {}
         self.values = []  # of the numbers at the example
         self.shared = [True, True]  # does the basis function depend on t alone?
+        self.flow = {}  # the symbol of f for the basis function that is its state
+        self._slopes = {}
         self.parameters = [self.symbol(self.number("parameter", k), value) for k, value in enumerate(point)]
         self.time = Symbol(self, {TIME: self.constant(1.0)}, time)
+
+    def state(self, number, value):
+        """A state of a nonlinear system as a symbol; the number at this place is where its series begins."""
+        return Symbol(self, {self.basis("state", number): self.constant(1.0)}, value)
 
     def symbol(self, number, value):
         """The number at this place as a symbol."""
@@ -307,6 +316,8 @@ class Graph:
             self.series.append(key)
             if operation == "combination":
                 self.shared.append(all(self.shared[b] and self.is_constant(c) for b, c in operands[0]))
+            elif operation == "state":
+                self.shared.append(False)
             else:
                 self.shared.append(all(self.shared[b] for b in operands[:2] if isinstance(b, int)))
         return self._series_places[key]
@@ -436,6 +447,46 @@ class Graph:
                 self.series[at] = (name, inside, self.single(self.lift(SLOPES[name](x, made))), 1.0)
         return made
 
+    def slope(self, x, state):
+        """The derivative of the symbol x by the state, a basis function; None where it is 0."""
+        total = None
+        for basis, number in x.terms.items():
+            own = self._slope_of(basis, state)
+            if own is not None:
+                own = self.product(self.symbol(number, 0.0), own)
+                total = own if total is None else self.sum(total, own)
+        return total
+
+    def _slope_of(self, basis, state):
+        key = basis, state
+        if key not in self._slopes:
+            self._slopes[key] = self._new_slope(basis, state)
+        return self._slopes[key]
+
+    def _new_slope(self, basis, state):
+        operation, *o = self.series[basis]
+        if operation in ("one", "time", "state"):
+            return self.lift(1.0) if basis == state else None
+        if operation == "combination":
+            return self.slope(Symbol(self, dict(o[0]), 0.0), state)
+        one = self._slope_of(o[0], state)
+        if operation not in ("product", "quotient"):
+            return None if one is None else self.product(self._alone(o[1]), one) * o[2]
+        two = self._slope_of(o[1], state)
+        if operation == "product":
+            parts = [None if two is None else self._alone(o[0]) * two, None if one is None else one * self._alone(o[1])]
+        else:
+            parts = [one, None if two is None else -(self._alone(basis) * two)]
+        parts = [part for part in parts if part is not None]
+        if not parts:
+            return None
+        total = self.sum(parts[0], parts[1]) if len(parts) == 2 else parts[0]
+        return total if operation == "product" else self.quotient(total, self._alone(o[1]))
+
+    def _alone(self, basis):
+        """The basis function as a symbol; its value is not needed, as nothing branches any more."""
+        return Symbol(self, {basis: self.constant(1.0)}, math.nan)
+
     def compiled(self, entries):
         """A Program of the entries, {(i, j): symbol}."""
         return Program(self, entries)
@@ -445,7 +496,7 @@ class Program:
     """The entries of a matrix as arrays for `kernels.floquet.program`, and as functions of points and times."""
 
     def __init__(self, graph, entries):
-        self.graph = graph
+        self.graph, self.states = graph, list(graph.flow)
         terms = [
             (basis, i, j, number)
             for (i, j), symbol in sorted(entries.items())
@@ -464,6 +515,10 @@ class Program:
                 last = len(inside)
             elif operation in ("product", "quotient"):
                 a, b = operands
+            elif operation == "state":
+                a, first = operands[0], len(inside)
+                inside += [pair for pair in graph.flow[k].terms.items() if graph.numbers[pair[1]] != ("constant", 0.0)]
+                last = len(inside)
             elif operands:
                 a, b, sign = operands
                 if self._is_line(a):
@@ -483,7 +538,8 @@ class Program:
 
     def _order(self):
         """Places of the basis functions that the entries need, each after those that it is made of."""
-        found, begun = [], set()
+        flow = self.graph.flow
+        found, begun = list(flow), set(flow)  # states need lower orders alone
 
         def visit(place):
             if place in begun:
@@ -499,7 +555,7 @@ class Program:
             if function:  # its derivative is asked for at lower orders alone
                 visit(before[1])
 
-        for place in self.used:
+        for place in (*self.used, *(basis for symbol in flow.values() for basis in symbol.terms)):
             visit(int(place))
         return np.array(found, dtype=np.int64)
 
@@ -538,9 +594,10 @@ class Program:
                 values[:, k], errors[:, k] = v, e
         return values, errors
 
-    def series(self, numbers, t, places):
+    def series(self, numbers, t, places, states=None):
         """{place: (values, error bounds)} (N or 1, m) of these basis functions at times t (N or 1, m).
 
+        `states` are values and error bounds (n, N, m) of the states, to first order in their errors.
         The bounds hold for the kernels, whose functions are those of the C library, rounded to 1 or 2 ulp.
         """
         values, errors = numbers
@@ -553,6 +610,9 @@ class Program:
                     v, e = np.ones((1, 1)), 0.0
                 elif operation == "time":
                     v, e = t, 0.0
+                elif operation == "state":
+                    at = self.states.index(k)
+                    v, e = states[0][at], states[1][at]
                 elif operation == "combination":
                     v = e = 0.0
                     for b, c in o[0]:
@@ -589,6 +649,8 @@ class Program:
             operation, *operands = self.graph.series[place]
             if operation == "combination":
                 before = [b for b, _c in operands[0]]
+            elif operation == "state":
+                before = []
             else:
                 before = operands[: 2 if operation in ("product", "quotient") else 1]
             for b in before:
@@ -599,10 +661,13 @@ class Program:
             visit(int(place))
         return found
 
-    def at(self, points, t, size, numbers=None):
-        """A (N, m, n, n) at times t (N or 1, m), and bounds of the errors of its terms; their sums round besides."""
+    def at(self, points, t, size, numbers=None, states=None):
+        """A (N, m, n, n) at times t (N or 1, m), and bounds of the errors of its terms.
+
+        Their sums round besides; with `states`, see `series`, this is included.
+        """
         numbers = self.numbers(points) if numbers is None else numbers
-        basis = self.series(numbers, t, self.used)
+        basis = self.series(numbers, t, self.used, states)
         A, E = np.zeros((2, len(points), t.shape[1], size, size))
         with np.errstate(all="ignore"):
             for b, i, j, c in self.terms:
@@ -610,6 +675,8 @@ class Program:
                 y, dy = numbers[0][:, c, None], numbers[1][:, c, None]
                 A[:, :, i, j] += x * y
                 E[:, :, i, j] += abs(x) * dy + abs(y) * dx
+                if states is not None:
+                    E[:, :, i, j] += len(self.terms) * ROUNDOFF_UP * abs(x * y)
         return A, E
 
     def holds(self, points, low, high):

@@ -1,0 +1,177 @@
+"""The scene of periodic orbits of a user's x' = f(t, x, p): what a module of `survey.scenes` offers, as an object."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from survey.measures.floquet import orbit
+from survey.measures.floquet.system import Raised
+from survey.measures.floquet.trace import Unsupported
+from survey.request.floquet_scene import SAME, TRIED
+from survey.request.function_scene import FunctionScene
+from survey.request.hill_scene import reason
+from survey.scene import Parameter, plus_minus
+
+LARGEST = 16  # states
+STATUS = {
+    "invalid_parameters": "outside the domain, or the start or the period is not finite, or the period not positive",
+    "no_orbit": "Newton's method does not converge from the start, or no orbit is shown to exist near where it ends: "
+    "give a better start",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class OrbitScene(FunctionScene):
+    """What a scene's module offers (see `survey.scenes`), for a user's f; `about` is its docstring."""
+
+    f: Callable
+    period: float | Callable | None
+    start: tuple[float, ...] | Callable
+    jacobian: Callable | None
+    states: tuple[str, ...]
+    PARAMETERS: tuple[Parameter, ...]
+    NAME: str
+    TEXT: str
+    HASH: str
+    TITLE: str
+    about: str
+    REFERENCES: tuple[str, ...]
+    FAMILY = "orbit"
+    AUDIT = ()
+    OPTIONS = ()
+    OUTPUTS = orbit.OUTPUTS
+    STATUS = STATUS
+
+    @property
+    def own(self):
+        """The parameters of f: all that there are."""
+        return self.PARAMETERS
+
+    @cached_property
+    def _equation(self):
+        return orbit.Equation(self.f, len(self.states), self.period, self.start)
+
+    @property
+    def DIMENSIONS(self):
+        """Coordinates: the names of the states, numbers of multipliers, of rows and columns."""
+        number = np.arange(1, len(self.states) + 1)
+        judged = number[:-1] if self.period is None else number
+        return {"state": np.array(self.states), "multiplier": judged, "row": number, "column": number}
+
+    @property
+    def NOTES(self):
+        """What the system is, as global attributes of a file."""
+        return {"states": ", ".join(self.states), "autonomous": str(self.period is None)}
+
+    def cost(self, options, sizes):
+        """Seconds per point, roughly."""
+        return 5e-4 + 1e-4 * len(self.states) ** 2
+
+    def solve(self, point, request):
+        """The requested outputs of a block (see `survey.scenes`)."""
+        shape = np.broadcast_shapes(*(np.shape(values) for values in point.values()))
+        columns = [np.broadcast_to(point[p.name], shape).reshape(-1) for p in self.PARAMETERS]
+        points = np.stack(columns, axis=1).astype(float)
+        wanted = set(request.variables) or {o.name for o in self.OUTPUTS}
+        out = self._called(orbit.solve, self._equation, points, request.method, request.rtol, wanted)
+        return {name: values.reshape(*shape, *values.shape[1:]) for name, values in out.items()}
+
+    def why(self, answer):
+        """Why a point has its verdict (see `survey.scenes`)."""
+        radius = f"spectral radius {plus_minus(answer['spectral_radius'], answer['spectral_radius_error'])}"
+        return radius + {
+            "unstable": ": it is certainly above 1",
+            "stable": ": it is certainly below 1",
+        }.get(str(answer["verdict"]), ": the error bar allows multipliers outside the unit circle, and inside or on it")
+
+    def check(self, points):
+        """Raise BadInput if f cannot be used, or contradicts the scene's other entries at these points (N, n)."""
+        equation = self._equation
+        given = points if len(points) else np.ones((1, len(self.PARAMETERS)))
+        x0, period = self._called(equation.begin, given)
+        known = np.isfinite(x0).all(axis=1) & (period > 0) & np.isfinite(period)
+        if len(points) and not known.any():
+            what = "START(p) has no finite value" if not np.isfinite(x0).all() else "the period is not positive"
+            self._refuse(f"{what} at {self._where(points[0])}", "correct it")
+        for point, x, T in zip(given[known], x0[known], period[known], strict=True):
+            self._try(point, x)
+            for own, programs in self._called(equation.traced, point[None], x[None]):
+                if own.size and len(points):
+                    self._compare(programs, point, x, T)
+
+    def _try(self, point, x):
+        """Raise BadInput unless f, run as Python, fills its array."""
+        call, n = "f(t, x, p, out)", len(self.states)
+        try:
+            value = self._plain(self.f, 0.25, x, point, n)
+        except IndexError as error:
+            if "only integers" in str(error):
+                self._refuse_index(call, error)
+            self._refuse(
+                f"{call} indexes beyond an array ({error})",
+                f"STATES names {n} for x and out, PARAMETERS {len(self.own)} for p",
+            )
+        except Exception as error:
+            self._refuse(f"{call} fails ({type(error).__name__}: {reason(error)})", "correct it")
+        if value.shape != (n,):
+            self._refuse(f"{call} returns an array of shape {value.shape}", f"it must fill out, of {n} numbers")
+
+    def _plain(self, function, t, x, point, shape):
+        out = np.zeros(shape)
+        with np.errstate(all="ignore"):
+            try:
+                value = getattr(function, "py_func", function)(float(t), x.copy(), point, out)
+            except (ArithmeticError, ValueError):
+                return np.full(shape, np.nan)
+        return out if value is None else np.asarray(value, dtype=float)
+
+    def _compare(self, programs, point, x, T):
+        """Refuse what the recorded operations show: other values than the code's, no period, another Jacobian."""
+        n, here = len(self.states), self._where(point)
+        t = T * TRIED
+        numbers = tuple(np.repeat(one, t.size, axis=0) for one in programs.numbers(point[None]))
+        states = np.repeat(x[None, :, None], t.size, axis=0)
+        f, A = (
+            programs.along(program, numbers, t[:, None], states, np.zeros_like(states))[0][:, 0]
+            for program in (programs.f, programs.A)
+        )
+        f = f[:, :, 0]
+        size = abs(f).max()
+        if not np.isfinite(size):
+            self._refuse(f"f has no finite value at the start, {here}", "correct it, or START")
+        plain = np.array([self._plain(self.f, time, x, point, n) for time in t])
+        if not (abs(plain - f) <= SAME * size).all():
+            self._refuse(
+                f"f(t, x, p, out) gives other values when its operations are recorded, at {here}",
+                "use + - * / ** and functions of math or numpy alone",
+            )
+        if self.period is not None:
+            later = np.array([self._plain(self.f, time + T, x, point, n) for time in t])
+            off = abs(later - plain).max()
+            if not off <= SAME * size:
+                self._refuse(f"f(t + T) differs from f(t) by {off:.2g} at {here}, T = {T:g}", "correct PERIOD")
+        if self.jacobian is not None:
+            given = np.array([self._called_jacobian(time, x, point) for time in t])
+            if not (abs(given - A) <= SAME * abs(A).max()).all():
+                self._refuse(f"jacobian(t, x, p, out) is not df/dx at {here}", "correct it, or leave it out")
+
+    def _called_jacobian(self, t, x, point):
+        n, call = len(self.states), "jacobian(t, x, p, out)"
+        try:
+            value = self._plain(self.jacobian, t, x, point, (n, n))
+        except Exception as error:
+            self._refuse(f"{call} fails ({type(error).__name__}: {reason(error)})", "correct it")
+        if value.shape != (n, n):
+            self._refuse(f"{call} returns an array of shape {value.shape}", f"it must fill out, {n} x {n}")
+        return value
+
+    def _called(self, function, *arguments):
+        try:
+            return function(*arguments)
+        except Unsupported as error:
+            self._refuse(str(error), "use + - * / ** and functions such as sin, exp, sqrt of math or numpy")
+        except Raised as error:
+            cause = error.__cause__
+            self._refuse(f"{error} fails ({type(cause).__name__}: {reason(cause)})", "correct it")

@@ -1,0 +1,333 @@
+"""Periodic orbits: against closed forms, SciPy and known numbers, and what their error bars promise."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import survey
+from survey.measures.floquet.orbit import Equation
+
+
+def contained(values, exact, bars, slack=0.0):
+    """Are the exact values, perhaps of mpmath, within the bars?"""
+    off = [float(abs(mpmath.mpf(float(x)) - y)) for x, y in zip(np.ravel(values), np.ravel(exact), strict=True)]
+    return (np.array(off) <= np.ravel(bars) + slack).all()
+
+
+def status(ds):
+    return [int(code) for code in np.ravel(ds.status)]
+
+
+def test_forced_linear_oscillator():
+    def f(t, x, p, out):
+        out[0], out[1] = x[1], -p[0] * x[0] - 2 * p[1] * x[1] + math.cos(t)
+
+    scene = survey.orbit(
+        f, states=("x", "v"), period=2 * math.pi, parameters=("k", "c"), start=lambda p: (0.1, p[0]), jacobian=jacobian
+    )
+    k, c = [0.3, 2.0, 17.0], [-0.2, 0.05, 0.4]
+    ds = survey.evaluate(scene, k=k, c=c)
+    assert set(status(ds)) == {0}
+    for i, stiffness in enumerate(k):
+        for j, damping in enumerate(c):
+            at = ds.isel(k=i, c=j)
+            z = 1 / mpmath.mpc(stiffness - 1, 2 * mpmath.mpf(damping))
+            assert contained(at.x0, [z.real, -z.imag], at.x0_error)
+            radius = mpmath.exp(-2 * mpmath.pi * (damping - mpmath.sqrt(max(damping**2 - stiffness, 0))))
+            assert contained(at.spectral_radius, [radius], at.spectral_radius_error)
+            assert int(at.verdict) == (damping > 0)
+    assert (ds.x0_error < 1e-12).all()
+
+
+def jacobian(t, x, p, out):
+    out[0, 1], out[1, 0], out[1, 1] = 1.0, -p[0], -2 * p[1]
+
+
+def test_forced_duffing_oscillator_with_a_known_orbit():
+    """The force makes B cos t a solution; Liouville gives the product of its multipliers."""
+
+    def f(t, x, p, out):
+        c, B = p
+        known = B * math.cos(t)
+        out[0] = x[1]
+        out[1] = -c * x[1] + x[0] - x[0] ** 3 - 2 * known + known**3 - c * B * math.sin(t)
+
+    scene = survey.orbit(
+        f, states=("x", "v"), period=2 * math.pi, parameters=("c", "B"), start=lambda p: (1.01 * p[1], 0.02)
+    )
+    c, B = [0.1, 0.3], [0.2, 0.9, 1.7, 3.0]
+    ds = survey.evaluate(scene, c=c, B=B)
+    assert set(status(ds)) == {0}
+    for i, damping in enumerate(c):
+        for j, amplitude in enumerate(B):
+            at = ds.isel(c=i, B=j)
+            assert contained(at.x0, [amplitude, 0.0], at.x0_error)
+            re, im, bar = at.multiplier_re.values, at.multiplier_im.values, at.multiplier_re_error.values
+            product = (re[0] + 1j * im[0]) * (re[1] + 1j * im[1])
+            size = abs(re) + abs(im) + bar
+            assert abs(product - math.exp(-2 * math.pi * damping)) <= bar[0] * size[1] + bar[1] * size[0] + 1e-15
+    assert (ds.x0_error < 3e-12).all()
+    assert set(np.unique(ds.verdict)) == {0, 1}
+
+
+@pytest.mark.parametrize("F, w", [(0.1, 1.4), (0.3, 1.2), (0.05, 0.7)])
+def test_forced_duffing_oscillator_against_scipy(F, w):
+    def f(t, x, p, out):
+        out[0] = x[1]
+        out[1] = -0.25 * x[1] + x[0] - x[0] ** 3 + p[0] * np.cos(p[1] * t)
+
+    scene = survey.orbit(
+        f, states=("x", "v"), period=lambda p: 2 * math.pi / p[1], parameters=("F", "w"), start=(1.0, 0.0)
+    )
+    ds = survey.evaluate(scene, F=F, w=w, variables=["x0", "monodromy", "verdict", "multiplier_re", "multiplier_im"])
+
+    def rhs(t, y):
+        A = np.array([[0.0, 1.0], [1 - 3 * y[0] ** 2, -0.25]])
+        slope = np.empty(2)
+        f(t, y[:2], (F, w), slope)
+        return np.concatenate([slope, (A @ y[2:].reshape(2, 2)).ravel()])
+
+    x = ds.x0.values + 1e-4
+    for _ in range(4):
+        y = np.concatenate([x, np.eye(2).ravel()])
+        y = solve_ivp(rhs, (0.0, 2 * math.pi / w), y, method="DOP853", rtol=1e-13, atol=1e-15).y[:, -1]
+        M = y[2:].reshape(2, 2)
+        x = x - np.linalg.solve(M - np.eye(2), y[:2] - x)
+    assert contained(ds.x0, x, ds.x0_error, slack=1e-11)
+    assert contained(ds.monodromy, M, ds.monodromy_error, slack=1e-10)
+    found = ds.multiplier_re.values + 1j * ds.multiplier_im.values
+    assert np.allclose(np.sort_complex(found), np.sort_complex(np.linalg.eigvals(M)), atol=1e-10)
+    assert int(ds.verdict) == (abs(found).max() < 1)
+
+
+def van_der_pol(**more):
+    def f(t, x, p, out):
+        out[0], out[1] = x[1], p[0] * (1 - x[0] ** 2) * x[1] - x[0]
+
+    given = {"period": None, "start": (2.0, 0.0, 6.5)} | more
+    return survey.orbit(f, states=("x", "v"), parameters="mu", **given)
+
+
+def test_van_der_pols_limit_cycle():
+    """The period and the amplitude to 20 digits: C. M. Andersen, J. F. Geer, SIAM J. Appl. Math. 42 (1982) 678."""
+    ds = survey.evaluate(van_der_pol(), mu=1.0)
+    assert contained(ds.period, [mpmath.mpf("6.66328685932313018969")], ds.period_error)
+    assert contained(ds.x0, [mpmath.mpf("2.00861986087484313650"), 0], ds.x0_error)
+    assert float(ds.period_error) < 1e-12
+
+    def rhs(t, y):
+        return y[1], (1 - y[0] ** 2) * y[1] - y[0], 1 - y[0] ** 2
+
+    y = solve_ivp(rhs, (0.0, float(ds.period)), (*ds.x0.values, 0.0), method="DOP853", rtol=1e-13, atol=1e-15).y[:, -1]
+    assert ds.sizes["multiplier"] == 1
+    assert abs(float(ds.multiplier_re[0]) - math.exp(y[2])) <= float(ds.multiplier_re_error[0]) + 1e-13
+    assert int(ds.verdict) == 1
+
+
+def test_an_unstable_cycle_and_one_far_from_the_start():
+    ds = survey.evaluate(van_der_pol(), mu=[-1.0, 3.0])
+    assert status(ds) == [0, 0]
+    assert ds.verdict.values.tolist() == [0, 1]
+    assert abs(float(ds.period[0]) - 6.663286859323130) <= float(ds.period_error[0]) + 1e-15
+    assert abs(float(ds.period[1]) - 8.859095500) < 1e-7
+
+
+def circle(t, x, p, out):
+    """A limit cycle r = 1 with the angular velocity w, and a third state that follows it."""
+    a, w = p
+    rest = a * (1 - x[0] * x[0] - x[1] * x[1])
+    out[:] = rest * x[0] - w * x[1], w * x[0] + rest * x[1], x[0] ** 2 - x[2]
+
+
+def test_limit_cycle_in_closed_form():
+    start = (1.05, 0.0, 0.6)
+    scene = survey.orbit(
+        circle, states=("x", "y", "z"), period=None, parameters=("a", "w"),
+        start=lambda p: (*start, 2 * math.pi / p[1] * 1.02),
+    )  # fmt: skip
+    a, w = [-0.1, 0.3, 1.0], [0.7, 2.0]
+    ds = survey.evaluate(scene, a=a, w=w)
+    assert set(status(ds)) == {0}
+    for i, rate in enumerate(a):
+        for j, speed in enumerate(w):
+            at = ds.isel(a=i, w=j)
+            assert contained(at.period, [2 * mpmath.pi / mpmath.mpf(speed)], at.period_error)
+            normal = np.zeros(3)
+            circle(0.0, start, (rate, speed), normal)
+
+            def z(angle, v=speed):
+                return (1 + (mpmath.cos(2 * angle) + 2 * v * mpmath.sin(2 * angle)) / (1 + 4 * mpmath.mpf(v) ** 2)) / 2
+
+            def state(angle, z=z):
+                return mpmath.cos(angle), mpmath.sin(angle), z(angle)
+
+            def plane(angle, normal=normal, state=state):
+                return sum(c * (x - mpmath.mpf(s)) for c, x, s in zip(normal, state(angle), start, strict=True))
+
+            angle = mpmath.findroot(plane, mpmath.atan2(float(at.x0[1]), float(at.x0[0])))
+            # the normal's rounding moves the plane by less than the last digit
+            assert contained(at.x0, state(angle), at.x0_error, slack=3e-16)
+            T = 2 * mpmath.pi / speed
+            exact = sorted([mpmath.exp(-2 * rate * T), mpmath.exp(-T)], reverse=True)
+            assert contained(at.multiplier_re, exact, at.multiplier_re_error)
+            assert contained(at.multiplier_im, [0, 0], at.multiplier_im_error)
+            assert contained(at.exponent, [mpmath.log(exact[0]) / T], at.exponent_error)
+            assert int(at.verdict) == (rate > 0)
+    assert (ds.period_error < 1e-12).all()
+
+
+def test_the_zero_solution_of_a_linear_system():
+    """Its multipliers are those that `survey.floquet` gives."""
+
+    def K(t, p, out):
+        out[0, 0] = p[0] - 2 * p[1] * math.cos(2 * t)
+
+    def C(t, p, out):
+        out[0, 0] = 0.1
+
+    def f(t, x, p, out):
+        out[0], out[1] = x[1], -(p[0] - 2 * p[1] * math.cos(2 * t)) * x[0] - 0.1 * x[1]
+
+    axes = {"a": np.linspace(0.3, 5, 12), "q": np.linspace(0.1, 3, 9)}
+    names = ("a", "q")
+    linear = survey.evaluate(survey.floquet(K=K, C=C, period=math.pi, parameters=names, states="x"), **axes)
+    ours = survey.evaluate(
+        survey.orbit(f, states=("x", "v"), period=math.pi, parameters=names, start=(0.01, 0.02)), **axes
+    )
+    assert (ours.status == 0).all() and (ours.verdict == linear.verdict).all()
+    off = abs(ours.multiplier_re - linear.multiplier_re)
+    assert (off <= ours.multiplier_re_error + linear.multiplier_re_error).all()
+
+
+def test_no_orbit():
+    def drifts(t, x, p, out):
+        out[0] = 1.0 + 0 * p[0] * x[0] + 0.5 * math.cos(t)
+
+    def spirals(t, x, p, out):
+        out[0], out[1] = x[1], -x[0] - p[0] * x[1]
+
+    def explodes(t, x, p, out):
+        out[0] = 1.0 + p[0] * x[0] * x[0]
+
+    scenes = [
+        survey.orbit(drifts, states="x", period=2 * math.pi, parameters="a", start=0.0),
+        survey.orbit(spirals, states=("x", "v"), period=None, parameters="a", start=(1.0, 0.0, 6.0)),
+        survey.orbit(explodes, states="x", period=10.0, parameters="a", start=0.0),
+    ]
+    for scene in scenes:
+        ds = survey.evaluate(scene, a=[0.3, 0.7])
+        assert status(ds) == [16, 16]
+        assert np.isnan(ds.x0).all() and (ds.verdict == -1).all()
+    # the orbits of a centre are a family: none of them is alone
+    assert status(survey.evaluate(scenes[1], a=0.0)) == [16]
+
+
+def test_invalid_points():
+    scene = van_der_pol(start=lambda p: (2.0, 0.0, 6.5 if p[0] > 0 else -1.0))
+    ds = survey.evaluate(scene, mu=[-1.0, 1.0, np.inf][:2])
+    assert status(ds) == [1, 0]
+
+
+def test_bits_do_not_depend_on_the_block():
+    mu = np.linspace(0.2, 1.4, 41)
+    whole = survey.evaluate(van_der_pol(), mu=mu)
+    for i in (0, 17, 40):
+        one = survey.evaluate(van_der_pol(), mu=mu[i])
+        for name in whole.data_vars:
+            assert np.array_equal(whole[name].isel(mu=i).values, one[name].values, equal_nan=True)
+
+
+def test_the_jacobian_of_every_operation():
+    def f(t, x, p, out):
+        a, b = x
+        out[0] = math.sin(a * b) * math.exp(-a) + math.tan(0.2 * b) / (1 + a**2) + math.erf(a) * np.sqrt(2 + b) + b**-3
+        out[1] = (
+            math.log(2 + a * a + b * b) + math.atan(a / b) * math.tanh(a - b) + (1.5 + a) ** p[0] + math.cosh(a) * t
+            + math.asinh(a * b) + math.acos(0.1 * a) * np.arcsin(0.2 * b) + math.atanh(0.1 * b) + math.acosh(2 + a * a)
+        )  # fmt: skip
+
+    p, x, t = np.array([[1.7]]), np.array([[0.6, 0.9]]), np.array([0.8])
+    [(_own, programs)] = Equation(f, 2, 1.0, (0.6, 0.9)).traced(p, x)
+    A = programs.along(programs.A, programs.numbers(p), t[:, None], x[:, :, None], np.zeros((1, 2, 1)))[0][0, 0]
+
+    def value(point):
+        out = np.zeros(2)
+        f(t[0], point, p[0], out)
+        return out
+
+    for k in range(2):
+        h = 1e-4 * np.eye(2)[k]
+        slope = (8 * (value(x[0] + h) - value(x[0] - h)) - (value(x[0] + 2 * h) - value(x[0] - 2 * h))) / 12e-4
+        assert np.allclose(A[:, k], slope, rtol=0, atol=1e-10)
+    f_of = programs.slopes(programs.numbers(p), t, x)
+    assert (abs(f_of[0][0] - value(x[0])) <= f_of[1][0] + 4e-16).all()
+
+
+def good(t, x, p, out):
+    out[0], out[1] = x[1], -x[0] - p[0] * x[1] + math.cos(t)
+
+
+def branches(t, x, p, out):
+    out[0], out[1] = x[1], -abs(x[0])
+
+
+def short(t, x, p, out):
+    out[2] = 1.0
+
+
+def fails(t, x, p, out):
+    raise KeyError("k")
+
+
+def skewed(t, x, p, out):
+    out[0, 1], out[1, 0] = 1.0, 1.0
+
+
+@pytest.mark.parametrize(
+    "changes, words",
+    [
+        ({"f": lambda t, x, p: 0}, "four arguments"),
+        ({"f": branches}, "a branch depends on t or on a state"),
+        ({"f": short}, "indexes beyond an array"),
+        ({"f": fails}, "fails \\(KeyError"),
+        ({"f": lambda t, x, p, out: [x[0]]}, "shape \\(1,\\)"),
+        ({"period": -1.0}, "PERIOD = -1.0"),
+        ({"period": 3.0}, "differs from f\\(t\\)"),
+        ({"period": None, "start": (1.0, 0.0, 6.0)}, "f\\(t, x, p, out\\) depends on t"),
+        ({"period": None}, "START must be 3 numbers"),
+        ({"start": (1.0,)}, "START must be 2 numbers"),
+        ({"start": lambda p: (1.0, 0.0, 2.0)}, "START\\(p\\) returns \\(3,\\) numbers, not 2"),
+        ({"start": lambda p: 1 / 0}, "START\\(p\\) fails \\(ZeroDivisionError"),
+        ({"states": ("x", "x")}, "STATES"),
+        ({"parameters": "x0"}, "PARAMETERS"),
+        ({"jacobian": skewed}, "is not df/dx"),
+    ],
+)
+def test_bad_input(changes, words):
+    given = {"f": good, "states": ("x", "v"), "period": 2 * math.pi, "parameters": "c", "start": (1.0, 0.0)} | changes
+    f = given.pop("f")
+    with pytest.raises(survey.BadInput, match=words) as caught:
+        survey.evaluate(survey.orbit(f, **given), **{given["parameters"]: 0.3})
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_and_a_run(tmp_path):
+    file = tmp_path / "duffing.py"
+    file.write_text(
+        '"""Duffing\'s oscillator."""\nfrom math import cos, pi\nSTATES = ("x", "v")\nPARAMETERS = ("F", "w")\n'
+        "def PERIOD(p):\n    return 2 * pi / p[1]\ndef START(p):\n    return 1.0, 0.0\n"
+        "def f(t, x, p, out):\n    out[0] = x[1]\n"
+        "    out[1] = -0.25 * x[1] + x[0] - x[0] ** 3 + p[0] * cos(p[1] * t)\n"
+    )
+    workflow = {
+        "scene": str(file),
+        "axes": {"F": {"start": 0.05, "stop": 0.2, "num": 4}, "w": {"start": 1.2, "stop": 1.4, "num": 3}},
+        "output": {"path": str(tmp_path / "duffing.nc")},
+    }
+    ds = survey.run(workflow)
+    assert (ds.status == 0).all()
+    assert ds.state.values.tolist() == ["x", "v"]
+    assert "certainly" in ds.survey.point(F=0.1, w=1.3).why
