@@ -46,7 +46,7 @@ RADII = (1.1, 2.1)  # of the ball, relative to |B G|: the first that serves
 WIDEST = 1e-3  # of the tube, relative to the largest state
 CHUNK = 2048  # points that are solved together
 CALL = 200_000  # numbers of a series that are recorded together
-MOST_STEPS = 20_000
+MOST_STEPS, MOST_RELAXED = 2_000, 10_000  # of an orbit, of the long time before it
 TRIALS, LEAST_DAMPING = 40, 1e-4  # of Newton's method
 CONVERGED = 1e-8  # relative: the last step, whose square is beyond float64
 FARTHEST = 0.2  # a step of it, relative to the orbit and the period
@@ -164,7 +164,7 @@ class Programs:
         errors[:, self.places] = 0.0
         return values, errors
 
-    def flow(self, numbers, x0, span, reach, derived=True, first=None):
+    def flow(self, numbers, x0, span, reach, derived=True, first=None, most=MOST_STEPS):
         """States at `span`, dX/dx0, largest states and numbers of steps; if `first` is given, steps and series."""
         N, n = x0.shape
         X, M, size, steps = np.full((N, n), np.nan), np.zeros((N * derived, n, n)), np.empty((N, n)), np.zeros(N, int)
@@ -173,7 +173,7 @@ class Programs:
         A = self.A
         flow(
             A.operations, A.signs, A.inside, A.order, A.used, A.terms, np.ascontiguousarray(numbers[0]), self.places,
-            np.ascontiguousarray(x0), np.ascontiguousarray(span), reach, MOST_STEPS,
+            np.ascontiguousarray(x0), np.ascontiguousarray(span), reach, most,
             np.zeros(0, int) if first is None else first, X, M, size, steps, *recorded,
         )  # fmt: skip
         return (X, M, size, steps) if first is None else (X, *recorded)
@@ -248,7 +248,8 @@ class Newton:
     def again(self, those):
         """As `solve`, for some points, from the state after a long time."""
         numbers, free = _of(self.numbers, those), self.phase is not None
-        x = self.programs.flow(numbers, self.guess[those], RELAXED * self.period[those], self.reach, derived=False)[0]
+        span = RELAXED * self.period[those]
+        x = self.programs.flow(numbers, self.guess[those], span, self.reach, derived=False, most=MOST_RELAXED)[0]
         T = self.period[those].copy()
         there = np.flatnonzero(np.isfinite(x).all(axis=1))
         if free and there.size:
