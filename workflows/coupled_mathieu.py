@@ -4,9 +4,10 @@ $$\ddot x + \omega_1^2 x + \epsilon\, y \cos\Omega t = 0, \qquad
 \ddot y + \omega_2^2 y + \epsilon\, x \cos\Omega t = 0,$$
 
 $\omega_1 = 1$, $\omega_2 = 0.62$. The coupling is symmetric, so that the system is Hamiltonian in (x, y, x', y'), and
-stability is lost only where multipliers of opposite Krein sign meet: next to the sums
-$\Omega = (\omega_1 + \omega_2) / k$, not next to the differences. The first tongue begins with the half width
-$\epsilon / (2 \sqrt{\omega_1 \omega_2})$ in $\Omega$ (Yakubovich and Starzhinskii, VI).
+stability is lost only where multipliers of opposite Krein sign meet: next to sums of two frequencies,
+$\omega_i + \omega_j = k\,\Omega$, never next to their difference. The tongue at $\Omega = \omega_1 + \omega_2$ begins
+with the half width $\epsilon / (2 \sqrt{\omega_1 \omega_2})$ (Yakubovich and Starzhinskii, VI); those of
+$2 \omega_i$ open at $k = 2$ and are of second order, for the coupling is of the two.
 """
 
 from math import cos, pi
