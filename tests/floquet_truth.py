@@ -62,7 +62,7 @@ def hard(n, number, seed):
         if kind == 2:
             edge = np.linalg.eigvals(block).real.max()
             block -= (edge + rng.choice([-1, 1]) * 10.0 ** rng.uniform(-12, -5)) * np.eye(n)
-        if kind == 3:
+        if kind == 3 and n > 1:
             block = np.diag(np.full(n, block[0, 0]))
             block[0, 1] = 1.0
         basis = np.linalg.qr(rng.normal(size=(n, n)))[0]
