@@ -47,7 +47,7 @@ def _plain(app, what, name, thing, options, lines):
     out, section = [], ""
     for line in lines:
         line = re.sub(r"(`[^`]+`)(?=\w)", r"\1\\ ", line.replace("|", r"\|"))
-        entry = re.match(r"(\*{0,2}\w+) : (.*)", line)
+        entry = re.match(r"(\*{0,2}\w+(?:, \w+)*) : (.*)", line)
         if re.fullmatch("-{3,}", line):
             section = out.pop()
             out += [f"**{section}**", ""]
