@@ -19,6 +19,7 @@ from survey.file.labels import count, counts, describe, flag_codes, layout, perc
 from survey.grid import Grid, lines
 from survey.request import trust, user_scene
 from survey.request.checks import check_options, check_parameters, check_request, methods_of
+from survey.request.function_scene import FunctionScene
 from survey.request.hill_scene import is_number
 from survey.request.workflow import check, read
 from survey.scene import Option, Output, Parameter, Request, condition, exists
@@ -88,7 +89,7 @@ def draw(ds: xr.Dataset, workflow: Any) -> list[Path]:
 
 
 def evaluate(
-    scene: str | os.PathLike[str] | user_scene.OwnScene,
+    scene: str | os.PathLike[str] | FunctionScene,
     *,
     method: str = "auto",
     rtol: float = 1e-10,

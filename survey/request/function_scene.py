@@ -1,5 +1,6 @@
 """What the scenes of a user's functions share: how they travel to other processes, and how they refuse."""
 
+from collections.abc import Callable
 from dataclasses import fields
 
 from survey.errors import BadInput
@@ -9,6 +10,12 @@ _known = {}  # by hash: a worker process compiles a scene once, for all of its b
 
 class FunctionScene:
     """Base of `HillScene`, `AbelScene`, `FloquetScene` and `OrbitScene`; `own`: parameters of the functions."""
+
+    NAME: str
+    HASH: str
+    about: str
+    own: tuple
+    check: Callable[..., None]  # refuses functions that are wrong at these points
 
     def __post_init__(self):
         object.__setattr__(self, "__doc__", self.about)

@@ -62,6 +62,8 @@ mirrored. Where z cannot be run like this, the attribute `z_more_digits` of the 
 stays.
 """
 
+from __future__ import annotations
+
 import hashlib
 import inspect
 import os
@@ -71,24 +73,25 @@ from functools import lru_cache
 from itertools import product
 from pathlib import Path
 from types import CodeType, ModuleType
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 import numpy.typing as npt
 
 from survey.errors import BadInput, Untrusted
-from survey.measures.floquet import orbit as orbits
-from survey.measures.floquet import stability
 from survey.measures.hill import monodromy
 from survey.request import trust
-from survey.request.abel_scene import AbelScene
-from survey.request.floquet_scene import LARGEST, FloquetScene
+from survey.request.function_scene import FunctionScene
 from survey.request.hill_scene import SAME, HillScene, is_number, reason
-from survey.request.orbit_scene import LARGEST as MOST_STATES
-from survey.request.orbit_scene import OrbitScene
 from survey.scene import Parameter
-from survey.scenes import gyrostat, load
+from survey.scenes import load
 from survey.wording import reason_of, short, shown
+
+# The other scenes, and the measures behind them, are imported when one is made: most runs need none.
+if TYPE_CHECKING:
+    from survey.request.abel_scene import AbelScene
+    from survey.request.floquet_scene import FloquetScene
+    from survey.request.orbit_scene import OrbitScene
 
 EXAMPLES = {
     "f": "def f(phi, p): return -p[0]",
@@ -112,8 +115,6 @@ ORBIT_REFERENCES = (
     "W. Tucker, Validated Numerics, Princeton 2011",
     "A. Jorba, M. Zou, Experimental Mathematics 14 (2005) 99",
 )
-OWN = (HillScene, AbelScene, FloquetScene, OrbitScene)
-OwnScene = HillScene | AbelScene | FloquetScene | OrbitScene
 
 
 def hill(
@@ -306,7 +307,7 @@ def orbit(
 
 def find(scene: Any, near: str | Path | None = None) -> tuple[str, Any]:
     """(name, scene) for a scene's name, a file `*.py` (relative to this folder, or else `near`), or an own scene."""
-    if isinstance(scene, OWN):
+    if isinstance(scene, FunctionScene):
         return scene.NAME, scene
     if callable(scene):
         raise BadInput(
@@ -322,7 +323,7 @@ def find(scene: Any, near: str | Path | None = None) -> tuple[str, Any]:
 
 def check(scene: Any, grid: Any = None) -> None:
     """Raise BadInput if `scene` is a user's and is wrong at the ends and middles of the grid's axes."""
-    if not isinstance(scene, OWN):
+    if not isinstance(scene, FunctionScene):
         return
     along = [sorted({0, size // 2, size - 1}) for size in grid.sizes.values()] if grid else []
     points = [grid.point(tuple(slice(i, i + 1) for i in index)) for index in product(*along)] if grid else []
@@ -354,7 +355,7 @@ def of_dataset(ds: Any) -> Any:
     )
 
 
-def _from_file(name: str, digest: Any, near: Path) -> OwnScene:
+def _from_file(name: str, digest: Any, near: Path) -> FunctionScene:
     """The scene in the file that a dataset names; none of it runs before its hash is compared and trusted."""
     try:
         path, text = _read(name, near)
@@ -394,7 +395,7 @@ def _read(name: str | os.PathLike[str], near: str | Path | None) -> tuple[Path, 
 
 
 @lru_cache(maxsize=32)
-def _from_text(name: str, text: str) -> OwnScene:
+def _from_text(name: str, text: str) -> FunctionScene:
     """The scene in the text of a file."""
     module = ModuleType(Path(name).stem)
     module.__file__ = name
@@ -463,6 +464,8 @@ def _abel(
     name: str, text: str, title: str | None, about: str | None, references: Iterable[str],
 ) -> AbelScene:  # fmt: skip
     """The checked scene; raises BadInput."""
+    from survey.request.abel_scene import AbelScene
+    from survey.scenes import gyrostat
 
     def refuse(message: str) -> NoReturn:
         raise BadInput(f"{name}: {message}")
@@ -490,6 +493,8 @@ def _floquet(
     name: str, text: str, title: str | None, about: str | None, references: Iterable[str],
 ) -> FloquetScene:  # fmt: skip
     """The checked scene; raises BadInput."""
+    from survey.measures.floquet import stability
+    from survey.request.floquet_scene import LARGEST, FloquetScene
 
     def refuse(message: str) -> NoReturn:
         raise BadInput(f"{name}: {message}")
@@ -528,6 +533,8 @@ def _orbit(
     name: str, text: str, title: str | None, about: str | None, references: Iterable[str],
 ) -> OrbitScene:  # fmt: skip
     """The checked scene; raises BadInput."""
+    from survey.measures.floquet import orbit
+    from survey.request.orbit_scene import LARGEST, OrbitScene
 
     def refuse(message: str) -> NoReturn:
         raise BadInput(f"{name}: {message}")
@@ -536,10 +543,10 @@ def _orbit(
         if not callable(function) or _arguments(function) != 4:
             if function is not None or letter == "f":
                 refuse(f"{letter} must be a function of four arguments, {letter}(t, x, p, out), that fills out")
-    parameters = _parameters(parameters, orbits.OUTPUTS, ("state", "multiplier", "row", "column"), refuse)
+    parameters = _parameters(parameters, orbit.OUTPUTS, ("state", "multiplier", "row", "column"), refuse)
     names = _state_names(states, refuse)
-    if len(names) > MOST_STATES:
-        refuse(f"STATES names {len(names)} states; at most {MOST_STATES} are allowed")
+    if len(names) > LARGEST:
+        refuse(f"STATES names {len(names)} states; at most {LARGEST} are allowed")
     if period is None and len(names) < 2:
         refuse("STATES names one state: without a PERIOD, orbits need two")
     if period is not None and not callable(period) and not (is_number(period) and 0 < period < np.inf):

@@ -17,6 +17,7 @@ from survey.request import user_scene
 from survey.request.axes import as_float, check_domain, check_size, grid_of, values_of
 from survey.request.checks import check_options, check_parameters, check_request, unknown_parameter
 from survey.request.edges_and_cells import check_boundaries, check_refine
+from survey.request.function_scene import FunctionScene
 from survey.request.hill_scene import is_number
 from survey.request.output_path import check_path
 from survey.request.schema import File, complaint
@@ -88,7 +89,7 @@ def check(data, text="", output=None, default_path="survey.nc", near=None):
     if not isinstance(data, Mapping):
         raise BadInput(f"{shown(data)} is neither the path of a workflow file nor a mapping with its tables")
     given_scene = data.get("scene")
-    if isinstance(given_scene, user_scene.OWN):
+    if isinstance(given_scene, FunctionScene):
         data = {**data, "scene": given_scene.NAME}
     try:
         file = File.model_validate(data)
