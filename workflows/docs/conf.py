@@ -1,8 +1,6 @@
 """Sphinx's configuration; `build.py` beside this file assembles the pages and calls it. No network is needed."""
 
 import re
-import sys
-from pathlib import Path
 
 import numpy.typing as npt
 from sphinx.util.typing import stringify_annotation
@@ -11,9 +9,9 @@ import survey.api  # so that the API pages show what users call  # noqa: F401
 
 project = "survey"
 author = "the survey founders"
-sys.path.insert(0, str(Path(__file__).parent))
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx_click", "formulas"]
-html_math_renderer = "drawn"
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx_click"]
+mathjax_path = "mathjax/tex-svg.js"  # one file, without a network: see static/mathjax
+mathjax3_config = {"svg": {"fontCache": "none"}, "options": {"enableMenu": False}}
 html_theme = "furo"
 html_title = "survey"
 html_static_path = ["static"]
