@@ -3,6 +3,7 @@
 import re
 
 import numpy.typing as npt
+from docutils import nodes
 from sphinx.util.typing import stringify_annotation
 
 import survey.api  # so that the API pages show what users call  # noqa: F401
@@ -33,8 +34,16 @@ ARRAY_LIKE = stringify_annotation(npt.ArrayLike, "smart")
 
 
 def setup(app):
+    app.connect("doctree-read", _as_written)
     app.connect("autodoc-process-docstring", _plain)
     app.connect("autodoc-process-signature", _short)
+
+
+def _as_written(app, doctree):
+    r"""Displayed formulas go to MathJax as they are: Sphinx would put those of several lines into `split`, without \tag."""
+    for node in doctree.findall(nodes.math_block):
+        node["no-wrap"] = node["nowrap"] = True  # the second until Sphinx 8.2
+        node[:] = [nodes.Text(rf"\[{node.astext()}\]")]
 
 
 def _plain(app, what, name, thing, options, lines):
