@@ -40,7 +40,7 @@ def setup(app):
 
 
 def _as_written(app, doctree):
-    r"""Displayed formulas go to MathJax as they are: Sphinx would put those of several lines into `split`, without \tag."""
+    r"""Displayed formulas go to MathJax as they are: Sphinx would put several lines into `split`, which has no \tag."""
     for node in doctree.findall(nodes.math_block):
         node["no-wrap"] = node["nowrap"] = True  # the second until Sphinx 8.2
         node[:] = [nodes.Text(rf"\[{node.astext()}\]")]
