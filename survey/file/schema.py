@@ -140,6 +140,8 @@ def _check_variable(ds, name, variable):
     bar = ds.variables.get(f"{name}_error")
     if bar is not None and (bar.dims != variable.dims or bar.dtype.kind != "f"):
         raise Damaged(f"{name}_error must hold an error bar for each value of {name}")
+    if bar is not None and variable.dtype.kind != "f":
+        raise Damaged(f"{name} has error bars, but does not hold floating-point numbers")
 
 
 def _flags_of(name, attributes):
