@@ -73,7 +73,7 @@ class HillScene(FunctionScene):
     def NOTES(self):
         """How z is known, as global attributes of a file."""
         checked = f"every T/{self._divisor * user_equation.CHECKED} at the ends and middles of the axes"
-        unseen = f"z is known by {self._sampling}, and {checked}; a spike narrower than that may go unseen"
+        unseen = f"z is known by {self._sampling}, and {checked}; a spike narrower at half its height may go unseen"
         obstacle = self._obstacle
         digits = f"none: {obstacle}" if obstacle else "double-double, where float64 cannot decide a verdict"
         return {
