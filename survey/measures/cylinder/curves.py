@@ -13,6 +13,7 @@ CLASSES = {
     "stable_manifold": 0, "unstable_cycle": 1, "stable_cycle": 2, "saddle": 3, "sink": 4, "centre": 5, "source": 6,
     "fold": 7, "cusp": 8, "supercritical_hopf": 9, "subcritical_hopf": 10, "bogdanov_takens": 11,
     "generalised_hopf": 12, "ends": 13, "homoclinic": 14, "heteroclinic": 15,
+    "cycle_fold": 16,
 }  # fmt: skip
 TITLE = "what the curve is"
 _COUNTED = "to some points of each curve on a map of two parameters, where the return maps are conclusive"
@@ -21,7 +22,10 @@ ALONG = (
     Output("equilibrium_phi", "angle of the equilibrium, or of the saddle of a stable manifold", r"\varphi_e",
            units="rad",
            applies="to stable manifolds, equilibria and their bifurcations"),
-    Output("multiplier", "Floquet multiplier of the cycle", "m", applies="to cycles"),
+    Output("multiplier", "Floquet multiplier of the cycle", "m", applies="to cycles, and at folds of cycles"),
+    Output("cycle_phi", "angle of a state on the semi-stable cycle: phi = 0, or the right turning point of a libration",
+           r"\varphi_c", units="rad", applies="at folds of cycles"),
+    Output("cycle_w", "velocity of a state on the semi-stable cycle", "w_c", applies="at folds of cycles"),
     Output("cycles_left", "number of cycles beside the curve, to the left of the order of its points (the first axis "
            "pointing to the right, the second upward)", applies=_COUNTED),
     Output("cycles_right", "number of cycles beside the curve, to the right of the order of its points",
@@ -49,4 +53,4 @@ def closed(square, axes, fixed, options):
 
 def seconds(axes):
     """Estimated seconds on one thread of the curves on one map, measured."""
-    return 0.1 if set(axes[:2]) == set(STATE) else 5.0
+    return 0.1 if set(axes[:2]) == set(STATE) else 10.0
