@@ -143,7 +143,8 @@ class Follower:
     def _border(self, u, beyond):
         """The row of the point on the map's border between u, inside, and the point beyond."""
         low, high = u[1:], beyond[1:]
-        share = np.where(high > 1.0, (1.0 - low) / (high - low + TINY), np.where(high < 0.0, low / (low - high), 1.0))
+        run = np.where(high == low, 1.0, high - low)
+        share = np.where(high > 1.0, (1.0 - low) / run, np.where(high < 0.0, -low / run, 1.0))
         axis = int(np.argmin(share))
         at, end = u + share[axis] * (beyond - u), float(high[axis] > 1.0)
         for _ in range(8):

@@ -4,7 +4,9 @@ On a map of initial states they part the fates: see `separatrices`. On a map of 
 see `bifurcations`.
 """
 
-from survey.measures.cylinder import bifurcations, separatrices
+import numpy as np
+
+from survey.measures.cylinder import bifurcations, own_bifurcations, separatrices
 from survey.measures.cylinder.separatrices import SYSTEM
 from survey.measures.sampled import joined
 from survey.scene import Output
@@ -33,8 +35,10 @@ ALONG = (
 )  # fmt: skip
 
 
-def refusal(axes):
+def refusal(axes, scene):
     """Why there are no curves on a map of these axes, in words; None if there are."""
+    if scene.FAMILY == "abel":
+        return _refusal_of_own(axes, scene)
     own = set(axes[:2])
     if len(axes) in (2, 3) and (own == set(STATE) or own <= set(SYSTEM)) and set(axes[2:]) <= set(SYSTEM):
         return None
@@ -42,6 +46,26 @@ def refusal(axes):
         f"curves are known on two axes of {', '.join(SYSTEM)}, or on {', '.join(STATE)}, in either case with at most "
         f"one more axis of the former after them, not on {', '.join(axes) or 'none'}"
     )
+
+
+def _refusal_of_own(axes, scene):
+    """As `refusal`, for a user's f and g."""
+    own = [p.name for p in scene.own]
+    if scene.period is None:
+        return "no curves are known: they are where f and g have the period 2 pi (PERIOD)"
+    if len(axes) in (2, 3) and set(axes) <= set(own):
+        return None
+    return f"curves are known on two axes of {', '.join(own)}, or three, not on {', '.join(axes) or 'none'}"
+
+
+def searched(scene, square, axes, fixed):
+    """The Curves on the map of `axes`, the unit square `square`; `fixed` holds the other parameters."""
+    if scene.FAMILY == "cylinder":
+        return closed(square, axes, fixed, {})
+    plane = own_bifurcations.Plane(square, tuple(axes), fixed, scene)
+    with np.errstate(all="ignore"):
+        rows = [bifurcations.counted(plane, *row) for row in own_bifurcations.found(plane)]
+    return joined([(CLASSES[kind], *rest) for kind, *rest in rows], [output.name for output in ALONG])
 
 
 def closed(square, axes, fixed, options):
