@@ -76,9 +76,11 @@ class FloquetScene(TracedScene):
     def solve(self, point, request):
         """The requested outputs of a block (see `survey.scenes`)."""
         points, shape = self._points(point)
+        points = points.reshape(*shape, -1)
         wanted = set(request.variables) or {o.name for o in self.OUTPUTS}
-        out = self._called(stability.solve, self._system, self.structure, points, request.method, request.rtol, wanted)
-        return {name: values.reshape(*shape, *values.shape[1:]) for name, values in out.items()}
+        lines = {k: request.line(p.name) for k, p in enumerate(self.PARAMETERS) if request.line(p.name)}
+        given = (points, request.method, request.rtol, wanted, lines)
+        return self._called(stability.solve, self._system, self.structure, *given)
 
     def why(self, answer):
         """Why a point has its verdict (see `survey.scenes`)."""

@@ -60,6 +60,24 @@ class System:
         edges = np.array([[*row, *[row[-1]] * (most - len(row))] for row in rows]).reshape(len(rows), most)
         return np.broadcast_to(period, len(points)).copy(), np.broadcast_to(edges, (len(points), most)).copy()
 
+    def periods(self, points):
+        """The period of each point (N); NaN where it is not positive."""
+        if not callable(self.period):
+            return np.full(len(points), self._number("PERIOD", self.period, None))
+        period = np.array([self._number("PERIOD", self.period, p) for p in points])
+        return np.where(period > 0, period, np.nan)
+
+    def smooth(self, point):
+        """Are PERIOD and BREAKS analytic in the parameters, as no branch of theirs depends on these?"""
+        graph = Graph([float(x) for x in point], 0.25)
+        try:
+            for value in (self.period, self.breaks):
+                if callable(value):
+                    trace.lifted(value)(graph.parameters)
+        except Exception:
+            return False
+        return not graph.guards and not graph.equalities
+
     def _value(self, name, value, p):
         try:
             return value(p) if callable(value) else value
