@@ -44,6 +44,7 @@ def answer(
     gap, parts = np.empty((d, LANES)), np.empty((6, LANES))
     rho, lane_z, lane_gap = np.empty(d), np.empty((d, 2)), np.empty(d)
     re, im, bar, sign = np.empty(n), np.empty(n), np.empty(n), np.zeros(n, np.int8)
+    angle, order = np.empty(n), np.empty(n, np.int64)
     form = np.empty((2, d))
     L = places.shape[1]
     for r in range(R):
@@ -88,8 +89,13 @@ def answer(
                         if abs(im[i]) <= bar[i]:
                             im[i] = 0.0  # its mirror image would be in the same disc
                     decided = UNDECIDED
-                _write(re, im, bar, sign, decided, paired, open_signs, K > d, asked, rtol, p, floats, signs, verdict,
-                       crossing, missed)  # fmt: skip
+                _write(re, im, bar, sign, decided, paired, asked, rtol, p, floats, verdict, missed)
+                if not missed[p] and (asked[MULTIPLIERS] or asked[CROSSING] or asked[KREIN]):
+                    _sort(re, im, bar, sign, floats[4 * n, p], p, floats, signs, angle, order)
+                    crossing[p] = _crossing(re, im, bar, angle, sign, verdict[p], paired, K > d)
+                    missed[p] = (asked[CROSSING] and crossing[p] == UNDECIDED) or (
+                        open_signs and (asked[KREIN] or asked[CROSSING])
+                    )
 
 
 @kernel
@@ -235,28 +241,36 @@ def _slope(form, d):
 
 
 @kernel
-def _write(
-    re, im, bar, sign, decided, paired, open_signs, of_signs, asked, rtol, p, floats, signs, verdict, crossing, missed
-):
-    """Sort the multipliers and write the answer of the point p."""
-    n = len(re)
-    most, top, least = 0.0, 0.0, 0.0
-    size, angle, order = np.empty(n), np.empty(n), np.arange(n)
+def _write(re, im, bar, sign, decided, paired, asked, rtol, p, floats, verdict, missed):
+    """Write the spectral radius and the verdict of the point p, and whether it has missed what is asked."""
+    n, value, top, least, wide = len(re), 0.0, 0.0, 0.0, False
     for i in range(n):
-        size[i], angle[i] = math.hypot(re[i], im[i]), math.atan2(im[i], re[i])
-        most = max(most, size[i])
-        top, least = max(top, size[i] + bar[i]), max(least, size[i] - bar[i])
+        size = math.sqrt(re[i] * re[i] + im[i] * im[i])
+        value, top, least = max(value, size), max(top, size + bar[i]), max(least, size - bar[i])
+        wide = wide or not bar[i] <= rtol * (1.0 + size)
+    top, least = top * (1.0 + 4.0 * EPS), least * (1.0 - 4.0 * EPS)
     if paired and decided == STABLE:
         value = top = least = 1.0
-    else:
-        value = most
-        top, least = top * (1.0 + 4.0 * EPS), least * (1.0 - 4.0 * EPS)
-    if not paired:
+    elif not paired:
         decided = STABLE if top < 1.0 else UNSTABLE if least > 1.0 else UNDECIDED
-    unit = TIE * (1.0 + most)
+    off = max(top - value, value - least)
+    floats[4 * n, p], floats[4 * n + 1, p], verdict[p] = value, off, decided
+    missed[p] = (
+        (asked[VERDICT] and decided == UNDECIDED)
+        or (wide and (asked[MULTIPLIERS] or asked[KREIN]))
+        or (asked[RADIUS] and not off <= rtol * (1.0 + value))
+    )
+
+
+@kernel
+def _sort(re, im, bar, sign, most, p, floats, signs, angle, order):
+    """Write the multipliers of the point p in order, and fill `angle` with their arguments."""
+    n, unit = len(re), TIE * (1.0 + most)
+    for i in range(n):
+        angle[i], order[i] = math.atan2(im[i], re[i]), i
     for i in range(1, n):
         own, k = order[i], i
-        while k > 0 and _before(own, order[k - 1], size, angle, unit):
+        while k > 0 and _before(own, order[k - 1], re, im, angle, unit):
             order[k] = order[k - 1]
             k -= 1
         order[k] = own
@@ -264,29 +278,19 @@ def _write(
         k = order[i]
         floats[i, p], floats[n + i, p], floats[2 * n + i, p] = re[k], im[k], bar[k]
         floats[3 * n + i, p] = bar[k] if im[k] != 0.0 else 0.0
-        signs[i, p] = sign[k] if paired else 0
-    floats[4 * n, p], floats[4 * n + 1, p] = value, max(top - value, value - least)
-    verdict[p] = decided
-    crossing[p] = _crossing(re, im, bar, size, angle, sign, decided, paired, of_signs)
-    bad = asked[VERDICT] and decided == UNDECIDED
-    bad = bad or ((asked[KREIN] or asked[CROSSING]) and open_signs)
-    if asked[MULTIPLIERS] or asked[CROSSING] or asked[KREIN]:
-        for i in range(n):
-            bad = bad or not bar[i] <= rtol * (1.0 + size[i])
-    if asked[RADIUS]:
-        bad = bad or not floats[4 * n + 1, p] <= rtol * (1.0 + value)
-    missed[p] = bad
+        signs[i, p] = sign[k]
 
 
 @kernel
-def _before(i, j, size, angle, unit):
+def _before(i, j, re, im, angle, unit):
     """Does the multiplier i come before j: by descending modulus, then angle?"""
-    one, two = round(size[i] / unit), round(size[j] / unit)
+    one = round(math.sqrt(re[i] * re[i] + im[i] * im[i]) / unit)
+    two = round(math.sqrt(re[j] * re[j] + im[j] * im[j]) / unit)
     return one > two or (one == two and angle[i] < angle[j])
 
 
 @kernel
-def _crossing(re, im, bar, size, angle, sign, decided, paired, of_signs):
+def _crossing(re, im, bar, angle, sign, decided, paired, of_signs):
     """See `measures.floquet.multipliers.crossing`."""
     n, lead = len(re), 0
     if paired and decided == STABLE:
@@ -306,12 +310,13 @@ def _crossing(re, im, bar, size, angle, sign, decided, paired, of_signs):
             return MINUS_ONE
         return COLLISION if between + doubt < min(to_plus, to_minus) else UNDECIDED
     for i in range(n):
-        if size[i] > size[lead]:
+        if math.hypot(re[i], im[i]) > math.hypot(re[lead], im[lead]):
             lead = i
+    least = math.hypot(re[lead], im[lead]) - bar[lead]
     for i in range(n):
         if i == lead or math.hypot(re[i] - re[lead], im[i] + im[lead]) <= bar[i] + bar[lead]:
             continue
-        if size[i] + bar[i] >= size[lead] - bar[lead]:
+        if math.hypot(re[i], im[i]) + bar[i] >= least:
             return UNDECIDED
     if abs(im[lead]) > bar[lead]:
         return COLLISION if paired else NEIMARK_SACKER
