@@ -29,8 +29,9 @@ from dataclasses import dataclass, field, fields, replace
 import numpy as np
 
 from survey import status
+from survey.kernels.floquet.discs import couplings
 from survey.kernels.floquet.flow import ORDER, flow, spread
-from survey.kernels.floquet.steps import products
+from survey.kernels.floquet.steps import carried, products
 from survey.kernels.math.roundoff import EPS, ROUNDOFF_UP
 from survey.measures.floquet import monodromy, stability, trace
 from survey.measures.floquet.system import KEPT, Raised
@@ -378,8 +379,7 @@ class Shown:
     dT: np.ndarray
     M: np.ndarray
     dM: np.ndarray
-    others: np.ndarray
-    d_others: np.ndarray
+    others: monodromy.Matrices
 
     def improve(self, other):
         """Take those over that only `other` shows."""
@@ -495,7 +495,8 @@ class Path:
         first_order = (wide * radius[point, None] + off).max(axis=1)
         stays = (second <= (WIDER - 1.0) * first_order) & (tube <= self.enough[point])
         stays = np.logical_and.reduceat(stays, self.first[:-1])
-        products(self.F, error, doubt, self.first, n, M, E, np.empty_like(E))
+        R = np.empty_like(E)
+        products(self.F, error, doubt, self.first, n, M, E, R)
         shift = dT if plane is None else dT + radius * unit
         E = E + (WIDER * shift * a_end)[:, None, None] * (abs(M) + E).max(axis=1, keepdims=True)
         bounds = E
@@ -510,14 +511,50 @@ class Path:
         shown = stays & (q < 1) & (near <= (1 - q) * radius) & np.isfinite(E).all(axis=(1, 2))
         final = np.minimum(near / (1 - q), radius) * (1 + 8 * EPS)
         dx = final[:, None] * s
-        others, d_others = M, E
+        f = df = None
         if plane is not None:
             dT = final * unit * (1 + 4 * EPS) + EPS * T
             f, df = self.programs.slopes(self.own, np.zeros(N), x, dx)
-            df = WIDER * df + 8 * EPS * abs(f)
-            others, d_others = deflated(M, E, f / s, df / s)
+            f, df = f / s, (WIDER * df + 8 * EPS * abs(f)) / s
+        others = self._sharp(M, E, R, error, doubt, WIDER * shift * a_end, np.flatnonzero(shown), f, df)
         back = s[:, :, None] / s[:, None, :]
-        return Shown(shown, x, dx + EPS * abs(x), T, dT, M * back, E * back, others, d_others)
+        return Shown(shown, x, dx + EPS * abs(x), T, dT, M * back, E * back, others)
+
+    def _sharp(self, M, E, R, error, doubt, late, which, f, df):
+        """The Matrices of the multipliers that are judged: those of M, or, if f is given, those but for its +1.
+
+        Errors are carried in the coordinates of eigenvectors; `late` bounds what the end's shift adds, relative to M.
+        """
+        N, n = M.shape[:2]
+        judged, bounds = (M, E) if f is None else deflated(M, E, f, df)
+        found = monodromy.Matrices.plain(judged, bounds)
+        values, vectors = np.ones((N, n), complex), np.full((N, n, n), np.nan, complex)
+        own, directions = np.linalg.eig(judged[which])
+        if f is None:
+            values[which], vectors[which] = own, directions
+        else:
+            values[which, 1:] = own
+            vectors[which] = completed(M[which], f[which], own, directions)
+        inverses = np.full_like(vectors, np.nan)
+        inverses[which] = monodromy.inverse(vectors[which])
+        extra = np.full((N, n, n), np.nan)
+        carried(self.F, error, doubt, self.first, which, n, vectors, inverses, extra)
+        tall = _product(abs(M) + E, abs(vectors))
+        extra += late[:, None, None] * abs(inverses).sum(axis=2)[:, :, None] * tall.max(axis=1, keepdims=True)
+        if f is None:
+            found.R, found.extra, found.V, found.W, found.centre = R, extra, vectors, inverses, values
+        else:
+            # V^-1 M V, V including f, is near diag(1, centre); f itself is V (1, off)
+            known = np.full((N, n, n), np.inf)
+            couplings(M, R, extra, values, vectors, inverses, known)
+            off = 1.01 * _applied(abs(inverses), df)
+            share = np.where(off[:, :1] < 0.01, 1.02 * off, np.inf)
+            found.extra = (known[:, 1:, 1:] + share[:, 1:, None] * known[:, :1, 1:]) * (1 + 8 * EPS)
+            found.R = np.zeros_like(judged)
+            found.centre[which], found.V[which] = own, directions
+            found.W[which] = monodromy.inverse(directions)
+        found.sharp[which] = np.isfinite(found.extra[which]).all(axis=(1, 2))
+        return found
 
 
 def _sum(series):
@@ -540,8 +577,7 @@ def deflated(M, E, f, df):
     """
     N, n = f.shape
     out, bounds = np.empty((2, N, n - 1, n - 1))
-    rows, k = np.arange(N), abs(f).argmax(axis=1)
-    rest = np.array([[j for j in range(n) if j != i] for i in range(n)])[k]
+    rows, (k, rest) = np.arange(N), _pivots(f)
     pivot = f[rows, k]
     q = f / pivot[:, None]
     dq = (df + abs(q) * df[rows, k, None]) / (abs(pivot) - df[rows, k])[:, None] + 2 * EPS * abs(q)
@@ -559,6 +595,26 @@ def deflated(M, E, f, df):
     return out, bounds
 
 
+def completed(M, f, values, directions):
+    """Eigenvectors of M (N, n, n): f, that of +1, and those that the eigenvectors of `deflated` M stand for."""
+    N, n = f.shape
+    rows, (k, rest) = np.arange(N), _pivots(f)
+    out = np.zeros((N, n, n), complex)
+    out[:, :, 0] = f
+    out[rows[:, None], rest, 1:] = directions
+    along = (M[rows, k][:, :, None] * out[:, :, 1:]).sum(axis=1) / f[rows, k, None]
+    with np.errstate(all="ignore"):
+        out[:, :, 1:] += f[:, :, None] * (along / (values - 1.0))[:, None, :]
+    return np.where(np.isfinite(out), out, np.nan)
+
+
+def _pivots(f):
+    """The place of the largest component of f (N, n), and the others."""
+    n = f.shape[1]
+    k = abs(f).argmax(axis=1)
+    return k, np.array([[j for j in range(n) if j != i] for i in range(n)])[k]
+
+
 class Found:
     """The results of N points as they come in."""
 
@@ -567,7 +623,7 @@ class Found:
         self.n, self.m, self.free = n, m, free
         self.good = np.zeros(N, bool)
         self.x, self.dx, self.T, self.dT = (np.full(shape, np.nan) for shape in ((N, n), (N, n), N, N))
-        self.M, self.others = np.full((N, 2, n, n), np.nan), np.full((N, 2, m, m), np.nan)
+        self.M, self.others = np.full((N, 2, n, n), np.nan), monodromy.Matrices.empty(N, m)
 
     def put(self, points, shown):
         """Keep what is Shown of these points."""
@@ -576,12 +632,12 @@ class Found:
         for name in ("x", "dx", "T", "dT"):
             getattr(self, name)[to] = getattr(shown, name)[shown.good]
         self.M[to, 0], self.M[to, 1] = shown.M[shown.good], shown.dM[shown.good]
-        self.others[to, 0], self.others[to, 1] = shown.others[shown.good], shown.d_others[shown.good]
+        self.others[to] = shown.others[shown.good]
 
     def outputs(self, known, rtol, wanted, computed):
         """The wanted outputs; `known`: the points that have a start and a period."""
         N = len(self.good)
-        matrices = monodromy.Matrices.plain(self.others[:, 0], self.others[:, 1])
+        matrices = self.others
         answer = stability.assess(matrices, "none", rtol, wanted)
         answer.status[~self.good] = NO_ORBIT
         answer.status[~known] = status.INVALID_PARAMETERS
