@@ -7,10 +7,8 @@ from functools import cached_property
 import numpy as np
 
 from survey.measures.floquet import motion, stability
-from survey.measures.floquet.system import Raised, System
-from survey.measures.floquet.trace import Unsupported
-from survey.request.function_scene import FunctionScene
-from survey.request.hill_scene import reason
+from survey.measures.floquet.system import System
+from survey.request.traced_scene import TracedScene
 from survey.scene import Parameter, plus_minus
 
 LARGEST = 64  # states
@@ -23,7 +21,7 @@ STATUS = {
 
 
 @dataclass(frozen=True, eq=False)
-class FloquetScene(FunctionScene):
+class FloquetScene(TracedScene):
     """What a scene's module offers (see `survey.scenes`), for a user's A, or M, C, K; `about` is its docstring."""
 
     matrices: dict[str, Callable]
@@ -77,9 +75,7 @@ class FloquetScene(FunctionScene):
 
     def solve(self, point, request):
         """The requested outputs of a block (see `survey.scenes`)."""
-        shape = np.broadcast_shapes(*(np.shape(values) for values in point.values()))
-        columns = [np.broadcast_to(point[p.name], shape).reshape(-1) for p in self.PARAMETERS]
-        points = np.stack(columns, axis=1).astype(float)
+        points, shape = self._points(point)
         wanted = set(request.variables) or {o.name for o in self.OUTPUTS}
         out = self._called(stability.solve, self._system, self.structure, points, request.method, request.rtol, wanted)
         return {name: values.reshape(*shape, *values.shape[1:]) for name, values in out.items()}
@@ -209,39 +205,11 @@ class FloquetScene(FunctionScene):
     def _plain(self, name, time, point):
         """The matrix of this name, from the code run on numbers."""
         m = self._size_of(name)
-        out = np.zeros((m, m))
-        function = getattr(self.matrices[name], "py_func", self.matrices[name])
-        with np.errstate(all="ignore"):
-            try:
-                value = function(float(time), point, out)
-            except (ArithmeticError, ValueError):
-                return np.full((m, m), np.nan)
-        return out if value is None else np.asarray(value, dtype=float)
+        return self._filled(self.matrices[name], (float(time), point), (m, m))
 
     def _try(self, point):
         """Raise BadInput unless the functions, run as Python, fill their matrices."""
-        for name in self.matrices:
+        for name, function in self.matrices.items():
             m = self._size_of(name)
-            call = f"{name}(t, p, out)"
-            try:
-                value = self._plain(name, 0.25, point)
-            except IndexError as error:
-                if "only integers" in str(error):
-                    self._refuse_index(call, error)
-                self._refuse(
-                    f"{call} indexes beyond an array ({error})",
-                    f"PARAMETERS names {len(self.own)} and out is {m} x {m}",
-                )
-            except Exception as error:
-                self._refuse(f"{call} fails ({type(error).__name__}: {reason(error)})", "correct it")
-            if value.shape != (m, m):
-                self._refuse(f"{call} returns an array of shape {value.shape}", f"it must fill out, {m} x {m}")
-
-    def _called(self, function, *arguments):
-        try:
-            return function(*arguments)
-        except Unsupported as error:
-            self._refuse(str(error), "use + - * / ** and functions such as sin, exp, sqrt of math or numpy")
-        except Raised as error:
-            cause = error.__cause__
-            self._refuse(f"{error} fails ({type(cause).__name__}: {reason(cause)})", "correct it")
+            sizes = f"PARAMETERS names {len(self.own)} and out is {m} x {m}"
+            self._tried(function, f"{name}(t, p, out)", (0.25, point), (m, m), sizes, f"{m} x {m}")

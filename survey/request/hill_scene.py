@@ -88,9 +88,7 @@ class HillScene(FunctionScene):
 
     def solve(self, point, request):
         """The requested outputs of a block (see `survey.scenes`)."""
-        shape = np.broadcast_shapes(*(np.shape(values) for values in point.values()))
-        columns = [np.broadcast_to(point[p.name], shape).reshape(-1) for p in self.PARAMETERS]
-        points = np.stack(columns, axis=1).astype(float)
+        points, shape = self._points(point)
         period, edges, slack = self._ranges(points)
         edges[~np.isfinite(points).all(axis=1)] = np.nan
         exact = None if self._obstacle else self._exact

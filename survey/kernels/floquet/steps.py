@@ -267,6 +267,46 @@ def _invert(work, inverse, n):
 
 
 @kernel
+def column_sums(A, out):
+    """Fill out (n) with the sums of the moduli in the columns of A (n, n)."""
+    for c in range(len(A)):
+        total = 0.0
+        for j in range(len(A)):
+            total += abs(A[j, c])
+        out[c] = total
+
+
+@kernel
+def multiply(left, right, zero, out):
+    """Fill out with the product of two matrices (n, n); `zero` is that of its type."""
+    for j in range(len(out)):
+        for c in range(len(out)):
+            total = zero
+            for m in range(len(out)):
+                total += left[j, m] * right[m, c]
+            out[j, c] = total
+
+
+@kernel
+def add_outer(A, by, before, out):
+    """Add `by` times the sum of the moduli in each row of A, times `before` (n) of each column, to out (n, n)."""
+    for j in range(len(A)):
+        total = 0.0
+        for m in range(len(A)):
+            total += abs(A[j, m])
+        for c in range(len(A)):
+            out[j, c] += by * total * before[c]
+
+
+@kernel
+def set_identity(A):
+    """Fill A (n, n) with the identity."""
+    A[:] = 0.0
+    for j in range(len(A)):
+        A[j, j] = 1.0
+
+
+@kernel
 def products(F, error, doubt, first, n, M, E, R):
     """Fill M (N, n, n), the product of the steps first[i] to first[i + 1] of each point, and bounds E of its entries.
 
@@ -280,49 +320,26 @@ def products(F, error, doubt, first, n, M, E, R):
     A, B = np.empty((n, n)), np.empty((n, n))
     for i in range(len(M)):
         steps = first[i + 1] - first[i]
-        A[:] = 0.0
-        for j in range(n):
-            A[j, j] = 1.0
+        set_identity(A)
         more = 0.0
         for k in range(steps):
-            largest = 0.0
-            for c in range(n):
-                total = 0.0
-                for j in range(n):
-                    total += abs(A[j, c])
-                before[k, c] = total
-            step = F[first[i] + k]
+            step, largest = F[first[i] + k], 0.0
             for j in range(n):
                 for c in range(n):
-                    total = 0.0
-                    for m in range(n):
-                        total += step[j, m] * A[m, c]
-                    B[j, c] = total
                     largest = max(largest, abs(step[j, c]))
+            column_sums(A, before[k])
+            multiply(step, A, 0.0, B)
             A[:] = B
             rounding[k] = n * ROUNDOFF_UP * largest
             more += doubt[first[i] + k]
         M[i] = A
         E[i] = 0.0
         R[i] = 0.0
-        A[:] = 0.0
-        for j in range(n):
-            A[j, j] = 1.0
+        set_identity(A)
         for k in range(steps - 1, -1, -1):
-            step, own = F[first[i] + k], error[first[i] + k]
-            for j in range(n):
-                total = 0.0
-                for m in range(n):
-                    total += abs(A[j, m])
-                for c in range(n):
-                    E[i, j, c] += (own + rounding[k]) * total * before[k, c]
-                    R[i, j, c] += rounding[k] * total * before[k, c]
-            for j in range(n):
-                for c in range(n):
-                    total = 0.0
-                    for m in range(n):
-                        total += A[j, m] * step[m, c]
-                    B[j, c] = total
+            add_outer(A, error[first[i] + k] + rounding[k], before[k], E[i])
+            add_outer(A, rounding[k], before[k], R[i])
+            multiply(A, F[first[i] + k], 0.0, B)
             A[:] = B
         factor = math.exp(min(2.0 * more, 700.0))
         for j in range(n):
@@ -347,36 +364,15 @@ def carried(F, error, doubt, first, which, n, V, W, B):
         A[:] = V[i]
         more = 0.0
         for k in range(first[i + 1] - first[i]):
-            step = F[first[i] + k]
-            for c in range(n):
-                total = 0.0
-                for j in range(n):
-                    total += abs(A[j, c])
-                before[k, c] = total
-            for j in range(n):
-                for c in range(n):
-                    sum_of = 0.0 + 0.0j
-                    for m in range(n):
-                        sum_of += step[j, m] * A[m, c]
-                    Z[j, c] = sum_of
+            column_sums(A, before[k])
+            multiply(F[first[i] + k], A, 0.0j, Z)
             A[:] = Z
             more += doubt[first[i] + k]
         A[:] = W[i]
         B[i] = 0.0
         for k in range(first[i + 1] - first[i] - 1, -1, -1):
-            step, own = F[first[i] + k], error[first[i] + k]
-            for j in range(n):
-                total = 0.0
-                for m in range(n):
-                    total += abs(A[j, m])
-                for c in range(n):
-                    B[i, j, c] += own * total * before[k, c]
-            for j in range(n):
-                for c in range(n):
-                    sum_of = 0.0 + 0.0j
-                    for m in range(n):
-                        sum_of += A[j, m] * step[m, c]
-                    Z[j, c] = sum_of
+            add_outer(A, error[first[i] + k], before[k], B[i])
+            multiply(A, F[first[i] + k], 0.0j, Z)
             A[:] = Z
         factor = math.exp(min(2.0 * more, 700.0))
         for j in range(n):
