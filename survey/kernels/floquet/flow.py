@@ -49,7 +49,8 @@ def flow(
         for lane in range(lanes):
             i = start + min(lane, count - 1)
             busy[lane], t[lane], s[lane] = lane < count, 0.0, span[i] / 32.0
-            V[:, lane] = numbers[i]
+            for k in range(numbers.shape[1]):
+                V[k, lane] = numbers[i, k]
             for k in range(len(terms)):
                 for c in range(n):
                     W[k, c * lanes + lane] = numbers[i, terms[k, NUMBER]]
@@ -64,18 +65,18 @@ def flow(
         left = count
         while left > 0:
             for c in range(n):
-                V[places[c]] = x[c]
+                for lane in range(lanes):
+                    V[places[c], lane] = x[c, lane]
             if derived:
                 P[0] = 0.0
                 for c in range(n):
                     P[0, c, c * lanes : (c + 1) * lanes] = 1.0
-            for k in range(ORDER):
+            for k in range(ORDER + 1):  # one call of each kernel: it is compiled once
                 extend(operations, signs, inside, order, V, t, s, S, k)
                 if k == 0:
-                    norm_of(S, W, terms, 0, rows, a)
-                if derived:
+                    norm_of(S, W, terms, k, rows, a)
+                if derived and k < ORDER:
                     next_term(S, W, terms, used, needed, k, n, s, B, C, P)
-            extend(operations, signs, inside, order, V, t, s, S, ORDER)
             for lane in range(count):
                 if not busy[lane]:
                     continue
@@ -155,8 +156,8 @@ def _advance(P, shares, n, F, D):
     for q in range(n * n):
         own = F[q]
         at = (q % n) * lanes
-        own[:] = P[ORDER, q // n, at : at + lanes]
-        for m in range(ORDER - 1, -1, -1):
+        own[:] = 0.0
+        for m in range(ORDER, -1, -1):
             one = P[m, q // n, at : at + lanes]
             for lane in range(lanes):
                 own[lane] = own[lane] * shares[lane] + one[lane]
@@ -197,7 +198,7 @@ def spread(F, delta, first, wide, off):
                             for m in range(n):
                                 total += F[k, r, m] * A[m, c]
                             B[r, c] = total
-                    A[:] = B
+                    A, B = B, A
                 for r in range(n):
                     total = 0.0
                     for c in range(n):
