@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from survey.measures.floquet import orbit
+from survey.measures.floquet.equation import Equation
 from survey.request.floquet_scene import SAME, TRIED
 from survey.request.traced_scene import TracedScene
 from survey.scene import Parameter, plus_minus
@@ -48,7 +49,7 @@ class OrbitScene(TracedScene):
 
     @cached_property
     def _equation(self):
-        return orbit.Equation(self.f, len(self.states), self.period, self.start)
+        return Equation(self.f, len(self.states), self.period, self.start)
 
     @property
     def DIMENSIONS(self):

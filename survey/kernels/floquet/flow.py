@@ -2,7 +2,7 @@
 beginnings of steps; many points at once, each with steps of its own.
 
 A step goes as far as the last two coefficients allow for rounding alone to count (Jorba & Zou), and no farther than
-`reach` / |A|, A = df/dx. No bounds are made here: `measures.floquet.orbit` has them of the defect of the series.
+`reach` / |A|, A = df/dx. No bounds are made here: `measures.floquet.existence` has them of the defect of the series.
 
 Source: A. Jorba, M. Zou, Experimental Mathematics 14 (2005) 99.
 """
