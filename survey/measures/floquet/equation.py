@@ -37,8 +37,11 @@ class Equation:
         guess = np.array([self._row("START(p)", self.start, p, self.n + self.free) for p in points])
         if self.free:
             return guess[:, :-1], guess[:, -1]
-        period = np.array([self._row("PERIOD(p)", self.period, p, 1)[0] for p in points])
-        return guess, period
+        return guess, self.periods(points)
+
+    def periods(self, points):
+        """The periods (N) of a system that depends on t."""
+        return np.array([self._row("PERIOD(p)", self.period, p, 1)[0] for p in points])
 
     def _row(self, name, value, p, size):
         try:

@@ -3,6 +3,8 @@
 Source: P. Deuflhard, Newton Methods for Nonlinear Problems (2004), 3.3.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 MOST_RELAXED = 10_000  # steps of the long time before an orbit
@@ -18,6 +20,45 @@ def chosen(numbers, those):
     return tuple(np.ascontiguousarray(one[those]) for one in numbers)
 
 
+@dataclass
+class Located:
+    """Orbits by Newton's method: states and periods, the points and normals of their planes (normals only where T is
+    unknown), the largest moduli of the states, and numbers of steps.
+    """
+
+    x: np.ndarray
+    T: np.ndarray
+    guess: np.ndarray
+    phase: np.ndarray
+    size: np.ndarray
+    steps: np.ndarray
+
+
+def located(equation, points, reach, x, T, relax=True):
+    """Located orbits at the points (N, parameters), and the numbers of those that are found, beginning at x (N, n), T.
+
+    With `relax`, those that are not found are looked for again from the state after a long time.
+    """
+    found = Located(*(np.full(np.shape(a), np.nan) for a in (x, T, x, x, x)), np.zeros(len(x), int))
+    good = [np.zeros(0, int)]
+    usable = np.flatnonzero(np.isfinite(points).all(axis=1) & np.isfinite(x).all(axis=1) & (T > 0) & np.isfinite(T))
+    for inside, programs in equation.traced(points[usable], x[usable]):
+        own = usable[inside]
+        orbits = Newton(programs, programs.numbers(points[own]), reach, x[own], T[own], equation.free)
+        those = orbits.solve()
+        if relax:
+            those = np.sort(np.concatenate([those, orbits.again(np.setdiff1d(np.arange(own.size), those))]))
+        found.x[own], found.T[own], found.guess[own] = orbits.x, orbits.T, orbits.guess
+        if equation.free:
+            found.phase[own] = orbits.phase
+        numbers = chosen(orbits.numbers, those)
+        X, _M, size, steps = programs.flow(numbers, orbits.x[those], orbits.T[those], reach, derived=False)
+        there = np.isfinite(X).all(axis=1)
+        found.size[own[those]], found.steps[own[those]] = size, steps
+        good.append(own[those[there]])
+    return found, np.sort(np.concatenate(good))
+
+
 class Newton:
     """Newton's method for N points, from states x (N, n) and periods T (N), which are unknown too if `free`."""
 
@@ -25,10 +66,6 @@ class Newton:
         self.programs, self.numbers, self.reach = programs, numbers, reach
         self.x, self.T, self.guess, self.period = x.copy(), T.copy(), x.copy(), T
         self.phase = programs.slopes(numbers, np.zeros(len(x)), x)[0] if free else None
-
-    def plane(self, those):
-        """Normals and points of the planes in which x of these points stays; None if T is known."""
-        return None if self.phase is None else (self.phase[those], self.guess[those])
 
     def again(self, those):
         """As `solve`, for some points, from the state after a long time."""

@@ -13,7 +13,7 @@ import numpy as np
 from survey import status
 from survey.kernels.floquet.flow import ORDER
 from survey.measures.floquet import existence, monodromy, stability
-from survey.measures.floquet.newton import Newton, chosen
+from survey.measures.floquet.newton import chosen, located
 from survey.scene import Output
 
 NO_ORBIT = status.FIRST_OF_SCENE
@@ -38,35 +38,35 @@ def solve(equation, points, method, rtol, wanted):
 
 
 def _chunk(equation, points, method, rtol, wanted):
-    n, N = equation.n, len(points)
-    free = equation.free
+    N, n = len(points), equation.n
     known = np.isfinite(points).all(axis=1)
     guess, period = np.full((N, n), np.nan), np.full(N, np.nan)
     guess[known], period[known] = equation.begin(points[known])
     known &= np.isfinite(guess).all(axis=1) & np.isfinite(period) & (period > 0)
-    where = np.flatnonzero(known)
-    found = Found(N, n, free)
-    for inside, programs in equation.traced(points[where], guess[where]):
-        own = where[inside]
-        numbers = programs.numbers(points[own])
-        reach = method.floquet_reach(rtol)
-        orbits = Newton(programs, numbers, reach, guess[own], period[own], free)
-        good = orbits.solve()
-        good = np.sort(np.concatenate([good, orbits.again(np.setdiff1d(np.arange(own.size), good))]))
-        step_counts = programs.flow(
-            chosen(numbers, good), orbits.x[good], orbits.T[good], reach, derived=False
-        )[3]  # fmt: skip
-        ends = np.cumsum(step_counts) * n * (ORDER + 1)
-        cuts = np.searchsorted(ends, np.arange(CALL, ends[-1], CALL)) if good.size else []
-        for some in np.split(np.arange(good.size), cuts):
-            if some.size:
-                those = good[some]
-                shown = existence.certified(
-                    programs, chosen(numbers, those), orbits.x[those], orbits.T[those],
-                    orbits.guess[those], orbits.plane(those), step_counts[some], method, reach,
-                )  # fmt: skip
-                found.put(own[those], shown)
+    found = _shown(equation, points, guess, period, method, rtol)
     return found.outputs(known, rtol, wanted, callable(equation.period))
+
+
+def _shown(equation, points, guess, period, method, rtol, relax=True):
+    """What is Found from these guesses."""
+    N, n, reach = len(points), equation.n, method.floquet_reach(rtol)
+    found = Found(N, n, equation.free)
+    orbits, good = located(equation, points, reach, guess, period, relax)
+    for inside, programs in equation.traced(points[good], guess[good]):
+        own = good[inside]
+        numbers = programs.numbers(points[own])
+        ends = np.cumsum(orbits.steps[own]) * n * (ORDER + 1)
+        cuts = np.searchsorted(ends, np.arange(CALL, ends[-1], CALL)) if own.size else []
+        for some in np.split(np.arange(own.size), cuts):
+            if some.size:
+                those = own[some]
+                plane = (orbits.phase[those], orbits.guess[those]) if equation.free else None
+                shown = existence.certified(
+                    programs, chosen(numbers, some), orbits.x[those], orbits.T[those], orbits.guess[those], plane,
+                    orbits.steps[those], method, reach,
+                )  # fmt: skip
+                found.put(those, shown)
+    return found
 
 
 class Found:
