@@ -12,6 +12,8 @@ Source: H. B. Keller, in Applications of Bifurcation Theory (1977) 359 (pseudo-a
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,17 +28,12 @@ DIFFERENCE = 1e-6  # of l, for derivatives that give directions alone
 SAME, SAME_SIZE = 1e-3, 1e-2  # relative: what lies on a curve already
 
 
-@dataclass(frozen=True)
-class Range:
+class Range(NamedTuple):
     """The parameter number `index` that is continued, from `low` to `high`."""
 
     index: int
     low: float
     high: float
-
-    def values(self, shares):
-        """The parameter at these shares of the range."""
-        return self.low + (self.high - self.low) * shares
 
 
 @dataclass
@@ -58,7 +55,7 @@ class Curve:
             turns = np.roots([3 * c[3, k, -1], 2 * c[2, k, -1], c[1, k, -1]]) if c[2:, k, -1].any() else np.zeros(0)
             turns = np.sort(turns[np.isreal(turns)].real)
             ends = [0.0, *turns[(turns > 0) & (turns < 1)], 1.0]
-            for a, b in zip(ends[:-1], ends[1:], strict=True):
+            for a, b in pairwise(ends):
                 at = [_cubic(c[:, k, -1], u) for u in (a, b)]
                 inside = np.flatnonzero((values - at[0]) * (values - at[1]) <= 0)
                 if inside.size:
@@ -94,16 +91,18 @@ class Curves:
         for share in np.linspace(0.0, 1.0, SEEDS):
             self._follow(share)
 
-    def _points(self, those, l):
+    def points(self, those, share):
+        """The parameters of these rows, with the continued one at shares of its range."""
+        index, low, high = self.continued
         points = self.rows[those].copy()
-        points[:, self.continued.index] = self.continued.values(l)
+        points[:, index] = low + (high - low) * share
         return points
 
     def _follow(self, share):
         """Follow the curves through the orbits at this share of the range, but for those that are known."""
         everyone = np.arange(len(self.rows))
-        points = self._points(everyone, share)
-        orbits, good = located(self.equation, points, self.reach)
+        points = self.points(everyone, share)
+        orbits, good = located(self.equation, points, self.reach, *self.equation.begin(points))
         those = np.array([i for i in good if not self._known(i, share, orbits, i)], dtype=int)
         if not those.size:
             return
@@ -193,7 +192,7 @@ class _Walk:
     def _value(self, those, y):
         """X(T), and the equations' left sides in the units of the scale, at y (K, m) of some tasks."""
         n, real = self.n, y * self.scale[those]
-        points = self.curves._points(self.rows[those], y[:, -1])
+        points = self.curves.points(self.rows[those], y[:, -1])
         T = real[:, n] if self.free else self.equation.periods(points)
         return points, real[:, :n], T
 

@@ -31,6 +31,7 @@ from survey.measures.floquet.newton import applied, bordered, chosen, inverse
 
 NODES = np.array([0.0, 0.25, 0.5, 0.75, 0.875, 1.0])  # of a step; sums with the ends of steps are exact
 MIDDLE = 2  # of NODES
+MEAN = np.array([7.0, 32.0, 12.0, 32.0, 0.0, 7.0]) / 90.0  # over a step, by NODES (Boole)
 SAMPLED = 1.25  # samples within a step, whose length is a small part of the radius of convergence
 WIDER = 1.1  # the tube than the linear equation says, and bounds to first order in its width
 RADII = (1.1, 2.1)  # of the ball, relative to |B G|: the first that serves
@@ -39,7 +40,8 @@ WIDEST = 1e-3  # of the tube, relative to the largest state
 
 @dataclass
 class Shown:
-    """Orbits that exist: states, periods, M and what their multipliers follow from, each with bounds."""
+    """Orbits that exist: states, periods, M and what their multipliers follow from, each with bounds; mean squares of
+    the states, without."""
 
     good: np.ndarray
     x: np.ndarray
@@ -48,6 +50,7 @@ class Shown:
     dT: np.ndarray
     M: np.ndarray
     dM: np.ndarray
+    square: np.ndarray
     others: monodromy.Matrices
 
     def improve(self, other):
@@ -104,6 +107,8 @@ class Path:
         size = (abs(self.X).max(axis=2) / self.scale[self.point]).max(axis=1)
         self.extent = np.maximum.reduceat(size, self.first[:-1])
         self.end = X
+        squares = (self.X * self.X).sum(axis=1) @ MEAN
+        self.square = np.add.reduceat(squares * self.h, self.first[:-1]) / T
 
     def _along(self, program, width):
         return self.programs.along(program, self.numbers, self.t, self.X, width)
@@ -187,7 +192,7 @@ class Path:
             f, df = f / s, (WIDER * df + 8 * EPS * abs(f)) / s
         others = self._sharp(M, E, R, error, doubt, WIDER * shift * a_end, np.flatnonzero(shown), f, df)
         back = s[:, :, None] / s[:, None, :]
-        return Shown(shown, x, dx + EPS * abs(x), T, dT, M * back, E * back, others)
+        return Shown(shown, x, dx + EPS * abs(x), T, dT, M * back, E * back, self.square, others)
 
     def _sharp(self, M, E, R, error, doubt, late, which, f, df):
         """The Matrices of the multipliers that are judged: those of M, or, if f is given, those but for its +1.

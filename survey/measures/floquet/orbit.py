@@ -13,11 +13,14 @@ import numpy as np
 from survey import status
 from survey.kernels.floquet.flow import ORDER
 from survey.measures.floquet import existence, monodromy, stability
+from survey.measures.floquet.continuation import Curves
 from survey.measures.floquet.newton import chosen, located
 from survey.scene import Output
 
 NO_ORBIT = status.FIRST_OF_SCENE
 CHUNK = 2048  # points that are solved together
+SAME = 1e-6  # relative: what one orbit is, found twice
+ROWS = 64  # whose curves are followed together
 CALL = 200_000  # numbers of a series that are recorded together
 
 _of_floquet = {o.name: o for o in stability.OUTPUTS}
@@ -27,6 +30,8 @@ OUTPUTS = (
     *(o for o in stability.OUTPUTS if o.name not in ("period", "krein")),
 )
 
+NUMBER = Output("orbits", "number of periodic orbits that are found and shown to exist", integer=True)
+
 
 def solve(equation, points, method, rtol, wanted):
     """The wanted outputs of the points (N, parameters), each with `_error` if it is a float, and `status`."""
@@ -35,6 +40,76 @@ def solve(equation, points, method, rtol, wanted):
         _chunk(equation, points[i : i + CHUNK], method, rtol, wanted) for i in range(0, max(len(points), 1), CHUNK)
     ]
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def solve_branches(equation, points, branch, continued, method, rtol, wanted):
+    """As `solve`, for the orbit number `branch` (N) of each point, among those on the curves of `continued`.
+
+    They are numbered by the mean squares of their states, and where these are the same, by x0.
+    """
+    method = monodromy.method_of(method)
+    known = np.isfinite(points).all(axis=1) & (branch == np.floor(branch))
+    different, place = np.unique(points[known], axis=0, return_inverse=True)
+    place = place.reshape(-1)
+    others = different.copy()
+    others[:, continued.index] = 0.0
+    rows, row = np.unique(others, axis=0, return_inverse=True)
+    row = row.reshape(-1)
+    parts, of_point = [], [[] for _ in different]
+    count = 0
+    for first in range(0, len(rows), ROWS):
+        curves = Curves(equation, continued, rows[first : first + ROWS], method.floquet_reach(rtol))
+        where, x, T = [], [], []
+        for k in range(len(curves.rows)):
+            mine = np.flatnonzero(row == first + k)
+            which, *start = curves.starts(k, different[mine, continued.index])
+            where.append(mine[which])
+            x.append(start[0])
+            T.append(start[1])
+        where, x, T = (np.concatenate(one) for one in (where, x, T))
+        for i in range(0, len(where), CHUNK):
+            own = where[i : i + CHUNK]
+            period = T[i : i + CHUNK] if equation.free else equation.periods(different[own])
+            found = _shown(equation, different[own], x[i : i + CHUNK], period, method, rtol, relax=False)
+            for k in np.flatnonzero(found.good):
+                of_point[own[k]].append((found.square[k], tuple(found.x[k]), found.T[k], count + k))
+            full = np.ones(len(own), bool)
+            parts.append(found.outputs(full, rtol, wanted, callable(equation.period)))
+            count += len(own)
+    order = [numbered(orbits, equation.free) for orbits in of_point]
+    empty = Found(1, equation.n, equation.free).outputs(np.ones(1, bool), rtol, wanted, callable(equation.period))
+    out = {name: np.concatenate([*(part[name] for part in parts), empty[name]]) for name in empty}
+    pick = np.full(len(points), count)
+    for i, k, number in zip(np.flatnonzero(known), place, branch[known].astype(int), strict=True):
+        if number <= len(order[k]):
+            pick[i] = order[k][number - 1]
+    out = {name: values[pick] for name, values in out.items()}
+    out["status"] = np.where(known, out["status"], status.INVALID_PARAMETERS).astype(out["status"].dtype)
+    if NUMBER.name in wanted:
+        out[NUMBER.name] = np.full(len(points), NUMBER.fill)
+        out[NUMBER.name][known] = np.array([len(one) for one in order], int)[place]
+    return out
+
+
+def numbered(orbits, free):
+    """The numbers of different orbits, by the mean squares of their states, then x0, from (square, x0, T, number)."""
+    kept = []
+    for one in sorted(orbits):
+        size = SAME * one[0] ** 0.5
+        same = (abs(np.subtract(one[1], other[1])).max() <= size for other in kept if _near(one[0], other[0]))
+        if free:
+            same = (abs(one[2] - other[2]) <= SAME * one[2] for other in kept if _near(one[0], other[0]))
+        if not any(same):
+            kept.append(one)
+    for i in range(1, len(kept)):
+        for k in range(i, 0, -1):
+            if _near(kept[k][0], kept[k - 1][0]) and kept[k][1] < kept[k - 1][1]:
+                kept[k - 1], kept[k] = kept[k], kept[k - 1]
+    return [one[3] for one in kept]
+
+
+def _near(a, b):
+    return abs(a - b) <= SAME * (a + b)
 
 
 def _chunk(equation, points, method, rtol, wanted):
@@ -75,7 +150,7 @@ class Found:
     def __init__(self, N, n, free):
         m = n - free
         self.n, self.m, self.free = n, m, free
-        self.good = np.zeros(N, bool)
+        self.good, self.square = np.zeros(N, bool), np.full(N, np.nan)
         self.x, self.dx, self.T, self.dT = (np.full(shape, np.nan) for shape in ((N, n), (N, n), N, N))
         self.M, self.others = np.full((N, 2, n, n), np.nan), monodromy.Matrices.empty(N, m)
 
@@ -83,7 +158,7 @@ class Found:
         """Keep what is Shown of these points."""
         to = points[shown.good]
         self.good[to] = True
-        for name in ("x", "dx", "T", "dT"):
+        for name in ("x", "dx", "T", "dT", "square"):
             getattr(self, name)[to] = getattr(shown, name)[shown.good]
         self.M[to, 0], self.M[to, 1] = shown.M[shown.good], shown.dM[shown.good]
         self.others[to] = shown.others[shown.good]
