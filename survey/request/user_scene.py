@@ -432,9 +432,9 @@ def _from_text(name: str, text: str) -> FunctionScene:
         return _floquet(matrices, *given, name, text, title, about, references)
     if is_orbit:
         about = module.__doc__ or inspect.getdoc(getattr(module.f, "py_func", module.f))
-        more = getattr(module, "jacobian", None), getattr(module, "CONTINUATION", None)
-        given = module.PERIOD, module.PARAMETERS, module.STATES, module.START, *more
-        return _orbit(module.f, *given, name, text, title, about, references)
+        of_orbit = getattr(module, "jacobian", None), getattr(module, "CONTINUATION", None)
+        system = module.PERIOD, module.PARAMETERS, module.STATES, module.START
+        return _orbit(module.f, *system, *of_orbit, name, text, title, about, references)
     optional = getattr(module, "EVEN", False), getattr(module, "BREAKS", ())
     about = module.__doc__ or inspect.getdoc(getattr(module.z, "py_func", module.z))
     return _hill(module.z, module.PERIOD, module.PARAMETERS, *optional, name, text, title, about, references)

@@ -1,28 +1,28 @@
 """Curves of periodic orbits, followed in one parameter, both ways round folds: all orbits at a point that they meet.
 
-The unknowns y = (x(0), l), or (x(0), T, l) where T is unknown, l the parameter, obey n, or n + 1, equations (see
-`newton`); a curve is followed by its arc length: a step along the tangent, and corrections across it by the derivative
-at the step's beginning. Where T is unknown, x(0) stays in a plane across the motion, which moves along with the curve.
+The unknowns y = (x(0), l), or (x(0), T, l) where T is unknown, l the share of the parameter's range, obey n, or n + 1,
+equations (see `newton`); a curve is followed by its arc length: a step along the tangent, and Newton's method across
+it. Where T is unknown, x(0) stays in a plane across the motion, which moves along with the curve.
 
 Curves begin at the orbits that Newton's method finds from the start at SEEDS values of l, and end where l leaves its
-range, after MOST_STEPS steps, or where these become too short. They depend on the other parameters and the range
-alone: so a point has the same orbits, in the same order, on every grid.
+range, after MOST_STEPS steps, or where these become too short. Curves that branch off are not looked for. They depend
+on the other parameters and the range alone: so a point has the same orbits, in the same order, on every grid.
 
 Source: H. B. Keller, in Applications of Bifurcation Theory (1977) 359 (pseudo-arclength).
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from survey.measures.floquet.newton import applied, bordered, inverse, located
+from survey.measures.floquet.newton import ACROSS, ROUGH, ROUGH_REACH, applied, bordered, inverse, located
 
 SEEDS = 9
-FIRST_STEP, LONGEST, SHORTEST = 0.01, 0.06, 1e-6  # relative to the range of l, and the sizes of x and T
+FIRST_STEP, LONGEST, SHORTEST = 0.01, 0.15, 1e-6  # relative to the range of l, x and T
 MOST_STEPS = 400  # in each direction
-CORRECTIONS, CORRECTED = 6, 1e-6
+CORRECTIONS, CORRECTED, CONTRACTION = 5, 1e-3, 0.5
+GROWTH, LEAST = 1.5, 1e-2  # of steps; the size of a state, relative to the largest one
 TURN, LITTLE = 0.35, 0.12  # of the tangent in a step, in radians: too much, and so little that steps become longer
 DIFFERENCE = 1e-6  # of l, for derivatives that give directions alone
 SAME, SAME_SIZE = 1e-3, 1e-2  # relative: what lies on a curve already
@@ -38,42 +38,45 @@ class Range(NamedTuple):
 
 @dataclass
 class Curve:
-    """Points y (K, m) of a curve in units of `scale` (m), and unit tangents; l, from 0 to 1, is the last component."""
+    """Points y (K, m) of a curve, its tangents, and the sizes that lengths are relative to. y ends with l."""
 
     y: np.ndarray
     tangent: np.ndarray
-    scale: np.ndarray
+    size: np.ndarray
 
     def crossings(self, values):
-        """Where l, on cubic pieces, takes the values (V): their numbers, and y (C, m), with its units."""
-        step = np.diff(self.y, axis=0)
-        length = np.linalg.norm(step, axis=1)[:, None]
-        one, two = length * self.tangent[:-1], length * self.tangent[1:]
+        """Where l, on cubic pieces, takes the values (V): their numbers, and y (C, m)."""
+        step, size = np.diff(self.y, axis=0), self.size[:-1]
+        length = np.linalg.norm(step / size, axis=1)[:, None]
+        one, two = (
+            length * t / np.linalg.norm(t / size, axis=1)[:, None] for t in (self.tangent[:-1], self.tangent[1:])
+        )
         c = np.stack([self.y[:-1], one, 3 * step - 2 * one - two, one + two - 2 * step])  # powers of u in [0, 1]
-        found, where = [], []
-        for k in range(len(step)):
-            turns = np.roots([3 * c[3, k, -1], 2 * c[2, k, -1], c[1, k, -1]]) if c[2:, k, -1].any() else np.zeros(0)
-            turns = np.sort(turns[np.isreal(turns)].real)
-            ends = [0.0, *turns[(turns > 0) & (turns < 1)], 1.0]
-            for a, b in pairwise(ends):
-                at = [_cubic(c[:, k, -1], u) for u in (a, b)]
-                inside = np.flatnonzero((values - at[0]) * (values - at[1]) <= 0)
-                if inside.size:
-                    found.append(inside)
-                    where.append(_cubic(c[:, k, :, None], _bisected(c[:, k, -1], values[inside], a, b)).T)
-        if not found:
-            return np.zeros(0, int), np.zeros((0, len(self.scale)))
-        return np.concatenate(found), np.concatenate(where) * self.scale
+        ends = _monotonic(c[:, :, -1])
+        at = _cubic(c[:, :, -1, None], ends)
+        below, above = np.minimum(at[:, :-1], at[:, 1:]), np.maximum(at[:, :-1], at[:, 1:])
+        piece, part, which = np.nonzero((below[:, :, None] <= values) & (values <= above[:, :, None]))
+        u = _bisected(c[:, piece, -1], values[which], ends[piece, part], ends[piece, part + 1])
+        return which, _cubic(c[:, piece], u[:, None])
+
+
+def _monotonic(c):
+    """Ends (K, 4) of the parts of [0, 1] on which cubics c (4, K) are monotonic; parts may be empty."""
+    with np.errstate(all="ignore"):
+        root = np.sqrt(np.maximum(c[2] ** 2 - 3 * c[1] * c[3], 0.0))
+        q = -(c[2] + np.copysign(root, c[2]))
+        turns = np.sort([q / (3 * c[3]), c[1] / q], axis=0)
+    turns = np.clip(np.nan_to_num(turns, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
+    return np.stack([np.zeros(c.shape[1]), *turns, np.ones(c.shape[1])], axis=1)
 
 
 def _cubic(c, u):
     return ((c[3] * u + c[2]) * u + c[1]) * u + c[0]
 
 
-def _bisected(c, values, a, b):
-    """u in [a, b] at which the cubic, monotonic there, takes the values."""
-    low, high = np.full(values.size, a), np.full(values.size, b)
-    rises = _cubic(c, b) > _cubic(c, a)
+def _bisected(c, values, low, high):
+    """Where in [low, high] cubics c (4, C), monotonic there, take the values (C)."""
+    rises = _cubic(c, high) > _cubic(c, low)
     for _ in range(50):
         middle = 0.5 * (low + high)
         below = (_cubic(c, middle) < values) == rises
@@ -106,20 +109,18 @@ class Curves:
         those = np.array([i for i in good if not self._known(i, share, orbits, i)], dtype=int)
         if not those.size:
             return
-        size = np.maximum(orbits.size[those], 1e-2 * orbits.size[those].max(axis=1, keepdims=True))
-        one = np.ones((those.size, 1))
-        y = np.concatenate([orbits.x[those], *([orbits.T[those, None]] if self.free else []), share * one], axis=1)
-        scale = np.concatenate([size, *([orbits.T[those, None]] if self.free else []), one], axis=1)
-        task = np.tile(np.arange(those.size), 2)
-        sign = np.repeat([1.0, -1.0], those.size)
-        walk = _Walk(self, those[task], y[task] / scale[task], scale[task], sign)
+        share, size, T = np.full((those.size, 1), share), orbits.size[those], orbits.T[those, None]
+        y = np.concatenate([orbits.x[those], *([T] if self.free else []), share], axis=1)
+        walk = _Walk(
+            self, np.tile(those, 2), np.tile(y, (2, 1)), np.tile(size, (2, 1)), np.repeat([1.0, -1.0], those.size)
+        )
         walk.run()
         for k, i in enumerate(those):
             there, back = walk.done(k), walk.done(k + those.size)
-            y = np.concatenate([back[0][:0:-1], there[0]])
-            tangent = np.concatenate([-back[1][:0:-1], there[1]])
-            if len(y) > 1:
-                self.of_row[i].append(Curve(y, tangent, scale[k]))
+            joined = [np.concatenate([b[:0:-1], a]) for a, b in zip(there, back, strict=True)]
+            joined[1][: max(len(back[0]) - 1, 0)] *= -1.0
+            if len(joined[0]) > 1:
+                self.of_row[i].append(Curve(*joined))
 
     def _known(self, i, share, orbits, k):
         for curve in self.of_row[i]:
@@ -144,20 +145,24 @@ class Curves:
 
 
 class _Walk:
-    """Steps along the curves of K tasks from y (K, m), in the direction in which `sign` l changes at first."""
+    """Steps along the curves of K tasks, from y (K, m) and the largest moduli of the states (K, n), in the direction
+    in which l changes by `sign` at first.
 
-    def __init__(self, curves, rows, y, scale, sign):
-        self.curves, self.rows, self.y, self.scale = curves, rows, y.copy(), scale
+    Lengths are relative to the orbit and the period at the last point, so that large orbits have as few steps as small.
+    """
+
+    def __init__(self, curves, rows, y, moduli, sign):
+        self.curves, self.rows, self.y = curves, rows, y.copy()
         self.n, self.free, self.equation = curves.equation.n, curves.free, curves.equation
         K, m = y.shape
-        self.step, self.live = np.full(K, FIRST_STEP), np.arange(K)
-        self.kept = [([], []) for _ in range(K)]
-        self.tangent, self.matrix = np.zeros((K, m)), np.full((K, m, m), np.nan)
-        self.plane = np.full((2, K, self.n), np.nan)
+        self.step, self.kept = np.full(K, FIRST_STEP), [([], [], []) for _ in range(K)]
+        self.size, self.tangent, self.plane = np.ones((K, m)), np.zeros((K, m)), np.full((2, K, self.n), np.nan)
+        self.size[:, : self.n] = moduli
         self.tangent[:, -1] = sign
-        good = self._turned(self.live, self.y, first=True)
-        # beside a fold l hardly changes: either way is one of the two
-        self.live = self.live[good]
+        everyone = np.arange(K)
+        if self.free:
+            self.plane[:] = self._slopes(curves.points(rows, y[:, -1]), y[:, : self.n]), y[:, : self.n]
+        self.live = everyone[self._moved(everyone, y, np.pi)]
 
     def run(self):
         """Follow the curves to their ends."""
@@ -165,77 +170,96 @@ class _Walk:
             if not self.live.size:
                 break
             live = self.live
-            y, good = self._corrected(live, self.y[live] + self.step[live, None] * self.tangent[live])
-            took = live[good]
-            before = self.tangent[took].copy()
-            moved = self._turned(took, y[good])
-            turn = np.arccos(np.clip((before[moved] * self.tangent[took[moved]]).sum(axis=1), -1, 1))
-            took = took[moved]
-            self.step[took] = np.where(turn < LITTLE, np.minimum(1.5 * self.step[took], LONGEST), self.step[took])
-            failed = np.setdiff1d(live, took)
+            good = self._moved(live, self.y[live] + self.step[live, None] * self.tangent[live], TURN)
+            took, failed = live[good], live[~good]
             self.step[failed] *= 0.5
-            inside = (self.y[:, -1] >= 0.0) & (self.y[:, -1] <= 1.0) | (len(self.kept) == 0)
-            gone = np.union1d(failed[self.step[failed] < SHORTEST], took[~inside[took]])
-            gone = np.union1d(gone, [k for k in took if self._closed(k)]).astype(int)
-            self.live = np.setdiff1d(live, gone)
+            closed = np.array([self._closed(k) for k in took], bool)
+            ended = closed | (self.y[took, -1] < 0.0) | (self.y[took, -1] > 1.0)
+            self.live = np.setdiff1d(live, np.concatenate([failed[self.step[failed] < SHORTEST], took[ended]]))
 
     def done(self, k):
-        """Points and tangents of a task's curve."""
-        y, tangent = self.kept[k]
-        return np.array(y).reshape(-1, self.y.shape[1]), np.array(tangent).reshape(-1, self.y.shape[1])
+        """Points, tangents and sizes of a task's curve."""
+        return tuple(np.array(one).reshape(-1, self.y.shape[1]) for one in self.kept[k])
 
     def _closed(self, k):
-        y, tangent = self.kept[k]
-        near = len(y) > 4 and np.linalg.norm(y[-1] - y[0]) < self.step[k] and tangent[-1] @ tangent[0] > 0.5
-        return bool(near)
+        y, tangent, size = self.kept[k]
+        near = len(y) > 4 and np.linalg.norm((y[-1] - y[0]) / size[0]) < self.step[k]
+        return bool(near and (tangent[-1] / size[0]) @ (tangent[0] / size[0]) > 0.0)
 
-    def _value(self, those, y):
-        """X(T), and the equations' left sides in the units of the scale, at y (K, m) of some tasks."""
-        n, real = self.n, y * self.scale[those]
+    def _real(self, those, y):
+        """Parameters, states and periods at y (K, m) of some tasks."""
         points = self.curves.points(self.rows[those], y[:, -1])
-        T = real[:, n] if self.free else self.equation.periods(points)
-        return points, real[:, :n], T
+        return points, y[:, : self.n], y[:, self.n] if self.free else self.equation.periods(points)
 
-    def _equations(self, those, x, X):
-        value = (X - x) / self.scale[those, : self.n]
-        if self.free:
-            c, at = self.plane[:, those]
-            planar = (c * (x - at)).sum(axis=1) / np.sqrt((c * c).sum(axis=1) * (x * x).sum(axis=1))
-            value = np.concatenate([value, planar[:, None]], axis=1)
-        return value
-
-    def _corrected(self, those, y):
-        """y moved onto the curve, across the tangent, and where that succeeds."""
-        done, lost, last = np.zeros(len(y), bool), np.zeros(len(y), bool), np.full(len(y), np.inf)
+    def _moved(self, those, y, most):
+        """Move these tasks to the curve near y, across their tangents, if these turn by less than `most`; where."""
+        done, lost, last = np.zeros(len(y), bool), np.zeros(len(y), bool), self.step[those]
+        tangent, size = np.empty_like(y), np.empty_like(y)
         for _ in range(CORRECTIONS):
             busy = np.flatnonzero(~done & ~lost)
             if not busy.size:
                 break
             mine = those[busy]
-            points, x, T = self._value(mine, y[busy])
-            X = self._flow(points, x, T, derived=False)[0]
-            value = self._equations(mine, x, X)
+            value, slope, size[busy] = self._equations(mine, y[busy])
+            across = self.tangent[mine] / self.size[mine] ** 2
             with np.errstate(all="ignore"):
-                step = -applied(self.matrix[mine], np.concatenate([value, np.zeros((busy.size, 1))], axis=1))
-                size = np.linalg.norm(step, axis=1)
-                bad = ~(size < np.minimum(0.5 * last[busy], self.step[mine]))
+                matrix = inverse(np.concatenate([slope, across[:, None]], axis=1))
+                step = -applied(matrix[:, :, :-1], value)
+                length = np.linalg.norm(step / self.size[mine], axis=1)
+                bad = ~(length < last[busy])
+                new = np.ascontiguousarray(matrix[:, :, -1])
+                tangent[busy] = new / np.linalg.norm(new / size[busy], axis=1, keepdims=True)
+                turn = _turn(self.tangent[mine] / self.size[mine], new / self.size[mine])
+                done[busy] = ~bad & (length < CORRECTED)
+                bad |= done[busy] & ~(turn < most)
             y[busy[~bad]] += step[~bad]
-            lost[busy[bad]] = True
-            done[busy] = ~bad & (size < CORRECTED)
-            last[busy] = size
-        return y, done
+            lost[busy[bad]], last[busy] = True, CONTRACTION * length
+            straight = done[busy] & (turn < LITTLE)
+            self.step[mine[straight]] = np.minimum(GROWTH * self.step[mine[straight]], LONGEST)
+        done &= ~lost
+        took = those[done]
+        self.y[took], self.tangent[took], self.size[took] = y[done], tangent[done], size[done]
+        if self.free and took.size:
+            x = self.y[took, : self.n]
+            self.plane[:, took] = self._slopes(self.curves.points(self.rows[took], self.y[took, -1]), x), x
+        for k in took:
+            for kept, one in zip(self.kept[k], (self.y[k], self.tangent[k], self.size[k]), strict=True):
+                kept.append(one.copy())
+        return done
+
+    def _equations(self, those, y):
+        """The equations' left sides at y (K, m), their derivatives (K, m - 1, m), and what lengths are relative to."""
+        n = self.n
+        points, x, T = self._real(those, y)
+        X, M, moduli = self._flow(points, x, T)
+        inward = np.where(y[:, -1] < 0.5, DIFFERENCE, -DIFFERENCE)
+        shifted = y.copy()
+        shifted[:, -1] += inward
+        by_l = (self._flow(*self._real(those, shifted), derived=False)[0] - X) / inward[:, None]
+        value, slope, size = X - x, M - np.eye(n), np.ones_like(y)
+        size[:, :n] = np.maximum(moduli, LEAST * moduli.max(axis=1, keepdims=True))
+        if self.free:
+            c, at = self.plane[:, those]
+            value = np.concatenate([value, (c * (x - at)).sum(axis=1)[:, None]], axis=1)
+            slope = bordered(slope, self._slopes(points, X), c)
+            by_l = np.concatenate([by_l, np.zeros((len(y), 1))], axis=1)
+            size[:, n] = T
+            across = (c * self._slopes(points, x)).sum(axis=1)
+            slope[~(across >= ACROSS * (c * c).sum(axis=1))] = np.nan
+        return value, np.concatenate([slope, by_l[:, :, None]], axis=2), size
 
     def _flow(self, points, x, T, derived=True):
         N, n = x.shape
-        X, M = np.full((N, n), np.nan), np.full((N * derived, n, n), np.nan)
+        X, M, size = np.full((N, n), np.nan), np.full((N * derived, n, n), np.nan), np.full((N, n), np.nan)
         usable = np.flatnonzero(np.isfinite(points).all(axis=1) & np.isfinite(x).all(axis=1) & (T > 0))
         for inside, programs in self.equation.traced(points[usable], x[usable]):
             own = usable[inside]
-            out = programs.flow(programs.numbers(points[own]), x[own], T[own], self.curves.reach, derived)
-            X[own] = out[0]
+            X[own], found, size[own], _steps = programs.flow(
+                programs.numbers(points[own]), x[own], T[own], ROUGH_REACH, derived, tolerance=ROUGH
+            )
             if derived:
-                M[own] = out[1]
-        return X, M
+                M[own] = found
+        return X, M, size
 
     def _slopes(self, points, x):
         f = np.full(x.shape, np.nan)
@@ -243,41 +267,9 @@ class _Walk:
             f[inside] = programs.slopes(programs.numbers(points[inside]), np.zeros(inside.size), x[inside])[0]
         return f
 
-    def _turned(self, those, y, first=False):
-        """Take y as the next points of these tasks, where the tangent has not turned too far; returns where."""
-        n = self.n
-        points, x, T = self._value(those, y)
-        X, M = self._flow(points, x, T)
-        inward = np.where(y[:, -1] < 0.5, DIFFERENCE, -DIFFERENCE)
-        shifted = y.copy()
-        shifted[:, -1] += inward
-        after, _x, T_after = self._value(those, shifted)
-        by_l = (self._flow(after, x, T_after, derived=False)[0] - X) / inward[:, None]
-        scale = self.scale[those]
-        slope = (M - np.eye(n)) * scale[:, None, :n] / scale[:, :n, None]
-        if self.free:
-            c = self._slopes(points, x)
-            late = self._slopes(points, X) * scale[:, n, None] / scale[:, :n]
-            unit = np.sqrt((c * c).sum(axis=1) * (x * x).sum(axis=1))[:, None]
-            slope = bordered(slope, late, c * scale[:, :n] / unit)
-            by_l = np.concatenate([by_l / scale[:, :n], np.zeros((len(y), 1))], axis=1)
-        else:
-            by_l = by_l / scale[:, :n]
-        B = np.concatenate([np.concatenate([slope, by_l[:, :, None]], axis=2), self.tangent[those, None]], axis=1)
-        last = np.zeros((len(y), y.shape[1]))
-        last[:, -1] = 1.0
-        with np.errstate(all="ignore"):
-            new = applied(inverse(B), last)
-            new /= np.linalg.norm(new, axis=1, keepdims=True)
-            turn = np.arccos(np.clip((new * self.tangent[those]).sum(axis=1), -1, 1))
-            B[:, -1] = new
-            matrix = inverse(B)
-            good = np.isfinite(matrix).all(axis=(1, 2)) & (first | (turn < TURN))
-        took = those[good]
-        self.y[took], self.tangent[took], self.matrix[took] = y[good], new[good], matrix[good]
-        if self.free:
-            self.plane[0, took], self.plane[1, took] = c[good], x[good]
-        for k in took:
-            self.kept[k][0].append(self.y[k].copy())
-            self.kept[k][1].append(self.tangent[k].copy())
-        return good
+
+def _turn(a, b):
+    """The angles between vectors (K, m)."""
+    with np.errstate(all="ignore"):
+        cosine = (a * b).sum(axis=1) / np.sqrt((a * a).sum(axis=1) * (b * b).sum(axis=1))
+        return np.arccos(np.clip(cosine, -1, 1))

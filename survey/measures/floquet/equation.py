@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from survey.kernels.floquet.flow import ORDER, flow
+from survey.kernels.math.roundoff import ROUNDOFF
 from survey.measures.floquet import trace
 from survey.measures.floquet.system import KEPT, Raised
 from survey.measures.floquet.trace import Graph, Unsupported
@@ -120,7 +121,7 @@ class Programs:
         errors[:, self.places] = 0.0
         return values, errors
 
-    def flow(self, numbers, x0, span, reach, derived=True, first=None, most=MOST_STEPS):
+    def flow(self, numbers, x0, span, reach, derived=True, first=None, most=MOST_STEPS, tolerance=ROUNDOFF):
         """States at `span`, dX/dx0, largest states and numbers of steps; if `first` is given, steps and series."""
         N, n = x0.shape
         X, M, size, steps = np.full((N, n), np.nan), np.zeros((N * derived, n, n)), np.empty((N, n)), np.zeros(N, int)
@@ -129,7 +130,7 @@ class Programs:
         A = self.A
         flow(
             A.operations, A.signs, A.inside, A.order, A.used, A.terms, np.ascontiguousarray(numbers[0]), self.places,
-            np.ascontiguousarray(x0), np.ascontiguousarray(span), reach, most,
+            np.ascontiguousarray(x0), np.ascontiguousarray(span), reach, tolerance, most,
             np.zeros(0, int) if first is None else first, X, M, size, steps, *recorded,
         )  # fmt: skip
         return (X, M, size, steps) if first is None else (X, *recorded)

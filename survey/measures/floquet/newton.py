@@ -10,6 +10,7 @@ import numpy as np
 MOST_RELAXED = 10_000  # steps of the long time before an orbit
 TRIALS, LEAST_DAMPING = 40, 1e-4
 CONVERGED = 1e-8  # relative: the last step, whose square is beyond float64
+ROUGH_REACH, ROUGH, ROUGHLY = 2.0, 1e-9, 1e-5  # until the last step is so small, the flow needs less accuracy
 FARTHEST = 0.2  # a step of it, relative to the orbit and the period
 ACROSS = 0.1  # how fast the plane is passed, relative to the start: equilibria are no orbits
 RELAXED, RETURN, NEAR = 32.0, 3.0, 0.2  # periods; the time in which an orbit comes back; how near, relative to it
@@ -104,13 +105,20 @@ class Newton:
 
     def solve(self):
         """The points where it converges; their x and T are the orbit's, nearly."""
+        near = self._solve(np.arange(len(self.x)), {"reach": ROUGH_REACH, "tolerance": ROUGH}, ROUGHLY)
+        return self._solve(near, {"reach": self.reach}, CONVERGED)
+
+    def _solve(self, those, how, converged):
+        """Those of some points where the last step is below `converged`; `how` the flow is computed."""
         N = len(self.x)
-        damping, found, live = np.ones(N), np.zeros(N, bool), np.arange(N)
-        value, inverse, size = self._linearised(live, self.x, self.T)
-        step = -applied(inverse, value)
-        live = live[np.isfinite(step).all(axis=1)]
+        damping, found, live = np.ones(N), np.zeros(N, bool), those
+        m = self.x.shape[1] + (self.phase is not None)
+        step, inverse, size = np.full((N, m), np.nan), np.full((N, m, m), np.nan), np.ones((N, m))
+        value, inverse[live], size[live] = self._linearised(live, self.x[live], self.T[live], how)
+        step[live] = -applied(inverse[live], value)
+        live = live[np.isfinite(step[live]).all(axis=1)]
         for _ in range(TRIALS):
-            done = self._norm(step[live], size[live], live) <= CONVERGED
+            done = self._norm(step[live], size[live], live) <= converged
             if done.any():
                 last = live[done]
                 x, T = self._moved(last, step[last])
@@ -120,7 +128,7 @@ class Newton:
                 break
             damping[live] = np.minimum(damping[live], FARTHEST / self._norm(step[live], size[live], live))
             x, T = self._moved(live, damping[live, None] * step[live])
-            new, new_inverse, new_size = self._linearised(live, x, T)
+            new, new_inverse, new_size = self._linearised(live, x, T, how)
             with np.errstate(all="ignore"):
                 simplified = -applied(inverse[live], new)
                 ratio = self._norm(simplified, size[live], live) / self._norm(step[live], size[live], live)
@@ -141,10 +149,10 @@ class Newton:
         T = self.T[those]
         return x, T + step[:, -1]
 
-    def _linearised(self, those, x, T):
+    def _linearised(self, those, x, T, how):
         """G, the inverse of its derivative, and the sizes of the unknowns."""
         numbers, n = chosen(self.numbers, those), x.shape[1]
-        X, M, size, _steps = self.programs.flow(numbers, x, T, self.reach)
+        X, M, size, _steps = self.programs.flow(numbers, x, T, **how)
         value, slope = X - x, M - np.eye(n)
         if self.phase is not None:
             f, c = self.programs.slopes(numbers, T, X)[0], self.phase[those]
