@@ -34,6 +34,11 @@ class Grid:
         """`lines` of its parameters."""
         return lines(self.parameters)
 
+    @property
+    def fixed(self):
+        """The names of the parameters that are single numbers."""
+        return fixed(self.parameters)
+
     def blocks(self, points_per_block):
         """Blocks, slices per dimension, of at most `points_per_block` points: the first dimensions are cut first."""
         return self._within([slice(0, size) for size in self.shape], points_per_block)
@@ -95,6 +100,11 @@ def lines(parameters):
             finite = values[np.isfinite(values)]
             found[name] = values.size, float(finite.min(initial=np.inf)), float(finite.max(initial=-np.inf))
     return found
+
+
+def fixed(parameters):
+    """The names of those of the `parameters` {name: (its dimensions, its values)} that are single numbers."""
+    return frozenset(name for name, (dims, _) in parameters.items() if not dims)
 
 
 def halved(lengths, most):

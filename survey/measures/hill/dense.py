@@ -218,7 +218,7 @@ def _series(problem, method, rtol, rows, n, axis):
     x = chebyshev.symmetric_nodes(n)
     x = x[: n // 2] if axis.even else x
     nodes = problem.at(rows, np.broadcast_to(axis.middle + axis.radius * x, (rows.size, x.size)).copy())
-    finer = Asked(max(rtol, BEST), DISCRIMINANT, together=True)
+    finer = Asked(max(rtol, BEST), DISCRIMINANT, together=True, full_period=problem.full_period)
     own = Answers(nodes.p.size, finer)
     pointwise.solve(nodes, method, finer, own)
     values, bars = (own.floats[c].reshape(nodes.p.shape) for c in (kernels.DISCRIMINANT, kernels.DISCRIMINANT + 1))
