@@ -158,7 +158,9 @@ def _at(s, oblate, rotates):
 def _row_axis(row, ends):
     rotates = bool(row.rotates.any())
     key = "satellite", row.oblate, rotates
-    return monodromy.RowAxis(key, *ends, at=lambda s: _at(s, row.oblate, rotates))
+    # y1 - y2' of a libration is odd in k
+    odd = None if rotates else lambda s: np.sqrt(-np.expm1(-s))
+    return monodromy.RowAxis(key, *ends, at=lambda s: _at(s, row.oblate, rotates), odd=odd)
 
 
 def _problem(row, rho, low=None, line=None, ends=None):

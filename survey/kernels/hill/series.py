@@ -1,10 +1,12 @@
-"""Discriminants of many rows from their Chebyshev series: rows share nothing, lanes of a row share their coefficients.
+"""Discriminants, or factors, of many rows from their Chebyshev series: rows share nothing, lanes of a row share their
+coefficients.
 
 Source: J. C. Mason, D. C. Handscomb, Chebyshev Polynomials (2003), 2.4.1.
 """
 
 import numpy as np
 
+from survey.kernels import lanes
 from survey.kernels.hill.answers import STABLE, UNDECIDED, UNSTABLE
 from survey.kernels.jit import kernel, splice
 
@@ -72,3 +74,65 @@ def _decide(d, bar, floats, rtol, verdict, missed):
     if not bar <= rtol:
         for i in range(len(verdict)):
             missed[i] |= not bar <= rtol * (1.0 + abs(d[i]))
+
+
+@splice
+def _table(x, even, odd, tile):
+    """T_k at x (or of y = 2 x^2 - 1 if `even`; T_{2k + 1} if `odd`) in the first lanes of the rows of `tile`."""
+    for i in range(len(x)):
+        y = 2.0 * x[i] * x[i] - 1.0 if even or odd else x[i]
+        tile[0, i] = x[i] if odd else 1.0
+        tile[1, i] = (2.0 * y - 1.0) * x[i] if odd else y
+    for k in range(2, len(tile)):
+        for i in range(len(x)):
+            y = 2.0 * x[i] * x[i] - 1.0 if even or odd else x[i]
+            tile[k, i] = 2.0 * y * tile[k - 1, i] - tile[k - 2, i]
+
+
+@kernel
+def factors(coefficients, bars, x, even, turns, left, right, share, full_period, results):
+    """The results (R x, RESULTS) of R rows at x: y1, y1', y2, y2' from their series `coefficients` (4, R, terms) within
+    `bars` (4, R); if `even`, from those of (y1 + y2') / 2, y1', y2 and, odd, (y1 - y2') / 2.
+
+    The numbers of zeros follow from `turns` (5, R, nodes), rotation numbers, and the least and the largest number of
+    zeros of y1 and of y2, at the nodes `left` and `right` of x, `share` of the way between; NaN where they do not tell.
+    """
+    _, rows, terms = coefficients.shape
+    table, odd, sums = np.empty((terms, TILE)), np.empty((terms, TILE)), np.empty((4, TILE))
+    for start in range(0, len(x), TILE):
+        count = min(TILE, len(x) - start)
+        _table(x[start : start + count], even, False, table)
+        if even:
+            _table(x[start : start + count], even, True, odd)
+        for j in range(rows):
+            for f in range(4):
+                _sum(coefficients[f, j], odd if even and f == 3 else table, sums[f], count)
+            y1_bar, dy2_bar = bars[0, j], bars[3, j]
+            if even:
+                y1_bar = dy2_bar = y1_bar + dy2_bar
+                for i in range(count):
+                    sums[0, i], sums[3, i] = sums[0, i] + sums[3, i], sums[0, i] - sums[3, i]
+            for i in range(count):
+                own = results[j * len(x) + start + i]
+                for f in range(4):
+                    own[lanes.Y1 + f] = sums[f, i]
+                own[lanes.Y1_BAR], own[lanes.DY1_BAR] = y1_bar, bars[1, j]
+                own[lanes.Y2_BAR], own[lanes.DY2_BAR] = bars[2, j], dy2_bar
+                one, other = left[start + i], right[start + i]
+                m = 0.0
+                if not full_period:
+                    m = _zeros(min(turns[1, j, one], turns[1, j, other]), max(turns[2, j, one], turns[2, j, other]),
+                               sums[0, i] < 0.0)  # fmt: skip
+                d = _zeros(min(turns[3, j, one], turns[3, j, other]), max(turns[4, j, one], turns[4, j, other]),
+                           sums[2, i] < 0.0)  # fmt: skip
+                near = turns[0, j, one] + share[start + i] * (turns[0, j, other] - turns[0, j, one])
+                own[lanes.Y1_ZEROS], own[lanes.Y2_ZEROS] = m, d
+                if not abs(m + d + 0.5 - 2.0 * near) <= 1.0:
+                    own[lanes.Y1_ZEROS] = own[lanes.Y2_ZEROS] = np.nan
+
+
+@splice
+def _zeros(low, high, odd):
+    """The number from `low` to `high`, which differ by 1 at most, that is odd or even; else NaN."""
+    value = low if (low % 2.0 == 1.0) == odd else low + 1.0
+    return value if value <= high and high - low <= 1.0 else np.nan

@@ -28,7 +28,12 @@ class Asked:
 
 
 class Answers(answers.Answers):
-    """`floats` (14, N): each of `kernels.hill.answers.FLOATS` and its error bound, if wanted; and the `verdict`."""
+    """`floats` (14, N): each of `kernels.hill.answers.FLOATS` and its error bound, if wanted; and the `verdict`.
+
+    `results` (N, RESULTS) is what they follow from, where all points were solved one by one.
+    """
+
+    results = None
 
     def __init__(self, size, asked):
         super().__init__(size, 2 * len(kernels.FLOATS), ("verdict",), np.flatnonzero(np.repeat(asked.wanted, 2)))

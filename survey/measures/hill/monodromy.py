@@ -45,6 +45,7 @@ class RowAxis:
     """An axis of `number` rows from position `low` to `high`; equal keys, and so equal axes, mean the same equations.
 
     The factors are analytic in the position; `at(positions)` is the Problem of rows there, without points of its own.
+    Where p -> -p exchanges y1 and y2', y1 - y2' is analytic when divided by `odd(positions)`, if that is given.
     """
 
     key: Hashable
@@ -52,6 +53,7 @@ class RowAxis:
     low: float
     high: float
     at: Callable = field(compare=False)
+    odd: Callable | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True)

@@ -72,6 +72,7 @@ def _solve(problem, method, asked, answers, chosen):
     answers.status[(answers.status == status.OK) & np.isnan(results[:, Y1_ZEROS])] = status.STEP_LIMIT
     answers.assess(results, rule)
     ladder.climb(rung, results, answers, again, assess)
+    answers.results = results
 
 
 def _first_steps(problem, method, asked):
