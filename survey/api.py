@@ -143,8 +143,9 @@ def evaluate(
         return _lazy(module, scene, request, given)
     grid = _grid(used, given)
     user_scene.check(module, grid)
-    ds = describe(grid, module, scene, request, solve.compute(grid, module, request))
-    return count(ds.assign_coords(_own_coordinates(given)))
+    arrays = solve.compute(grid, module, request)
+    ds, own = count(describe(grid, module, scene, request, arrays), arrays), _own_coordinates(given)
+    return ds.assign_coords(own) if own else ds
 
 
 def open(path: str | os.PathLike[str], *, trust_scene: bool = False) -> xr.Dataset:
@@ -191,7 +192,7 @@ def _labelled(key: str, value: Any) -> xr.DataArray:
         raise _not_real(key, value.values)
     if value.size == 0:
         raise BadInput(f"{short(key, 40)}: an empty array has no points; give at least one value")
-    return value.astype(float)
+    return value.astype(float) if value.chunks else value.copy(data=np.array(value.values, dtype=float))
 
 
 def _array(key: str, value: Any) -> npt.NDArray[Any]:

@@ -88,8 +88,9 @@ def solve(point, request):
         return _solve(shared, point["rho"], oblate, request, line=request.line("rho"), ends=_ends(request))
     alpha = np.asarray(point["inertia_ratio"], dtype=float)
     rho, low = rates(alpha, request.options["direction"])
+    line, ends = _line_of_rho(request), _ends(request)
     bodies = [
-        _solve(shared, np.where((alpha > 1) == oblate, rho, np.nan), oblate, request, low)
+        _solve(shared, np.where((alpha > 1) == oblate, rho, np.nan), oblate, request, low, line, ends)
         for oblate in np.unique(alpha > 1)
     ]
     return {name: np.where(alpha > 1, bodies[-1][name], bodies[0][name]) for name in bodies[0]}
@@ -136,6 +137,15 @@ def _per_orbit(out, orbits):
         out["exponent_error"] / orbits + (_PERIOD_ULPS + 4) * EPS * out["exponent_per_orbit"]
     )
     monodromy.overflow(out, out["exponent_per_orbit_error"] > LARGEST)
+
+
+def _line_of_rho(request):
+    """The axis of rho that an axis of inertia ratios gives, if it has bodies of one kind."""
+    line = request.line("inertia_ratio")
+    if line is None or line[1] <= 1 <= line[2]:
+        return None
+    rho, _ = rates(np.array(line[1:]), request.options["direction"])
+    return line[0], float(rho.min()), float(rho.max())
 
 
 def _ends(request):

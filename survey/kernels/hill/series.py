@@ -119,16 +119,30 @@ def factors(coefficients, bars, x, even, turns, left, right, share, full_period,
                 own[lanes.Y1_BAR], own[lanes.DY1_BAR] = y1_bar, bars[1, j]
                 own[lanes.Y2_BAR], own[lanes.DY2_BAR] = bars[2, j], dy2_bar
                 one, other = left[start + i], right[start + i]
-                m = 0.0
+                # -p has the rotation number of p, whose y1 is the y2' of -p
+                mirrored = even and x[start + i] < 0.0
+                y1, m = sums[3, i] if mirrored else sums[0, i], 0.0
                 if not full_period:
                     m = _zeros(min(turns[1, j, one], turns[1, j, other]), max(turns[2, j, one], turns[2, j, other]),
-                               sums[0, i] < 0.0)  # fmt: skip
+                               y1 < 0.0)  # fmt: skip
                 d = _zeros(min(turns[3, j, one], turns[3, j, other]), max(turns[4, j, one], turns[4, j, other]),
                            sums[2, i] < 0.0)  # fmt: skip
                 near = turns[0, j, one] + share[start + i] * (turns[0, j, other] - turns[0, j, one])
+                if one == other and not full_period:  # beyond the last node, where one of the two may have changed
+                    if m != m:
+                        m = _nearest(2.0 * near - 0.5 - d, y1 < 0.0)
+                    elif d != d:
+                        d = _nearest(2.0 * near - 0.5 - m, sums[2, i] < 0.0)
                 own[lanes.Y1_ZEROS], own[lanes.Y2_ZEROS] = m, d
-                if not abs(m + d + 0.5 - 2.0 * near) <= 1.0:
+                if not abs(m + d + 0.5 - 2.0 * near) <= 1.0 or (mirrored and abs(y1) <= y1_bar):
                     own[lanes.Y1_ZEROS] = own[lanes.Y2_ZEROS] = np.nan
+
+
+@splice
+def _nearest(x, odd):
+    """The odd, or even, number nearest to x."""
+    parity = 1.0 if odd else 0.0
+    return parity + 2.0 * np.floor(0.5 * (x - parity) + 0.5)
 
 
 @splice

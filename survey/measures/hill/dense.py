@@ -147,7 +147,7 @@ def _rows(problem, method, asked, answers, chosen, axis, open_points):
             good = (served >= MOST) | ((served > 0) & (at == first[rows] + RETRIES))
             degree[rows[~good]] += 1
             rows, series, bars = rows[good], np.ascontiguousarray(series[:, good]), bars[:, good]
-            turns = turns[:, good]
+            turns = None if turns is None else turns[:, good]
         if rows.size:
             _answer(problem, asked, answers, rows, series, bars, turns, axis, open_points)
 
@@ -169,16 +169,17 @@ def _answer_by_factors(problem, asked, answers, rows, series, bars, turns, axis,
     padded = np.zeros((*series.shape[:2], -(-series.shape[2] // TERMS) * TERMS))
     padded[:, :, : series.shape[2]] = series
     number = turns.shape[2] * (2 if axis.even else 1)
-    most = max(1, CALL_POINTS // x.size)
-    for first in range(0, rows.size, most):
-        some = slice(first, first + most)
-        own = rows[some]
-        points = (own[:, None] * x.size + np.arange(x.size)).reshape(-1)
-        results = _factors(padded[:, some], bars[:, some], x, axis.even, turns[:, some], number, asked.full_period)
-        found = Answers(points.size, asked)
-        found.assess(results, None if problem.rule is None else problem.rule.reshape(-1)[points])
-        answers.replace(points, found)
-        open_points[own] = (found.missed | (found.status != status.OK)).reshape(own.size, x.size)
+    rule = None if problem.rule is None else problem.rule.reshape(-1)
+    most, apart = max(1, CALL_POINTS // x.size), np.flatnonzero(np.diff(rows) != 1) + 1
+    for part in np.split(np.arange(rows.size), apart):
+        for some in (part[i : i + most] for i in range(0, part.size, most)):
+            some = slice(some[0], some[-1] + 1)
+            results = _factors(padded[:, some], bars[:, some], x, axis.even, turns[:, some], number, asked.full_period)
+            answers.assess(results, rule, first=rows[some.start] * x.size)
+    # what this leaves without an answer is solved again
+    failed = answers.status != status.OK
+    answers.status[failed] = status.OK
+    open_points[rows] = (answers.missed | failed).reshape(problem.p.shape)[rows]
 
 
 def _factors(series, bars, x, even, turns, number, full_period):
