@@ -97,15 +97,58 @@ class HillScene(FunctionScene):
         axes = self._axes(point, request) if request.method == "auto" else None
         if axes is not None:
             return self._solve_rows(point, request, axes)
+        box = self._box_axes(point, request) if request.method == "auto" else None
         shape = np.broadcast_shapes(*(np.shape(values) for values in point.values()))
         columns = [np.broadcast_to(point[p.name], shape).reshape(-1) for p in self.PARAMETERS]
         points = np.stack(columns, axis=1).astype(float)
         period, edges, slack = self._ranges(points)
+        if box is not None:
+            out = self._solve_scattered(points, box, request)
+            out["period"] = np.where(out["status"] == status.OK, period[:, None], np.nan)
+            out["period_error"] = EPS * out["period"]
+            return {name: values.reshape(shape) for name, values in out.items()}
         problem, rough = self._called(
             user_equation.problem, self.z, points, edges, period, slack, self.EVEN, self._more_digits
         )
         out = self._answers(problem, rough, period, request)
         return {name: values.reshape(shape) for name, values in out.items()}
+
+    def _solve_scattered(self, points, axes, request):
+        """The outputs (N, 1) of points on their own, from series on the box that holds them."""
+        rough = np.zeros(len(points), np.bool_)
+
+        def problem_of(left):
+            period, edges, slack = self._ranges(points[left])
+            problem, rough[left] = self._called(
+                user_equation.problem, self.z, points[left], edges, period, slack, self.EVEN, self._more_digits
+            )
+            return problem
+
+        box = user_rows.box(self.z, self.HASH, axes, points[0], self._ranges, self.EVEN)
+        position, p = np.ascontiguousarray(points[:, axes.across]), np.ascontiguousarray(points[:, axes.lane])
+        out = self._called(monodromy.solve_scattered, box, position, p, problem_of, request.rtol, request.variables)
+        out["status"] = np.where(rough[:, None], status.NO_CONVERGENCE, out["status"]).astype(np.int8)
+        return out
+
+    def _box_axes(self, point, request):
+        """The parameters on the axes of a box that holds points on their own, two of which alone differ; or None."""
+        ranges = {i: request.ranges[p.name] for i, p in enumerate(self.PARAMETERS) if p.name in request.ranges}
+        free = [i for i, p in enumerate(self.PARAMETERS) if p.name not in request.fixed]
+        if len(ranges) != 2 or set(ranges) != set(free) or callable(self.period) or callable(self.breaks):
+            return None
+        number = monodromy.boxed(min(given[0] for given in ranges.values()))
+        if number is None or any(not given[2] > given[1] for given in ranges.values()):
+            return None
+        of_z, _ = _dependence(self, self._numbers(point, request))
+        for lane, across in (free, free[::-1]):
+            if of_z[lane] <= 1 and of_z[across] <= dependence.ENTIRE:
+                return user_rows.Axes(lane, (number, *ranges[lane][1:]), across, (number, *ranges[across][1:]))
+        return None
+
+    def _numbers(self, point, request):
+        """The parameters that are single numbers; None for others."""
+        names = [p.name for p in self.PARAMETERS]
+        return tuple(float(np.ravel(point[name])[0]) if name in request.fixed else None for name in names)
 
     def _solve_rows(self, point, request, axes):
         """As `solve`, in rows along an axis of which z is a linear function."""
@@ -147,8 +190,7 @@ class HillScene(FunctionScene):
         lines = {i: line for i, line in lines.items() if line and line[0] >= LANES and line[2] > line[1]}
         if not lines:
             return None
-        numbers = tuple(float(np.ravel(point[name])[0]) if name in request.fixed else None for name in names)
-        of_z, of_ranges = _dependence(self, numbers)
+        of_z, of_ranges = _dependence(self, self._numbers(point, request))
         lanes = [i for i in lines if of_z[i] <= 1 and not of_ranges[i]]
         if not lanes:
             return None

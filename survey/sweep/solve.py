@@ -13,7 +13,10 @@ from survey.sweep.cost import points_per_block
 def solve_block(scene, request, grid, block):
     """The variables of `layout` in one block of the grid."""
     return solve_point(
-        scene, replace(request, lines=grid.lines, fixed=grid.fixed), grid.point(block), _shape(grid, block)
+        scene,
+        replace(request, lines=grid.lines, fixed=grid.fixed, ranges=grid.ranges),
+        grid.point(block),
+        _shape(grid, block),
     )
 
 

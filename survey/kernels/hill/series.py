@@ -119,23 +119,78 @@ def factors(coefficients, bars, x, even, turns, left, right, share, full_period,
                 own[lanes.Y1_BAR], own[lanes.DY1_BAR] = y1_bar, bars[1, j]
                 own[lanes.Y2_BAR], own[lanes.DY2_BAR] = bars[2, j], dy2_bar
                 one, other = left[start + i], right[start + i]
-                # -p has the rotation number of p, whose y1 is the y2' of -p
-                mirrored = even and x[start + i] < 0.0
-                y1, m = sums[3, i] if mirrored else sums[0, i], 0.0
-                if not full_period:
-                    m = _zeros(min(turns[1, j, one], turns[1, j, other]), max(turns[2, j, one], turns[2, j, other]),
-                               y1 < 0.0)  # fmt: skip
-                d = _zeros(min(turns[3, j, one], turns[3, j, other]), max(turns[4, j, one], turns[4, j, other]),
-                           sums[2, i] < 0.0)  # fmt: skip
                 near = turns[0, j, one] + share[start + i] * (turns[0, j, other] - turns[0, j, one])
-                if one == other and not full_period:  # beyond the last node, where one of the two may have changed
-                    if m != m:
-                        m = _nearest(2.0 * near - 0.5 - d, y1 < 0.0)
-                    elif d != d:
-                        d = _nearest(2.0 * near - 0.5 - m, sums[2, i] < 0.0)
-                own[lanes.Y1_ZEROS], own[lanes.Y2_ZEROS] = m, d
-                if not abs(m + d + 0.5 - 2.0 * near) <= 1.0 or (mirrored and abs(y1) <= y1_bar):
-                    own[lanes.Y1_ZEROS] = own[lanes.Y2_ZEROS] = np.nan
+                _count(
+                    own, even and x[start + i] < 0.0, full_period, near, one == other,
+                    min(turns[1, j, one], turns[1, j, other]), max(turns[2, j, one], turns[2, j, other]),
+                    min(turns[3, j, one], turns[3, j, other]), max(turns[4, j, one], turns[4, j, other]),
+                )  # fmt: skip
+
+
+@kernel
+def points(coefficients, bars, x, even, scale, turns, nodes, share, full_period, results):
+    """As `factors` at points on their own, x (2, N) across and along the rows, from series `coefficients` (4, terms
+    along, terms across) of a panel within `bars` (4); the last of the four is multiplied by `scale` (N).
+
+    `nodes` (4, N) are the two nodes across the rows, and the two along them, around each point, `share` (2, N) of the
+    way between, and `turns` (5, nodes across, nodes along).
+    """
+    _, terms, across = coefficients.shape
+    table, odd, rows = np.empty((terms, TILE)), np.empty((terms, TILE)), np.empty((across, TILE))
+    sums, part = np.empty((4, TILE)), np.empty(TILE)
+    for start in range(0, x.shape[1], TILE):
+        count = min(TILE, x.shape[1] - start)
+        _table(x[0, start : start + count], False, False, rows)
+        _table(x[1, start : start + count], even, False, table)
+        if even:
+            _table(x[1, start : start + count], even, True, odd)
+        for f in range(4):
+            for i in range(count):
+                sums[f, i] = 0.0
+            for k in range(terms):
+                _sum(coefficients[f, k], rows, part, count)
+                along = odd[k] if even and f == 3 else table[k]
+                for i in range(count):
+                    sums[f, i] += along[i] * part[i]
+        for i in range(count):
+            own, at = results[start + i], start + i
+            y1, dy2, y1_bar, dy2_bar = sums[0, i], sums[3, i], bars[0], bars[3]
+            if even:
+                dy2_bar = y1_bar = y1_bar + dy2_bar * scale[at]
+                y1, dy2 = y1 + dy2 * scale[at], y1 - dy2 * scale[at]
+            own[lanes.Y1], own[lanes.DY1], own[lanes.Y2], own[lanes.DY2] = y1, sums[1, i], sums[2, i], dy2
+            own[lanes.Y1_BAR], own[lanes.DY1_BAR] = y1_bar, bars[1]
+            own[lanes.Y2_BAR], own[lanes.DY2_BAR] = bars[2], dy2_bar
+            a, b, c, d = nodes[0, at], nodes[1, at], nodes[2, at], nodes[3, at]
+            low = turns[0, a, c] + share[0, at] * (turns[0, b, c] - turns[0, a, c])
+            high = turns[0, a, d] + share[0, at] * (turns[0, b, d] - turns[0, a, d])
+            _count(
+                own, even and x[1, at] < 0.0, full_period, low + share[1, at] * (high - low), c == d,
+                min(min(turns[1, a, c], turns[1, b, c]), min(turns[1, a, d], turns[1, b, d])),
+                max(max(turns[2, a, c], turns[2, b, c]), max(turns[2, a, d], turns[2, b, d])),
+                min(min(turns[3, a, c], turns[3, b, c]), min(turns[3, a, d], turns[3, b, d])),
+                max(max(turns[4, a, c], turns[4, b, c]), max(turns[4, a, d], turns[4, b, d])),
+            )  # fmt: skip
+
+
+@splice
+def _count(own, mirrored, full_period, near, beyond, m_low, m_high, d_low, d_high):
+    """Numbers of zeros, NaN where they are not known: between these of y1, and of y2, at nodes around the point, or
+    `beyond` the last. `near` is the rotation number between those of nodes.
+
+    A point -p, `mirrored`, has the rotation number of p, whose y1 is the y2' of -p.
+    """
+    y1, m = own[lanes.DY2] if mirrored else own[lanes.Y1], 0.0
+    if not full_period:
+        m = _zeros(m_low, m_high, y1 < 0.0)
+    d = _zeros(d_low, d_high, own[lanes.Y2] < 0.0)
+    if beyond and not full_period:  # one of the two may have changed
+        if m != m:
+            m = _nearest(2.0 * near - 0.5 - d, y1 < 0.0)
+        elif d != d:
+            d = _nearest(2.0 * near - 0.5 - m, own[lanes.Y2] < 0.0)
+    known = abs(m + d + 0.5 - 2.0 * near) <= 1.0 and not (mirrored and abs(y1) <= own[lanes.Y1_BAR])
+    own[lanes.Y1_ZEROS], own[lanes.Y2_ZEROS] = (m, d) if known else (np.nan, np.nan)
 
 
 @splice

@@ -25,7 +25,7 @@ import numpy as np
 
 from survey import status
 from survey.kernels.hill import answers as kernels
-from survey.kernels.hill.series import TERMS, discriminants, factors
+from survey.kernels.hill.series import TERMS, discriminants, factors, points
 from survey.kernels.jit import wait_for_other_compiler
 from survey.kernels.lanes import RESULTS, Y1_ZEROS
 from survey.kernels.math import chebyshev
@@ -71,9 +71,9 @@ def serves(problem, asked):
     return problem.line is not None and problem.line[2] > problem.line[1]
 
 
-def _sought(asked):
+def _sought(asked, factors_only=False):
     named = {name for name, wanted in zip(kernels.FLOATS, asked.wanted, strict=True) if wanted}
-    if named <= ANSWERS:
+    if named <= ANSWERS and not factors_only:
         return Sought((kernels.DISCRIMINANT,))
     return Sought(tuple(kernels.FACTOR_ROWS.tolist()), "rotation_number" in named)
 
@@ -109,6 +109,33 @@ def solve(problem, method, asked, answers):
             rows = _surfaces(problem, method, asked, answers, rows, axis, open_points)
         _rows(problem, method, asked, answers, rows, axis, open_points)
     return open_points.reshape(-1)
+
+
+def scattered(box, method, asked, answers, position, p):
+    """Answer points on their own (N each) from the series of their `box`; returns those (N, bool) to be solved."""
+    sought, axis, open_points = _sought(asked, factors_only=True), _axis(box.line, box.even), np.ones(p.size, np.bool_)
+    with _ONE_AT_A_TIME:
+        served = panels(box.row_axis, method, asked.rtol, axis, sought)
+    for low, high, series, bars, turns in served:
+        inside = np.flatnonzero(open_points & (position >= low) & (position <= high))
+        padded = np.zeros((4, series.shape[2], -(-series.shape[1] // TERMS) * TERMS))
+        padded[:, :, : series.shape[1]] = series.transpose(0, 2, 1)
+        for some in np.split(inside, range(CALL_POINTS, inside.size, CALL_POINTS)):
+            x = np.stack(
+                [(position[some] - 0.5 * (low + high)) / (0.5 * (high - low)), (p[some] - axis.middle) / axis.radius]
+            )
+            odd, results = _odd(box.row_axis, axis, position[some]), np.empty((some.size, RESULTS))
+            number = turns.shape[2] * (2 if axis.even else 1)
+            *across, one = _between(x[0], turns.shape[1], turns.shape[1])
+            *along, other = _between(abs(x[1]) if axis.even else x[1], number, turns.shape[2])
+            around, share = np.stack([*across, *along]), np.stack([one, other])
+            points(padded, bars, x, axis.even, odd, turns, around, share, box.full_period, results)
+            found = Answers(some.size, asked)
+            found.assess(results, None)
+            good = np.flatnonzero(~found.missed & (found.status == status.OK))
+            answers.replace(some[good], found, good)
+            open_points[some[good]] = False
+    return open_points
 
 
 @dataclass(frozen=True)

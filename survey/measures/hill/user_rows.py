@@ -78,6 +78,12 @@ def _row_axis(z, key, axes, points, ranges, even):
     return monodromy.RowAxis((key, axes, others), *axes.row_line, at=rows_at)
 
 
+def box(z, key, axes, point, ranges, even):
+    """The box of points on their own between the ends of both axes; all other parameters are those of a `point`."""
+    row_axis = _row_axis(z, key, axes, point[None], ranges, even)
+    return monodromy.Box(row_axis, axes.line, full_period=not even)
+
+
 def _bound(low_square, high_square, low, high):
     """Bounds (R, 3) of z by |p|, of what is at most these squares of frequencies at both ends, and a mean between."""
     slope = (high_square - low_square) / (high - low)
