@@ -16,7 +16,7 @@ from survey import measures, status
 from survey.errors import BadInput
 from survey.file import disk, reading, schema
 from survey.file.labels import count, counts, describe, flag_codes, layout, percent
-from survey.grid import Grid, lines
+from survey.grid import Grid, fixed, lines, ranges
 from survey.request import trust, user_scene
 from survey.request.checks import check_options, check_parameters, check_request, methods_of
 from survey.request.function_scene import FunctionScene
@@ -143,8 +143,9 @@ def evaluate(
         return _lazy(module, scene, request, given)
     grid = _grid(used, given)
     user_scene.check(module, grid)
-    ds = describe(grid, module, scene, request, solve.compute(grid, module, request))
-    return count(ds.assign_coords(_own_coordinates(given)))
+    arrays = solve.compute(grid, module, request)
+    ds, own = count(describe(grid, module, scene, request, arrays), arrays), _own_coordinates(given)
+    return ds.assign_coords(own) if own else ds
 
 
 def open(path: str | os.PathLike[str], *, trust_scene: bool = False) -> xr.Dataset:
@@ -191,7 +192,7 @@ def _labelled(key: str, value: Any) -> xr.DataArray:
         raise _not_real(key, value.values)
     if value.size == 0:
         raise BadInput(f"{short(key, 40)}: an empty array has no points; give at least one value")
-    return value.astype(float)
+    return value.astype(float) if value.chunks else value.copy(data=np.array(value.values, dtype=float))
 
 
 def _array(key: str, value: Any) -> npt.NDArray[Any]:
@@ -255,7 +256,8 @@ def _lazy(module: Any, scene: str, request: Request, given: dict[str, xr.DataArr
     """The same dataset, its values computed block by block when they are asked for."""
     table = layout(module, request)
     names = list(given)
-    request = replace(request, lines=lines({name: (array.dims, array) for name, array in given.items()}))
+    axes = {name: (array.dims, array) for name, array in given.items()}
+    request = replace(request, lines=lines(axes), fixed=fixed(axes), ranges=ranges(axes))
 
     def solve_arrays(*arrays: Any) -> tuple[Any, ...]:
         shape = np.broadcast_shapes(*(array.shape for array in arrays))
