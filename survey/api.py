@@ -44,7 +44,9 @@ def run(
     output : path of the netCDF file, instead of the workflow's.
     workers : number of worker processes; by default threads of this process.
     scheduler : address or scheduler file of a dask.distributed cluster.
-    fresh : delete the finished blocks of an earlier, interrupted run.
+    fresh : replace what earlier runs have left at the output: a finished file, or the blocks of an interrupted run.
+        Otherwise a finished file of the same workflow is returned as it is (nothing is computed, pictures are drawn
+        again), and one of another workflow is refused.
     block_timeout : seconds after which a worker process that has not finished its block is replaced (five minutes more
         for its first, to compile); by default 20 times the longest block so far, and at least five minutes.
 

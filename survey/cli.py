@@ -73,7 +73,7 @@ def program():
     metavar="SECONDS",
     help="Replace a worker that takes longer for a block; by default 20 times the longest so far, at least 5 minutes.",
 )
-@click.option("--fresh", is_flag=True, help="Delete the finished blocks of an earlier, interrupted run.")
+@click.option("--fresh", is_flag=True, help="Replace what earlier runs left: the file or its blocks.")
 @click.option("--quiet", is_flag=True, help="No progress and no closing lines.")
 def run(workflow, output, overrides, workers, scheduler, block_timeout, fresh, quiet):
     """Run, or resume, a sweep; write OUT.nc and the pictures that the workflow requests."""
@@ -309,7 +309,7 @@ def _draw(workflow):
 def _summarise(finished, paths):
     """Print the files written, the counts, and the times."""
     if finished.already_complete:
-        err.print(f"{paths.pop(0)}: already complete; removed what the run that wrote it had left", markup=False)
+        err.print(f"{paths.pop(0)}: already complete; nothing was computed", markup=False)
     for path in paths:
         err.print(f"wrote {path}", markup=False)
     attributes = finished.attributes
@@ -328,6 +328,8 @@ def _summarise(finished, paths):
         err.print(f"edges: {curves} could not be followed to the map's border (curve_complete = 0)")
     if "edge_left_out" in attributes:
         err.print(f"edges: not searched for {attributes['edge_left_out']}, where they accumulate", markup=False)
+    if finished.already_complete:
+        return
     times = {"compiling": finished.compiling, "kernels": finished.computing, "file": finished.writing}
     times |= {"edges and cells": finished.edges_and_cells} if finished.edges_and_cells else {}
     err.print(", ".join(f"{name} {seconds:.1f} s" for name, seconds in times.items()))
