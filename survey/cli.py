@@ -74,19 +74,24 @@ def program():
     help="Replace a worker that takes longer for a block; by default 20 times the longest so far, at least 5 minutes.",
 )
 @click.option("--fresh", is_flag=True, help="Replace what earlier runs left: the file or its blocks.")
+@click.option("--reuse", metavar="FILE.nc", help="Take the points that this file of an earlier run holds from it.")
 @click.option("--quiet", is_flag=True, help="No progress and no closing lines.")
-def run(workflow, output, overrides, workers, scheduler, block_timeout, fresh, quiet):
+def run(workflow, output, overrides, workers, scheduler, block_timeout, fresh, reuse, quiet):
     """Run, or resume, a sweep; write OUT.nc and the pictures that the workflow requests."""
+    from survey.request import earlier
     from survey.request.workflow import read
     from survey.sweep import engine
     from survey.sweep.progress import Progress
 
     checked, finished = read(workflow, overrides, output), None
     resume_command = shlex.join(["survey", *(word for word in sys.argv[1:] if word != "--fresh")])
+    held, told = earlier.find(checked, reuse) if reuse else (None, "")
+    if told and not quiet:
+        err.print(plain(told), markup=False)
     _stop_on_sigterm()
     try:
         with Progress(err, checked, silent=quiet) as progress:
-            finished = engine.run(checked, workers, scheduler, fresh, progress, resume_command, block_timeout)
+            finished = engine.run(checked, workers, scheduler, fresh, progress, resume_command, block_timeout, held)
             pictures = _draw(checked)
     except KeyboardInterrupt as stop:
         traceback.clear_frames(stop.__traceback__)  # the semaphores they hold would be reported as leaked

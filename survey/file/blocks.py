@@ -29,18 +29,18 @@ class Blocks:
     another survey (unless `fresh`), Damaged if their survey is unknown. For users, the folder also keeps `about`, the
     text of the `workflow`, and `resume_command`. If the output is complete and of the same workflow, `published` holds
     its attributes, and all that remains is to `remove` what a run may have left. A complete output of another one is
-    refused, unless `fresh`, or blocks of this run show that its replacement has begun.
+    refused, unless `fresh`, or this run `replaces` it, or its blocks show that it was asked to.
     """
 
-    def __init__(self, path, fingerprint, fresh=False, about=None, workflow="", resume_command=None, text=None):
+    def __init__(
+        self, path, fingerprint, fresh=False, about=None, workflow="", resume_command=None, text=None, replaces=False
+    ):
         self.folder = unfinished.folder_of(path)
         self.path = Path(path)
         self.fingerprint = {"format": FORMAT, **fingerprint}
         self.identity = _hash(self.fingerprint)
-        # of the output, which does not depend on how it was cut into blocks
-        of_output = self.fingerprint.keys() - {"format", "block_geometry"}
-        self.of_output = _hash({key: self.fingerprint[key] for key in of_output})
-        self.fresh = fresh
+        self.of_output = of_output(fingerprint)
+        self.fresh, self.replaces = fresh, replaces
         self.about, self.workflow, self.text = about or {}, workflow, text
         name = {"host": socket.gethostname(), "pid": os.getpid(), "run": uuid.uuid4().hex}
         self.lock = lock.Lock(f"{path}.lock", name)
@@ -161,7 +161,7 @@ class Blocks:
             clear(self.folder)
         files = [file for file in self.folder.glob("*") if file.suffix in (".block", ".extra")]
         self._refuse_other_survey(files)
-        if not self.fresh and self._complete(bool(files)):
+        if not self.fresh and self._complete(bool(files) or self.replaces):
             return
         if not files:  # then nothing is lost
             clear(self.folder)
@@ -221,6 +221,11 @@ class Blocks:
             write_atomically(digest, line, self.folder)
         self.published = found
         return True
+
+
+def of_output(fingerprint):
+    """Hash of what decides the values of an output, which does not depend on how it was cut into blocks."""
+    return _hash({key: value for key, value in fingerprint.items() if key != "block_geometry"})
 
 
 def _hash(table):

@@ -69,6 +69,6 @@ def refuse(path, found, workflow, code, scene_hash):
     points = found.get("points")
     many = f" of {points:,} points" if isinstance(points, (int, np.integer)) else ""
     raise BadInput(
-        f"{path} is a finished survey{many} {' and '.join(causes)}; write another file with -o, or replace it with "
-        "--fresh (in Python, output= or fresh=True)"
+        f"{path} is a finished survey{many} {' and '.join(causes)}; write another file with -o, replace it with "
+        f"--fresh, or extend it with --reuse {path} (in Python output=, fresh=True, reuse=)"
     )
