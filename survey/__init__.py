@@ -20,6 +20,7 @@ from importlib import import_module
 
 _HOME = {"run": "survey.api", "evaluate": "survey.api", "open": "survey.api", "hill": "survey.request.user_scene"}
 _HOME |= {name: "survey.request.user_scene" for name in ("abel", "floquet", "orbit")}
+_HOME |= {"concat": "survey.analysis.join"}
 _HOME |= {
     "SurveyError": "survey.errors",
     "BadInput": "survey.errors",

@@ -231,6 +231,18 @@ def plot(path, output, var, style, width, at):
 
 
 @program.command()
+@click.argument("paths", metavar="A.nc B.nc...", nargs=-1, required=True)
+@click.option("-o", "--output", metavar="C.nc", required=True, help="The netCDF file to write; it must not exist.")
+def merge(paths, output):
+    """Join surveys that differ in the values of one axis, or in one fixed parameter, into one file."""
+    from survey.analysis import join
+
+    joined = join.merge(paths, output)
+    err.print(plain(f"{output}: {counted(joined.status.size, 'point')} of {len(paths)} files"), markup=False)
+    out.print(plain(str(output)), markup=False)
+
+
+@program.command()
 @click.argument("path", metavar="OUT.nc")
 @click.option("--port", type=click.IntRange(0, 65535), default=5006, show_default=True, help="0 for any free port.")
 @click.option("--link", default="", help="The address of an earlier view, to open it again.")
