@@ -154,6 +154,17 @@ class Point:
         except (ArithmeticError, LookupError, TypeError, ValueError):
             return "the values in the file do not belong to this scene"
 
+    @property
+    def margin(self):
+        """The nearest boundary in each parameter, in words; "" where none is known, or finding it takes seconds."""
+        from survey.analysis import edge
+
+        try:
+            found = edge.margin(self.dataset) if edge.is_quick(self.dataset) else None
+        except BadInput:
+            return ""
+        return edge.in_words(found) if found is not None else ""
+
     def __repr__(self):
         rows = [tuple(map(plain, row)) for row in self._rows()]
         width = max((len(f"{name} = {value}") for name, value, about in rows if about), default=0)
@@ -177,6 +188,8 @@ class Point:
         yield "why", self.why, ""
         if int(ds.status) == status.OK:
             yield "status", "ok", ""
+            if self.margin:
+                yield "nearest boundaries", self.margin, ""
         settings = [f"{key} = {value}" for key, value in options_of(ds).items()]
         settings += [f"method {ds.attrs.get('method', 'auto')}", f"rtol {ds.attrs.get('rtol', float('nan')):g}"]
         yield "solved with", ", ".join(settings), ""
