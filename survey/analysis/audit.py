@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from survey import status
-from survey.analysis.point import options_at
+from survey.analysis.given import options_at
 from survey.api import evaluate
 from survey.errors import Damaged
 from survey.file import schema

@@ -7,9 +7,9 @@ import numpy as np
 import xarray as xr
 
 from survey import measures, modules
-from survey.analysis.point import options_at, parameters
+from survey.analysis.given import options_at, parameters
 from survey.errors import BadInput
-from survey.file.labels import flag_attributes, flag_codes
+from survey.file.labels import flag_attributes
 from survey.request import user_scene
 from survey.request.checks import check_options, check_parameters
 from survey.request.edges_and_cells import check_even

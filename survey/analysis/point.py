@@ -8,10 +8,11 @@ import numpy as np
 import xarray as xr
 
 from survey import modules, status
+from survey.analysis import edge
+from survey.analysis.given import parameters
 from survey.errors import BadInput, Damaged, Untrusted
 from survey.file.labels import UNDECIDED, error_bars, fill_of, flag_codes, options_of
 from survey.request import user_scene
-from survey.request.checks import check_options
 from survey.wording import plain
 
 MAX_ROWS = 1000  # of one output
@@ -99,16 +100,6 @@ def meaning(variable):
     return words.get(int(variable), str(int(variable)))
 
 
-def options_at(ds, scene):
-    """{name: value} of all options of the scene, as in the file; raises BadInput for unknown ones."""
-    return check_options(scene, options_of(ds), [p.name for p in scene.PARAMETERS if p.name in ds.coords])
-
-
-def parameters(ds):
-    """{name: value} of a point's parameters."""
-    return {name: float(c) for name, c in ds.coords.items() if c.ndim == 0 and c.dtype.kind in "fi"}
-
-
 @dataclass(frozen=True, repr=False)
 class Point:
     """Everything known about one point; print it, or show it in a notebook.
@@ -157,8 +148,6 @@ class Point:
     @property
     def margin(self):
         """The nearest boundary in each parameter, in words; "" where none is known, or finding it takes seconds."""
-        from survey.analysis import edge
-
         try:
             found = edge.margin(self.dataset) if edge.is_quick(self.dataset) else None
         except BadInput:

@@ -6,7 +6,7 @@ import warnings
 import numpy as np
 
 from survey import api, modules
-from survey.analysis.point import options_at
+from survey.analysis.given import options_at
 from survey.errors import BadInput, Damaged
 from survey.file.labels import count, describe
 from survey.grid import coordinates, logarithmic
