@@ -43,7 +43,7 @@ def _check_closed(measure, scene, name, table, axes, given):
         second_axis(measure, scene, names[0], fixed)
     elif len(names) != 1:
         stacks = [[*names[:2], third] for third in names[2:]] or [names]  # further axes make a stack of maps
-        refusal = next(filter(None, map(measure.refusal, stacks)), None)
+        refusal = next(filter(None, (measure.refusal(stack, scene) for stack in stacks)), None)
     if refusal:
         raise BadInput(f"boundaries: of {name} {refusal}; change the axes, or leave the table out")
     if table.axis is not None:

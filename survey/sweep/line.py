@@ -58,9 +58,10 @@ def on_line(scene, options, along, ends, fixed):
 def second_axis(measure, scene, along, fixed):
     """The parameter that spans a map with `along` on which curves are known; raises BadInput if there is none."""
     for p in scene.PARAMETERS:
-        if p.name != along and np.isfinite(fixed.get(p.name, np.nan)) and measure.refusal([along, p.name]) is None:
+        known = p.name != along and np.isfinite(fixed.get(p.name, np.nan))
+        if known and measure.refusal([along, p.name], scene) is None:
             return p.name
-    raise BadInput(f"no boundaries are known along {along}: {measure.refusal([along])}")
+    raise BadInput(f"no boundaries are known along {along}: {measure.refusal([along], scene)}")
 
 
 def _bounds(parameter, value):

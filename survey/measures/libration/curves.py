@@ -19,9 +19,9 @@ ALONG = ()
 LINES = 129
 
 
-def refusal(axes):
+def refusal(axes, scene):
     """Why there are no curves on a map of these axes, in words; None if there are."""
-    if len(axes) == 2 and set(axes) == set(AXES):
+    if scene.FAMILY == "danby" and set(axes) == set(AXES) and len(axes) == 2:
         return None
     return f"curves are known on the axes mu and e of libration_elliptic, not on {', '.join(axes) or 'none'}"
 
