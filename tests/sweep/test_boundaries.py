@@ -227,10 +227,10 @@ def test_a_row_of_its_own(tmp_path):
         ),
         ({"boundaries": {"axis": "rhoo"}}, r"boundaries.axis: unknown axis 'rhoo'; did you mean 'rho'"),
         ({"boundaries": {"axes": "rho"}}, r"unknown key boundaries.axes; did you mean 'axis'"),
-        ({"axes": {"k": 0.5, "rho": 1.0}}, r"boundaries: they are drawn on one axis or two"),
+        ({"axes": {"k": 0.5, "rho": 1.0}}, r"boundaries: they are drawn along an axis, and there is none"),
         (
             {"scene": "libration", "axes": {"mu": {"values": [0.01, 0.02]}}, "options": {}},
-            r"no boundary curves are known for the scene libration",
+            r"no boundaries are known along mu: curves are known on the axes mu and e of libration_elliptic",
         ),
     ],
 )
