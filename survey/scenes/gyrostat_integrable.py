@@ -7,6 +7,9 @@ trigonometric  (58)-(61): A11 phi' = mu (B12 sin phi + B31 cos phi - S2 B31 / C2
 elliptic       (62)-(68): A11 phi'^2 = n + (C22 - C33) cos 2phi / 2 - C23 sin 2phi + 2 S2 sin phi + 2 S3 cos phi
 quartic        (64)-(68): u'^2 = P4(u) / 4 of u = tan(phi / 2), P4 = a0 u^4 + 4 a1 u^3 + 6 a2 u^2 + 4 a3 u + a4
 
+Model: the flow of the scene `gyrostat`, itself a reduction of the whole body, where further conditions on the constants
+give closed forms. Without these conditions: `gyrostat`.
+
 Parameters, in order: A11; B12, B31; theta0, the angle between the axis of rotation and the vertical; n, or instead of
 it k, the constant of (7), which with lambda1 gives n = k / cos theta0 - lambda1; C22, C33, C23; S2, S3; the quartic's
 a0, a1, a2, a3, a4; phi0; w0, where the energy leaves it free; t. At phi0 the constants give phi' but, where its square
