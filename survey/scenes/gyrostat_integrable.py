@@ -24,7 +24,8 @@ the invariants g2, g3; the discriminant of P4 is 256 G. G < 0: two real roots; G
 a separatrix, or a degenerate rest. Where the constants make G exactly 0 (all a0 to a4, or the others at phi0 = 0) the
 solution is that on the separatrix, (66), exactly.
 
-Source: M. E. Lesina, Ya. V. Zinovyeva, "The gyrostat with Barnett-London effect" (2004), corrected in `gyrostat.md`.
+Source: M. E. Lesina, Ya. V. Zinovyeva, "The gyrostat with Barnett-London effect" (2004), corrected in `gyrostat.md`;
+`gyrostat_integrable.md` beside this file.
 The conditions under which a body moves so are checked by the scene `gyrostat_body`; the scene `gyrostat` takes the
 outputs reduced_NAME. All error bars cover the rounding of the reduction.
 """
