@@ -15,7 +15,8 @@ import survey.scenes
 from survey import measures, status
 from survey.errors import BadInput
 from survey.file import disk, reading, schema
-from survey.file.labels import count, counts, describe, flag_codes, layout, percent
+from survey.file.labels import count, counts, flag_codes, layout, percent
+from survey.file.labels import describe as labelled
 from survey.grid import Grid, lines
 from survey.request import earlier, trust, user_scene
 from survey.request.checks import check_options, check_parameters, check_request, methods_of
@@ -150,7 +151,7 @@ def evaluate(
         return _lazy(module, scene, request, given)
     grid = _grid(used, given)
     user_scene.check(module, grid)
-    ds = describe(grid, module, scene, request, solve.compute(grid, module, request))
+    ds = labelled(grid, module, scene, request, solve.compute(grid, module, request))
     return count(ds.assign_coords(_own_coordinates(given)))
 
 
@@ -284,7 +285,7 @@ def _lazy(module: Any, scene: str, request: Request, given: dict[str, xr.DataArr
     sizes = dict(zip(results[-1].dims, results[-1].shape, strict=True))
     values = {key: (array.dims, array.data) for key, array in given.items()}
     data = {name: array.data for name, array in arrays.items()}
-    return describe(Grid(sizes, values), module, scene, request, data).assign_coords(_own_coordinates(given))
+    return labelled(Grid(sizes, values), module, scene, request, data).assign_coords(_own_coordinates(given))
 
 
 def scene(name: Any) -> dict[str, Any]:
@@ -308,6 +309,33 @@ def scene(name: Any) -> dict[str, Any]:
         | {m: _method_line(module, m) for m in methods_of(module)},
         "references": list(module.REFERENCES),
     }
+
+
+class Description(dict[str, Any]):
+    """What `describe` returns: a mapping, shown as a table."""
+
+    def __repr__(self) -> str:
+        lines = [f"{self['name']}: {self['title']}"]
+        for heading in ("parameters", "options", "outputs", "status", "methods"):
+            rows = self[heading]
+            width = max(map(len, rows), default=0)
+            lines += ["", f"{heading}:", *(f"  {key:<{width}}  {text}" for key, text in rows.items())] if rows else []
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        from survey.show import notebook
+
+        rows = [(heading, key, text) for heading in ("parameters", "options", "outputs", "status", "methods")
+                for key, text in self[heading].items()]  # fmt: skip
+        return str(notebook.table(f"{self['name']}: {self['title']}", rows))
+
+
+def describe(scene: Any) -> Description:
+    """A scene's parameters, options, outputs, statuses and methods, shown as a table: `survey.describe("satellite")`.
+
+    `scene` is what `survey.evaluate` takes. The result is a mapping, with the equations under "about".
+    """
+    return Description(globals()["scene"](scene))
 
 
 def summary(ds: xr.Dataset) -> dict[str, Any]:

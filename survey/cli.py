@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from survey import __version__
 from survey.errors import BadInput, SurveyError, Untrusted
 from survey.wording import counted, plain, reason_of
 
@@ -56,7 +57,7 @@ def complain(message, code):
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(package_name="survey")
+@click.version_option(__version__, prog_name="survey")
 def program():
     """Stability maps of mechanical systems: every point with an error bar, and a verdict that respects it."""
 

@@ -8,6 +8,7 @@ from importlib.metadata import version
 
 import numpy as np
 
+from survey import __version__
 from survey.errors import Stopped
 from survey.kernels import jit
 from survey.sweep.cost import block_geometry
@@ -16,7 +17,7 @@ from survey.sweep.cost import block_geometry
 @cache
 def code_version():
     """What identifies the code that solves blocks: it must be the same on every worker, but not the processor."""
-    return {"survey": version("survey"), "sources": jit.SOURCE_HASH}
+    return {"survey": __version__, "sources": jit.SOURCE_HASH}
 
 
 def compilers():
