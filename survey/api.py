@@ -18,7 +18,7 @@ from survey.file import disk, reading, schema
 from survey.file.labels import count, counts, flag_codes, layout, percent
 from survey.file.labels import describe as labelled
 from survey.grid import Grid, lines
-from survey.request import earlier, trust, user_scene
+from survey.request import earlier, physical, trust, user_scene
 from survey.request.checks import check_options, check_parameters, check_request, methods_of
 from survey.request.function_scene import FunctionScene
 from survey.request.hill_scene import is_number
@@ -137,7 +137,8 @@ def evaluate(
     """
     scene, module = user_scene.find(scene)
     names = {option.name for option in module.OPTIONS}
-    given = {key: _labelled(key, value) for key, value in parameters.items() if key not in names}
+    named = {key: value for key, value in parameters.items() if key not in names}
+    given = {key: _labelled(key, value) for key, value in physical.resolved(module, named).items()}
     options = check_options(module, {key: parameters[key] for key in parameters if key in names}, given)
     used = check_parameters(module, scene, options, given)
     if variables is not None:
@@ -234,7 +235,8 @@ def _check_dimensions(module: Any, given: dict[str, xr.DataArray]) -> None:
 def _check_single_values(used: dict[str, Parameter], given: dict[str, xr.DataArray]) -> None:
     for key, array in given.items():
         if array.ndim == 0 and not array.chunks and not used[key].holds(array.values):
-            raise BadInput(f"{key} = {float(array):g} is outside its domain; allowed: {used[key].domain}")
+            raise BadInput(f"{key} = {float(array):g} is outside its domain; allowed: {used[key].domain}"
+                           f"{physical.hint(used[key], float(array))}")  # fmt: skip
 
 
 def _grid(used: dict[str, Parameter], given: dict[str, xr.DataArray]) -> Grid:
@@ -295,7 +297,7 @@ def scene(name: Any) -> dict[str, Any]:
         "name": name,
         "title": module.TITLE,
         "about": inspect.cleandoc(module.__doc__),
-        "parameters": {p.name: _parameter_line(module, p) for p in module.PARAMETERS},
+        "parameters": {p.name: _parameter_line(module, p) for p in module.PARAMETERS} | physical.described(module),
         "options": {
             o.name: f"{o.long_name}: {' | '.join(o.choices)} (default {o.default}){_option_condition(o)}"
             for o in module.OPTIONS
@@ -378,7 +380,7 @@ def _option_condition(option: Option) -> str:
 
 
 def _parameter_line(module: Any, p: Parameter) -> str:
-    unit = " (no unit)" if p.units == "1" else f" ({p.units})"
+    unit = " (any consistent units)" if p.units == "1" else f" ({p.units})"
     need = (
         f"default {p.default:g}"
         if p.default is not None

@@ -6,6 +6,7 @@ import numpy as np
 
 from survey.errors import BadInput
 from survey.grid import Grid, check_axis, coordinates
+from survey.request import physical
 from survey.request.schema import Listed, Spread
 from survey.wording import shown
 
@@ -47,7 +48,8 @@ def check_domain(parameter, values):
     ends = np.atleast_1d(values)[[0, -1]]
     for value in ends[~parameter.holds(ends)]:
         what = "is" if np.ndim(values) == 0 else "has an end"
-        raise BadInput(f"axes.{parameter.name} {what} {value:g}, outside its domain; allowed: {parameter.domain}")
+        raise BadInput(f"axes.{parameter.name} {what} {value:g}, outside its domain; allowed: {parameter.domain}"
+                       f"{physical.hint(parameter, float(value))}")  # fmt: skip
 
 
 def grid_of(parameters, given):

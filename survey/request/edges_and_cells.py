@@ -78,7 +78,7 @@ def check_refine(scene, name, file, given):
     if len(axes) != 2 or min(values.size for values in axes.values()) < 2:
         raise BadInput("refine: cells need exactly two axes of two values or more; fix the other parameters")
     widths = _check_width_table(file.refine.width, axes)
-    return {key: _fraction(widths, key, values, file.axes[key]) for key, values in axes.items()}
+    return {key: _fraction(widths, key, values, file.axes.get(key)) for key, values in axes.items()}
 
 
 def _check_width_table(widths, axes):
