@@ -24,6 +24,10 @@ class Survey:
                 "this dataset was not written by survey: it has no status, or no attribute scene "
                 "(arithmetic drops attributes: xr.set_options(keep_attrs=True) keeps them)"
             )
+        stacked = [dim for dim in ds.status.dims if dim in ds.coords and ds[dim].dtype == object
+                   and ds[dim].size and isinstance(ds[dim].values.flat[0], tuple)]  # fmt: skip
+        if stacked:
+            raise BadInput(f"this survey is stacked along {stacked[0]}: give it its axes back with .unstack()")
         schema.check(ds, complete=False)
         self._ds = ds
 

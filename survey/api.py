@@ -32,7 +32,7 @@ def run(
     workflow: str | os.PathLike[str] | Mapping[str, Any],
     output: str | os.PathLike[str] | None = None,
     workers: int | None = None,
-    scheduler: str | None = None,
+    scheduler: Any = None,
     fresh: bool = False,
     block_timeout: float | None = None,
     reuse: str | os.PathLike[str] | None = None,
@@ -45,7 +45,7 @@ def run(
         `survey.abel`, `survey.floquet` or `survey.orbit` returns).
     output : path of the netCDF file, instead of the workflow's.
     workers : number of worker processes; by default threads of this process.
-    scheduler : address or scheduler file of a dask.distributed cluster.
+    scheduler : address or scheduler file of a dask.distributed cluster, or a Client of it.
     fresh : replace what earlier runs have left at the output: a finished file, or the blocks of an interrupted run.
         Otherwise a finished file of the same workflow is returned as it is (nothing is computed, pictures are drawn
         again), and one of another workflow is refused.
@@ -64,6 +64,9 @@ def run(
     ------
     survey.BadInput, survey.Damaged, survey.Stopped (resumable): one line each.
     """
+    if isinstance(workflow, (xr.Dataset, xr.DataArray)):
+        raise BadInput("run: this is a dataset, not a workflow; give the path of a workflow file, or a mapping; "
+                       "ds.survey.zoom() and survey.evaluate solve further points")  # fmt: skip
     checked = (read if isinstance(workflow, (str, os.PathLike)) else check)(workflow, output=output)
     if workers is not None and (not isinstance(workers, int) or workers < 1):
         raise BadInput(f"workers = {shown(workers)}: it must be a positive integer, or None for threads")
@@ -135,6 +138,8 @@ def evaluate(
     >>> ds.verdict.dims
     ('k',)
     """
+    if isinstance(scene, (xr.Dataset, xr.DataArray)):
+        raise BadInput("evaluate: this is a dataset, not a scene; give a scene's name first, such as 'satellite'")
     scene, module = user_scene.find(scene)
     names = {option.name for option in module.OPTIONS}
     named = {key: value for key, value in parameters.items() if key not in names}
@@ -152,7 +157,13 @@ def evaluate(
         return _lazy(module, scene, request, given)
     grid = _grid(used, given)
     user_scene.check(module, grid)
-    ds = labelled(grid, module, scene, request, solve.compute(grid, module, request))
+    try:
+        ds = labelled(grid, module, scene, request, solve.compute(grid, module, request))
+    except MemoryError:
+        raise BadInput(
+            f"evaluate: {counted(grid.points, 'point')} do not fit in memory; use survey.run, which writes a file, or "
+            "dask arrays (DataArray.chunk), or fewer points or variables"
+        ) from None
     return count(ds.assign_coords(_own_coordinates(given)))
 
 

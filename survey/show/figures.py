@@ -16,7 +16,9 @@ from survey.show.layout import alone, fit
 from survey.show.maps import draw_map
 from survey.show.profiles import draw_profile
 from survey.show.style import figure_size, style_named
-from survey.show.text import title_of
+from survey.show.text import literal, title_of
+
+MOST_LABELS = 30  # on an axis
 
 
 def save(ds, path, name=None, style=None, width="single"):
@@ -44,6 +46,11 @@ def onto(axes, ds, name=None, boundaries=True, style=None, across=(None, None), 
     name = name or ("verdict" if "verdict" in ds else drawable[0])
     if name not in drawable:
         raise BadInput(modules.unknown("variable", name, drawable))
+    labels = {dim: [str(label) for label in ds[dim].values] for dim in ds.status.dims
+              if dim in ds.coords and ds[dim].dtype.kind not in "iuf"}  # fmt: skip
+    for dim in ds.status.dims:
+        if dim in labels or dim not in ds.coords:
+            ds = ds.drop_vars(dim, errors="ignore").assign_coords({dim: np.arange(ds.sizes[dim])})
     part, variable, state = _flat(ds, name, _chosen(ds, across))
     for text in axes.findobj(Text):  # perhaps made while the user had LaTeX on
         text.set_usetex(False)
@@ -55,6 +62,10 @@ def onto(axes, ds, name=None, boundaries=True, style=None, across=(None, None), 
         draw_profile(axes, part, variable, state, paper)
     else:
         raise BadInput(f"{name} is a single number; a figure needs at least one axis")
+    for dim, setting in zip(variable.dims, (axes.set_xticks, axes.set_yticks), strict=False):
+        if dim in labels:
+            words = [literal(text, 40) for text in labels[dim][:MOST_LABELS]]
+            setting(range(len(words)), words)
     if not paper:
         axes.set_title(title_of(ds, variable), fontsize=10 if alone(axes) else 8)
     fit(axes)
