@@ -5,6 +5,7 @@ import json
 import socket
 from functools import cache
 from importlib.metadata import version
+from pathlib import Path
 
 import numpy as np
 
@@ -51,5 +52,13 @@ def fingerprint(workflow):
         "variables": sorted(request.variables),
         "block_geometry": block_geometry(workflow),
         "kernels": jit.SOURCE_HASH,
-        "scene_hash": getattr(workflow.scene, "HASH", ""),
+        "scene_hash": getattr(workflow.scene, "HASH", "") or _hash_of_plugin(workflow.scene),
     }
+
+
+def _hash_of_plugin(scene):
+    """Hash of the source of a scene that another package brings; "" for those here, which `kernels` covers."""
+    file = getattr(scene, "__file__", None)
+    if file is None or scene.__name__.startswith("survey."):
+        return ""
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()
