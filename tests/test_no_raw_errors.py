@@ -68,9 +68,9 @@ def test_what_is_no_survey_is_told(grid):
     with pytest.raises(BadInput, match="this is a dataset, not a scene"):
         survey.evaluate(grid)
     wide = np.linspace(0, 1, 10**6)
-    with pytest.raises(BadInput, match="points do not fit in memory; use survey.run"):
+    with pytest.raises(BadInput, match="points do not fit in memory"):
         survey.evaluate("mathieu", a=wide, q=wide)
-    with pytest.raises(BadInput, match="an address, a scheduler file, or a dask.distributed Client"):
+    with pytest.raises(BadInput, match="an address, a scheduler file, or a"):
         survey.run({"scene": "mathieu", "axes": {"a": 1.0, "q": 0.1}}, output="x.nc", scheduler=3)
 
 

@@ -136,7 +136,7 @@ def _in_own_terms(scene, file):
     """The values of all axes by parameter; physical input, such as degrees, in the scene's own terms."""
     given = {key: values_of(f"axes.{key}", axis) for key, axis in file.axes.items()}
     known = {p.name for p in scene.PARAMETERS} | {option.name for option in scene.OPTIONS}
-    if "body" in file.options and "body" not in known:
+    if isinstance(file.options.get("body"), str) and "mu" in known and "body" not in known:
         given["body"] = file.options.pop("body")
     if set(given) <= known:
         return given

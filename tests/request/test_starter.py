@@ -80,7 +80,7 @@ def test_another_package_brings_a_scene(tmp_path, monkeypatch):
     try:
         ds = survey.evaluate("brought", a=1.0, q=0.1)
         assert int(ds.verdict) == int(survey.evaluate("mathieu", a=1.0, q=0.1).verdict)
-        with pytest.raises(BadInput, match="the scene broken of the package .* cannot be loaded"):
+        with pytest.raises(BadInput, match=r"the scene broken of the package .* cannot be loaded"):
             survey.evaluate("broken", a=1.0)
         with pytest.raises(BadInput, match="did you mean 'brought'"):
             survey.evaluate("brougt", a=1.0)
