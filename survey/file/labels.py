@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from survey import status
+from survey import __version__, status
 from survey.file import schema
 from survey.scene import exists
 
@@ -106,7 +106,7 @@ def attributes(scene, name, request):
         "method": request.method,
         "rtol": request.rtol,
         "references": "; ".join(scene.REFERENCES),
-        "source": f"survey {provenance()['version_survey']}: scene {name}, method {request.method}",
+        "source": f"survey {__version__}: scene {name}, method {request.method}",
         **provenance(),
         **({"scene_text": scene.TEXT, "scene_hash": scene.HASH} if hasattr(scene, "TEXT") else {}),
         **getattr(scene, "NOTES", {}),
@@ -243,7 +243,7 @@ def provenance():
 
     commit, dirty = _commit()
     return {
-        "version_survey": version("survey"),
+        "version_survey": __version__,
         "version_numba": version("numba"),
         "version_llvmlite": version("llvmlite"),
         "version_numpy": version("numpy"),

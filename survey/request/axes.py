@@ -6,6 +6,7 @@ import numpy as np
 
 from survey.errors import BadInput
 from survey.grid import Grid, check_axis, coordinates
+from survey.request import physical
 from survey.request.schema import Listed, Spread
 from survey.wording import shown
 
@@ -52,7 +53,8 @@ def check_domain(parameter, values, others=()):
         what = "is" if np.ndim(values) == 0 else "has an end"
         instead = f"; instead of {parameter.name} you can give {' or '.join(others)}" if others else ""
         raise BadInput(
-            f"axes.{parameter.name} {what} {value:g}, outside its domain; allowed: {parameter.domain}{instead}"
+            f"axes.{parameter.name} {what} {value:g}, outside its domain; allowed: {parameter.domain}"
+            f"{physical.hint(parameter, float(value)) or instead}"
         )
 
 
