@@ -77,6 +77,6 @@ def test_a_scene_describes_its_methods_by_what_they_do_for_it():
                 assert len(method.SERVES) == 1 or line.startswith(method.ABOUT[family].removesuffix(".")), (scene, name)
     for name in modules.names(methods):
         method = measures.method(name)
-        assert len(method.SERVES) == 1 or set(method.ABOUT) == set(method.SERVES), name
+        assert len(method.SERVES) == 1 or set(method.ABOUT) >= set(method.SERVES), name
     danby, hill = (api.scene(scene)["methods"]["taylor16"] for scene in ("libration_elliptic", "satellite"))
     assert "y'' + z y = 0" in hill and "y''" not in danby and "L4" in danby
