@@ -45,7 +45,8 @@ narrower than both may go unseen; near BREAKS the samples are as dense as necess
 
 A (or M, C, K) is run once, as Python, to record its operations on t and p; the record gives the power series of A in
 every step, for all points, and bounds of the rounding. Branches are followed as the code takes them: points that take
-others are recorded on their own. What depends on t must be analytic between BREAKS.
+others are recorded on their own. What depends on t must be analytic between BREAKS. A spike is seen if it is T/128 wide
+at half its height (`A_resolved_width`); a narrower one may go unseen, unless its position is one of BREAKS.
 
 f(t, x, p, out) is recorded likewise, and its derivatives by x are those of the record; it must be analytic in t and x:
 branches may depend on parameters alone.

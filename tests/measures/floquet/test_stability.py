@@ -240,3 +240,9 @@ def test_bits_do_not_depend_on_the_block():
         one = survey.evaluate(scene, a=a[i], q=q[k], c=0.1)
         for name in whole.data_vars:
             assert np.array_equal(whole[name].isel(a=i, q=k).values, one[name].values, equal_nan=True)
+
+
+def test_bars_next_to_the_largest_float_leave_the_verdict_open():
+    """Where a thousand times the bars overflows, the eigenvalues of a matrix with infinities were asked for."""
+    M, E = np.array([[[1.0, 0.5], [0.25, 1.0]]]), np.full((1, 2, 2), 1e306)
+    assert verdicts(Discs(monodromy.Matrices.plain(M, E)), M, E, False).tolist() == [-1]
