@@ -13,7 +13,7 @@ import numpy as np
 
 from survey.kernels import lanes
 from survey.kernels.body import motion
-from survey.kernels.cylinder import fate, program, returns, steps
+from survey.kernels.cylinder import fate, returns, steps
 from survey.kernels.cylinder.flow import (
     BOUND_DG,
     BOUND_F,
@@ -25,8 +25,8 @@ from survey.kernels.cylinder.flow import (
     TRUNC_W,
     WEIGHT,
     W,
-    gyrostat,
     series,
+    values,
 )
 from survey.kernels.floquet import runge_kutta
 from survey.kernels.hill.matrix import rounding
@@ -171,12 +171,6 @@ def flow_setting(p, w, tolerance):
 @kernel
 def flow_at(p, T, dt):
     """(phi, w, integral of f, integral of g) at dt after the start of the step: one step of size dt."""
-    # which f and g is asked once a step, so that the gyrostat's become part of the loop over stages
-    return _flow_at(program.values, p, T, dt) if len(p) > program.COLUMNS else _flow_at(gyrostat, p, T, dt)
-
-
-@inline
-def _flow_at(values, p, T, dt):
     phi, w = T[0, PHI], T[0, W]
     x = v = e = y = 0.0  # changes: each sum is added to phi or w once, whose rounding is the one that bars count
     for i in range(STAGES):
