@@ -11,6 +11,7 @@ from survey.kernels.floquet import program as pg
 # The width at half height, as a share of the period, from which a spike is seen; Chebyshev points of each piece, which
 # lie closer than that; and those when a scene is checked.
 WIDTH, NUMBER, CHECKED = 1 / 128, 256, 16384
+WAVES = tuple(pg.CODES[name] + pg.OF_LINE for name in ("sin", "cos"))
 SIMPLE = 4  # sines and cosines of lines, multiplied with each other: their series of order 16 show them
 RESOLVED = 1e-12  # relative to the largest Chebyshev coefficient: smaller ones do not count
 HARMLESS = 1e-16  # what an entry of A, in balanced units, may change by over a piece
@@ -29,7 +30,7 @@ def suspects(program):
             elif code == pg.PRODUCT:
                 degree[place] = visit(int(a)) + visit(int(b))
             else:
-                simple = code in (pg.ONE, pg.TIME, pg.SIN + pg.OF_LINE, pg.COS + pg.OF_LINE)
+                simple = code in (pg.ONE, pg.TIME, *WAVES)
                 degree[place] = int(code != pg.ONE) if simple else np.inf
         return degree[place]
 
