@@ -11,11 +11,11 @@ import numpy as np
 
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.branches import unstable
-from survey.kernels.cylinder.equilibria import ANGLE, BAR, KIND, MOST, SADDLE, equilibria
+from survey.kernels.cylinder.equilibria import ANGLE, BAR, KIND, MOST, SADDLE, equilibria_inside
 from survey.kernels.cylinder.flow import B12, B31, BOUND_DG, BOUND_F, BOUND_G, C23, S2, TWO_PI, potential, table, values
 from survey.kernels.cylinder.program import COLUMNS as GYROSTAT
 from survey.kernels.cylinder.steps import bar, carried, expand, passage, time_of_turning
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import constant, for_constants, inline, kernel
 
 ITSELF, REVERSED, MIRRORED, BOTH = range(4)
 # w and its error bound at the next equilibria to the right, the last of them the saddle itself, a turn further; then
@@ -90,6 +90,16 @@ def height(p, phi):
     return mean * phi - total
 
 
+def _constant(p, q):
+    return constant(q)
+
+
+@for_constants(_constant)
+def like(p, q):
+    """The row q, a read-only array if p is one."""
+    return q
+
+
 @inline
 def connections(setting, begin, at, P, wanted, tolerance, out):
     """Fill out (rows, 4, 2, ROW) for the four systems and the saddles of higher and of lower V.
@@ -104,7 +114,7 @@ def connections(setting, begin, at, P, wanted, tolerance, out):
             for label in range(2):
                 for k in range(ROW):
                     out[i, system, label, k] = math.nan
-        count, hidden = equilibria(P[i], eqs)
+        count, hidden = equilibria_inside(P[i], eqs)
         saddles, high, level = 0, -1, 0.0
         for k in range(count):
             if eqs[k, KIND] == SADDLE:
@@ -122,7 +132,7 @@ def connections(setting, begin, at, P, wanted, tolerance, out):
                     turned[k, j] = eqs[k, j]
                 if mirrored:
                     turned[k, ANGLE] = TWO_PI - eqs[k, ANGLE]
-            unstable(q, turned, count, starts)
+            unstable(like(P[i], q), turned, count, starts)
             branch = 0
             for k in range(count):
                 if eqs[k, KIND] != SADDLE:
@@ -136,5 +146,5 @@ def connections(setting, begin, at, P, wanted, tolerance, out):
                     away = away if away > 0.0 else away + TWO_PI
                     row[OFFSETS + j] = away if j < count - 1 else TWO_PI
                 if wanted[system, label] > 0.0:
-                    first_turn(setting, begin, at, q, starts[2 * branch + 1], tolerance, row)
+                    first_turn(setting, begin, at, like(P[i], q), starts[2 * branch + 1], tolerance, row)
                 branch += 1
