@@ -348,6 +348,7 @@ def areas(ds: xr.Dataset) -> dict[str, str]:
 
 def _option_condition(option: Option) -> str:
     text = f"; only with {option.only_with}" if option.only_with else ""
+    text += "".join(f"; only when {name} = {' | '.join(allowed)}" for name, allowed in option.when.items())
     return text + (f"; not with {option.replaced_by}, which replaces it" if option.replaced_by else "")
 
 
