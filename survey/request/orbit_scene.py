@@ -1,21 +1,27 @@
 """The scene of periodic orbits of a user's x' = f(t, x, p): what a module of `survey.scenes` offers, as an object."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from survey.measures.floquet import orbit
+from survey.measures.floquet.continuation import Range
+from survey.measures.floquet.equation import Equation
 from survey.request.floquet_scene import SAME, TRIED
 from survey.request.traced_scene import TracedScene
 from survey.scene import Parameter, plus_minus
 
 LARGEST = 16  # states
+BRANCH = Parameter(
+    "branch", "number of the orbit among those of the point, by the mean square of its states", "i",
+    default=1.0, minimum=1.0, maximum=99.0, uncut=True,
+)  # fmt: skip
 STATUS = {
     "invalid_parameters": "outside the domain, or the start or the period is not finite, or the period not positive",
     "no_orbit": "Newton's method does not converge from the start, or no orbit is shown to exist near where it ends: "
-    "give a better start",
+    "give a better start; or, with CONTINUATION, the point has fewer orbits than `branch`",
 }
 
 
@@ -28,7 +34,8 @@ class OrbitScene(TracedScene):
     start: tuple[float, ...] | Callable
     jacobian: Callable | None
     states: tuple[str, ...]
-    PARAMETERS: tuple[Parameter, ...]
+    continued: Range | None
+    own: tuple[Parameter, ...]
     NAME: str
     TEXT: str
     HASH: str
@@ -38,17 +45,24 @@ class OrbitScene(TracedScene):
     FAMILY = "orbit"
     AUDIT = ()
     OPTIONS = ()
-    OUTPUTS = orbit.OUTPUTS
     STATUS = STATUS
 
     @property
-    def own(self):
-        """The parameters of f: all that there are."""
-        return self.PARAMETERS
+    def PARAMETERS(self):
+        """Those of f, and, where orbits are continued, which of them is meant."""
+        if self.continued is None:
+            return self.own
+        along = self.continued.index
+        return (*(replace(p, uncut=True) if k == along else p for k, p in enumerate(self.own)), BRANCH)
+
+    @property
+    def OUTPUTS(self):
+        """The outputs, and, where orbits are continued, their number."""
+        return orbit.OUTPUTS if self.continued is None else (*orbit.OUTPUTS, orbit.NUMBER)
 
     @cached_property
     def _equation(self):
-        return orbit.Equation(self.f, len(self.states), self.period, self.start)
+        return Equation(self.f, len(self.states), self.period, self.start)
 
     @property
     def DIMENSIONS(self):
@@ -60,17 +74,29 @@ class OrbitScene(TracedScene):
     @property
     def NOTES(self):
         """What the system is, as global attributes of a file."""
-        return {"states": ", ".join(self.states), "autonomous": str(self.period is None)}
+        notes = {"states": ", ".join(self.states), "autonomous": str(self.period is None)}
+        if self.continued is not None:
+            index, low, high = self.continued
+            notes["continuation"] = f"{self.own[index].name} from {low:g} to {high:g}"
+        return notes
 
     def cost(self, options, sizes):
-        """Seconds per point, roughly."""
-        return 5e-4 + 1e-4 * len(self.states) ** 2
+        """Seconds per point, roughly: one set of curves serves its row, one set of orbits all branches."""
+        one = 5e-4 + 1e-4 * len(self.states) ** 2
+        if self.continued is None:
+            return one
+        return (one + 100 * one / sizes[self.own[self.continued.index].name]) / sizes["branch"]
 
     def solve(self, point, request):
         """The requested outputs of a block (see `survey.scenes`)."""
         points, shape = self._points(point)
         wanted = set(request.variables) or {o.name for o in self.OUTPUTS}
-        out = self._called(orbit.solve, self._equation, points, request.method, request.rtol, wanted)
+        if self.continued is None:
+            out = self._called(orbit.solve, self._equation, points, request.method, request.rtol, wanted)
+        else:
+            branch = np.broadcast_to(point["branch"], shape).reshape(-1)
+            given = points, branch, self.continued, request.method, request.rtol, wanted
+            out = self._called(orbit.solve_branches, self._equation, *given)
         return {name: values.reshape(*shape, *values.shape[1:]) for name, values in out.items()}
 
     def why(self, answer):
@@ -84,7 +110,7 @@ class OrbitScene(TracedScene):
     def check(self, points):
         """Raise BadInput if f cannot be used, or contradicts the scene's other entries at these points (N, n)."""
         equation = self._equation
-        given = points if len(points) else np.ones((1, len(self.PARAMETERS)))
+        given = points if len(points) else np.ones((1, len(self.own)))
         x0, period = self._called(equation.begin, given)
         known = np.isfinite(x0).all(axis=1) & (period > 0) & np.isfinite(period)
         if len(points) and not known.any():

@@ -44,7 +44,8 @@ def extend(operations, signs, inside, order, V, middle, half, S, n):
                     own[lane] += one[lane] * number[lane]
         elif code == STATE:
             if n == 0:
-                own[:] = V[a]
+                for lane in range(lanes):
+                    own[lane] = V[a, lane]
             else:
                 own[:] = 0.0
                 for k in range(operations[i, 3], operations[i, 4]):
@@ -61,7 +62,8 @@ def extend(operations, signs, inside, order, V, middle, half, S, n):
                     own[lane] += one[lane] * two[lane]
         elif code == QUOTIENT:
             one, two = S[a, n], S[b, 0]
-            own[:] = one
+            for lane in range(lanes):
+                own[lane] = one[lane]
             for k in range(1, n + 1):
                 below, before = S[b, k], S[i, n - k]
                 for lane in range(lanes):

@@ -64,14 +64,13 @@ def factors(
         for i in range(n):
             X[0, i, i * lanes : (i + 1) * lanes] = 1.0
         w[0], e[0] = 1.0, 0.0
-        for k in range(ORDER):
+        for k in range(ORDER + 1):  # one call of each kernel: it is compiled once
             extend(operations, signs, inside, order, V, t, s, S, k)
             norm_of(S, W, terms, k, rows, a[k])
-            next_term(S, W, terms, used, needed, k, n, s, B, C, X)
-            _row_sums(X[k + 1], n, rows, w[k + 1])
-            _rounded(a, w, e, own, s, k, most)
-        extend(operations, signs, inside, order, V, t, s, S, ORDER)
-        norm_of(S, W, terms, ORDER, rows, a[ORDER])
+            if k < ORDER:
+                next_term(S, W, terms, used, needed, k, n, s, B, C, X)
+                _row_sums(X[k + 1], n, rows, w[k + 1])
+                _rounded(a, w, e, own, s, k, most)
         _ends(X, plus, minus)
         for lane in range(min(lanes, len(point) - start)):
             cut, rounding, total = _missing(a, w, e, s, lane)
@@ -168,9 +167,8 @@ def _ends(X, plus, minus):
     """Fill the sums of the series at tau = 1 and -1, like X[0]."""
     for i in range(X.shape[1]):
         one, two = plus[i], minus[i]
-        one[:] = X[ORDER, i]  # of even orders
-        two[:] = X[ORDER - 1, i]
-        for k in range(ORDER - 2, -1, -2):
+        one[:], two[:] = 0.0, 0.0
+        for k in range(ORDER, -1, -2):
             even = X[k, i]
             for q in range(len(one)):
                 one[q] += even[q]
@@ -321,6 +319,14 @@ def set_identity(A):
 
 
 @kernel
+def copy(A, out):
+    """Fill the matrix out; out[:] = A compiles the words of an error for 2 s."""
+    for j in range(len(out)):
+        for c in range(out.shape[1]):
+            out[j, c] = A[j, c]
+
+
+@kernel
 def products(F, error, doubt, first, n, M, E, R):
     """Fill M (N, n, n), the product of the steps first[i] to first[i + 1] of each point, and bounds E of its entries.
 
@@ -341,10 +347,10 @@ def products(F, error, doubt, first, n, M, E, R):
             step = F[first[i] + k]
             column_tops(A, before[k])
             multiply(step, A, 0.0, B)
-            A[:] = B
+            A, B = B, A
             rounding[k] = n * ROUNDOFF_UP * row_norm(step)
             more += doubt[first[i] + k]
-        M[i] = A
+        copy(A, M[i])
         E[i] = 0.0
         R[i] = 0.0
         set_identity(A)
@@ -352,7 +358,7 @@ def products(F, error, doubt, first, n, M, E, R):
             add_outer(A, error[first[i] + k] + rounding[k], before[k], E[i])
             add_outer(A, rounding[k], before[k], R[i])
             multiply(A, F[first[i] + k], 0.0, B)
-            A[:] = B
+            A, B = B, A
         factor = math.exp(min(2.0 * more, 700.0))
         for j in range(n):
             for c in range(n):
@@ -373,19 +379,19 @@ def carried(F, error, doubt, first, which, n, V, W, B):
     before = np.empty((longest + 1, n))
     A, Z = np.empty((n, n), np.complex128), np.empty((n, n), np.complex128)
     for i in which:
-        A[:] = V[i]
+        copy(V[i], A)
         more = 0.0
         for k in range(first[i + 1] - first[i]):
             column_tops(A, before[k])
             multiply(F[first[i] + k], A, 0.0j, Z)
-            A[:] = Z
+            A, Z = Z, A
             more += doubt[first[i] + k]
-        A[:] = W[i]
+        copy(W[i], A)
         B[i] = 0.0
         for k in range(first[i + 1] - first[i] - 1, -1, -1):
             add_outer(A, error[first[i] + k], before[k], B[i])
             multiply(A, F[first[i] + k], 0.0j, Z)
-            A[:] = Z
+            A, Z = Z, A
         factor = math.exp(min(2.0 * more, 700.0))
         for j in range(n):
             for c in range(n):
