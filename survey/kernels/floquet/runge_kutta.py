@@ -82,5 +82,5 @@ def factors(
                 off = max(off, h * combined(abs(e5[q, lane]), abs(e3[q, lane])))
             rounding = ROUNDOFF_UP * ((n + 24.0) * WEIGHT * h * norm[lane] + largest)
             total = SAFETY * off + rounding + h * noise[point[task]] * n * largest
-            error[task] = total if math.isfinite(total) else math.inf
-            doubt[task] = n * error[task] * (1.0 + n * largest)
+            error[task] = n * total if math.isfinite(total) else math.inf
+            doubt[task] = error[task] * (1.0 + n * largest)

@@ -14,8 +14,8 @@ METHODS = {
             ("rtol",),
         ),
         "floquet_factors": Function(
-            "fill F (tasks, n, n), bounds `error` (tasks) of the errors of its entries and `doubt` (tasks), how large "
-            "these are relative to F; task k is the step of length 2 half[k] about middle[k] of the point point[k]. "
+            "fill F (tasks, n, n), bounds `error` (tasks) of the sums of its errors in a row and `doubt` (tasks), how "
+            "large these are relative to F; task k is the step of length 2 half[k] about middle[k] of point point[k]. "
             "The first six say how A is computed from numbers (N, count), see `kernels.floquet.program`; A_ij is taken "
             "times scale_j / scale_i, from scale (N, n), and `noise` (N) bounds the rounding of its rows",
             ("operations", "signs", "inside", "order", "used", "terms", "numbers", "scale", "noise", "n", "point",
