@@ -6,13 +6,14 @@ from functools import cached_property
 
 import numpy as np
 
-from survey.measures.floquet import motion, stability
+from survey.measures.floquet import dense, motion, stability
 from survey.measures.floquet.system import System
 from survey.request.traced_scene import TracedScene
 from survey.scene import Parameter, plus_minus
 
 LARGEST = 64  # states
 TRIED = np.array([0.0, 0.11, 0.29, 0.47, 0.62, 0.83])  # of a period: where A is tried as Python
+NODES = 1500  # that a map asks for, roughly
 SAME = 1e-9  # relative to the largest entry: what counts as periodic, as symplectic, as the same
 STATUS = {
     "invalid_parameters": "outside the domain, or A or T is not finite there, or A has not the stated structure",
@@ -71,14 +72,20 @@ class FloquetScene(TracedScene):
     def cost(self, options, sizes):
         """Seconds per point, roughly."""
         n = len(self.states)
-        return 1.5e-5 + 1e-6 * n**2 + 1e-7 * n**3
+        alone = 1.5e-5 + 1e-6 * n**2 + 1e-7 * n**3
+        longest = sorted(sizes.values())[-2:]
+        if np.prod(longest) < 4 * NODES or n > dense.LARGEST:
+            return alone
+        return 1e-7 * n + (0.05 + NODES / np.prod(longest)) * alone  # by series, one point in twenty on its own
 
     def solve(self, point, request):
         """The requested outputs of a block (see `survey.scenes`)."""
         points, shape = self._points(point)
+        points = points.reshape(*shape, -1)
         wanted = set(request.variables) or {o.name for o in self.OUTPUTS}
-        out = self._called(stability.solve, self._system, self.structure, points, request.method, request.rtol, wanted)
-        return {name: values.reshape(*shape, *values.shape[1:]) for name, values in out.items()}
+        lines = {k: request.line(p.name) for k, p in enumerate(self.PARAMETERS) if request.line(p.name)}
+        given = (points, request.method, request.rtol, wanted, lines)
+        return self._called(stability.solve, self._system, self.structure, *given)
 
     def why(self, answer):
         """Why a point has its verdict (see `survey.scenes`)."""

@@ -384,3 +384,42 @@ def carried(F, error, doubt, first, which, n, V, W, B):
         for j in range(n):
             for c in range(n):
                 B[i, j, c] *= factor * (1.0 + 1e-9)  # the last covers the rounding of A here
+
+
+@kernel
+def gradients(F, error, doubt, first, B, out):
+    """Fill out (N, K) with bounds of the errors of the K sums over i, j of B_ji M_ij; B is (N, K, n, n).
+
+    As in `products`, but what errors of different entries do to a sum is bounded together: the error d of a step adds
+    sum of d_ij (X B L)_ji, X the product of the steps before it and L that of those behind it.
+    """
+    n, K, longest = F.shape[1], B.shape[1], 0
+    for i in range(len(B)):
+        longest = max(longest, first[i + 1] - first[i])
+    before, sums = np.empty((longest + 1, n, n)), np.empty(n)
+    A, Z = np.empty((n, n)), np.empty((n, n))
+    for i in range(len(B)):
+        steps, more = first[i + 1] - first[i], 0.0
+        set_identity(before[0])
+        for k in range(steps):
+            multiply(F[first[i] + k], before[k], 0.0, before[k + 1])
+            more += doubt[first[i] + k]
+        out[i] = 0.0
+        for q in range(K):
+            A[:] = B[i, q]
+            for k in range(steps - 1, -1, -1):
+                # A is B L
+                step, own, largest, total, rounded = F[first[i] + k], error[first[i] + k], 0.0, 0.0, 0.0
+                multiply(before[k], A, 0.0, Z)
+                column_sums(before[k], sums)
+                for j in range(n):
+                    row = 0.0
+                    for c in range(n):
+                        total += abs(Z[j, c])
+                        row += abs(A[j, c])
+                        largest = max(largest, abs(step[j, c]))
+                    rounded += row * sums[j]
+                out[i, q] += own * total + n * ROUNDOFF_UP * largest * rounded
+                multiply(A, step, 0.0, Z)
+                A[:] = Z
+            out[i, q] *= math.exp(min(2.0 * more, 700.0)) * (1.0 + 1e-9)

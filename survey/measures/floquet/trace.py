@@ -530,6 +530,11 @@ class Program:
         self.inside = np.array(inside, dtype=np.int64).reshape(-1, 2)
         self.order = self._order()
 
+    @property
+    def analytic(self):
+        """Is A analytic in the parameters too, as no branch depends on them?"""
+        return all(self._decided(s) for s, _yes in (*self.graph.guards, *self.graph.equalities))
+
     def _is_line(self, place):
         """Is the basis function linear in t?"""
         operation, *operands = self.graph.series[place]
