@@ -16,8 +16,8 @@ from survey.scene import Parameter, plus_minus
 LARGEST = 16  # states
 ELSEWHERE = "give a better start, or another point"
 BRANCH = Parameter(
-    "branch", "number of the orbit among those of the point, by the mean square of its states", "i",
-    default=1.0, minimum=1.0, maximum=99.0, uncut=True,
+    "branch", "number of the orbit among those of the point, by the mean square of its states; from the last if < 0",
+    "i", default=1.0, minimum=-99.0, maximum=99.0, excluded=(0.0,), uncut=True,
 )  # fmt: skip
 STATUS = {
     "invalid_parameters": "outside the domain, or the start or the period is not finite, or the period not positive",

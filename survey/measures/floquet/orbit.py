@@ -82,8 +82,8 @@ def solve_branches(equation, points, branch, continued, method, rtol, wanted):
     out = {name: np.concatenate([*(part[name] for part in parts), empty[name]]) for name in empty}
     pick = np.full(len(points), count)
     for i, k, number in zip(np.flatnonzero(known), place, branch[known].astype(int), strict=True):
-        if number <= len(order[k]):
-            pick[i] = order[k][number - 1]
+        if abs(number) <= len(order[k]):
+            pick[i] = order[k][number - (number > 0)]
     out = {name: values[pick] for name, values in out.items()}
     out["status"] = np.where(known, out["status"], status.INVALID_PARAMETERS).astype(out["status"].dtype)
     if NUMBER.name in wanted:
