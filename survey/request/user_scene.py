@@ -286,8 +286,8 @@ def orbit(
         differentiated. If it is, it is compared with that.
     continuation : name, least and greatest value of a parameter along which orbits are followed, also round folds, from
         those that are found from the start at 9 values. So points have all orbits of these curves, on any grid:
-        the output `orbits` is their number, and the parameter `branch` (1, 2, ..., by the mean square of the states;
-        1 by default) says which one is meant.
+        the output `orbits` is their number, and the parameter `branch` says which one is meant: 1, 2, ..., by the mean
+        square of the states, or -1, -2, ... from the largest; 1 by default.
 
     Raises survey.BadInput with one line that names what is wrong.
 

@@ -184,13 +184,16 @@ def _ends(X, plus, minus):
 @kernel
 def _missing(a, w, e, s, lane):
     """What the series lacks beyond its last term, its rounding, and the sum of its terms' norms, in lane lane."""
-    total = rounding = 0.0
+    total = rounding = largest = 0.0
     for k in range(ORDER + 1):
         total += w[k, lane]
         rounding += e[k, lane]
+        largest = max(largest, a[k, lane])
     # A's own coefficients beyond the last known are taken to fall as the last four did
     last, before = a[ORDER, lane] + a[ORDER - 1, lane], a[ORDER - 2, lane] + a[ORDER - 3, lane]
     fall = math.sqrt(last / before) if before > 0.0 else 0.0
+    if last <= ROUNDOFF_UP * largest:  # beside zeros of coefficients the fall is an accident
+        fall = min(fall, 0.94)
     rest = 2.0 * last * fall / (1.0 - fall) if fall < 0.95 else (0.0 if last == 0.0 else math.inf)
     cut = 0.0
     for k in range(ORDER, ORDER + BEYOND):

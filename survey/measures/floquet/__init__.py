@@ -23,4 +23,10 @@ METHODS = {
         ),
     }
 }  # fmt: skip
-METHODS["orbit"] = METHODS["floquet"]  # for the linear system along an orbit, whose series begin with its states
+METHODS["orbit"] = METHODS["floquet"] | {  # for the linear system along an orbit, whose series begin with its states
+    "orbit_motion": Function(
+        "instead of proofs: fill X (N, n), the states at span (N) from x0 (N, n) at 0, and M (N, n, n), their "
+        "derivatives by x0, in `steps` (N) equal steps; the other arguments are as in `kernels.floquet.flow.flow`",
+        ("operations", "signs", "inside", "order", "terms", "numbers", "places", "x0", "span", "steps", "X", "M"),
+    ),
+}
