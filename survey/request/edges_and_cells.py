@@ -19,7 +19,7 @@ def check_boundaries(scene, name, table, given):
     if measure is None:
         raise BadInput(f"boundaries: no boundary curves are known for the scene {name}; leave the table out")
     if hasattr(measure, "refusal"):
-        return _check_closed(measure, name, table, {key: given[key].size for key in axes})
+        return _check_closed(measure, scene, name, table, {key: given[key].size for key in axes})
     _check_even(scene, name, "boundaries")
     if not 1 <= len(axes) <= 2:
         raise BadInput(f"boundaries: they are drawn on one axis or two, and there are {len(axes)}; fix the others")
@@ -31,10 +31,10 @@ def check_boundaries(scene, name, table, given):
     return axis
 
 
-def _check_closed(measure, name, table, sizes):
+def _check_closed(measure, scene, name, table, sizes):
     """The last of the axes {name: number of values}; raises BadInput where the measure knows no curves on these."""
     axes = list(sizes)
-    refusal = measure.refusal(axes)
+    refusal = measure.refusal(axes, scene)
     if refusal:
         raise BadInput(f"boundaries: of {name} {refusal}; change the axes, or leave the table out")
     if table.axis is not None:

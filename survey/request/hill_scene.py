@@ -76,7 +76,7 @@ class HillScene(FunctionScene):
     def NOTES(self):
         """How z is known, as global attributes of a file."""
         checked = f"every T/{self._divisor * user_equation.CHECKED} at the ends and middles of the axes"
-        unseen = f"z is known by {self._sampling}, and {checked}; a spike narrower than that may go unseen"
+        unseen = f"z is known by {self._sampling}, and {checked}; a spike narrower at half its height may go unseen"
         obstacle = self._obstacle
         digits = f"none: {obstacle}" if obstacle else "double-double, where float64 cannot decide a verdict"
         return {
@@ -98,9 +98,7 @@ class HillScene(FunctionScene):
         if axes is not None:
             return self._solve_rows(point, request, axes)
         box = self._box_axes(point, request) if request.method == "auto" else None
-        shape = np.broadcast_shapes(*(np.shape(values) for values in point.values()))
-        columns = [np.broadcast_to(point[p.name], shape).reshape(-1) for p in self.PARAMETERS]
-        points = np.stack(columns, axis=1).astype(float)
+        points, shape = self._points(point)
         period, edges, slack = self._ranges(points)
         if box is not None:
             out = self._solve_scattered(points, box, request)

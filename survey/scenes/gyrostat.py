@@ -59,7 +59,7 @@ double-double arithmetic, in disjoint discs that are proven to hold them; an equ
 for the two or three roots within its error bar, a pair of which may be complex.
 
 [boundaries] draws, over phi0 and w0, the stable manifolds of the saddles, cycles and equilibria; over two parameters of
-the system, where portraits change: folds and Hopf curves of equilibria, K = 0, saddle connections (see
+the system, where portraits change: folds and Hopf curves of equilibria, K = 0, saddle connections, folds of cycles (see
 `measures/cylinder/curves.py`).
 
 Questions: `trajectory` (phi and w at t), `abel` (w and t at phi), `fate` (where the solution ends) and `portrait` (of

@@ -31,6 +31,7 @@ CURVES = {
     "ends": ("K = 0 (or L = 0): ends", {"color": "#000000", "ls": (0, (1, 1.5)), "lw": 1.6}),
     "homoclinic": ("homoclinic connections", {"color": "#D40000", "ls": "-", "lw": 1.2}),
     "heteroclinic": ("heteroclinic connections", {"color": "#D40000", "ls": (0, (4, 1.5)), "lw": 1.2}),
+    "cycle_fold": ("folds of cycles", {"color": "#0050A0", "ls": "-", "lw": 1.4}),
     "fold": ("folds of equilibria", {"color": "#000000", "ls": "-", "lw": 1.2}),
     "supercritical_hopf": ("supercritical Hopf", {"ls": "-"} | _PALE),
     "subcritical_hopf": (

@@ -64,7 +64,7 @@ def plan(workflow, cost):
     if hasattr(measure, "refusal"):
         sizes = workflow.grid.sizes
         seconds = measure.seconds(list(sizes)) if hasattr(measure, "seconds") else 0.1  # measured, per map
-        if hasattr(measure, "searched"):
+        if hasattr(measure, "searched") and not hasattr(measure, "seconds"):
             seconds = 1e5 * cost  # measured: some ten points solved for each point of a curve, and a lattice
         size = 8 * (1 + len(sizes) + 2 * len(measure.ALONG))
         return {"bytes_per_curve_point": size}, seconds * prod(list(sizes.values())[2:])

@@ -26,7 +26,7 @@ from survey.methods import dop853
 
 SIZES = (65, 513, 4097)
 # Evenly spread points of the part that is solved at which z is probed, however smooth it seems; those when a scene is
-# checked; and the least number between two breaks.
+# checked; and the least number between two breaks. All but the fewest Chebyshev points lie closer than PROBES.
 PROBES, CHECKED, LEAST_PROBES = 128, 16384, 8
 # Relative to max |z|: z is resolved where its last coefficients are below the first, rough where above the second.
 RESOLVED, ROUGH = 1e-14, 1e-8
@@ -239,12 +239,27 @@ def measured(z, points, edges, period, slack, probes=PROBES):
         u = np.clip(u, left[pieces] + ends, right[pieces] - ends) if ends.any() else u
         return at(z, points[own], period[own, None] - u if mirrored else u)
 
-    def missed(pieces, known, size):
-        """How far z is from its interpolant between the Chebyshev points of `known`."""
+    def probed(pieces):
+        """The points, the ends (N, 2) and the number of probes of each piece."""
         ends, own = np.concatenate([left[pieces], right[pieces]], axis=1), owner[pieces]
         share = np.diff(ends, axis=1)[:, 0] / edges[own, -1]
-        number = np.maximum(np.ceil(probes * np.nan_to_num(share)), LEAST_PROBES).astype(np.int64)
-        return unlike(z, points[own], ends, known, size, number)
+        return points[own], ends, np.maximum(np.ceil(probes * np.nan_to_num(share)), LEAST_PROBES).astype(np.int64)
+
+    def between(pieces, known, size):
+        """How far z is from its interpolant at the probes: few Chebyshev points lie further apart than these."""
+        own, ends, number = probed(pieces)
+        out = np.empty(len(pieces))
+        for count in np.unique(number):
+            rows = np.flatnonzero(number == count)
+            for some in np.array_split(rows, rows.size * count // CALL_SAMPLES + 1):
+                u = ends[some, :1] + np.diff(ends[some], axis=1) * evenly(count)
+                out[some] = furthest(known[some], to_probes(int(count)), at(z, own[some], u))
+        return out
+
+    def missed(pieces, known, size):
+        """How far z is from its interpolant at the probe that is most unlike the others."""
+        own, ends, number = probed(pieces)
+        return unlike(z, own, ends, known, size, number)
 
     size, rate, noise, last = np.empty((4, owner.size))
     unresolved, off = np.arange(owner.size), np.zeros(owner.size)
@@ -256,7 +271,7 @@ def measured(z, points, edges, period, slack, probes=PROBES):
                 off[some] = abs(known - values(some, number, mirrored=True)).max(axis=1)
             smooth = np.flatnonzero((last[some] <= RESOLVED * size[some]) | (number == SIZES[-1]))
             some = some[smooth]
-            hidden = missed(some, known[smooth], size[some])
+            hidden = (between if number == SIZES[0] else missed)(some, known[smooth], size[some])
             hidden[~(hidden > 10 * RESOLVED * size[some] + 4 * noise[some])] = 0
             noise[some], last[some] = np.maximum(noise[some], hidden), np.maximum(last[some], hidden)
         unresolved = unresolved[last[unresolved] > RESOLVED * size[unresolved]]
@@ -276,6 +291,37 @@ def unlike(z, points, ends, known, size, number):
     except Exception as error:
         raise Raised from error
     return out
+
+
+@kernel
+def furthest(values, transform, wanted):
+    """The largest |values @ transform - wanted| of each row (N); infinite where one is not finite."""
+    out, own = np.empty(len(values)), np.empty(transform.shape[1])
+    for i in range(len(values)):
+        own[:] = 0.0
+        for k in range(len(transform)):
+            for j in range(transform.shape[1]):  # no sum over j: vector code with the same bits
+                own[j] += values[i, k] * transform[k, j]
+        out[i] = 0.0
+        for j in range(transform.shape[1]):
+            off = abs(own[j] - wanted[i, j])
+            out[i] = max(out[i], off) if isfinite(off) else inf
+    return out
+
+
+def evenly(number):
+    """As many evenly spread points on [0, 1], half their distance from its ends."""
+    return (np.arange(number) + 0.5) / number
+
+
+@cache
+def to_probes(number):
+    """(SIZES[0], number): from values at Chebyshev points to the interpolant's at evenly spread ones."""
+    away = evenly(number) - chebyshev_points(SIZES[0])[:, None]
+    weight = (-1.0) ** np.arange(SIZES[0])
+    weight[[0, -1]] *= 0.5
+    terms = weight[:, None] / np.where(away == 0, 1, away)
+    return np.where((away == 0).any(axis=0), away == 0, terms / terms.sum(axis=0))
 
 
 @inline
