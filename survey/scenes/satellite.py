@@ -76,8 +76,9 @@ _PERIOD_ULPS = 6
 
 
 def cost(options, sizes):
-    """Seconds per point, roughly: a point of a dense row, its share of the outputs included."""
-    return 1e-6
+    """Seconds per point, roughly."""
+    rows = max(sizes.get(name, 1) for name in ("k", "one_minus_k", "amplitude"))
+    return monodromy.cost(rows, max(sizes.get(name, 1) for name in ("rho", "inertia_ratio")))
 
 
 def solve(point, request):
