@@ -154,8 +154,10 @@ def _solve_scattered(box, shared, rho, oblate, request):
         return _problem(Motion(*(values[points] for values in columns), bool(oblate)), rho[points, None])
 
     out = monodromy.solve_scattered(box, position, rho, problem_of, request.rtol, _wanted(request))
-    integral = row.integrals[0]
-    period = np.where(row.rotates, 2 * integral / np.maximum(row.k, 1), 4 * integral)
+    period = None
+    if not _wanted(request).isdisjoint({"period", "exponent_per_orbit", "lyapunov"}):
+        integral = row.integrals[0]
+        period = np.where(row.rotates, 2 * integral / np.maximum(row.k, 1), 4 * integral)
     return _derived(out, row, rho[:, None], block, request, period)
 
 

@@ -18,8 +18,9 @@ Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013),
 """
 
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -45,6 +46,8 @@ RETRIES = 2
 _ONE_AT_A_TIME = threading.Lock()
 ANSWERS = frozenset({"discriminant", "exponent"})
 DISCRIMINANT = np.array([name == "discriminant" for name in kernels.FLOATS])
+# The parts of the axis across points on their own.
+ROWS_PER_PART, MOST_PARTS = 130, 8
 # Points of a call that answers from factors: their temporaries stay in the processor's cache.
 CALL_POINTS = 8192
 
@@ -115,7 +118,7 @@ def scattered(box, method, asked, answers, position, p):
     """Answer points on their own (N each) from the series of their `box`; returns those (N, bool) to be solved."""
     sought, axis, open_points = _sought(asked, factors_only=True), _axis(box.line, box.even), np.ones(p.size, np.bool_)
     with _ONE_AT_A_TIME:
-        served = panels(box.row_axis, method, asked.rtol, axis, sought)
+        served = [panel for part in _parts(box.row_axis) for panel in panels(part, method, asked.rtol, axis, sought)]
     for low, high, series, bars, turns in served:
         inside = np.flatnonzero(open_points & (position >= low) & (position <= high))
         padded, number, bars = _shortened(series, bars)
@@ -138,6 +141,13 @@ def scattered(box, method, asked, answers, position, p):
             open_points[some] = found.missed[own] | failed
             answers.status[some[failed]] = status.OK  # what this leaves without an answer is solved again
     return open_points
+
+
+def _parts(row_axis):
+    """The axis in parts: the more points there are, the more of them pay, on which series have fewer terms."""
+    parts = int(np.clip(row_axis.number // ROWS_PER_PART, 1, MOST_PARTS))
+    ends = np.linspace(row_axis.low, row_axis.high, parts + 1)
+    return [replace(row_axis, low=float(low), high=float(high)) for low, high in pairwise(ends)]
 
 
 def _shortened(series, bars):
