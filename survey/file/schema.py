@@ -164,7 +164,8 @@ def _check_axes(ds):
 
 def edges(ds):
     """Raise Damaged unless the edges of tongues are consistent: `edge_*` along the dimension `edge`."""
-    _along(ds, "edge", "edge_position", "edge_position_error", "edge_class", "edge_index")
+    names = ("edge_position", "edge_position_error", "edge_class", *(["edge_index"] if "edge_index" in ds else []))
+    _along(ds, "edge", *names)
     _divided(ds, "edge_count", "edge")
     _coded(ds, "edge_class")
     if not set(ds.edge_count.dims) <= set(ds.status.dims) or ds.attrs.get("boundaries") not in ds.status.dims:

@@ -63,6 +63,11 @@ def closed(square, axes, fixed, options):
     return _joined(found, square, axes)
 
 
+def seconds(axes):
+    """Estimated seconds on one thread of the curves on one map, measured."""
+    return 0.1 if set(axes) <= set(AXES) else 1.5
+
+
 def _of_states(square, axes, fixed):
     """The Curves on a map of initial states."""
     count, kinds, parameters, errors, known = [], [], [], [], []
