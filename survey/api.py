@@ -16,7 +16,7 @@ from survey import measures, status
 from survey.errors import BadInput
 from survey.file import disk, reading, schema
 from survey.file.labels import count, counts, describe, flag_codes, layout, percent
-from survey.grid import Grid, fixed, lines, ranges
+from survey.grid import Grid, fixed, lines
 from survey.request import earlier, trust, user_scene
 from survey.request.checks import check_options, check_parameters, check_request, methods_of
 from survey.request.function_scene import FunctionScene
@@ -264,7 +264,7 @@ def _lazy(module: Any, scene: str, request: Request, given: dict[str, xr.DataArr
     table = layout(module, request)
     names = list(given)
     axes = {name: (array.dims, array) for name, array in given.items()}
-    request = replace(request, lines=lines(axes), fixed=fixed(axes), ranges=ranges(axes))
+    request = replace(request, lines=lines(axes), fixed=fixed(axes))
 
     def solve_arrays(*arrays: Any) -> tuple[Any, ...]:
         shape = np.broadcast_shapes(*(array.shape for array in arrays))

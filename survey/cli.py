@@ -260,11 +260,13 @@ def view(path, port, link, no_browser, trust_scene):
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def scenes(name, as_json):
     """List the scenes; or show one scene's equations, parameters, outputs and sources."""
+    if name is None:
+        import survey.scenes
+
+        return _show(survey.scenes(), as_json)
     from survey import api
 
-    if name is None:
-        _show(api.scenes(), as_json)
-    elif as_json:
+    if as_json:
         _show(api.scene(name), True)
     else:
         _describe(api.scene(name))

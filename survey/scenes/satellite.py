@@ -76,8 +76,9 @@ _PERIOD_ULPS = 6
 
 
 def cost(options, sizes):
-    """Seconds per point, roughly: a point of a dense row, its share of the outputs included."""
-    return 1e-6
+    """Seconds per point, roughly."""
+    rows = max(sizes.get(name, 1) for name in ("k", "one_minus_k", "amplitude"))
+    return monodromy.cost(rows, max(sizes.get(name, 1) for name in ("rho", "inertia_ratio")))
 
 
 def solve(point, request):
@@ -120,24 +121,24 @@ def _solve(shared, rho, oblate, request, low=None, line=None, ends=None):
     row = Motion(*(block.per_row(values) for values in shared), bool(oblate))
     problem = _problem(row, block.per_point(rho), None if low is None else block.per_point(low), line, ends)
     out = monodromy.solve(problem, request.method, request.rtol, _wanted(request))
-    return _derived(out, row, problem.p, block, request)
+    return _derived(out, row, problem.p, block, request, row.period)
 
 
 def _wanted(request):
     return set(request.variables) | ({"exponent"} if "exponent_per_orbit" in request.variables else set())
 
 
-def _derived(out, row, rho, block, request):
-    """The outputs in the block's shape, with those that follow from the others, rows `row` and `rho` (rows, lanes)."""
+def _derived(out, row, rho, block, request, period):
+    """The outputs in the block's shape, with those that follow from the others, the rows' motions and `rho`."""
     wanted, ok = _wanted(request), out["status"] == status.OK
     ok = out["status"] == status.OK
     if "period" in wanted:
-        out["period"] = np.where(ok, row.period[:, None], np.nan)
+        out["period"] = np.where(ok, period[:, None], np.nan)
         out["period_error"] = _PERIOD_ULPS * EPS * out["period"]
     if "exponent_per_orbit" in wanted:
-        _per_orbit(out, abs(rho) * (row.period[:, None] / (2 * pi)))
+        _per_orbit(out, abs(rho) * (period[:, None] / (2 * pi)))
     if "lyapunov" in wanted:
-        out["lyapunov"] = (row.lyapunov(rho) & ok).astype(np.int8)
+        out["lyapunov"] = (row.lyapunov(rho, period) & ok).astype(np.int8)
     return {name: block.back(values) for name, values in out.items()}
 
 
@@ -153,7 +154,11 @@ def _solve_scattered(box, shared, rho, oblate, request):
         return _problem(Motion(*(values[points] for values in columns), bool(oblate)), rho[points, None])
 
     out = monodromy.solve_scattered(box, position, rho, problem_of, request.rtol, _wanted(request))
-    return _derived(out, row, rho[:, None], block, request)
+    period = None
+    if not _wanted(request).isdisjoint({"period", "exponent_per_orbit", "lyapunov"}):
+        integral = row.integrals[0]
+        period = np.where(row.rotates, 2 * integral / np.maximum(row.k, 1), 4 * integral)
+    return _derived(out, row, rho[:, None], block, request, period)
 
 
 def _box(request, oblate):
