@@ -382,5 +382,6 @@ def _output_text(o: Output) -> str:
 
 def _method_line(module: Any, name: str) -> str:
     method = measures.method(name)
-    first, when = inspect.cleandoc(method.__doc__).splitlines()[0], condition(module, getattr(method, "WHEN", {}))
+    docstring, when = inspect.cleandoc(method.__doc__), condition(module, getattr(method, "WHEN", {}))
+    first = getattr(method, "ABOUT", {}).get(module.FAMILY, docstring.splitlines()[0])
     return first.removesuffix(".") + when if when else first

@@ -81,7 +81,7 @@ def _why_excluded(scene, when, key, given, table):
 
 def unknown_parameter(scene, key, known):
     """One line for a parameter that the scene of this name does not have."""
-    return modules.unknown(f"parameter of scene {scene}", key, known)
+    return modules.unknown(f"parameter of scene {scene}", key, known, more=("rtol", "method", "variables"))
 
 
 def check_request(scene, options, method, rtol, variables, tables=("", "")):

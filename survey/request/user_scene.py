@@ -84,7 +84,7 @@ import numpy.typing as npt
 from survey.errors import BadInput, Untrusted
 from survey.measures.hill import monodromy
 from survey.request import trust
-from survey.request.function_scene import FunctionScene
+from survey.request.function_scene import FunctionScene, refusal
 from survey.request.hill_scene import SAME, HillScene, is_number, reason
 from survey.scene import Parameter
 from survey.scenes import load
@@ -448,7 +448,7 @@ def _hill(
     """The checked scene; raises BadInput."""
 
     def refuse(message: str) -> NoReturn:
-        raise BadInput(f"{name}: {message}")
+        raise refusal(name, message)
 
     if not callable(z) or _arguments(z) != 2:
         refuse("z must be a function of two arguments, z(u, p); the parameters are p[0], p[1], ...")
@@ -477,7 +477,7 @@ def _abel(
     from survey.scenes import gyrostat
 
     def refuse(message: str) -> NoReturn:
-        raise BadInput(f"{name}: {message}")
+        raise refusal(name, message)
 
     for letter, function in (("f", f), ("g", g)):
         if not callable(function) or _arguments(function) != 2:
@@ -506,7 +506,7 @@ def _floquet(
     from survey.request.floquet_scene import LARGEST, FloquetScene
 
     def refuse(message: str) -> NoReturn:
-        raise BadInput(f"{name}: {message}")
+        raise refusal(name, message)
 
     if ("A" in matrices) == ("K" in matrices) or (len(matrices) > 1 and "A" in matrices):
         refuse("give either A(t, p, out), or K(t, p, out) with or without M and C")
@@ -546,7 +546,7 @@ def _orbit(
     from survey.request.orbit_scene import LARGEST, OrbitScene
 
     def refuse(message: str) -> NoReturn:
-        raise BadInput(f"{name}: {message}")
+        raise refusal(name, message)
 
     for letter, function in (("f", f), ("jacobian", jacobian)):
         if not callable(function) or _arguments(function) != 4:

@@ -107,7 +107,9 @@ def check(data, text="", output=None, default_path="survey.nc", near=None):
     given = {key: values_of(f"axes.{key}", axis) for key, axis in file.axes.items()}
     parameters = check_parameters(scene, name, options, given, "axes.")
     for key, values in given.items():
-        check_domain(parameters[key], values)
+        group = parameters[key].instead_of or key
+        others = [p.name for p in scene.PARAMETERS if group in (p.name, p.instead_of) and p.name != key]
+        check_domain(parameters[key], values, others)
     solver = file.solver
     request = check_request(scene, options, solver.method, solver.rtol, file.output.variables, ("solver.", "output."))
     for figure in file.output.figures:

@@ -3,6 +3,9 @@
     f = b12 cos phi - b31 sin phi,
     g = -d cos phi sin phi - c23 cos 2phi + s2 cos phi - s3 sin phi                              (57)
 
+Model: the six equations of `gyrostat_body`, on a set that is invariant under conditions necessary and sufficient for
+it. Not for motions beside the set, which may leave it: `gyrostat_body` tells.
+
 Parameters, in order: b12, b31 (components of B over A11), d = c22 - c33 and c23 (of C), s2, s3 (of s), up to
 1e12; phi0 (rad) and w0, the initial angle and velocity. In (57) phi is the independent variable and
 w w_phi = f w + g; here the system is solved in time, so turning points (w = 0) are passed.

@@ -1,5 +1,8 @@
 """Mathieu's equation, the yardstick of parametric resonance: y'' + (a - 2 q cos 2t) y = 0, period T = pi.
 
+Model: a pendulum's equation, linearised about its rest, or one coordinate of an ion in a quadrupole trap, which is
+linear as it stands. Not for a pendulum's finite angles, or for several ions.
+
 Parameters, in order: a (characteristic value) and q (parametric excitation), up to 1e12, without units, in the
 notation of DLMF 28.2.1.
 
