@@ -24,7 +24,8 @@ from survey.request.function_scene import FunctionScene
 from survey.request.hill_scene import is_number
 from survey.request.workflow import check, read
 from survey.scene import Option, Output, Parameter, Request, condition, exists
-from survey.sweep import engine, solve
+from survey.sweep import announce, engine, solve
+from survey.sweep.progress import Progress
 from survey.wording import counted, short, shown
 
 
@@ -73,7 +74,11 @@ def run(
     if block_timeout is not None and not (is_number(block_timeout) and 0 < block_timeout < np.inf):
         raise BadInput(f"block_timeout = {shown(block_timeout)}: it must be a positive number of seconds, or None")
     held = earlier.find(checked, reuse)[0] if reuse is not None else None
-    engine.run(checked, workers, scheduler, fresh, block_timeout=block_timeout, earlier=held)
+    silent = not announce.is_watched()
+    with Progress(announce.console(), checked, silent) as progress:
+        engine.run(
+            checked, workers, scheduler, fresh, None if silent else progress, block_timeout=block_timeout, earlier=held
+        )
     ds = reading.load(checked.path)
     draw(ds, checked)
     return ds
@@ -158,7 +163,9 @@ def evaluate(
     grid = _grid(used, given)
     user_scene.check(module, grid)
     try:
-        ds = labelled(grid, module, scene, request, solve.compute(grid, module, request))
+        with announce.watched(scene, module, grid.points, lambda: _seconds(module, request, grid)) as progress:
+            found = solve.compute(grid, module, request, progress=progress)
+        ds = labelled(grid, module, scene, request, found)
     except MemoryError:
         raise BadInput(
             f"evaluate: {counted(grid.points, 'point')} do not fit in memory; use survey.run, which writes a file, or "
@@ -248,6 +255,12 @@ def _check_single_values(used: dict[str, Parameter], given: dict[str, xr.DataArr
         if array.ndim == 0 and not array.chunks and not used[key].holds(array.values):
             raise BadInput(f"{key} = {float(array):g} is outside its domain; allowed: {used[key].domain}"
                            f"{physical.hint(used[key], float(array))}")  # fmt: skip
+
+
+def _seconds(module: Any, request: Request, grid: Grid) -> float:
+    """Rough seconds on one thread."""
+    sizes = {name: values.size for name, (_, values) in grid.parameters.items()}
+    return float(module.cost(request.options, sizes) * grid.points)
 
 
 def _grid(used: dict[str, Parameter], given: dict[str, xr.DataArray]) -> Grid:
