@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from survey import __version__
 from survey.errors import BadInput, SurveyError, Untrusted
 from survey.wording import counted, plain, reason_of
 
@@ -56,13 +57,69 @@ def complain(message, code):
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(package_name="survey")
+@click.version_option(__version__, prog_name="survey")
 def program():
     """Stability maps of mechanical systems: every point with an error bar, and a verdict that respects it."""
 
 
+def _scene_names(_context, _parameter, incomplete):
+    """Completion of a scene's name."""
+    import survey.scenes
+
+    return [name for name in survey.scenes() if name.startswith(incomplete)]
+
+
+class _Files(click.ParamType):
+    """A path; completed with the files of one kind, and folders."""
+
+    name = "path"
+
+    def __init__(self, suffix):
+        self.suffix = suffix
+
+    def shell_complete(self, ctx, param, incomplete):
+        from click.shell_completion import CompletionItem
+
+        folder = os.path.dirname(incomplete)
+        found = [os.path.join(folder, name) for name in sorted(os.listdir(folder or "."))]
+        return [
+            CompletionItem(path + "/" * os.path.isdir(path))
+            for path in found
+            if path.startswith(incomplete) and (path.endswith(self.suffix) or os.path.isdir(path))
+        ]
+
+
+WORKFLOW = _Files(".toml")
+
+
 @program.command()
-@click.argument("workflow")
+@click.argument("scene", shell_complete=_scene_names)
+@click.option("-o", "--output", metavar="FILE.toml", help="The workflow file; by default SCENE.toml.")
+def init(scene, output):
+    """Write a commented workflow of the scene to start from; it runs as it is."""
+    from survey.request import starter
+
+    text = starter.workflow(scene)
+    path = output or f"{os.path.basename(scene).removesuffix('.py')}.toml"
+    try:
+        with open(path, "x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise BadInput(f"{path} exists; name another file with -o") from None
+    err.print(plain(f"wrote {path}; run it with: survey run {shlex.quote(path)}"), markup=False)
+    out.print(plain(path), markup=False)
+
+
+@program.command()
+def schema():
+    """Print the JSON schema of a workflow file, by which editors complete and check it."""
+    from survey.request import starter
+
+    _show(starter.schema(), True)
+
+
+@program.command()
+@click.argument("workflow", type=WORKFLOW)
 @click.option("-o", "--output", metavar="OUT.nc", help="The netCDF file, instead of the workflow's output.path.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Replace a key, such as axes.k.num=40.")
 @click.option("--workers", type=click.IntRange(1), help="Worker processes; by default threads of this process.")
@@ -102,7 +159,7 @@ def run(workflow, output, overrides, workers, scheduler, block_timeout, fresh, r
 
 
 @program.command()
-@click.argument("workflow")
+@click.argument("workflow", type=WORKFLOW)
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Replace a key, such as axes.k.num=40.")
 @click.option("-o", "--output", metavar="OUT.nc", help="The netCDF file, instead of the workflow's output.path.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
@@ -256,7 +313,7 @@ def view(path, port, link, no_browser, trust_scene):
 
 
 @program.command()
-@click.argument("name", required=False)
+@click.argument("name", required=False, shell_complete=_scene_names)
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def scenes(name, as_json):
     """List the scenes; or show one scene's equations, parameters, outputs and sources."""
@@ -273,7 +330,7 @@ def scenes(name, as_json):
 
 
 @program.command()
-@click.argument("scene")
+@click.argument("scene", shell_complete=_scene_names)
 @click.option("--peers", is_flag=True, help="Also measure the best other programs, where installed.")
 @click.option("-o", "--output", metavar="DIR", default=".", show_default=True, help="Folder for CSV, JSON and PNG.")
 def precision(scene, peers, output):

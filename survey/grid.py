@@ -156,6 +156,12 @@ def coordinates(start, stop, num, spacing="linear"):
     return np.linspace(start, stop, num)
 
 
+def positions(values):
+    """Coordinates as floats; labels by their number, counted from 0."""
+    values = np.asarray(values)
+    return values.astype(float) if values.dtype.kind in "iufb" else np.arange(values.size, dtype=float)
+
+
 def logarithmic(values):
     """Are the coordinates spaced evenly in the logarithm, and not evenly?"""
     if values.size < 3 or values.min() <= 0:

@@ -30,16 +30,19 @@ def names(package):
     return sorted(module.name for module in iter_modules(package.__path__))
 
 
-def load(package, name, what):
-    """The module `name` of `package`; raises BadInput, naming the nearest, if there is none."""
+def load(package, name, what, further=()):
+    """The module `name` of `package`; raises BadInput, naming the nearest, if there is none.
+
+    `further`: names that are allowed, too, and found elsewhere.
+    """
     if not isinstance(name, str):
-        raise BadInput(unknown(what, name, names(package)))
+        raise BadInput(unknown(what, name, [*names(package), *further]))
     path = f"{package.__name__}.{name}"
     if str(name).isidentifier() and path in sys.modules:  # the folder is not read again for every block
         return import_module(path)  # waits for another thread that has begun to import it
     known = names(package)
     if name not in known:
-        raise BadInput(unknown(what, name, known))
+        raise BadInput(unknown(what, name, [*known, *further]))
     return import_module(path)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from survey.errors import BadInput
 from survey.grid import Grid, check_axis, coordinates
+from survey.request import physical
 from survey.request.schema import Listed, Spread
 from survey.wording import shown
 
@@ -53,6 +54,7 @@ def check_domain(parameter, values, others=()):
         instead = f"; instead of {parameter.name} you can give {' or '.join(others)}" if others else ""
         raise BadInput(
             f"axes.{parameter.name} {what} {value:g}, outside its domain; allowed: {parameter.domain}{instead}"
+            f"{physical.hint(parameter, float(value))}"
         )
 
 

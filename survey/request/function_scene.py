@@ -1,5 +1,6 @@
 """What the scenes of a user's functions share: how they travel to other processes, and how they refuse."""
 
+import html
 import re
 from collections.abc import Callable
 from dataclasses import fields
@@ -7,6 +8,7 @@ from dataclasses import fields
 import numpy as np
 
 from survey.errors import BadInput
+from survey.wording import plain
 
 _KEYS = re.compile(r"\b(PARAMETERS|PERIOD|EVEN|BREAKS|STATES|STRUCTURE|START|CONTINUATION)\b")
 _known = {}  # by hash: a worker process compiles a scene once, for all of its blocks
@@ -23,6 +25,27 @@ class FunctionScene:
 
     def __post_init__(self):
         object.__setattr__(self, "__doc__", self.about)
+
+    def __repr__(self):
+        return "\n".join([self.TITLE, *(f"  {name}: {text}" for name, text in self._rows())])
+
+    def _repr_html_(self):
+        rows = "".join(
+            f"<tr><th>{html.escape(name)}</th><td style='text-align:left'>{html.escape(plain(text))}</td></tr>"
+            for name, text in self._rows()
+        )
+        title = html.escape(plain(self.TITLE))
+        return f"<div class='tex2jax_ignore mathjax_ignore'><table><caption>{title}</caption>{rows}</table></div>"
+
+    def _rows(self):
+        """Yield (what, text) of the scene: what survey.evaluate takes and gives."""
+        yield "scene", self.NAME
+        for p in self.PARAMETERS:
+            default = "" if p.default is None else f", default {p.default:g}"
+            yield p.name, f"{p.long_name}, {p.domain}{default}" if p.long_name != p.name else f"{p.domain}{default}"
+        for option in self.OPTIONS:
+            yield option.name, f"{' | '.join(option.choices)} (default {option.default})"
+        yield "outputs", ", ".join(dict.fromkeys(o.name for o in self.OUTPUTS))
 
     def __reduce__(self):
         return _restored, (type(self), self.HASH, [getattr(self, field.name) for field in fields(self)])

@@ -33,7 +33,7 @@ STATUS = {
 }
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class HillScene(FunctionScene):
     """What a scene's module offers (see `survey.scenes`), for a user's z; `about` is its docstring."""
 

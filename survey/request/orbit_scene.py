@@ -26,7 +26,7 @@ STATUS = {
 }
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class OrbitScene(TracedScene):
     """What a scene's module offers (see `survey.scenes`), for a user's f; `about` is its docstring."""
 

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from survey import modules
 from survey.errors import BadInput
 from survey.grid import Grid
-from survey.request import user_scene
+from survey.request import physical, user_scene
 from survey.request.axes import as_float, check_domain, check_size, grid_of, values_of
 from survey.request.checks import check_options, check_parameters, check_request, unknown_parameter
 from survey.request.edges_and_cells import check_boundaries, check_refine
@@ -102,9 +102,9 @@ def check(data, text="", output=None, default_path="survey.nc", near=None):
     name, scene = user_scene.find(given_scene, near)
     numbers = {p.name for p in scene.PARAMETERS if p.number_option and is_number(file.options.get(p.name))}
     file.axes |= {key: as_float(f"options.{key}", file.options.pop(key)) for key in sorted(numbers - set(file.axes))}
-    options = check_options(scene, file.options, file.axes, "options.")
     check_size(file.axes)
-    given = {key: values_of(f"axes.{key}", axis) for key, axis in file.axes.items()}
+    given = _in_own_terms(scene, file)
+    options = check_options(scene, file.options, given, "options.")
     parameters = check_parameters(scene, name, options, given, "axes.")
     for key, values in given.items():
         group = parameters[key].instead_of or key
@@ -134,6 +134,19 @@ def check(data, text="", output=None, default_path="survey.nc", near=None):
     )
 
 
+def _in_own_terms(scene, file):
+    """The values of all axes by parameter; physical input, such as degrees, in the scene's own terms."""
+    given = {key: values_of(f"axes.{key}", axis) for key, axis in file.axes.items()}
+    known = {p.name for p in scene.PARAMETERS} | {option.name for option in scene.OPTIONS}
+    if isinstance(file.options.get("body"), str) and "mu" in known and "body" not in known:
+        given["body"] = file.options.pop("body")
+    if set(given) <= known:
+        return given
+    found = physical.resolved(scene, given)
+    values = {key: np.asarray(getattr(value, "values", value)) for key, value in found.items()}
+    return {key: value if value.ndim else np.float64(value) for key, value in values.items()}
+
+
 def _check_names(data, scene, near):
     """Raise BadInput for an unknown scene or parameter: naming a key that is missing below it would not help."""
     axes = data.get("axes")
@@ -142,7 +155,7 @@ def _check_names(data, scene, near):
     name, scene = user_scene.find(scene, near)
     known = [p.name for p in scene.PARAMETERS]
     for key in axes:
-        if key not in known and key not in {option.name for option in scene.OPTIONS}:
+        if key not in {*known, *(option.name for option in scene.OPTIONS), *physical.words(scene)}:
             raise BadInput(f"axes.{short(key, 40)}: {unknown_parameter(name, key, known)}")
 
 

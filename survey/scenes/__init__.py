@@ -1,6 +1,7 @@
 """The scenes: one physical system per file. `survey/scene.py` holds the words in which a scene describes itself.
 
 A scene module holds what CONTRACT lists, and no other public name; the table is checked when the scene is loaded.
+Another package brings scenes by entry points of the group "survey.scenes": `NAME = "package.module"`.
 
 `solve(point, request)` answers one block. `point` maps each parameter that exists to a float64 array; all have the same
 number of dimensions and broadcast to the block's shape: an axis of the block is long in the arrays that vary along it
@@ -22,11 +23,16 @@ for it (`survey.kernels.jit.wait_for_other_compiler`) where it needs what is com
 import ast
 import sys
 from functools import cache
+from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
 
 from survey import contract, modules
 from survey.contract import Function, Value
+from survey.errors import BadInput
+from survey.wording import short
+
+GROUP = "survey.scenes"  # of entry points
 
 CONTRACT = {
     "TITLE": Value("one line", str, needed=True),
@@ -62,12 +68,16 @@ class _Folder(ModuleType):
     """`survey.scenes` is this folder; called, it gives {name: title} of the scenes."""
 
     def __call__(self):
-        return {name: _title(name) for name in modules.names(self)}
+        return {name: _title(name) for name in modules.names(self)} | {name: load(name).TITLE for name in brought()}
 
 
 def load(name):
     """The scene `name`, a module. Raises BadInput if there is none, or if it does not keep to CONTRACT."""
-    module = modules.load(sys.modules[__name__], name, "scene")
+    others = brought()
+    if isinstance(name, str) and name in others:
+        module = _loaded(name, others[name])
+    else:
+        module = modules.load(sys.modules[__name__], name, "scene", others)
     _check(module)
     return module
 
@@ -80,6 +90,24 @@ def _title(name):
             if isinstance(node, ast.Assign) and any(getattr(to, "id", "") == "TITLE" for to in node.targets):
                 return ast.literal_eval(node.value) if isinstance(node.value, ast.Constant) else load(name).TITLE
     return load(name).TITLE
+
+
+@cache
+def brought():
+    """{name: entry point} of the scenes of other packages; those of this package come first."""
+    own = modules.names(sys.modules[__name__])
+    return {point.name: point for point in entry_points(group=GROUP) if point.name not in own}
+
+
+def _loaded(name, point):
+    """The module of an entry point; raises BadInput if it cannot be imported."""
+    try:
+        return point.load()
+    except Exception as error:
+        raise BadInput(
+            f"the scene {name} of the package {point.dist.name if point.dist else point.value} cannot be loaded "
+            f"({type(error).__name__}: {short(error, 150)})"
+        ) from None
 
 
 @cache
