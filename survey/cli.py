@@ -98,6 +98,41 @@ def run(workflow, output, overrides, workers, scheduler, block_timeout, fresh, q
 
 @program.command()
 @click.argument("workflow")
+@click.option("-o", "--output", metavar="OUT.nc", help="The netCDF file, instead of the workflow's with _proved added.")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Replace a key, such as refine.width=0.01.")
+@click.option("--fresh", is_flag=True, help="Delete what an earlier, interrupted run has proved.")
+@click.option("--quiet", is_flag=True, help="No progress and no closing lines.")
+def prove(workflow, output, overrides, fresh, quiet):
+    """Prove a stability map: OUT.nc with its cells, and OUT.cert, which `survey-check` verifies by itself."""
+    from dataclasses import replace
+
+    from survey.request.workflow import read
+    from survey.sweep import engine, proofs
+    from survey.sweep.progress import Progress
+
+    checked, finished = read(workflow, overrides, output), None
+    if output is None:
+        checked = replace(checked, path=checked.path.with_stem(f"{checked.path.stem}_proved"))
+    checked = replace(checked, proves=True)
+    proofs.equation_of(checked)  # refuses what cannot be proved
+    resume_command = shlex.join(["survey", *(word for word in sys.argv[1:] if word != "--fresh")])
+    _stop_on_sigterm()
+    try:
+        with Progress(err, checked, silent=quiet) as progress:
+            finished = engine.run(checked, None, None, fresh, progress, resume_command)
+            pictures = _draw(checked)
+    except KeyboardInterrupt as stop:
+        traceback.clear_frames(stop.__traceback__)
+        _end_interrupted(stop.args[0] if stop.args else 130, checked.path, finished, resume_command)
+    if not quiet:
+        certificate = checked.path.with_suffix(".cert")
+        _summarise(finished, [checked.path, certificate, *pictures])
+        err.print(f"verify it, also on another machine: survey-check {certificate}", markup=False)
+    return 1 if _failed(finished) else 0
+
+
+@program.command()
+@click.argument("workflow")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Replace a key, such as axes.k.num=40.")
 @click.option("-o", "--output", metavar="OUT.nc", help="The netCDF file, instead of the workflow's output.path.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")

@@ -44,6 +44,7 @@ class Workflow:
     boundaries: str | None = None
     refine: Mapping[str, tuple[float, bool]] | None = None
     style: str = "screen"
+    proves: bool = False  # the cells of `refine` are theorems
 
 
 def read(path, overrides=(), output=None):

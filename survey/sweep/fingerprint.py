@@ -51,4 +51,4 @@ def fingerprint(workflow):
         "block_geometry": block_geometry(workflow),
         "kernels": jit.SOURCE_HASH,
         "scene_hash": getattr(workflow.scene, "HASH", ""),
-    }
+    } | ({"proves": True} if workflow.proves else {})
