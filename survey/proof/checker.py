@@ -1,36 +1,35 @@
 #!/usr/bin/env python3
 """survey-check OUT.cert: proves the stability map that a certificate states, or says what fails.
 
-This file needs Python and python-flint (ball arithmetic: https://flintlib.org, https://arblib.org), and nothing else: it
-can be copied, read in an hour, and run alone (`python checker.py OUT.cert`). It believes no number of the certificate.
-What the certificate states, and what the word PROVED then means, is printed by `statement` below.
+This file needs Python and python-flint (ball arithmetic, https://flintlib.org) and nothing else: it can be copied, read
+in an hour, and run alone, `python checker.py OUT.cert`. It believes no number of the certificate. What is proved is
+printed by `Certificate.statement`; the lemmas below have their proofs in the documentation, on the page "Proved maps".
 
-HILL'S EQUATION. y'' + z(u, p) y = 0 with two real parameters p = (p1, p2) in a rectangle. The certificate gives z by
+HILL'S EQUATION y'' + z(u, p) y = 0, with two real parameters p = (p1, p2) in a rectangle. A certificate gives z by
 formulas on consecutive pieces of [0, S], and a kind:
     even      z is continued by z(-u) = z(u) and z(S + u) = z(S - u); its period is T = 2 S;
     periodic  z is continued by z(u + S) = z(u); its period is T = S.
-y1, y2 are the solutions with y1 = 1, y1' = 0 and y2 = 0, y2' = 1 at u = 0; a dash is d/du.
+y1, y2 are the solutions with y1 = 1, y1' = 0 and y2 = 0, y2' = 1 at u = 0, and D = y1(T) + y2'(T).
 
-1. VERDICTS. All solutions are bounded for all u if |D| < 2, and one is unbounded if |D| > 2, D = y1(T) + y2'(T)
-   (Magnus and Winkler, Hill's Equation, 1966, theorem 1.1). If z is even, D - 2 = 4 y1'(S) y2(S) and
-   D + 2 = 4 y1(S) y2'(S): only the signs of the four factors are needed.
-2. ONE STEP (`Equation.step`). Let |z| <= Z on the disc |u - u0| <= R of the complex plane, z analytic there, w >= sqrt(Z),
-   w > 0, 0 < h < R, x = h/R. On every ray from u0, v = (w y, y') satisfies |v'| <= w |v| in the maximum norm, so
-   |w y| <= e^(wR) |v(u0)| on the disc; by Cauchy the Taylor coefficients satisfy |a_n| <= M R^-n with
-   M = e^(wR) max(|y(u0)|, |y'(u0)|/w). Cut after degree N, at u0 + h:
-       |y - sum| <= M x^(N+1) / (1 - x),     |y' - sum'| <= (M/R) (N+1) x^N / (1 - x)^2.
-3. THE PARAMETERS (`Equation.truncation`). A panel is a rectangle of parameters, mapped to [-1, 1]^2. Let f be one of the
-   factors. If |f| <= M for p1 on the Bernstein ellipse E_r (semi-axes (r +- 1/r)/2), f analytic inside, p2 real, then
-   the interpolant I1 f at the n Chebyshev points of the first kind satisfies |f - I1 f| <= 4 M r^(1-n) / (r - 1): the
-   coefficients of f are at most 2 M r^-k, and T_k, k >= n, is interpolated by 0 or by some +-T_j (Trefethen,
-   Approximation Theory and Approximation Practice, theorem 8.1 and chapter 4). In two variables
-       |f - I1 I2 f| <= |f - I1 f| + L |f - I2 f|,     L = 1 + (2/pi) log n1 >= the norm of I1 (Rivlin, 1974).
-4. GROWTH (`Equation.growth`). For complex z and a constant w > 0 the Euclidean norm of (w y, y') grows at a rate of at
-   most the logarithmic norm |w^2 - conj(z)| / (2w) of [[0, w], [-z/w, 0]]; so |(w y, y')(S)| is at most
-   exp(int_0^S |w^2 - conj(z)| / (2w) du) |(w y, y')(0)|. On the ellipse this gives M for all four factors.
-5. CELLS (`Panel.check`). The interpolant is written in Bernstein's polynomials of a cell, whose coefficients enclose its
-   values there; a cell is halved by de Casteljau's matrices. If all coefficients, which are balls, exceed the bound of 3,
-   the factor is positive on the whole cell, its border included; negative likewise.
+1. VERDICTS (`Panel.verdict`). If |D| < 2 all solutions are bounded, if |D| > 2 one grows exponentially (Magnus and
+   Winkler, Hill's Equation, 1966, theorem 1.1). If z is even, D - 2 = 4 y1'(S) y2(S) and D + 2 = 4 y1(S) y2'(S): the
+   signs of the four factors y1, y1', y2, y2' at S decide. If not, the factors are 2 - D and 2 + D.
+2. A STEP (`Equation.steps`). Let z be analytic and |z| <= Z on the disc |u - u0| <= R, w^2 >= Z, w > 0, 0 < h < R, and
+   x = h/R. On every ray from u0 the maximum norm of v = (w y, y') satisfies |v|' <= w |v|, so |w y| <= e^(wR) |v(u0)|
+   on the disc, and by Cauchy the Taylor coefficients of y satisfy |a_n| <= M R^-n, M = e^(wR) max(|y|, |y'|/w) at u0.
+   At u0 + h the sums up to degree N are off by at most M x^(N+1) / (1 - x), for y' by (M/R) (N+1) x^N / (1 - x)^2.
+3. GROWTH (`Equation.growth`). For complex z and a constant w > 0, the Euclidean norm of (w y, y') grows at most at the
+   rate |w^2 - conj z| / (2 w), the logarithmic norm of [[0, w], [-z/w, 0]]; so
+   |(w y, y')(S)| <= exp(int_0^S |w^2 - conj z| / (2 w) du) |(w y, y')(0)|.
+4. PARAMETERS (`Equation.truncation`). A panel is a rectangle of parameters, mapped to [-1, 1]^2. If a factor f is
+   analytic, |f| <= M, for p1 in the Bernstein ellipse E_r (semi-axes (r +- 1/r)/2) and real p2, then its interpolant I1 f
+   at the n Chebyshev points of the first kind satisfies |f - I1 f| <= 4 M r^(1-n) / (r - 1): its coefficients are at
+   most 2 M r^-k, and each T_k, k >= n, is interpolated by 0 or by some +-T_j (Trefethen, Approximation Theory and
+   Approximation Practice, theorem 8.1 and chapter 4). In two variables |f - I1 I2 f| <= |f - I1 f| + L |f - I2 f|,
+   where L = 1 + (2/pi) log n1 is at least the norm of I1 (Rivlin, The Chebyshev Polynomials, 1974).
+5. CELLS (`Panel.check`). I1 I2 f is written in Bernstein's polynomials of a cell: its values there lie between the
+   least and the largest coefficient. De Casteljau's matrices give the coefficients on halves. A factor is positive on a
+   cell, its border included, if all coefficients (which are balls) exceed the bound of 4; negative likewise.
 """
 
 import ast
@@ -48,15 +47,14 @@ from multiprocessing import get_context
 from flint import acb, arb, arb_mat, arb_series, ctx
 
 FORMAT = "survey-certificate 1"
-PANEL = {"nodes", "ellipses", "rates", "steps", "order", "cells"}
-KINDS = ("even", "periodic")
-STABLE, UNSTABLE, OPEN, SPLIT = "s", "u", "o", "+"  # "+" is followed by its four quarters
+STABLE, UNSTABLE, OPEN, SPLIT = "s", "u", "o", "+"  # cells; "+" is followed by its four quarters
 VERDICTS = {STABLE: "stable", UNSTABLE: "unstable", OPEN: "open"}
-QUARTERS = ((1, 1), (1, 0), (0, 1), (0, 0))  # (upper half of p2, of p1), the first in the text being the last here
-DEEPEST = 24  # a panel's cells are halved at most so often
-RATIO = arb(1) / 8  # h / R of a step
-ARCS, BOXES, COVER = 24, 16, 4  # of an ellipse's upper half, of each piece of [0, S], of an ellipse's box: where z is bounded
-LARGEST = 2**23  # characters of a certificate
+QUARTERS = ((1, 1), (1, 0), (0, 1), (0, 0))  # (upper half of p2?, of p1?): the last one is the first in the text
+RATIO, FAR = arb(1) / 8, 4  # h / R of a step; a step is halved unless w R < FAR
+SHORTEST = Fraction(1, 2**20)  # step, as a part of a piece
+ARCS, BOXES, COVER = 24, 32, 4  # parts of half an ellipse, of a piece of [0, S], of a side of half an ellipse's box
+DEEPEST, LARGEST = 24, 2**23  # halvings of a panel; characters of a certificate
+MALFORMED = (KeyError, TypeError, ValueError, IndexError, AttributeError, RecursionError, ArithmeticError)
 
 
 class Failed(Exception):
@@ -68,114 +66,15 @@ def need(condition, why):
         raise Failed(why)
 
 
-# ---------------------------------------------------------------------------------------------------------- formulas
-
-
-class Formula:
-    """An expression in u and the parameters: + - * / ** (whole exponents), numbers (exact decimals), pi, FUNCTIONS."""
-
-    def __init__(self, text, names):
-        need(isinstance(text, str) and len(text) < 20_000, "a formula is not a text, or too long")
-        try:
-            self.tree = ast.parse(text, mode="eval").body
-        except (SyntaxError, ValueError, RecursionError, MemoryError):
-            raise Failed(f"not a formula: {text[:80]!r}") from None
-        self.text, self.numbers = text, {}
-        self._admit(self.tree, {*names, "pi"}, 0)
-
-    def _admit(self, node, names, depth):
-        """Nothing but arithmetic may stand in a formula."""
-        need(depth < 200, "a formula is nested too deeply")
-        if isinstance(node, ast.Constant):
-            text = ast.get_source_segment(self.text, node)
-            need(type(node.value) in (int, float), f"{text!r} is not a number")
-            self.numbers[node] = Fraction(text)
-        elif isinstance(node, ast.Name):
-            need(node.id in names, f"{node.id!r} is neither u, nor pi, nor a parameter")
-        elif isinstance(node, ast.UnaryOp):
-            need(isinstance(node.op, ast.USub), "an operation is not allowed")
-            self._admit(node.operand, names, depth + 1)
-        elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
-            need(isinstance(node.right, ast.Constant) and type(node.right.value) is int, "an exponent is not whole")
-            need(0 <= node.right.value <= 64, "an exponent is not between 0 and 64")
-            self._admit(node.left, names, depth + 1)
-        elif isinstance(node, ast.BinOp):
-            need(isinstance(node.op, (ast.Add, ast.Sub, ast.Mult, ast.Div)), "an operation is not allowed")
-            self._admit(node.left, names, depth + 1)
-            self._admit(node.right, names, depth + 1)
-        else:
-            need(
-                isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in FUNCTIONS
-                and len(node.args) == 1 and not node.keywords,
-                f"{ast.get_source_segment(self.text, node)!r} is not allowed",
-            )  # fmt: skip
-            self._admit(node.args[0], names, depth + 1)
-
-    def __call__(self, **values):
-        """Its value, or its power series, for balls, complex balls or series of balls."""
-        return self._value(self.tree, values)
-
-    def _value(self, node, values):
-        if isinstance(node, ast.Constant):
-            return exact(self.numbers[node])
-        if isinstance(node, ast.Name):
-            return arb.pi() if node.id == "pi" else values[node.id]
-        if isinstance(node, ast.UnaryOp):
-            return -self._value(node.operand, values)
-        if isinstance(node, ast.Call):
-            return FUNCTIONS[node.func.id](self._value(node.args[0], values))
-        left = self._value(node.left, values)
-        if isinstance(node.op, ast.Pow):
-            return power(left, node.right.value)
-        right = self._value(node.right, values)
-        if isinstance(node.op, ast.Add):
-            return left + right
-        if isinstance(node.op, ast.Sub):
-            return left - right
-        return left * right if isinstance(node.op, ast.Mult) else left / right
-
-
-def power(x, n):
-    """x^n by repeated multiplication."""
-    found = x if n % 2 else arb(1)
-    return found if n < 2 else found * power(x * x, n // 2)
-
-
-def _branch(name):
-    """A function with a branch cut: of a complex ball that meets the cut it is not a number."""
-    return lambda x: getattr(x, name)(analytic=True) if isinstance(x, acb) else getattr(x, name)()
-
-
-def _even_part(x, sign):
-    """(e^x + sign e^-x) / 2: arb's series know neither cosh nor sinh."""
-    return (x.exp() + sign * (-x).exp()) / 2
-
-
-FUNCTIONS = {
-    "sin": lambda x: x.sin(),
-    "cos": lambda x: x.cos(),
-    "tan": lambda x: x.sin() / x.cos(),
-    "exp": lambda x: x.exp(),
-    "sinh": lambda x: _even_part(x, -1),
-    "cosh": lambda x: _even_part(x, 1),
-    "tanh": lambda x: _even_part(x, -1) / _even_part(x, 1),
-    "log": _branch("log"),
-    "sqrt": _branch("sqrt"),
-}
-
-
 def exact(number):
     """The ball of a rational number."""
     return arb(number.numerator) / number.denominator
 
 
 def rational(text):
-    """A rational number given as a text: '0.99', '-7/3'."""
-    need(isinstance(text, str) and len(text) < 60, "a number is not a short text")
-    try:
-        return Fraction(text)
-    except (ValueError, ZeroDivisionError):
-        raise Failed(f"{text!r} is not a rational number") from None
+    """The rational number that a text such as '0.99' or '-7/3' denotes."""
+    need(isinstance(text, str) and len(text) < 80, "a number is not a short text")
+    return Fraction(text)
 
 
 def whole(value, least, most, what):
@@ -183,148 +82,204 @@ def whole(value, least, most, what):
     return value
 
 
-# ------------------------------------------------------------------------------------------------------ the equation
-
-
-class Equation:
-    """y'' + z(u, p) y = 0 on [0, S], in pieces [(S_k, z_k)]; what it promises of its solutions, in balls."""
-
-    def __init__(self, kind, pieces, names):
-        need(kind in KINDS, f"the kind of z is neither {' nor '.join(KINDS)}")
-        need(isinstance(pieces, list) and 0 < len(pieces) <= 100, "there must be 1 to 100 pieces of [0, S]")
-        self.kind, self.names, self.pieces = kind, names, []
-        start = arb(0)
-        for end, z in pieces:
-            end, text = Formula(end, [])(), end
-            need(end > start, "the ends of the pieces of [0, S] do not increase")
-            self.pieces.append((start, end, text, Formula(z, ["u", *names])))
-            start = end
-        self.span = start
-
-    def steps(self, box, count, order, ratio):
-        """[(u0, h, z, (y, y' of either solution left out))]: `count` steps a piece; `box`: balls of the parameters."""
-        found = []
-        for start, end, _, z in self.pieces:
-            h = (end - start) / count
-            radius = h / ratio
-            for number in range(count):
-                u0 = start + number * h
-                disc = acb(u0 + radius * arb(0, 1), radius * arb(0, 1))
-                size = acb(z(u=disc, **box)).abs_upper()
-                need(size.is_finite(), f"z is not bounded on the disc of step {number}: shorter steps are needed")
-                w = size.sqrt().upper() + exact(Fraction(1, 1024))
-                growth = (w * radius).exp()
-                y = growth * ratio ** (order + 1) / (1 - ratio)
-                dy = growth / radius * (order + 1) * ratio**order / (1 - ratio) ** 2
-                found.append((u0, h, z, ((y, dy), (y / w, dy / w))))
-        return found
-
-    def factors(self, steps, order, point):
-        """y1, y1', y2, y2' at S for the parameters `point` (balls)."""
-        ctx.cap = order + 1
-        y1, dy1, y2, dy2 = arb(1), arb(0), arb(0), arb(1)
-        for u0, h, z, left_out in steps:
-            series = arb_series(z(u=arb_series([u0, 1]), **point))
-            z_n = [series[n] for n in range(order - 1)]
-            (a, da), (b, db) = (
-                self._step(z_n, h, order, *start, *missed)
-                for start, missed in zip(((arb(1), arb(0)), (arb(0), arb(1))), left_out, strict=True)
-            )
-            y1, dy1 = a * y1 + b * dy1, da * y1 + db * dy1
-            y2, dy2 = a * y2 + b * dy2, da * y2 + db * dy2
-        return y1, dy1, y2, dy2
-
-    @staticmethod
-    def _step(z_n, h, order, y, dy, y_missed, dy_missed):
-        """y and y' after one step, from the Taylor series with the coefficients z_n of z; with what it leaves out."""
-        a = [y, dy]
-        for n in range(order - 1):
-            total = sum((z_n[j] * a[n - j] for j in range(n + 1)), arb(0))
-            a.append(-total / ((n + 1) * (n + 2)))
-        value, slope = arb(0), arb(0)
-        for n in range(order, -1, -1):
-            slope = slope * h + value
-            value = value * h + a[n]
-        return value + y_missed * arb(0, 1), slope + dy_missed * arb(0, 1)
-
-    def growth(self, box, w):
-        """exp(int_0^S |w^2 - conj(z)| / (2w) du) for parameters in the complex balls of `box`."""
-        total = arb(0)
-        for start, end, _, z in self.pieces:
-            part = (end - start) / BOXES
-            for number in range(BOXES):
-                u = start + (end - start) * share(number, BOXES)
-                value = acb(z(u=u, **box))
-                total += (w * w - value.conjugate()).abs_upper() / (2 * w) * part
-        return total.exp()
-
-    def truncation(self, sides, counts, ellipses, rates):
-        """Bounds of |f - I1 I2 f| for each factor f; `sides`: (centre, half length) of both parameters."""
-        real = {name: centre + half * arb(0, 1) for name, (centre, half) in zip(self.names, sides, strict=True)}
-        parts = []
-        for name, (centre, half), n, r, w in zip(self.names, sides, counts, ellipses, rates, strict=True):
-            worst = self.on_ellipse(real, name, centre, half, r, w)
-            part = 4 * r ** (1 - n) / (r - 1)
-            y1, dy1, y2, dy2 = worst, worst * w, worst / w, worst
-            parts.append([part * m for m in ((y1, dy1, y2, dy2) if self.kind == "even" else (y1 + dy2,) * 2)])
-        norm = 1 + 2 / arb.pi() * arb(counts[0]).log()
-        return [(first + norm * second).upper() for first, second in zip(*parts, strict=True)]
-
-    def on_ellipse(self, real, name, centre, half, r, w):
-        """The largest `growth` where this parameter lies on the ellipse: on its upper half, by reflection."""
-        self._analytic(real, name, centre, half, r)
-        worst = arb(0)
-        for number in range(ARCS):
-            turn = acb(0, arb.pi() * share(number, ARCS)).exp()
-            arc = centre + half * (r * turn + 1 / (r * turn)) / 2
-            worst = worst.max(self.growth({**real, name: arc}, w))
-        need(worst.is_finite(), "z is not bounded on an ellipse")
-        return worst
-
-    def _analytic(self, real, name, centre, half, r):
-        """z must be analytic in this parameter inside the ellipse: finite on boxes that cover it, for all u."""
-        across, up = half * (r + 1 / r) / 2, half * (r - 1 / r) / 2
-        for start, end, _, z in self.pieces:
-            for part, i, j in product(range(BOXES), range(COVER), range(COVER)):
-                u = start + (end - start) * share(part, BOXES)
-                inside = acb(centre + across * (2 * share(i, COVER) - 1), up * (2 * share(j, COVER) - 1))
-                need(acb(z(u=u, **{**real, name: inside})).is_finite(), f"z is singular in {name} inside an ellipse")
-
-
 def share(number, of):
     """The ball of [number, number + 1] / of."""
     return (arb(number) / of).union(arb(number + 1) / of)
 
 
-# --------------------------------------------------------------------------------------------------------------- cells
+# ----------------------------------------------------------------------------------------------------------- formulas
+
+
+def power(x, n):
+    """x^n by multiplication."""
+    found = x if n % 2 else arb(1)
+    return found if n < 2 else found * power(x * x, n // 2)
+
+
+def of_exponentials(sign):
+    """(e^x + sign e^-x) / 2."""
+    return lambda x: (x.exp() + sign * (-x).exp()) / 2
+
+
+def with_branch_cut(name):
+    """A function which is not a number for complex balls that meet its branch cut, where it is not analytic."""
+    return lambda x: getattr(x, name)(analytic=True) if isinstance(x, acb) else getattr(x, name)()
+
+
+FUNCTIONS = {
+    "sin": lambda x: x.sin(), "cos": lambda x: x.cos(), "tan": lambda x: x.sin() / x.cos(), "exp": lambda x: x.exp(),
+    "cosh": of_exponentials(1), "sinh": of_exponentials(-1),
+    "tanh": lambda x: of_exponentials(-1)(x) / of_exponentials(1)(x),
+    "log": with_branch_cut("log"), "sqrt": with_branch_cut("sqrt"),
+}  # fmt: skip
+OPERATIONS = {
+    ast.Add: lambda x, y: x + y, ast.Sub: lambda x, y: x - y, ast.Mult: lambda x, y: x * y, ast.Div: lambda x, y: x / y,
+}  # fmt: skip
+
+
+class Formula:
+    """An expression in `names` and pi: + - * /, ** with whole exponents, exact decimals, FUNCTIONS; nothing else."""
+
+    def __init__(self, text, names):
+        need(isinstance(text, str) and len(text) < 20_000, "a formula is not a text, or too long")
+        self.text, self.names = text, {*names, "pi"}
+        try:
+            self.value = self._read(ast.parse(text, mode="eval").body)
+        except (SyntaxError, ValueError, RecursionError, MemoryError):
+            raise Failed(f"this is not a formula: {text[:80]!r}") from None
+
+    def __call__(self, **values):
+        """Its value for balls, complex balls, or power series of balls."""
+        return self.value({"pi": arb.pi(), **values})
+
+    def _read(self, node):
+        """The node as a function of {name: value}."""
+        if isinstance(node, ast.Constant) and type(node.value) in (int, float):
+            number = Fraction(ast.get_source_segment(self.text, node))
+            return lambda values: exact(number)
+        if isinstance(node, ast.Name) and node.id in self.names:
+            return lambda values: values[node.id]
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+            operand = self._read(node.operand)
+            return lambda values: -operand(values)
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
+            need(isinstance(node.right, ast.Constant), "an exponent is not a number")
+            base, exponent = self._read(node.left), whole(node.right.value, 0, 64, "an exponent")
+            return lambda values: power(base(values), exponent)
+        if isinstance(node, ast.BinOp) and type(node.op) in OPERATIONS:
+            left, right, operation = self._read(node.left), self._read(node.right), OPERATIONS[type(node.op)]
+            return lambda values: operation(left(values), right(values))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in FUNCTIONS:
+            need(len(node.args) == 1 and not node.keywords, f"{node.func.id} takes one argument")
+            argument, function = self._read(node.args[0]), FUNCTIONS[node.func.id]
+            return lambda values: function(argument(values))
+        raise Failed(f"{ast.get_source_segment(self.text, node)!r} is not allowed in a formula")
+
+
+# ------------------------------------------------------------------------------------------------------- the equation
+
+
+class Equation:
+    """y'' + z(u, p) y = 0 on [0, S]; `pieces`: [(end, formula of z)] from 0 to S; `names` of the two parameters."""
+
+    def __init__(self, kind, pieces, names):
+        need(kind in ("even", "periodic"), "z is neither even nor periodic")
+        need(0 < len(pieces) <= 100, "there must be 1 to 100 pieces of [0, S]")
+        self.even, self.names, self.pieces, start = kind == "even", names, [], arb(0)
+        for end, z in pieces:
+            end = Formula(end, [])
+            need(end() > start, "the ends of the pieces of [0, S] do not increase")
+            self.pieces.append((start, end(), end.text, Formula(z, ["u", *names])))
+            start = end()
+
+    def steps(self, box, order):
+        """[(u0, h, z, bounds of what is left out of (y1, y1') and of (y2, y2'))]; `box` covers the parameters."""
+        found = []
+        for start, end, _, z in self.pieces:
+            waiting = [(Fraction(0), Fraction(1))]
+            while waiting:
+                low, high = waiting.pop()
+                need(high - low > SHORTEST, "z is too large, or singular too near to the real axis")
+                u0, h = start + (end - start) * exact(low), (end - start) * exact(high - low)
+                radius = h / RATIO
+                size = acb(z(u=acb(u0 + radius * arb(0, 1), radius * arb(0, 1)), **box)).abs_upper()
+                w = size.sqrt().upper() + exact(SHORTEST)
+                if not w * radius < FAR:  # or z is not finite on the disc
+                    waiting += [((low + high) / 2, high), (low, (low + high) / 2)]
+                    continue
+                y = (w * radius).exp() * RATIO ** (order + 1) / (1 - RATIO)
+                dy = (w * radius).exp() / radius * (order + 1) * RATIO**order / (1 - RATIO) ** 2
+                found.append((u0, h, z, ((y, dy), (y / w, dy / w))))
+        return found
+
+    def factors(self, steps, order, point):
+        """The factors for the parameters `point` (balls)."""
+        ctx.cap = order + 1
+        y1, dy1, y2, dy2 = arb(1), arb(0), arb(0), arb(1)
+        for u0, h, z, ((y, dy), (other, dother)) in steps:
+            series = arb_series(z(u=arb_series([u0, 1]), **point))
+            z_n = [series[n] for n in range(order - 1)]
+            a, da = step(z_n, h, order, arb(1), arb(0), y, dy)
+            b, db = step(z_n, h, order, arb(0), arb(1), other, dother)
+            y1, dy1, y2, dy2 = a * y1 + b * dy1, da * y1 + db * dy1, a * y2 + b * dy2, da * y2 + db * dy2
+        return (y1, dy1, y2, dy2) if self.even else (2 - y1 - dy2, 2 + y1 + dy2)
+
+    def truncation(self, sides, counts, ellipses, rates):
+        """Bounds of |f - I1 I2 f| for each factor f; `sides`: (centre, half length) of both parameters."""
+        parts = []
+        for name, n, r, w in zip(self.names, counts, ellipses, rates, strict=True):
+            growth = arb(0)
+            for arc in self.on_ellipse(sides, name, r):
+                growth = growth.max(self.growth(arc, w))
+            part = 4 * growth * r ** (1 - n) / (r - 1)
+            parts.append((part, part * w, part / w, part) if self.even else (2 * part, 2 * part))
+        norm = 1 + 2 / arb.pi() * arb(counts[0]).log()
+        return [(first + norm * second).upper() for first, second in zip(*parts, strict=True)]
+
+    @staticmethod
+    def growth(arc, w):
+        """exp(int_0^S |w^2 - conj z| / (2 w) du), from [(length of a part of [0, S], z there)]."""
+        return sum((length * (w * w - z.conjugate()).abs_upper() / (2 * w) for length, z in arc), arb(0)).exp()
+
+    def on_ellipse(self, sides, name, r):
+        """For arcs that cover the upper half of E_r of one parameter: [(length of a part of [0, S], z there)].
+
+        The lower half is its mirror image, since z is real for real parameters. Raises Failed unless z is analytic in
+        E_r, that is finite on boxes that cover its upper half.
+        """
+        real = {name: centre + half * arb(0, 1) for name, (centre, half) in zip(self.names, sides, strict=True)}
+        centre, half = sides[self.names.index(name)]
+        across, up = half * (r + 1 / r) / 2, half * (r - 1 / r) / 2
+        turns = [acb(0, arb.pi() * share(number, ARCS)).exp() for number in range(ARCS)]
+        arcs = [acb(centre + across * turn.real, up * turn.imag) for turn in turns]
+        columns, rows = ([share(k, COVER) for k in range(COVER)] for _ in range(2))
+        inside = [acb(centre + across * (2 * x - 1), up * y) for x, y in product(columns, rows)]
+        found = [[] for _ in arcs]
+        for start, end, _, z in self.pieces:
+            for part in range(BOXES):
+                u = start + (end - start) * share(part, BOXES)
+                finite = all(acb(z(u=u, **{**real, name: place})).is_finite() for place in inside)
+                need(finite, f"z is singular for a complex {name} inside an ellipse")
+                for arc, place in zip(found, arcs, strict=True):
+                    arc.append(((end - start) / BOXES, acb(z(u=u, **{**real, name: place}))))
+        return found
+
+
+def step(z_n, h, order, y, dy, y_missed, dy_missed):
+    """y and y' after a step from the Taylor coefficients z_n of z, with what the sums leave out."""
+    a = [y, dy]
+    for n in range(order - 1):
+        a.append(-sum((z_n[j] * a[n - j] for j in range(n + 1)), arb(0)) / ((n + 1) * (n + 2)))
+    value, slope = arb(0), arb(0)
+    for coefficient in reversed(a):
+        value, slope = value * h + coefficient, slope * h + value
+    return value + y_missed * arb(0, 1), slope + dy_missed * arb(0, 1)
+
+
+# -------------------------------------------------------------------------------------------------------------- cells
 
 
 class Panel:
-    """A rectangle of parameters on which the factors are polynomials to within `truncation`; its cells."""
+    """A rectangle of parameters on which the factors are polynomials to within `truncation`; `sides`: its ends."""
 
     def __init__(self, equation, sides, data):
-        need(isinstance(data, dict) and set(data) == PANEL, f"a panel must have {', '.join(sorted(PANEL))}")
-        need(all(len(data[key]) == 2 for key in ("nodes", "ellipses", "rates")), "a panel has two of a kind")
-        self.counts = [whole(n, 2, 40, "a number of nodes") for n in data["nodes"]]
-        self.ellipses, self.rates = ([exact(rational(x)) for x in data[key]] for key in ("ellipses", "rates"))
-        need(all(r > 1 for r in self.ellipses) and all(w > 0 for w in self.rates), "r <= 1 or w <= 0")
-        self.order, self.steps = whole(data["order"], 2, 400, "an order"), whole(data["steps"], 1, 10_000, "steps")
-        need(isinstance(data["cells"], str) and set(data["cells"]) <= set(VERDICTS) | {SPLIT}, "unknown cells")
         self.equation, self.cells = equation, data["cells"]
         self.sides = [(exact((low + high) / 2), exact((high - low) / 2)) for low, high in sides]
+        self.counts = [whole(n, 2, 40, "a number of nodes") for n in data["nodes"]]
+        self.ellipses, self.rates = ([exact(rational(x)) for x in data[key]] for key in ("ellipses", "rates"))
+        need(all(r > 1 for r in self.ellipses) and all(w > 0 for w in self.rates), "an r <= 1, or a w <= 0")
+        self.order = whole(data["order"], 2, 400, "an order")
+        need(set(self.cells) <= {*VERDICTS, SPLIT}, "unknown cells")
 
     def polynomials(self):
         """For each factor: its Bernstein coefficients on the panel, and the bound of what they leave out."""
         equation, names = self.equation, self.equation.names
         nodes = [[(arb.pi() * (2 * i + 1) / (2 * n)).cos() for i in range(n)] for n in self.counts]
         box = {name: centre + half * arb(0, 1) for name, (centre, half) in zip(names, self.sides, strict=True)}
-        steps = equation.steps(box, self.steps, self.order, RATIO)
-        values = []
-        for x, y in product(*nodes):
-            place = (centre + half * at for (centre, half), at in zip(self.sides, (x, y), strict=True))
-            y1, dy1, y2, dy2 = equation.factors(steps, self.order, dict(zip(names, place, strict=True)))
-            even = equation.kind == "even"
-            values.append((y1, dy1, y2, dy2) if even else (2 - y1 - dy2, 2 + y1 + dy2))
+        steps, values = equation.steps(box, self.order), []
+        for at in product(*nodes):
+            place = (centre + half * x for (centre, half), x in zip(self.sides, at, strict=True))
+            values.append(equation.factors(steps, self.order, dict(zip(names, place, strict=True))))
         left, right = (bernstein(at).inv() for at in nodes)
         tables = [left * arb_mat(*self.counts, list(f)) * right.transpose() for f in zip(*values, strict=True)]
         return tables, equation.truncation(self.sides, self.counts, self.ellipses, self.rates)
@@ -353,36 +308,42 @@ class Panel:
         return shares
 
     def verdict(self, signs):
-        """What the signs of the factors prove."""
-        if self.equation.kind == "even":
+        """What the signs of the factors prove (0: unknown)."""
+        if self.equation.even:
             y1, dy1, y2, dy2 = signs
-            below, above = -dy1 * y2, y1 * dy2  # the signs of 2 - D and 2 + D
-        else:
-            below, above = signs
+            signs = -dy1 * y2, y1 * dy2  # of 2 - D and of 2 + D
+        below, above = signs
         return UNSTABLE if -1 in (below, above) else STABLE if below == above == 1 else OPEN
 
 
 def bernstein(nodes):
-    """The matrix of Bernstein's polynomials of degree n - 1 on [-1, 1] at n nodes."""
+    """The values of Bernstein's polynomials of degree n - 1 on [-1, 1] at n nodes."""
     n = len(nodes)
-    rows = [[comb(n - 1, j) * power((1 + x) / 2, j) * power((1 - x) / 2, n - 1 - j) for j in range(n)] for x in nodes]
-    return arb_mat(rows)
+    return arb_mat(
+        [[comb(n - 1, j) * power((1 + x) / 2, j) * power((1 - x) / 2, n - 1 - j) for j in range(n)] for x in nodes]
+    )
 
 
 def halving(n):
     """Bernstein coefficients on an interval -> on its lower and on its upper half (de Casteljau)."""
     lower = [[arb(comb(i, j)) / 2**i for j in range(n)] for i in range(n)]
-    upper = [[lower[n - 1 - i][n - 1 - j] for j in range(n)] for i in range(n)]
-    return arb_mat(lower), arb_mat(upper)
+    return arb_mat(lower), arb_mat([row[::-1] for row in lower[::-1]])
 
 
 def quarter(table, first, second):
-    """The coefficients on a quarter of the cell, once they are needed."""
+    """The coefficients on a quarter of a cell, computed when they are needed."""
     return lambda: first * table * second.transpose()
 
 
+def sign(table, bound):
+    """1 or -1 if the polynomial, and all that differs from it by at most `bound`, has this sign on the cell; else 0."""
+    if table[0, 0] > bound:
+        return int(all(x > bound for x in table.entries()))
+    return -int(table[0, 0] < -bound and all(x < -bound for x in table.entries()))
+
+
 def shares_of(cells):
-    """{verdict: the share of the panel that its cells have}; raises Failed unless the cells cover the panel."""
+    """{verdict: its share of the panel}; raises Failed unless the cells cover the panel."""
     shares, waiting = dict.fromkeys(VERDICTS, Fraction(0)), [0]
     for letter in cells:
         need(waiting, "there are more cells than cover the panel")
@@ -396,20 +357,7 @@ def shares_of(cells):
     return shares
 
 
-def open_panel():
-    """The data of a panel of which nothing is stated."""
-    return {"nodes": [2, 2], "ellipses": ["2", "2"], "rates": ["1", "1"], "steps": 1, "order": 2, "cells": OPEN}
-
-
-def sign(table, bound):
-    """1 or -1 if the polynomial, and all that differs from it by at most `bound`, has this sign on its cell; else 0."""
-    corner = table[0, 0]
-    if corner > bound:
-        return 1 if all(x > bound for x in table.entries()) else 0
-    return -1 if corner < -bound and all(x < -bound for x in table.entries()) else 0
-
-
-# --------------------------------------------------------------------------------------------------------- certificate
+# -------------------------------------------------------------------------------------------------------- certificate
 
 
 class Certificate:
@@ -419,13 +367,10 @@ class Certificate:
         need(len(text) < LARGEST, "the certificate is too long")
         try:
             data = json.loads(text)
-        except (ValueError, RecursionError):
-            raise Failed("the certificate is not JSON") from None
-        need(isinstance(data, dict) and data.get("format") == FORMAT, f"the format is not {FORMAT!r}")
-        try:
+            need(data["format"] == FORMAT, f"the format is not {FORMAT!r}")
             need(digest(data) == data["sha256"], "it was changed: its digest is another")
             self._read(data)
-        except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+        except MALFORMED as error:
             raise Failed(f"the certificate is malformed ({type(error).__name__}: {error})") from None
 
     def _read(self, data):
@@ -437,53 +382,79 @@ class Certificate:
         self.sides = [tuple(rational(end) for end in side) for side in data["rectangle"]]
         good = len(self.sides) == 2 and all(len(side) == 2 and side[0] < side[1] for side in self.sides)
         need(good, "the rectangle must have two sides of positive length")
-        self.across = [whole(n, 1, 4096, "a number of panels") for n in data["panels"]["across"]]
-        self.panels = data["panels"]["list"]
-        number = self.across[0] * self.across[1] if len(self.across) == 2 else 0
-        need(len(self.panels) == number, "the panels do not cover the rectangle")
+        self.panels, across = data["panels"]["list"], data["panels"]["across"]
+        need(len(across) == 2, "the panels must lie across two sides")
+        self.places = places([whole(n, 1, 4096, "a number of panels") for n in across], data["panels"]["layout"])
+        need(len(self.panels) == len(self.places), "the panels do not cover the rectangle")
         self.shares = {letter: rational(data["shares"][letter]) for letter in VERDICTS}
 
     def panel(self, number):
-        """The Panel of this number: the second parameter varies first."""
-        at = divmod(number, self.across[1])
-        sides = [
-            [low + (high - low) * Fraction(i + end, n) for end in (0, 1)]
-            for (low, high), i, n in zip(self.sides, at, self.across, strict=True)
-        ]
-        return Panel(self.equation, sides, self.panels[number])
+        """The Panel of this number."""
+        return Panel(self.equation, within(self.sides, self.places[number]), self.panels[number])
 
     def statement(self, shares):
         """The theorem in words; `shares`: {verdict: its share of the rectangle}."""
         (a, b), (c, d) = self.sides
         first, second = self.names
-        start, lines = "0", []
+        start, lines = "0", ["Consider y'' + z(u) y = 0, where"]
         for _, _, end, z in self.equation.pieces:
             lines.append(f"    z(u) = {z.text}    for {start} <= u <= {end},")
             start = end
         even = f"    z(-u) = z(u), z({start} + u) = z({start} - u), and the period T = 2 ({start})."
-        lines.append(even if self.equation.kind == "even" else f"    z(u + T) = z(u), the period T = {start}.")
-        cells = [sum(panel["cells"].count(letter) for panel in self.panels) for letter in VERDICTS]
-        lines = [
-            "Consider y'' + z(u) y = 0, where", *lines,
-            f"The rectangle {a} <= {first} <= {b}, {c} <= {second} <= {d} is divided into {sum(cells):,} cells.",
-            f"In each of the {cells[0]:,} stable cells, borders included, |D| < 2: all solutions are bounded.",
-            f"In each of the {cells[1]:,} unstable cells, borders included, |D| > 2: a solution grows exponentially.",
-            f"Of {cells[2]:,} cells nothing is stated. (D is the trace of the monodromy matrix over T.)",
-        ]  # fmt: skip
+        cells = [f"{sum(panel['cells'].count(letter) for panel in self.panels):,}" for letter in VERDICTS]
+        lines += [
+            even if self.equation.even else f"    z(u + T) = z(u), and the period T = {start}.",
+            f"The rectangle {a} <= {first} <= {b}, {c} <= {second} <= {d} is divided into cells.",
+            f"In each of the {cells[0]} stable cells, borders included, |D| < 2: all solutions are bounded.",
+            f"In each of the {cells[1]} unstable cells, borders included, |D| > 2: a solution grows exponentially.",
+            f"Of the {cells[2]} open cells nothing is stated. (D is the trace of the monodromy matrix over T.)",
+        ]
         for letter in (STABLE, UNSTABLE):
-            low, high = shares[letter], shares[letter] + shares[OPEN]
-            area = [decimal((b - a) * (d - c) * part, 12, part is high) for part in (low, high)]
-            percent = [decimal(100 * part, 4, part is high) for part in (low, high)]
-            lines.append(
-                f"The {VERDICTS[letter]} points have an area from {area[0]} to {area[1]}, which is "
-                f"{percent[0]} % to {percent[1]} % of the rectangle."
-            )
+            bounds = (shares[letter], False), (shares[letter] + shares[OPEN], True)
+            area = " to ".join(decimal((b - a) * (d - c) * part, 12, up) for part, up in bounds)
+            percent = " to ".join(decimal(100 * part, 4, up) for part, up in bounds)
+            lines.append(f"The {VERDICTS[letter]} points have an area of {area}: {percent} % of the rectangle.")
         return "\n".join(lines)
+
+
+def places(across, layout):
+    """The panels as parts of both sides, the second varying first; of a layout such as "..+....", "+" is quartered."""
+    need(across[0] * across[1] <= 2**16, "there are too many panels")
+    found, waiting = [], []
+    for at in reversed(list(product(*map(range, across)))):
+        waiting.append(tuple((Fraction(k, n), Fraction(k + 1, n)) for k, n in zip(at, across, strict=True)))
+    for letter in layout:
+        need(waiting, "the layout has more panels than cover the rectangle")
+        place = waiting.pop()
+        if letter == SPLIT:
+            waiting += quarters(place)
+        else:
+            found.append(place)
+    need(not waiting, "the layout does not cover the rectangle")
+    return found
+
+
+def quarters(place):
+    """The quarters of a part of the rectangle, the first one last."""
+    halves = [((start, (start + end) / 2), ((start + end) / 2, end)) for start, end in place]
+    return [(halves[0][right], halves[1][upper]) for upper, right in QUARTERS]
+
+
+def within(sides, place):
+    """Parts of the sides as numbers."""
+    return [tuple(low + (high - low) * end for end in part) for (low, high), part in zip(sides, place, strict=True)]
+
+
+def weighed(places, found):
+    """{verdict: its share of the rectangle} from its shares of the panels."""
+    areas = [(b - a) * (d - c) for (a, b), (c, d) in places]
+    pairs = list(zip(areas, found, strict=True))
+    return {letter: sum((area * part[letter] for area, part in pairs), Fraction(0)) for letter in VERDICTS}
 
 
 def digest(data):
     """The SHA-256 of all but itself."""
-    body = json.dumps({key: data[key] for key in sorted(set(data) - {"sha256"})}, sort_keys=True)
+    body = json.dumps({key: value for key, value in data.items() if key != "sha256"}, sort_keys=True)
     return hashlib.sha256(body.encode()).hexdigest()
 
 
@@ -494,28 +465,29 @@ def decimal(number, digits, up):
     return f"{scaled // 10**digits}.{scaled % 10**digits:0{digits}d}"
 
 
+once_read = lru_cache(maxsize=1)(Certificate)
+
+
 def proved(text, number):
-    """The shares of the verdicts of one panel, or why they are not proved; in a process of its own."""
+    """The shares of the verdicts of one panel, or why they are not proved; perhaps in a process of its own."""
     try:
         return once_read(text).panel(number).check()
     except Failed as failed:
         return f"panel {number + 1}: {failed}"
-    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+    except MALFORMED as error:
         return f"panel {number + 1} is malformed ({type(error).__name__}: {error})"
-
-
-once_read = lru_cache(maxsize=1)(Certificate)
 
 
 def check(text, processes=1, report=lambda done, total: None):
     """The statement that the text of a certificate proves; raises Failed if it proves none."""
-    certificate = once_read(text)
-    total, number = dict.fromkeys(VERDICTS, Fraction(0)), len(certificate.panels)
+    certificate, found = once_read(text), []
+    number = len(certificate.panels)
     with get_context("spawn").Pool(processes) if processes > 1 else nullcontext() as pool:
-        for done, found in enumerate((pool.imap if pool else map)(partial(proved, text), range(number)), 1):
-            need(isinstance(found, dict), found)
-            total = {letter: total[letter] + found[letter] / number for letter in VERDICTS}
-            report(done, number)
+        for shares in (pool.imap if pool else map)(partial(proved, text), range(number)):
+            need(isinstance(shares, dict), shares)
+            found.append(shares)
+            report(len(found), number)
+    total = weighed(certificate.places, found)
     need(total == certificate.shares, "the shares of the verdicts are not those that it states")
     return certificate.statement(total)
 

@@ -4,7 +4,6 @@ The nodes and the bounds are the checker's own (`survey.proof.checker`), in ball
 many at a time, with a bound of all rounding: nothing is stated that does not hold with a margin.
 """
 
-from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
@@ -13,87 +12,91 @@ from flint import arb
 from survey.proof import checker
 
 BITS = 96  # of the balls
-ORDER = 24  # of the Taylor series
-SMALL = 1e-9  # what the series of a step may leave out, of the largest factor
-NODES = (8, 10, 12, 14, 16, 18, 20, 24, 28, 32)
-ELLIPSES = (1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 14, 20)
-RATES = 6  # values of w that are tried
+ORDERS = range(12, 80, 4)  # of the Taylor series
+NODES = (6, 8, 10, 12, 14, 16, 18, 20)
+ELLIPSES = (20, 12, 8, 6, 4.5, 3.5, 2.8, 2.3, 1.9, 1.6)
+RATES = np.geomspace(0.3, 1.3, 8)  # w relative to the square root of the largest |z|, which are tried
 UNIT = 2.0**-53
-
-
-@dataclass(frozen=True)
-class Plan:
-    """How a panel is proved: the keys of a certificate's panel but for the cells."""
-
-    nodes: tuple
-    ellipses: tuple
-    rates: tuple
-    steps: int
-    order: int
-
-    def table(self, cells):
-        """The panel of a certificate."""
-        return {
-            "nodes": list(self.nodes), "ellipses": [_text(r) for r in self.ellipses],
-            "rates": [_text(w) for w in self.rates], "steps": self.steps, "order": self.order, "cells": cells,
-        }  # fmt: skip
-
-
-def _text(number):
-    return str(Fraction(number).limit_denominator(1000))
+PANEL = "."  # in a layout
 
 
 def plan(equation, sides, tolerance):
-    """The cheapest Plan found whose truncation is below `tolerance` on the panel `sides`; raises checker.Failed."""
-    centres = [(checker.exact((low + high) / 2), checker.exact((high - low) / 2)) for low, high in sides]
-    real = {name: centre + half * arb(0, 1) for name, (centre, half) in zip(equation.names, centres, strict=True)}
-    chosen = [_ellipse(equation, real, name, *side, tolerance) for name, side in zip(equation.names, centres, strict=True)]
+    """A panel without its cells, on which the polynomials leave out less than `tolerance`, relative to the bound of the
+    factors' growth for real parameters; raises checker.Failed.
+
+    `sides`: the ends of both, rational."""
+    sides = [(checker.exact((low + high) / 2), checker.exact((high - low) / 2)) for low, high in sides]
+    chosen = [_ellipse(equation, sides, name, tolerance) for name in equation.names]
     nodes, ellipses, rates = zip(*chosen, strict=True)
-    steps = _steps(equation, real)
-    return Plan(nodes, ellipses, rates, steps, ORDER)
+    return {
+        "nodes": list(nodes), "ellipses": [str(Fraction(r).limit_denominator(10)) for r in ellipses],
+        "rates": [str(Fraction(w).limit_denominator(1000)) for w in rates],
+        "order": _order(equation, sides, tolerance), "cells": checker.OPEN,
+    }  # fmt: skip
 
 
-def _ellipse(equation, real, name, centre, half, tolerance):
-    """(number of nodes, r, w) for one parameter."""
+def _ellipse(equation, sides, name, tolerance):
+    """(number of nodes, r, w) for one parameter: the fewest nodes."""
     best, why = None, None
     for r in ELLIPSES:
-        for w in _rates(equation, real):
-            try:
-                growth = float(equation.on_ellipse(real, name, centre, half, arb(r), arb(w)))
-            except checker.Failed as failed:
-                why = failed
-                continue
-            worst = 4 * growth * max(w, 1, 1 / w)
-            n = next((n for n in NODES if worst * r ** (1 - n) / (r - 1) < 0.2 * tolerance), None)
-            if n and (best is None or (n, growth) < best[:2]):
-                best = n, growth, r, w
+        try:
+            arcs = equation.on_ellipse(sides, name, arb(r))
+        except checker.Failed as failed:
+            why = failed
+            continue
+        sizes = np.array(
+            [[[float(x) for x in (length, z.real.mid(), z.imag.mid(), z.rad())] for length, z in arc] for arc in arcs]
+        )
+        if not np.isfinite(sizes).all():
+            continue
+        length, real, imaginary, radius = np.moveaxis(sizes, -1, 0)
+        top = np.sqrt(np.abs(real).max() + radius.max())
+        for w in top * RATES:
+            exponent = (length * (np.hypot(w * w - real, imaginary) + radius) / (2 * w)).sum(1).max()
+            bound = 4 * np.exp(min(exponent, 700.0)) * max(w, 1 / w, 1) / (r - 1)
+            n = next((n for n in NODES if bound * r ** (1 - n) < 0.2 * tolerance), None)
+            if n and (best is None or (n, bound * r ** (1 - n)) < best[:2]):
+                best = n, bound * r ** (1 - n), r, float(w)
+        if best and best[0] < NODES[-1] and r < best[2]:
+            break
     if best is None:
         raise why or checker.Failed("no ellipse has a small enough bound: smaller panels are needed")
     return best[0], best[2], best[3]
 
 
-def _rates(equation, real):
-    """Values of w to try, about the square root of the largest |z|."""
-    top = 1e-3
-    for start, end, _, z in equation.pieces:
-        for part in range(checker.BOXES):
-            u = start + (end - start) * checker.share(part, checker.BOXES)
-            top = max(top, float(checker.acb(z(u=u, **real)).abs_upper()))
-    return [float(Fraction(np.sqrt(top) * x).limit_denominator(1000)) for x in np.linspace(0.4, 1.2, RATES)]
+def _order(equation, sides, tolerance):
+    """The order at which the series of all steps leave out little enough."""
+    real = {name: centre + half * arb(0, 1) for name, (centre, half) in zip(equation.names, sides, strict=True)}
+    for order in ORDERS:
+        missed = (y + dy for step in equation.steps(real, order) for y, dy in step[3])
+        if float(sum(missed)) < 1e-3 * tolerance:
+            return order
+    raise checker.Failed("the series of the steps leave out too much")
 
 
-def _steps(equation, real):
-    """The number of steps of a piece whose series leave out little enough."""
-    steps = 1
-    while steps < 10_000:
-        try:
-            missed = [step[3] for step in equation.steps(real, steps, ORDER, checker.RATIO)]
-            if float(sum(y + dy for pair in missed for y, dy in pair)) < SMALL:
-                return steps
-        except checker.Failed:
-            pass
-        steps = steps + 1 + steps // 3
-    raise checker.Failed("z is too large, or singular too near to the real axis: a smaller rectangle is needed")
+def panels(equation, sides, depth, tolerance):
+    """(layout, panels of the certificate) of a part of the rectangle, whose cells are halved at most `depth` times.
+
+    Where few nodes do not suffice, its quarters are proved instead.
+    """
+    try:
+        found = plan(equation, sides, tolerance)
+        panel = checker.Panel(equation, sides, found)
+        return PANEL, [found | {"cells": cells(panel, depth)}]
+    except checker.Failed:
+        if not depth:
+            return PANEL, [open_panel()]
+    quarters = [checker.within(sides, place) for place in reversed(checker.quarters(((Fraction(0), Fraction(1)),) * 2))]
+    layouts, lists = zip(*(panels(equation, quarter, depth - 1, tolerance) for quarter in quarters), strict=True)
+    found = [panel for some in lists for panel in some]
+    if all(panel["cells"] == checker.OPEN for panel in found):
+        return PANEL, [open_panel()]
+    return checker.SPLIT + "".join(layouts), found
+
+
+def open_panel():
+    """A panel of which nothing is stated."""
+    return {"nodes": [2, 2], "ellipses": ["2", "2"], "rates": ["1", "1"], "order": 2, "cells": checker.OPEN}
 
 
 def cells(panel, depth):

@@ -20,6 +20,7 @@ from survey.sweep import dispatch
 CODES = {"undecided": -1, "unstable": 0, "stable": 1}
 LABELS = ("unstable", "stable")
 DEEPEST = 20  # halvings of the rectangle
+START = 2  # of them make the parts that are proved one by one
 FRACTION = 1e-3  # of the width of a cell: what a panel's series may leave out, of the largest factor
 
 
@@ -43,8 +44,7 @@ def equation_of(workflow):
         raise BadInput("prove: the workflow must say how small the cells are: add [refine] with a width")
     axes = list(workflow.refine)
     written = {
-        key: key if key in axes else _decimal(float(values))
-        for key, (_, values) in workflow.grid.parameters.items()
+        key: key if key in axes else _decimal(float(values)) for key, (_, values) in workflow.grid.parameters.items()
     }
     rectangle = []
     for key in axes:
@@ -70,62 +70,19 @@ def find(workflow, once, progress=None):
     kind, pieces, names, rectangle = equation_of(workflow)
     checker.ctx.prec = search.BITS
     given = {"kind": kind, "pieces": pieces}
-    sides = [[Fraction(end) for end in side] for side in rectangle]
     depths = [min(DEEPEST, max(0, math.ceil(math.log2(1 / width) - 1e-9))) for width, _ in workflow.refine.values()]
-    try:
-        across, depth, tolerance = _division(checker.Equation(kind, pieces, names), sides, depths)
-    except checker.Failed as failed:
-        raise BadInput(f"prove: nothing can be proved here: {failed}") from None
+    depth = max(0, min(depths) - START)
+    across, tolerance = [2 ** (whole - depth) for whole in depths], FRACTION * 0.5 ** max(depths)
     prover = Prover(given, names, rectangle, across, depth, tolerance)
-    panels, shares = _solved(prover, once, progress)
-    text = certificate(workflow.title, given, names, rectangle, across, panels, shares)
+    layout, panels = _solved(prover, once, progress)
+    text = _certificate(workflow.title, given, names, rectangle, across, layout, panels)
     path = workflow.path.with_suffix(".cert")
     write_atomically(path, text.encode())
-    return _describe(workflow, path, text, sides, across, panels, shares)
-
-
-def _division(equation, sides, depths):
-    """(numbers of panels across, halvings of each, tolerance): the division with the least work, by four panels of it."""
-    from survey.proof import checker, search
-
-    best, why = None, None
-    tolerance = FRACTION * 0.5 ** max(depths)
-    for depth in range(min(depths), -1, -1):
-        across = [2 ** (whole - depth) for whole in depths]
-        if across[0] * across[1] > 4096:
-            break
-        tried = {(i * (n - 1), j * (m - 1)) for n, m in [across] for i in (0, 1) for j in (0, 1)}
-        work = []
-        for at in sorted(tried):
-            try:
-                plan = search.plan(equation, panel_sides(sides, across, at), tolerance)
-            except checker.Failed as failed:
-                why = failed
-                continue
-            nodes = plan.nodes[0] * plan.nodes[1]
-            work.append(nodes * plan.steps + 30 * nodes)
-        if len(work) < len(tried):  # where it fails nothing is proved: smaller panels may do
-            continue
-        total = across[0] * across[1] * sum(work) / len(work)
-        if best and total > best[0]:
-            break
-        if best is None or total < best[0]:
-            best = total, across, depth
-    if best is None:
-        raise why or checker.Failed("too many panels are needed")
-    return *best[1:], tolerance
-
-
-def panel_sides(sides, across, at):
-    """The sides of the panel at this position of the division."""
-    return [
-        [low + (high - low) * Fraction(i + end, n) for end in (0, 1)]
-        for (low, high), n, i in zip(sides, across, at, strict=True)
-    ]
+    return _describe(workflow, path, text)
 
 
 class Prover:
-    """All that a worker needs to prove one panel; called with its number, gives (number, panel of the certificate)."""
+    """All that a worker needs to prove a part of the map; called with its number, gives (number, (layout, panels))."""
 
     def __init__(self, equation, names, rectangle, across, depth, tolerance):
         self.equation, self.names, self.rectangle = equation, names, rectangle
@@ -133,7 +90,7 @@ class Prover:
 
     @property
     def numbers(self):
-        """The panels' numbers."""
+        """Of the parts."""
         return range(self.across[0] * self.across[1])
 
     def __call__(self, number):
@@ -142,13 +99,8 @@ class Prover:
         checker.ctx.prec = search.BITS
         equation = checker.Equation(self.equation["kind"], self.equation["pieces"], self.names)
         sides = [[Fraction(end) for end in side] for side in self.rectangle]
-        sides = panel_sides(sides, self.across, divmod(number, self.across[1]))
-        try:
-            plan = search.plan(equation, sides, self.tolerance)
-            cells = search.cells(checker.Panel(equation, sides, plan.table(checker.OPEN)), self.depth)
-        except checker.Failed:
-            return number, checker.open_panel()
-        return number, plan.table(cells)
+        part = checker.within(sides, checker.places(self.across, search.PANEL * len(self.numbers))[number])
+        return number, search.panels(equation, part, self.depth, self.tolerance)
 
 
 class _Missing(Exception):
@@ -156,65 +108,71 @@ class _Missing(Exception):
 
 
 def _solved(prover, once, progress):
-    """(the panels of the certificate, {verdict: its share of the rectangle}); kept as they are finished."""
-    from survey.proof import checker
+    """(the layout, the panels) of the whole map; those of each part are kept as it is finished."""
+    from survey.proof import checker, search
 
-    panels = {}
+    parts = {}
 
     def name(number):
-        return f"panel-{prover.depth}-{prover.across[0]}-{prover.across[1]}-{number}"
+        return f"proof-{prover.depth}-{prover.across[0]}-{prover.across[1]}-{number}"
 
     def missing():
         raise _Missing
 
     for number in prover.numbers:
         with contextlib.suppress(_Missing):
-            panels[number] = _unpacked(once(name(number), missing))
-    todo, reused = [number for number in prover.numbers if number not in panels], len(panels)
+            parts[number] = _unpacked(once(name(number), missing))
+    todo, reused = [number for number in prover.numbers if number not in parts], len(parts)
 
     def finished(done, result=None):
         if result:
-            number, panel = result
-            panels[number] = _unpacked(once(name(number), lambda: _packed(panel)))
+            number, part = result
+            parts[number] = _unpacked(once(name(number), lambda: _packed(part)))
         if progress:
-            progress(reused + done, len(prover.numbers), reused, "panels proved")
+            progress(reused + done, len(prover.numbers), reused, "parts proved")
+
+    def died(number):
+        return number, (search.PANEL, [search.open_panel()])
 
     if todo:
-        died = lambda number: (number, checker.open_panel())  # noqa: E731
         dispatch.on_processes(prover, todo, finished, died, min(dispatch.cpus(), len(todo)))
-    shares = dict.fromkeys(checker.VERDICTS, Fraction(0))
-    for panel in panels.values():
-        shares = {key: shares[key] + part / len(panels) for key, part in checker.shares_of(panel["cells"]).items()}
-    return [panels[number] for number in prover.numbers], shares
+    layouts, lists = zip(*(parts[number] for number in prover.numbers), strict=True)
+    return "".join(layouts), [panel for some in lists for panel in some]
 
 
-def _packed(panel):
-    return {"panel": np.frombuffer(json.dumps(panel).encode(), np.uint8)}
+def _packed(part):
+    return {"part": np.frombuffer(json.dumps(part).encode(), np.uint8)}
 
 
 def _unpacked(arrays):
-    return json.loads(arrays["panel"].tobytes())
+    return json.loads(arrays["part"].tobytes())
 
 
-def certificate(title, equation, names, rectangle, across, panels, shares):
+def _certificate(title, equation, names, rectangle, across, layout, panels):
     """The text of the certificate."""
     from survey.proof import checker, search
 
+    found = [checker.shares_of(panel["cells"]) for panel in panels]
+    shares = checker.weighed(checker.places(across, layout), found)
     table = {
         "format": checker.FORMAT, "title": title, "bits": search.BITS, "equation": equation, "parameters": names,
-        "rectangle": rectangle, "panels": {"across": across, "list": panels},
-        "shares": {key: str(part) for key, part in shares.items()},
+        "rectangle": rectangle, "panels": {"across": across, "layout": layout, "list": panels},
+        "shares": {letter: str(part) for letter, part in shares.items()},
     }  # fmt: skip
     return json.dumps(table | {"sha256": checker.digest(table)}, indent=1) + "\n"
 
 
-def _describe(workflow, path, text, sides, across, panels, shares):
+def _describe(workflow, path, text):
     """Variables and attributes."""
     from survey.proof import checker
 
-    names = list(workflow.refine)
+    certificate, names = checker.Certificate(text), list(workflow.refine)
+    sides, shares = certificate.sides, certificate.shares
     parameters = [next(p for p in workflow.scene.PARAMETERS if p.name == name) for name in names]
-    found = [_boxes(sides, across, divmod(number, across[1]), panel) for number, panel in enumerate(panels)]
+    found = [
+        _boxes(checker.within(sides, place), panel)
+        for place, panel in zip(certificate.places, certificate.panels, strict=True)
+    ]
     box, letters = (np.concatenate(parts) for parts in zip(*found, strict=True))
     codes = {checker.OPEN: -1, checker.UNSTABLE: 0, checker.STABLE: 1}
     variables = {}
@@ -237,7 +195,7 @@ def _describe(workflow, path, text, sides, across, panels, shares):
     about = {
         "refine": ", ".join(names), "areas": ", ".join(words), "proof": "each decided cell is proved in ball arithmetic",
         "proof_certificate": path.name, "proof_sha256": hashlib.sha256(text.encode()).hexdigest(),
-        "proof_statement": checker.Certificate(text).statement(shares),
+        "proof_statement": certificate.statement(shares),
     }  # fmt: skip
     return xr.Dataset(variables, coords, about)
 
@@ -272,20 +230,18 @@ def _rounded(number, towards):
     return value if Fraction(value) == number else math.nextafter(value, towards)
 
 
-def _boxes(sides, across, at, panel):
+def _boxes(sides, panel):
     """The cells of a panel: (their ends along both axes (M, 4), their letters)."""
     from survey.proof import checker
 
-    (x0, x1), (y0, y1) = panel_sides(sides, across, at)
-    boxes, letters, waiting = [], [], [(0, 0, 0)]
+    boxes, letters, waiting = [], [], [((0.0, 1.0), (0.0, 1.0))]
     for letter in panel["cells"]:
-        depth, i, j = waiting.pop()
+        place = waiting.pop()
         if letter == checker.SPLIT:
-            waiting += [(depth + 1, 2 * i + right, 2 * j + upper) for upper, right in checker.QUARTERS]
-            continue
-        part = 0.5**depth
-        boxes.append((i * part, (i + 1) * part, j * part, (j + 1) * part))
-        letters.append(letter)
-    share = np.array(boxes)
-    low, length = np.array([x0, x0, y0, y0], float), np.array([x1 - x0, x1 - x0, y1 - y0, y1 - y0], float)
-    return low + length * share, np.array(letters)
+            waiting += checker.quarters(place)
+        else:
+            boxes.append([*place[0], *place[1]])
+            letters.append(letter)
+    low = np.array([float(side[0]) for side in sides])
+    length = np.array([float(side[1] - side[0]) for side in sides])
+    return low.repeat(2) + length.repeat(2) * np.array(boxes), np.array(letters)
