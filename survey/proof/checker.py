@@ -7,8 +7,8 @@ printed by `Certificate.statement`; the lemmas below have their proofs in the do
 
 HILL'S EQUATION y'' + z(u, p) y = 0, with two real parameters p = (p1, p2) in a rectangle. A certificate gives z by
 formulas on consecutive pieces of [0, S], and a kind:
-    even      z is continued by z(-u) = z(u) and z(S + u) = z(S - u); its period is T = 2 S;
-    periodic  z is continued by z(u + S) = z(u); its period is T = S.
+    even      z is continued by z(-u) = z(u) and z(S + u) = z(S - u), with the period T = 2 S;
+    periodic  z is continued with the period T = S.
 y1, y2 are the solutions with y1 = 1, y1' = 0 and y2 = 0, y2' = 1 at u = 0, and D = y1(T) + y2'(T).
 
 1. VERDICTS (`Panel.verdict`). If |D| < 2 all solutions are bounded, if |D| > 2 one grows exponentially (Magnus and
@@ -22,7 +22,7 @@ y1, y2 are the solutions with y1 = 1, y1' = 0 and y2 = 0, y2' = 1 at u = 0, and 
    rate |w^2 - conj z| / (2 w), the logarithmic norm of [[0, w], [-z/w, 0]]; so
    |(w y, y')(S)| <= exp(int_0^S |w^2 - conj z| / (2 w) du) |(w y, y')(0)|.
 4. PARAMETERS (`Equation.truncation`). A panel is a rectangle of parameters, mapped to [-1, 1]^2. If a factor f is
-   analytic, |f| <= M, for p1 in the Bernstein ellipse E_r (semi-axes (r +- 1/r)/2) and real p2, then its interpolant I1 f
+   analytic, |f| <= M, for p1 in the Bernstein ellipse E_r (semi-axes (r +- 1/r)/2) and real p2, its interpolant I1 f
    at the n Chebyshev points of the first kind satisfies |f - I1 f| <= 4 M r^(1-n) / (r - 1): its coefficients are at
    most 2 M r^-k, and each T_k, k >= n, is interpolated by 0 or by some +-T_j (Trefethen, Approximation Theory and
    Approximation Practice, theorem 8.1 and chapter 4). In two variables |f - I1 I2 f| <= |f - I1 f| + L |f - I2 f|,
@@ -52,7 +52,7 @@ VERDICTS = {STABLE: "stable", UNSTABLE: "unstable", OPEN: "open"}
 QUARTERS = ((1, 1), (1, 0), (0, 1), (0, 0))  # (upper half of p2?, of p1?): the last one is the first in the text
 RATIO, FAR = arb(1) / 8, 4  # h / R of a step; a step is halved unless w R < FAR
 SHORTEST = Fraction(1, 2**20)  # step, as a part of a piece
-ARCS, BOXES, COVER = 24, 32, 4  # parts of half an ellipse, of a piece of [0, S], of a side of half an ellipse's box
+ARCS, BOXES, COVER = 24, 32, 4  # parts of half an ellipse, of a piece of [0, S] (at least), of a box's side
 DEEPEST, LARGEST = 24, 2**23  # halvings of a panel; characters of a certificate
 MALFORMED = (KeyError, TypeError, ValueError, IndexError, AttributeError, RecursionError, ArithmeticError)
 
@@ -87,9 +87,6 @@ def share(number, of):
     return (arb(number) / of).union(arb(number + 1) / of)
 
 
-# ----------------------------------------------------------------------------------------------------------- formulas
-
-
 def power(x, n):
     """x^n by multiplication."""
     found = x if n % 2 else arb(1)
@@ -108,8 +105,7 @@ def with_branch_cut(name):
 
 FUNCTIONS = {
     "sin": lambda x: x.sin(), "cos": lambda x: x.cos(), "tan": lambda x: x.sin() / x.cos(), "exp": lambda x: x.exp(),
-    "cosh": of_exponentials(1), "sinh": of_exponentials(-1),
-    "tanh": lambda x: of_exponentials(-1)(x) / of_exponentials(1)(x),
+    "cosh": of_exponentials(1), "sinh": of_exponentials(-1), "tanh": lambda x: 1 - 2 / ((2 * x).exp() + 1),
     "log": with_branch_cut("log"), "sqrt": with_branch_cut("sqrt"),
 }  # fmt: skip
 OPERATIONS = {
@@ -154,9 +150,6 @@ class Formula:
             argument, function = self._read(node.args[0]), FUNCTIONS[node.func.id]
             return lambda values: function(argument(values))
         raise Failed(f"{ast.get_source_segment(self.text, node)!r} is not allowed in a formula")
-
-
-# ------------------------------------------------------------------------------------------------------- the equation
 
 
 class Equation:
@@ -232,16 +225,24 @@ class Equation:
         across, up = half * (r + 1 / r) / 2, half * (r - 1 / r) / 2
         turns = [acb(0, arb.pi() * share(number, ARCS)).exp() for number in range(ARCS)]
         arcs = [acb(centre + across * turn.real, up * turn.imag) for turn in turns]
-        columns, rows = ([share(k, COVER) for k in range(COVER)] for _ in range(2))
-        inside = [acb(centre + across * (2 * x - 1), up * y) for x, y in product(columns, rows)]
+        parts = [share(k, COVER) for k in range(COVER)]
+        inside = [acb(centre + across * (2 * x - 1), up * y) for x, y in product(parts, parts)]
         found = [[] for _ in arcs]
         for start, end, _, z in self.pieces:
-            for part in range(BOXES):
-                u = start + (end - start) * share(part, BOXES)
-                finite = all(acb(z(u=u, **{**real, name: place})).is_finite() for place in inside)
-                need(finite, f"z is singular for a complex {name} inside an ellipse")
-                for arc, place in zip(found, arcs, strict=True):
-                    arc.append(((end - start) / BOXES, acb(z(u=u, **{**real, name: place}))))
+            waiting = [(Fraction(k, BOXES), Fraction(k + 1, BOXES)) for k in range(BOXES)]
+            while waiting:
+                low, high = waiting.pop()
+                need(high - low > SHORTEST, f"z is singular for a complex {name} inside an ellipse")
+                u = start + (end - start) * exact(low).union(exact(high))
+                values = []
+                for place in (*arcs, *inside):
+                    values.append(acb(z(u=u, **{**real, name: place})))
+                    if not values[-1].is_finite():
+                        waiting += [((low + high) / 2, high), (low, (low + high) / 2)]
+                        break
+                else:
+                    for arc, value in zip(found, values, strict=False):
+                        arc.append(((end - start) * exact(high - low), value))
         return found
 
 
@@ -254,9 +255,6 @@ def step(z_n, h, order, y, dy, y_missed, dy_missed):
     for coefficient in reversed(a):
         value, slope = value * h + coefficient, slope * h + value
     return value + y_missed * arb(0, 1), slope + dy_missed * arb(0, 1)
-
-
-# -------------------------------------------------------------------------------------------------------------- cells
 
 
 class Panel:
@@ -291,7 +289,7 @@ class Panel:
             return shares
         tables, bounds = self.polynomials()
         halves = [halving(n) for n in self.counts]
-        waiting = [([0] * len(tables), [lambda table=table: table for table in tables])]
+        waiting = [([0] * len(tables), [lambda t=t: t for t in tables])]  # tables are computed when they are needed
         for position, letter in enumerate(self.cells, 1):
             signs, tables = waiting.pop()
             if letter == OPEN:
@@ -300,7 +298,7 @@ class Panel:
             signs = [known or sign(*pair) for known, *pair in zip(signs, tables, bounds, strict=True)]
             if letter == SPLIT:
                 waiting += [
-                    (signs, [quarter(table, halves[0][right], halves[1][upper]) for table in tables])
+                    (signs, [lambda t=t, x=halves[0][right], y=halves[1][upper]: x * t * y.transpose() for t in tables])
                     for upper, right in QUARTERS
                 ]
             else:
@@ -318,9 +316,9 @@ class Panel:
 
 def bernstein(nodes):
     """The values of Bernstein's polynomials of degree n - 1 on [-1, 1] at n nodes."""
-    n = len(nodes)
+    d = len(nodes) - 1
     return arb_mat(
-        [[comb(n - 1, j) * power((1 + x) / 2, j) * power((1 - x) / 2, n - 1 - j) for j in range(n)] for x in nodes]
+        [[comb(d, j) * power((1 + x) / 2, j) * power((1 - x) / 2, d - j) for j in range(d + 1)] for x in nodes]
     )
 
 
@@ -328,11 +326,6 @@ def halving(n):
     """Bernstein coefficients on an interval -> on its lower and on its upper half (de Casteljau)."""
     lower = [[arb(comb(i, j)) / 2**i for j in range(n)] for i in range(n)]
     return arb_mat(lower), arb_mat([row[::-1] for row in lower[::-1]])
-
-
-def quarter(table, first, second):
-    """The coefficients on a quarter of a cell, computed when they are needed."""
-    return lambda: first * table * second.transpose()
 
 
 def sign(table, bound):
@@ -357,9 +350,6 @@ def shares_of(cells):
     return shares
 
 
-# -------------------------------------------------------------------------------------------------------- certificate
-
-
 class Certificate:
     """What the text of a certificate states; raises Failed if it is not one."""
 
@@ -380,11 +370,11 @@ class Certificate:
         need(good and len(names) == len(set(names)) == 2, "there must be two parameters with names of their own")
         self.equation = Equation(data["equation"]["kind"], data["equation"]["pieces"], names)
         self.sides = [tuple(rational(end) for end in side) for side in data["rectangle"]]
-        good = len(self.sides) == 2 and all(len(side) == 2 and side[0] < side[1] for side in self.sides)
-        need(good, "the rectangle must have two sides of positive length")
-        self.panels, across = data["panels"]["list"], data["panels"]["across"]
-        need(len(across) == 2, "the panels must lie across two sides")
-        self.places = places([whole(n, 1, 4096, "a number of panels") for n in across], data["panels"]["layout"])
+        (a, b), (c, d) = self.sides
+        need(a < b and c < d, "the rectangle must have sides of positive length")
+        self.panels = data["panels"]["list"]
+        across = [whole(n, 1, 4096, "a number of panels") for n in data["panels"]["across"]]
+        self.places = places(across, data["panels"]["layout"])
         need(len(self.panels) == len(self.places), "the panels do not cover the rectangle")
         self.shares = {letter: rational(data["shares"][letter]) for letter in VERDICTS}
 
@@ -419,10 +409,9 @@ class Certificate:
 
 def places(across, layout):
     """The panels as parts of both sides, the second varying first; of a layout such as "..+....", "+" is quartered."""
-    need(across[0] * across[1] <= 2**16, "there are too many panels")
-    found, waiting = [], []
-    for at in reversed(list(product(*map(range, across)))):
-        waiting.append(tuple((Fraction(k, n), Fraction(k + 1, n)) for k, n in zip(at, across, strict=True)))
+    need(len(across) == 2 and across[0] * across[1] <= 2**16, "too many panels, or not across two sides")
+    parts = [[(Fraction(k, n), Fraction(k + 1, n)) for k in range(n)] for n in across]
+    found, waiting = [], list(product(*parts))[::-1]
     for letter in layout:
         need(waiting, "the layout has more panels than cover the rectangle")
         place = waiting.pop()
@@ -447,9 +436,8 @@ def within(sides, place):
 
 def weighed(places, found):
     """{verdict: its share of the rectangle} from its shares of the panels."""
-    areas = [(b - a) * (d - c) for (a, b), (c, d) in places]
-    pairs = list(zip(areas, found, strict=True))
-    return {letter: sum((area * part[letter] for area, part in pairs), Fraction(0)) for letter in VERDICTS}
+    pairs = [((b - a) * (d - c), shares) for ((a, b), (c, d)), shares in zip(places, found, strict=True)]
+    return {letter: sum((area * shares[letter] for area, shares in pairs), Fraction(0)) for letter in VERDICTS}
 
 
 def digest(data):
@@ -478,15 +466,13 @@ def proved(text, number):
         return f"panel {number + 1} is malformed ({type(error).__name__}: {error})"
 
 
-def check(text, processes=1, report=lambda done, total: None):
+def check(text, processes=1):
     """The statement that the text of a certificate proves; raises Failed if it proves none."""
-    certificate, found = once_read(text), []
-    number = len(certificate.panels)
+    certificate = once_read(text)
     with get_context("spawn").Pool(processes) if processes > 1 else nullcontext() as pool:
-        for shares in (pool.imap if pool else map)(partial(proved, text), range(number)):
-            need(isinstance(shares, dict), shares)
-            found.append(shares)
-            report(len(found), number)
+        found = list((pool.imap if pool else map)(partial(proved, text), range(len(certificate.panels))))
+    for shares in found:
+        need(isinstance(shares, dict), shares)
     total = weighed(certificate.places, found)
     need(total == certificate.shares, "the shares of the verdicts are not those that it states")
     return certificate.statement(total)
@@ -499,13 +485,9 @@ def main(arguments=None):
     parser.add_argument("-j", "--processes", type=int, default=1, metavar="N", help="processes; 1 by default")
     given = parser.parse_args(arguments)
 
-    def report(done, total):
-        if sys.stderr.isatty():
-            print(f"\r{done} of {total} panels", end="\n" if done == total else "", file=sys.stderr)
-
     try:
         with open(given.certificate, encoding="utf-8") as file:
-            statement = check(file.read(LARGEST), given.processes, report)
+            statement = check(file.read(LARGEST), given.processes)
     except (Failed, OSError, UnicodeDecodeError) as failed:
         print(f"NOT PROVED: {given.certificate}: {failed}")
         return 1

@@ -108,12 +108,13 @@ def equation(names, ends, options):
         if name in names
     )
     rho, oblate = _body(names, ends, options)
-    c = f"(-{k}**2)" if oblate else f"(1 - {k}**2)"
+    rest = f"cos({names['amplitude']})**2" if "amplitude" in names else f"(1 - {k}**2)"
+    c = f"(-{k}**2)" if oblate else rest
     if _rotates(names, ends):
-        a = f"({k}**2 - sin(u)**2)"
+        a = f"(cos(u)**2 - {rest})"
         z = f"2 + (2*{rho}*sqrt({a}) + {rho}**2 + {c})/{a} + cos(2*u)/(2*{a}) + 3*sin(2*u)**2/(16*{a}**2)"
         return "even", [("pi/2", z)]
-    a = f"(1 - ({k}*sin(u))**2)"
+    a = f"(cos(u)**2 + {rest}*sin(u)**2)"
     w = f"{k}*cos(u)"
     z = f"(2*({w})**2 + 2*{rho}*{w} + {rho}**2 + {c})/{a} + {k}**2*cos(2*u)/(2*{a})"
     return "even", [("pi", f"{z} + 3*({k}**2*sin(2*u)/{a})**2/16")]
