@@ -7,6 +7,7 @@
     survey.evaluate(survey.abel(f, g, ...), t=1.0)               # your own Abel equation w w' = f(phi, p) w + g(phi, p)
     survey.evaluate(survey.floquet(A, ...), p=1.0)               # your own linear periodic system x' = A(t, p) x
     survey.evaluate(survey.orbit(f, ...), p=1.0)                 # periodic orbits of your own system x' = f(t, x, p)
+    survey.edge("satellite", along="rho", near=1.2, k=0.5)       # the boundaries of stability along a parameter
     survey.scenes()                                              # the scenes and what they answer
     ds = survey.open("results/satellite_prolate.nc")             # open and check a file
 
@@ -20,6 +21,7 @@ from importlib import import_module
 
 _HOME = {"run": "survey.api", "evaluate": "survey.api", "open": "survey.api", "hill": "survey.request.user_scene"}
 _HOME |= {name: "survey.request.user_scene" for name in ("abel", "floquet", "orbit")}
+_HOME |= {"concat": "survey.analysis.join", "edge": "survey.analysis.edge"}
 _HOME |= {
     "SurveyError": "survey.errors",
     "BadInput": "survey.errors",

@@ -1,5 +1,7 @@
 """What a type checker sees of the package: the names that `__init__.py` finds when they are asked for."""
 
+from survey.analysis.edge import edge as edge
+from survey.analysis.join import concat as concat
 from survey.api import evaluate as evaluate
 from survey.api import open as open
 from survey.api import run as run

@@ -58,6 +58,17 @@ class Survey:
 
         return point.Point(point.nearest(self._ds, coords).load())
 
+    def margin(self, **coords):
+        """How far the nearest point is from the boundaries of stability: a Dataset along the dimension `parameter`.
+
+        For each parameter along which the scene has boundaries, all others fixed: `value`, `edge` (the nearest
+        boundary), `edge_error` (a bound), `distance` (edge less value) and `edge_class`. NaN where none was found
+        within two hundred times 1 + |value|. They are exact, as those of `survey.edge`, and need no file of a map.
+        """
+        from survey.analysis import edge, point
+
+        return edge.margin(point.nearest(self._ds, coords).load())
+
     def trajectory(self, time=None, figure=None, **coords):
         """Solve the nearest point in time and draw its motion, as its scene defines. Returns the motion, a Dataset.
 

@@ -16,8 +16,8 @@ from survey import measures, status
 from survey.errors import BadInput
 from survey.file import disk, reading, schema
 from survey.file.labels import count, counts, describe, flag_codes, layout, percent
-from survey.grid import Grid, lines
-from survey.request import trust, user_scene
+from survey.grid import Grid, fixed, lines, ranges
+from survey.request import earlier, trust, user_scene
 from survey.request.checks import check_options, check_parameters, check_request, methods_of
 from survey.request.function_scene import FunctionScene
 from survey.request.hill_scene import is_number
@@ -34,6 +34,7 @@ def run(
     scheduler: str | None = None,
     fresh: bool = False,
     block_timeout: float | None = None,
+    reuse: str | os.PathLike[str] | None = None,
 ) -> xr.Dataset:
     """Run, or resume, the survey in the TOML file `workflow`: the same as the command `survey run`.
 
@@ -44,9 +45,14 @@ def run(
     output : path of the netCDF file, instead of the workflow's.
     workers : number of worker processes; by default threads of this process.
     scheduler : address or scheduler file of a dask.distributed cluster.
-    fresh : delete the finished blocks of an earlier, interrupted run.
+    fresh : replace what earlier runs have left at the output: a finished file, or the blocks of an interrupted run.
+        Otherwise a finished file of the same workflow is returned as it is (nothing is computed, pictures are drawn
+        again), and one of another workflow is refused.
     block_timeout : seconds after which a worker process that has not finished its block is replaced (five minutes more
         for its first, to compile); by default 20 times the longest block so far, and at least five minutes.
+    reuse : a file of an earlier run: points that are in it, too, are taken from it where the bits would be the same
+        (the attribute `points_reused` of the result is their number). With longer or finer axes only the rest is
+        solved.
 
     Returns
     -------
@@ -62,7 +68,8 @@ def run(
         raise BadInput(f"workers = {shown(workers)}: it must be a positive integer, or None for threads")
     if block_timeout is not None and not (is_number(block_timeout) and 0 < block_timeout < np.inf):
         raise BadInput(f"block_timeout = {shown(block_timeout)}: it must be a positive number of seconds, or None")
-    engine.run(checked, workers, scheduler, fresh, block_timeout=block_timeout)
+    held = earlier.find(checked, reuse)[0] if reuse is not None else None
+    engine.run(checked, workers, scheduler, fresh, block_timeout=block_timeout, earlier=held)
     ds = reading.load(checked.path)
     draw(ds, checked)
     return ds
@@ -143,8 +150,9 @@ def evaluate(
         return _lazy(module, scene, request, given)
     grid = _grid(used, given)
     user_scene.check(module, grid)
-    ds = describe(grid, module, scene, request, solve.compute(grid, module, request))
-    return count(ds.assign_coords(_own_coordinates(given)))
+    arrays = solve.compute(grid, module, request)
+    ds, own = count(describe(grid, module, scene, request, arrays), arrays), _own_coordinates(given)
+    return ds.assign_coords(own) if own else ds
 
 
 def open(path: str | os.PathLike[str], *, trust_scene: bool = False) -> xr.Dataset:
@@ -191,7 +199,7 @@ def _labelled(key: str, value: Any) -> xr.DataArray:
         raise _not_real(key, value.values)
     if value.size == 0:
         raise BadInput(f"{short(key, 40)}: an empty array has no points; give at least one value")
-    return value.astype(float)
+    return value.astype(float) if value.chunks else value.copy(data=np.array(value.values, dtype=float))
 
 
 def _array(key: str, value: Any) -> npt.NDArray[Any]:
@@ -255,7 +263,8 @@ def _lazy(module: Any, scene: str, request: Request, given: dict[str, xr.DataArr
     """The same dataset, its values computed block by block when they are asked for."""
     table = layout(module, request)
     names = list(given)
-    request = replace(request, lines=lines({name: (array.dims, array) for name, array in given.items()}))
+    axes = {name: (array.dims, array) for name, array in given.items()}
+    request = replace(request, lines=lines(axes), fixed=fixed(axes), ranges=ranges(axes))
 
     def solve_arrays(*arrays: Any) -> tuple[Any, ...]:
         shape = np.broadcast_shapes(*(array.shape for array in arrays))

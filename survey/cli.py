@@ -73,20 +73,25 @@ def program():
     metavar="SECONDS",
     help="Replace a worker that takes longer for a block; by default 20 times the longest so far, at least 5 minutes.",
 )
-@click.option("--fresh", is_flag=True, help="Delete the finished blocks of an earlier, interrupted run.")
+@click.option("--fresh", is_flag=True, help="Replace what earlier runs left: the file or its blocks.")
+@click.option("--reuse", metavar="FILE.nc", help="Take the points that this file of an earlier run holds from it.")
 @click.option("--quiet", is_flag=True, help="No progress and no closing lines.")
-def run(workflow, output, overrides, workers, scheduler, block_timeout, fresh, quiet):
+def run(workflow, output, overrides, workers, scheduler, block_timeout, fresh, reuse, quiet):
     """Run, or resume, a sweep; write OUT.nc and the pictures that the workflow requests."""
+    from survey.request import earlier
     from survey.request.workflow import read
     from survey.sweep import engine
     from survey.sweep.progress import Progress
 
     checked, finished = read(workflow, overrides, output), None
     resume_command = shlex.join(["survey", *(word for word in sys.argv[1:] if word != "--fresh")])
+    held, told = earlier.find(checked, reuse) if reuse else (None, "")
+    if told and not quiet:
+        err.print(plain(told), markup=False)
     _stop_on_sigterm()
     try:
         with Progress(err, checked, silent=quiet) as progress:
-            finished = engine.run(checked, workers, scheduler, fresh, progress, resume_command, block_timeout)
+            finished = engine.run(checked, workers, scheduler, fresh, progress, resume_command, block_timeout, held)
             pictures = _draw(checked)
     except KeyboardInterrupt as stop:
         traceback.clear_frames(stop.__traceback__)  # the semaphores they hold would be reported as leaked
@@ -261,6 +266,18 @@ def plot(path, output, var, style, width, at):
 
 
 @program.command()
+@click.argument("paths", metavar="A.nc B.nc...", nargs=-1, required=True)
+@click.option("-o", "--output", metavar="C.nc", required=True, help="The netCDF file to write; it must not exist.")
+def merge(paths, output):
+    """Join surveys that differ in the values of one axis, or in one fixed parameter, into one file."""
+    from survey.analysis import join
+
+    joined = join.merge(paths, output)
+    err.print(plain(f"{output}: {counted(joined.status.size, 'point')} of {len(paths)} files"), markup=False)
+    out.print(plain(str(output)), markup=False)
+
+
+@program.command()
 @click.argument("path", metavar="OUT.nc")
 @click.option("--port", type=click.IntRange(0, 65535), default=5006, show_default=True, help="0 for any free port.")
 @click.option("--link", default="", help="The address of an earlier view, to open it again.")
@@ -344,7 +361,7 @@ def _draw(workflow):
 def _summarise(finished, paths):
     """Print the files written, the counts, and the times."""
     if finished.already_complete:
-        err.print(f"{paths.pop(0)}: already complete; removed what the run that wrote it had left", markup=False)
+        err.print(f"{paths.pop(0)}: already complete; nothing was computed", markup=False)
     for path in paths:
         err.print(f"wrote {path}", markup=False)
     attributes = finished.attributes
@@ -363,6 +380,8 @@ def _summarise(finished, paths):
         err.print(f"edges: {curves} could not be followed to the map's border (curve_complete = 0)")
     if "edge_left_out" in attributes:
         err.print(f"edges: not searched for {attributes['edge_left_out']}, where they accumulate", markup=False)
+    if finished.already_complete:
+        return
     times = {"compiling": finished.compiling, "kernels": finished.computing, "file": finished.writing}
     times |= {"edges and cells": finished.edges_and_cells} if finished.edges_and_cells else {}
     err.print(", ".join(f"{name} {seconds:.1f} s" for name, seconds in times.items()))

@@ -108,6 +108,8 @@ class Request:
     rtol: float = 1e-10
     variables: frozenset[str] = frozenset()
     lines: Mapping[str, tuple[int, float, float]] = field(default_factory=dict)
+    fixed: frozenset[str] = frozenset()
+    ranges: Mapping[str, tuple[int, float, float]] = field(default_factory=dict)
 
     def line(self, name: str) -> tuple[int, float, float] | None:
         """(number, least, greatest) of the full axis of the parameter `name`, which no other shares; or None.

@@ -57,8 +57,8 @@ def test_every_mutation_ends_in_an_answer_or_one_line(folder):
 
 
 def test_mutations_that_once_ended_in_a_traceback_or_in_hidden_text(folder):
-    """An axis without values, areas without units, a variable whose name turns the text round."""
-    checked(folder, (10459, 10509, 10569), draw=False)
+    """An axis without values, areas without units, hidden text in a name, areas of -1e308, bars of a verdict."""
+    checked(folder, (10459, 10509, 10569, 10089, 11392), draw=False)
 
 
 def test_mutations_are_drawn_or_refused(folder):

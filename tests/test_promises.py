@@ -323,7 +323,7 @@ def test_a_log_gets_a_line_now_and_then(folder):
     ]
     assert done.returncode == 0 and 2 <= len(lines) <= 45 and "\r" not in done.stderr, done.stderr
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, "run", "sweep.toml"], cwd=folder, capture_output=True, text=True
+        [sys.executable, "-c", PROGRAM, "run", "sweep.toml", "--fresh"], cwd=folder, capture_output=True, text=True
     )
     assert done.stderr.count("elapsed") == 1, done.stderr  # the last
 

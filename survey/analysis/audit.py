@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from survey import status
-from survey.analysis.point import options_at
+from survey.analysis.given import options_at
 from survey.api import evaluate
 from survey.errors import Damaged
 from survey.file import schema
@@ -91,8 +91,10 @@ def _edges(ds, chosen, solve, _):
     schema.edges(ds)
     if not np.isin(ds.edge_class.values, range(len(FACTORS))).all():
         raise Damaged("edge_class contains codes that belong to no factor at T/2")
-    axis, count = ds.attrs["boundaries"], np.atleast_1d(ds.edge_count.values)
-    point = {dim: ds[dim].values[np.repeat(np.arange(count.size), count)[chosen]] for dim in ds.edge_count.dims}
+    axis, count = ds.attrs["boundaries"], ds.edge_count.values
+    rows = np.repeat(np.arange(count.size), count.ravel())[chosen]
+    places = zip(ds.edge_count.dims, np.unravel_index(rows, count.shape) if count.ndim else (), strict=True)
+    point = {dim: ds[dim].values[place] for dim, place in places}
     x, width = ds.edge_position.values[chosen], ds.edge_position_error.values[chosen]
     of = np.array(FACTORS)[ds.edge_class.values[chosen]]
     signs = []

@@ -49,13 +49,16 @@ def _edges(ds):
     schema.edges(ds)
     count, axis = ds.edge_count, ds.attrs.get("boundaries", ds.status.dims[-1])
     found = {}
-    for dim in count.dims:
-        found[dim] = ("place", np.repeat(ds[dim].values, count.values), ds[dim].attrs)
+    for dim, values in zip(
+        count.dims, np.meshgrid(*(ds[dim].values for dim in count.dims), indexing="ij"), strict=True
+    ):
+        found[dim] = ("place", np.repeat(values.ravel(), count.values.ravel()), ds[dim].attrs)
     found[axis] = ("place", ds.edge_position.values, ds.edge_position.attrs)
     found["position_error"] = ("place", ds.edge_position_error.values, ds.edge_position_error.attrs)
-    for name, source in (("kind", ds.edge_class), ("index", ds.edge_index)):
-        found[name] = ("place", source.values, source.attrs)
-    return _table(ds, found, f"edges of tongues along {axis}, from the file")
+    for name, source in (("kind", "edge_class"), ("index", "edge_index")):
+        if source in ds:
+            found[name] = ("place", ds[source].values, ds[source].attrs)
+    return _table(ds, found, f"boundaries along {axis}, from the file")
 
 
 def _undecided_cells(ds):

@@ -8,10 +8,11 @@ import numpy as np
 import xarray as xr
 
 from survey import modules, status
+from survey.analysis import edge
+from survey.analysis.given import parameters
 from survey.errors import BadInput, Damaged, Untrusted
 from survey.file.labels import UNDECIDED, error_bars, fill_of, flag_codes, options_of
 from survey.request import user_scene
-from survey.request.checks import check_options
 from survey.wording import plain
 
 MAX_ROWS = 1000  # of one output
@@ -99,16 +100,6 @@ def meaning(variable):
     return words.get(int(variable), str(int(variable)))
 
 
-def options_at(ds, scene):
-    """{name: value} of all options of the scene, as in the file; raises BadInput for unknown ones."""
-    return check_options(scene, options_of(ds), [p.name for p in scene.PARAMETERS if p.name in ds.coords])
-
-
-def parameters(ds):
-    """{name: value} of a point's parameters."""
-    return {name: float(c) for name, c in ds.coords.items() if c.ndim == 0 and c.dtype.kind in "fi"}
-
-
 @dataclass(frozen=True, repr=False)
 class Point:
     """Everything known about one point; print it, or show it in a notebook.
@@ -154,6 +145,15 @@ class Point:
         except (ArithmeticError, LookupError, TypeError, ValueError):
             return "the values in the file do not belong to this scene"
 
+    @property
+    def margin(self):
+        """The nearest boundary in each parameter, in words; "" where none is known, or finding it takes seconds."""
+        try:
+            found = edge.margin(self.dataset) if edge.is_quick(self.dataset) else None
+        except BadInput:
+            return ""
+        return edge.in_words(found) if found is not None else ""
+
     def __repr__(self):
         rows = [tuple(map(plain, row)) for row in self._rows()]
         width = max((len(f"{name} = {value}") for name, value, about in rows if about), default=0)
@@ -177,6 +177,8 @@ class Point:
         yield "why", self.why, ""
         if int(ds.status) == status.OK:
             yield "status", "ok", ""
+            if self.margin:
+                yield "nearest boundaries", self.margin, ""
         settings = [f"{key} = {value}" for key, value in options_of(ds).items()]
         settings += [f"method {ds.attrs.get('method', 'auto')}", f"rtol {ds.attrs.get('rtol', float('nan')):g}"]
         yield "solved with", ", ".join(settings), ""

@@ -4,7 +4,8 @@ import numpy as np
 import xarray as xr
 
 from survey import api
-from survey.analysis.point import options_at, parameters, values
+from survey.analysis.given import options_at, parameters
+from survey.analysis.point import values
 from survey.errors import BadInput
 from survey.request import user_scene
 

@@ -6,7 +6,7 @@ import warnings
 import numpy as np
 
 from survey import api, modules
-from survey.analysis.point import options_at
+from survey.analysis.given import options_at
 from survey.errors import BadInput, Damaged
 from survey.file.labels import count, describe
 from survey.grid import coordinates, logarithmic
@@ -23,7 +23,7 @@ def sweep(ds, ranges, num=None, output=None):
     if output is not None:
         return api.run(data, output=output)
     found = solve.compute(checked.grid, checked.scene, checked.request)
-    finer = count(describe(checked.grid, checked.scene, checked.name, checked.request, found))
+    finer = count(describe(checked.grid, checked.scene, checked.name, checked.request, found), found)
     for further in edges_and_cells.find(checked, lambda name, make: make()):
         finer = finer.assign(further.variables).assign_attrs(further.attrs)
     return finer.assign_attrs(title=checked.title, workflow=checked.text)
@@ -97,7 +97,7 @@ def _axes(ds, ranges, num):
             spacing = "log" if logarithmic(coord.values) else "linear"
             table[name] = {"start": low, "stop": high, "num": _number(num, name, coord.size), "spacing": spacing}
         else:
-            table[name] = _unchanged(coord.values)
+            table[name] = unchanged(coord.values)
     return table
 
 
@@ -105,7 +105,7 @@ def _parameters(ds):
     return {p.name for p in user_scene.find(user_scene.of_dataset(ds))[1].PARAMETERS}
 
 
-def _unchanged(values):
+def unchanged(values):
     """The axis with the same bits: by its ends if that reproduces them, else value by value."""
     for spacing in ("linear", "log")[: 1 + (values.min() > 0)] if values.size > 1 else ():
         start, stop = float(values[0]), float(values[-1])

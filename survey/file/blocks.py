@@ -15,9 +15,8 @@ import numpy as np
 from isal import isal_zlib
 
 from survey.errors import BadInput, Damaged, Stopped
-from survey.file import lock, unfinished
+from survey.file import finished, lock, unfinished
 from survey.file.disk import digest_of, refused, sync, write_atomically
-from survey.file.reading import attributes_of
 
 FORMAT = 3
 
@@ -28,19 +27,20 @@ class Blocks:
     Each block is labelled with its survey; the manifest, which is created first and removed last, informs users.
     Use as a context manager; raises BadInput if another run holds the output, or if the existing blocks belong to
     another survey (unless `fresh`), Damaged if their survey is unknown. For users, the folder also keeps `about`, the
-    text of the `workflow`, and `resume_command`. If an interrupted run has left something beside a complete output of
-    the same workflow, `published` holds that output's attributes, and all that remains is to `remove` the rest.
+    text of the `workflow`, and `resume_command`. If the output is complete and of the same workflow, `published` holds
+    its attributes, and all that remains is to `remove` what a run may have left. A complete output of another one is
+    refused, unless `fresh`, or this run `replaces` it, or its blocks show that it was asked to.
     """
 
-    def __init__(self, path, fingerprint, fresh=False, about=None, workflow="", resume_command=None, text=None):
+    def __init__(
+        self, path, fingerprint, fresh=False, about=None, workflow="", resume_command=None, text=None, replaces=False
+    ):
         self.folder = unfinished.folder_of(path)
         self.path = Path(path)
         self.fingerprint = {"format": FORMAT, **fingerprint}
         self.identity = _hash(self.fingerprint)
-        # of the output, which does not depend on how it was cut into blocks
-        of_output = self.fingerprint.keys() - {"format", "block_geometry"}
-        self.of_output = _hash({key: self.fingerprint[key] for key in of_output})
-        self.fresh = fresh
+        self.of_output = of_output(fingerprint)
+        self.fresh, self.replaces = fresh, replaces
         self.about, self.workflow, self.text = about or {}, workflow, text
         name = {"host": socket.gethostname(), "pid": os.getpid(), "run": uuid.uuid4().hex}
         self.lock = lock.Lock(f"{path}.lock", name)
@@ -49,9 +49,9 @@ class Blocks:
 
     def __enter__(self):
         with refused(self.path):
-            left = self._acquire()
+            self._acquire()
             try:
-                self._prepare(bool(left) or self.folder.exists())
+                self._prepare()
             except BaseException:
                 self.__exit__()
                 raise
@@ -150,20 +150,20 @@ class Blocks:
         return True
 
     def _acquire(self):
-        """Acquire the lock; returns what it names if a run has ended without removing it."""
+        """Acquire the lock."""
         try:
-            return self.lock.acquire()
+            self.lock.acquire()
         except lock.Held as held:
             raise BadInput(f"{self.path}: another run is writing it ({held}); wait, or use -o") from None
 
-    def _prepare(self, left):
+    def _prepare(self):
         if self.fresh:
             clear(self.folder)
-        finished = [file for file in self.folder.glob("*") if file.suffix in (".block", ".extra")]
-        self._refuse_other_survey(finished)
-        if left and not self.fresh and self._complete():
+        files = [file for file in self.folder.glob("*") if file.suffix in (".block", ".extra")]
+        self._refuse_other_survey(files)
+        if not self.fresh and self._complete(bool(files) or self.replaces):
             return
-        if not finished:  # then nothing is lost
+        if not files:  # then nothing is lost
             clear(self.folder)
         self.folder.mkdir(exist_ok=True)
         sync(self.path.parent)
@@ -200,25 +200,32 @@ class Blocks:
             return False
         return True
 
-    def _complete(self):
-        """Is the output complete and of the same workflow? If so, set `published`, and keep one digest beside it."""
-        try:
+    def _complete(self, begun):
+        """Is the output complete and of the same workflow? If so, set `published`, and keep one digest beside it.
+
+        Raises BadInput if it is complete and of another workflow, and no run that replaces it has `begun`.
+        """
+        found = {} if self.text is None else finished.attributes(self.path)
+        if not found or finished.lost(found):
+            return False
+        if found.get("fingerprint") != self.of_output or finished.changes(found, self.text):
+            if not begun:
+                code, own = self.about.get("code", {}), self.fingerprint.get("scene_hash", "")
+                finished.refuse(self.path, found, self.text, code, own)
+            return False
+        digest = digest_of(self.path)
+        if digest.exists() and digest.read_bytes().count(b"\n") > 1:  # the run ended between file and digest
+            self.folder.mkdir(exist_ok=True)
             with open(self.path, "rb") as file:
                 line = f"{hashlib.file_digest(file, 'sha256').hexdigest()}  {self.path.name}\n".encode()
-            digests = digest_of(self.path).read_bytes()
-            if line not in digests:
-                return False
-            attributes = attributes_of(self.path)
-        except (OSError, RuntimeError):
-            return False
-        wanted = {"complete": 1, "fingerprint": self.of_output, "workflow": self.text}
-        if any(attributes.get(key) != value for key, value in wanted.items()):
-            return False
-        if digests != line:  # the run ended between writing the file and its digest
-            self.folder.mkdir(exist_ok=True)
-            write_atomically(digest_of(self.path), line, self.folder)
-        self.published = attributes
+            write_atomically(digest, line, self.folder)
+        self.published = found
         return True
+
+
+def of_output(fingerprint):
+    """Hash of what decides the values of an output, which does not depend on how it was cut into blocks."""
+    return _hash({key: value for key, value in fingerprint.items() if key != "block_geometry"})
 
 
 def _hash(table):

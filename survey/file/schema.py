@@ -15,6 +15,7 @@ from survey.errors import Damaged
 RATIO, SPARE = 1032, 2**20
 CHUNK = 2**28  # bytes: tiles of survey are a hundred times smaller
 AXIS = 10**8  # values: more than a workflow allows
+AREA = 1e300  # so that sums and fractions of areas stay within the range of floats
 VARIABLES, FLAGS = 2000, 28
 REQUIRED = ("scene", "options", "method", "rtol")
 TEXTS = (
@@ -139,6 +140,8 @@ def _check_variable(ds, name, variable):
     bar = ds.variables.get(f"{name}_error")
     if bar is not None and (bar.dims != variable.dims or bar.dtype.kind != "f"):
         raise Damaged(f"{name}_error must hold an error bar for each value of {name}")
+    if bar is not None and variable.dtype.kind != "f":
+        raise Damaged(f"{name} has error bars, but does not hold floating-point numbers")
 
 
 def _flags_of(name, attributes):
@@ -161,7 +164,8 @@ def _check_axes(ds):
 
 def edges(ds):
     """Raise Damaged unless the edges of tongues are consistent: `edge_*` along the dimension `edge`."""
-    _along(ds, "edge", "edge_position", "edge_position_error", "edge_class", "edge_index")
+    names = ("edge_position", "edge_position_error", "edge_class", *(["edge_index"] if "edge_index" in ds else []))
+    _along(ds, "edge", *names)
     _divided(ds, "edge_count", "edge")
     _coded(ds, "edge_class")
     if not set(ds.edge_count.dims) <= set(ds.status.dims) or ds.attrs.get("boundaries") not in ds.status.dims:
@@ -188,8 +192,15 @@ def cells(ds):
 
 
 def areas(ds):
-    """Raise Damaged unless each verdict has its area and its fraction of the map."""
-    _along(ds, "area_verdict", "area_verdict", "area", "area_error", "area_fraction", "area_fraction_error")
+    """Raise Damaged unless each verdict has its area and its fraction of the map, which add up to a whole."""
+    names = ("area", "area_error", "area_fraction", "area_fraction_error")
+    _along(ds, "area_verdict", "area_verdict", *names)
+    for name in names:
+        values = ds[name].values.astype(float)
+        if not (values >= 0).all() or not (values / AREA < 1).all():
+            raise Damaged(f"{name} must hold finite numbers that are not negative")
+    if not abs(ds.area_fraction.values.astype(float).sum() - 1) < 1e-6:
+        raise Damaged("area_fraction must add up to 1")
     if len(flags(ds.area_verdict.attrs)) != ds.sizes["area_verdict"]:
         raise Damaged("area_verdict must name a verdict for each area")
 

@@ -78,12 +78,11 @@ def drift(path, old, new, changed, workflow):
     if "scene_hash" in changed:
         causes.append("from another z(u, p), or other f and g")
         ways_back.append("those functions")
-    differences = _differences(folder, workflow)
-    if not causes and not differences:
-        differences = [f"{key} {_short(old.get(key))} -> {_short(new[key])}" for key in changed]
-    if differences:
-        more = f" and {len(differences) - SHOWN} more" if len(differences) > SHOWN else ""
-        causes.append(f"from another workflow ({', '.join(differences[:SHOWN])}{more})")
+    changes = _differences(folder, workflow)
+    if not causes and not changes:
+        changes = [f"{key} {_short(old.get(key))} -> {_short(new[key])}" for key in changed]
+    if changes:
+        causes.append(f"from another workflow ({listed(changes)})")
         ways_back.append(f"that workflow (survey run {shlex.quote(str(folder / 'workflow.toml'))} -o {path})")
     return (
         f"{folder} contains {done} {' and '.join(causes)}; go back to {' and '.join(ways_back)}, or write another file "
@@ -94,12 +93,28 @@ def drift(path, old, new, changed, workflow):
 def _differences(folder, workflow):
     """['solver.rtol 1e-10 -> 1e-09', ...]: keys in which the workflow of the blocks and the new one differ."""
     try:
-        old = tomllib.loads((folder / "workflow.toml").read_text(encoding="utf-8"))
-        changes = list(_changes(old, tomllib.loads(workflow)))
+        return differences((folder / "workflow.toml").read_text(encoding="utf-8"), workflow, INDEPENDENT)
     except (OSError, ValueError):
         return []
-    of_blocks = [change for change in changes if not any(f"{change[0]}.".startswith(f"{key}.") for key in INDEPENDENT)]
-    return [f"{key} {_short(before)} -> {_short(now)}" for key, before, now in of_blocks]
+
+
+def differences(old, new, independent):
+    """['solver.rtol 1e-10 -> 1e-09', ...]: keys in which two workflows' texts differ, except `independent` ones.
+
+    Raises ValueError if a text is not TOML.
+    """
+    changes = _changes(tomllib.loads(old), tomllib.loads(new))
+    return [
+        f"{key} {_short(before)} -> {_short(now)}"
+        for key, before, now in changes
+        if not any(f"{key}.".startswith(f"{other}.") for other in independent)
+    ]
+
+
+def listed(differences):
+    """The first differences, and how many more there are."""
+    more = f" and {len(differences) - SHOWN} more" if len(differences) > SHOWN else ""
+    return f"{', '.join(differences[:SHOWN])}{more}"
 
 
 def _changes(old, new, prefix=""):

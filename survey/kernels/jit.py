@@ -9,6 +9,7 @@ every source that is compiled, of the versions and of the CPU, so that any edit 
 """
 
 import hashlib
+import inspect
 import os
 import time
 from pathlib import Path
@@ -17,7 +18,8 @@ import llvmlite
 import llvmlite.binding as llvm
 import numba
 import platformdirs
-from numba.core import event
+from numba.core import event, imputils
+from numba.extending import intrinsic, overload
 
 COMPILED = ("kernels", "methods", "measures", "scenes")  # the packages whose functions are compiled
 # What decides no number of the output: all other sources do, those that are yet to be written included.
@@ -119,3 +121,41 @@ def inline(function):
 def splice(function):
     """As `inline`, but copied into its callers before they are typed: compiled once, if it is called once."""
     return numba.njit(inline="always", **_FLAGS)(function)
+
+
+def for_constants(special):
+    """Make kernels call the kernel `special` in place of the decorated function on a read-only array as first argument.
+
+    Then they compile nothing that the decorated function alone needs. It must be right for any array: without the JIT
+    it is the one that runs.
+    """
+
+    special = getattr(special, "py_func", special)
+
+    def decorated(function):
+        def chosen(*arguments):
+            return function if arguments[0].mutable else special
+
+        chosen.__signature__ = inspect.signature(function)
+        overload(function, jit_options=_FLAGS)(chosen)
+        return function
+
+    return decorated
+
+
+def constant(array):
+    """The array, which is not written to from here on: kernels take it for a read-only one, see `for_constants`."""
+    return array
+
+
+@intrinsic
+def _read_only(_context, array):
+    def borrowed(context, builder, signature, arguments):
+        return imputils.impl_ret_borrowed(context, builder, signature.return_type, arguments[0])
+
+    return array.copy(readonly=True)(array), borrowed
+
+
+@overload(constant)
+def _constant(array):
+    return lambda array: _read_only(array)

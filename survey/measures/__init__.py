@@ -22,7 +22,9 @@ QUESTIONS = {
             ("square", "axes", "fixed", "options"),
         ),
         "searched": Function("the same from the outputs of the `scene`", ("scene", "square", "axes", "fixed")),
-        "refusal": Function("why there are no curves on a map of these axes, in words; None if there are", ("axes",)),
+        "refusal": Function(
+            "why there are no curves on a map of these axes, in words; None if there are", ("axes", "scene")
+        ),
         "seconds": Function("estimated seconds of `closed` on one thread; a tenth of a second if missing", ("axes",)),
         "CLASSES": Value("{name: code} of the curves' classes", dict),
         "TITLE": Value("what a class is, one line", str),

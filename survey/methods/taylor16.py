@@ -69,7 +69,8 @@ def _product(matrix, k, x, i):
 @splice
 def _hill_row(samples, h, coefficients):
     """Per function, in units of -4/h^2: powers of x, the last two Legendre coefficients, the largest sample, and what
-    components of degree >= 20 add to the low coefficients, where the Gauss points take them for these.
+    components of degree >= 20 add to the low coefficients, where the Gauss points take them for these. What rounding
+    is relative to may be larger than the samples: then it follows them.
     """
     count = samples.shape[2]
     paired, series = np.empty((_HALF, count)), np.empty((_HALF, count))
@@ -96,6 +97,10 @@ def _hill_row(samples, h, coefficients):
             for i in range(count):
                 coefficients[first + _TAIL, i] += 0.25 * h[i] * h[i] * abs(series[_HALF - 1, i])
                 coefficients[first + _ALIAS, i] += 0.25 * h[i] * h[i] * abs(series[_HALF - 2, i])
+        if samples.shape[1] > 2 * _HALF:
+            for i in range(count):
+                given = 0.25 * h[i] * h[i] * samples[c, 2 * _HALF, i]
+                coefficients[first + _SIZE, i] = max(coefficients[first + _SIZE, i], given)
         for i in range(count):  # at the rate at which the last four fall, five times two degrees on
             tail = coefficients[first + _TAIL, i]
             rate = min(max(tail / coefficients[first + _ALIAS, i], _SLOWEST), 1.0)

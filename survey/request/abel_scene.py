@@ -92,10 +92,10 @@ class AbelScene(FunctionScene):
         names = tuple(p.name for p in self.own)
         if question in ("fate", "portrait"):
             measure = blocks.fates if question == "fate" else blocks.portraits
-            return measure(point, names, self._flows, method, request.rtol)
+            return measure(point, names, self.flows, method, request.rtol)
         names = (*names, "phi0", "w0")
         given, last, back = blocks.dense(point, names, {"trajectory": "t", "abel": "phi"}[question])
-        rows = solution.rows(self._flows(given[:, :-2]), given[:, -2], given[:, -1])
+        rows = solution.rows(self.flows(given[:, :-2]), given[:, -2], given[:, -1])
         if question == "trajectory":
             return blocks.trajectories(rows, last, back, solution, method, request.rtol)
         before = request.options.get("branch") == "before"
@@ -114,10 +114,10 @@ class AbelScene(FunctionScene):
         panels = orbit.ON_PLANE if self.period is None else orbit.ON_CYLINDER
         request = Request({"question": "trajectory"}, rtol=1e-9)
         names = [p.name for p in self.own]
-        flow = None if self.period is None else self._flows(np.array([[point[name] for name in names]]))[0]
+        flow = None if self.period is None else self.flows(np.array([[point[name] for name in names]]))[0]
         return orbit.solve(lambda asked: self.solve(asked, request), self.OUTPUTS, names, point, time, panels, flow)
 
-    def _flows(self, points):
+    def flows(self, points):
         """The programs of the parameters (N, n)."""
         try:
             return equation.flows(self.f, self.g, points, self.period is not None)
@@ -131,9 +131,9 @@ class AbelScene(FunctionScene):
         for point in points if len(points) else np.ones((1, len(self.own))):
             self._try(point)
         if not len(points):
-            self._flows(np.ones((1, len(self.own))))
+            self.flows(np.ones((1, len(self.own))))
             return
-        flows = self._flows(points)
+        flows = self.flows(points)
         lost = np.flatnonzero(np.isnan(flows[:, 0]))
         if lost.size and self.period is not None and self._finite(points[lost[0]]):
             self._refuse(

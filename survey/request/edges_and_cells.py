@@ -5,6 +5,7 @@ import numpy as np
 from survey import measures, modules
 from survey.errors import BadInput
 from survey.request.schema import Spread
+from survey.sweep.line import second_axis
 from survey.wording import short
 
 MIN_FRACTION = 1e-6  # width of a cell as a fraction of its axis
@@ -19,10 +20,10 @@ def check_boundaries(scene, name, table, given):
     if measure is None:
         raise BadInput(f"boundaries: no boundary curves are known for the scene {name}; leave the table out")
     if hasattr(measure, "refusal"):
-        return _check_closed(measure, name, table, {key: given[key].size for key in axes})
-    _check_even(scene, name, "boundaries")
-    if not 1 <= len(axes) <= 2:
-        raise BadInput(f"boundaries: they are drawn on one axis or two, and there are {len(axes)}; fix the others")
+        return _check_closed(measure, scene, name, table, {key: given[key] for key in axes}, given)
+    check_even(scene, name, "boundaries")
+    if not axes:
+        raise BadInput("boundaries: they are drawn along an axis, and there is none; add one")
     if table.axis is not None and table.axis not in axes:
         raise BadInput(f"boundaries.axis: {modules.unknown('axis', table.axis, axes)}")
     axis = table.axis or axes[-1]
@@ -31,23 +32,31 @@ def check_boundaries(scene, name, table, given):
     return axis
 
 
-def _check_closed(measure, name, table, sizes):
-    """The last of the axes {name: number of values}; raises BadInput where the measure knows no curves on these."""
-    axes = list(sizes)
-    refusal = measure.refusal(axes)
+def _check_closed(measure, scene, name, table, axes, given):
+    """The last of the axes {name: values}; raises BadInput where the measure knows no curves on these."""
+    names = list(axes)
+    refusal = None
+    if len(names) == 1 and not hasattr(measure, "searched"):
+        fixed = {p.name: p.default if p.default is not None else np.nan for p in scene.PARAMETERS} | {
+            key: float(value) for key, value in given.items() if not np.ndim(value)
+        }
+        second_axis(measure, scene, names[0], fixed)
+    elif len(names) != 1:
+        stacks = [[*names[:2], third] for third in names[2:]] or [names]  # further axes make a stack of maps
+        refusal = next(filter(None, (measure.refusal(stack, scene) for stack in stacks)), None)
     if refusal:
         raise BadInput(f"boundaries: of {name} {refusal}; change the axes, or leave the table out")
     if table.axis is not None:
         raise BadInput(
             f"boundaries.axis: the curves of {name} are found without rows, and no axis is searched; leave it out"
         )
-    for key in axes[:2]:
-        if sizes[key] < 2:
+    for key in names[:2]:
+        if axes[key].size < 2:
             raise BadInput(f"boundaries: the axis {key} has one value, but curves need a range; give two or more")
-    return axes[-1]
+    return names[-1]
 
 
-def _check_even(scene, name, table):
+def check_even(scene, name, table):
     """Raise BadInput where there are no factors at T/2, whose zeros are the edges."""
     if not getattr(scene, "EVEN", True):
         raise BadInput(f"{table}: the z of {name} is not even, so it has no half-period factors; leave the table out")
@@ -63,7 +72,7 @@ def check_refine(scene, name, file, given):
     axes = {key: values for key, values in given.items() if np.ndim(values)}
     if measures.question(scene.FAMILY, "cells") is None:
         raise BadInput(f"refine: [refine] is not supported for the scene {name}; leave the table out")
-    _check_even(scene, name, "refine")
+    check_even(scene, name, "refine")
     if len(axes) != 2 or min(values.size for values in axes.values()) < 2:
         raise BadInput("refine: cells need exactly two axes of two values or more; fix the other parameters")
     widths = _check_width_table(file.refine.width, axes)

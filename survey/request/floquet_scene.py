@@ -6,15 +6,14 @@ from functools import cached_property
 
 import numpy as np
 
-from survey.measures.floquet import motion, stability
-from survey.measures.floquet.system import Raised, System
-from survey.measures.floquet.trace import Unsupported
-from survey.request.function_scene import FunctionScene
-from survey.request.hill_scene import reason
+from survey.measures.floquet import dense, motion, stability
+from survey.measures.floquet.system import System
+from survey.request.traced_scene import TracedScene
 from survey.scene import Parameter, plus_minus
 
 LARGEST = 64  # states
 TRIED = np.array([0.0, 0.11, 0.29, 0.47, 0.62, 0.83])  # of a period: where A is tried as Python
+NODES = 1500  # that a map asks for, roughly
 SAME = 1e-9  # relative to the largest entry: what counts as periodic, as symplectic, as the same
 STATUS = {
     "invalid_parameters": "outside the domain, or A or T is not finite there, or A has not the stated structure",
@@ -23,7 +22,7 @@ STATUS = {
 
 
 @dataclass(frozen=True, eq=False)
-class FloquetScene(FunctionScene):
+class FloquetScene(TracedScene):
     """What a scene's module offers (see `survey.scenes`), for a user's A, or M, C, K; `about` is its docstring."""
 
     matrices: dict[str, Callable]
@@ -73,16 +72,20 @@ class FloquetScene(FunctionScene):
     def cost(self, options, sizes):
         """Seconds per point, roughly."""
         n = len(self.states)
-        return 1.5e-5 + 1e-6 * n**2 + 1e-7 * n**3
+        alone = 1.5e-5 + 1e-6 * n**2 + 1e-7 * n**3
+        longest = sorted(sizes.values())[-2:]
+        if np.prod(longest) < 4 * NODES or n > dense.LARGEST:
+            return alone
+        return 1e-7 * n + (0.05 + NODES / np.prod(longest)) * alone  # by series, one point in twenty on its own
 
     def solve(self, point, request):
         """The requested outputs of a block (see `survey.scenes`)."""
-        shape = np.broadcast_shapes(*(np.shape(values) for values in point.values()))
-        columns = [np.broadcast_to(point[p.name], shape).reshape(-1) for p in self.PARAMETERS]
-        points = np.stack(columns, axis=1).astype(float)
+        points, shape = self._points(point)
+        points = points.reshape(*shape, -1)
         wanted = set(request.variables) or {o.name for o in self.OUTPUTS}
-        out = self._called(stability.solve, self._system, self.structure, points, request.method, request.rtol, wanted)
-        return {name: values.reshape(*shape, *values.shape[1:]) for name, values in out.items()}
+        lines = {k: request.line(p.name) for k, p in enumerate(self.PARAMETERS) if request.line(p.name)}
+        given = (points, request.method, request.rtol, wanted, lines)
+        return self._called(stability.solve, self._system, self.structure, *given)
 
     def why(self, answer):
         """Why a point has its verdict (see `survey.scenes`)."""
@@ -209,39 +212,11 @@ class FloquetScene(FunctionScene):
     def _plain(self, name, time, point):
         """The matrix of this name, from the code run on numbers."""
         m = self._size_of(name)
-        out = np.zeros((m, m))
-        function = getattr(self.matrices[name], "py_func", self.matrices[name])
-        with np.errstate(all="ignore"):
-            try:
-                value = function(float(time), point, out)
-            except (ArithmeticError, ValueError):
-                return np.full((m, m), np.nan)
-        return out if value is None else np.asarray(value, dtype=float)
+        return self._filled(self.matrices[name], (float(time), point), (m, m))
 
     def _try(self, point):
         """Raise BadInput unless the functions, run as Python, fill their matrices."""
-        for name in self.matrices:
+        for name, function in self.matrices.items():
             m = self._size_of(name)
-            call = f"{name}(t, p, out)"
-            try:
-                value = self._plain(name, 0.25, point)
-            except IndexError as error:
-                if "only integers" in str(error):
-                    self._refuse_index(call, error)
-                self._refuse(
-                    f"{call} indexes beyond an array ({error})",
-                    f"PARAMETERS names {len(self.own)} and out is {m} x {m}",
-                )
-            except Exception as error:
-                self._refuse(f"{call} fails ({type(error).__name__}: {reason(error)})", "correct it")
-            if value.shape != (m, m):
-                self._refuse(f"{call} returns an array of shape {value.shape}", f"it must fill out, {m} x {m}")
-
-    def _called(self, function, *arguments):
-        try:
-            return function(*arguments)
-        except Unsupported as error:
-            self._refuse(str(error), "use + - * / ** and functions such as sin, exp, sqrt of math or numpy")
-        except Raised as error:
-            cause = error.__cause__
-            self._refuse(f"{error} fails ({type(cause).__name__}: {reason(cause)})", "correct it")
+            sizes = f"PARAMETERS names {len(self.own)} and out is {m} x {m}"
+            self._tried(function, f"{name}(t, p, out)", (0.25, point), (m, m), sizes, f"{m} x {m}")

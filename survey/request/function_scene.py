@@ -3,13 +3,15 @@
 from collections.abc import Callable
 from dataclasses import fields
 
+import numpy as np
+
 from survey.errors import BadInput
 
 _known = {}  # by hash: a worker process compiles a scene once, for all of its blocks
 
 
 class FunctionScene:
-    """Base of `HillScene`, `AbelScene`, `FloquetScene` and `OrbitScene`; `own`: parameters of the functions."""
+    """Base of `HillScene`, `AbelScene` and `TracedScene`; `own`: parameters of the functions."""
 
     NAME: str
     HASH: str
@@ -22,6 +24,12 @@ class FunctionScene:
 
     def __reduce__(self):
         return _restored, (type(self), self.HASH, [getattr(self, field.name) for field in fields(self)])
+
+    def _points(self, point):
+        """The parameters of the functions at the points of a block (N, n), and the block's shape."""
+        shape = np.broadcast_shapes(*(np.shape(values) for values in point.values()))
+        columns = [np.broadcast_to(point[p.name], shape).reshape(-1) for p in self.own]
+        return np.stack(columns, axis=1).astype(float), shape
 
     def _where(self, point):
         return ", ".join(f"{p.name} = {value:g}" for p, value in zip(self.own, point, strict=True))

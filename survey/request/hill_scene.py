@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -10,7 +10,8 @@ import numpy as np
 from survey import status
 from survey.errors import BadInput
 from survey.kernels.math.roundoff import EPS
-from survey.measures.hill import monodromy, motion, multiprecision, user_equation, why
+from survey.measures.hill import dependence, monodromy, motion, multiprecision, user_equation, user_rows, why
+from survey.measures.rows import Rows
 from survey.proof import formulas
 from survey.request.function_scene import FunctionScene
 from survey.scene import Parameter
@@ -24,6 +25,8 @@ LONG_NAMES = {
 SYMBOLS = {"y1": "y_1(T)", "y2": "y_2(T)", "dy1": "y_1'(T)", "dy2": "y_2'(T)"}
 # Breaks closer to each other or to the ends than this fraction of the period count as one.
 SAME = 8 * user_equation.SLACK
+# Points of an axis from which on rows pay.
+LANES = 8
 # Beginnings of those lines of numba's messages that do not say what is wrong.
 CHATTER = ("Failed in", "During", "This error", "There are", "- Of which", "Overload", "File ", "Unknown", "^", "[1]")
 # Meaning of two of the common codes here.
@@ -76,7 +79,7 @@ class HillScene(FunctionScene):
     def NOTES(self):
         """How z is known, as global attributes of a file."""
         checked = f"every T/{self._divisor * user_equation.CHECKED} at the ends and middles of the axes"
-        unseen = f"z is known by {self._sampling}, and {checked}; a spike narrower than that may go unseen"
+        unseen = f"z is known by {self._sampling}, and {checked}; a spike narrower at half its height may go unseen"
         obstacle = self._obstacle
         digits = f"none: {obstacle}" if obstacle else "double-double, where float64 cannot decide a verdict"
         return {
@@ -86,23 +89,118 @@ class HillScene(FunctionScene):
         }
 
     def cost(self, options, sizes):
-        """Seconds per point, roughly."""
-        return 2e-5 if self.EVEN else 3e-5
+        """Seconds per point, roughly: those of rows share their samples."""
+        of_z, of_ranges = _dependence(self, (None,) * len(self.PARAMETERS))
+        names = [p.name for p in self.PARAMETERS]
+        rows = [sizes.get(name, 1) >= LANES and of_z[i] <= 1 and not of_ranges[i] for i, name in enumerate(names)]
+        return 1e-6 if any(rows) else 1e-5
 
     def solve(self, point, request):
         """The requested outputs of a block (see `survey.scenes`)."""
-        shape = np.broadcast_shapes(*(np.shape(values) for values in point.values()))
-        columns = [np.broadcast_to(point[p.name], shape).reshape(-1) for p in self.PARAMETERS]
-        points = np.stack(columns, axis=1).astype(float)
+        axes = self._axes(point, request) if request.method == "auto" else None
+        if axes is not None:
+            return self._solve_rows(point, request, axes)
+        box = self._box_axes(point, request) if request.method == "auto" else None
+        points, shape = self._points(point)
         period, edges, slack = self._ranges(points)
-        edges[~np.isfinite(points).all(axis=1)] = np.nan
-        exact = None if self._obstacle else self._exact
-        problem, rough = self._called(user_equation.problem, self.z, points, edges, period, slack, self.EVEN, exact)
+        if box is not None:
+            out = self._solve_scattered(points, box, request)
+            out["period"] = np.where(out["status"] == status.OK, period[:, None], np.nan)
+            out["period_error"] = EPS * out["period"]
+            return {name: values.reshape(shape) for name, values in out.items()}
+        problem, rough = self._called(
+            user_equation.problem, self.z, points, edges, period, slack, self.EVEN, self._more_digits
+        )
+        out = self._answers(problem, rough, period, request)
+        return {name: values.reshape(shape) for name, values in out.items()}
+
+    def _solve_scattered(self, points, axes, request):
+        """The outputs (N, 1) of points on their own, from series on the box that holds them."""
+        rough = np.zeros(len(points), np.bool_)
+
+        def problem_of(left):
+            period, edges, slack = self._ranges(points[left])
+            problem, rough[left] = self._called(
+                user_equation.problem, self.z, points[left], edges, period, slack, self.EVEN, self._more_digits
+            )
+            return problem
+
+        box = user_rows.box(self.z, self.HASH, axes, points[0], self._ranges, self.EVEN)
+        position, p = np.ascontiguousarray(points[:, axes.across]), np.ascontiguousarray(points[:, axes.lane])
+        out = self._called(monodromy.solve_scattered, box, position, p, problem_of, request.rtol, request.variables)
+        out["status"] = np.where(rough[:, None], status.NO_CONVERGENCE, out["status"]).astype(np.int8)
+        return out
+
+    def _box_axes(self, point, request):
+        """The parameters on the axes of a box that holds points on their own, two of which alone differ; or None."""
+        ranges = {i: request.ranges[p.name] for i, p in enumerate(self.PARAMETERS) if p.name in request.ranges}
+        free = [i for i, p in enumerate(self.PARAMETERS) if p.name not in request.fixed]
+        if len(ranges) != 2 or set(ranges) != set(free) or callable(self.period) or callable(self.breaks):
+            return None
+        number = monodromy.boxed(min(given[0] for given in ranges.values()))
+        if number is None or any(not given[2] > given[1] for given in ranges.values()):
+            return None
+        of_z, _ = _dependence(self, self._numbers(point, request))
+        for lane, across in (free, free[::-1]):
+            if of_z[lane] <= 1 and of_z[across] <= dependence.ENTIRE:
+                return user_rows.Axes(lane, (number, *ranges[lane][1:]), across, (number, *ranges[across][1:]))
+        return None
+
+    def _numbers(self, point, request):
+        """The parameters that are single numbers; None for others."""
+        names = [p.name for p in self.PARAMETERS]
+        return tuple(float(np.ravel(point[name])[0]) if name in request.fixed else None for name in names)
+
+    def _solve_rows(self, point, request, axes):
+        """As `solve`, in rows along an axis of which z is a linear function."""
+        names = [p.name for p in self.PARAMETERS]
+        block = Rows([point[name] for i, name in enumerate(names) if i != axes.lane], point[names[axes.lane]])
+        lanes, points = block.per_point(point[names[axes.lane]]), np.zeros((block.rows, len(names)))
+        for i, name in enumerate(names):
+            points[:, i] = axes.line[1] if i == axes.lane else block.per_row(point[name])
+        out = {}
+        for rows in self._families(points, axes):
+            period, _, _ = self._ranges(points[rows])
+            problem, rough = self._called(
+                user_rows.problem, self.z, self.HASH, axes, points[rows], lanes[rows], self._ranges, self.EVEN,
+                self._more_digits,
+            )  # fmt: skip
+            for name, values in self._answers(problem, rough, period, request).items():
+                out.setdefault(name, np.empty(lanes.shape, values.dtype))[rows] = values
+        return {name: block.back(values) for name, values in out.items()}
+
+    def _families(self, points, axes):
+        """The rows that a series across them serves: they differ in one parameter; all of them if there is no such."""
+        if axes.across is None:
+            return [np.arange(len(points))]
+        others = np.delete(points, [axes.lane, axes.across], axis=1)
+        _, family = np.unique(others, axis=0, return_inverse=True)
+        return [np.flatnonzero(family.reshape(-1) == i) for i in range(family.max() + 1)]
+
+    def _answers(self, problem, rough, period, request):
         out = self._called(monodromy.solve, problem, request.method, request.rtol, request.variables)
         out["status"] = np.where(rough[:, None], status.NO_CONVERGENCE, out["status"]).astype(np.int8)
         out["period"] = np.where(out["status"] == status.OK, period[:, None], np.nan)
         out["period_error"] = (4 if callable(self.period) else 1) * EPS * out["period"]
-        return {name: values.reshape(shape) for name, values in out.items()}
+        return out
+
+    def _axes(self, point, request):
+        """The axes along and across the rows of a map of this request; None where z is linear along none."""
+        names = [p.name for p in self.PARAMETERS]
+        lines = {i: request.line(name) for i, name in enumerate(names)}
+        lines = {i: line for i, line in lines.items() if line and line[0] >= LANES and line[2] > line[1]}
+        if not lines:
+            return None
+        of_z, of_ranges = _dependence(self, self._numbers(point, request))
+        lanes = [i for i in lines if of_z[i] <= 1 and not of_ranges[i]]
+        if not lanes:
+            return None
+        lane = max(lanes, key=lambda i: lines[i][0])
+        across = [i for i in lines if i != lane and of_z[i] <= dependence.ENTIRE and not of_ranges[i]]
+        if not across:
+            return user_rows.Axes(lane, lines[lane])
+        across = max(across, key=lambda i: lines[i][0])
+        return user_rows.Axes(lane, lines[lane], across, lines[across])
 
     def equation(self, names, ends, options):
         """The equation in formulas (see `survey.scenes`); raises BadInput where z has none."""
@@ -141,10 +239,11 @@ class HillScene(FunctionScene):
         most = max((len(row) for row in rows), default=2)
         edges = np.array([[*row, *[row[-1]] * (most - len(row))] for row in rows]).reshape(len(rows), most)
         slack = np.array([user_equation.SLACK * (some.size > 0) for some in breaks]) * period
-        if each is points:
-            return period, edges, slack
-        number = len(points)
-        return np.full(number, period[0]), np.tile(edges, (number, 1)), np.full(number, slack[0])
+        if each is not points:
+            number = len(points)
+            period, edges, slack = np.full(number, period[0]), np.tile(edges, (number, 1)), np.full(number, slack[0])
+        edges[~np.isfinite(points).all(axis=1)] = np.nan
+        return period, edges, slack
 
     def _row(self, breaks, period):
         """0, the breaks inside the part that is solved, and its end."""
@@ -157,6 +256,10 @@ class HillScene(FunctionScene):
             if position - row[-1] > near and end - position > near:
                 row.append(position)
         return [*row, end]
+
+    @property
+    def _more_digits(self):
+        return None if self._obstacle else self._exact
 
     @cached_property
     def _lifted(self):
@@ -285,6 +388,24 @@ class HillScene(FunctionScene):
             return function(*arguments)
         except user_equation.Raised as error:
             self._refuse(f"z(u, p) raises {error.__cause__!r}", "make it return nan there")
+
+
+@lru_cache(maxsize=64)
+def _dependence(scene, fixed):
+    """The degrees of z, and of the period and the breaks, in each parameter but those `fixed` numbers; OPAQUE if
+    unknown.
+    """
+    nothing = [dependence.OPAQUE] * len(fixed)
+    example = np.array([[1.0 if value is None else value for value in fixed]])
+    try:
+        ranges = [dependence.degrees(f, fixed) for f in (scene.period, scene.breaks) if callable(f)]
+        of_ranges = [max(degrees) for degrees in zip(*ranges, strict=True)] or [0] * len(fixed)
+        _, edges, _ = scene._ranges(example)
+        ends = np.stack([edges[0, :-1], edges[0, 1:]], axis=1)
+        u = ends[:, :1] + np.diff(ends, axis=1) * user_equation.chebyshev_points(user_equation.SIZES[0])
+        return dependence.degrees(scene.z, fixed, u[:, 1:-1].ravel().tolist()), of_ranges
+    except dependence.Unknown:
+        return nothing, nothing
 
 
 def _at_full_period(output):

@@ -1,29 +1,32 @@
 """The scene of periodic orbits of a user's x' = f(t, x, p): what a module of `survey.scenes` offers, as an object."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from survey.measures.floquet import orbit
-from survey.measures.floquet.system import Raised
-from survey.measures.floquet.trace import Unsupported
+from survey.measures.floquet.continuation import Range
+from survey.measures.floquet.equation import Equation
 from survey.request.floquet_scene import SAME, TRIED
-from survey.request.function_scene import FunctionScene
-from survey.request.hill_scene import reason
+from survey.request.traced_scene import TracedScene
 from survey.scene import Parameter, plus_minus
 
 LARGEST = 16  # states
+BRANCH = Parameter(
+    "branch", "number of the orbit among those of the point, by the mean square of its states", "i",
+    default=1.0, minimum=1.0, maximum=99.0, uncut=True,
+)  # fmt: skip
 STATUS = {
     "invalid_parameters": "outside the domain, or the start or the period is not finite, or the period not positive",
     "no_orbit": "Newton's method does not converge from the start, or no orbit is shown to exist near where it ends: "
-    "give a better start",
+    "give a better start; or, with CONTINUATION, the point has fewer orbits than `branch`",
 }
 
 
 @dataclass(frozen=True, eq=False)
-class OrbitScene(FunctionScene):
+class OrbitScene(TracedScene):
     """What a scene's module offers (see `survey.scenes`), for a user's f; `about` is its docstring."""
 
     f: Callable
@@ -31,7 +34,8 @@ class OrbitScene(FunctionScene):
     start: tuple[float, ...] | Callable
     jacobian: Callable | None
     states: tuple[str, ...]
-    PARAMETERS: tuple[Parameter, ...]
+    continued: Range | None
+    own: tuple[Parameter, ...]
     NAME: str
     TEXT: str
     HASH: str
@@ -41,17 +45,24 @@ class OrbitScene(FunctionScene):
     FAMILY = "orbit"
     AUDIT = ()
     OPTIONS = ()
-    OUTPUTS = orbit.OUTPUTS
     STATUS = STATUS
 
     @property
-    def own(self):
-        """The parameters of f: all that there are."""
-        return self.PARAMETERS
+    def PARAMETERS(self):
+        """Those of f, and, where orbits are continued, which of them is meant."""
+        if self.continued is None:
+            return self.own
+        along = self.continued.index
+        return (*(replace(p, uncut=True) if k == along else p for k, p in enumerate(self.own)), BRANCH)
+
+    @property
+    def OUTPUTS(self):
+        """The outputs, and, where orbits are continued, their number."""
+        return orbit.OUTPUTS if self.continued is None else (*orbit.OUTPUTS, orbit.NUMBER)
 
     @cached_property
     def _equation(self):
-        return orbit.Equation(self.f, len(self.states), self.period, self.start)
+        return Equation(self.f, len(self.states), self.period, self.start)
 
     @property
     def DIMENSIONS(self):
@@ -63,19 +74,29 @@ class OrbitScene(FunctionScene):
     @property
     def NOTES(self):
         """What the system is, as global attributes of a file."""
-        return {"states": ", ".join(self.states), "autonomous": str(self.period is None)}
+        notes = {"states": ", ".join(self.states), "autonomous": str(self.period is None)}
+        if self.continued is not None:
+            index, low, high = self.continued
+            notes["continuation"] = f"{self.own[index].name} from {low:g} to {high:g}"
+        return notes
 
     def cost(self, options, sizes):
-        """Seconds per point, roughly."""
-        return 5e-4 + 1e-4 * len(self.states) ** 2
+        """Seconds per point, roughly: one set of curves serves its row, one set of orbits all branches."""
+        one = 5e-4 + 1e-4 * len(self.states) ** 2
+        if self.continued is None:
+            return one
+        return (one + 100 * one / sizes[self.own[self.continued.index].name]) / sizes["branch"]
 
     def solve(self, point, request):
         """The requested outputs of a block (see `survey.scenes`)."""
-        shape = np.broadcast_shapes(*(np.shape(values) for values in point.values()))
-        columns = [np.broadcast_to(point[p.name], shape).reshape(-1) for p in self.PARAMETERS]
-        points = np.stack(columns, axis=1).astype(float)
+        points, shape = self._points(point)
         wanted = set(request.variables) or {o.name for o in self.OUTPUTS}
-        out = self._called(orbit.solve, self._equation, points, request.method, request.rtol, wanted)
+        if self.continued is None:
+            out = self._called(orbit.solve, self._equation, points, request.method, request.rtol, wanted)
+        else:
+            branch = np.broadcast_to(point["branch"], shape).reshape(-1)
+            given = points, branch, self.continued, request.method, request.rtol, wanted
+            out = self._called(orbit.solve_branches, self._equation, *given)
         return {name: values.reshape(*shape, *values.shape[1:]) for name, values in out.items()}
 
     def why(self, answer):
@@ -89,7 +110,7 @@ class OrbitScene(FunctionScene):
     def check(self, points):
         """Raise BadInput if f cannot be used, or contradicts the scene's other entries at these points (N, n)."""
         equation = self._equation
-        given = points if len(points) else np.ones((1, len(self.PARAMETERS)))
+        given = points if len(points) else np.ones((1, len(self.own)))
         x0, period = self._called(equation.begin, given)
         known = np.isfinite(x0).all(axis=1) & (period > 0) & np.isfinite(period)
         if len(points) and not known.any():
@@ -103,29 +124,13 @@ class OrbitScene(FunctionScene):
 
     def _try(self, point, x):
         """Raise BadInput unless f, run as Python, fills its array."""
-        call, n = "f(t, x, p, out)", len(self.states)
-        try:
-            value = self._plain(self.f, 0.25, x, point, n)
-        except IndexError as error:
-            if "only integers" in str(error):
-                self._refuse_index(call, error)
-            self._refuse(
-                f"{call} indexes beyond an array ({error})",
-                f"STATES names {n} for x and out, PARAMETERS {len(self.own)} for p",
-            )
-        except Exception as error:
-            self._refuse(f"{call} fails ({type(error).__name__}: {reason(error)})", "correct it")
-        if value.shape != (n,):
-            self._refuse(f"{call} returns an array of shape {value.shape}", f"it must fill out, of {n} numbers")
+        n = len(self.states)
+        sizes = f"STATES names {n} for x and out, PARAMETERS {len(self.own)} for p"
+        self._tried(self.f, "f(t, x, p, out)", (0.25, x.copy(), point), (n,), sizes, f"of {n} numbers")
 
-    def _plain(self, function, t, x, point, shape):
-        out = np.zeros(shape)
-        with np.errstate(all="ignore"):
-            try:
-                value = getattr(function, "py_func", function)(float(t), x.copy(), point, out)
-            except (ArithmeticError, ValueError):
-                return np.full(shape, np.nan)
-        return out if value is None else np.asarray(value, dtype=float)
+    def _at(self, t, x, point):
+        """f from the code run on numbers."""
+        return self._filled(self.f, (float(t), x.copy(), point), (len(self.states),))
 
     def _compare(self, programs, point, x, T):
         """Refuse what the recorded operations show: other values than the code's, no period, another Jacobian."""
@@ -141,37 +146,21 @@ class OrbitScene(FunctionScene):
         size = abs(f).max()
         if not np.isfinite(size):
             self._refuse(f"f has no finite value at the start, {here}", "correct it, or START")
-        plain = np.array([self._plain(self.f, time, x, point, n) for time in t])
+        plain = np.array([self._at(time, x, point) for time in t])
         if not (abs(plain - f) <= SAME * size).all():
             self._refuse(
                 f"f(t, x, p, out) gives other values when its operations are recorded, at {here}",
                 "use + - * / ** and functions of math or numpy alone",
             )
         if self.period is not None:
-            later = np.array([self._plain(self.f, time + T, x, point, n) for time in t])
+            later = np.array([self._at(time + T, x, point) for time in t])
             off = abs(later - plain).max()
             if not off <= SAME * size:
                 self._refuse(f"f(t + T) differs from f(t) by {off:.2g} at {here}, T = {T:g}", "correct PERIOD")
         if self.jacobian is not None:
-            given = np.array([self._called_jacobian(time, x, point) for time in t])
+            sizes = f"STATES names {n} for x, out is {n} x {n}, PARAMETERS {len(self.own)} for p"
+            call, what = "jacobian(t, x, p, out)", f"{n} x {n}"
+            asked = [(self.jacobian, call, (float(time), x.copy(), point), (n, n), sizes, what) for time in t]
+            given = np.array([self._tried(*one) for one in asked])
             if not (abs(given - A) <= SAME * abs(A).max()).all():
                 self._refuse(f"jacobian(t, x, p, out) is not df/dx at {here}", "correct it, or leave it out")
-
-    def _called_jacobian(self, t, x, point):
-        n, call = len(self.states), "jacobian(t, x, p, out)"
-        try:
-            value = self._plain(self.jacobian, t, x, point, (n, n))
-        except Exception as error:
-            self._refuse(f"{call} fails ({type(error).__name__}: {reason(error)})", "correct it")
-        if value.shape != (n, n):
-            self._refuse(f"{call} returns an array of shape {value.shape}", f"it must fill out, {n} x {n}")
-        return value
-
-    def _called(self, function, *arguments):
-        try:
-            return function(*arguments)
-        except Unsupported as error:
-            self._refuse(str(error), "use + - * / ** and functions such as sin, exp, sqrt of math or numpy")
-        except Raised as error:
-            cause = error.__cause__
-            self._refuse(f"{error} fails ({type(cause).__name__}: {reason(cause)})", "correct it")

@@ -32,6 +32,7 @@ that of the periodic orbits of x' = f(t, x, p)
     PERIOD             T, a number or a function of p; None: f does not depend on t, and T is found
     START              where Newton's method begins: the n states at t = 0, or a function of p that returns them; if
                        PERIOD is None, a guess of the period after them
+    CONTINUATION       optional: (name, least, greatest value) of a parameter along which orbits are followed
     jacobian(t, x, p, out)    optional: fills the n x n matrix df/dx, and is compared with that of the record
 
 and all optionally a docstring, TITLE and REFERENCES. It is executed like any Python file: use only files that you
@@ -69,6 +70,7 @@ import inspect
 import os
 import stat
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import lru_cache
 from itertools import product
 from pathlib import Path
@@ -260,6 +262,7 @@ def orbit(
     parameters: str | Parameter | Iterable[str | Parameter],
     start: npt.ArrayLike | Callable[[Any], npt.ArrayLike],
     jacobian: Callable[[Any, Any, Any, Any], Any] | None = None,
+    continuation: tuple[str, float, float] | None = None,
     title: str | None = None,
 ) -> OrbitScene:
     """The scene of the periodic orbits of x' = f(t, x, p), for `survey.evaluate` and `survey.run`.
@@ -280,6 +283,10 @@ def orbit(
         None, a guess of the period follows them.
     jacobian : function that fills the n x n matrix df/dx. It need not be given: the operations of f are recorded and
         differentiated. If it is, it is compared with that.
+    continuation : name, least and greatest value of a parameter along which orbits are followed, also round folds, from
+        those that are found from the start at 9 values. So points have all orbits of these curves, on any grid:
+        the output `orbits` is their number, and the parameter `branch` (1, 2, ..., by the mean square of the states;
+        1 by default) says which one is meant.
 
     Raises survey.BadInput with one line that names what is wrong.
 
@@ -300,7 +307,7 @@ def orbit(
         text = ""
     name = f"orbit({getattr(function, '__name__', 'f').strip('<>')})"
     about = inspect.getdoc(function)
-    scene = _orbit(f, period, parameters, states, start, jacobian, name, text, title, about, ())
+    scene = _orbit(f, period, parameters, states, start, jacobian, continuation, name, text, title, about, ())
     _made[scene.HASH] = scene
     return scene
 
@@ -425,8 +432,9 @@ def _from_text(name: str, text: str) -> FunctionScene:
         return _floquet(matrices, *given, name, text, title, about, references)
     if is_orbit:
         about = module.__doc__ or inspect.getdoc(getattr(module.f, "py_func", module.f))
-        given = module.PERIOD, module.PARAMETERS, module.STATES, module.START, getattr(module, "jacobian", None)
-        return _orbit(module.f, *given, name, text, title, about, references)
+        of_orbit = getattr(module, "jacobian", None), getattr(module, "CONTINUATION", None)
+        system = module.PERIOD, module.PARAMETERS, module.STATES, module.START
+        return _orbit(module.f, *system, *of_orbit, name, text, title, about, references)
     optional = getattr(module, "EVEN", False), getattr(module, "BREAKS", ())
     about = module.__doc__ or inspect.getdoc(getattr(module.z, "py_func", module.z))
     return _hill(module.z, module.PERIOD, module.PARAMETERS, *optional, name, text, title, about, references)
@@ -529,7 +537,7 @@ def _floquet(
 
 
 def _orbit(
-    f: Any, period: Any, parameters: Any, states: Any, start: Any, jacobian: Any,
+    f: Any, period: Any, parameters: Any, states: Any, start: Any, jacobian: Any, continuation: Any,
     name: str, text: str, title: str | None, about: str | None, references: Iterable[str],
 ) -> OrbitScene:  # fmt: skip
     """The checked scene; raises BadInput."""
@@ -543,7 +551,11 @@ def _orbit(
         if not callable(function) or _arguments(function) != 4:
             if function is not None or letter == "f":
                 refuse(f"{letter} must be a function of four arguments, {letter}(t, x, p, out), that fills out")
-    parameters = _parameters(parameters, orbit.OUTPUTS, ("state", "multiplier", "row", "column"), refuse)
+    more = ("state", "multiplier", "row", "column", *(("orbits", "branch") if continuation is not None else ()))
+    parameters = _parameters(parameters, orbit.OUTPUTS, more, refuse)
+    continued = None
+    if continuation is not None:
+        parameters, continued = _continued(continuation, parameters, refuse)
     names = _state_names(states, refuse)
     if len(names) > LARGEST:
         refuse(f"STATES names {len(names)} states; at most {LARGEST} are allowed")
@@ -563,12 +575,35 @@ def _orbit(
     about = inspect.cleandoc(
         about or f"Periodic orbits of x' = f(t, x, p), p = ({', '.join(p.name for p in parameters)})."
     )
-    bits = text.encode() if name.endswith(".py") else _bits((f, period, parameters, names, start, jacobian))
+    bits = text.encode() if name.endswith(".py") else _bits((f, period, parameters, names, start, jacobian, continued))
     return OrbitScene(
-        f=f, period=period, start=start, jacobian=jacobian, states=names, PARAMETERS=parameters, NAME=name, TEXT=text,
+        f=f, period=period, start=start, jacobian=jacobian, states=names, continued=continued, own=parameters,
+        NAME=name, TEXT=text,
         HASH=hashlib.sha256(bits).hexdigest(), TITLE=title or about.splitlines()[0].rstrip("."), about=about,
         REFERENCES=tuple(references) or ORBIT_REFERENCES,
     )  # fmt: skip
+
+
+def _continued(
+    given: Any, parameters: tuple[Parameter, ...], refuse: Callable[[str], NoReturn]
+) -> tuple[tuple[Parameter, ...], Any]:
+    """The parameters, one of them within the range of continuation, and that `Range`."""
+    from survey.measures.floquet.continuation import Range
+
+    names = [p.name for p in parameters]
+    try:
+        name, low, high = given[0], float(given[1]), float(given[2])
+        good = len(given) == 3 and name in names and -np.inf < low < high < np.inf
+    except (TypeError, ValueError, IndexError, KeyError):
+        good = False
+    if not good:
+        refuse(f"CONTINUATION = {shown(given)}: give a parameter's name, its least and its greatest value")
+    index = names.index(name)
+    own = parameters[index]
+    if not own.holds([low, high]).all():
+        refuse(f"CONTINUATION = {shown(given)}: the range is not within the domain, {own.domain}")
+    own = replace(own, minimum=low, maximum=high, open_minimum=False, open_maximum=False)
+    return (*parameters[:index], own, *parameters[index + 1 :]), Range(index, low, high)
 
 
 def _state_names(states: Any, refuse: Callable[[str], NoReturn]) -> tuple[str, ...]:

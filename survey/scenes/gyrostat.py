@@ -13,7 +13,7 @@ Integrable strata: I0 (g = 0), I1 (b = 0, H conserved), I2 (K = L = 0). Symmetri
 (phi, w, b31, c23, s2) -> -(...); phi -> phi + pi, (b, s) -> -(b, s); rotations of axes 2 and 3.
 
 Source: M. E. Lesina, Ya. V. Zinovyeva, "The gyrostat with Barnett-London effect" (2004), checked and corrected in
-`gyrostat.md` beside this file (whose section 5 is the classification that the fates follow).
+`gyrostat.md` beside this file (with the classification that the fates follow).
 
 A fate is decided by the monotone return maps and by proven regions of attraction, never by a limit of steps; the
 cycles are those that a lattice of return maps shows, with dips followed down to folds. b = 0 and g = 0 are taken
@@ -59,7 +59,7 @@ double-double arithmetic, in disjoint discs that are proven to hold them; an equ
 for the two or three roots within its error bar, a pair of which may be complex.
 
 [boundaries] draws, over phi0 and w0, the stable manifolds of the saddles, cycles and equilibria; over two parameters of
-the system, where portraits change: folds and Hopf curves of equilibria, K = 0, saddle connections (see
+the system, where portraits change: folds and Hopf curves of equilibria, K = 0, saddle connections, folds of cycles (see
 `measures/cylinder/curves.py`).
 
 Questions: `trajectory` (phi and w at t), `abel` (w and t at phi), `fate` (where the solution ends) and `portrait` (of

@@ -51,9 +51,17 @@ def cost(options, sizes):
 
 def solve(point, request):
     """All outputs of a block that the request wants (see `survey.scenes`)."""
-    block = Rows((point["q"],), point["a"])
-    problem = _problem(block.per_row(point["q"]), block.per_point(point["a"]), request.line("a"), request.line("q"))
-    out = monodromy.solve(problem, request.method, request.rtol, request.variables)
+    block, box = Rows((point["q"],), point["a"]), _box(request)
+    if box is None:
+        problem = _problem(block.per_row(point["q"]), block.per_point(point["a"]), request.line("a"), request.line("q"))
+        out = monodromy.solve(problem, request.method, request.rtol, request.variables)
+    else:
+        block = Rows((point["q"], point["a"]))
+        q, a = block.per_row(point["q"]), block.per_row(point["a"])
+        position = np.where(q == 0, np.nan, q)  # there exact rules decide
+        out = monodromy.solve_scattered(
+            box, position, a, lambda points: _problem(q[points], a[points, None]), request.rtol, request.variables
+        )
     out["period"] = np.where(out["status"] == status.OK, pi, np.nan)
     out["period_error"] = 1.3e-16 + 0.0 * out["period"]  # pi is rounded
     return {name: block.back(values) for name, values in out.items()}
@@ -87,9 +95,22 @@ def _problem(q, a, line=None, ends=None):
         constant=constant,
         line=line,
         span_low=np.full(q.size, dd.HALF_PI[1]),
-        row_axis=monodromy.RowAxis("mathieu", *ends, at=lambda q: _problem(q, np.zeros((q.size, 0)))) if ends else None,
+        row_axis=_row_axis(*ends) if ends else None,
         positions=q,
     )
+
+
+def _row_axis(number, low, high):
+    return monodromy.RowAxis("mathieu", number, low, high, at=lambda q: _problem(q, np.zeros((q.size, 0))))
+
+
+def _box(request):
+    """Where the points of a survey lie whose a and q share an axis; None if there are few."""
+    a, q = request.ranges.get("a"), request.ranges.get("q")
+    number = monodromy.boxed(min(a[0], q[0])) if a and q and request.method == "auto" else None
+    if number is None or not (a[2] > a[1] and q[2] > q[1]):
+        return None
+    return monodromy.Box(_row_axis(number, *q[1:]), (number, *a[1:]))
 
 
 def _rules(q, a):

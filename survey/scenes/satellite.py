@@ -89,8 +89,9 @@ def solve(point, request):
         return _solve(shared, point["rho"], oblate, request, line=request.line("rho"), ends=_ends(request))
     alpha = np.asarray(point["inertia_ratio"], dtype=float)
     rho, low = rates(alpha, request.options["direction"])
+    line, ends = _line_of_rho(request), _ends(request)
     bodies = [
-        _solve(shared, np.where((alpha > 1) == oblate, rho, np.nan), oblate, request, low)
+        _solve(shared, np.where((alpha > 1) == oblate, rho, np.nan), oblate, request, low, line, ends)
         for oblate in np.unique(alpha > 1)
     ]
     return {name: np.where(alpha > 1, bodies[-1][name], bodies[0][name]) for name in bodies[0]}
@@ -159,20 +160,62 @@ def trajectory(point, answer, options, time=None):
 
 def _solve(shared, rho, oblate, request, low=None, line=None, ends=None):
     """The outputs for one kind of body; points not of it have rho = NaN. `low` is what float64 took from rho."""
+    box = None if low is not None else _box(request, oblate)
+    if box is not None:
+        return _solve_scattered(box, shared, rho, oblate, request)
     block = Rows(shared, rho)
     row = Motion(*(block.per_row(values) for values in shared), bool(oblate))
     problem = _problem(row, block.per_point(rho), None if low is None else block.per_point(low), line, ends)
-    wanted = set(request.variables) | ({"exponent"} if "exponent_per_orbit" in request.variables else set())
-    out = monodromy.solve(problem, request.method, request.rtol, wanted)
+    out = monodromy.solve(problem, request.method, request.rtol, _wanted(request))
+    return _derived(out, row, problem.p, block, request)
+
+
+def _wanted(request):
+    return set(request.variables) | ({"exponent"} if "exponent_per_orbit" in request.variables else set())
+
+
+def _derived(out, row, rho, block, request):
+    """The outputs in the block's shape, with those that follow from the others, rows `row` and `rho` (rows, lanes)."""
+    wanted, ok = _wanted(request), out["status"] == status.OK
     ok = out["status"] == status.OK
     if "period" in wanted:
         out["period"] = np.where(ok, row.period[:, None], np.nan)
         out["period_error"] = _PERIOD_ULPS * EPS * out["period"]
     if "exponent_per_orbit" in wanted:
-        _per_orbit(out, abs(problem.p) * (row.period[:, None] / (2 * pi)))
+        _per_orbit(out, abs(rho) * (row.period[:, None] / (2 * pi)))
     if "lyapunov" in wanted:
-        out["lyapunov"] = (row.lyapunov(problem.p) & ok).astype(np.int8)
+        out["lyapunov"] = (row.lyapunov(rho) & ok).astype(np.int8)
     return {name: block.back(values) for name, values in out.items()}
+
+
+def _solve_scattered(box, shared, rho, oblate, request):
+    """As `_solve`, of points on their own that a `box` holds."""
+    block = Rows((*shared, rho))
+    columns, rho = [block.per_row(values) for values in shared], block.per_row(rho)
+    row = Motion(*columns, bool(oblate))
+    # exact rules decide at k = 0 and rho = 0
+    position = np.where((row.k == 0) | (rho == 0), np.nan, -2 * np.log(row.kc))
+
+    def problem_of(points):
+        return _problem(Motion(*(values[points] for values in columns), bool(oblate)), rho[points, None])
+
+    out = monodromy.solve_scattered(box, position, rho, problem_of, request.rtol, _wanted(request))
+    return _derived(out, row, rho[:, None], block, request)
+
+
+def _box(request, oblate):
+    """Where the points of a survey lie whose rho shares an axis with k; None if there are few, or of both kinds."""
+    rho = request.ranges.get("rho")
+    for name in ("k", "one_minus_k", "amplitude"):
+        given = request.ranges.get(name)
+        if given is None or rho is None or request.method != "auto":
+            continue
+        number = monodromy.boxed(min(given[0], rho[0]))
+        ends = _ends_of(name, number, *given[1:]) if number else None
+        if ends and ends[2] > ends[1] and rho[2] > rho[1]:
+            librates = bool((moduli({name: np.array(given[1:])})[0] < 1).all())
+            return monodromy.Box(_row_axis(oblate, not librates, ends), (number, *rho[1:]), even=librates)
+    return None
 
 
 def _per_orbit(out, orbits):
@@ -185,14 +228,27 @@ def _per_orbit(out, orbits):
     monodromy.overflow(out, out["exponent_per_orbit_error"] > LARGEST)
 
 
+def _line_of_rho(request):
+    """The axis of rho that an axis of inertia ratios gives, if it has bodies of one kind."""
+    line = request.line("inertia_ratio")
+    if line is None or line[1] <= 1 <= line[2]:
+        return None
+    rho, _ = rates(np.array(line[1:]), request.options["direction"])
+    return line[0], float(rho.min()), float(rho.max())
+
+
 def _ends(request):
     """(number, least and greatest s = -log |1 - k^2| or -log(1 - 1/k^2)) of an axis of one family of motions."""
     for name in ("k", "one_minus_k", "amplitude"):
         line = request.line(name)
         if line is not None:
-            k, kc, _, _ = moduli({name: np.array(line[1:])})
-            return (line[0], *np.sort(-2 * np.log(kc))) if (k > 1).all() or (k < 1).all() else None
+            return _ends_of(name, *line)
     return None
+
+
+def _ends_of(name, number, low, high):
+    k, kc, _, _ = moduli({name: np.array([low, high])})
+    return (number, *np.sort(-2 * np.log(kc))) if (k > 1).all() or (k < 1).all() else None
 
 
 def _at(s, oblate, rotates):
@@ -202,10 +258,11 @@ def _at(s, oblate, rotates):
     return _problem(Motion(k, kc, k, np.full_like(k, motion.K), oblate), np.zeros((s.size, 0)))
 
 
-def _row_axis(row, ends):
-    rotates = bool(row.rotates.any())
-    key = "satellite", row.oblate, rotates
-    return monodromy.RowAxis(key, *ends, at=lambda s: _at(s, row.oblate, rotates))
+def _row_axis(oblate, rotates, ends):
+    key = "satellite", oblate, rotates
+    # y1 - y2' of a libration is odd in k
+    odd = None if rotates else lambda s: np.sqrt(-np.expm1(-s))
+    return monodromy.RowAxis(key, *ends, at=lambda s: _at(s, oblate, rotates), odd=odd)
 
 
 def _problem(row, rho, low=None, line=None, ends=None):
@@ -225,7 +282,7 @@ def _problem(row, rho, low=None, line=None, ends=None):
         constant=constant,
         line=line,
         even=~row.rotates,
-        row_axis=_row_axis(row, ends) if ends else None,
+        row_axis=_row_axis(row.oblate, bool(row.rotates.any()), ends) if ends else None,
         positions=-2 * np.log(row.kc) if ends else None,
     )
 

@@ -22,6 +22,9 @@ CURVES = {
     "minus_one": ("a multiplier passes -1", {"color": "#000000", "ls": (0, (5, 2)), "lw": 1.0}),
     "neimark_sacker": ("a complex pair passes the circle", {"color": "#D40000", "ls": "-", "lw": 1.2}),
     "collision": ("multipliers collide on the circle", {"color": "#D40000", "ls": (0, (4, 1.5)), "lw": 1.2}),
+    "A": ("A: multipliers meet at -1", {"color": "#000000", "ls": "-", "lw": 1.2}),
+    "B": ("B: multipliers meet at -1", {"color": "#000000", "ls": (0, (5, 2)), "lw": 1.2}),
+    "KC": ("KC: two pairs meet on the circle", {"color": "#D40000", "ls": "-", "lw": 1.2}),
     "pole_passage": ("pole passages", {"color": "#FFFFFF", "ls": (0, (4, 2)), "lw": 1.0, "path_effects": [_RIM]}),
     "stable_precession": ("stable regular precessions", {"color": "#000000", "ls": "-", "lw": 1.2}),
     "separatrix": ("separatrices", {"color": "#D55E00", "ls": "-", "lw": 1.4}),
@@ -31,6 +34,7 @@ CURVES = {
     "ends": ("K = 0 (or L = 0): ends", {"color": "#000000", "ls": (0, (1, 1.5)), "lw": 1.6}),
     "homoclinic": ("homoclinic connections", {"color": "#D40000", "ls": "-", "lw": 1.2}),
     "heteroclinic": ("heteroclinic connections", {"color": "#D40000", "ls": (0, (4, 1.5)), "lw": 1.2}),
+    "cycle_fold": ("folds of cycles", {"color": "#0050A0", "ls": "-", "lw": 1.4}),
     "fold": ("folds of equilibria", {"color": "#000000", "ls": "-", "lw": 1.2}),
     "supercritical_hopf": ("supercritical Hopf", {"ls": "-"} | _PALE),
     "subcritical_hopf": (

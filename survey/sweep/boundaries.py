@@ -8,18 +8,20 @@ curves without the map's rows has `closed` or `searched`; of the others `edges` 
 follows them over the map, and `folds` finds where they turn back.
 """
 
-from itertools import pairwise
+from itertools import pairwise, product
 from math import prod
+from types import SimpleNamespace
 
 import numpy as np
 import xarray as xr
 
 from survey import measures
 from survey.file.labels import flag_attributes, meaning
-from survey.grid import logarithmic
+from survey.grid import Grid, logarithmic
 from survey.measures.square import Square
 from survey.measures.tasks import in_turn
 from survey.scene import Request
+from survey.sweep.line import OnLine, on_line
 
 ROWS = 8  # solved together
 COLUMNS = 9  # searched for curves that meet no row
@@ -35,15 +37,16 @@ def find(workflow, each=in_turn, once=lambda name, make: make()):
     """
     measure = _measure(workflow, "curves")
     if hasattr(measure, "refusal"):
-        return xr.Dataset(_closed(workflow, measure), attrs={"boundaries": workflow.boundaries})
+        make = _closed if len(workflow.grid.sizes) > 1 else _on_a_line
+        return xr.Dataset(make(workflow, measure), attrs={"boundaries": workflow.boundaries})
     grid, axis = workflow.grid, workflow.boundaries
     other = [dim for dim in grid.sizes if dim != axis]
     across = next((dim for dim in other if grid.sizes[dim] > 1), None)  # curves need a range
-    edges = _edges(workflow, axis, grid.sizes[other[0]] if other else 1, each, once)
+    edges = _edges(workflow, axis, each, once)
     found = _rows(workflow, axis, other, edges)
     about = {"boundaries": axis, "edge_incomplete_rows": int((edges.complete == 0).sum())}
     if across:
-        found |= _curves(workflow, across, axis, edges, each)
+        found |= _curves(workflow, across, axis, other, edges, each)
         about["curves_lost"] = int((found["curve_complete"][1] == 0).sum())
     left_out = [
         f"{name} from {a:.12g} to {b:.12g}"
@@ -55,6 +58,17 @@ def find(workflow, each=in_turn, once=lambda name, make: make()):
     return xr.Dataset(found, attrs=about)
 
 
+def along(scene, options, name, ends, fixed):
+    """(OnLine, index of each or None, are these all?) between `ends` of the parameter `name`; `fixed`: all others."""
+    measure = measures.question(scene.FAMILY, "curves")
+    if hasattr(measure, "refusal"):
+        return on_line(scene, options, name, ends, fixed), None, None
+    parameters = {name: ((name,), np.array(ends))} | {key: ((), np.float64(value)) for key, value in fixed.items()}
+    line = SimpleNamespace(scene=scene, grid=Grid({name: 2}, parameters), request=Request(options))
+    edges = _edges(line, name)
+    return OnLine(edges.position, edges.error, edges.kind), edges.index, bool(edges.complete.all())
+
+
 def plan(workflow, cost):
     """({what is known beforehand: rows, bytes per edge}, estimated seconds on one thread).
 
@@ -64,13 +78,13 @@ def plan(workflow, cost):
     if hasattr(measure, "refusal"):
         sizes = workflow.grid.sizes
         seconds = measure.seconds(list(sizes)) if hasattr(measure, "seconds") else 0.1  # measured, per map
-        if hasattr(measure, "searched"):
+        if hasattr(measure, "searched") and not hasattr(measure, "seconds"):
             seconds = 1e5 * cost  # measured: some ten points solved for each point of a curve, and a lattice
         size = 8 * (1 + len(sizes) + 2 * len(measure.ALONG))
         return {"bytes_per_curve_point": size}, seconds * prod(list(sizes.values())[2:])
     sizes = [size for dim, size in workflow.grid.sizes.items() if dim != workflow.boundaries and size > 1]
     # measured: ten to twenty edges per row; about five hundred points of curves
-    seconds = prod(sizes) * (2e-3 + 250 * cost) + (0.2 + 1e4 * cost if sizes else 0.0)
+    seconds = prod(sizes) * (2e-3 + 250 * cost) + (prod(sizes[1:]) * (0.2 + 1e4 * cost) if sizes else 0.0)
     return {"rows": prod(sizes), "bytes_per_edge": 25, "bytes_per_curve_point": 24 * len(sizes)}, seconds
 
 
@@ -80,14 +94,10 @@ def _measure(workflow, question):
 
 
 def _closed(workflow, measure):
-    """The variables of curves found without rows: on one map, or on each map of the stack along a third axis."""
-    grid = workflow.grid
-    names, fixed = (
-        list(grid.sizes),
-        {name: float(values) for name, (dims, values) in grid.parameters.items() if not dims},
-    )
+    """The variables of curves found without rows: on one map, or on each map of the stack along further axes."""
+    names, fixed = list(workflow.grid.sizes), _fixed(workflow)
     square, third = _square(workflow, *names[:2]), names[2:]
-    planes = [{third[0]: float(value)} for value in grid.parameters[third[0]][1]] if third else [{}]
+    planes = _planes(workflow, third)
     if hasattr(measure, "searched"):
         found = [measure.searched(workflow.scene, square, names[:2], fixed | plane) for plane in planes]
     else:
@@ -108,6 +118,33 @@ def _closed(workflow, measure):
     return variables
 
 
+def _planes(workflow, names):
+    """{name: value} of each combination of the values of these axes, the last running fastest."""
+    axes = [np.asarray(workflow.grid.parameters[name][1], float) for name in names]
+    return [dict(zip(names, map(float, values), strict=True)) for values in product(*axes)]
+
+
+def _fixed(workflow):
+    return {name: float(values) for name, (dims, values) in workflow.grid.parameters.items() if not dims}
+
+
+def _on_a_line(workflow, measure):
+    """The variables of the points at which an axis alone meets the curves."""
+    (axis,) = workflow.grid.sizes
+    values = np.asarray(workflow.grid.parameters[axis][1])
+    ends = float(values.min()), float(values.max())
+    found = on_line(workflow.scene, workflow.request.options, axis, ends, _fixed(workflow))
+    parameter, named = _named(workflow, axis)
+    position = named | {"long_name": f"{parameter.long_name} at the boundary"}
+    return {
+        "edge_count": ((), np.int32(found.position.size), {
+            "long_name": "number of boundaries", "units": "1", "sample_dimension": "edge"}),
+        "edge_position": ("edge", found.position, position | {"ancillary_variables": "edge_position_error"}),
+        "edge_position_error": ("edge", found.error, named | {"long_name": "error bound of edge_position"}),
+        "edge_class": ("edge", *_flags(measure.TITLE, measure.CLASSES, found.kind)),
+    }  # fmt: skip
+
+
 def _of_curves(workflow, names, count, kind, values, error, where):
     """The variables that all curves have; `values` (m, names): the parameters at their points."""
     variables = {
@@ -126,9 +163,10 @@ def _of_curves(workflow, names, count, kind, values, error, where):
     return variables
 
 
-def _edges(workflow, axis, rows, each, once):
+def _edges(workflow, axis, each=in_turn, once=lambda name, make: make()):
     """The Edges of all rows, found a few rows at a time."""
     measure, between = _measure(workflow, "edges"), _parts(workflow, axis)
+    rows = prod(size for dim, size in workflow.grid.sizes.items() if dim != axis)
 
     def make(some):
         solve = _row_solver(workflow, axis, some)
@@ -148,10 +186,17 @@ def _edges(workflow, axis, rows, each, once):
 
 def _row_solver(workflow, axis, rows):
     """What `edges.find` asks of the scene, for these rows."""
-    others = {name: values for name, (_, values) in workflow.grid.parameters.items() if name != axis}
+    grid = workflow.grid
+    other = [dim for dim in grid.sizes if dim != axis]
+    place = dict(zip(other, np.unravel_index(rows, [grid.sizes[dim] for dim in other]) if other else (), strict=True))
+    others = {
+        name: values[place[dims[0]]] if dims else values
+        for name, (dims, values) in grid.parameters.items()
+        if name != axis
+    }
 
     def solve(row, x, wanted):
-        point = {name: values[rows[row]][:, None] if np.ndim(values) else values for name, values in others.items()}
+        point = {name: values[row][:, None] if np.ndim(values) else values for name, values in others.items()}
         return _solve(workflow, point | {axis: x}, wanted)
 
     return solve
@@ -165,7 +210,7 @@ def _solve(workflow, point, wanted):
 def _rows(workflow, axis, other, edges):
     """The variables of the rows."""
     rows = edges.complete.size
-    dims, shape = (tuple(other), (rows,)) if other else ((), ())
+    dims, shape = tuple(other), tuple(workflow.grid.sizes[dim] for dim in other)
     count = np.bincount(edges.row, minlength=rows).astype(np.int32).reshape(shape)
     parameter, named = _named(workflow, axis)
     position = named | {"long_name": f"{parameter.long_name} at the edge of a tongue"}
@@ -181,44 +226,80 @@ def _rows(workflow, axis, other, edges):
     }  # fmt: skip
 
 
-def _curves(workflow, across, axis, edges, each):
-    """The variables of the curves on the map of the axes `across` (its rows) and `axis`, and of their folds."""
-    square = _square(workflow, across, axis)
-    fixed = {name: values for name, (dims, values) in workflow.grid.parameters.items() if not dims}
+def _curves(workflow, across, axis, other, edges, each):
+    """The variables of the curves on each map of the axes `across` (its rows) and `axis`, and of their folds."""
+    grid, further = workflow.grid, [dim for dim in other if dim != across]
+    place = dict(zip(other, np.unravel_index(edges.row, [grid.sizes[dim] for dim in other]), strict=True))
+    found, square = [], _square(workflow, across, axis)
+    curve_of, curves_before = np.full(edges.row.size, -1), 0
+    for plane in _planes(workflow, further):
+        own = np.ones(edges.row.size, bool)
+        for dim, value in plane.items():
+            own &= np.asarray(grid.parameters[dim][1])[place[dim]] == value
+        of_rows = np.asarray(grid.parameters[across][1])[place[across][own]]
+        seeds = np.stack([of_rows, edges.position[own]], axis=1), edges.kind[own], edges.index[own]
+        curves, folds = _on_plane(workflow, square, across, axis, seeds, plane, each)
+        found.append((plane, curves, folds, curves_before))
+        of_seed = curves.of_seed[: of_rows.size]
+        curve_of[own] = np.where(of_seed >= 0, of_seed + curves_before, of_seed)
+        curves_before += curves.count.size
+
+    def all_of(name):
+        return np.concatenate([getattr(curves, name) for _, curves, _, _ in found])
+
+    planes = [[np.full((curves.error.size, 1), plane[dim]) for dim in further] for plane, curves, _, _ in found]
+    on_curves = np.column_stack([
+        square.parameters(all_of("x")), *(np.concatenate([part[i] for part in planes]) for i in range(len(further)))
+    ])  # fmt: skip
+    names, where = (across, axis, *further), "on the edge of a tongue"
+    kind = _class(workflow, all_of("kind"))
+    variables = _of_curves(workflow, names, all_of("count"), kind, on_curves, all_of("error"), where)
+    variables |= {
+        "edge_curve": ("edge", curve_of.astype(np.int32), {
+            "long_name": "curve through the edge, counted from 0", "units": "1"}),
+        "curve_index": ("curve", *_index(all_of("index"))),
+        "curve_complete": ("curve", all_of("complete").astype(np.int8),
+                           _yes_or_no("is the curve closed, or ended by the map or edge_left_out", "lost complete")),
+    }  # fmt: skip
+    return variables | _of_folds(workflow, across, (across, axis), square, further, found)
+
+
+def _on_plane(workflow, square, across, axis, of_rows, plane, each):
+    """(the curves, their folds) on one map, in positions; `of_rows`: positions, kinds and indices of edges on rows."""
+    fixed = {name: values for name, (dims, values) in workflow.grid.parameters.items() if not dims} | plane
 
     def solve(q, p, wanted):
         return _solve(workflow, fixed | {across: q, axis: p}, wanted)
 
     pieces = [_pieces(workflow, name) for name in (across, axis)]
-    rows = np.asarray(workflow.grid.parameters[across][1])[edges.row]
-    of_rows = square.positions(np.stack([rows, edges.position], axis=1)), edges.kind, edges.index
     searched = _measure(workflow, "edges"), solve, square, _columns(pieces[1])
-    found = [of_rows, *(_of_columns(*searched, *piece) for piece in pieces[0])]
+    found = [(square.positions(of_rows[0]), *of_rows[1:]), *(_of_columns(*searched, *piece) for piece in pieces[0])]
     measure = _measure(workflow, "curves")
     seeds = measure.Seeds(*_with_rectangles(*(np.concatenate(v) for v in zip(*found, strict=True)), pieces))
     curves = measure.trace(solve, square, seeds, each)
-    folds = _measure(workflow, "folds").find(solve, square, curves)
-    names, on_curves, at_folds = (across, axis), square.parameters(curves.x), square.parameters(folds.x)
-    where = "on the edge of a tongue"
-    variables = _of_curves(workflow, names, curves.count, _class(workflow, curves.kind), on_curves, curves.error, where)
-    variables |= {
-        "edge_curve": ("edge", curves.of_seed[: edges.row.size].astype(np.int32), {
-            "long_name": "curve through the edge, counted from 0", "units": "1"}),
-        "curve_index": ("curve", *_index(curves.index)),
-        "curve_complete": ("curve", curves.complete.astype(np.int8),
-                           _yes_or_no("is the curve closed, or ended by the map or edge_left_out", "lost complete")),
-        "fold_curve": ("fold", folds.curve.astype(np.int32), {
-            "long_name": f"curve that turns back in {across}, counted from 0", "units": "1",
-            "instance_dimension": "curve"}),
-    }  # fmt: skip
+    return curves, _measure(workflow, "folds").find(solve, square, curves)
+
+
+def _of_folds(workflow, across, names, square, further, found):
+    """The variables of the folds of all maps."""
+    x, error = (np.concatenate([getattr(folds, name) for _, _, folds, _ in found]) for name in ("x", "error"))
+    curve = np.concatenate([folds.curve + before for _, _, folds, before in found])
+    at_folds = square.parameters(x)
+    variables = {"fold_curve": ("fold", curve.astype(np.int32), {
+        "long_name": f"curve that turns back in {across}, counted from 0", "units": "1",
+        "instance_dimension": "curve"})}  # fmt: skip
     for i, name in enumerate(names):
         parameter, named = _named(workflow, name)
         variables[f"fold_{name}"] = ("fold", at_folds[:, i], named | {
             "long_name": f"{parameter.long_name} at the fold of an edge",
             "ancillary_variables": f"fold_{name}_error"})  # fmt: skip
-        ends = square.parameters(np.stack([folds.x - folds.error, folds.x + folds.error]))[..., i]
+        ends = square.parameters(np.stack([x - error, x + error]))[..., i]
         variables[f"fold_{name}_error"] = ("fold", abs(ends - at_folds[:, i]).max(axis=0), named | {
             "long_name": f"error bound of fold_{name}"})  # fmt: skip
+    for name in further:
+        parameter, named = _named(workflow, name)
+        values = np.concatenate([np.full(len(folds.curve), plane[name]) for plane, _, folds, _ in found])
+        variables[f"fold_{name}"] = ("fold", values, named | {"long_name": parameter.long_name})
     return variables
 
 

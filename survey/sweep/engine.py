@@ -22,7 +22,7 @@ from survey.sweep.compile_ahead import compiling_ahead
 from survey.sweep.cost import regions_of
 from survey.sweep.fingerprint import code_version, compilers, fingerprint, refuse_other_code
 from survey.sweep.plan import refuse_too_large
-from survey.sweep.solve import solve_block
+from survey.sweep.reuse import solve_block
 from survey.sweep.time_left import TimeLeft
 
 SAMPLES = 16  # blocks, spread over the map, that are solved first
@@ -69,13 +69,14 @@ class Job:
     grid: Any
     kept: Blocks
     code: dict[str, str]
+    earlier: Any = None
 
     def __call__(self, block):
         refuse_other_code(self.code)
         number, ends = block
         cuts = tuple(slice(*pair) for pair in ends)
         began, before = time.perf_counter(), compile_seconds()
-        content = self.kept.keep(number, solve_block(self.scene, self.request, self.grid, cuts))
+        content = self.kept.keep(number, solve_block(self.scene, self.request, self.grid, cuts, self.earlier))
         compiled = compile_seconds()
         seconds = time.perf_counter() - began - (compiled - before)
         return Solved(number, _process(), compiled, max(seconds, 0.0), content)
@@ -91,13 +92,17 @@ class Job:
         return Solved(number, "", 0.0, None)
 
 
-def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, resume_command=None, block_timeout=None):
+def run(
+    workflow, workers=None, scheduler=None, fresh=False, progress=None, resume_command=None, block_timeout=None,
+    earlier=None,
+):  # fmt: skip
     """Run or resume the survey and write its netCDF file; returns a Finished.
 
     A region of the file is written as soon as its blocks are finished, while others are computed.
     `progress(done, total, reused, what, left)` is called as blocks and parts of the boundaries finish; `left()`
     estimates the seconds left. `resume_command` resumes the run after an interruption.
-    `block_timeout`: seconds after which a worker process that has finished no block is replaced.
+    `block_timeout`: seconds after which a worker process that has finished no block is replaced. `earlier`: the values
+    of another file that are taken over, a survey.sweep.reuse.Earlier; the output may replace that file.
     Raises BadInput, Damaged or Stopped.
     """
     started = time.perf_counter()
@@ -107,14 +112,15 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, resu
     blocks = [block for _, blocks in regions for block in blocks]
     about = {"points": workflow.grid.points, "blocks": len(blocks), "code": code_version() | compilers()}
     kept = Blocks(
-        workflow.path, fingerprint(workflow), fresh, about, _findable(workflow), resume_command, workflow.text
-    )
+        workflow.path, fingerprint(workflow), fresh, about, _findable(workflow), resume_command, workflow.text,
+        earlier is not None and os.path.exists(workflow.path) and os.path.samefile(earlier.path, workflow.path),
+    )  # fmt: skip
     with disk.refused(workflow.path, "the run"), client, kept:
         if kept.published:
             kept.remove()
             return Finished(kept.published, counts_in(kept.published), 0.0, 0.0, 0.0, 0.0, True)
         reused = kept.intact()
-        job = Job(workflow.scene, workflow.request, workflow.grid, kept, code_version())
+        job = Job(workflow.scene, workflow.request, workflow.grid, kept, code_version(), earlier)
         left = TimeLeft(workflow.grid.shape, blocks, reused)
         compiled, patience = {}, dispatch.Patience(block_timeout)
 
@@ -157,7 +163,7 @@ def run(workflow, workers=None, scheduler=None, fresh=False, progress=None, resu
                 "wall_time_s": round(time.perf_counter() - started, 3),
                 "compile_time_s": round(compiling, 3),
                 "blocks_reused": len(reused),
-            }
+            } | ({"points_reused": earlier.points} if earlier else {})
             written = assembly.finish(further, timings)
         kept.remove()
     writing = time.perf_counter() - computed - finding - compiling_further

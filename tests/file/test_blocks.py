@@ -264,7 +264,7 @@ def test_a_disk_that_refuses_leaves_the_old_file(copy, small, monkeypatch, where
     with monkeypatch.context() as patch:
         patch.setattr(where, name, refuse)
         with pytest.raises(Stopped, match=r"copy\.nc.*(No space left|HDF5: an|Input/output)"):
-            survey.run(small, output=copy)
+            survey.run(small, output=copy, fresh=True)
     assert copy.read_bytes() == before and reading.check(copy) == []
     assert [file.name for file in copy.parent.rglob("*") if file.name.endswith((".part", "output.nc"))] == []
     assert survey.run(small, output=copy).status.size == 24  # the lock is free, and what is there is of use
@@ -290,7 +290,7 @@ def test_an_error_at_each_write_call_in_turn_loses_nothing(copy, small, surveyed
     for fail in range(1, 100):
         call = 0
         try:
-            survey.run(small, output=copy)
+            survey.run(small, output=copy, fresh=True)
         except Stopped as error:
             assert "Input/output error" in str(error) and "\n" not in str(error)
             assert reading.check(copy) == []

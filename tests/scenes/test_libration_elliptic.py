@@ -26,9 +26,13 @@ def points(mu, e, **more):
     return survey.evaluate("libration_elliptic", mu=xr.DataArray(mu, dims="p"), e=xr.DataArray(e, dims="p"), **more)
 
 
-@pytest.mark.parametrize(("method", "rtol"), [("auto", 1e-6), ("auto", 1e-12), ("dop853", 2e-9), ("rk4", 1e-6)])
+@pytest.mark.parametrize(("method", "rtol"), [("auto", 1e-6), ("auto", 1e-12), ("dop853", 1.3e-9), ("rk4", 1e-6)])
 def test_references_lie_within_the_bars(method, rtol):
-    """At e < 0.7 the bars of dop853 come down to 1.4e-9, whatever is asked; hence its rtol here."""
+    """At e < 0.7 the bars of dop853 come down to 1.2e-9, whatever is asked; hence its rtol here.
+
+    At e = 0.5, mu = 0.005 the finest tolerance takes 108 steps, each of which rounds by about 1e-15; these add up with
+    the worst signs and grow fifty times in the matrix and ten times in b. The errors are 1e-13.
+    """
     ds = points([row["mu"] for row in POINTS], [row["e"] for row in POINTS], method=method, rtol=rtol)
     with mp.workdps(30):
         for name in "ab":

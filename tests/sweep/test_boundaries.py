@@ -55,7 +55,7 @@ def test_the_plan_counts_rows_and_bytes(path):
 
 
 def test_the_tongue_n_2_opens_with_half_the_square(path):
-    """Oblate tongue n = 2: k^2 / 2 wide about 1 + k^2 / 12 (satellite.md, section 4)."""
+    """Oblate tongue n = 2: k^2 / 2 wide about 1 + k^2 / 12 (satellite.md: What is known)."""
     ds = xr.load_dataset(path)
     first = slice(0, int(ds.edge_count[0]))
     own = ds.edge_position.values[first][ds.edge_index.values[first] == 2]
@@ -227,10 +227,10 @@ def test_a_row_of_its_own(tmp_path):
         ),
         ({"boundaries": {"axis": "rhoo"}}, r"boundaries.axis: unknown axis 'rhoo'; did you mean 'rho'"),
         ({"boundaries": {"axes": "rho"}}, r"unknown key boundaries.axes; did you mean 'axis'"),
-        ({"axes": {"k": 0.5, "rho": 1.0}}, r"boundaries: they are drawn on one axis or two"),
+        ({"axes": {"k": 0.5, "rho": 1.0}}, r"boundaries: they are drawn along an axis, and there is none"),
         (
             {"scene": "libration", "axes": {"mu": {"values": [0.01, 0.02]}}, "options": {}},
-            r"no boundary curves are known for the scene libration",
+            r"no boundaries are known along mu: curves are known on the axes mu and e of libration_elliptic",
         ),
     ],
 )

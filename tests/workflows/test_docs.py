@@ -1,5 +1,6 @@
 """Every snippet of the documentation runs; every figure has its command; the page on adding files adds working ones."""
 
+import doctest
 import importlib
 import inspect
 import json
@@ -269,16 +270,35 @@ def test_every_scene_has_its_page_with_its_mathematics(tool, name):
     path = ROOT / f"survey/scenes/{name}.md"
     assert path.exists() == (f"{name}.md" in survey.scenes.load(name).__doc__)
     if path.exists():
-        title = path.read_text().partition("\n")[0].removeprefix("# ")
-        assert tool("scene_pages").escaped(title) in page
+        errata = path.read_text().partition("\n## Errata\n")[2]
+        assert errata.strip() and errata.replace("../../results/", "../results/").strip() in page
 
 
-def test_an_item_of_a_list_keeps_its_lines(tool):
-    """And an indented formula that stands alone is shown as it is."""
-    notes = tool("scene_pages").notes
-    shown = notes("* one,\n  and on\n* two:\n  (1) x = y\n")
-    assert shown.strip() == "* one,\n  and on\n* two:\\\n  (1) x = y"
-    assert "```text\n  x_1 = y_1\n```" in notes("so\n\n  x_1 = y_1\n\nthen")
+@pytest.mark.parametrize("name", modules.names(survey.scenes))
+def test_the_examples_of_a_scene_give_what_they_show(name):
+    path = ROOT / f"survey/scenes/{name}.md"
+    shown = "\n".join(fenced(path.read_text(), "pycon")) if path.exists() else ""
+    assert path.exists() == bool(shown)
+    test = doctest.DocTestParser().get_doctest(shown, {}, name, str(path), 0)
+    assert doctest.DocTestRunner(optionflags=doctest.ELLIPSIS).run(test).failed == 0
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "survey/scenes").glob("*.md")), ids=lambda path: path.stem)
+def test_the_explanation_of_a_scene_is_what_a_page_needs(path):
+    """Its title is the scene's, it shows a drawing, and formulas stand in $, with their brackets closed."""
+    text = path.read_text()
+    assert text.startswith(f"# {survey.scenes.load(path.stem).TITLE}\n")
+    assert f"(../../results/drawing_{path.stem}.png)" in text and "\n## Errata" in text
+    prose = re.sub(r"```.*?```|`[^`\n]*`", "", text, flags=re.DOTALL)
+    formulas = re.findall(r"\$\$(.+?)\$\$", prose, re.DOTALL)
+    rest = re.sub(r"\$\$.+?\$\$", "", prose, flags=re.DOTALL)
+    formulas += re.findall(r"\$([^$]+)\$", rest)
+    assert len(formulas) > 20 and "$" not in re.sub(r"\$[^$]+\$", "", rest)
+    for formula in formulas:
+        assert formula.count("{") == formula.count("}") and len(re.findall(r"\\left\b", formula)) == len(
+            re.findall(r"\\right\b", formula)
+        ), formula
+        assert "\n\n" not in formula, formula
 
 
 @pytest.mark.parametrize("page", [ROOT / "README.md", DOCS / "overnight.md"], ids=lambda path: path.stem)

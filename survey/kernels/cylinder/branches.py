@@ -8,7 +8,7 @@ from survey.kernels.cylinder.equilibria import ANGLE, BAR, KIND, SADDLE
 from survey.kernels.cylinder.flow import B12, B31, BOUND_DDG, BOUND_DG, BOUND_F, C23, S2, S3, D, values
 from survey.kernels.cylinder.program import COLUMNS, in_angle
 from survey.kernels.cylinder.records import START_PHI, START_PHI_BAR, START_W, START_W_BAR
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import for_constants, inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 ORDER = 16
@@ -17,12 +17,7 @@ FURTHEST = 0.1  # rad from the saddle
 
 
 @inline
-def forces(p, phi, f, g):
-    """Taylor coefficients of f and of g about phi, where g = 0."""
-    if len(p) > COLUMNS:
-        in_angle(p, phi, f, g)
-        g[0] = 0.0
-        return
+def _forces_of_gyrostat(p, phi, f, g):
     s, c = math.sin(phi), math.cos(phi)
     s2, c2 = 2.0 * s * c, (c - s) * (c + s)
     one, two = 1.0, 1.0  # 1/n! and 2^n/n!
@@ -31,6 +26,16 @@ def forces(p, phi, f, g):
         g[n] = one * (p[S2] * c - p[S3] * s) - two * (0.5 * p[D] * s2 + p[C23] * c2)
         s, c, s2, c2 = c, -s, c2, -s2
         one, two = one / (n + 1), two * 2.0 / (n + 1)
+    g[0] = 0.0
+
+
+@for_constants(_forces_of_gyrostat)
+def forces(p, phi, f, g):
+    """Taylor coefficients of f and of g about phi, where g = 0."""
+    if len(p) == COLUMNS:
+        _forces_of_gyrostat(p, phi, f, g)
+        return
+    in_angle(p, phi, f, g)
     g[0] = 0.0
 
 

@@ -11,10 +11,11 @@ import numpy as np
 
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.branches import unstable
-from survey.kernels.cylinder.equilibria import ANGLE, BAR, KIND, MOST, SADDLE, equilibria
+from survey.kernels.cylinder.equilibria import ANGLE, BAR, KIND, MOST, SADDLE, equilibria_inside
 from survey.kernels.cylinder.flow import B12, B31, BOUND_DG, BOUND_F, BOUND_G, C23, S2, TWO_PI, potential, table, values
+from survey.kernels.cylinder.program import COLUMNS as GYROSTAT
 from survey.kernels.cylinder.steps import bar, carried, expand, passage, time_of_turning
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import constant, for_constants, inline, kernel
 
 ITSELF, REVERSED, MIRRORED, BOTH = range(4)
 # w and its error bound at the next equilibria to the right, the last of them the saddle itself, a turn further; then
@@ -24,6 +25,7 @@ TURN, TURN_BAR, PASSED, FROM, FROM_BAR, COLUMNS, OFFSETS = range(2 * MOST, 2 * M
 ROW = OFFSETS + MOST
 LIMIT = 600  # steps
 SAME = 1e-12  # difference of V, in units of its own, up to which the first of two saddles counts as the higher
+SAMPLES = 256  # of the circle, for the V of a program
 NEAR = 1e-10  # velocities, in those of the system, at which a branch counts as stopped
 
 
@@ -74,6 +76,30 @@ def changed(p, system, q):
         q[B31], q[C23], q[S2] = -q[B31], -q[C23], -q[S2]
 
 
+@kernel
+def height(p, phi):
+    """V at phi; for a program -int_0^phi (g - mean g), to a few digits."""
+    if len(p) == GYROSTAT:
+        return potential(p, phi)
+    total, mean = 0.0, 0.0
+    for i in range(SAMPLES):
+        at = (i + 0.5) * TWO_PI / SAMPLES
+        g = values(p, at)[1]
+        mean += g / SAMPLES
+        total += g * min(max(phi - i * TWO_PI / SAMPLES, 0.0), TWO_PI / SAMPLES)
+    return mean * phi - total
+
+
+def _constant(p, q):
+    return constant(q)
+
+
+@for_constants(_constant)
+def like(p, q):
+    """The row q, a read-only array if p is one."""
+    return q
+
+
 @inline
 def connections(setting, begin, at, P, wanted, tolerance, out):
     """Fill out (rows, 4, 2, ROW) for the four systems and the saddles of higher and of lower V.
@@ -88,16 +114,14 @@ def connections(setting, begin, at, P, wanted, tolerance, out):
             for label in range(2):
                 for k in range(ROW):
                     out[i, system, label, k] = math.nan
-        count, hidden = equilibria(P[i], eqs)
-        saddles, high = 0, -1
+        count, hidden = equilibria_inside(P[i], eqs)
+        saddles, high, level = 0, -1, 0.0
         for k in range(count):
             if eqs[k, KIND] == SADDLE:
                 saddles += 1
-                if (
-                    high < 0
-                    or potential(P[i], eqs[k, ANGLE]) - potential(P[i], eqs[high, ANGLE]) > SAME * P[i, BOUND_G]
-                ):
-                    high = k
+                own = height(P[i], eqs[k, ANGLE])
+                if high < 0 or own - level > SAME * P[i, BOUND_G]:
+                    high, level = k, own
         if hidden or count == 0 or 2 * saddles != count:
             continue
         for system in range(4):
@@ -108,7 +132,7 @@ def connections(setting, begin, at, P, wanted, tolerance, out):
                     turned[k, j] = eqs[k, j]
                 if mirrored:
                     turned[k, ANGLE] = TWO_PI - eqs[k, ANGLE]
-            unstable(q, turned, count, starts)
+            unstable(like(P[i], q), turned, count, starts)
             branch = 0
             for k in range(count):
                 if eqs[k, KIND] != SADDLE:
@@ -122,5 +146,5 @@ def connections(setting, begin, at, P, wanted, tolerance, out):
                     away = away if away > 0.0 else away + TWO_PI
                     row[OFFSETS + j] = away if j < count - 1 else TWO_PI
                 if wanted[system, label] > 0.0:
-                    first_turn(setting, begin, at, q, starts[2 * branch + 1], tolerance, row)
+                    first_turn(setting, begin, at, like(P[i], q), starts[2 * branch + 1], tolerance, row)
                 branch += 1

@@ -19,12 +19,11 @@ ANGLE, F, DG, BAR, KIND, STABLE, VAA, VAB, VBB, LEVEL = range(10)
 SADDLE, NODE, FOCUS, DEGENERATE = range(4)
 
 
-@kernel
 def equilibria(p, table):
     """Fill the rows of `table` (MOST, 10) with the equilibria in [0, 2 pi), ascending.
 
     Returns their number, and whether the roundings of float64 hide one, or that there is none: g' beside it, or g where
-    it comes near 0 without reaching it. Then the rows are those of `clustered`.
+    it comes near 0 without reaching it. Then the rows are those of `clustered`, which is compiled when one needs it.
     """
     count = bisected(p, table)
     if count >= 0:
@@ -33,6 +32,9 @@ def equilibria(p, table):
         return 0, True
     found, hidden = clustered(p, table)
     return found, hidden or count == HIDDEN
+
+
+equilibria_inside = kernel(equilibria)  # for kernels
 
 
 @kernel

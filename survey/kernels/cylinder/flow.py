@@ -7,7 +7,8 @@ A step keeps its work in one table T[n, row]: the coefficient of (t - t_n)^n of 
 the last line T[LAST] what a method notes about the step (its truncation error, its step size).
 
 A row p with more than COLUMNS columns holds any other f and g, as a `program`; on a line, where `on_circle` is False,
-phi is not taken mod 2 pi, and the bounds in p are those near the angle of the last `series`.
+phi is not taken mod 2 pi, and the bounds in p are those near the angle of the last `series`. Rows of the gyrostat are
+read-only arrays: by that kernels for them are compiled without the program (see `for_constants`).
 """
 
 import math
@@ -17,7 +18,7 @@ import numpy as np
 from survey.kernels.cylinder import program
 from survey.kernels.cylinder.program import COLUMNS, ON_CIRCLE
 from survey.kernels.cylinder.records import GIVEN, PHI0, START_PHI, START_W, W0
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import for_constants, inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 ORDER = 20  # of the Taylor series in t; near -ln(eps)/2 + 1 = 19 the work per unit of time is least (Jorba & Zou)
@@ -39,10 +40,17 @@ TWO_PI_LOW = 2.4492935982947064e-16  # 2 pi - TWO_PI
 def coefficients(b12, b31, d, c23, s2, s3):
     """Rows of the six parameters (arrays of one shape) and bounds of |f|, |g|, |g'|, |g''| over the circle."""
     b, c, s = np.hypot(b12, b31), np.hypot(0.5 * np.asarray(d), c23), np.hypot(s2, s3)
-    return np.stack([b12, b31, d, c23, s2, s3, b, c + s, 2.0 * c + s, 4.0 * c + s], axis=-1)
+    P = np.stack([b12, b31, d, c23, s2, s3, b, c + s, 2.0 * c + s, 4.0 * c + s], axis=-1)
+    P.flags.writeable = False
+    return P
 
 
 @inline
+def _always(p):
+    return True
+
+
+@for_constants(_always)
 def on_circle(p):
     """Do f and g have the period 2 pi?"""
     return len(p) == COLUMNS or p[ON_CIRCLE] > 0.0
@@ -55,20 +63,19 @@ def spread(rows, P, starts):
         starts[i, START_PHI], starts[i, START_W] = rows[i, PHI0], rows[i, W0]
         for k in range(6):
             P[i, k] = rows[i, k]
-        if P.shape[1] > COLUMNS:
-            for k in range(6, P.shape[1]):
-                P[i, k] = rows[i, k + GIVEN - 6]
-            if not on_circle(P[i]):
-                program.bound_near(P[i], rows[i, PHI0])
-            continue
         b, c, s = math.hypot(P[i, 0], P[i, 1]), math.hypot(0.5 * P[i, 2], P[i, 3]), math.hypot(P[i, 4], P[i, 5])
         P[i, BOUND_F], P[i, BOUND_G], P[i, BOUND_DG], P[i, BOUND_DDG] = b, c + s, 2.0 * c + s, 4.0 * c + s
 
 
 @kernel
-def values(p, phi):
-    """f, g, g' at phi."""
-    return program.values(p, phi) if len(p) > COLUMNS else gyrostat(p, phi)
+def spread_programs(rows, P, starts):
+    """As `spread`, of programs."""
+    for i in range(len(rows)):
+        starts[i, START_PHI], starts[i, START_W] = rows[i, PHI0], rows[i, W0]
+        for k in range(P.shape[1]):
+            P[i, k] = rows[i, k if k < 6 else k + GIVEN - 6]
+        if not on_circle(P[i]):
+            program.bound_near(P[i], rows[i, PHI0])
 
 
 @inline
@@ -82,6 +89,12 @@ def gyrostat(p, phi):
     return f, g, dg
 
 
+@for_constants(gyrostat)
+def values(p, phi):
+    """f, g, g' at phi."""
+    return program.values(p, phi) if len(p) > COLUMNS else gyrostat(p, phi)
+
+
 @inline
 def potential(p, phi):
     """V = (d/2) sin^2 phi + (c23/2) sin 2phi - s2 sin phi - s3 cos phi, g = -V'."""
@@ -90,13 +103,7 @@ def potential(p, phi):
 
 
 @kernel
-def series(p, phi, w, T, order):
-    """Fill rows PHI..Y of T with the series through (phi, w) up to t^order."""
-    if len(p) > COLUMNS:
-        if not on_circle(p):
-            program.bound_near(p, phi)
-        program.in_time(p, phi, w, order, T[:, PHI], T[:, W], T[:, E], T[:, Y])
-        return
+def _series_of_gyrostat(p, phi, w, T, order):
     s, c = math.sin(phi), math.cos(phi)
     T[0, PHI], T[0, W], T[0, SIN], T[0, COS] = phi, w, s, c
     T[0, SIN2], T[0, COS2] = 2.0 * s * c, (c - s) * (c + s)
@@ -119,16 +126,38 @@ def series(p, phi, w, T, order):
         T[n + 1, W] = p[B12] * s + p[B31] * c + y  # w = F + y
 
 
+@for_constants(_series_of_gyrostat)
+def series(p, phi, w, T, order):
+    """Fill rows PHI..Y of T with the series through (phi, w) up to t^order."""
+    if len(p) == COLUMNS:
+        _series_of_gyrostat(p, phi, w, T, order)
+        return
+    if not on_circle(p):
+        program.bound_near(p, phi)
+    program.in_time(p, phi, w, order, T[:, PHI], T[:, W], T[:, E], T[:, Y])
+
+
 @kernel
-def variation(p, T):
-    """Fill rows U1..DG up to t^LOW: u' = f u + z, z' = g' u, from the series of sin and cos in T."""
+def _rates_of_gyrostat(p, T):
+    for n in range(LOW):
+        T[n, F_] = p[B12] * T[n, COS] - p[B31] * T[n, SIN]
+        T[n, DG] = -p[D] * T[n, COS2] + 2.0 * p[C23] * T[n, SIN2] - p[S2] * T[n, SIN] - p[S3] * T[n, COS]
+    T[LOW, F_] = p[B12] * T[LOW, COS] - p[B31] * T[LOW, SIN]
+
+
+@for_constants(_rates_of_gyrostat)
+def rates(p, T):
+    """Fill rows F_ and DG of T up to t^LOW, from the series of phi or of its sin and cos."""
     if len(p) > COLUMNS:
         program.along(p, T[: LOW + 1, PHI], T[: LOW + 1, F_], T[: LOW + 1, DG])
     else:
-        for n in range(LOW):
-            T[n, F_] = p[B12] * T[n, COS] - p[B31] * T[n, SIN]
-            T[n, DG] = -p[D] * T[n, COS2] + 2.0 * p[C23] * T[n, SIN2] - p[S2] * T[n, SIN] - p[S3] * T[n, COS]
-        T[LOW, F_] = p[B12] * T[LOW, COS] - p[B31] * T[LOW, SIN]
+        _rates_of_gyrostat(p, T)
+
+
+@kernel
+def variation(p, T):
+    """Fill rows U1..DG up to t^LOW: u' = f u + z, z' = g' u, from the series in T."""
+    rates(p, T)
     T[0, U1], T[0, Z1], T[0, U2], T[0, Z2] = 1.0, -T[0, F_], 0.0, 1.0
     for n in range(LOW):
         a0 = a1 = a2 = a3 = 0.0
@@ -190,11 +219,16 @@ def centred(phi):
 
 
 @inline
+def _longest_step_of_gyrostat(p, w):
+    return 1.0 / math.sqrt(p[BOUND_DG] + p[BOUND_F] * (abs(w) + 0.25 * p[BOUND_F]) + 1e-300)
+
+
+@for_constants(_longest_step_of_gyrostat)
 def longest_step(p, w):
     """A step within which w has at most one zero.
 
     w'' - f w' - (f' w + g') w = 0; without its damping the restoring force is Q = -g' - f^2/4 - f' w/2, so by Sturm
     zeros of w are pi / sqrt(max Q) apart at least. Here a third of that.
     """
-    step = 1.0 / math.sqrt(p[BOUND_DG] + p[BOUND_F] * (abs(w) + 0.25 * p[BOUND_F]) + 1e-300)
+    step = _longest_step_of_gyrostat(p, w)
     return step if on_circle(p) else min(step, program.longest_step(p, w))

@@ -90,7 +90,7 @@ from survey.kernels.cylinder.steps import (
     unturned,
     values,
 )
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import constant, inline, kernel
 from survey.kernels.math.newton import bracketed
 from survey.kernels.unroll import unroll
 
@@ -248,9 +248,9 @@ def _pass(T, state, before, fixed, q, i, block, targets, j, doubt, started, floa
     if doubt == j:
         doubt = -1
     if turned:
-        ending = TURNING if clean_turning(q, x1, bar_phi, bar_w) else SEPARATRIX
+        ending = TURNING if clean_turning(constant(q), x1, bar_phi, bar_w) else SEPARATRIX
         t = before[TIME, i]
-        bar_t = bar_w / abs(values(q, x1)[1]) + 3e-16 * t if ending == TURNING else 0.0
+        bar_t = bar_w / abs(values(constant(q), x1)[1]) + 3e-16 * t if ending == TURNING else 0.0
         for k in range(doubt if doubt >= 0 else j, size):
             if k >= j or not certain(floats[k]):
                 status[k] = ending
@@ -264,7 +264,7 @@ def _pass(T, state, before, fixed, q, i, block, targets, j, doubt, started, floa
     if started and not v1 > 2.0 * bar_w:
         return j, doubt, started, SEPARATRIX
     started = started or v1 > 2.0 * bar_w
-    if j < size and runs_into_node(q, x1, v1, unturned(targets[j], turns) - angle):
+    if j < size and runs_into_node(constant(q), x1, v1, unturned(targets[j], turns) - angle):
         return j, doubt, started, EQUILIBRIUM
     return j, doubt, started, (_GOING if j < size or doubt >= 0 else OK)
 

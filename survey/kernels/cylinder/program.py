@@ -18,6 +18,7 @@ import math
 import numpy as np
 
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math import functions
 from survey.kernels.math.roundoff import EPS, ROUNDOFF_UP
 
 # Columns of the six parameters: signs and marks, and the mean of f on the circle, 0 where it vanishes within rounding.
@@ -35,38 +36,8 @@ COARSEST, FINEST = 16, 65536  # pieces of the circle, over which f and g are bou
 @kernel
 def function(code, x, number):
     """The function of this code at x; NaN outside its domain."""
-    if code == SIN:
-        return math.sin(x)
-    if code == COS:
-        return math.cos(x)
-    if code == TAN:
-        return math.tan(x)
-    if code == ASIN:
-        return math.asin(x) if abs(x) <= 1.0 else math.nan
-    if code == ACOS:
-        return math.acos(x) if abs(x) <= 1.0 else math.nan
-    if code == ATAN:
-        return math.atan(x)
-    if code == SINH:
-        return math.sinh(x) if abs(x) < 700.0 else math.nan
-    if code == COSH:
-        return math.cosh(x) if abs(x) < 700.0 else math.nan
-    if code == TANH:
-        return math.tanh(x)
-    if code == ASINH:
-        return math.asinh(x)
-    if code == ACOSH:
-        return math.acosh(x) if x >= 1.0 else math.nan
-    if code == ATANH:
-        return math.atanh(x) if abs(x) < 1.0 else math.nan
-    if code == EXP:
-        return math.exp(x) if x < 709.0 else math.nan
-    if code == LOG:
-        return math.log(x) if x > 0.0 else math.nan
-    if code == SQRT:
-        return math.sqrt(x) if x >= 0.0 else math.nan
-    if code == ERF:
-        return math.erf(x)
+    if code != POWER:
+        return functions.function(code - SIN, x)
     return x**number if x > 0.0 else math.nan
 
 

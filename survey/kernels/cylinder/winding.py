@@ -10,7 +10,19 @@ import math
 
 import numpy as np
 
-from survey.kernels.cylinder.equilibria import ANGLE, BAR, DG, FOCUS, KIND, MOST, NODE, STABLE, F, equilibria, offset
+from survey.kernels.cylinder.equilibria import (
+    ANGLE,
+    BAR,
+    DG,
+    FOCUS,
+    KIND,
+    MOST,
+    NODE,
+    STABLE,
+    F,
+    equilibria_inside,
+    offset,
+)
 from survey.kernels.cylinder.equilibria import settled as node_settled
 from survey.kernels.cylinder.flow import BOUND_DDG, BOUND_DG, BOUND_F, BOUND_G, reduced, table
 from survey.kernels.cylinder.steps import (
@@ -84,7 +96,7 @@ def zeros(end, dt):
 def counts(setting, begin, at, p, phi0, w0, times, tolerance, limit, out):
     """Fill out[j] with the number of turning points before the ascending times[j] >= 0 where it is UNDETERMINED."""
     eqs, end, T = np.zeros((MOST, 10)), np.zeros(5), table()
-    count, _hidden = equilibria(p, eqs)
+    count, _hidden = equilibria_inside(p, eqs)
     if p[BOUND_G] == 0.0 or rests(p, phi0, w0):
         out[: len(times)] = 0
         return

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 
+from survey.kernels.floquet.steps import copy
 from survey.kernels.jit import kernel
 from survey.kernels.math.roundoff import EPS, ROUNDOFF_UP
 
@@ -74,7 +75,8 @@ def powers(M, E, number, may_be_stable, verdict):
     N, n = M.shape[0], M.shape[1]
     A, B, X, Y = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
     for p in range(N):
-        A[:], X[:] = M[p], E[p]
+        copy(M[p], A)
+        copy(E[p], X)
         for _ in range(number):
             norm = trace = spread = 0.0
             for i in range(n):
@@ -100,4 +102,4 @@ def powers(M, E, number, may_be_stable, verdict):
                         one, two = abs(A[i, k]), abs(A[k, j])
                         bound += one * X[k, j] + X[i, k] * two + X[i, k] * X[k, j] + (n + 1) * ROUNDOFF_UP * one * two
                     B[i, j], Y[i, j] = total, bound * (1.0 + 4.0 * n * EPS)
-            A[:], X[:] = B, Y
+            A, B, X, Y = B, A, Y, X

@@ -1,8 +1,9 @@
 """The flow of nonlinear systems x' = f(t, x) and its derivative by the initial state, by Taylor series about the
 beginnings of steps; many points at once, each with steps of its own.
 
-A step goes as far as the last two coefficients allow for rounding alone to count (Jorba & Zou), and no farther than
-`reach` / |A|, A = df/dx. No bounds are made here: `measures.floquet.orbit` has them of the defect of the series.
+A step goes as far as the last two coefficients allow for `tolerance`, relative to the states (Jorba & Zou), and no
+farther than `reach` / |A|, A = df/dx. No bounds are made here: `measures.floquet.existence` has them of the defect of
+the series.
 
 Source: A. Jorba, M. Zou, Experimental Mathematics 14 (2005) 99.
 """
@@ -14,7 +15,6 @@ import numpy as np
 from survey.kernels.floquet.program import BASIS, COLUMN, NUMBER, extend
 from survey.kernels.floquet.steps import lanes_of, next_term, norm_of
 from survey.kernels.jit import kernel
-from survey.kernels.math.roundoff import ROUNDOFF
 
 ORDER = 20
 DIGITS = 2.0**48  # of the ends of steps, so that sums and differences of them are exact
@@ -24,8 +24,8 @@ SHORTER, SHORTEST = 0.1, 1e-9  # where a series is not finite; of the span: step
 
 @kernel
 def flow(
-    operations, signs, inside, order, used, terms, numbers, places, x0, span, reach, most, first, X, M, size, steps,
-    begin, length, series,
+    operations, signs, inside, order, used, terms, numbers, places, x0, span, reach, tolerance, most, first, X, M, size,
+    steps, begin, length, series,
 ):  # fmt: skip
     """Fill X (N, n), the states at t = span (N) from x0 (N, n) at 0, and the numbers of `steps` (N); NaN: it fails.
 
@@ -33,7 +33,9 @@ def flow(
     size (N, n): the largest moduli of the states at the ends of steps. If first (N + 1) is not empty, step k of point i
     is recorded at first[i] + k: `begin`, `length`, `series` (n, ORDER + 1) in units of the step.
     """
-    n, lanes = x0.shape[1], lanes_of(x0.shape[1])
+    n, lanes = x0.shape[1], 2
+    while lanes < lanes_of(n) and lanes < len(x0):  # bits do not depend on it
+        lanes *= 2
     derived, recorded = len(M) > 0, len(first) > 0
     S, V = np.zeros((len(operations), ORDER + 1, lanes)), np.zeros((numbers.shape[1], lanes))
     B, C = np.zeros((len(operations), ORDER + 1, n * lanes)), np.zeros((len(operations), n, n * lanes))
@@ -49,7 +51,8 @@ def flow(
         for lane in range(lanes):
             i = start + min(lane, count - 1)
             busy[lane], t[lane], s[lane] = lane < count, 0.0, span[i] / 32.0
-            V[:, lane] = numbers[i]
+            for k in range(numbers.shape[1]):
+                V[k, lane] = numbers[i, k]
             for k in range(len(terms)):
                 for c in range(n):
                     W[k, c * lanes + lane] = numbers[i, terms[k, NUMBER]]
@@ -64,23 +67,23 @@ def flow(
         left = count
         while left > 0:
             for c in range(n):
-                V[places[c]] = x[c]
+                for lane in range(lanes):
+                    V[places[c], lane] = x[c, lane]
             if derived:
                 P[0] = 0.0
                 for c in range(n):
                     P[0, c, c * lanes : (c + 1) * lanes] = 1.0
-            for k in range(ORDER):
+            for k in range(ORDER + 1):  # one call of each kernel: it is compiled once
                 extend(operations, signs, inside, order, V, t, s, S, k)
                 if k == 0:
-                    norm_of(S, W, terms, 0, rows, a)
-                if derived:
+                    norm_of(S, W, terms, k, rows, a)
+                if derived and k < ORDER:
                     next_term(S, W, terms, used, needed, k, n, s, B, C, P)
-            extend(operations, signs, inside, order, V, t, s, S, ORDER)
             for lane in range(count):
                 if not busy[lane]:
                     continue
                 i = start + lane
-                share = _share(S, held, lane)
+                share = _share(S, held, lane, tolerance)
                 lost = steps[i] >= most or min(share, 1.0) * s[lane] < SHORTEST * span[i]
                 if lost or not math.isfinite(share):
                     s[lane] *= SHORTER
@@ -131,7 +134,7 @@ def flow(
 
 
 @kernel
-def _share(S, held, lane):
+def _share(S, held, lane, tolerance):
     """How far the series of the states serve, relative to the step for which they were made; NaN: not at all."""
     share = WIDEST
     for c in range(len(held)):
@@ -144,7 +147,7 @@ def _share(S, held, lane):
             if not math.isfinite(last):
                 return math.nan
             if last > 0.0:
-                share = min(share, (ROUNDOFF * size / last) ** (1.0 / m))
+                share = min(share, (tolerance * size / last) ** (1.0 / m))
     return share
 
 
@@ -155,8 +158,8 @@ def _advance(P, shares, n, F, D):
     for q in range(n * n):
         own = F[q]
         at = (q % n) * lanes
-        own[:] = P[ORDER, q // n, at : at + lanes]
-        for m in range(ORDER - 1, -1, -1):
+        own[:] = 0.0
+        for m in range(ORDER, -1, -1):
             one = P[m, q // n, at : at + lanes]
             for lane in range(lanes):
                 own[lane] = own[lane] * shares[lane] + one[lane]
@@ -197,7 +200,7 @@ def spread(F, delta, first, wide, off):
                             for m in range(n):
                                 total += F[k, r, m] * A[m, c]
                             B[r, c] = total
-                    A[:] = B
+                    A, B = B, A
                 for r in range(n):
                     total = 0.0
                     for c in range(n):

@@ -12,55 +12,15 @@ S[basis, n, lane] is the coefficient of tau^n, t = middle + tau * half; V[number
 Source: A. Griewank, A. Walther, Evaluating Derivatives (2008), chapter 13.
 """
 
-import math
-
 from survey.kernels.jit import kernel
+from survey.kernels.math.functions import NAMES, function
 
-_NAMES = (
-    "one time combination product quotient sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp log sqrt "
-    "erf state"
-)
-CODES = {name: code for code, name in enumerate(_NAMES.split())}
+ONE, TIME, COMBINATION, PRODUCT, QUOTIENT, FUNCTIONS = range(6)  # the last: of the first of NAMES
+STATE = FUNCTIONS + len(NAMES)
+CODES = {"one": ONE, "time": TIME, "combination": COMBINATION, "product": PRODUCT, "quotient": QUOTIENT}
+CODES |= {"state": STATE} | {name: FUNCTIONS + k for k, name in enumerate(NAMES)}
 OF_LINE = 32
-ONE, TIME, COMBINATION, PRODUCT, QUOTIENT, SIN, COS, TAN, ASIN, ACOS, ATAN, SINH, COSH = range(13)
-TANH, ASINH, ACOSH, ATANH, EXP, LOG, SQRT, ERF, STATE = range(13, 22)
 BASIS, ROW, COLUMN, NUMBER = range(4)  # columns of `terms`
-
-
-@kernel
-def function(code, x):
-    """The function of this code at x; NaN outside its domain."""
-    if code == SIN:
-        return math.sin(x)
-    if code == COS:
-        return math.cos(x)
-    if code == TAN:
-        return math.tan(x)
-    if code == ASIN:
-        return math.asin(x) if abs(x) <= 1.0 else math.nan
-    if code == ACOS:
-        return math.acos(x) if abs(x) <= 1.0 else math.nan
-    if code == ATAN:
-        return math.atan(x)
-    if code == SINH:
-        return math.sinh(x) if abs(x) < 700.0 else math.nan
-    if code == COSH:
-        return math.cosh(x) if abs(x) < 700.0 else math.nan
-    if code == TANH:
-        return math.tanh(x)
-    if code == ASINH:
-        return math.asinh(x)
-    if code == ACOSH:
-        return math.acosh(x) if x >= 1.0 else math.nan
-    if code == ATANH:
-        return math.atanh(x) if abs(x) < 1.0 else math.nan
-    if code == EXP:
-        return math.exp(x) if x < 709.0 else math.nan
-    if code == LOG:
-        return math.log(x) if x > 0.0 else math.nan
-    if code == SQRT:
-        return math.sqrt(x) if x >= 0.0 else math.nan
-    return math.erf(x)
 
 
 @kernel
@@ -84,7 +44,8 @@ def extend(operations, signs, inside, order, V, middle, half, S, n):
                     own[lane] += one[lane] * number[lane]
         elif code == STATE:
             if n == 0:
-                own[:] = V[a]
+                for lane in range(lanes):
+                    own[lane] = V[a, lane]
             else:
                 own[:] = 0.0
                 for k in range(operations[i, 3], operations[i, 4]):
@@ -101,7 +62,8 @@ def extend(operations, signs, inside, order, V, middle, half, S, n):
                     own[lane] += one[lane] * two[lane]
         elif code == QUOTIENT:
             one, two = S[a, n], S[b, 0]
-            own[:] = one
+            for lane in range(lanes):
+                own[lane] = one[lane]
             for k in range(1, n + 1):
                 below, before = S[b, k], S[i, n - k]
                 for lane in range(lanes):
@@ -109,7 +71,7 @@ def extend(operations, signs, inside, order, V, middle, half, S, n):
             for lane in range(lanes):
                 own[lane] /= two[lane]
         elif n == 0:
-            plain = code if code < OF_LINE else code - OF_LINE
+            plain = (code if code < OF_LINE else code - OF_LINE) - FUNCTIONS
             for lane in range(lanes):
                 own[lane] = function(plain, S[a, 0, lane])
         else:

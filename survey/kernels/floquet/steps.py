@@ -64,14 +64,13 @@ def factors(
         for i in range(n):
             X[0, i, i * lanes : (i + 1) * lanes] = 1.0
         w[0], e[0] = 1.0, 0.0
-        for k in range(ORDER):
+        for k in range(ORDER + 1):  # one call of each kernel: it is compiled once
             extend(operations, signs, inside, order, V, t, s, S, k)
             norm_of(S, W, terms, k, rows, a[k])
-            next_term(S, W, terms, used, needed, k, n, s, B, C, X)
-            _row_sums(X[k + 1], n, rows, w[k + 1])
-            _rounded(a, w, e, own, s, k, most)
-        extend(operations, signs, inside, order, V, t, s, S, ORDER)
-        norm_of(S, W, terms, ORDER, rows, a[ORDER])
+            if k < ORDER:
+                next_term(S, W, terms, used, needed, k, n, s, B, C, X)
+                _row_sums(X[k + 1], n, rows, w[k + 1])
+                _rounded(a, w, e, own, s, k, most)
         _ends(X, plus, minus)
         for lane in range(min(lanes, len(point) - start)):
             cut, rounding, total = _missing(a, w, e, s, lane)
@@ -168,9 +167,8 @@ def _ends(X, plus, minus):
     """Fill the sums of the series at tau = 1 and -1, like X[0]."""
     for i in range(X.shape[1]):
         one, two = plus[i], minus[i]
-        one[:] = X[ORDER, i]  # of even orders
-        two[:] = X[ORDER - 1, i]
-        for k in range(ORDER - 2, -1, -2):
+        one[:], two[:] = 0.0, 0.0
+        for k in range(ORDER, -1, -2):
             even = X[k, i]
             for q in range(len(one)):
                 one[q] += even[q]
@@ -267,6 +265,54 @@ def _invert(work, inverse, n):
 
 
 @kernel
+def column_sums(A, out):
+    """Fill out (n) with the sums of the moduli in the columns of A (n, n)."""
+    for c in range(len(A)):
+        total = 0.0
+        for j in range(len(A)):
+            total += abs(A[j, c])
+        out[c] = total
+
+
+@kernel
+def multiply(left, right, zero, out):
+    """Fill out with the product of two matrices (n, n); `zero` is that of its type."""
+    for j in range(len(out)):
+        for c in range(len(out)):
+            total = zero
+            for m in range(len(out)):
+                total += left[j, m] * right[m, c]
+            out[j, c] = total
+
+
+@kernel
+def add_outer(A, by, before, out):
+    """Add `by` times the sum of the moduli in each row of A, times `before` (n) of each column, to out (n, n)."""
+    for j in range(len(A)):
+        total = 0.0
+        for m in range(len(A)):
+            total += abs(A[j, m])
+        for c in range(len(A)):
+            out[j, c] += by * total * before[c]
+
+
+@kernel
+def set_identity(A):
+    """Fill A (n, n) with the identity."""
+    A[:] = 0.0
+    for j in range(len(A)):
+        A[j, j] = 1.0
+
+
+@kernel
+def copy(A, out):
+    """Fill the matrix out; out[:] = A compiles the words of an error for 2 s."""
+    for j in range(len(out)):
+        for c in range(out.shape[1]):
+            out[j, c] = A[j, c]
+
+
+@kernel
 def products(F, error, doubt, first, n, M, E, R):
     """Fill M (N, n, n), the product of the steps first[i] to first[i + 1] of each point, and bounds E of its entries.
 
@@ -280,50 +326,27 @@ def products(F, error, doubt, first, n, M, E, R):
     A, B = np.empty((n, n)), np.empty((n, n))
     for i in range(len(M)):
         steps = first[i + 1] - first[i]
-        A[:] = 0.0
-        for j in range(n):
-            A[j, j] = 1.0
+        set_identity(A)
         more = 0.0
         for k in range(steps):
-            largest = 0.0
-            for c in range(n):
-                total = 0.0
-                for j in range(n):
-                    total += abs(A[j, c])
-                before[k, c] = total
-            step = F[first[i] + k]
+            step, largest = F[first[i] + k], 0.0
             for j in range(n):
                 for c in range(n):
-                    total = 0.0
-                    for m in range(n):
-                        total += step[j, m] * A[m, c]
-                    B[j, c] = total
                     largest = max(largest, abs(step[j, c]))
-            A[:] = B
+            column_sums(A, before[k])
+            multiply(step, A, 0.0, B)
+            A, B = B, A
             rounding[k] = n * ROUNDOFF_UP * largest
             more += doubt[first[i] + k]
-        M[i] = A
+        copy(A, M[i])
         E[i] = 0.0
         R[i] = 0.0
-        A[:] = 0.0
-        for j in range(n):
-            A[j, j] = 1.0
+        set_identity(A)
         for k in range(steps - 1, -1, -1):
-            step, own = F[first[i] + k], error[first[i] + k]
-            for j in range(n):
-                total = 0.0
-                for m in range(n):
-                    total += abs(A[j, m])
-                for c in range(n):
-                    E[i, j, c] += (own + rounding[k]) * total * before[k, c]
-                    R[i, j, c] += rounding[k] * total * before[k, c]
-            for j in range(n):
-                for c in range(n):
-                    total = 0.0
-                    for m in range(n):
-                        total += A[j, m] * step[m, c]
-                    B[j, c] = total
-            A[:] = B
+            add_outer(A, error[first[i] + k] + rounding[k], before[k], E[i])
+            add_outer(A, rounding[k], before[k], R[i])
+            multiply(A, F[first[i] + k], 0.0, B)
+            A, B = B, A
         factor = math.exp(min(2.0 * more, 700.0))
         for j in range(n):
             for c in range(n):
@@ -344,41 +367,59 @@ def carried(F, error, doubt, first, which, n, V, W, B):
     before = np.empty((longest + 1, n))
     A, Z = np.empty((n, n), np.complex128), np.empty((n, n), np.complex128)
     for i in which:
-        A[:] = V[i]
+        copy(V[i], A)
         more = 0.0
         for k in range(first[i + 1] - first[i]):
-            step = F[first[i] + k]
-            for c in range(n):
-                total = 0.0
-                for j in range(n):
-                    total += abs(A[j, c])
-                before[k, c] = total
-            for j in range(n):
-                for c in range(n):
-                    sum_of = 0.0 + 0.0j
-                    for m in range(n):
-                        sum_of += step[j, m] * A[m, c]
-                    Z[j, c] = sum_of
-            A[:] = Z
+            column_sums(A, before[k])
+            multiply(F[first[i] + k], A, 0.0j, Z)
+            A, Z = Z, A
             more += doubt[first[i] + k]
-        A[:] = W[i]
+        copy(W[i], A)
         B[i] = 0.0
         for k in range(first[i + 1] - first[i] - 1, -1, -1):
-            step, own = F[first[i] + k], error[first[i] + k]
-            for j in range(n):
-                total = 0.0
-                for m in range(n):
-                    total += abs(A[j, m])
-                for c in range(n):
-                    B[i, j, c] += own * total * before[k, c]
-            for j in range(n):
-                for c in range(n):
-                    sum_of = 0.0 + 0.0j
-                    for m in range(n):
-                        sum_of += A[j, m] * step[m, c]
-                    Z[j, c] = sum_of
-            A[:] = Z
+            add_outer(A, error[first[i] + k], before[k], B[i])
+            multiply(A, F[first[i] + k], 0.0j, Z)
+            A, Z = Z, A
         factor = math.exp(min(2.0 * more, 700.0))
         for j in range(n):
             for c in range(n):
                 B[i, j, c] *= factor * (1.0 + 1e-9)  # the last covers the rounding of A here
+
+
+@kernel
+def gradients(F, error, doubt, first, B, out):
+    """Fill out (N, K) with bounds of the errors of the K sums over i, j of B_ji M_ij; B is (N, K, n, n).
+
+    As in `products`, but what errors of different entries do to a sum is bounded together: the error d of a step adds
+    sum of d_ij (X B L)_ji, X the product of the steps before it and L that of those behind it.
+    """
+    n, K, longest = F.shape[1], B.shape[1], 0
+    for i in range(len(B)):
+        longest = max(longest, first[i + 1] - first[i])
+    before, sums = np.empty((longest + 1, n, n)), np.empty(n)
+    A, Z = np.empty((n, n)), np.empty((n, n))
+    for i in range(len(B)):
+        steps, more = first[i + 1] - first[i], 0.0
+        set_identity(before[0])
+        for k in range(steps):
+            multiply(F[first[i] + k], before[k], 0.0, before[k + 1])
+            more += doubt[first[i] + k]
+        out[i] = 0.0
+        for q in range(K):
+            A[:] = B[i, q]
+            for k in range(steps - 1, -1, -1):
+                # A is B L
+                step, own, largest, total, rounded = F[first[i] + k], error[first[i] + k], 0.0, 0.0, 0.0
+                multiply(before[k], A, 0.0, Z)
+                column_sums(before[k], sums)
+                for j in range(n):
+                    row = 0.0
+                    for c in range(n):
+                        total += abs(Z[j, c])
+                        row += abs(A[j, c])
+                        largest = max(largest, abs(step[j, c]))
+                    rounded += row * sums[j]
+                out[i, q] += own * total + n * ROUNDOFF_UP * largest * rounded
+                multiply(A, step, 0.0, Z)
+                A[:] = Z
+            out[i, q] *= math.exp(min(2.0 * more, 700.0)) * (1.0 + 1e-9)

@@ -1,4 +1,4 @@
-"""The curves on a map of two parameters at which a portrait changes: closed forms, and those of `connections`.
+"""The curves on a map of two parameters at which a portrait changes: closed forms, `connections`, `cycle_folds`.
 
 g is linear in d, c23, s2, s3, and f in b12, b31, so for each angle phi of an equilibrium the parameters of the map are:
 
@@ -18,8 +18,9 @@ import numpy as np
 
 from survey.kernels.cylinder import equilibria as eq
 from survey.kernels.cylinder.flow import BOUND_G, coefficients
+from survey.kernels.cylinder.program import COLUMNS
 from survey.kernels.math.roundoff import ROUNDOFF
-from survey.measures.cylinder import connections
+from survey.measures.cylinder import connections, cycle_folds
 from survey.measures.cylinder.fate import G, remembered
 from survey.measures.sampled import changes, inside, runs
 from survey.measures.square import Square
@@ -45,6 +46,18 @@ class Plane:
     def system(self, xy):
         """{name: values} at parameters xy (m, 2)."""
         return self.fixed | dict(zip(self.axes, np.asarray(xy).T, strict=True))
+
+    @property
+    def conservative(self):
+        """Is b = 0 all over the map?"""
+        return not any(name in self.axes or self.fixed[name] for name in ("b12", "b31"))
+
+    def flows(self, x):
+        """The rows of the flows at positions x (m, 2)."""
+        system = self.system(self.square.parameters(x))
+        return np.ascontiguousarray(
+            coefficients(*np.broadcast_arrays(*(system[name] for name in SYSTEM), x[:, 0])[:-1])
+        )
 
     def positions(self, xy):
         xy = np.clip(np.nan_to_num(xy, nan=1e200), -1e200, 1e200)
@@ -89,24 +102,32 @@ def found(square, axes, fixed):
     plane = Plane(square, tuple(axes), fixed)
     with np.errstate(all="ignore"):
         hopfs = (row for curve in _hopfs(plane) for row in _hopf(plane, curve))
-        rows = [*_ends(plane), *connections.found(plane), *_folds(plane), *hopfs]
-        return [_counted(plane, *row) for row in rows]
+        rows = [*_ends(plane), *connections.found(plane), *cycle_folds.found(plane), *_folds(plane), *hopfs]
+        return [counted(plane, *row) for row in rows]
 
 
-def _counted(plane, kind, xy, error, known):
+def counted(plane, kind, xy, error, known):
     """A row of `found` with the numbers of cycles to the left and to the right of some points of the curve."""
     sides = np.full((2, len(xy)), np.nan)
     x = plane.positions(xy)
-    for i in np.unique(np.linspace(1, len(xy) - 2, COUNTED).astype(int)) if len(xy) > 2 else ():
+    for i in _spread(x) if len(xy) > 2 else ():
         along = x[i + 1] - x[i - 1]
         across = np.array([-along[1], along[0]]) / max(np.hypot(*along), TINY)
         for side, sign in zip(sides, (1.0, -1.0), strict=True):
-            there = plane.square.parameters(x[i] + sign * ASIDE * across)
-            s = remembered(taylor, [plane.system(there)[name] for name in SYSTEM])
-            if s.stratum == G and s.conclusive and not s.folded:
+            row = plane.flows(x[i][None] + sign * ASIDE * across)[0]
+            if not np.isfinite(row).all():
+                continue
+            s = remembered(taylor, row if len(row) > COLUMNS else row[:6])
+            if s.stratum == G and s.conclusive and not s.folded and not s.unknown:
                 side[i] = len(s.plus) + len(s.minus) + len(s.librations)
     names = ("cycles_left", "cycles_right")
     return kind, xy, error, known | {name: (side, 0.0 * side) for name, side in zip(names, sides, strict=True)}
+
+
+def _spread(x):
+    """Numbers of COUNTED inner points that divide a curve, positions x (m, 2), evenly."""
+    along = np.cumsum(np.hypot(*np.diff(x, axis=0).T))
+    return np.unique(np.clip(np.searchsorted(along, np.linspace(0.0, along[-1], COUNTED)), 1, len(x) - 2))
 
 
 @dataclass(frozen=True)

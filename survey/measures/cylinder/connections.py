@@ -17,14 +17,12 @@ from itertools import product
 import numpy as np
 
 from survey.kernels.cylinder import connections as cn
-from survey.kernels.cylinder.flow import coefficients
 from survey.measures import contours
 from survey.methods import taylor
 
 LINES, HALVINGS = 97, 12
 TOLERANCE = 1e-17  # truncation of one step
 BESIDE = 1e-5  # of the map: a jump is as high there as next to the point
-SYSTEM = ("b12", "b31", "d", "c23", "s2", "s3")
 HIGH, LOW = range(2)  # saddles, by V
 # (unstable, stable): the systems in which both branches leave to the right
 UPPER, LOWER = (cn.ITSELF, cn.BOTH), (cn.MIRRORED, cn.REVERSED)
@@ -61,8 +59,8 @@ def found(plane):
 
 def curves(plane):
     """[(Connection, positions (m, 2), errors (m))] of the curves."""
-    if not any(name in plane.axes or plane.fixed[name] for name in ("b12", "b31")):
-        return  # b = 0: every branch is part of a connection, see `separatrices`
+    if plane.conservative:
+        return  # every branch is part of a connection, see `separatrices`
     everything = _traced(plane, contours.lattice(LINES), np.ones((4, 2)))
     for connection in _every():
         values = connection.miss(*(everything[:, *branch] for branch in connection.branches))[0]
@@ -75,12 +73,12 @@ def curves(plane):
 
 def _traced(plane, x, wanted):
     """The branches (m, 4, 2, ROW) of the systems at positions x (m, 2)."""
-    system = plane.system(plane.square.parameters(x))
-    columns = np.broadcast_arrays(*(system[name] for name in SYSTEM), x[:, 0])[:-1]
-    out = np.empty((len(x), 4, 2, cn.ROW))
-    P = np.ascontiguousarray(coefficients(*columns))
-    for i in range(0, len(x), 1000):
-        taylor.flow_connections(P[i : i + 1000], wanted, TOLERANCE, out[i : i + 1000])
+    out, P = np.full((len(x), 4, 2, cn.ROW), np.nan), plane.flows(x)
+    good = np.flatnonzero(np.isfinite(P).all(axis=1))
+    for some in np.array_split(good, 1 + len(good) // 1000):
+        found = np.empty((len(some), 4, 2, cn.ROW))
+        taylor.flow_connections(np.ascontiguousarray(P[some]), wanted, TOLERANCE, found)
+        out[some] = found
     return out
 
 

@@ -4,7 +4,9 @@ On a map of initial states they part the fates: see `separatrices`. On a map of 
 see `bifurcations`.
 """
 
-from survey.measures.cylinder import bifurcations, separatrices
+import numpy as np
+
+from survey.measures.cylinder import bifurcations, own_bifurcations, separatrices
 from survey.measures.cylinder.separatrices import SYSTEM
 from survey.measures.sampled import joined
 from survey.scene import Output
@@ -13,6 +15,7 @@ CLASSES = {
     "stable_manifold": 0, "unstable_cycle": 1, "stable_cycle": 2, "saddle": 3, "sink": 4, "centre": 5, "source": 6,
     "fold": 7, "cusp": 8, "supercritical_hopf": 9, "subcritical_hopf": 10, "bogdanov_takens": 11,
     "generalised_hopf": 12, "ends": 13, "homoclinic": 14, "heteroclinic": 15,
+    "cycle_fold": 16,
 }  # fmt: skip
 TITLE = "what the curve is"
 _COUNTED = "to some points of each curve on a map of two parameters, where the return maps are conclusive"
@@ -21,7 +24,10 @@ ALONG = (
     Output("equilibrium_phi", "angle of the equilibrium, or of the saddle of a stable manifold", r"\varphi_e",
            units="rad",
            applies="to stable manifolds, equilibria and their bifurcations"),
-    Output("multiplier", "Floquet multiplier of the cycle", "m", applies="to cycles"),
+    Output("multiplier", "Floquet multiplier of the cycle", "m", applies="to cycles, and at folds of cycles"),
+    Output("cycle_phi", "angle of a state on the semi-stable cycle: phi = 0, or the right turning point of a libration",
+           r"\varphi_c", units="rad", applies="at folds of cycles"),
+    Output("cycle_w", "velocity of a state on the semi-stable cycle", "w_c", applies="at folds of cycles"),
     Output("cycles_left", "number of cycles beside the curve, to the left of the order of its points (the first axis "
            "pointing to the right, the second upward)", applies=_COUNTED),
     Output("cycles_right", "number of cycles beside the curve, to the right of the order of its points",
@@ -29,8 +35,10 @@ ALONG = (
 )  # fmt: skip
 
 
-def refusal(axes):
+def refusal(axes, scene):
     """Why there are no curves on a map of these axes, in words; None if there are."""
+    if scene.FAMILY == "abel":
+        return _refusal_of_own(axes, scene)
     own = set(axes[:2])
     if len(axes) in (2, 3) and (own == set(STATE) or own <= set(SYSTEM)) and set(axes[2:]) <= set(SYSTEM):
         return None
@@ -38,6 +46,26 @@ def refusal(axes):
         f"curves are known on two axes of {', '.join(SYSTEM)}, or on {', '.join(STATE)}, in either case with at most "
         f"one more axis of the former after them, not on {', '.join(axes) or 'none'}"
     )
+
+
+def _refusal_of_own(axes, scene):
+    """As `refusal`, for a user's f and g."""
+    own = [p.name for p in scene.own]
+    if scene.period is None:
+        return "no curves are known: they are where f and g have the period 2 pi (PERIOD)"
+    if len(axes) in (2, 3) and set(axes) <= set(own):
+        return None
+    return f"curves are known on two axes of {', '.join(own)}, or three, not on {', '.join(axes) or 'none'}"
+
+
+def searched(scene, square, axes, fixed):
+    """The Curves on the map of `axes`, the unit square `square`; `fixed` holds the other parameters."""
+    if scene.FAMILY == "cylinder":
+        return closed(square, axes, fixed, {})
+    plane = own_bifurcations.Plane(square, tuple(axes), fixed, scene)
+    with np.errstate(all="ignore"):
+        rows = [bifurcations.counted(plane, *row) for row in own_bifurcations.found(plane)]
+    return joined([(CLASSES[kind], *rest) for kind, *rest in rows], [output.name for output in ALONG])
 
 
 def closed(square, axes, fixed, options):
@@ -49,4 +77,4 @@ def closed(square, axes, fixed, options):
 
 def seconds(axes):
     """Estimated seconds on one thread of the curves on one map, measured."""
-    return 0.1 if set(axes[:2]) == set(STATE) else 5.0
+    return 0.1 if set(axes[:2]) == set(STATE) else 10.0

@@ -197,8 +197,10 @@ def skeleton(method, six):
         return s
     eqs, thresholds = s.equilibria, s.thresholds.copy()
     plus, thresholds[0], first = _rotations(method, s.p, eqs, s.section, s.ends[0], s.K, s.L)
-    mirrored = flow_of(_signed(s.p, MIRROR))
-    minus, thresholds[1], second = _rotations(method, mirrored, _mirrored(eqs), -s.section, s.ends[1], s.K, -s.L)
+    mirrored = flow_of(signed(s.p, MIRROR))
+    minus, thresholds[1], second = _rotations(
+        method, mirrored, mirrored_equilibria(eqs), -s.section, s.ends[1], s.K, -s.L
+    )
     librations, third = _librations(method, s.p, eqs, s.folded)
     conclusive = first and second and third
     return replace(s, plus=plus, minus=minus, librations=librations, thresholds=thresholds, conclusive=conclusive)
@@ -209,7 +211,7 @@ def flow_of(six):
     return np.ascontiguousarray(six if len(six) > COLUMNS else coefficients(*six[:6]))
 
 
-def _signed(six, signs):
+def signed(six, signs):
     return np.concatenate([np.asarray(six[:6]) * signs, six[6:]])
 
 
@@ -258,7 +260,7 @@ def _section(p, eqs):
     return float(highest - 2.0 * math.pi if highest > math.pi else highest)
 
 
-def _mirrored(eqs):
+def mirrored_equilibria(eqs):
     """The equilibria under S2."""
     turned = eqs.copy()
     turned[:, eq.ANGLE] = -eqs[:, eq.ANGLE] % (2.0 * math.pi)

@@ -7,8 +7,8 @@ asked accuracy is solved again with smaller steps, and the better answer is kept
 import numpy as np
 
 from survey.kernels.cylinder import records as rc
-from survey.kernels.cylinder.flow import BOUND_DDG, spread
-from survey.kernels.cylinder.program import ON_CIRCLE
+from survey.kernels.cylinder.flow import spread, spread_programs
+from survey.kernels.cylinder.program import COLUMNS, ON_CIRCLE
 from survey.kernels.cylinder.steps import OK, TURNING, UNDETERMINED
 
 LEAST_BAR = 1e-150  # bars are carried on by their squares, which underflow below
@@ -51,8 +51,10 @@ def attempts(method, rtol):
 
 def split(rows):
     """Rows of GIVEN numbers (see `records`) as the kernels take them: coefficients and initial states."""
-    P, starts = np.empty((len(rows), max(BOUND_DDG + 1, rows.shape[1] - 2))), np.empty((len(rows), 2))
-    spread(np.ascontiguousarray(rows, dtype=float), P, starts)
+    own = rows.shape[1] > rc.GIVEN
+    P, starts = np.empty((len(rows), rows.shape[1] - 2 if own else COLUMNS)), np.empty((len(rows), 2))
+    (spread_programs if own else spread)(np.ascontiguousarray(rows, dtype=float), P, starts)
+    P.flags.writeable = own
     return P, starts
 
 
@@ -96,7 +98,7 @@ def _in_time(method, rows, times, rtol):
 
     def run(pick, tolerance):
         P, starts = split(rows[pick])
-        at = np.ascontiguousarray(times[pick])
+        at = np.array(times[pick], order="C")  # never read-only, as a broadcast array is
         floats, turnings, status = _nothing(at.shape)
         ends = np.zeros(len(P), dtype=np.int64)
         method.flow_trajectories(P, starts, at, tolerance, budget, floats, turnings, ends)
@@ -174,7 +176,7 @@ def _in_phi(method, rows, targets, rtol):
         P, starts = split(rows[pick])
         floats = np.full((*targets[pick].shape, rc.STATE), np.nan)
         status = np.zeros(targets[pick].shape, dtype=np.int64)
-        at = np.ascontiguousarray(targets[pick])
+        at = np.array(targets[pick], order="C")
         method.flow_abels(P, starts, at, tolerance, budget, floats, status)
         return floats, status
 

@@ -35,7 +35,7 @@ SURE = 1e-6  # the widest bracket of a point, half of it, that is drawn
 RTOL, ROUGH = 1e-13, 1e-9  # of M for points of curves, and to see where these are
 
 
-def refusal(axes):
+def refusal(axes, scene):
     """Why there are no curves on a map of these axes, in words; None if there are."""
     return None if len(axes) in (2, 3) else f"curves are drawn on two axes, or three, not on {len(axes)}"
 

@@ -6,6 +6,7 @@ ladder of more steps, and have their errors carried sharply (`stability`).
 """
 
 from dataclasses import dataclass, fields
+from functools import partial
 
 import numpy as np
 
@@ -159,7 +160,11 @@ class Matrices:
 
 
 def solve(points, method, rtol, factor, those, sharp):
-    """The Matrices of some of the Points, in `factor` (K) times the steps asked for; `sharp`: see Matrices."""
+    """The Matrices of some of the Points, in `factor` (K) times the steps asked for; `sharp`: see Matrices.
+
+    A function `sharp` takes, for some of `those` (their places there), the Matrices in the balanced units of the
+    states, these units (N, n), and the steps: F, their error bounds, `doubt` and `first` of `steps.products`.
+    """
     n = points.n
     count = points.steps(method.floquet_reach(rtol), factor, those)
     found = Matrices.empty(len(those), n)
@@ -174,7 +179,7 @@ def solve(points, method, rtol, factor, those, sharp):
         cuts = np.searchsorted(work, np.arange(CALL_WORK, work[-1], CALL_WORK)) if work.size else []
         for some in np.split(mine, cuts):
             if some.size:
-                given = programs, numbers, count[some], sharp
+                given = programs, numbers, count[some], sharp if isinstance(sharp, bool) else partial(sharp, some)
                 found[some] = _call(points, method, those[some], place[those[some]], *given)
     return found
 
@@ -207,7 +212,9 @@ def _call(points, method, those, place, programs, numbers, count, sharp):
         offset += steps_of
     found = Matrices.empty(len(those), n)
     steps.products(F, error, doubt, first, n, found.M, found.E, found.R)
-    if sharp:
+    if callable(sharp):
+        sharp(found, scale, F, error, doubt, first)
+    elif sharp:
         which = np.flatnonzero(np.isfinite(found.M).all(axis=(1, 2)) & np.isfinite(found.E).all(axis=(1, 2)))
         found.centre[which], found.V[which] = np.linalg.eig(found.M[which])
         found.W[which] = inverse(found.V[which])

@@ -12,7 +12,8 @@ import numpy as np
 from survey import status
 from survey.kernels.math.roundoff import EPS
 from survey.measures import answers
-from survey.measures.floquet import monodromy, multipliers
+from survey.measures.floquet import dense, monodromy, multipliers
+from survey.measures.floquet.answers import Answers
 from survey.measures.floquet.multipliers import (
     COLLISION,
     MARGINAL,
@@ -53,19 +54,6 @@ LADDER = answers.Ladder(1.5 ** np.arange(16), np.arange(16) + 1, None, most=16)
 CHUNK = 65536  # points n^2 that are solved together: bounds the memory
 
 
-class Answers(answers.Answers):
-    """`floats`: re, im, bars of n multipliers, the spectral radius and its bar; `codes`; the Krein `signs` (n, N)."""
-
-    def __init__(self, size, n):
-        super().__init__(size, 3 * n + 2, ("verdict", "crossing"))
-        self.n, self.signs = n, np.zeros((n, size), np.int8)
-
-    def replace(self, points, other, those=slice(None)):
-        """See `measures.answers`."""
-        super().replace(points, other, those)
-        self.signs[:, points] = other.signs[:, those]
-
-
 def assess(matrices, structure, rtol, asked):
     """The Answers of points from their Matrices; `asked` holds the names of the outputs that are wanted."""
     M, E = matrices.M, matrices.E
@@ -82,8 +70,10 @@ def assess(matrices, structure, rtol, asked):
     if paired:  # all multipliers are on the circle, exactly
         strong = found.verdict == STABLE
         value, bar = np.where(strong, 1.0, value), np.where(strong, 0.0, bar)
-    found.floats[:n], found.floats[n : 2 * n], found.floats[2 * n : 3 * n] = centre.real.T, centre.imag.T, bars.T
-    found.floats[3 * n], found.floats[3 * n + 1] = value, bar
+    real = discs.isolated & (centre.imag == 0)  # its conjugate would be in the same disc
+    for k, part in enumerate((centre.real, centre.imag, bars, np.where(real, 0.0, bars))):
+        found.floats[k * n : (k + 1) * n] = part.T
+    found.floats[4 * n], found.floats[4 * n + 1] = value, bar
     lost = ~np.isfinite(found.floats).all(axis=0)
     with np.errstate(invalid="ignore"):
         wide = ~(bars <= rtol * (1 + abs(centre))).all(axis=1)
@@ -97,21 +87,30 @@ def assess(matrices, structure, rtol, asked):
     return found
 
 
-def solve(system, structure, points, method, rtol, wanted):
-    """The wanted outputs of the points (N, parameters), each with `_error` if it is a float, and `status`."""
-    n = system.n
-    method = monodromy.method_of(method)
-    chunk = max(1, CHUNK // (n * n))
-    parts = [
-        _chunk(system, structure, points[i : i + chunk], method, rtol, wanted) for i in range(0, len(points), chunk)
-    ]
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+def solve(system, structure, points, method, rtol, wanted, lines=None):
+    """The wanted outputs of the points (..., parameters), each with `_error` if it is a float, and `status`.
+
+    `lines`: of parameters that have an axis of a map of their own, {number of the parameter: (points of the axis,
+    least, greatest)}.
+    """
+    n, shape = system.n, points.shape[:-1]
+    flat = points.reshape(-1, points.shape[-1])
+    answer, left = Answers(len(flat), n), np.arange(len(flat))
+    results = monodromy.Matrices.empty(len(flat) if "monodromy" in wanted else 0, n)
+    if method == "auto" and dense.serves(system, structure, wanted, lines or {}):
+        left = np.flatnonzero(dense.solve(system, structure, points, rtol, wanted, lines, answer))
+    method, chunk = monodromy.method_of(method), max(1, CHUNK // (n * n))
+    for i in range(0, left.size, chunk):
+        some = left[i : i + chunk]
+        _solve_some(system, structure, flat[some], method, rtol, wanted, some, answer, results)
+    period = system.periods(flat) if wanted & {"period", "exponent"} else None
+    out = outputs(answer, results, period, callable(system.period), wanted)
+    return {name: values.reshape(*shape, *values.shape[1:]) for name, values in out.items()}
 
 
-def _chunk(system, structure, given, method, rtol, wanted):
-    n = system.n
+def _solve_some(system, structure, given, method, rtol, wanted, places, answer, results):
+    """Answer points (N, parameters), each from its own monodromy matrix, at their `places`."""
     points = monodromy.Points(system, given)
-    answer, results = Answers(len(given), n), monodromy.Matrices.empty(len(given), n)
     where = np.flatnonzero(points.valid)
     asked = wanted | ({"multiplier_re"} if wanted & {"multiplier_im", "krein"} else set())
     asked |= {"spectral_radius"} if "exponent" in wanted else set()
@@ -129,35 +128,40 @@ def _chunk(system, structure, given, method, rtol, wanted):
         own = solved(np.arange(where.size), rung)
         best = assessed(None, own)
         LADDER.climb(rung, own, best, solved, assessed)
-        answer.replace(where, best)
-        results[where] = own
-    answer.status[~points.valid] = np.where(
-        points.rough[~points.valid], status.NO_CONVERGENCE, status.INVALID_PARAMETERS
-    )
-    return outputs(answer, results, points.period, callable(system.period), wanted)
+        answer.replace(places[where], best)
+        if len(results.M):
+            results[places[where]] = own
+    lost = ~points.valid
+    answer.status[places[lost]] = np.where(points.rough[lost], status.NO_CONVERGENCE, status.INVALID_PARAMETERS)
+    for name in ("verdict", "crossing"):
+        getattr(answer, name)[places[lost]] = UNDECIDED
+    answer.signs[:, places[lost]] = 0
 
 
 def outputs(answer, results, period, computed, wanted):
-    """The wanted outputs from the Answers and the Matrices."""
+    """The wanted outputs from the Answers and the Matrices; `period` (N), `computed` from parameters or not."""
     n = answer.n
     ok = answer.status == status.OK
     answer.floats[:, ~ok] = np.nan
-    re, im, bars = (answer.floats[k * n : (k + 1) * n].T for k in range(3))
-    value, bar = answer.floats[3 * n], answer.floats[3 * n + 1]
-    with np.errstate(all="ignore"):
-        positive = value > bar
-        exponent = np.where(positive, np.log(value) / period, np.nan)
-        exponent_bar = np.where(positive, -np.log1p(-bar / value) / period, np.nan) * (1 + 4 * EPS)
-        exponent_bar += 4 * EPS * abs(exponent)
-    M, E = (np.where(ok[:, None, None], matrix, np.nan) for matrix in (results.M, results.E))
-    period = np.where(ok, period, np.nan)
+    re, im, bar_re, bar_im = (answer.floats[k * n : (k + 1) * n].T for k in range(4))
+    value, bar = answer.floats[4 * n], answer.floats[4 * n + 1]
     out = {
-        "multiplier_re": re, "multiplier_re_error": bars, "multiplier_im": im, "multiplier_im_error": bars,
-        "spectral_radius": value, "spectral_radius_error": bar, "exponent": exponent, "exponent_error": exponent_bar,
-        "monodromy": M, "monodromy_error": E,
-        "period": period, "period_error": (4 if computed else 1) * EPS * period,
-        "krein": np.where(ok, answer.signs, 0).T.astype(np.int8), "crossing": answer.crossing,
-        "verdict": answer.verdict,
+        "multiplier_re": re, "multiplier_re_error": bar_re, "multiplier_im": im, "multiplier_im_error": bar_im,
+        "spectral_radius": value, "spectral_radius_error": bar, "crossing": answer.crossing, "verdict": answer.verdict,
     }  # fmt: skip
+    if "krein" in wanted:
+        out["krein"] = np.where(ok, answer.signs, 0).T.astype(np.int8)
+    if "exponent" in wanted:
+        with np.errstate(all="ignore"):
+            positive = value > bar
+            exponent = np.where(positive, np.log(value) / period, np.nan)
+            exponent_bar = np.where(positive, -np.log1p(-bar / value) / period, np.nan) * (1 + 4 * EPS)
+        out |= {"exponent": exponent, "exponent_error": exponent_bar + 4 * EPS * abs(exponent)}
+    if "period" in wanted:
+        period = np.where(ok, period, np.nan)
+        out |= {"period": period, "period_error": (4 if computed else 1) * EPS * period}
+    if "monodromy" in wanted:
+        M, E = (np.where(ok[:, None, None], matrix, np.nan) for matrix in (results.M, results.E))
+        out |= {"monodromy": M, "monodromy_error": E}
     kept = {name: values for name, values in out.items() if name.removesuffix("_error") in wanted}
     return kept | {"status": answer.status}

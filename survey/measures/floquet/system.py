@@ -13,9 +13,10 @@ from itertools import pairwise
 import numpy as np
 
 from survey.measures.floquet import trace
-from survey.measures.floquet.trace import Graph, Symbol, Unsupported
+from survey.measures.floquet.trace import ONE, Graph, Symbol, Unsupported
 
 KEPT = 256  # traces
+RECORDED = 64  # points from which on it pays to record PERIOD
 LOCK = threading.Lock()
 
 
@@ -49,8 +50,10 @@ class System:
         """Period (N) and the edges of the pieces (N, P + 1), the last one repeated where a point has fewer."""
         vary = callable(self.period) or callable(self.breaks)
         each = points if vary else points[:1]
-        period = np.array([self._number("PERIOD", self.period, p) for p in each])
-        period = np.where(period > 0, period, np.nan)
+        period = self.periods(each)
+        if not callable(self.breaks) and not np.size(self.breaks):
+            period = np.broadcast_to(period, len(points)).copy()
+            return period, np.stack([0.0 * period, period], axis=1)
         rows = []
         for p, length in zip(each, period, strict=True):
             inside = np.atleast_1d(self._value("BREAKS", self.breaks, p)).astype(float)
@@ -59,6 +62,37 @@ class System:
         most = max(map(len, rows), default=2)
         edges = np.array([[*row, *[row[-1]] * (most - len(row))] for row in rows]).reshape(len(rows), most)
         return np.broadcast_to(period, len(points)).copy(), np.broadcast_to(edges, (len(points), most)).copy()
+
+    def periods(self, points):
+        """The period of each point (N); NaN where it is not positive."""
+        if not callable(self.period):
+            return np.full(len(points), self._number("PERIOD", self.period, None))
+        period = self._recorded(points) if len(points) > RECORDED else None
+        if period is None:
+            period = np.array([self._number("PERIOD", self.period, p) for p in points])
+        return np.where(period > 0, period, np.nan)
+
+    def _recorded(self, points):
+        """PERIOD at the points from its operations, recorded; None where branches decide."""
+        graph = Graph([float(x) for x in points[0]], 0.25)
+        try:
+            found = graph.lift(trace.lifted(self.period)(graph.parameters))
+        except Exception:
+            return None
+        if graph.guards or graph.equalities or not found.is_number:
+            return None
+        return graph.compiled({}).numbers(points)[0][:, found.terms[ONE]]
+
+    def smooth(self, point):
+        """Are PERIOD and BREAKS analytic in the parameters, as no branch of theirs depends on these?"""
+        graph = Graph([float(x) for x in point], 0.25)
+        try:
+            for value in (self.period, self.breaks):
+                if callable(value):
+                    trace.lifted(value)(graph.parameters)
+        except Exception:
+            return False
+        return not graph.guards and not graph.equalities
 
     def _value(self, name, value, p):
         try:

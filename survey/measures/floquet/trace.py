@@ -257,7 +257,7 @@ class Graph:
     `numbers` are tuples (operation, operands ...), `series` too; `guards` are (symbol, is it positive?).
     """
 
-    def __init__(self, point, time, scope=None):
+    def __init__(self, point, time):
         self.numbers, self.series, self.guards, self.equalities = [], [("one",), ("time",)], [], []
         self._number_places, self._series_places = {}, {}
         self.values = []  # of the numbers at the example
@@ -525,11 +525,15 @@ class Program:
                     code += pg.OF_LINE
             rows.append((code, a, b, first, last))
             weights.append(sign)
-            assert k < len(rows)
         self.operations = np.array(rows, dtype=np.int64).reshape(-1, 5)
         self.signs = np.array(weights)
         self.inside = np.array(inside, dtype=np.int64).reshape(-1, 2)
         self.order = self._order()
+
+    @property
+    def analytic(self):
+        """Is A analytic in the parameters too, as no branch depends on them?"""
+        return all(self._decided(s) for s, _yes in (*self.graph.guards, *self.graph.equalities))
 
     def _is_line(self, place):
         """Is the basis function linear in t?"""

@@ -1,7 +1,7 @@
 """Danby's question: are the triangular points of the elliptic problem stable? Trace invariants, verdict, collision.
 
 The monodromy's characteristic polynomial is l^4 - a l^3 + b l^2 - a l + 1. By the reversibility half a period gives all
-(`traces`; `scenes/libration_elliptic.md`, section 3): stable <=> A B > 0, C D > 0, K > 0 and 0 < t < 2, decided by the
+(`traces`; `scenes/libration_elliptic.md`): stable <=> A B > 0, C D > 0, K > 0 and 0 < t < 2, decided by the
 error bounds of these; A B = 0 means multipliers -1, K = 0 two pairs that meet.
 
 Points climb a ladder of steps (`survey.measures.answers`). A dense row (one e, many mu) is five Chebyshev series in

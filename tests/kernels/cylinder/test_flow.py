@@ -3,11 +3,14 @@
 import math
 
 import mpmath as mp
+import numba
 import numpy as np
 import pytest
 
 from survey.kernels.cylinder import equilibria as eq
-from survey.kernels.cylinder import flow, steps
+from survey.kernels.cylinder import flow, program, steps
+from survey.kernels.jit import fresh
+from survey.measures.cylinder import solution
 from survey.methods import taylor
 
 SIX = (0.7, -0.4, 1.1, 0.3, 0.5, -0.2)
@@ -113,3 +116,21 @@ def test_errors_of_the_start_and_the_target_lie_within_the_bar_of_a_crossing(n):
     floats, size = np.empty((1, 4)), 1e-10
     steps.fill_crossing(floats, 0, n, 1.0, 0.0, (n + 3) * size**2, 0.0, n * size**2, -1.0, 0.0)
     assert (2 * n + 3) * size <= floats[0, 2] < 1.1 * (2 * n + 4) * size
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+def test_kernels_of_the_gyrostat_compile_no_program():
+    """Its rows are read-only arrays; a row that may be written to is taken for a program."""
+    P, _starts = solution.split(np.ones((1, 8)))
+    own = np.zeros(program.OPERATIONS + 2 * program.WIDTH)
+    for p in (flow.coefficients(*SIX), P[0], own):
+        every(p, flow.table())
+    for kernel in (program.values, program.in_time, program.along, program.bound_near, program.longest_step):
+        assert {signature[0].mutable for signature in kernel.signatures} == {True}
+
+
+@fresh
+def every(p, T):
+    flow.series(p, 0.1, 0.2, T, flow.LOW)
+    flow.rates(p, T)
+    return flow.values(p, 0.1), flow.longest_step(p, 0.2), flow.on_circle(p)

@@ -144,10 +144,10 @@ def test_free_motions_stop_between_two_lines():
 
 
 def test_other_axes_are_refused_by_name():
-    assert curves.refusal(["phi0", "w0"]) is None
-    assert curves.refusal(["w0", "phi0", "d"]) is None
-    assert "phi0" in curves.refusal(["phi0", "d"])
-    assert "none" in curves.refusal([])
+    assert curves.refusal(["phi0", "w0"], gyrostat) is None
+    assert curves.refusal(["w0", "phi0", "d"], gyrostat) is None
+    assert "phi0" in curves.refusal(["phi0", "d"], gyrostat)
+    assert "none" in curves.refusal([], gyrostat)
 
 
 def test_maps_of_both_orders_and_stacks_have_the_same_curves():

@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import survey
-from survey.measures.floquet.orbit import Equation
+from survey.measures.floquet.equation import Equation
 
 
 def contained(values, exact, bars, slack=0.0):

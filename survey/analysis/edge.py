@@ -1,0 +1,233 @@
+"""Boundaries without a file: along one parameter, and the nearest one to a point in each of its parameters."""
+
+import os
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from survey import measures, modules
+from survey.analysis.given import options_at, parameters
+from survey.errors import BadInput
+from survey.file.labels import flag_attributes
+from survey.request import user_scene
+from survey.request.checks import check_options, check_parameters
+from survey.request.edges_and_cells import check_even
+from survey.request.function_scene import FunctionScene
+from survey.request.hill_scene import is_number
+from survey.scene import plus_minus
+from survey.sweep import boundaries
+from survey.wording import shown
+
+FIRST, WIDER, MOST = 0.05, 8.0, 5  # half the first range around a value, relative to 1 + |value|; how it is widened
+INSIDE = 1e-3  # of a range: how far from an end that does not belong to the domain
+WIDEST = 1e4  # of a domain that is searched as a whole
+
+
+def edge(
+    scene: str | os.PathLike[str] | FunctionScene, *, along: str, near: float | None = None, **parameters: Any
+) -> xr.Dataset:
+    """The boundaries of stability along one parameter, exact as [boundaries] in a workflow are, without a file.
+
+    Parameters
+    ----------
+    scene : as in `survey.evaluate`.
+    along : the name of the parameter along which boundaries are searched.
+    near : a value of it: only the nearest boundary on each side of it is returned, at most two.
+    **parameters : numbers for the scene's other parameters, and options. `along=(low, high)`, under that parameter's
+        name, is the range that is searched; by default its whole domain, if that is bounded, or what is `near`.
+
+    Returns
+    -------
+    xarray.Dataset along the dimension `place`, ascending: `edge` (in the unit of the parameter), `edge_error`, a bound,
+    `edge_class`, and `edge_index` where boundaries have numbers (of tongues). The attribute `complete` is 1 where it is
+    shown that there are no others in the range, 0 where not, and absent where this is not known.
+
+    Raises
+    ------
+    survey.BadInput where the scene has no boundaries along the parameter, or it has no bounded range.
+
+    Examples
+    --------
+    >>> import survey
+    >>> survey.edge("satellite", along="rho", near=1.2, k=0.5).edge.values.round(6)
+    array([1.026056, 1.604051])
+    """
+    name, module = user_scene.find(scene)
+    measure = measures.question(module.FAMILY, "curves")
+    if measure is None:
+        raise BadInput(f"edge: no boundaries are known for the scene {name}")
+    if hasattr(measure, "trace"):
+        check_even(module, name, "edge")
+    names = {option.name for option in module.OPTIONS}
+    given = {key: value for key, value in parameters.items() if key not in names}
+    ends = given.pop(along, None)
+    known = [p.name for p in module.PARAMETERS]
+    if along not in known:
+        raise BadInput(f"along: {modules.unknown('parameter', along, known)}")
+    chosen = {key: value for key, value in parameters.items() if key in names}
+    options = check_options(module, chosen, [*given, along])
+    used = check_parameters(module, name, options, dict.fromkeys([along, *given]))
+    fixed = {key: _number(key, given.get(key, p.default), p) for key, p in used.items() if key != along}
+    if near is not None:
+        near = _number("near", near, used[along])
+    ends = _range(used[along], ends, near)
+    user_scene.check(module)
+    found = _find(module, options, used[along], ends, near, fixed)
+    return _described(module, measure, used, along, fixed, *found)
+
+
+def _number(key, value, parameter):
+    if not is_number(value) or not parameter.holds([value]).all():
+        raise BadInput(f"{key} = {shown(value)}: it must be one number in its domain; allowed: {parameter.domain}")
+    return float(value)
+
+
+def _range(parameter, ends, near):
+    """(low, high) of the part of the domain that is searched; None for what lies around `near`."""
+    name = parameter.name
+    if ends is None and near is not None:
+        return None
+    low, high = parameter.minimum, parameter.maximum
+    if ends is None:
+        if high - low > WIDEST:
+            raise BadInput(f"edge: give near= a value of {name}, or a range, such as {name}=(0.5, 2.0)")
+        return low + INSIDE * (high - low) * parameter.open_minimum, high - INSIDE * (
+            high - low
+        ) * parameter.open_maximum
+    try:
+        first, last = map(float, ends)
+    except (TypeError, ValueError):
+        first = last = np.nan
+    if not (low <= first < last <= high):
+        raise BadInput(
+            f"{name} = {shown(ends)}: it is searched along, so give (low, high) in its domain; allowed: "
+            f"{parameter.domain}"
+        )
+    return first, last
+
+
+def _find(scene, options, parameter, ends, near, fixed):
+    """(OnLine, index or None, complete or None) between `ends`, or the nearest on each side of `near`."""
+    if ends is not None:
+        found = boundaries.along(scene, options, parameter.name, ends, fixed)
+        return found if near is None else _nearest(*found, near)
+    low, high = _piece(parameter, near)
+    width = FIRST * (1.0 + abs(near))
+    for _ in range(MOST):
+        here = max(low, near - width), min(high, near + width)
+        found = boundaries.along(scene, options, parameter.name, here, fixed)
+        position = found[0].position
+        if (here[0] == low or (position <= near).any()) and (here[1] == high or (position >= near).any()):
+            break
+        width *= WIDER
+    return _nearest(*found, near)
+
+
+def _piece(parameter, near):
+    """The part of the domain around `near` that does not contain an excluded value."""
+    low, high = parameter.minimum, parameter.maximum
+    below, above = [x for x in parameter.excluded if x < near], [x for x in parameter.excluded if x > near]
+    if below or parameter.open_minimum:
+        low = max([low, *below])
+        low += INSIDE * (near - low)
+    if above or parameter.open_maximum:
+        high = min([high, *above])
+        high -= INSIDE * (high - near)
+    return low, high
+
+
+def _nearest(found, index, complete, near):
+    """Only the last boundary below `near`, and the first above."""
+    below, above = np.flatnonzero(found.position <= near)[-1:], np.flatnonzero(found.position > near)[:1]
+    chosen = np.concatenate([below, above])
+    return (
+        boundaries.OnLine(*(getattr(found, name)[chosen] for name in ("position", "error", "kind"))),
+        (None if index is None else index[chosen]),
+        complete,
+    )
+
+
+def _described(module, measure, used, along, fixed, found, index, complete):
+    parameter = used[along]
+    about = {"units": parameter.units, "symbol": parameter.symbol}
+    hill = hasattr(measure, "trace")
+    classes = measures.question(module.FAMILY, "edges").CLASSES if hill else measure.CLASSES
+    title = "kind of the periodic solution on the boundary" if hill else measure.TITLE
+    data = {
+        "edge": ("place", found.position, about | {
+            "long_name": f"{parameter.long_name} at the boundary", "ancillary_variables": "edge_error"}),
+        "edge_error": ("place", found.error, about | {"long_name": "error bound of edge"}),
+        "edge_class": ("place", found.kind.astype(np.int8), flag_attributes(classes) | {"long_name": title}),
+    }  # fmt: skip
+    if index is not None:
+        data["edge_index"] = ("place", index.astype(np.int32), {
+            "long_name": "number of the tongue, twice its rotation number", "symbol": "n"})  # fmt: skip
+    coordinates = {key: ((), value, {"long_name": used[key].long_name, "units": used[key].units})
+                   for key, value in fixed.items() if np.isfinite(value)}  # fmt: skip
+    attributes = {"title": f"{module.TITLE}: boundaries along {along}", "along": along}
+    return xr.Dataset(data, coordinates, attributes | ({} if complete is None else {"complete": int(complete)}))
+
+
+def margin(ds):
+    """The Dataset that `ds.survey.margin` describes, of one point (a dataset without axes)."""
+    scene = user_scene.of_dataset(ds)
+    module = user_scene.find(scene)[1]
+    measure = measures.question(module.FAMILY, "curves")
+    if measure is None:
+        raise BadInput(f"margin: no boundaries are known for the scene {ds.attrs['scene']}")
+    here, options = parameters(ds), options_at(ds, module)
+    rows = []
+    for name in here:
+        try:
+            rows.append((name, *_margin(scene, options, name, here)))
+        except BadInput:  # no boundaries are known along this parameter, or it cannot vary
+            continue
+    if not rows:
+        raise BadInput(f"margin: no boundaries are known along {', '.join(here)} of {ds.attrs['scene']}")
+    names, values, edges, errors, words = map(np.array, zip(*rows, strict=True))
+    about = {"long_name": "of the parameter, in its unit"}
+    return xr.Dataset(
+        {
+            "value": ("parameter", values, about),
+            "edge": (
+                "parameter",
+                edges,
+                {"long_name": "the nearest boundary; NaN: none was found"},
+            ),
+            "edge_error": ("parameter", errors, {"long_name": "error bound of edge, and of distance"}),
+            "distance": ("parameter", edges - values, {"long_name": "edge less value"}),
+            "edge_class": ("parameter", words, {"long_name": "what the boundary is"}),
+        },
+        {"parameter": names},
+        {"title": f"{ds.attrs.get('title', '')}: margins of a point", "scene": ds.attrs["scene"]},
+    )
+
+
+def _margin(scene, options, name, here):
+    """(value, nearest boundary, its error bound, its class) along one parameter of a point."""
+    value = here[name]
+    others = {key: other for key, other in here.items() if key != name}
+    found = edge(scene, along=name, near=value, **others, **options)
+    if not found.edge.size:
+        return value, np.nan, np.nan, ""
+    nearest = int(abs(found.edge.values - value).argmin())
+    names = dict(
+        zip(found.edge_class.attrs["flag_values"], found.edge_class.attrs["flag_meanings"].split(), strict=True)
+    )
+    return value, float(found.edge[nearest]), float(found.edge_error[nearest]), names[int(found.edge_class[nearest])]
+
+
+def is_quick(ds):
+    """Are the margins of a point found within about a second?"""
+    module = user_scene.find(user_scene.of_dataset(ds))[1]
+    measure = measures.question(module.FAMILY, "curves")
+    if measure is None or hasattr(measure, "searched"):
+        return False
+    return not hasattr(measure, "seconds") or sum(measure.seconds([name]) for name in parameters(ds)) < 1.0
+
+
+def in_words(found):
+    """`k = 0.861772 +- 8e-15 (even_periodic), ...` of what `margin` has found; "" if that is nothing."""
+    rows = zip(*(found[name].values for name in ("parameter", "edge", "edge_error", "edge_class")), strict=True)
+    return ", ".join(f"{name} = {plus_minus(at, bar)} ({kind})" for name, at, bar, kind in rows if np.isfinite(at))

@@ -1,0 +1,184 @@
+"""Several runs of one survey joined along an axis, in memory or as a file."""
+
+import os
+import tempfile
+import tomllib
+from collections.abc import Iterable
+from functools import reduce
+from pathlib import Path
+
+import numpy as np
+import tomli_w
+import xarray as xr
+
+from survey.analysis.point import of_points
+from survey.analysis.zoom import unchanged
+from survey.errors import BadInput
+from survey.file import disk, reading, schema
+from survey.file.labels import command, now, tally
+from survey.file.map_file import TILE_POINTS, MapFile
+from survey.grid import halved
+from survey.request.output_path import check_path
+from survey.wording import counted, shown
+
+SAME = ("scene", "scene_hash", "options", "method", "rtol")
+SUMMED = ("wall_time_s", "compile_time_s")
+OF_RUN = ("fingerprint", "blocks_reused", "points_reused", "edge_left_out", "edge_incomplete_rows", "curves_lost")
+
+
+def concat(datasets: Iterable[xr.Dataset | str | os.PathLike[str]]) -> xr.Dataset:
+    """Join surveys that differ in the values of one axis, or in one fixed parameter, which becomes an axis.
+
+    Parameters
+    ----------
+    datasets : two or more datasets of surveys, or paths of their files, in any order.
+
+    Returns
+    -------
+    xarray.Dataset, sorted along that axis, with counts of the whole. Points that several contain are kept once. Edges,
+    curves and cells ([boundaries], [refine]) are left out: they belong to the parts.
+
+    Raises
+    ------
+    survey.BadInput where the parts do not belong together: another scene, option, method, rtol or set of outputs, more
+    than one axis that differs, or different values at a common point.
+    """
+    parts = [_part(given) for given in _as_list(datasets)]
+    if len(parts) < 2:
+        raise BadInput(f"concat: give two or more surveys, not {len(parts)}")
+    for part in parts[1:]:
+        _check_alike(parts[0], part)
+    axis = _axis(parts)
+    about = parts[0][axis].attrs
+    parts = [_along(of_points(part), axis) for part in parts]
+    joined = reduce(lambda one, other: _joined(one, other, axis), parts)
+    return _described(joined.assign_coords({axis: (axis, joined[axis].values, about)}), parts, axis)
+
+
+def _along(part, axis):
+    """The survey with the axis as a dimension."""
+    if axis in part.dims:
+        return part
+    return part.assign_coords({axis: float(part[axis])}).expand_dims(axis)
+
+
+def merge(paths, output):
+    """Write the `concat` of the files to the netCDF file `output`; returns the Dataset. Nothing is replaced."""
+    output = check_path(output)
+    if output.exists():
+        raise BadInput(f"{output} exists; name another file with -o, or remove it first")
+    joined = concat(list(paths))
+    with disk.refused(output), tempfile.TemporaryDirectory(dir=output.parent, prefix=f".{output.name}.") as folder:
+        _write(joined, output, Path(folder))
+    return joined
+
+
+def _as_list(datasets):
+    if isinstance(datasets, (str, Path, xr.Dataset)) or not hasattr(datasets, "__iter__"):
+        raise BadInput(f"concat: give a list of surveys, such as [one, other], not {shown(datasets)}")
+    return list(datasets)
+
+
+def _part(given):
+    if not isinstance(given, xr.Dataset):
+        return reading.load(given)
+    if "status" not in given or "scene" not in given.attrs:
+        raise BadInput("concat: a dataset was not written by survey: it has no status, or no attribute scene")
+    schema.check(given, complete=False)
+    return given
+
+
+def _check_alike(one, other):
+    for key in SAME:
+        if one.attrs.get(key) != other.attrs.get(key):
+            raise BadInput(
+                f"concat: the surveys have another {key}: {shown(one.attrs.get(key))} and {shown(other.attrs.get(key))}"
+            )
+    names = [set(of_points(ds).data_vars) for ds in (one, other)]
+    if names[0] != names[1]:
+        only = ", ".join(sorted(names[0] ^ names[1]))
+        raise BadInput(f"concat: only one of the surveys has {only}; leave it out of the other (drop_vars)")
+
+
+def _axis(parts):
+    """The one coordinate that differs."""
+    names = set().union(*(part.coords for part in parts))
+    absent = sorted(name for name in names if any(name not in part.coords for part in parts))
+    if absent:
+        raise BadInput(f"concat: only some of the surveys have {', '.join(map(str, absent))}")
+    first = parts[0]
+    different = [name for name in first.coords if any(not part[name].variable.equals(first[name].variable)
+                                                      for part in parts[1:])]  # fmt: skip
+    if len(different) != 1:
+        what = f"in {', '.join(map(str, different))}" if different else "in none: they are of the same points"
+        raise BadInput(f"concat: surveys are joined along one axis, and these differ {what}")
+    name = different[0]
+    if first[name].dtype.kind not in "iuf" or any(part[name].dims not in ((), (name,)) for part in parts):
+        raise BadInput(f"concat: {name} is no axis of numbers, along which surveys can be joined")
+    return name
+
+
+def _joined(one, other, axis):
+    """Both, in ascending order; raises BadInput where they contradict each other."""
+    _, at, there = np.intersect1d(one[axis].values, other[axis].values, return_indices=True)
+    common = one.isel({axis: at}).equals(other.transpose(*one.status.dims, ...).isel({axis: there}))
+    if at.size and not common:
+        value = float(one[axis].values[at[0]])
+        raise BadInput(f"concat: the surveys have different values at common points, such as {axis} = {value:g}; "
+                       "leave these out of one of them")  # fmt: skip
+    rest = np.setdiff1d(np.arange(other.sizes[axis]), there)
+    joined = xr.concat([one, other.isel({axis: rest})], axis, combine_attrs="override", join="exact")
+    return joined.transpose(*one.status.dims, ...).sortby(axis)
+
+
+def _described(joined, parts, axis):
+    """With the counts and attributes of the whole."""
+    attributes = {key: value for key, value in parts[0].attrs.items() if key not in OF_RUN}
+    for key in attributes:
+        values = list(dict.fromkeys(str(part.attrs.get(key)) for part in parts))
+        if key in SUMMED:
+            attributes[key] = float(sum(part.attrs.get(key, 0.0) for part in parts))
+        elif len(values) > 1 and key.startswith(("version_", "commit", "dirty", "kernel_hash", "cpu", "source")):
+            attributes[key] = " | ".join(values)
+    attributes["workflow"] = _workflow(attributes.get("workflow", ""), joined[axis])
+    attributes["history"] = f"{now()}: {command()}: {counted(len(parts), 'survey')} joined along {axis}"
+    joined = joined.assign_attrs(attributes)
+    total = tally(joined)
+    for arrays in reading.pieces(joined):
+        total.add(arrays)
+    return joined.assign_attrs(total.attributes)
+
+
+def _workflow(text, coordinate):
+    """The workflow with the joined axis, without what belongs to the parts."""
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        return text
+    if not isinstance(data.get("axes"), dict):
+        return text
+    data = {key: table for key, table in data.items() if key not in ("boundaries", "refine")}
+    data["axes"] |= {coordinate.name: unchanged(coordinate.values)}
+    return tomli_w.dumps(data)
+
+
+def _write(joined, output, folder):
+    """Write a survey's dataset as a run does, a row of tiles at a time."""
+    point = joined.status.dims
+    variables = {name: (v.dims, v.attrs) for name, v in joined.data_vars.items()}
+    coordinates = {name: (c.dims, c.values.astype("U") if c.dtype.kind == "O" else c.values, c.attrs)
+                   for name, c in joined.coords.items()}  # fmt: skip
+    layout = {name: (v.dtype, None, v.shape[len(point) :]) for name, v in joined.data_vars.items()}
+    tile = halved(joined.status.shape, TILE_POINTS)
+    file = MapFile(output, folder, coordinates, variables, layout, joined.status.shape, tile)
+    try:
+        rows = max(1, reading.PIECE // max(1, joined.status[0].size)) // tile[0] * tile[0] or tile[0]
+        for first in range(0, joined.sizes[point[0]], rows):
+            cut = slice(first, min(first + rows, joined.sizes[point[0]]))
+            where = (cut, *(slice(0, joined.sizes[dim]) for dim in point[1:]))
+            for name, variable in joined.data_vars.items():
+                file.write(name, variable.isel({point[0]: cut}).values, where)
+        kept = {key: value for key, value in joined.attrs.items() if key != "complete"}
+        file.publish(kept | {"date_created": now()})
+    finally:
+        file.discard()

@@ -1,0 +1,323 @@
+"""Multipliers, and what follows from them, on rows of points where the coefficients of a polynomial are series.
+
+The polynomial is monic: the characteristic one of M, whose roots are the multipliers l, or, of symplectic and
+reversible systems ("paired": with l, 1 / l is a multiplier), that whose roots are the s = l + 1 / l. Weierstrass's
+iteration finds its roots z_i in lanes, from those at the nearest node; its corrections W_i at the end bound their
+errors, since the roots are the eigenvalues of diag(z_i) - W 1^T: Gershgorin's discs of it, in units that make one of
+them narrow, hold one root each. Of coefficients known to within their `doubts` W_i is known to within a bound.
+
+A point whose discs meet, or whose answer misses what is asked, is `missed`: its own monodromy has to tell.
+
+Sources: B. T. Smith, J. ACM 17 (1970) 661; V. A. Yakubovich, V. M. Starzhinskii, Linear Differential Equations with
+Periodic Coefficients (1975), III.
+"""
+
+import math
+
+import numpy as np
+
+from survey.kernels.jit import kernel
+from survey.kernels.math.chebyshev import restrict
+from survey.kernels.math.roundoff import EPS, ROUNDOFF_UP
+
+LANES = 32
+ITERATIONS = 7
+UNDECIDED, UNSTABLE, STABLE = -1, 0, 1  # as in measures.floquet.multipliers, and so are those below
+PLUS_ONE, MINUS_ONE, NEIMARK_SACKER, COLLISION = 1, 2, 3, 4
+MULTIPLIERS, RADIUS, VERDICT, CROSSING, KREIN = range(5)  # columns of `asked`
+TIE = 1e-9  # moduli that differ by less, relative to 1 + the largest, count as equal when multipliers are sorted
+
+
+@kernel
+def answer(
+    series, doubts, x, table, near, starts, places, n, paired, asked, rtol, floats, signs, verdict, crossing, missed
+):
+    """Answer the points places (R, L) of rows at x (R): columns of `floats`, `signs`, ... as in `stability.Answers`.
+
+    series (n1, K m), of K coefficients, m terms along the row each, known to within doubts (K); table (m, L or more, a
+    multiple of LANES): T_k at the points of a row. near (R + L): the nearest node of each row, then of each column;
+    starts (n1, m, d, 2): the roots at the nodes. Of K = 2 d coefficients the last d are those of the Krein form.
+    """
+    K, m, d, R = len(doubts), len(table), starts.shape[2], len(x)
+    work, own = np.empty((2, K * m)), np.empty((1, K * m))
+    c, z, y, w = np.empty((K, LANES)), np.empty((d, LANES)), np.empty((d, LANES)), np.empty((d, LANES))
+    gap, parts = np.empty((d, LANES)), np.empty((6, LANES))
+    rho, lane_z, lane_gap = np.empty(d), np.empty((d, 2)), np.empty(d)
+    re, im, bar, sign = np.empty(n), np.empty(n), np.empty(n), np.zeros(n, np.int8)
+    angle, order = np.empty(n), np.empty(n, np.int64)
+    form = np.empty((2, d))
+    L = places.shape[1]
+    for r in range(R):
+        restrict(series, x[r : r + 1], work, own)
+        for first in range(0, L, LANES):
+            count = min(LANES, L - first)
+            for k in range(K):
+                sums = c[k]
+                sums[:] = 0.0
+                for j in range(m - 1, -1, -1):
+                    weight, one = own[0, k * m + j], table[j, first : first + LANES]
+                    for lane in range(LANES):
+                        sums[lane] += weight * one[lane]
+            for lane in range(LANES):
+                column = near[R + first + min(lane, count - 1)]
+                for i in range(d):
+                    z[i, lane], y[i, lane] = starts[near[r], column, i, 0], starts[near[r], column, i, 1]
+            _roots(c, d, z, y, parts)
+            _corrections(c, d, doubts, z, y, w, gap, parts)
+            for lane in range(count):
+                p = places[r, first + lane]
+                widest = 0.0
+                for i in range(d):
+                    widest = max(widest, w[i, lane]) if w[i, lane] >= 0.0 else math.inf
+                clear = True
+                for i in range(d):
+                    clear = clear and gap[i, lane] > 2.0 * d * (w[i, lane] + widest)
+                    rho[i] = w[i, lane] * (1.0 + (d - 1) * min(1.0, 2.0 * widest / gap[i, lane]))
+                    lane_z[i, 0], lane_z[i, 1], lane_gap[i] = z[i, lane], y[i, lane], gap[i, lane]
+                verdict[p], crossing[p], missed[p] = UNDECIDED, UNDECIDED, True
+                if not clear or not widest < math.inf:
+                    continue
+                open_signs = False
+                if paired:
+                    if K > d:
+                        for i in range(d):
+                            form[0, i], form[1, i] = c[d + i, lane], doubts[d + i]
+                    decided, open_signs = _paired(lane_z, rho, form, K > d, re, im, bar, sign)
+                else:
+                    for i in range(d):
+                        re[i], im[i], bar[i] = lane_z[i, 0], lane_z[i, 1], rho[i]
+                        if abs(im[i]) <= bar[i]:
+                            im[i] = 0.0  # its mirror image would be in the same disc
+                    decided = UNDECIDED
+                _write(re, im, bar, sign, decided, paired, asked, rtol, p, floats, verdict, missed)
+                if not missed[p] and (asked[MULTIPLIERS] or asked[CROSSING] or asked[KREIN]):
+                    _sort(re, im, bar, sign, floats[4 * n, p], p, floats, signs, angle, order)
+                    crossing[p] = _crossing(re, im, bar, angle, sign, verdict[p], paired, K > d)
+                    missed[p] = (asked[CROSSING] and crossing[p] == UNDECIDED) or (
+                        open_signs and (asked[KREIN] or asked[CROSSING])
+                    )
+
+
+@kernel
+def _roots(c, d, z, y, parts):
+    """Weierstrass's iteration from z + i y, in lanes."""
+    pr, pi, qr, qi = parts[0], parts[1], parts[2], parts[3]
+    lanes = len(pr)
+    for _ in range(ITERATIONS):
+        for i in range(d):
+            _value(c, d, z[i], y[i], pr, pi)
+            _product(z, y, i, d, qr, qi)
+            x, t = z[i], y[i]
+            for lane in range(lanes):
+                size = 1.0 / (qr[lane] * qr[lane] + qi[lane] * qi[lane])
+                x[lane] -= (pr[lane] * qr[lane] + pi[lane] * qi[lane]) * size
+                t[lane] -= (pi[lane] * qr[lane] - pr[lane] * qi[lane]) * size
+
+
+@kernel
+def _value(c, d, x, t, pr, pi):
+    """The polynomial at x + i t."""
+    pr[:], pi[:] = 1.0, 0.0
+    for k in range(d):
+        a = c[k]
+        for lane in range(len(x)):
+            real = pr[lane] * x[lane] - pi[lane] * t[lane] + a[lane]
+            pi[lane] = pr[lane] * t[lane] + pi[lane] * x[lane]
+            pr[lane] = real
+
+
+@kernel
+def _product(z, y, i, d, qr, qi):
+    """The product over j of z_i - z_j."""
+    qr[:], qi[:] = 1.0, 0.0
+    x, t = z[i], y[i]
+    for j in range(d):
+        if j == i:
+            continue
+        u, v = z[j], y[j]
+        for lane in range(len(x)):
+            a, b = x[lane] - u[lane], t[lane] - v[lane]
+            real = qr[lane] * a - qi[lane] * b
+            qi[lane] = qr[lane] * b + qi[lane] * a
+            qr[lane] = real
+
+
+@kernel
+def _corrections(c, d, doubts, z, y, w, gap, parts):
+    """Fill w with bounds of the corrections |W_i|, and `gap` with the distance of each root to the nearest other."""
+    pr, pi, qr, qi, size, bound = parts[0], parts[1], parts[2], parts[3], parts[4], parts[5]
+    lanes = len(size)
+    for i in range(d):
+        x, t, own, near = z[i], y[i], w[i], gap[i]
+        _value(c, d, x, t, pr, pi)
+        _product(z, y, i, d, qr, qi)
+        for lane in range(lanes):
+            size[lane] = math.sqrt(x[lane] * x[lane] + t[lane] * t[lane])
+            bound[lane], near[lane] = 8.0 * d * ROUNDOFF_UP, math.inf
+        for k in range(d):
+            a = c[k]
+            for lane in range(lanes):
+                bound[lane] = bound[lane] * size[lane] + doubts[k] + 8.0 * d * ROUNDOFF_UP * abs(a[lane])
+        for lane in range(lanes):
+            total = math.sqrt(pr[lane] * pr[lane] + pi[lane] * pi[lane]) + bound[lane]
+            own[lane] = total / math.sqrt(qr[lane] * qr[lane] + qi[lane] * qi[lane]) * (1.0 + 8.0 * d * EPS)
+        for j in range(d):
+            if j == i:
+                continue
+            u, v = z[j], y[j]
+            for lane in range(lanes):
+                a, b = x[lane] - u[lane], t[lane] - v[lane]
+                near[lane] = min(near[lane], math.sqrt(a * a + b * b))
+
+
+@kernel
+def _paired(z, rho, form, of_forms, re, im, bar, sign):
+    """The multipliers of the s = z; returns the verdict, and is a Krein sign open?
+
+    The sign of the multiplier exp(i a), 0 < a < pi, is that of form / q' at s = 2 cos a, q the polynomial of the s.
+    """
+    d, on, off, open_ = len(rho), 0, False, False
+    for i in range(d):
+        s, t, r = z[i, 0], z[i, 1], rho[i]
+        a, b = 2 * i, 2 * i + 1
+        sign[a] = sign[b] = 0
+        if abs(t) > r:  # not real: neither is its multiplier on the circle
+            off = True
+            # l = (s + v) / 2 with v = sqrt(s^2 - 4), and |delta v| <= |delta v^2| / |v|
+            v = np.sqrt(complex(s * s - t * t - 4.0, 2.0 * s * t))
+            if v.real * s + v.imag * t < 0.0:
+                v = -v
+            one = 0.5 * (complex(s, t) + v)
+            spread = (2.0 * math.hypot(s, t) + r) * r
+            wide = 0.5 * (r + spread / abs(v)) if spread < 0.5 * abs(v) ** 2 else math.inf
+            wide += 8.0 * EPS * abs(one)
+            two, size = 1.0 / one, abs(one)
+            re[a], im[a], bar[a] = one.real, one.imag, wide
+            re[b], im[b] = two.real, two.imag
+            bar[b] = wide / (size * (size - wide)) + 4.0 * EPS / size if size > 2.0 * wide else math.inf
+        elif abs(s) + r < 2.0:
+            on += 1
+            height = math.sqrt((2.0 - s) * (2.0 + s))
+            re[a] = re[b] = 0.5 * s
+            im[a], im[b] = 0.5 * height, -0.5 * height
+            far = abs(s) + r
+            bar[a] = bar[b] = r / math.sqrt((2.0 - far) * (2.0 + far)) + 4.0 * EPS
+            if of_forms:
+                value, wide, side = 0.0, 0.0, 1.0
+                for k in range(d):
+                    value = value * s + form[0, k]
+                    wide = wide * 2.0 + form[1, k] + 4.0 * d * EPS * abs(form[0, k])
+                    if k != i and s < z[k, 0] and abs(z[k, 1]) <= rho[k]:
+                        side = -side  # of the slope of the polynomial; pairs of conjugates do not change it
+                if abs(value) > wide + _slope(form, d) * r:
+                    sign[a] = 1 if value * side > 0.0 else -1
+                    sign[b] = -sign[a]
+                else:
+                    open_ = True
+        elif abs(s) - r > 2.0:
+            off = True
+            size, near = abs(s), abs(s) - r
+            one = 0.5 * (size + math.sqrt((size - 2.0) * (size + 2.0)))
+            wide = 0.5 * r * (1.0 + near / math.sqrt((near - 2.0) * (near + 2.0))) + 4.0 * EPS * one
+            two = 1.0 / one
+            re[a], im[a], bar[a] = math.copysign(one, s), 0.0, wide
+            re[b], im[b] = math.copysign(two, s), 0.0
+            bar[b] = wide / (one * (one - wide)) + 2.0 * EPS * two if one > 2.0 * wide else math.inf
+        else:
+            re[a] = re[b] = math.copysign(1.0, s)
+            im[a] = im[b] = math.nan  # real or not
+            bar[a] = bar[b] = math.inf
+    return (UNSTABLE if off else STABLE if on == d else UNDECIDED), open_
+
+
+@kernel
+def _slope(form, d):
+    """A bound of the form's slope where |s| <= 2."""
+    total, power = 0.0, 1.0
+    for k in range(1, d):
+        total += k * power * abs(form[0, d - 1 - k])
+        power *= 2.0
+    return total
+
+
+@kernel
+def _write(re, im, bar, sign, decided, paired, asked, rtol, p, floats, verdict, missed):
+    """Write the spectral radius and the verdict of the point p, and whether it has missed what is asked."""
+    n, value, top, least, wide = len(re), 0.0, 0.0, 0.0, False
+    for i in range(n):
+        size = math.sqrt(re[i] * re[i] + im[i] * im[i])
+        value, top, least = max(value, size), max(top, size + bar[i]), max(least, size - bar[i])
+        wide = wide or not bar[i] <= rtol * (1.0 + size)
+    top, least = top * (1.0 + 4.0 * EPS), least * (1.0 - 4.0 * EPS)
+    if paired and decided == STABLE:
+        value = top = least = 1.0
+    elif not paired:
+        decided = STABLE if top < 1.0 else UNSTABLE if least > 1.0 else UNDECIDED
+    off = max(top - value, value - least)
+    floats[4 * n, p], floats[4 * n + 1, p], verdict[p] = value, off, decided
+    missed[p] = (
+        (asked[VERDICT] and decided == UNDECIDED)
+        or (wide and (asked[MULTIPLIERS] or asked[KREIN]))
+        or (asked[RADIUS] and not off <= rtol * (1.0 + value))
+    )
+
+
+@kernel
+def _sort(re, im, bar, sign, most, p, floats, signs, angle, order):
+    """Write the multipliers of the point p in order, and fill `angle` with their arguments."""
+    n, unit = len(re), TIE * (1.0 + most)
+    for i in range(n):
+        angle[i], order[i] = math.atan2(im[i], re[i]), i
+    for i in range(1, n):
+        own, k = order[i], i
+        while k > 0 and _before(own, order[k - 1], re, im, angle, unit):
+            order[k] = order[k - 1]
+            k -= 1
+        order[k] = own
+    for i in range(n):
+        k = order[i]
+        floats[i, p], floats[n + i, p], floats[2 * n + i, p] = re[k], im[k], bar[k]
+        floats[3 * n + i, p] = bar[k] if im[k] != 0.0 else 0.0
+        signs[i, p] = sign[k]
+
+
+@kernel
+def _before(i, j, re, im, angle, unit):
+    """Does the multiplier i come before j: by descending modulus, then angle?"""
+    one = round(math.sqrt(re[i] * re[i] + im[i] * im[i]) / unit)
+    two = round(math.sqrt(re[j] * re[j] + im[j] * im[j]) / unit)
+    return one > two or (one == two and angle[i] < angle[j])
+
+
+@kernel
+def _crossing(re, im, bar, angle, sign, decided, paired, of_signs):
+    """See `measures.floquet.multipliers.crossing`."""
+    n, lead = len(re), 0
+    if paired and decided == STABLE:
+        to_plus = to_minus = between = math.inf
+        doubt = wide = 0.0
+        for i in range(n):
+            to_plus, to_minus = min(to_plus, 2.0 * abs(angle[i])), min(to_minus, 2.0 * (math.pi - abs(angle[i])))
+            doubt = max(doubt, 4.0 * bar[i])
+            for j in range(n):
+                if j != i and angle[i] > 0.0 and angle[j] > 0.0 and (not of_signs or sign[i] * sign[j] < 0):
+                    between = min(between, abs(angle[i] - angle[j]))
+                    wide = max(wide, 2.0 * (bar[i] + bar[j]))
+        doubt = max(doubt, wide)
+        if to_plus + doubt < min(to_minus, between):
+            return PLUS_ONE
+        if to_minus + doubt < min(to_plus, between):
+            return MINUS_ONE
+        return COLLISION if between + doubt < min(to_plus, to_minus) else UNDECIDED
+    for i in range(n):
+        if math.hypot(re[i], im[i]) > math.hypot(re[lead], im[lead]):
+            lead = i
+    least = math.hypot(re[lead], im[lead]) - bar[lead]
+    for i in range(n):
+        if i == lead or math.hypot(re[i] - re[lead], im[i] + im[lead]) <= bar[i] + bar[lead]:
+            continue
+        if math.hypot(re[i], im[i]) + bar[i] >= least:
+            return UNDECIDED
+    if abs(im[lead]) > bar[lead]:
+        return COLLISION if paired else NEIMARK_SACKER
+    return PLUS_ONE if re[lead] > 0.0 else MINUS_ONE

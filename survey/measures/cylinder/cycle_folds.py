@@ -1,0 +1,166 @@
+"""Folds of cycles on a map of two parameters: where a return map touches the identity, and two cycles are one.
+
+There the change D of the map has an extremum on which it is 0: a multiplier passes +1. Extrema are looked for on a
+lattice of the map, by the signs of the map's slope less 1 among SCANNED points, and where the extremal D changes its
+sign from one node to the next a fold is followed (`survey.measures.tracks`). What a fold does between lines of the
+lattice alone, and folds whose cycles nearly touch a saddle throughout, may be missed.
+"""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+
+from survey.kernels.cylinder import equilibria as eq
+from survey.kernels.cylinder import returns as rt
+from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, values
+from survey.measures import tracks
+from survey.measures.cylinder.fate import FINE, MIRROR, G, flow_of, mirrored_equilibria, outline, signed
+from survey.methods import taylor
+
+LINES, SCANNED = 33, 26
+BISECTIONS, APPROACHES = 18, 6  # of the border of a map, and points beside it
+ROTATION_PLUS, ROTATION_MINUS, LIBRATION = range(3)
+LEAST, FASTEST = 1e-3, 30.0  # slowest and fastest rotation that is looked at, in velocities of the system
+TWO_PI = 2.0 * math.pi
+
+
+class Maps:
+    """The return maps at one parameter point: rows of `flow_image`, by the logarithm of w or by the turning point."""
+
+    def __init__(self, row):
+        s = outline(row)
+        self.good = s.stratum == G and not s.folded and not s.unknown
+        self.flows = {}
+        self.flows[ROTATION_PLUS] = self.flows[LIBRATION] = s.p, s.equilibria
+        self.scale = s.p[BOUND_F] + math.sqrt(s.p[BOUND_DG])
+        mirrored = flow_of(signed(s.p, MIRROR))
+        self.flows[ROTATION_MINUS] = mirrored, mirrored_equilibria(s.equilibria)
+
+    def node(self, kind, place):
+        """(class, a, b, bar of a, bar of b) of a map: a its change (of log w), b its slope less 1.
+
+        The section of rotations is phi = 0.
+        """
+        p, eqs = self.flows[kind]
+        node = np.zeros(7)
+        if not self.good:
+            return 0, *np.full(4, np.nan)
+        if kind == LIBRATION:
+            high = self._end(eqs, place)
+            if high is None:
+                return 0, *np.full(4, np.nan)
+            taylor.flow_image(rt.LIBRATION, p, eqs, len(eqs), high, place, FINE, node)
+            size, steep = 1.0, p[BOUND_DG] / (abs(values(p, place)[1]) + tracks.TINY)
+        else:
+            size = math.exp(place)
+            taylor.flow_image(rt.ROTATION, p, eqs, len(eqs), 0.0, size, FINE, node)
+            steep = 1.0 / size
+        change, slope, error = node[rt.CHANGE], node[rt.SLOPE], node[rt.ERROR]
+        bar = 1e-14 * (1.0 + slope) + 20.0 * error + 2.0 * slope * steep * (abs(change) + error)
+        return int(node[rt.CLASS]), change / size, slope - 1.0, error / size, bar
+
+    @staticmethod
+    def _end(eqs, place):
+        """The equilibrium to the right of the angle, if the one to its left is no saddle."""
+        if not len(eqs):
+            return None
+        away = (eqs[:, eq.ANGLE] - place) % TWO_PI
+        left = int(np.argmax(away))
+        return None if eqs[left, eq.KIND] == eq.SADDLE else place + away.min()
+
+    def extrema(self):
+        """[(label, is it a minimum?, place, a)] of the extrema of all maps; a label is (kind, class)."""
+        if not self.good:
+            return
+        speeds = np.log(self.scale * np.geomspace(LEAST, FASTEST, SCANNED))
+        scans = [(ROTATION_PLUS, speeds), (ROTATION_MINUS, speeds)]
+        eqs = self.flows[LIBRATION][1]
+        share = 1.0 / (1.0 + np.exp(-np.linspace(-7.0, 7.0, SCANNED - 4)))
+        for i, row in enumerate(eqs):
+            if row[eq.DG] < 0.0 and row[eq.KIND] != eq.DEGENERATE:
+                high = eqs[i + 1, eq.ANGLE] if i + 1 < len(eqs) else eqs[0, eq.ANGLE] + TWO_PI
+                scans.append((LIBRATION, row[eq.ANGLE] + share * (high - row[eq.ANGLE])))
+        for kind, places in scans:
+            yield from self._extrema(kind, places)
+
+    def _extrema(self, kind, places):
+        nodes = [(x, *self.node(kind, x)) for x in places]
+        for low, high in pairwise(nodes):
+            parts = [low, high]
+            if low[1] != high[1]:
+                parts = self._beside(kind, low, high)
+            for one, two in pairwise(parts):
+                if one[1] == two[1] > 0 and one[3] * two[3] < 0.0:
+                    x, a = self._extremum(kind, one, two)
+                    yield (kind, one[1]), two[3] > 0.0, x, a
+
+    def _beside(self, kind, low, high):
+        """Nodes on both sides of the border of a class, that lies between two nodes."""
+        ends = [low, high]
+        one, two = low, high
+        for _ in range(BISECTIONS):
+            x = 0.5 * (one[0] + two[0])
+            middle = (x, *self.node(kind, x))
+            one, two = (middle, two) if middle[1] == low[1] else (one, middle)
+        found = []
+        for border, end in ((one, ends[0]), (two, ends[1])):
+            shares = 10.0 ** -np.arange(1.0, APPROACHES) if end[1] > 0 else np.zeros(0)
+            beside = [(x, *self.node(kind, x)) for x in border[0] + shares * (end[0] - border[0])]
+            found += [end, *beside, border]
+        return sorted(found)
+
+    def _extremum(self, kind, one, two):
+        """(place, a) of the extremum between two nodes, to a few digits."""
+        for _ in range(6):
+            share = min(max(one[3] / (one[3] - two[3]), 0.05), 0.95)
+            x = one[0] + share * (two[0] - one[0])
+            middle = (x, *self.node(kind, x))
+            if middle[1] != one[1]:
+                break
+            one, two = (middle, two) if middle[3] * one[3] > 0.0 else (one, middle)
+        best = min((one, two), key=lambda node: abs(node[3]))
+        return best[0], best[2]
+
+
+def found(plane):
+    """[(class, parameters (m, 2), errors (m), {name: (values, errors)})] of the folds on the map."""
+    known = {}
+
+    def maps(position):
+        key = position.tobytes()
+        if key not in known:
+            if len(known) > 8:
+                known.pop(next(iter(known)))
+            row = plane.flows(position[None])[0]
+            known[key] = Maps(row) if np.isfinite(row).all() else None
+        return known[key]
+
+    def things(position):
+        here = maps(position)
+        return list(here.extrema()) if here else []
+
+    def function_of(label):
+        kind, own = label
+
+        def function(place, position):
+            here = maps(np.asarray(position))
+            found = here.node(kind, place) if here else (0,) * 5
+            return found[1:] if found[0] == own else np.full(4, np.nan)
+
+        return function
+
+    for (kind, _class), track in tracks.from_lattice(LINES, things, function_of, plane.square.grain):
+        for part in track.certain():
+            yield "cycle_fold", plane.square.parameters(part.x), part.error, _known(kind, part)
+
+
+def _known(kind, part):
+    """A state on the cycle at each point of a fold, and its multiplier there."""
+    none = np.zeros(len(part.x))
+    known = {"multiplier": (none + 1.0, none), "cycle_phi": (none, none), "cycle_w": (none, none)}
+    if kind == LIBRATION:
+        return known | {"cycle_phi": (part.place, part.place_error)}
+    w = np.exp(part.place)
+    side = 1.0 if kind == ROTATION_PLUS else -1.0
+    return known | {"cycle_w": (side * w, w * np.expm1(part.place_error) + 4e-16 * w)}

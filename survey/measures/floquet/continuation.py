@@ -1,0 +1,275 @@
+"""Curves of periodic orbits, followed in one parameter, both ways round folds: all orbits at a point that they meet.
+
+The unknowns y = (x(0), l), or (x(0), T, l) where T is unknown, l the share of the parameter's range, obey n, or n + 1,
+equations (see `newton`); a curve is followed by its arc length: a step along the tangent, and Newton's method across
+it. Where T is unknown, x(0) stays in a plane across the motion, which moves along with the curve.
+
+Curves begin at the orbits that Newton's method finds from the start at SEEDS values of l, and end where l leaves its
+range, after MOST_STEPS steps, or where these become too short. Curves that branch off are not looked for. They depend
+on the other parameters and the range alone: so a point has the same orbits, in the same order, on every grid.
+
+Source: H. B. Keller, in Applications of Bifurcation Theory (1977) 359 (pseudo-arclength).
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from survey.measures.floquet.newton import ACROSS, ROUGH, ROUGH_REACH, applied, bordered, inverse, located
+
+SEEDS = 9
+FIRST_STEP, LONGEST, SHORTEST = 0.01, 0.15, 1e-6  # relative to the range of l, x and T
+MOST_STEPS = 400  # in each direction
+CORRECTIONS, CORRECTED, CONTRACTION = 5, 1e-3, 0.5
+GROWTH, LEAST = 1.5, 1e-2  # of steps; the size of a state, relative to the largest one
+TURN, LITTLE = 0.35, 0.12  # of the tangent in a step, in radians: too much, and so little that steps become longer
+DIFFERENCE = 1e-6  # of l, for derivatives that give directions alone
+SAME, SAME_SIZE = 1e-3, 1e-2  # relative: what lies on a curve already
+
+
+class Range(NamedTuple):
+    """The parameter number `index` that is continued, from `low` to `high`."""
+
+    index: int
+    low: float
+    high: float
+
+
+@dataclass
+class Curve:
+    """Points y (K, m) of a curve, its tangents, and the sizes that lengths are relative to. y ends with l."""
+
+    y: np.ndarray
+    tangent: np.ndarray
+    size: np.ndarray
+
+    def crossings(self, values):
+        """Where l, on cubic pieces, takes the values (V): their numbers, and y (C, m)."""
+        step, size = np.diff(self.y, axis=0), self.size[:-1]
+        length = np.linalg.norm(step / size, axis=1)[:, None]
+        one, two = (
+            length * t / np.linalg.norm(t / size, axis=1)[:, None] for t in (self.tangent[:-1], self.tangent[1:])
+        )
+        c = np.stack([self.y[:-1], one, 3 * step - 2 * one - two, one + two - 2 * step])  # powers of u in [0, 1]
+        ends = _monotonic(c[:, :, -1])
+        at = _cubic(c[:, :, -1, None], ends)
+        below, above = np.minimum(at[:, :-1], at[:, 1:]), np.maximum(at[:, :-1], at[:, 1:])
+        piece, part, which = np.nonzero((below[:, :, None] <= values) & (values <= above[:, :, None]))
+        u = _bisected(c[:, piece, -1], values[which], ends[piece, part], ends[piece, part + 1])
+        return which, _cubic(c[:, piece], u[:, None])
+
+
+def _monotonic(c):
+    """Ends (K, 4) of the parts of [0, 1] on which cubics c (4, K) are monotonic; parts may be empty."""
+    with np.errstate(all="ignore"):
+        root = np.sqrt(np.maximum(c[2] ** 2 - 3 * c[1] * c[3], 0.0))
+        q = -(c[2] + np.copysign(root, c[2]))
+        turns = np.sort([q / (3 * c[3]), c[1] / q], axis=0)
+    turns = np.clip(np.nan_to_num(turns, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
+    return np.stack([np.zeros(c.shape[1]), *turns, np.ones(c.shape[1])], axis=1)
+
+
+def _cubic(c, u):
+    return ((c[3] * u + c[2]) * u + c[1]) * u + c[0]
+
+
+def _bisected(c, values, low, high):
+    """Where in [low, high] cubics c (4, C), monotonic there, take the values (C)."""
+    rises = _cubic(c, high) > _cubic(c, low)
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        below = (_cubic(c, middle) < values) == rises
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return 0.5 * (low + high)
+
+
+class Curves:
+    """The curves of each of R rows, sets of parameters whose continued one does not matter."""
+
+    def __init__(self, equation, continued, rows, reach):
+        self.equation, self.continued, self.rows, self.reach = equation, continued, rows, reach
+        self.free = equation.free
+        self.of_row = [[] for _ in rows]
+        for share in np.linspace(0.0, 1.0, SEEDS):
+            self._follow(share)
+
+    def points(self, those, share):
+        """The parameters of these rows, with the continued one at shares of its range."""
+        index, low, high = self.continued
+        points = self.rows[those].copy()
+        points[:, index] = low + (high - low) * share
+        return points
+
+    def _follow(self, share):
+        """Follow the curves through the orbits at this share of the range, but for those that are known."""
+        everyone = np.arange(len(self.rows))
+        points = self.points(everyone, share)
+        orbits, good = located(self.equation, points, self.reach, *self.equation.begin(points))
+        those = np.array([i for i in good if not self._known(i, share, orbits, i)], dtype=int)
+        if not those.size:
+            return
+        share, size, T = np.full((those.size, 1), share), orbits.size[those], orbits.T[those, None]
+        y = np.concatenate([orbits.x[those], *([T] if self.free else []), share], axis=1)
+        walk = _Walk(
+            self, np.tile(those, 2), np.tile(y, (2, 1)), np.tile(size, (2, 1)), np.repeat([1.0, -1.0], those.size)
+        )
+        walk.run()
+        for k, i in enumerate(those):
+            there, back = walk.done(k), walk.done(k + those.size)
+            joined = [np.concatenate([b[:0:-1], a]) for a, b in zip(there, back, strict=True)]
+            joined[1][: max(len(back[0]) - 1, 0)] *= -1.0
+            if len(joined[0]) > 1:
+                self.of_row[i].append(Curve(*joined))
+
+    def _known(self, i, share, orbits, k):
+        for curve in self.of_row[i]:
+            for y in curve.crossings(np.array([share]))[1]:
+                if self.free:
+                    same = abs(y[-2] - orbits.T[k]) <= SAME * orbits.T[k]
+                    same &= (abs(y[:-2] - orbits.x[k]) <= orbits.size[k] * 2.1).all()
+                else:
+                    same = (abs(y[:-1] - orbits.x[k]) <= SAME * orbits.size[k].max()).all()
+                if same:
+                    return True
+        return False
+
+    def starts(self, row, values):
+        """The curves of a row at values of the parameter (V): numbers of the values, states, periods (C each)."""
+        shares = (values - self.continued.low) / (self.continued.high - self.continued.low)
+        n, m = self.equation.n, self.equation.n + self.free + 1
+        found = [curve.crossings(shares) for curve in self.of_row[row]]
+        which = np.concatenate([np.zeros(0, int), *(one for one, _y in found)])
+        y = np.concatenate([np.zeros((0, m)), *(y for _one, y in found)])
+        return which, y[:, :n], y[:, n] if self.free else np.full(len(y), np.nan)
+
+
+class _Walk:
+    """Steps along the curves of K tasks, from y (K, m) and the largest moduli of the states (K, n), in the direction
+    in which l changes by `sign` at first.
+
+    Lengths are relative to the orbit and the period at the last point, so that large orbits have as few steps as small.
+    """
+
+    def __init__(self, curves, rows, y, moduli, sign):
+        self.curves, self.rows, self.y = curves, rows, y.copy()
+        self.n, self.free, self.equation = curves.equation.n, curves.free, curves.equation
+        K, m = y.shape
+        self.step, self.kept = np.full(K, FIRST_STEP), [([], [], []) for _ in range(K)]
+        self.size, self.tangent, self.plane = np.ones((K, m)), np.zeros((K, m)), np.full((2, K, self.n), np.nan)
+        self.size[:, : self.n] = moduli
+        self.tangent[:, -1] = sign
+        everyone = np.arange(K)
+        if self.free:
+            self.plane[:] = self._slopes(curves.points(rows, y[:, -1]), y[:, : self.n]), y[:, : self.n]
+        self.live = everyone[self._moved(everyone, y, np.pi)]
+
+    def run(self):
+        """Follow the curves to their ends."""
+        for _ in range(MOST_STEPS):
+            if not self.live.size:
+                break
+            live = self.live
+            good = self._moved(live, self.y[live] + self.step[live, None] * self.tangent[live], TURN)
+            took, failed = live[good], live[~good]
+            self.step[failed] *= 0.5
+            closed = np.array([self._closed(k) for k in took], bool)
+            ended = closed | (self.y[took, -1] < 0.0) | (self.y[took, -1] > 1.0)
+            self.live = np.setdiff1d(live, np.concatenate([failed[self.step[failed] < SHORTEST], took[ended]]))
+
+    def done(self, k):
+        """Points, tangents and sizes of a task's curve."""
+        return tuple(np.array(one).reshape(-1, self.y.shape[1]) for one in self.kept[k])
+
+    def _closed(self, k):
+        y, tangent, size = self.kept[k]
+        near = len(y) > 4 and np.linalg.norm((y[-1] - y[0]) / size[0]) < self.step[k]
+        return bool(near and (tangent[-1] / size[0]) @ (tangent[0] / size[0]) > 0.0)
+
+    def _real(self, those, y):
+        """Parameters, states and periods at y (K, m) of some tasks."""
+        points = self.curves.points(self.rows[those], y[:, -1])
+        return points, y[:, : self.n], y[:, self.n] if self.free else self.equation.periods(points)
+
+    def _moved(self, those, y, most):
+        """Move these tasks to the curve near y, across their tangents, if these turn by less than `most`; where."""
+        done, lost, last = np.zeros(len(y), bool), np.zeros(len(y), bool), self.step[those]
+        tangent, size = np.empty_like(y), np.empty_like(y)
+        for _ in range(CORRECTIONS):
+            busy = np.flatnonzero(~done & ~lost)
+            if not busy.size:
+                break
+            mine = those[busy]
+            value, slope, size[busy] = self._equations(mine, y[busy])
+            across = self.tangent[mine] / self.size[mine] ** 2
+            with np.errstate(all="ignore"):
+                matrix = inverse(np.concatenate([slope, across[:, None]], axis=1))
+                step = -applied(matrix[:, :, :-1], value)
+                length = np.linalg.norm(step / self.size[mine], axis=1)
+                bad = ~(length < last[busy])
+                new = np.ascontiguousarray(matrix[:, :, -1])
+                tangent[busy] = new / np.linalg.norm(new / size[busy], axis=1, keepdims=True)
+                turn = _turn(self.tangent[mine] / self.size[mine], new / self.size[mine])
+                done[busy] = ~bad & (length < CORRECTED)
+                bad |= done[busy] & ~(turn < most)
+            y[busy[~bad]] += step[~bad]
+            lost[busy[bad]], last[busy] = True, CONTRACTION * length
+            straight = done[busy] & (turn < LITTLE)
+            self.step[mine[straight]] = np.minimum(GROWTH * self.step[mine[straight]], LONGEST)
+        done &= ~lost
+        took = those[done]
+        self.y[took], self.tangent[took], self.size[took] = y[done], tangent[done], size[done]
+        if self.free and took.size:
+            x = self.y[took, : self.n]
+            self.plane[:, took] = self._slopes(self.curves.points(self.rows[took], self.y[took, -1]), x), x
+        for k in took:
+            for kept, one in zip(self.kept[k], (self.y[k], self.tangent[k], self.size[k]), strict=True):
+                kept.append(one.copy())
+        return done
+
+    def _equations(self, those, y):
+        """The equations' left sides at y (K, m), their derivatives (K, m - 1, m), and what lengths are relative to."""
+        n = self.n
+        points, x, T = self._real(those, y)
+        X, M, moduli = self._flow(points, x, T)
+        inward = np.where(y[:, -1] < 0.5, DIFFERENCE, -DIFFERENCE)
+        shifted = y.copy()
+        shifted[:, -1] += inward
+        by_l = (self._flow(*self._real(those, shifted), derived=False)[0] - X) / inward[:, None]
+        value, slope, size = X - x, M - np.eye(n), np.ones_like(y)
+        size[:, :n] = np.maximum(moduli, LEAST * moduli.max(axis=1, keepdims=True))
+        if self.free:
+            c, at = self.plane[:, those]
+            value = np.concatenate([value, (c * (x - at)).sum(axis=1)[:, None]], axis=1)
+            slope = bordered(slope, self._slopes(points, X), c)
+            by_l = np.concatenate([by_l, np.zeros((len(y), 1))], axis=1)
+            size[:, n] = T
+            across = (c * self._slopes(points, x)).sum(axis=1)
+            slope[~(across >= ACROSS * (c * c).sum(axis=1))] = np.nan
+        return value, np.concatenate([slope, by_l[:, :, None]], axis=2), size
+
+    def _flow(self, points, x, T, derived=True):
+        N, n = x.shape
+        X, M, size = np.full((N, n), np.nan), np.full((N * derived, n, n), np.nan), np.full((N, n), np.nan)
+        usable = np.flatnonzero(np.isfinite(points).all(axis=1) & np.isfinite(x).all(axis=1) & (T > 0))
+        for inside, programs in self.equation.traced(points[usable], x[usable]):
+            own = usable[inside]
+            X[own], found, size[own], _steps = programs.flow(
+                programs.numbers(points[own]), x[own], T[own], ROUGH_REACH, derived, tolerance=ROUGH
+            )
+            if derived:
+                M[own] = found
+        return X, M, size
+
+    def _slopes(self, points, x):
+        f = np.full(x.shape, np.nan)
+        for inside, programs in self.equation.traced(points, x):
+            f[inside] = programs.slopes(programs.numbers(points[inside]), np.zeros(inside.size), x[inside])[0]
+        return f
+
+
+def _turn(a, b):
+    """The angles between vectors (K, m)."""
+    with np.errstate(all="ignore"):
+        cosine = (a * b).sum(axis=1) / np.sqrt((a * a).sum(axis=1) * (b * b).sum(axis=1))
+        return np.arccos(np.clip(cosine, -1, 1))

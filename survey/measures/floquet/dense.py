@@ -1,0 +1,404 @@
+"""Dense maps of a linear periodic system: the characteristic polynomial as Chebyshev series in one or two parameters.
+
+Where A is analytic in the parameters so is the polynomial. Its coefficients are series on panels of the map, solved at
+their nodes; panels on which they converge slowly, or vary by more orders than the accuracy allows, are halved. A point
+is answered from the series alone (`kernels.floquet.characteristic`); one whose verdict or accuracy these leave open,
+or whose Krein signs, is solved on its own. Of symplectic and reversible systems the polynomial is that of the
+s = l + 1 / l, and Krein signs come from the traces of J times polynomials of M: with adj(l - M) = sum_k l^(n-1-k) B_k
+and v the eigenvector of l, |v|^2 / (v* i J v) = tr(adj(l - M) i J) / p'(l).
+
+The bound of a coefficient: that at the nodes times the Lebesgue constants, the tails of the series, and rounding; at
+a few points that are no nodes it is tried. All depends on the axes of the map, never on the block.
+
+Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 4, 8 and 15; F. R. Gantmacher,
+The Theory of Matrices (1959), IV.4 (B_k).
+"""
+
+import threading
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from survey.kernels.floquet import characteristic, steps
+from survey.kernels.math import chebyshev
+from survey.kernels.math.roundoff import EPS
+from survey.measures.floquet import monodromy
+from survey.measures.floquet.answers import Answers
+
+DEGREES = np.array([8, 12, 16, 20, 24, 28, 32, 40, 48])
+PROBED = 56  # nodes of the lines that show the degrees that are needed
+POINTS_PER_NODE = 2.5  # a panel pays if there are this many points for each that it solves
+SMALLEST = 16  # points of an axis
+BEST = 1e-14  # accuracy of M at the nodes
+MOST_DEEP = 12  # halvings
+LEAST = 0.5  # the share of those that their own bounds answer, below which cutting is of no use
+MOST = 0.9  # the share of the nodes answered to the asked accuracy from which on a panel serves
+TRIED = np.array([[0.137, -0.713], [-0.551, 0.318], [0.862, 0.907], [-0.934, -0.269]])  # points that are no nodes
+LARGEST = 12  # states
+SERVED = frozenset({"multiplier_re", "multiplier_im", "spectral_radius", "exponent", "period", "krein", "crossing",
+                    "verdict"})  # fmt: skip
+_ONE_AT_A_TIME = threading.Lock()
+
+
+@dataclass(frozen=True)
+class Axis:
+    """An axis of the map: the parameter's number, the number of points, the least and the greatest."""
+
+    column: int
+    number: int
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Map:
+    """What series are made for: they are the same for equal maps. `fixed`: values of all parameters."""
+
+    system: object
+    structure: str
+    rtol: float
+    asked: tuple[bool, ...]
+    axes: tuple[Axis, ...]
+    fixed: tuple[float, ...]
+
+    @property
+    def paired(self):
+        """Is 1 / conj(l) a multiplier with l?"""
+        return self.structure != "none"
+
+    def points(self, *x):
+        """Points (N, parameters) at positions of the axes."""
+        out = np.tile(np.array(self.fixed), (len(x[0]), 1))
+        for axis, values in zip(self.axes, x, strict=True):
+            out[:, axis.column] = values
+        return out
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A part of the map: middles and radii of its sides, series (n1, K n2), their bounds, and roots at the nodes."""
+
+    middle: tuple[float, ...]
+    radius: tuple[float, ...]
+    series: np.ndarray
+    doubts: np.ndarray
+    starts: np.ndarray
+
+
+def flags(wanted):
+    """What the kernel is asked for (see `kernels.floquet.characteristic`), by names of outputs."""
+    groups = ({"multiplier_re", "multiplier_im"}, {"spectral_radius", "exponent"}, {"verdict"}, {"crossing"}, {"krein"})
+    return tuple(bool(group & wanted) for group in groups)
+
+
+def axes_of(lines):
+    """The Axes of a map that series may serve, from {column: (number, low, high)}: two at most, the longest."""
+    some = [Axis(column, *line) for column, line in lines.items() if line[0] >= SMALLEST and line[2] > line[1]]
+    return tuple(sorted(sorted(some, key=lambda a: (-a.number, a.column))[:2], key=lambda a: a.column))
+
+
+def serves(system, structure, wanted, lines):
+    """May series answer the points?"""
+    paired_odd = structure != "none" and system.n % 2
+    return wanted <= SERVED and system.n <= LARGEST and not paired_odd and bool(axes_of(lines))
+
+
+def solve(system, structure, points, rtol, wanted, lines, answer):
+    """Answer the points (..., parameters) of a block that series serve; returns those (N, bool) still to be solved.
+
+    `points` has the block's axes first; a parameter in `lines` varies along one of them.
+    """
+    axes, shape = axes_of(lines), points.shape[:-1]
+    index, along = np.arange(np.prod(shape)).reshape(shape), []
+    for axis in axes:
+        own = points[..., axis.column]
+        varies = [k for k in range(len(shape)) if (own.take(0, k) != own.take(-1, k)).any()]
+        along.append(varies[0] if varies else None)
+    for k in along:
+        index = index[..., None] if k is None else index
+    moved = [k if k is not None else len(shape) + along[:i].count(None) for i, k in enumerate(along)]
+    index = np.moveaxis(index, moved, range(-len(axes), 0))
+    index = index.reshape(-1, *index.shape[-len(axes) :])
+    flat, left = points.reshape(-1, points.shape[-1]), np.ones(index.size, bool)
+    for own in index:
+        own = own.reshape(len(own), -1) if len(axes) == 2 else own.reshape(1, -1)
+        fixed = flat[own[0, 0]].copy()
+        fixed[[axis.column for axis in axes]] = 0.0
+        if not np.isfinite(fixed).all():
+            continue
+        key = Map(system, structure, rtol, flags(wanted), axes, tuple(fixed))
+        with _ONE_AT_A_TIME:
+            found = panels(key)
+        rows = flat[own[:, 0], axes[0].column] if len(axes) == 2 else np.zeros(1)
+        columns = flat[own[0], axes[-1].column]
+        free = np.ones(own.shape, bool)
+        for panel in found:
+            x, y = (_scaled(values, panel, k) for k, values in ((0, rows), (-1, columns)))
+            if len(axes) == 1:
+                x = np.zeros(1)
+            inside = np.flatnonzero(abs(x) <= 1.0), np.flatnonzero(abs(y) <= 1.0)
+            if not (inside[0].size and inside[1].size):
+                continue
+            _answer(key, panel, x[inside[0]], y[inside[1]], own[np.ix_(*inside)], answer)
+            free[np.ix_(*inside)] = False
+        left[own[~free]] = False
+    left |= answer.missed
+    return left
+
+
+def _scaled(values, panel, side):
+    """Positions from -1 to 1; at an end rounding may leave it by what the bounds allow for."""
+    x = (values - panel.middle[side]) / panel.radius[side]
+    return np.where(abs(x) <= 1.0 + 4 * EPS, np.clip(x, -1.0, 1.0), x)
+
+
+def _answer(key, panel, x, y, places, answer):
+    """Answer the points of a panel at x (rows), y (columns), between -1 and 1."""
+    n1, K = len(panel.series), len(panel.doubts)
+    n2 = panel.series.shape[1] // K
+    lanes = characteristic.LANES
+    table = np.zeros((n2, -(-y.size // lanes) * lanes))
+    table[0, : y.size], table[1, : y.size] = 1.0, y
+    for k in range(2, n2):
+        table[k] = 2.0 * table[1] * table[k - 1] - table[k - 2]
+    near = np.concatenate([_nearest(x, n1), _nearest(y, n2)])
+    characteristic.answer(
+        panel.series, panel.doubts, np.ascontiguousarray(x), table, near, panel.starts, np.ascontiguousarray(places),
+        key.system.n, key.paired, np.array(key.asked), key.rtol, answer.floats, answer.signs,
+        answer.verdict, answer.crossing, answer.missed,
+    )  # fmt: skip
+
+
+def _nearest(x, n):
+    """The number of the node nearest to x in its angle."""
+    return np.clip((np.arccos(np.clip(x, -1.0, 1.0)) * (n / np.pi)).astype(np.int64), 0, n - 1)
+
+
+@lru_cache(maxsize=32)
+def panels(key):
+    """The Panels of a Map, in which its points are looked for in this order: the same for all blocks."""
+    number = [axis.number for axis in key.axes]
+    budget = float(np.prod(number)) / POINTS_PER_NODE
+    left, found = [(tuple((axis.low, axis.high) for axis in key.axes), 0)], []
+    while left:
+        sides, depth = left.pop(0)
+        share = [n * (b - a) / (axis.high - axis.low) for n, (a, b), axis in zip(number, sides, key.axes, strict=True)]
+        made, spent, cut = _panel(key, sides, min(budget, float(np.prod(share)) / POINTS_PER_NODE))
+        budget -= spent
+        if made is not None:
+            found.append(made)
+        elif cut is not None and depth < MOST_DEEP:
+            low, high = sides[cut]
+            for one in ((low, 0.5 * (low + high)), (0.5 * (low + high), high)):
+                left.append(((*sides[:cut], one, *sides[cut + 1 :]), depth + 1))
+    return tuple(found)
+
+
+def _panel(key, sides, budget):
+    """(the Panel or None, points solved, the side to be cut or None) of a part of the map, within a budget."""
+    middle = tuple(0.5 * (a + b) for a, b in sides)
+    radius = tuple(0.5 * (b - a) for a, b in sides)
+    degrees, spent = _degrees(key, middle, radius, budget)
+    if degrees is None:
+        return None, spent, None
+    longest = int(np.argmax(degrees))
+    if degrees[longest] > DEGREES[-1]:
+        return None, spent, longest
+    sizes = [int(DEGREES[np.searchsorted(DEGREES, n)]) for n in degrees]
+    if spent + np.prod(sizes) > budget:
+        return None, spent, None
+    x = np.stack(np.meshgrid(*map(chebyshev.symmetric_nodes, sizes), indexing="ij"), axis=-1).reshape(-1, len(sizes))
+    tried = TRIED[:, : len(sizes)]
+    known = _coefficients(key, middle, radius, np.concatenate([x, tried]))
+    spent += len(x) + len(tried)
+    if known is None:
+        return None, spent, None
+    values, bars = known
+    panel = _expanded(key, middle, radius, sizes, values[: len(x)], bars[: len(x)])
+    if panel is None:
+        return None, spent, longest
+    served = _served(key, panel, x)
+    if served < MOST or not _holds(panel, tried, values[len(x) :], bars[len(x) :]):
+        # what varies most is cut: the size of the coefficients, or what they need
+        nodes_alone = replace(panel, doubts=np.median(bars[: len(x)], axis=0))
+        hopeless = _served(key, nodes_alone, x) < LEAST
+        return None, spent, None if hopeless else _steepest(sizes, values[: len(x)])
+    return panel, spent, None
+
+
+def _degrees(key, middle, radius, budget):
+    """The number of nodes that each side asks for, beyond DEGREES if none is enough; and the points solved."""
+    sides = len(middle)
+    ends = [np.zeros(1)] if sides == 1 else [np.array([-1.0, 0.1, 1.0])]
+    if PROBED * sides * len(ends[0]) > budget:
+        return None, 0
+    x, needed = chebyshev.symmetric_nodes(PROBED), []
+    lines = [np.stack([x if k == side else np.full(PROBED, end) for k in range(sides)], axis=1)
+             for side in range(sides) for end in ends[0]]  # fmt: skip
+    known = _coefficients(key, middle, radius, np.concatenate(lines))
+    if known is None:
+        return None, len(lines) * PROBED
+    values, bars = (part.reshape(sides, -1, PROBED, part.shape[1]) for part in known)
+    for side in range(sides):
+        most = 0
+        for line, bar in zip(values[side], bars[side], strict=True):
+            series = abs(chebyshev.by_columns(PROBED).T @ line)
+            noise = np.maximum(4.0 * bar.max(axis=0), 1e-15 * abs(line).max(axis=0))
+            noise = np.maximum(noise, 1e-3 * key.rtol * (1.0 + abs(line).min(axis=0)))
+            most = max(most, 1 + int(np.flatnonzero((series > noise).any(axis=1)).max(initial=0)))
+        needed.append(most + 4 if most < PROBED - 4 else 10 * PROBED)
+    return np.array(needed), len(lines) * PROBED
+
+
+def _coefficients(key, middle, radius, x):
+    """Coefficients (N, K) of the polynomial at x (N, sides) on a panel, and their bounds; None if there are none."""
+    points = key.points(*(m + r * x[:, k] for k, (m, r) in enumerate(zip(middle, radius, strict=True))))
+    if not key.system.smooth(points[0]):
+        return None
+    with np.errstate(all="ignore"):
+        own = monodromy.Points(key.system, points)
+        if not own.valid.all() or len(own.groups) != 1 or not all(p.analytic for p in own.groups[0][1]):
+            return None
+        every, n = np.arange(len(points)), key.system.n
+        out = np.empty((2, len(points), n // 2 * (2 if key.structure == "symplectic" else 1) if key.paired else n))
+
+        def finish(some, matrices, scale, *steps_of):
+            out[:, some] = coefficients(matrices.M, matrices.E, scale, key.structure, steps_of)
+
+        monodromy.solve(own, monodromy.method_of("auto"), BEST, np.ones(len(points)), every, finish)
+    return out if np.isfinite(out).all() else None
+
+
+def coefficients(M, E, scale, structure, steps_of):
+    """Those of the polynomial but its first, 1, from the highest power on (N, K), and their bounds.
+
+    M (N, n, n) are known within E, in the units `scale` (N, n) of the states; `steps_of`: see `monodromy.solve`. For
+    p(l) = l^n + c_1 l^(n-1) + ... dc_k = -tr(B_(k-1) dM). c_k comes from B_(k-1), or, where rounding asks for it, from
+    the computed eigenvalues, which are those of a matrix within 8 n EPS |M| of M.
+    """
+    N, n = M.shape[:2]
+    m, one = n // 2, np.eye(n)
+    size, near = abs(M), 8 * n * EPS * np.sqrt((M * M).sum(axis=(1, 2)))
+    own = np.linalg.eigvals(M).astype(complex)
+    c, moduli = np.zeros((N, n + 1), complex), np.zeros((N, n + 1))
+    c[:, 0] = moduli[:, 0] = 1.0
+    for i in range(n):
+        c[:, 1 : i + 2] -= own[:, i, None] * c[:, : i + 1]
+        moduli[:, 1 : i + 2] += abs(own[:, i, None]) * moduli[:, : i + 1]
+    c, bars, kept = c.real.copy(), 4 * n * EPS * moduli, n if structure == "none" else m
+    B, off, wide = np.broadcast_to(one, M.shape).copy(), np.zeros_like(M), np.zeros_like(M)
+    found, form = np.empty((N, kept, n, n)), np.zeros((2, N, n))  # form: tr(B_k J)
+    J = np.zeros((n, n))
+    J[:m, n - m :], J[n - m :, :m] = np.eye(m), -np.eye(m)
+    J = J * (scale[:, None, :] / scale[:, :, None])
+    for k in range(1, n + 1):
+        # off: rounding of B; wide: the same, and what the error of M does to it
+        MB, tall = M @ B, size @ abs(B)
+        off, wide = size @ off + n * EPS * tall, size @ wide + E @ abs(B) + n * EPS * tall
+        direct, doubt = (
+            -np.trace(MB, axis1=1, axis2=2) / k,
+            np.trace(off, axis1=1, axis2=2) / k + n * EPS * abs(np.trace(MB, axis1=1, axis2=2)),
+        )
+        bars[:, k] += near * abs(B).sum(axis=(1, 2))
+        sharper = doubt < bars[:, k]
+        c[:, k], bars[:, k] = np.where(sharper, direct, c[:, k]), np.where(sharper, doubt, bars[:, k])
+        if k <= kept:
+            found[:, k - 1] = B
+        B = MB + c[:, k, None, None] * one
+        off = off + (bars[:, k] + EPS * abs(c[:, k]))[:, None, None] * one
+        wide = wide + (bars[:, k] + n * (abs(B) * np.swapaxes(E, 1, 2)).sum(axis=(1, 2)))[:, None, None] * one
+        if structure == "symplectic" and k < n:
+            form[0, :, k] = (B * np.swapaxes(J, 1, 2)).sum(axis=(1, 2))
+            form[1, :, k] = (wide * abs(np.swapaxes(J, 1, 2))).sum(axis=(1, 2))
+    more = np.empty((N, kept))
+    steps.gradients(*steps_of, np.ascontiguousarray(found), more)
+    c, bars = c[:, : kept + 1], bars[:, : kept + 1]
+    bars[:, 1:] += 1.001 * more
+    if structure == "none":
+        return c[:, 1:], bars[:, 1:]
+    values, doubts = _in_sums(c[:, ::-1], bars[:, ::-1], m)
+    if structure == "symplectic":
+        forms = _in_sums(form[0, :, m:0:-1], form[1, :, m:0:-1], m - 1)
+        return np.concatenate([values[:, 1:], forms[0]], axis=1), np.concatenate([doubts[:, 1:], forms[1]], axis=1)
+    return values[:, 1:], doubts[:, 1:]
+
+
+def _in_sums(c, bars, m):
+    """The sum of c_j (l^j + l^-j), c_0 once, as a polynomial of s = l + 1 / l, highest power first, and bounds."""
+    change = _sums(m)
+    return (c @ change)[:, ::-1], ((bars + 4 * EPS * abs(c)) @ abs(change))[:, ::-1]
+
+
+@lru_cache
+def _sums(m):
+    """Row j: l^j + l^-j (1 for j = 0) as a polynomial of s = l + 1 / l, from the constant term on (m + 1, m + 1)."""
+    rows = np.zeros((m + 1, m + 1))
+    before, own = np.zeros((2, m + 1))
+    before[0] = 2.0
+    rows[0, 0] = 1.0
+    if m:
+        own[1] = rows[1, 1] = 1.0
+    for j in range(2, m + 1):
+        before, own = own, np.roll(own, 1) - before
+        rows[j] = own
+    return rows
+
+
+def _expanded(key, middle, radius, sizes, values, bars):
+    """The Panel of values (nodes, K) at the nodes; None if a bound is not finite."""
+    K = values.shape[1]
+    ulps = [(4 + abs(m) + r) / r for m, r in zip(middle, radius, strict=True)]
+    n1, n2 = sizes if len(sizes) == 2 else (1, sizes[0])
+    series, doubts = np.empty((n1, K, n2)), np.empty(K)
+    for k in range(K):
+        grid = values[:, k].reshape(n1, n2)
+        own, doubt = chebyshev.expand(grid, chebyshev.by_columns(n2), ulps[-1])
+        total = doubt.max() + chebyshev.lebesgue(n2) * bars[:, k].max()
+        if n1 > 1:
+            own, tail = chebyshev.transform(own, chebyshev.by_columns(n1), ulps[0])
+            total = tail + chebyshev.lebesgue(n1) * total
+        series[:, k], doubts[k] = own, total
+    if not np.isfinite(doubts).all():
+        return None
+    d = key.system.n // (2 if key.paired else 1)
+    companion = np.zeros((len(values), d, d))
+    companion[:, 0] = -values[:, :d]
+    companion[:, np.arange(1, d), np.arange(d - 1)] = 1.0
+    roots = np.linalg.eigvals(companion)
+    starts = np.stack([roots.real, roots.imag], axis=-1).reshape(n1, n2, d, 2)
+    return Panel(middle, radius, series.reshape(n1, K * n2), doubts, np.ascontiguousarray(starts))
+
+
+def _served(key, panel, x):
+    """The share of positions x that the panel answers as asked."""
+    n1 = len(panel.series)
+    rows = x[:, 0].reshape(n1, -1)[:, 0] if x.shape[1] == 2 else np.zeros(1)
+    columns = x[:, -1].reshape(n1, -1)[0]
+    answer = Answers(len(x), key.system.n)
+    _answer(key, panel, rows, columns, np.arange(len(x)).reshape(rows.size, columns.size), answer)
+    return 1.0 - answer.missed.mean()
+
+
+def _holds(panel, x, values, bars):
+    """Are the series within their bounds where points were solved on their own?"""
+    K = len(panel.doubts)
+    series = panel.series.reshape(len(panel.series), K, -1)
+    for at, value, bar in zip(x, values, bars, strict=True):
+        one = np.cos(np.arange(series.shape[2]) * np.arccos(at[-1]))
+        two = np.cos(np.arange(len(series)) * np.arccos(at[0])) if len(series) > 1 else np.ones(1)
+        off = abs(np.einsum("i,ikj,j->k", two, series, one) - value)
+        if not (off <= panel.doubts + bar).all():
+            return False
+    return True
+
+
+def _steepest(sizes, values):
+    """The side along which the coefficients' size varies most, or that has the more nodes."""
+    if len(sizes) == 1:
+        return 0
+    size = np.log(1.0 + abs(values).max(axis=1)).reshape(sizes)
+    spread = [np.ptp(size, axis=k).max() for k in range(2)]
+    if max(spread) > 1.0 + min(spread):
+        return int(np.argmax(spread))
+    return int(np.argmax(sizes))

@@ -1,0 +1,145 @@
+"""x' = f(t, x, p) of a user: its operations and those of df/dx, recorded once, and its flow."""
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from survey.kernels.floquet.flow import ORDER, flow
+from survey.kernels.math.roundoff import ROUNDOFF
+from survey.measures.floquet import trace
+from survey.measures.floquet.system import KEPT, Raised
+from survey.measures.floquet.trace import Graph, Unsupported
+
+MOST_STEPS = 2_000  # of an orbit
+LOCK = threading.Lock()
+
+
+@dataclass(frozen=True, eq=False)
+class Equation:
+    """x' = f(t, x, p) of n states. `period` is a value, a function of p, or None; `start` a value or a function of p,
+    the n states, and a guess of the period after them if `period` is None.
+    """
+
+    f: Callable
+    n: int
+    period: float | Callable | None
+    start: tuple | Callable
+    _traces: list = field(default_factory=list, repr=False)
+
+    @property
+    def free(self):
+        """Is the period unknown?"""
+        return self.period is None
+
+    def begin(self, points):
+        """Guesses of the state (N, n) and of the period (N), which is what it is where it is known."""
+        guess = np.array([self._row("START(p)", self.start, p, self.n + self.free) for p in points])
+        if self.free:
+            return guess[:, :-1], guess[:, -1]
+        return guess, self.periods(points)
+
+    def periods(self, points):
+        """The periods (N) of a system that depends on t."""
+        return np.array([self._row("PERIOD(p)", self.period, p, 1)[0] for p in points])
+
+    def _row(self, name, value, p, size):
+        try:
+            row = np.atleast_1d(np.asarray(value(p) if callable(value) else value, dtype=float))
+        except Exception as error:
+            raise Raised(name) from error
+        if row.shape != (size,):
+            what = "the states and a guess of the period" if size > self.n else "the states" if size > 1 else "a number"
+            raise Unsupported(f"{name} returns {row.shape} numbers, not {size}: {what}")
+        return row
+
+    def traced(self, points, x0):
+        """[(indices, Programs)] of the points; raises Unsupported or Raised."""
+        left, found = np.arange(len(points)), []
+        with LOCK:
+            known = list(self._traces)
+        zero = np.zeros(len(points))
+        while left.size:
+            for programs in known:
+                inside = programs.A.holds(points[left], zero[left], zero[left] + 1.0) == 1
+                if inside.any():
+                    found.append((left[inside], programs))
+                    left = left[~inside]
+            if not left.size:
+                break
+            known = [self._trace(points[left[0]], x0[left[0]])]
+            with LOCK:
+                self._traces.extend(known)
+                del self._traces[:-KEPT]
+            if known[0].A.holds(points[left[:1]], zero[:1], zero[:1] + 1.0)[0] != 1:  # on the very edge of a branch
+                found.append((left[:1], known[0]))
+                left = left[1:]
+        return found
+
+    def _trace(self, point, x0):
+        graph, n = Graph([float(x) for x in point], 0.25), self.n
+        x, out = np.empty(n, dtype=object), np.zeros(n, dtype=object)
+        for k in range(n):
+            x[k] = graph.state(graph.number("parameter", len(point) + k), float(x0[k]))
+        states = [graph.single(x[k]) for k in range(n)]
+        try:
+            value = trace.lifted(self.f)(graph.time, x, graph.parameters, out)
+            out = out if value is None else np.array(value, dtype=object)
+        except Unsupported as error:
+            raise Unsupported(f"f(t, x, p, out): {error}") from None
+        except ArithmeticError as error:
+            raise Unsupported(f"f(t, x, p, out): {error}, while its operations are recorded") from None
+        except Exception as error:
+            raise Raised("f(t, x, p, out)") from error
+        if out.shape != (n,):
+            raise Unsupported(f"f(t, x, p, out) returns an array of shape {out.shape}, not {(n,)}")
+        if not all(symbol.is_number for symbol, _yes in (*graph.guards, *graph.equalities)):
+            raise Unsupported("f(t, x, p, out): a branch depends on t or on a state (abs and maximum are branches)")
+        rows = [graph.lift(out[i]) for i in range(n)]
+        graph.flow.update(zip(states, rows, strict=True))
+        slopes = {(i, j): graph.slope(rows[i], state) for i in range(n) for j, state in enumerate(states)}
+        places = [graph.series[state][1] for state in states]
+        A = graph.compiled({at: symbol for at, symbol in slopes.items() if symbol is not None})
+        if self.free and trace.TIME in A.order:
+            raise Unsupported("f(t, x, p, out) depends on t, so that PERIOD must be given")
+        f = graph.compiled({(i, 0): row for i, row in enumerate(rows)})
+        return Programs(A, f, np.array(places))
+
+
+@dataclass(frozen=True, eq=False)
+class Programs:
+    """A = df/dx and f (in column 0) as `trace.Program`s; `places` of the states among the numbers."""
+
+    A: trace.Program
+    f: trace.Program
+    places: np.ndarray
+
+    def numbers(self, points):
+        """Values and error bounds of the numbers at the points; those of the states are 0."""
+        values, errors = self.A.numbers(np.concatenate([points, np.zeros((len(points), len(self.places)))], axis=1))
+        errors[:, self.places] = 0.0
+        return values, errors
+
+    def flow(self, numbers, x0, span, reach, derived=True, first=None, most=MOST_STEPS, tolerance=ROUNDOFF):
+        """States at `span`, dX/dx0, largest states and numbers of steps; if `first` is given, steps and series."""
+        N, n = x0.shape
+        X, M, size, steps = np.full((N, n), np.nan), np.zeros((N * derived, n, n)), np.empty((N, n)), np.zeros(N, int)
+        total = 0 if first is None else first[-1]
+        recorded = np.empty(total), np.empty(total), np.empty((total, n, ORDER + 1))
+        A = self.A
+        flow(
+            A.operations, A.signs, A.inside, A.order, A.used, A.terms, np.ascontiguousarray(numbers[0]), self.places,
+            np.ascontiguousarray(x0), np.ascontiguousarray(span), reach, tolerance, most,
+            np.zeros(0, int) if first is None else first, X, M, size, steps, *recorded,
+        )  # fmt: skip
+        return (X, M, size, steps) if first is None else (X, *recorded)
+
+    def slopes(self, numbers, t, x, width=0.0):
+        """f (N, n) at states x (N, n), known to within `width`, and its bounds."""
+        out = self.along(self.f, numbers, t[:, None], x[:, :, None], np.broadcast_to(width, x.shape)[:, :, None])
+        return tuple(one[:, 0, :, 0] for one in out)
+
+    def along(self, program, numbers, t, x, width):
+        """A program's values (N, m, n, n) at times t (N, m), states x (N, n, m) known to within `width`, and bounds."""
+        return program.at(t, t, x.shape[1], numbers, (x.swapaxes(0, 1), width.swapaxes(0, 1)))

@@ -1,0 +1,63 @@
+"""The curves that [boundaries] draws on maps of mu and e of the elliptic problem: Danby's A and B, and KC.
+
+On A and B a pair of multipliers meets at -1, on KC two pairs of unlike kind meet on the unit circle: zeros of the
+half-period factors A and B, and of K where 0 < t < 2 (`scenes/libration_elliptic.md`, section 3). They are searched for
+on LINES lines of the map each way, and every point is bracketed on its line by certain signs.
+"""
+
+import numpy as np
+
+from survey.kernels.libration.traces import discriminant, product
+from survey.measures import contours
+from survey.measures.libration import danby
+from survey.measures.sampled import joined
+
+CLASSES = {"A": 0, "B": 1, "KC": 2}
+TITLE = "curve of Danby's diagram: multipliers meet at -1 (A, B), or two pairs on the unit circle (KC)"
+AXES = ("mu", "e")
+ALONG = ()
+LINES = 129
+
+
+def refusal(axes, scene):
+    """Why there are no curves on a map of these axes, in words; None if there are."""
+    if scene.FAMILY == "danby" and set(axes) == set(AXES) and len(axes) == 2:
+        return None
+    return f"curves are known on the axes mu and e of libration_elliptic, not on {', '.join(axes) or 'none'}"
+
+
+def closed(square, axes, fixed, options):
+    """The Curves on the map of `axes`, the unit square `square`."""
+    found = []
+    for name, code in CLASSES.items():
+
+        def on_map(x, name=name):
+            here = dict(zip(axes, square.parameters(x).T, strict=True))
+            return _function(name, here["e"], here["mu"])
+
+        for x, error in contours.lines(on_map, square.grain, LINES):
+            found.append((code, square.parameters(x), error, {}))
+    return joined(found, [])
+
+
+def seconds(axes):
+    """Estimated seconds on one thread of the curves on one map, measured; or along one axis alone."""
+    return 1.0 if len(axes) > 1 else 0.4
+
+
+def _function(name, e, mu):
+    """(values, bars) of the function that vanishes on the curve, at points (N); NaN where it means something else."""
+    out, bars = np.full((2, e.size), np.nan)
+    inside = (mu > 0.0) & (mu <= 0.5) & (e >= 0.0) & (e < 1.0)
+    if not inside.any():
+        return out, bars
+    values, errors = danby.factors(e[inside], mu[inside])
+    (a, b, c, d, t), (ea, eb, ec, ed, et) = values.T, errors.T
+    if name == "KC":
+        (ab, ab_bar), (cd, cd_bar) = product.py_func(a, b, ea, eb), product.py_func(c, d, ec, ed)
+        k, k_bar = np.vectorize(discriminant)(t, ab, cd, et, ab_bar, cd_bar)
+        on_circle = (t > 0.0) & (t < 2.0)
+        out[inside], bars[inside] = np.where(on_circle, k, np.nan), k_bar
+    else:
+        out[inside], bars[inside] = (a, ea) if name == "A" else (b, eb)
+    return out, bars

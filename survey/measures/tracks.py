@@ -1,0 +1,266 @@
+"""Curves on a map on which something that moves with the parameters is exceptional: followed point by point.
+
+A system gives, at a position of the map and a place x, two numbers (a, b) and their error bounds: b = 0 says where the
+thing is (an extremum, an equilibrium), a = 0 that the position lies on the curve. The curve is followed in the space of
+(x, position), where it has no cusps, by steps along its tangent and Newton's method. Each of its points is bracketed,
+across the curve, by positions at which a has certain and opposite signs where b = 0. Positions are those of
+`survey.measures.square`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from survey.measures.contours import runs
+from survey.measures.sampled import FLAT, LONGEST, inside
+
+STEP = 1e-5  # of differences, in units of the map and of x
+FURTHEST = 0.4  # change of x over one step
+LEAST, MOST = 3e-5, 2000  # step on the map at which a curve is given up, and points of a curve
+SLOW = 12  # points that have not come further than as many of the LEAST steps end a curve
+SAME = np.array([0.05, 3e-4, 3e-4])  # of x and of the map: curves so near to one another are one
+WIDEST = 1e-6  # error of a point that is kept
+TINY = 1e-300
+
+
+@dataclass(frozen=True)
+class Track:
+    """Points of a curve: positions (m, 2) with their errors, places x with theirs; which of them are certain."""
+
+    x: np.ndarray
+    error: np.ndarray
+    place: np.ndarray
+    place_error: np.ndarray
+    sure: np.ndarray
+
+    def certain(self):
+        """The runs of points that are certain."""
+        return [replace_all(self, part) for part in runs(self.sure)]
+
+    def passes(self, u):
+        """Does the curve pass u = (x, position)?"""
+        points = np.column_stack([self.place, self.x])
+        if len(points) < 2:
+            return False
+        low, chord = points[:-1], np.diff(points, axis=0)
+        share = np.clip(((u - low) * chord).sum(axis=1) / np.maximum((chord * chord).sum(axis=1), TINY), 0.0, 1.0)
+        return bool((abs(low + share[:, None] * chord - u) < SAME).all(axis=1).any())
+
+    def within(self, other):
+        """Does nearly all of this curve lie on the other?"""
+        points = np.column_stack([self.place, self.x])
+        return np.mean([other.passes(u) for u in points]) > 0.9
+
+
+def replace_all(track, part):
+    """The points `part` of a Track."""
+    return Track(*(getattr(track, name)[part] for name in Track.__dataclass_fields__))
+
+
+@dataclass(frozen=True)
+class Follower:
+    """Follows the curve a = b = 0 of the function (place, position) -> (a, b, bar of a, bar of b)."""
+
+    function: Callable
+    grain: float
+
+    def _at(self, u):
+        return np.array(self.function(u[0], u[1:]), dtype=float)
+
+    def _slopes(self, u):
+        """The derivatives of a and b by x and by the position (2, 3)."""
+        ends = [[self._at(u + side * STEP * axis)[:2] for side in (1.0, -1.0)] for axis in np.eye(3)]
+        return np.array([(high - low) / (2.0 * STEP) for high, low in ends]).T
+
+    def landed(self, u):
+        """The point of the curve next to u, and the slopes there; None if it is not found."""
+        for _ in range(12):
+            values, slopes = self._at(u), self._slopes(u)
+            if not (np.isfinite(values).all() and np.isfinite(slopes).all()):
+                return None
+            step = -np.linalg.pinv(slopes) @ values[:2]
+            size = max(abs(step[0]) / FURTHEST, np.hypot(*step[1:]) / 0.1)
+            u = u + step / max(size, 1.0)
+            if abs(step).max() < 1e-9:
+                return u, slopes
+        return None
+
+    def _corrected(self, u, tangent):
+        """As `landed`, within the plane across the tangent."""
+        start, slopes = u, self._slopes(u)
+        if not np.isfinite(slopes).all():
+            return None
+        for _ in range(8):
+            values = self._at(u)
+            whole = np.vstack([slopes, tangent])
+            if not np.isfinite(values).all() or abs(np.linalg.det(whole)) < TINY:
+                return None
+            step = np.linalg.solve(whole, -np.array([*values[:2], tangent @ (u - start)]))
+            u = u + step
+            if abs(step).max() > 0.5:
+                return None
+            if abs(step).max() < 1e-9:
+                slopes = self._slopes(u)
+                return (u, slopes) if np.isfinite(slopes).all() else None
+        return None
+
+    def track(self, u):
+        """The Track through the point next to u on the map, or None."""
+        found = self.landed(u)
+        if found is None or not inside(found[0][None, 1:])[0]:
+            return None
+        ahead, closed = self._half(found, 1.0)
+        back = [] if closed else self._half(found, -1.0)[0]
+        rows = [*back[::-1], self._row(*found, None), *ahead]
+        x, error, place, spread, sure = map(np.array, zip(*rows, strict=True))
+        return Track(x, error, place, spread, sure)
+
+    def _half(self, found, sense):
+        """The rows after the first point to one side, and whether the curve closes."""
+        (u, slopes), rows, step = found, [], 0.25 * LONGEST
+        first, tangent = u, sense * _tangent(slopes)
+        while len(rows) < MOST and step > LEAST:
+            new = self._corrected(u + step * tangent, tangent)
+            ahead = None if new is None else _tangent(new[1])
+            if ahead is not None:
+                ahead = ahead if ahead @ tangent > 0.0 else -ahead
+            if ahead is None or not _near(u, tangent, new[0], ahead):
+                step *= 0.5
+                continue
+            if not inside(new[0][None, 1:])[0]:
+                end = self._border(u, new[0])
+                return rows + ([end] if end else []), False
+            rows.append(self._row(*new, None))
+            moved = np.linalg.norm(new[0] - u)
+            if len(rows) > 3 and np.linalg.norm(new[0] - first) < moved and abs(ahead @ _tangent(found[1])) > 0.9:
+                return [*rows, self._row(*found, None)], True
+            u, tangent, step = new[0], ahead, 1.5 * step
+            if len(rows) > SLOW and np.hypot(*(u[1:] - rows[-SLOW][0])) < SLOW * LEAST:
+                break
+        return rows, False
+
+    def _border(self, u, beyond):
+        """The row of the point on the map's border between u, inside, and the point beyond."""
+        low, high = u[1:], beyond[1:]
+        run = np.where(high == low, 1.0, high - low)
+        share = np.where(high > 1.0, (1.0 - low) / run, np.where(high < 0.0, -low / run, 1.0))
+        axis = int(np.argmin(share))
+        at, end = u + share[axis] * (beyond - u), float(high[axis] > 1.0)
+        for _ in range(8):
+            at[1 + axis] = end
+            values, slopes = self._at(at), self._slopes(at)
+            part = slopes[:, [0, 2 - axis]]
+            if not (np.isfinite(values).all() and np.isfinite(part).all()) or np.linalg.det(part) == 0.0:
+                return None
+            step = np.linalg.solve(part, -values[:2])
+            at[[0, 2 - axis]] += step
+            if abs(step).max() > 0.5:
+                return None
+            if abs(step).max() < 1e-9:
+                return self._row(at, slopes, 1 - axis) if inside(at[None, 1:])[0] else None
+        return None
+
+    def _row(self, u, slopes, axis):
+        """(position, its error, place, its error, is it certain?), bracketed across the curve or along the `axis`."""
+        (a_x, *a_y), (b_x, *b_y) = slopes
+        a_y, b_y, x = np.array(a_y), np.array(b_y), u[1:].copy()
+        lost = x, np.nan, u[0], np.nan, False
+        if not abs(b_x) > 0.0:
+            return lost
+        across = a_y - a_x * b_y / b_x
+        normal = across / max(np.hypot(*across), TINY) if axis is None else np.eye(2)[axis]
+        steep = abs(across @ normal)
+        _a, b, bar, b_bar = self._at(u)
+        if not steep > 0.0 or not self._crosses(u, b_bar / abs(b_x)):
+            return lost
+        width = 2.0 * (bar + abs(a_x / b_x) * b_bar) / steep + 4.0 * self.grain
+        while width < WIDEST:
+            sides = [self._sign(u, side * width * normal, b_y, a_x, b_x) for side in (1.0, -1.0)]
+            if sides[0] * sides[1] < 0.0:
+                spread = 1.5 * (abs(b) + b_bar) / abs(b_x) + abs(b_y / b_x) @ np.full(2, width)
+                return x, width + self.grain, u[0], spread, True
+            width *= 3.0
+        return lost
+
+    def _crosses(self, u, width):
+        """Does b change its sign at u beyond its error bound?"""
+        width = max(10.0 * width, 1e-9 * (1.0 + abs(u[0])))
+        while width < 0.1:
+            (_, low, _, low_bar), (_, high, _, high_bar) = (
+                self._at(u + np.array([side * width, 0.0, 0.0])) for side in (-1.0, 1.0)
+            )
+            if low * high < 0.0 and abs(low) > low_bar and abs(high) > high_bar:
+                return True
+            width *= 10.0
+        return False
+
+    def _sign(self, u, step, b_y, a_x, b_x):
+        """The sign of a where b = 0, beside u; 0 where it is open."""
+        x = u[0] - b_y @ step / b_x
+        for last in (False, True):
+            a, b, bar, b_bar = self.function(x, u[1:] + step)
+            if last:
+                bar += abs(a_x / b_x) * (abs(b) + b_bar) + b * b / abs(b_x)
+                return np.sign(a) if abs(a) > bar else 0.0
+            x -= b / b_x
+        return 0.0
+
+
+def _tangent(slopes):
+    """The direction of the curve in (x, position)."""
+    along = np.cross(*slopes)
+    return along / max(np.linalg.norm(along), TINY)
+
+
+def _near(u, tangent, new, ahead):
+    """Is the chord from u to the new point short and flat enough?"""
+    chord = np.hypot(*(new - u)[1:])
+    one, two = tangent[1:], ahead[1:]
+    bend = abs(one[0] * two[1] - one[1] * two[0]) / max(np.hypot(*one) * np.hypot(*two), TINY)
+    turned = one @ two < 0.0  # a cusp of the curve on the map
+    flat = chord * bend <= 8.0 * FLAT or chord <= FLAT
+    return chord <= 2.0 * LONGEST and abs(new[0] - u[0]) <= FURTHEST and ahead @ tangent > 0.9 and flat and (
+        not turned or chord <= 1e-3)  # fmt: skip
+
+
+def from_lattice(number, things, function_of, grain):
+    """[(label, Track)] of all curves that part the nodes of a lattice of so many lines each way.
+
+    things(position) -> [(label, side, place, a)] where b = 0; function_of(label): what a Follower takes. A curve is
+    begun where, from one node to the next, a changes its sign on things of one label and side that are near.
+    """
+    ticks = np.linspace(0.0, 1.0, number)
+    known = [[things(np.array([one, two])) for two in ticks] for one in ticks]
+    found = []
+    for i in range(number):
+        for j in range(number):
+            for k, m in ((i + 1, j), (i, j + 1)):
+                if k < number and m < number:
+                    here, there = np.array([ticks[i], ticks[j]]), np.array([ticks[k], ticks[m]])
+                    for label, start in _changes(known[i][j], known[k][m], here, there):
+                        if not any(own == label and track.passes(start) for own, track in found):
+                            _add(found, label, Follower(function_of(label), grain), start)
+    found.sort(key=lambda one: -len(one[1].x))
+    return [(label, track) for i, (label, track) in enumerate(found)
+            if not any(own == label and track.within(longer) for own, longer in found[:i])]  # fmt: skip
+
+
+def _add(found, label, follower, start):
+    landed = follower.landed(start)
+    if landed is None or any(own == label and track.passes(landed[0]) for own, track in found):
+        return
+    track = follower.track(landed[0])
+    if track is not None:
+        found.append((label, track))
+
+
+def _changes(some, others, here, there):
+    """(label, (place, position)) where a of a thing changes its sign between two positions."""
+    for label, side, x, a in some:
+        same = [(abs(y - x), y, c) for *other, y, c in others if other == [label, side]]
+        if same:
+            off, y, c = min(same)
+            if a * c < 0.0 and off < 1.0:
+                share = a / (a - c)
+                yield label, np.array([x + share * (y - x), *(here + share * (there - here))])

@@ -1,0 +1,88 @@
+"""A file whose values a survey may take over: `survey run --reuse`, checked."""
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+
+from survey.file import finished, reading
+from survey.file.blocks import of_output
+from survey.request import workflow as workflows
+from survey.sweep import reuse
+from survey.sweep.fingerprint import fingerprint
+from survey.sweep.reuse import Earlier
+from survey.wording import short, shown
+
+FURTHER = ("boundaries", "refine")  # found anew
+NAMES = {"scene_hash": "text of your own scene"}
+
+
+def find(workflow, path):
+    """(survey.sweep.reuse.Earlier or None, a sentence on how much of the file at `path` is taken over, or why not).
+
+    Raises BadInput or Damaged if there is no survey in the file.
+    """
+    ds = reading.load(Path(path))
+    found, why = None, _unlike(workflow, ds.attrs)
+    if not why:
+        found, why = _common(workflow, ds, Path(path))
+    if why:
+        return None, f"{path}: nothing is taken from this file: {why}"
+    return found, f"{path}: {found.points:,} of {workflow.grid.points:,} points are taken from this file"
+
+
+def _unlike(workflow, attributes):
+    """Why the file's values have other bits than those of this workflow at the same points, or ""."""
+    if finished.lost(attributes):
+        return "workers died while it was computed"
+    try:
+        old = _checked(workflow, attributes)
+    except (KeyError, ValueError) as error:  # BadInput is a ValueError
+        return f"its workflow cannot be read ({short(error, 150)})"
+    before, now = fingerprint(old), fingerprint(workflow)
+    for key in ("scene", "scene_hash", "options", "method", "rtol"):
+        if before[key] != now[key]:
+            return f"another {NAMES.get(key, key)} ({shown(before[key])}, not {shown(now[key])})"
+    more = sorted(workflow.request.variables - old.request.variables)
+    if more:
+        return f"it has no {', '.join(more)}, and all values of a point are found together"
+    if attributes.get("fingerprint") != of_output(before):
+        return "it is from another version of the code"
+    return ""
+
+
+def _checked(workflow, attributes):
+    """The workflow of the file, as this version of the code understands it."""
+    data = {key: table for key, table in tomllib.loads(attributes["workflow"]).items() if key not in FURTHER}
+    data.get("output", {}).pop("figures", None)
+    own = data.get("scene") == workflow.name and "scene_hash" in attributes
+    return workflows.check(data | ({"scene": workflow.scene} if own else {}), output=workflow.path)
+
+
+def _common(workflow, ds, path):
+    """(the Earlier, "") of the points that are in both; (None, why) where there are none, or their bits differ."""
+    old, new = _checked(workflow, ds.attrs).grid, workflow.grid
+    if old.parameters.keys() != new.parameters.keys():
+        return None, "it has other parameters"
+    where, fixed = {}, {}
+    for name, (dims, values) in new.parameters.items():
+        place = _places(np.atleast_1d(old.parameters[name][1]), np.atleast_1d(values))
+        if name in new.uncut and not np.array_equal(place, np.arange(old.sizes.get(name, 1))):
+            return None, f"one solution serves the whole axis {name}, and that differs"
+        if (place < 0).all():
+            return None, f"it has no value of {name} that is needed here"
+        if dims:
+            where[name] = place
+        elif name in old.sizes:
+            fixed[name] = int(place[0])
+    where, shared = {dim: where[dim] for dim in new.sizes}, tuple(dim for dim in new.sizes if dim in old.sizes)
+    found = Earlier(str(path.absolute()), path.stat().st_mtime_ns, where, shared, fixed)
+    why = reuse.obstacle(workflow.scene, workflow.request, new, found, old.lines)
+    return (None, why) if why else (found, "")
+
+
+def _places(old, new):
+    """For each new value the place of the same float among the old ones, or -1."""
+    order = np.argsort(old)
+    place = order[np.minimum(np.searchsorted(old[order], new), old.size - 1)]
+    return np.where(old[place] == new, place, -1)

@@ -1,0 +1,89 @@
+"""The boundaries that a line along one parameter meets, all others fixed: exact as the curves of [boundaries] are.
+
+Where a scene's family finds curves without rows, the line is the border of a narrow map: there the curves end at points
+of their own, and the error of such a point is along the border.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from survey import measures
+from survey.errors import BadInput
+from survey.measures.square import Square
+
+NARROW = 1e-3  # the map's width, relative to 1 + |value|
+SAME = 4.0  # error bounds within which two points are the same
+
+
+@dataclass(frozen=True)
+class OnLine:
+    """Boundaries, ascending: `position`, its `error`, `kind` (a code of the family's CLASSES)."""
+
+    position: np.ndarray
+    error: np.ndarray
+    kind: np.ndarray
+
+
+def on_line(scene, options, along, ends, fixed):
+    """The OnLine between `ends` (low, high) of the parameter `along`; `fixed`: {name: value} of all others.
+
+    Raises BadInput where the scene's family knows no curves.
+    """
+    measure = measures.question(scene.FAMILY, "curves")
+    if hasattr(measure, "searched"):
+        second, bounds, scene = "", (0.0, 1.0), _Flat(scene)
+        others = fixed
+    else:
+        second = second_axis(measure, scene, along, fixed)
+        bounds = _bounds(next(p for p in scene.PARAMETERS if p.name == second), fixed[second])
+        others = {name: value for name, value in fixed.items() if name != second}
+    low, high = (np.array(pair, float) for pair in zip(ends, bounds, strict=True))
+    square = Square(low, high, np.array([False, False]))
+    if second:
+        curves = measure.closed(square, [along, second], others, options)
+    else:
+        curves = measure.searched(scene, square, [along, second], others)
+    value = fixed.get(second, 0.0)
+    here = np.flatnonzero(curves.parameters[:, 1] == value)
+    position, kind = curves.parameters[here, 0], np.repeat(curves.kind, curves.count)[here]
+    error = np.asarray(curves.error)[here] * (ends[1] - ends[0]) + np.spacing(abs(position))
+    order = np.lexsort((kind, position))
+    position, error, kind = position[order], error[order], kind[order]
+    near = np.diff(position) <= SAME * (error[1:] + error[:-1])
+    keep = np.concatenate([[True], ~(near & (np.diff(kind) == 0))]) if position.size else np.zeros(0, bool)
+    return OnLine(position[keep], error[keep], kind[keep])
+
+
+def second_axis(measure, scene, along, fixed):
+    """The parameter that spans a map with `along` on which curves are known; raises BadInput if there is none."""
+    for p in scene.PARAMETERS:
+        known = p.name != along and np.isfinite(fixed.get(p.name, np.nan))
+        if known and measure.refusal([along, p.name], scene) is None:
+            return p.name
+    raise BadInput(f"no boundaries are known along {along}: {measure.refusal([along], scene)}")
+
+
+def _bounds(parameter, value):
+    """(low, high) of a narrow range inside the parameter's domain, of which `value` is an end."""
+    width = NARROW * (1.0 + abs(value))
+    for other in (value + width, value - width):
+        inside = parameter.holds([other]).all() and not any(
+            min(value, other) <= excluded <= max(value, other) for excluded in parameter.excluded
+        )
+        if inside:
+            return min(value, other), max(value, other)
+    raise BadInput(f"{parameter.name} = {value:g}: no boundaries can be found so close to the ends of its domain")
+
+
+class _Flat:
+    """A scene with a second parameter, "", on which nothing depends."""
+
+    def __init__(self, scene):
+        self._scene = scene
+
+    def __getattr__(self, name):
+        return getattr(self._scene, name)
+
+    def solve(self, point, request):
+        return self._scene.solve({name: values for name, values in point.items() if name}, request)

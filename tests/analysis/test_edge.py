@@ -1,0 +1,126 @@
+"""Boundaries along a line and margins of points, against the files' [boundaries], closed forms and kept values."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import survey
+from survey.errors import BadInput
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_edges_of_a_row_are_those_of_boundaries(tmp_path):
+    asked = {"scene": "mathieu", "axes": {"q": 1.5, "a": {"start": -3.0, "stop": 30.0, "num": 3}}, "boundaries": {}}
+    ds = survey.run(asked, output=tmp_path / "m.nc")
+    found = survey.edge("mathieu", along="a", a=(-3.0, 30.0), q=1.5)
+    np.testing.assert_array_equal(found.edge, ds.edge_position)
+    np.testing.assert_array_equal(found.edge_class, ds.edge_class)
+    np.testing.assert_array_equal(found.edge_index, ds.edge_index)
+    assert found.attrs["complete"] == 1 and found.edge.attrs["units"] == "1"
+
+
+def test_characteristic_values_of_mathieu():
+    """DLMF 28.8 / Abramowitz-Stegun table 20.1: a_0, b_1, a_1, b_2 at q = 5 (to the ten digits given there)."""
+    special = pytest.importorskip("scipy.special")
+    exact = sorted([*(special.mathieu_a(r, 5.0) for r in range(4)), *(special.mathieu_b(r, 5.0) for r in range(1, 4))])
+    found = survey.edge("mathieu", along="a", a=(-7.0, 12.0), q=5.0)
+    np.testing.assert_allclose(found.edge, [a for a in exact if a < 12.0], atol=1e-9)
+    assert (found.edge_error < 1e-12).all()
+
+
+def test_near_gives_the_neighbours():
+    everything = survey.edge("satellite", along="rho", rho=(0.6, 2.5), k=0.5)
+    near = survey.edge("satellite", along="rho", near=1.2, k=0.5)
+    below, above = everything.edge[everything.edge < 1.2].max(), everything.edge[everything.edge > 1.2].min()
+    bar = float(everything.edge_error.max()) + float(near.edge_error.max())
+    np.testing.assert_allclose(near.edge, [below, above], atol=bar, rtol=0)
+    verdicts = survey.evaluate("satellite", k=0.5, rho=[float(near.edge[0]) + s for s in (-1e-9, 1e-9)]).verdict
+    assert set(verdicts.values) == {0, 1}
+
+
+def test_the_whole_domain_of_an_amplitude():
+    found = survey.edge("satellite", along="amplitude", inertia_ratio=0.19)
+    assert (np.diff(found.edge) > 0).all() and found.edge.size > 5
+    at = float(found.edge[0])
+    verdicts = survey.evaluate("satellite", amplitude=[at - 1e-9, at + 1e-9], inertia_ratio=0.19).verdict.values
+    assert set(verdicts) == {0, 1}
+
+
+def test_danbys_curves_agree_with_the_kept_table(tmp_path):
+    with (ROOT / "results" / "libration_elliptic_boundaries.csv").open() as file:
+        kept = {(row["curve"], row["e"]): row for row in csv.DictReader(file)}
+    found = survey.edge("libration_elliptic", along="mu", mu=(0.001, 0.06), e=0.1)
+    names = found.edge_class.attrs["flag_meanings"].split()
+    assert [names[code] for code in found.edge_class.values] == ["B", "A", "KC"]
+    for name, at, bar in zip(["B", "A", "KC"], found.edge.values, found.edge_error.values, strict=True):
+        row = kept[name, "0.1"]
+        assert abs(at - float(row["mu"])) <= bar + float(row["mu_error"]) and bar < 1e-12
+    axes = {"e": {"start": 0.0, "stop": 0.4, "num": 3}, "mu": {"start": 0.001, "stop": 0.06, "num": 3}}
+    ds = survey.run({"scene": "libration_elliptic", "axes": axes, "boundaries": {}}, output=tmp_path / "d.nc")
+    table = ds.survey.boundary(kind="KC")
+    sides = [survey.evaluate("libration_elliptic", e=table.e, mu=table.mu + s).verdict.values for s in (-1e-9, 1e-9)]
+    inside = (table.e.values > 0.0) & (table.e.values < 0.31)
+    assert inside.sum() > 10 and (sides[0][inside] == 1).all() and (sides[1][inside] == 0).all()
+
+
+def test_the_line_of_closed_curves_and_a_run_of_one_axis(tmp_path):
+    numbers = {"alpha": 0.3, "beta": 0.2, "ratio": 1.3}
+    found = survey.edge("brun", along="l", l=(-2.0, 3.0), sign="1", **numbers)
+    axes = {"l": {"start": -2.0, "stop": 3.0, "num": 5}, **numbers}
+    ds = survey.run(
+        {"scene": "brun", "options": {"sign": "1"}, "axes": axes, "boundaries": {}}, output=tmp_path / "b.nc"
+    )
+    np.testing.assert_array_equal(ds.edge_position, found.edge)
+    assert ds.survey.boundary(kind="separatrix").sizes["place"] == 1
+    at = float(found.edge[found.edge_class == 1][0])
+    near = survey.evaluate("brun", l=[at - 1e-6, at + 1e-6], sign="1", **numbers).separatrix_distance
+    assert (abs(near) < 3e-6).all()
+
+
+def test_three_axes_have_boundaries_on_every_plane(tmp_path):
+    (tmp_path / "z.py").write_text(
+        "from math import cos, pi\nPARAMETERS = ('a', 'q', 'c')\nPERIOD = pi\nEVEN = True\n"
+        "def z(u, p):\n    return p[0] + p[2] - 2 * p[1] * cos(2 * u)\n"
+    )
+    axes = {"c": {"values": [0.0, 0.5]}, "q": {"start": 0.5, "stop": 1.5, "num": 3},
+            "a": {"start": -1.0, "stop": 5.0, "num": 3}}  # fmt: skip
+    ds = survey.run({"scene": str(tmp_path / "z.py"), "axes": axes, "boundaries": {}}, output=tmp_path / "o.nc")
+    assert ds.edge_count.dims == ("c", "q") and int(ds.edge_count.sum()) == ds.sizes["edge"]
+    table = ds.survey.boundary()
+    planes = [table.isel(place=np.flatnonzero(table.c.values == c)) for c in (0.0, 0.5)]
+    for c, plane in zip((0.0, 0.5), planes, strict=True):
+        special = pytest.importorskip("scipy.special")
+        at = plane.isel(place=np.flatnonzero((plane["index"].values == 1) & (plane.kind.values == 0)))
+        expected = special.mathieu_a(1, at.q.values)
+        other = special.mathieu_b(1, at.q.values)
+        off = np.minimum(abs(at.a.values + c - expected), abs(at.a.values + c - other))
+        assert at.a.size > 2 and (off < 1e-8).all()
+    assert ds.survey.slice(c=0.5).survey.map() is not None
+
+
+def test_margins_are_the_distances_to_the_edges():
+    ds = survey.evaluate("satellite", k=[0.3, 0.5], rho=1.2)
+    found = ds.survey.margin(k=0.5)
+    assert found.parameter.values.tolist() == ["k", "rho"]
+    near = survey.edge("satellite", along="rho", near=1.2, k=0.5).edge.values
+    assert float(found.edge.sel(parameter="rho")) == near[abs(near - 1.2).argmin()]
+    np.testing.assert_array_equal(found.distance, found.edge - found.value)
+    text = repr(ds.survey.point(k=0.5))
+    assert f"rho = {float(found.edge.sel(parameter='rho')):.6g} +- " in text and "nearest boundaries" in text
+
+
+def test_what_has_no_boundaries_is_told():
+    for match, keywords in (
+        ("unknown parameter 'kk'", {"along": "kk", "rho": 1.0}),
+        ("give near= a value of rho, or a range", {"along": "rho", "k": 0.5}),
+        ("rho is missing", {"along": "k", "near": 0.3}),
+        (r"so give \(low, high\)", {"along": "rho", "k": 0.5, "rho": 1.0}),
+        ("it must be one number in its domain", {"along": "rho", "near": 1.0, "k": [0.1, 0.2]}),
+    ):
+        with pytest.raises(BadInput, match=match):
+            survey.edge("satellite", **keywords)
+    with pytest.raises(BadInput, match="no boundaries are known"):
+        survey.edge("libration", along="mu")

@@ -1,0 +1,84 @@
+"""Surveys joined along an axis: the same values as one run of all points, and what does not fit is refused."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import survey
+from survey.errors import BadInput
+from survey.file import reading
+
+
+@pytest.fixture
+def parts(small, tmp_path, monkeypatch):
+    """(the whole file, two files of its parts): w0 in two halves with a common value."""
+    monkeypatch.chdir(tmp_path)
+    base = small.read_text().replace('figures = ["w"]', "")
+    values = np.linspace(0.5, 2.0, 6)
+    paths = []
+    for name, chosen in (("whole", values), ("high", values[2:]), ("low", values[:3])):
+        text = base.replace("w0  = { start = 0.5, stop = 2.0, num = 6 }", f"w0 = {{ values = {chosen.tolist()} }}")
+        (tmp_path / f"{name}.toml").write_text(text)
+        survey.run(f"{name}.toml", output=f"{name}.nc")
+        paths.append(tmp_path / f"{name}.nc")
+    return paths
+
+
+def test_the_whole_is_what_one_run_gives(parts):
+    whole, high, low = map(survey.open, parts)
+    joined = survey.concat([high, low])
+    xr.testing.assert_identical(joined.drop_attrs(), whole.drop_attrs())
+    for key in ("points", "status_counts", "accuracy_missed", "scene", "options", "rtol"):
+        assert joined.attrs[key] == whole.attrs[key]
+    assert joined.attrs["wall_time_s"] == pytest.approx(high.attrs["wall_time_s"] + low.attrs["wall_time_s"])
+    again = survey.run({**_parsed(joined.attrs["workflow"]), "output": {"path": "again.nc"}})
+    xr.testing.assert_equal(again.drop_attrs(), whole.drop_attrs())
+
+
+def _parsed(text):
+    import tomllib
+
+    return tomllib.loads(text)
+
+
+def test_the_command_writes_a_sound_file_and_replaces_none(parts, program):
+    whole, high, low = parts
+    done = program("merge", low, high, "-o", "joined.nc")
+    assert done.returncode == 0 and done.stdout == "joined.nc\n" and "24 points of 2 files" in done.stderr
+    assert reading.check("joined.nc") == []
+    xr.testing.assert_equal(survey.open("joined.nc").drop_attrs(), survey.open(whole).drop_attrs())
+    assert survey.open("joined.nc").w.attrs == survey.open(whole).w.attrs
+    assert program("verify", "joined.nc", "--points", "3").returncode == 0
+    again = program("merge", low, high, "-o", "joined.nc")
+    assert again.returncode == 2 and "joined.nc exists" in again.stderr
+    assert {file.name for file in program.folder.glob("*joined*")} == {"joined.nc", "joined.nc.sha256"}
+
+
+def test_a_fixed_number_becomes_an_axis():
+    rows = [survey.evaluate("mathieu", a=[0.2, 1.5, 2.0], q=q) for q in (0.4, 0.1, 0.2)]
+    joined = survey.concat(rows)
+    assert joined.verdict.dims == ("q", "a") and joined.q.values.tolist() == [0.1, 0.2, 0.4]
+    assert joined.q.attrs == rows[0].q.attrs
+    for row in rows:
+        np.testing.assert_array_equal(joined.discriminant.sel(q=float(row.q)), row.discriminant)
+    assert joined.attrs["points"] == 9 and joined.survey.map() is not None
+
+
+def test_what_does_not_fit_is_refused():
+    one = survey.evaluate("mathieu", a=[0.2, 1.5], q=0.4)
+
+    def refused(match, *others):
+        with pytest.raises(BadInput, match=match):
+            survey.concat([one, *others])
+
+    refused("two or more")
+    refused("have another scene: 'mathieu' and 'libration'", survey.evaluate("libration", mu=0.01))
+    refused("have another rtol", survey.evaluate("mathieu", a=[0.2, 1.5], q=0.5, rtol=1e-6))
+    refused("only one of the surveys has", survey.evaluate("mathieu", a=[0.2, 1.5], q=0.5, variables=["verdict"]))
+    refused("these differ in a, q", survey.evaluate("mathieu", a=[0.3, 1.5], q=0.5))
+    refused("in none: they are of the same points", one)
+    other = survey.evaluate("mathieu", a=[1.5, 1.6], q=0.4)
+    refused("different values at common points, such as a = 1.5", other.assign(discriminant=other.discriminant + 1))
+    refused("was not written by survey", xr.Dataset())
+    with pytest.raises(BadInput, match="give a list of surveys"):
+        survey.concat(one)

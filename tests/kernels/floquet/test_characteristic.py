@@ -1,0 +1,103 @@
+"""Multipliers from coefficients known within bounds: roots of every polynomial within them are in the error bars."""
+
+import mpmath
+import numpy as np
+import pytest
+from scipy.optimize import linear_sum_assignment
+
+from survey.kernels.floquet import characteristic
+from survey.measures.floquet.answers import Answers
+
+
+def answered(coefficients, doubts, starts, n, paired, rtol=1.0):
+    """The Answers of one point, as a series of one term."""
+    answer = Answers(1, n)
+    series = np.array(coefficients, dtype=float).reshape(1, -1)
+    table = np.zeros((1, characteristic.LANES))
+    table[0, 0] = 1.0
+    characteristic.answer(
+        series, np.array(doubts, dtype=float), np.zeros(1), table, np.zeros(2, np.int64),
+        np.stack([starts.real, starts.imag], axis=-1).reshape(1, 1, -1, 2), np.zeros((1, 1), np.int64), n, paired,
+        np.array([True, True, True, False, False]), rtol, answer.floats, answer.signs, answer.verdict, answer.crossing,
+        answer.missed,
+    )  # fmt: skip
+    return answer
+
+
+def roots_of(c, off):
+    """The roots of the monic polynomial whose other coefficients are c + off."""
+    given = [mpmath.mpf(a) + mpmath.mpf(b) for a, b in zip(c, off, strict=True)]
+    return mpmath.polyroots([*given[::-1], 1], asc=True, maxsteps=400, extraprec=200)
+
+
+def inside(answer, exact):
+    """Are the exact multipliers, in some order, within the bars?"""
+    n = answer.n
+    re, im, bar_re, bar_im = (answer.floats[k * n : (k + 1) * n, 0] for k in range(4))
+    off = [[max(abs(re[i] - z.real) / max(bar_re[i], 1e-300), abs(im[i] - z.imag) / max(bar_im[i], 1e-300))
+            for z in exact] for i in range(n)]  # fmt: skip
+    off = np.minimum(np.array(off, dtype=float), 1e9)
+    rows, columns = linear_sum_assignment(off)
+    return off[rows, columns].max()
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 7, 12])
+def test_roots_of_all_polynomials_within_the_doubts(n):
+    rng, served, worst = np.random.default_rng(n), 0, 0.0
+    for _ in range(60):
+        pairs = rng.integers(0, n // 2 + 1)
+        own = rng.normal(size=pairs) + 1j * rng.normal(size=pairs)
+        roots = np.concatenate([own, own.conj(), 1.5 * rng.normal(size=n - 2 * pairs)])
+        c = np.poly(roots)[1:].real
+        doubts = 10.0 ** rng.uniform(-13, -5) * rng.uniform(size=n)
+        answer = answered(c, doubts, roots * (1 + 0.05 * rng.normal(size=n)) + 0.01j * rng.normal(size=n), n, False)
+        if not np.isfinite(answer.floats).all() or answer.missed[0]:
+            continue
+        served += 1
+        signs = rng.choice([-1.0, 1.0], size=n)
+        with mpmath.workdps(40):
+            other = [mpmath.mpf(1)] + [
+                mpmath.mpf(a) + mpmath.mpf(s * b) for a, b, s in zip(c, doubts, signs, strict=True)
+            ]
+            exact = mpmath.polyroots(other[::-1], asc=True, maxsteps=400, extraprec=200)
+        worst = max(worst, inside(answer, exact))
+        radius = float(max(abs(root) for root in exact))
+        assert abs(radius - answer.floats[4 * n, 0]) <= answer.floats[4 * n + 1, 0]
+        assert answer.verdict[0] in (-1, int(radius < 1))
+    assert served > 40
+    assert worst <= 1.0
+    assert worst > 1e-3  # the bars are not wide for nothing
+
+
+@pytest.mark.parametrize("m", [1, 2, 3, 6])
+def test_sums_of_multipliers_and_their_inverses(m):
+    rng, kinds = np.random.default_rng(m), set()
+    for _ in range(80):
+        pairs = rng.integers(0, m // 2 + 1)
+        own = 2 * rng.normal(size=pairs) + 1j * rng.normal(size=pairs)
+        s = np.concatenate([own, own.conj(), rng.uniform(-2.3, 2.3, size=m - 2 * pairs)])
+        if rng.random() < 0.5:
+            s = rng.uniform(-2.0, 2.0, size=m).astype(complex)
+        c = np.poly(s)[1:].real
+        doubts = 10.0 ** rng.uniform(-13, -7) * rng.uniform(size=m)
+        answer = answered(c, doubts, s * (1 + 0.02 * rng.normal(size=m)), 2 * m, True)
+        if answer.missed[0]:
+            continue
+        with mpmath.workdps(40):
+            signs = rng.choice([-1.0, 1.0], size=m)
+            other = [mpmath.mpf(1)] + [
+                mpmath.mpf(a) + mpmath.mpf(g * b) for a, b, g in zip(c, doubts, signs, strict=True)
+            ]
+            roots = mpmath.polyroots(other[::-1], asc=True, maxsteps=400, extraprec=200)
+            exact = [(z + sign * mpmath.sqrt(mpmath.mpc(z) ** 2 - 4)) / 2 for z in roots for sign in (1, -1)]
+            on_circle = all(abs(mpmath.im(z)) < 1e-25 and abs(mpmath.re(z)) < 2 for z in roots)
+        assert inside(answer, exact) <= 1.0
+        assert answer.verdict[0] in (-1, int(on_circle))
+        kinds.add(int(answer.verdict[0]))
+    assert kinds >= {0, 1}
+
+
+def test_double_roots_are_left_to_the_point_itself():
+    roots = np.array([0.5, 0.5 + 1e-9, -0.3])
+    answer = answered(np.poly(roots)[1:], np.full(3, 1e-14), roots + np.array([1e-3, -1e-3, 0]), 3, False)
+    assert answer.missed[0] and answer.verdict[0] == -1

@@ -1,0 +1,125 @@
+"""Curves of periodic orbits: all orbits of a point, round folds, in the same order and bits on every grid."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import survey
+
+
+def duffing(t, x, p, out):
+    F, w = p
+    out[0], out[1] = x[1], -0.2 * x[1] - x[0] - x[0] ** 3 + F * np.cos(w * t)
+
+
+def scene(**more):
+    given = {"continuation": ("w", 0.8, 4.0)} | more
+    return survey.orbit(
+        duffing, states=("x", "v"), parameters=("F", "w"), period=lambda p: 2 * math.pi / p[1], start=(0.0, 0.0),
+        **given,
+    )  # fmt: skip
+
+
+def cycles(t, x, p, out):
+    """r' = r (m + r^2 - r^4), theta' = 1.5: two cycles for -1/4 < m < 0, one for m > 0."""
+    r2 = x[0] ** 2 + x[1] ** 2
+    grow = p[0] + r2 - r2**2
+    out[0], out[1] = grow * x[0] - 1.5 * x[1], 1.5 * x[0] + grow * x[1]
+
+
+def shot(F, w, x):
+    """x(T) and dx(T)/dx(0) by SciPy."""
+
+    def rhs(t, y):
+        A = np.array([[0.0, 1.0], [-1.0 - 3 * y[0] ** 2, -0.2]])
+        slope = np.empty(2)
+        duffing(t, y[:2], (F, w), slope)
+        return np.concatenate([slope, (A @ y[2:].reshape(2, 2)).ravel()])
+
+    y = np.concatenate([x, np.eye(2).ravel()])
+    y = solve_ivp(rhs, (0.0, 2 * math.pi / w), y, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    return y[:2], y[2:].reshape(2, 2)
+
+
+def test_duffings_three_orbits_against_scipy():
+    """Newton's method from a lattice of starts finds no orbit that the curves do not, and the same states."""
+    w = np.array([1.2, 1.9, 2.3])
+    ds = survey.evaluate(scene(), F=1.0, w=w, branch=[1.0, 2.0, 3.0])
+    for i, frequency in enumerate(w):
+        found = []
+        starts = np.array(np.meshgrid([-3, -1, 0, 1, 3], [-4, 0, 4])).reshape(2, -1).T.astype(float)
+        for start in (*starts, *(ds.x0.values[i][ds.status.values[i] == 0] + 1e-2)):
+            x = start
+            for _ in range(12):
+                X, M = shot(1.0, frequency, x)
+                step = np.linalg.solve(np.eye(2) - M, X - x)
+                x = x + step
+                if abs(step).max() < 1e-11 or abs(x).max() > 20:
+                    break
+            if abs(step).max() < 1e-9 and not any(abs(x - other).max() < 1e-6 for other in found):
+                found.append(x)
+        ours = ds.isel(w=i)
+        count = int(ours.orbits[0])
+        assert count == len(found) == (1, 3, 1)[i]
+        assert (ours.status == 0).values.tolist() == [k < count for k in range(3)]
+        for k in range(count):
+            off = [abs(x - ours.x0[k].values) for x in found]
+            best = min(off, key=max)
+            assert (best <= ours.x0_error[k].values + 1e-9).all()
+        assert len({tuple(np.round(x, 6)) for x in ours.x0.values[:count]}) == count
+    middle = ds.isel(w=1)
+    assert middle.verdict.values.tolist() == [1, 0, 1]  # the orbit between the folds is the saddle
+
+
+def test_cycles_round_their_fold_in_closed_form():
+    system = survey.orbit(
+        cycles, states=("x", "y"), parameters="m", period=None, start=(1.1, 0.0, 4.2), continuation=("m", -0.5, 0.4)
+    )
+    m = np.array([-0.4, -0.26, -0.2499, -0.2, -0.1, -0.03, 0.2])
+    ds = survey.evaluate(system, m=m, branch=[1.0, 2.0])
+    assert ds.orbits.isel(branch=0).values.tolist() == [0, 0, 2, 2, 2, 2, 1]
+    for i, value in enumerate(m):
+        root = mpmath.sqrt(1 + 4 * mpmath.mpf(value)) if value > -0.25 else None
+        squares = [] if root is None else [q for q in ((1 - root) / 2, (1 + root) / 2) if q > 0]
+        for k in range(2):
+            at = ds.isel(m=i, branch=k)
+            if k >= len(squares):
+                assert int(at.status) == 16 and np.isnan(at.x0).all() and int(at.verdict) == -1
+                continue
+            assert int(at.status) == 0
+            T = 4 * mpmath.pi / 3
+            assert abs(float(at.period) - T) <= float(at.period_error) + 1e-15
+            radius = math.hypot(*at.x0.values)
+            assert abs(radius - float(mpmath.sqrt(squares[k]))) <= 1.5 * at.x0_error.max() + 4e-16
+            exact = mpmath.exp(T * (2 * squares[k] - 4 * squares[k] ** 2))
+            assert abs(float(at.multiplier_re[0]) - exact) <= float(at.multiplier_re_error[0])
+            assert int(at.verdict) == (k == len(squares) - 1)
+
+
+def test_bits_depend_on_no_grid():
+    w, F = np.linspace(0.8, 4.0, 9), np.array([0.4, 1.0, 1.3])
+    whole = survey.evaluate(scene(), F=F, w=w, branch=[1.0, 2.0, 3.0])
+    for i, j, k in ((0, 0, 0), (1, 3, 2), (2, 8, 0), (1, 4, 1)):
+        one = survey.evaluate(scene(), F=F[i], w=w[j], branch=k + 1.0)
+        for name in whole.data_vars:
+            assert np.array_equal(whole[name].isel(F=i, w=j, branch=k).values, one[name].values, equal_nan=True), name
+
+
+def test_branches_that_are_no_numbers():
+    ds = survey.evaluate(scene(), F=1.0, w=1.9, branch=[1.0, 1.5, 4.0])
+    assert ds.status.values.tolist() == [0, 1, 16]
+    assert ds.orbits.values.tolist() == [3, -1, 3]
+
+
+@pytest.mark.parametrize("given", [("k", 0.0, 1.0), ("w", 2.0, 1.0), ("w", 0.0), "w", ("w", 0.0, math.inf), 3.0])
+def test_bad_ranges(given):
+    with pytest.raises(survey.BadInput, match="CONTINUATION") as caught:
+        scene(continuation=given)
+    assert "\n" not in str(caught.value)
+
+
+def test_outside_the_range():
+    assert survey.evaluate(scene(), F=1.0, w=[0.5, 1.0]).status.values.tolist() == [1, 0]

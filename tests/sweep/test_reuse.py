@@ -1,0 +1,113 @@
+"""Extending a survey: points that an earlier file holds are taken from it, with the bits of a run without it."""
+
+import re
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import survey
+from survey.errors import BadInput
+from survey.request import earlier, workflow
+from survey.sweep import cost, engine, solve
+
+BRUN = """
+scene = "brun"
+[options]
+sign = "1"
+[axes]
+l = { values = [0.5, 0.7, 0.9, 1.2] }
+alpha = { start = -0.5, stop = 0.5, num = 5 }
+beta = 0.1
+ratio = 1.3
+[solver]
+rtol = 1e-9
+"""
+
+
+@pytest.fixture
+def brun(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "brun.toml").write_text(BRUN)
+    survey.run("brun.toml", output="old.nc")
+    return tmp_path / "brun.toml"
+
+
+@pytest.mark.parametrize(
+    ("overrides", "points"),
+    [
+        (["axes.alpha={ start = -0.5, stop = 0.5, num = 9 }"], 20),  # finer
+        (["axes.alpha={ start = -0.5, stop = 1.0, num = 7 }"], 20),  # longer
+        (["axes.alpha=0.25"], 4),  # a row
+        (["axes.beta={ values = [0.0, 0.1, 0.3] }"], 20),  # one dimension more
+        (["axes.l={ values = [1.2, 1.0, 0.7] }"], 10),  # the other way round
+        (["output.variables=['period', 'verdict']"], 20),  # fewer variables
+    ],
+)
+@pytest.mark.parametrize("block", [7, 10**6])
+def test_what_is_held_is_not_solved_and_the_bits_are_the_same(brun, monkeypatch, overrides, points, block):
+    monkeypatch.setattr(cost, "BLOCK_POINTS", block)
+    sizes, solved = [], solve.solve_point
+
+    def counting(scene, request, point, shape):
+        sizes.append(int(np.prod(shape)))
+        return solved(scene, request, point, shape)
+
+    checked = workflow.read(brun, overrides, "new.nc")
+    held, told = earlier.find(checked, "old.nc")
+    with monkeypatch.context() as patch:
+        patch.setattr(solve, "solve_point", counting)
+        engine.run(checked, earlier=held)
+    assert f"{points} of {checked.grid.points} points are taken from this file" in told
+    assert sum(sizes) == checked.grid.points - points and held.points == points
+    engine.run(workflow.read(brun, overrides, "own.nc"))
+    new, own = survey.open("new.nc"), survey.open("own.nc")
+    assert new.attrs["points_reused"] == points and new.attrs["fingerprint"] == own.attrs["fingerprint"]
+    xr.testing.assert_equal(new.drop_attrs(), own.drop_attrs())
+
+
+@pytest.mark.parametrize(
+    ("override", "why"),
+    [
+        ("solver.rtol=1e-6", r"another rtol \(1e-09, not 1e-06\)"),
+        ("options.sign='-1'", "another options"),
+        ("axes.alpha=0.3", "no value of alpha that is needed here"),
+    ],
+)
+def test_it_is_told_why_nothing_is_taken(brun, override, why):
+    held, told = earlier.find(workflow.read(brun, [override], "new.nc"), "old.nc")
+    assert held is None and re.search(why, told)
+
+
+def test_a_map_whose_series_take_the_whole_axis_is_solved_anew(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    axes = {"k": {"start": 0.1, "stop": 0.9, "num": 30}, "rho": {"start": 1.0, "stop": 3.0, "num": 40}}
+    survey.run({"scene": "satellite", "axes": axes}, output="old.nc")
+    axes["rho"] = {"start": 1.0, "stop": 4.0, "num": 60}
+    longer = workflow.check({"scene": "satellite", "axes": axes}, output="new.nc")
+    held, told = earlier.find(longer, "old.nc")
+    assert held is None and "nothing is taken from this file: " in told
+    assert "on a map, its values depend on all of the axis rho" in told or "has other bits on this map" in told
+
+
+def test_a_trajectory_needs_the_same_times(ran, small, monkeypatch):
+    monkeypatch.chdir(ran.parent)
+    more = workflow.read(small, ["axes.w0.num=11"], "new.nc")
+    held, told = earlier.find(more, ran)
+    assert held.points == 24 and "24 of 44 points" in told
+    engine.run(more, workers=2, earlier=held)
+    engine.run(workflow.read(small, ["axes.w0.num=11"], "own.nc"))
+    xr.testing.assert_equal(survey.open("new.nc").drop_attrs(), survey.open("own.nc").drop_attrs())
+    held, told = earlier.find(workflow.read(small, ["axes.t.num=7"], "new.nc"), ran)
+    assert held is None and "one solution serves the whole axis t" in told
+
+
+def test_the_command_extends_a_file_in_place(ran, small, program):
+    words = ("run", small, "--set", "axes.w0.num=11")
+    refused = program(*words)
+    assert refused.returncode == 2 and "or extend it with --reuse small.nc" in refused.stderr
+    done = program(*words, "--reuse", "small.nc")
+    assert done.returncode == 0 and "small.nc: 24 of 44 points are taken from this file" in done.stderr
+    assert survey.open(ran).attrs["points_reused"] == 24 and survey.open(ran).status.size == 44
+    with pytest.raises(BadInput, match="no such file"):
+        survey.run(small, output="x.nc", reuse="none.nc")
