@@ -104,7 +104,7 @@ def run(workflow, output, overrides, workers, scheduler, block_timeout, fresh, r
 @program.command()
 @click.argument("workflow")
 @click.option("-o", "--output", metavar="OUT.nc", help="The netCDF file, instead of the workflow's with _proved added.")
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Replace a key, such as refine.width=0.01.")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Replace a key: refine.width=0.01.")
 @click.option("--fresh", is_flag=True, help="Delete what an earlier, interrupted run has proved.")
 @click.option("--quiet", is_flag=True, help="No progress and no closing lines.")
 def prove(workflow, output, overrides, fresh, quiet):

@@ -44,12 +44,8 @@ def _ellipse(equation, sides, name, tolerance):
         except checker.Failed as failed:
             why = failed
             continue
-        sizes = np.array(
-            [[[float(x) for x in (length, z.real.mid(), z.imag.mid(), z.rad())] for length, z in arc] for arc in arcs]
-        )
-        if not np.isfinite(sizes).all():
-            continue
-        length, real, imaginary, radius = np.moveaxis(sizes, -1, 0)
+        parts = [[(length, z.real.mid(), z.imag.mid(), z.rad()) for length, z in arc] for arc in arcs]
+        length, real, imaginary, radius = np.moveaxis(np.array(parts, float), -1, 0)
         top = np.sqrt(np.abs(real).max() + radius.max())
         for w in top * RATES:
             exponent = (length * (np.hypot(w * w - real, imaginary) + radius) / (2 * w)).sum(1).max()

@@ -51,7 +51,7 @@ CONTRACT = {
         ("point", "answer", "options", "time"),
     ),
     "equation": Function(
-        "for `survey prove`: (kind, [(end, z), ...]), Hill's equation in formulas as `survey/proof/checker.py` reads them. "
+        "for `survey prove`: (kind, [(end, z), ...]), Hill's equation in formulas for `survey/proof/checker.py`; "
         "`names`: for each parameter its name, or its value as a text; `ends`: {axis: (least, largest value)}",
         ("names", "ends", "options"),
     ),

@@ -100,8 +100,8 @@ def solve(point, request):
 def equation(names, ends, options):
     """The equation in formulas (see `survey.scenes`), in the angle u = am of a libration, u = x of a rotation.
 
-    As a function of u, y has an equation with a first derivative, which y = A^(-1/4) v removes; at u = 0 and at the half
-    period A > 0 and A' = 0, so that the factors of v have the signs of those of y, and their products are the same.
+    As a function of u, y has an equation with a first derivative, which y = A^(-1/4) v removes; at u = 0 and at the
+    half period A > 0 and A' = 0, so that the factors of v have the signs of those of y.
     """
     k = next(
         text.format(names[name])
