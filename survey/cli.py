@@ -115,10 +115,9 @@ def prove(workflow, output, overrides, fresh, quiet):
     from survey.sweep import engine, proofs
     from survey.sweep.progress import Progress
 
-    checked, finished = read(workflow, overrides, output), None
+    checked, finished = read(workflow, overrides, output, proves=True), None
     if output is None:
         checked = replace(checked, path=checked.path.with_stem(f"{checked.path.stem}_proved"))
-    checked = replace(checked, proves=True)
     proofs.equation_of(checked)  # refuses what cannot be proved
     resume_command = shlex.join(["survey", *(word for word in sys.argv[1:] if word != "--fresh")])
     _stop_on_sigterm()

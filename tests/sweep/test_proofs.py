@@ -96,7 +96,7 @@ def prover(scene, axes, options, width=0.125):
 
 @pytest.mark.parametrize("body", BODIES)
 def test_satellites_agree_with_the_map(body):
-    """The elementary form of the equation gives the verdicts of the elliptic one, at the centre of each decided cell."""
+    """The elementary form of the equation gives the verdicts of the elliptic one, in decided cells."""
     scene, axes, options = BODIES[body]
     made = prover(scene, axes, options)
     _, (layout, panels) = made(0)
