@@ -89,7 +89,7 @@ def prover(scene, axes, options, width=0.125):
         "scene": scene, "options": options, "refine": {"width": width},
         "axes": {name: {"start": ends[0], "stop": ends[1], "num": 5} for name, ends in axes.items()},
     }  # fmt: skip
-    workflow = check(table)
+    workflow = check(table, proves=True)
     kind, pieces, names, rectangle = proofs.equation_of(workflow)
     return proofs.Prover({"kind": kind, "pieces": pieces}, names, rectangle, [1, 1], 4, 1e-4)
 
@@ -133,7 +133,7 @@ def test_what_cannot_be_proved_is_refused_in_one_line(change, words):
     table = {"scene": "mathieu", "axes": {"a": [0.0, 1.0], "q": [0.0, 1.0]}, "refine": {"width": 0.1}} | change
     table["axes"] = {name: {"values": ends} for name, ends in table["axes"].items()}
     with pytest.raises(survey.BadInput) as error:
-        proofs.equation_of(check({key: value for key, value in table.items() if value is not None}))
+        proofs.equation_of(check({key: value for key, value in table.items() if value is not None}, proves=True))
     assert words in str(error.value) and "\n" not in str(error.value)
 
 
