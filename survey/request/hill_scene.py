@@ -3,13 +3,16 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from itertools import pairwise
 
 import numpy as np
 
 from survey import status
+from survey.errors import BadInput
 from survey.kernels.math.roundoff import EPS
 from survey.measures.hill import dependence, monodromy, motion, multiprecision, user_equation, user_rows, why
 from survey.measures.rows import Rows
+from survey.proof import formulas
 from survey.request.function_scene import FunctionScene
 from survey.scene import Parameter
 
@@ -205,6 +208,22 @@ class HillScene(FunctionScene):
             return user_rows.Axes(lane, lines[lane])
         across = max(across, key=lambda i: lines[i][0])
         return user_rows.Axes(lane, lines[lane], across, lines[across])
+
+    def equation(self, names, ends, options):
+        """The equation in formulas (see `survey.scenes`); raises BadInput where z has none."""
+        values = [ends[p.name][0] if p.name in ends else float(names[p.name]) for p in self.PARAMETERS]
+        if callable(self.period) or callable(self.breaks):
+            raise BadInput(f"prove: {self.NAME}: PERIOD and BREAKS must be numbers, not functions of p")
+        _, edges, _ = self._ranges(np.array([values]))
+        written = [names[p.name] for p in self.PARAMETERS]
+        try:
+            pieces = [
+                (formulas.number(float(high)), formulas.formula(self.z, written, (low, high)))
+                for low, high in pairwise(edges[0])
+            ]
+        except multiprecision.Unsupported as error:
+            raise BadInput(f"prove: {self.NAME}: z has no formula ({error})") from None
+        return "even" if self.EVEN else "periodic", pieces
 
     def why(self, answer):
         """Why the point has its verdict (see `survey.scenes`)."""

@@ -58,6 +58,11 @@ CONTRACT = {
         "survey.scene.Trajectory: the motion at one point up to `time`, or as long as suits if that is None",
         ("point", "answer", "options", "time"),
     ),
+    "equation": Function(
+        "for `survey prove`: (kind, [(end, z), ...]), Hill's equation in formulas for `survey/proof/checker.py`; "
+        "`names`: for each parameter its name, or its value as a text; `ends`: {axis: (least, largest value)}",
+        ("names", "ends", "options"),
+    ),
     "compile_ahead": Function(
         "compile some kernels of a map of these variables, by calls on next to nothing; see above", ("variables",)
     ),

@@ -80,6 +80,11 @@ def trajectory(point, answer, options, time=None):
     return motion.solve(_problem(np.array([point["q"]]), np.array([[point["a"]]])), answer, time)
 
 
+def equation(names, ends, options):
+    """The equation in formulas (see `survey.scenes`)."""
+    return "even", [("pi/2", f"{names['a']} - 2*{names['q']}*cos(2*u)")]
+
+
 def _problem(q, a, line=None, ends=None):
     rule, constant = _rules(q, a)
     return monodromy.Problem(
