@@ -17,14 +17,15 @@ from survey.errors import BadInput
 from survey.file import disk, reading, schema
 from survey.file.labels import count, counts, flag_codes, layout, percent
 from survey.file.labels import describe as labelled
-from survey.grid import Grid, fixed, lines, ranges
+from survey.grid import Grid, fixed, lines
 from survey.request import earlier, physical, trust, user_scene
 from survey.request.checks import check_options, check_parameters, check_request, methods_of
 from survey.request.function_scene import FunctionScene
 from survey.request.hill_scene import is_number
 from survey.request.workflow import check, read
 from survey.scene import Option, Output, Parameter, Request, condition, exists
-from survey.sweep import engine, solve
+from survey.sweep import announce, engine, solve
+from survey.sweep.progress import Progress
 from survey.wording import counted, short, shown
 
 
@@ -73,7 +74,11 @@ def run(
     if block_timeout is not None and not (is_number(block_timeout) and 0 < block_timeout < np.inf):
         raise BadInput(f"block_timeout = {shown(block_timeout)}: it must be a positive number of seconds, or None")
     held = earlier.find(checked, reuse)[0] if reuse is not None else None
-    engine.run(checked, workers, scheduler, fresh, block_timeout=block_timeout, earlier=held)
+    silent = not announce.is_watched()
+    with Progress(announce.console(), checked, silent) as progress:
+        engine.run(
+            checked, workers, scheduler, fresh, None if silent else progress, block_timeout=block_timeout, earlier=held
+        )
     ds = reading.load(checked.path)
     draw(ds, checked)
     return ds
@@ -158,13 +163,15 @@ def evaluate(
     grid = _grid(used, given)
     user_scene.check(module, grid)
     try:
-        arrays = solve.compute(grid, module, request)
+        with announce.watched(scene, module, grid.points, lambda: _seconds(module, request, grid)) as progress:
+            found = solve.compute(grid, module, request, progress=progress)
+        ds = count(labelled(grid, module, scene, request, found), found)
     except MemoryError:
         raise BadInput(
             f"evaluate: {counted(grid.points, 'point')} do not fit in memory; use survey.run, which writes a file, or "
             "dask arrays (DataArray.chunk), or fewer points or variables"
         ) from None
-    ds, own = count(labelled(grid, module, scene, request, arrays), arrays), _own_coordinates(given)
+    own = _own_coordinates(given)
     return ds.assign_coords(own) if own else ds
 
 
@@ -251,6 +258,12 @@ def _check_single_values(used: dict[str, Parameter], given: dict[str, xr.DataArr
                            f"{physical.hint(used[key], float(array))}")  # fmt: skip
 
 
+def _seconds(module: Any, request: Request, grid: Grid) -> float:
+    """Rough seconds on one thread."""
+    sizes = {name: values.size for name, (_, values) in grid.parameters.items()}
+    return float(module.cost(request.options, sizes) * grid.points)
+
+
 def _grid(used: dict[str, Parameter], given: dict[str, xr.DataArray]) -> Grid:
     sizes: dict[Hashable, int] = {}
     for key, array in given.items():
@@ -278,7 +291,7 @@ def _lazy(module: Any, scene: str, request: Request, given: dict[str, xr.DataArr
     table = layout(module, request)
     names = list(given)
     axes = {name: (array.dims, array) for name, array in given.items()}
-    request = replace(request, lines=lines(axes), fixed=fixed(axes), ranges=ranges(axes))
+    request = replace(request, lines=lines(axes), fixed=fixed(axes))
 
     def solve_arrays(*arrays: Any) -> tuple[Any, ...]:
         shape = np.broadcast_shapes(*(array.shape for array in arrays))
@@ -389,6 +402,7 @@ def areas(ds: xr.Dataset) -> dict[str, str]:
 
 def _option_condition(option: Option) -> str:
     text = f"; only with {option.only_with}" if option.only_with else ""
+    text += "".join(f"; only when {name} = {' | '.join(allowed)}" for name, allowed in option.when.items())
     return text + (f"; not with {option.replaced_by}, which replaces it" if option.replaced_by else "")
 
 

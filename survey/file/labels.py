@@ -106,7 +106,7 @@ def attributes(scene, name, request):
         "method": request.method,
         "rtol": request.rtol,
         "references": "; ".join(scene.REFERENCES),
-        "source": f"survey {__version__}: scene {name}, method {request.method}",
+        "source": f"survey {provenance()['version_survey']}: scene {name}, method {request.method}",
         **provenance(),
         **({"scene_text": scene.TEXT, "scene_hash": scene.HASH} if hasattr(scene, "TEXT") else {}),
         **getattr(scene, "NOTES", {}),

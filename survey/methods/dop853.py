@@ -39,14 +39,9 @@ from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.kernels.math.runge_kutta import fundamental
 
 ORDER = 8
-SERVES = ("abel", "body", "cylinder", "danby", "floquet", "hill")
+SERVES = ("abel", "body", "cylinder", "danby", "floquet", "hill", "orbit")
 # time, relative to the default of each family
-COST = {"abel": 20.0, "body": 60.0, "cylinder": 60.0, "danby": 2500.0, "floquet": 10.0, "hill": 80.0}
-FLOW_FINEST = 1e-16  # useful tolerance for flows on the cylinder
-FLOW_WORK = 4  # steps, relative to the Taylor method
-_FIRST = LOW + 1  # stages lie in the lines of the table after the low series
-ADAPTIVE = True
-NODES = tuple(C[:STAGES])
+COST = {"abel": 20.0, "body": 60.0, "cylinder": 60.0, "danby": 2500.0, "floquet": 10.0, "hill": 80.0, "orbit": 20.0}
 _ABOUT = "DOP853, order 8, adaptive: "
 _CHECK = "steps of its own at every point. The independent check."
 ABOUT = {
@@ -55,9 +50,14 @@ ABOUT = {
     "cylinder": _ABOUT + "phi' = w, w' = f w + g in time, " + _CHECK,
     "danby": _ABOUT + "the four linear equations about L4 in the eccentric anomaly, " + _CHECK,
     "floquet": _ABOUT + "x' = A(t) x, " + _CHECK,
-    "orbit": _ABOUT + "the orbit and small deviations from it, " + _CHECK,
     "hill": _ABOUT + "y'' + z y = 0, " + _CHECK,
+    "orbit": _ABOUT + "x' = f(t, x) and its variational equation, " + _CHECK,
 }
+FLOW_FINEST = 1e-16  # useful tolerance for flows on the cylinder
+FLOW_WORK = 4  # steps, relative to the Taylor method
+_FIRST = LOW + 1  # stages lie in the lines of the table after the low series
+ADAPTIVE = True
+NODES = tuple(C[:STAGES])
 _WEIGHT = float(np.abs(B).sum())  # 12.9: some of B are negative
 _SMALLEST, _LARGEST = 0.2, 5.0
 # Zeros are counted by signs at the ends of steps: a step stays below this many radians of the fastest phase.
@@ -70,6 +70,7 @@ _SLOPE_ROUNDINGS = 4.0
 
 
 floquet_factors = runge_kutta.factors
+orbit_motion = runge_kutta.motion
 
 
 def floquet_reach(rtol):

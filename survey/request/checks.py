@@ -28,7 +28,14 @@ def check_options(scene, given, parameters=(), table=""):
         if option.only_with and option.only_with not in parameters:
             raise BadInput(f"{table}{key} requires the parameter {option.only_with}; give that too, or leave this out")
     exist = [o for o in known.values() if o.replaced_by not in parameters and o.only_with in ("", *parameters)]
-    return {option.name: str(given.get(option.name, option.default)) for option in exist}
+    values = {option.name: str(given.get(option.name, option.default)) for option in exist}
+    for option in exist:
+        if not exists(option, values):
+            if option.name in given:
+                allowed = ", ".join(f"{key} = {' | '.join(them)}" for key, them in option.when.items())
+                raise BadInput(f"{table}{option.name} exists only with {allowed}; change that, or leave this out")
+            del values[option.name]
+    return values
 
 
 def check_parameters(scene, name, options, given, table=""):

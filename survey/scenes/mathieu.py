@@ -48,8 +48,8 @@ _HALF_PERIOD = pi / 2
 
 
 def cost(options, sizes):
-    """Seconds per point, roughly: a point of a dense row, its share of the outputs included."""
-    return 1e-6
+    """Seconds per point, roughly."""
+    return monodromy.cost(sizes.get("q", 1), sizes.get("a", 1))
 
 
 def solve(point, request):
@@ -78,6 +78,11 @@ def compile_ahead(variables):
 def trajectory(point, answer, options, time=None):
     """Solutions and multipliers of a point (see `survey.scenes`)."""
     return motion.solve(_problem(np.array([point["q"]]), np.array([[point["a"]]])), answer, time)
+
+
+def equation(names, ends, options):
+    """The equation in formulas (see `survey.scenes`)."""
+    return "even", [("pi/2", f"{names['a']} - 2*{names['q']}*cos(2*u)")]
 
 
 def _problem(q, a, line=None, ends=None):
