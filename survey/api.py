@@ -25,7 +25,7 @@ from survey.request.hill_scene import is_number
 from survey.request.workflow import check, read
 from survey.scene import Option, Output, Parameter, Request, condition, exists
 from survey.sweep import announce, engine, solve
-from survey.sweep.progress import Progress
+from survey.sweep.progress import Progress, watched
 from survey.wording import counted, short, shown
 
 
@@ -163,7 +163,7 @@ def evaluate(
     grid = _grid(used, given)
     user_scene.check(module, grid)
     try:
-        with announce.watched(scene, module, grid.points, lambda: _seconds(module, request, grid)) as progress:
+        with watched(scene, module, grid.points, lambda: _seconds(module, request, grid)) as progress:
             found = solve.compute(grid, module, request, progress=progress)
         ds = count(labelled(grid, module, scene, request, found), found)
     except MemoryError:

@@ -6,10 +6,8 @@ Elsewhere (scripts, pipes) nothing is said.
 import contextlib
 import sys
 import threading
-from types import SimpleNamespace
 
 PATIENCE = 0.5  # seconds of compiling that pass without a word
-LONG = 2.0  # seconds of work, estimated, for which there is a bar
 SECONDS = {"hill": 20, "cylinder": 40, "abel": 40, "nutation": 20, "danby": 10, "normal_form": 10}  # measured, 2 cores
 USUAL = 30
 
@@ -57,23 +55,3 @@ def compiling(name, scene, say):
         event.unregister("numba:compile", listener)
         if listener.timer:
             listener.timer.cancel()
-
-
-@contextlib.contextmanager
-def watched(name, scene, points, seconds):
-    """For a call from Python: names compiling; yields what to call with (done, total), or None if nothing is shown.
-
-    `seconds()` estimates how long it takes.
-    """
-    if not is_watched():
-        yield None
-        return
-    from survey.sweep.progress import Progress
-
-    shown, quick = console(), seconds() < LONG
-    workflow = SimpleNamespace(name=name, grid=SimpleNamespace(points=points))
-    with (
-        compiling(name, scene, lambda text: shown.print(text, markup=False)),
-        Progress(shown, workflow, silent=quick) as progress,
-    ):
-        yield None if quick else lambda done, total: progress(done, total, 0)

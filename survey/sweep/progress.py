@@ -1,7 +1,9 @@
 """Progress and ETA on stderr: a bar on a terminal, occasional lines in a log."""
 
+import contextlib
 import time
 from datetime import timedelta
+from types import SimpleNamespace
 
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
@@ -11,6 +13,7 @@ from survey.wording import counted
 
 LOG_SECONDS = 60
 BAR_SECONDS = 0.2
+LONG = 2.0  # seconds of work, estimated, for which a call from Python has a bar
 
 
 class Progress:
@@ -104,3 +107,21 @@ def _clock(seconds):
 
 def _left(done, total, reused, elapsed, left):
     return left() if left else elapsed / max(done - reused, 1) * (total - done)
+
+
+@contextlib.contextmanager
+def watched(name, scene, points, seconds):
+    """For a call from Python: names compiling; yields what to call with (done, total), or None if nothing is shown.
+
+    `seconds()` estimates how long it takes.
+    """
+    if not announce.is_watched():
+        yield None
+        return
+    shown, quick = announce.console(), seconds() < LONG
+    workflow = SimpleNamespace(name=name, grid=SimpleNamespace(points=points))
+    with (
+        announce.compiling(name, scene, lambda text: shown.print(text, markup=False)),
+        Progress(shown, workflow, silent=quick) as progress,
+    ):
+        yield None if quick else lambda done, total: progress(done, total, 0)

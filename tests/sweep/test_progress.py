@@ -42,13 +42,13 @@ def test_compiling_is_named_once_it_takes_a_moment(monkeypatch):
 def test_a_notebook_and_a_terminal_see_a_bar_and_a_script_nothing(monkeypatch):
     console = Console(file=io.StringIO(), force_jupyter=False, force_terminal=True, width=120, highlight=False)
     monkeypatch.setattr(announce, "console", lambda: console)
-    monkeypatch.setattr(announce, "LONG", 0.0)
+    monkeypatch.setattr(progress, "LONG", 0.0)
     scene = types.SimpleNamespace(FAMILY="hill")
-    with announce.watched("mathieu", scene, 10, lambda: 1.0) as progress:
-        assert progress is None
+    with progress.watched("mathieu", scene, 10, lambda: 1.0) as bar:
+        assert bar is None
     monkeypatch.setattr(announce, "is_watched", lambda: True)
-    with announce.watched("mathieu", scene, 10, lambda: 1.0) as progress:
-        progress(0, 2)
-        progress(1, 2)
-        progress(2, 2)
+    with progress.watched("mathieu", scene, 10, lambda: 1.0) as bar:
+        bar(0, 2)
+        bar(1, 2)
+        bar(2, 2)
     assert "mathieu: 10 points in 2 blocks" in console.file.getvalue()

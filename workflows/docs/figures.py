@@ -50,6 +50,8 @@ def _fit(command, figure):
         names = [f"precision_{words[2]}.png"]
     elif words[:2] == ["survey", "run"]:
         names = [] if "output.figures=[]" in words else _of_workflow(ROOT / words[2])
+    elif words[0] == "survey":
+        names = []
     else:  # {...} in a name may be anything; a script may be a folder
         script = ROOT / words[1]
         texts = [path.read_text() for path in (script.glob("*.py") if script.is_dir() else [script])]
