@@ -67,9 +67,9 @@ def solve(point, request):
     block = Rows((point["e"],), point["mu"])
     line = request.line("mu")
     dense = line is not None and line[0] >= danby.DENSE
-    out = danby.solve(
-        block.per_row(point["e"]), block.per_point(point["mu"]), request.method, request.rtol, dense
-    )  # fmt: skip
+    many = request.ranges.get("mu", (0,))[0] >= danby.MANY
+    e, mu = block.per_row(point["e"]), block.per_point(point["mu"])
+    out = danby.solve(e, mu, request.method, request.rtol, dense, many)
     return {name: block.back(values) for name, values in out.items()}
 
 

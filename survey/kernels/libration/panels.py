@@ -10,7 +10,7 @@ import numpy as np
 
 from survey.kernels.jit import inline, kernel
 from survey.kernels.libration.danby_double import BARS, LOW
-from survey.kernels.libration.traces import INVARIANTS, NODES
+from survey.kernels.libration.traces import INVARIANTS, NODES, place
 from survey.kernels.math import double as dd
 from survey.kernels.math.roundoff import EPS
 
@@ -134,3 +134,25 @@ def row(e, first, middle, coefficients, bars, series, row_bars):
                 one, two = last, one
             series[j, 0, m], series[j, 1, m] = dd.mul(growth, one)
         row_bars[j] = 1.01 * growth[0] * bars[j]
+
+
+@kernel
+def points(e, mu, first, middle, coefficients, lengths, bars, out):
+    """Fill `out` (N, RESULTS of `traces`) for points of one panel, as `rows`; order k in y has `lengths`[k] terms."""
+    in_y, in_s, sums = np.empty(TERMS), np.empty(NODES), np.empty(NODES)
+    for i in range(len(e)):
+        growth = (1.0 + e[i]) / (1.0 - e[i])
+        growth = growth if first else growth * growth
+        cosines(position(e[i], middle), in_y)
+        cosines(place(mu[i]), in_s)
+        for j in range(INVARIANTS):
+            for m in range(NODES):
+                sums[m] = 0.0
+            for k in range(TERMS):
+                for m in range(lengths[k]):
+                    sums[m] += in_y[k] * coefficients[j, k, m]
+            total = 0.0
+            for m in range(lengths[0] - 1, -1, -1):
+                total += in_s[m] * sums[m]
+            out[i, j] = growth * total
+            out[i, INVARIANTS + j] = growth * bars[j] + 4.0 * EPS * abs(out[i, j])

@@ -135,6 +135,13 @@ def nearest(t, k, t_bar, k_bar):
     return KREIN if gap < -margin or two > -0.5 + bar else UNDECIDED
 
 
+@inline
+def place(mu):
+    """4 s - 3 within half an EPS."""
+    s = dd.positive_root(dd.shifted(dd.times(dd.square(dd.two_sum(0.5, -mu)), 3.0), 0.25))
+    return (4.0 * s[0] - 3.0) + 4.0 * s[1]
+
+
 @kernel
 def dense(series, bars, rows, mu, rtol, overflow, floats, verdict, collision, missed, status):
     """Answer the `missed` points of `rows` of mu (R, L) from their Chebyshev series in 4 s - 3 (rows, 5, NODES).
@@ -147,9 +154,7 @@ def dense(series, bars, rows, mu, rtol, overflow, floats, verdict, collision, mi
         for first in range(0, mu.shape[1], TILE):
             count = min(TILE, mu.shape[1] - first)
             for i in range(count):
-                square = dd.shifted(dd.times(dd.square(dd.two_sum(0.5, -mu[rows[r], first + i])), 3.0), 0.25)
-                s = dd.positive_root(square)
-                x[i] = (4.0 * s[0] - 3.0) + 4.0 * s[1]  # within half an EPS
+                x[i] = place(mu[rows[r], first + i])
             for j in range(INVARIANTS):
                 for i in range(count):  # Clenshaw; NODES is a constant, so that the inner loop is unrolled
                     one = two = 0.0

@@ -5,8 +5,8 @@ The monodromy's characteristic polynomial is l^4 - a l^3 + b l^2 - a l + 1. By t
 error bounds of these; A B = 0 means multipliers -1, K = 0 two pairs that meet.
 
 Points climb a ladder of steps (`survey.measures.answers`). Dense rows (one e, many mu) are five Chebyshev series in
-s = sqrt(1 - 3 mu (1 - mu)), which come from series in both parameters (`panels`). e = 0 has its closed form, and so has
-mu = 0. What these leave open, or not as accurate as asked, is solved in double-double (`danby_double`).
+s = sqrt(1 - 3 mu (1 - mu)), which come from series in both parameters (`panels`), as do very many points. e = 0 and
+mu = 0 have closed forms. What these leave open, or not as accurate as asked, is solved in double-double.
 """
 
 from functools import lru_cache
@@ -47,15 +47,16 @@ _NUMBERS = np.array([2, 3, 4, 5, 6, 7, 8, *((5 + i % 4) << (i // 4 + 1) for i in
 STEPS = Ladder(_NUMBERS, np.arange(_NUMBERS.size) + 3, slice(INVARIANTS, RESULTS), most=5)
 TOLERANCES = Ladder(10.0 ** -np.arange(4.0, 16.0), np.arange(12) + 1, slice(INVARIANTS, RESULTS), most=5)
 FINEST = 1e-14
-DENSE = 3 * NODES  # the least number of points in a row for which a series pays
+# The least number of points in a row for which a series pays, and of points on their own: a panel costs 30,000 of them.
+DENSE, MANY = 3 * NODES, 30_000
 # Keep a kernel call below about a second: steps, or points of an adaptive method.
 CALL_WORK, WALKS = 3_000_000, 500
 
 
-def solve(e, mu, method="auto", rtol=1e-10, dense=False):
+def solve(e, mu, method="auto", rtol=1e-10, dense=False, many=False):
     """The outputs for rows e (R) of points mu (R, L), all (R, L): a, b, their bounds, verdict, collision, status.
 
-    `dense`: the rows are long enough for series (see DENSE), wherever they are cut.
+    `dense`: the rows are long enough for series (see DENSE), `many`: the points are enough, wherever they are cut.
     """
     answers = Answers(mu.size)
     valid = np.isfinite(e)[:, None] & np.isfinite(mu)
@@ -65,6 +66,11 @@ def solve(e, mu, method="auto", rtol=1e-10, dense=False):
         answers.replace(np.flatnonzero(closed), closed_form(mu[closed], rtol))
     if method == "auto" and dense:
         _by_series(e, mu, rtol, answers, left)
+    elif method == "auto" and many:
+        points = np.flatnonzero(left)
+        own = Answers(points.size)
+        own.assess(panels.points(e[points // mu.shape[1]], mu[left]), rtol)
+        answers.replace(points, own)
     elif left.any():
         used = taylor16 if method == "auto" else measures.method(method)
         points = np.flatnonzero(left)

@@ -6,6 +6,7 @@ roundings of its sum are all of its bar: in float64 about 1e-14 of the factors, 
 
 from decimal import Decimal, localcontext
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from survey.kernels.math.chebyshev import lebesgue, tail
 from survey.kernels.math.roundoff import EPS, PAIR_ROUNDOFF, PAIR_SUM_ROUNDOFF
 
 DIGITS = 40
+LEAST = 1e-17  # of the largest coefficient: what is less counts at no single point
 PI = "3.14159265358979323846264338327950288419716939937510582097494"
 # Orders in y and in 4 s - 3. A sum of T_n(x) c_n rounds its terms, T_n or Clenshaw's sum by n^2 / 2 EPS, and x, where
 # T_n' <= n^2.
@@ -26,11 +28,20 @@ ROUNDING = EPS * (8.0 + IN_Y + 3.0 * IN_Y**2 + IN_S + 1.1 * IN_S**2)
 PAIR_ROUNDING = 4.0 * PAIR_ROUNDOFF * np.arange(1.0, NODES + 1) ** 3
 
 
+class Panel(NamedTuple):
+    """Series on one panel; bars (5) are what A to t, divided by their growth, may be off."""
+
+    middle: np.ndarray  # see `kernels.libration.panels.position` (4)
+    pairs: np.ndarray  # (5, 2, NODES, NODES)
+    pair_bars: np.ndarray
+    series: np.ndarray  # in float64 (5, TERMS, NODES of `traces`)
+    lengths: np.ndarray  # how many terms each order in y has that count at a single point (TERMS)
+    bars: np.ndarray
+
+
 @lru_cache(maxsize=64)
 def panel(number):
-    """The middle of a panel (4); its series as pairs (5, 2, NODES, NODES) with the bars (5) of these; and in float64,
-    (5, TERMS, NODES of `traces`) and their bars (5). Bars are what A to t, divided by their growth, may be off.
-    """
+    """The Panel of this number."""
     shapes, weights, middle = nodes(number)
     rates, matrix = tables()
     results = np.empty((NODES**2, kernels.RESULTS))
@@ -42,8 +53,13 @@ def panel(number):
     bars = lebesgue(NODES - 1) ** 2 * (bars + PAIR_SUM_ROUNDOFF * NODES * sizes)
     bars += (PAIR_ROUNDING * (in_y + in_s)).sum(axis=1) + tail(in_y) + tail(in_s)
     short = np.ascontiguousarray(series[:, 0, : panels.TERMS, : traces.NODES])
-    left_out = in_y[:, panels.TERMS :].sum(axis=1) + in_s[:, traces.NODES :].sum(axis=1)
-    return middle, series, bars, short, bars + left_out + (ROUNDING * abs(short)).sum(axis=(1, 2))
+    counts = (abs(short) > LEAST * abs(short).max(axis=(1, 2), keepdims=True)).any(axis=0)
+    lengths = (np.where(counts, IN_S + 1, 0).max(axis=1) + 7) // 8 * 8  # whole vectors
+    lengths[0] = lengths.max()
+    left_out = magnitudes.copy()
+    left_out[:, : panels.TERMS, : traces.NODES][:, IN_S < lengths[:, None]] = 0.0
+    short_bars = bars + left_out.sum(axis=(1, 2)) + (ROUNDING * abs(short)).sum(axis=(1, 2))
+    return Panel(middle, series, bars, short, lengths, short_bars)
 
 
 def rows(e):
@@ -54,8 +70,8 @@ def rows(e):
     for one in np.unique(number):
         mine = np.flatnonzero(number == one)
         found, found_bars = np.empty((mine.size, INVARIANTS, traces.NODES)), np.empty((mine.size, INVARIANTS))
-        middle, _series, _bars, short, short_bars = panel(int(one))
-        panels.rows(e[mine], one == 0, middle, short, short_bars, found, found_bars)
+        own = panel(int(one))
+        panels.rows(e[mine], one == 0, own.middle, own.series, own.bars, found, found_bars)
         series[mine], bars[mine] = found, found_bars
     return series, bars
 
@@ -64,9 +80,21 @@ def row(e):
     """As `rows`, of one row as pairs (5, 2, NODES), and the bounds (5)."""
     number, series, bars = np.empty(1, dtype=np.int64), np.empty((INVARIANTS, 2, NODES)), np.empty(INVARIANTS)
     panels.panels(np.array([e]), number)
-    middle, own, own_bars, _short, _bars = panel(int(number[0]))
-    panels.row(e, number[0] == 0, middle, own, own_bars, series, bars)
+    own = panel(int(number[0]))
+    panels.row(e, number[0] == 0, own.middle, own.pairs, own.pair_bars, series, bars)
     return series, bars
+
+
+def points(e, mu):
+    """Results (N, RESULTS of `traces`) of points."""
+    number, results = np.empty(e.size, dtype=np.int64), np.empty((e.size, traces.RESULTS))
+    panels.panels(e, number)
+    for one in np.unique(number):
+        mine = np.flatnonzero(number == one)
+        found, own = np.empty((mine.size, traces.RESULTS)), panel(int(one))
+        panels.points(e[mine], mu[mine], one == 0, own.middle, own.series, own.lengths, own.bars, found)
+        results[mine] = found
+    return results
 
 
 def nodes(number):

@@ -3,10 +3,13 @@
 import danby_exact as exact
 import numpy as np
 import pytest
+import xarray as xr
 from mpmath import mp, mpf
 
+import survey
 from survey.kernels.math.chebyshev import cosines
-from survey.measures.libration import danby_double, panels
+from survey.measures.libration import danby, danby_double, panels
+from survey.sweep import cost
 
 NAMES = ("A", "B", "C", "D", "t")
 MU = np.array([1e-12, 1e-4, 0.0123, 0.04699, 0.2, 0.5])
@@ -55,3 +58,31 @@ def test_a_series_is_that_of_multiprecision():
         wanted = exact.factors(mpf(mu), mpf(e), exact.STEPS, exact.ORDER)
         for j, name in enumerate(NAMES):
             assert abs(mpf(float(at(series[0, j], np.array([mu]))[0])) - wanted[name]) <= bars[0, j] < 1e-12
+
+
+def test_points_lie_within_their_bars():
+    random = np.random.default_rng(3)
+    e = np.concatenate([random.uniform(0, 1, 300), 1 - 10 ** random.uniform(-15, -1, 200), [1e-300, 0.5]])
+    mu = np.concatenate([random.uniform(0, 0.5, 400), 10 ** random.uniform(-20, -1, 102)])
+    found, truth = panels.points(e, mu), danby_double._results(e, mu)
+    off = abs((found[:, :5] - truth[:, :5]) - truth[:, 5:10])
+    assert (off <= found[:, 5:] + truth[:, 10:]).all() and off.max() > 0
+    sizes = abs(panels.rows(e)[0] @ cosines(24)).max(axis=2)
+    assert np.median(found[:, 5:] / sizes) < 3e-14
+
+
+def test_many_points_are_those_of_few_and_keep_their_bits_in_any_block(monkeypatch):
+    random = np.random.default_rng(4)
+    points = {
+        "mu": xr.DataArray(random.uniform(0, 0.05, 400), dims="p"),
+        "e": xr.DataArray(np.linspace(0, 0.9, 400), dims="p"),
+    }
+    few = survey.evaluate("libration_elliptic", **points)
+    monkeypatch.setattr(danby, "MANY", 400)
+    many = survey.evaluate("libration_elliptic", **points)
+    for name in "ab":
+        assert (abs(few[name] - many[name]) <= few[f"{name}_error"].astype(float) + many[f"{name}_error"]).all()
+        assert (many[f"{name}_error"][1:] < few[f"{name}_error"][1:]).mean() > 0.9  # they are from series
+    assert (few.verdict == many.verdict).all() and (few.collision == many.collision).all()
+    monkeypatch.setattr(cost, "BLOCK_POINTS", 17)
+    xr.testing.assert_identical(many.drop_attrs(), survey.evaluate("libration_elliptic", **points).drop_attrs())
