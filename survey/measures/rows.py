@@ -12,7 +12,7 @@ class Rows:
         self.shape = np.broadcast_shapes(*(np.shape(a) for a in (*shared, *others)))
         of_rows = [axis for axis in range(len(self.shape)) if any(self._size(a, axis) > 1 for a in shared)]
         of_lanes = [axis for axis in range(len(self.shape)) if axis not in of_rows]
-        self.order = of_rows + of_lanes
+        self.order, self.lane_axes = of_rows + of_lanes, len(of_lanes)
         self.rows = prod(self.shape[axis] for axis in of_rows)
         self.lanes = prod(self.shape[axis] for axis in of_lanes)
 
@@ -25,20 +25,24 @@ class Rows:
         """`per_row` of several arrays, (arrays, rows)."""
         found = np.empty((len(arrays), self.rows))
         for column, array in zip(found, arrays, strict=True):
-            column[:] = self._broadcast(array)[:, 0]
+            column[:] = self.per_row(array)
         return found
 
     def per_row(self, array):
         """One value per row, of an array that is constant along the lanes."""
-        return np.ascontiguousarray(self.per_point(array)[:, 0])
+        first = self._full(array)[(..., *[0] * self.lane_axes)]
+        return np.array(first, order="C").reshape(self.rows)
 
     def per_point(self, array):
         """All values (rows, lanes), contiguous float64; a copy, as for read-only views kernels would compile again."""
         return np.array(self._broadcast(array), order="C")
 
     def _broadcast(self, array):
-        full = np.broadcast_to(np.asarray(array, dtype=float), self.shape).transpose(self.order)
-        return full.reshape(self.rows, self.lanes)
+        return self._full(array).reshape(self.rows, self.lanes)
+
+    def _full(self, array):
+        """All values, a read-only view with the axes in order."""
+        return np.broadcast_to(np.asarray(array, dtype=float), self.shape).transpose(self.order)
 
     def back(self, array):
         """(rows, lanes), or (rows, 1), in the block's shape."""

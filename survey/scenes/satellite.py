@@ -98,7 +98,9 @@ def solve(point, request):
         _solve(shared, np.where((alpha > 1) == oblate, rho, np.nan), oblate, request, low, line, ends)
         for oblate in np.unique(alpha > 1)
     ]
-    return {name: np.where(alpha > 1, bodies[-1][name], bodies[0][name]) for name in bodies[0]}
+    if len(bodies) == 1:
+        return bodies[0]
+    return {name: np.where(alpha > 1, bodies[1][name], bodies[0][name]) for name in bodies[0]}
 
 
 def equation(names, ends, options):
