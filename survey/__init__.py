@@ -8,6 +8,7 @@
     survey.evaluate(survey.floquet(A, ...), p=1.0)               # your own linear periodic system x' = A(t, p) x
     survey.evaluate(survey.orbit(f, ...), p=1.0)                 # periodic orbits of your own system x' = f(t, x, p)
     survey.edge("satellite", along="rho", near=1.2, k=0.5)       # the boundaries of stability along a parameter
+    survey.describe("satellite")                                 # its parameters, outputs and methods, as a table
     survey.scenes()                                              # the scenes and what they answer
     ds = survey.open("results/satellite_prolate.nc")             # open and check a file
 
@@ -19,8 +20,10 @@ Importing this package compiles nothing and imports nothing heavy.
 import sys
 from importlib import import_module
 
-_HOME = {"run": "survey.api", "evaluate": "survey.api", "open": "survey.api", "hill": "survey.request.user_scene"}
-_HOME |= {name: "survey.request.user_scene" for name in ("abel", "floquet", "orbit")}
+__version__ = "0.1.0"
+
+_HOME = {name: "survey.api" for name in ("run", "evaluate", "open", "describe")}
+_HOME |= {name: "survey.request.user_scene" for name in ("hill", "abel", "floquet", "orbit")}
 _HOME |= {"concat": "survey.analysis.join", "edge": "survey.analysis.edge"}
 _HOME |= {
     "SurveyError": "survey.errors",
@@ -68,4 +71,4 @@ def __getattr__(name):
 
 
 def __dir__():
-    return sorted([*globals(), *_HOME])
+    return [*__all__, "__version__"]

@@ -2,6 +2,7 @@
 
 from survey.analysis.edge import edge as edge
 from survey.analysis.join import concat as concat
+from survey.api import describe as describe
 from survey.api import evaluate as evaluate
 from survey.api import open as open
 from survey.api import run as run
@@ -14,3 +15,5 @@ from survey.request.user_scene import abel as abel
 from survey.request.user_scene import floquet as floquet
 from survey.request.user_scene import hill as hill
 from survey.request.user_scene import orbit as orbit
+
+__version__: str

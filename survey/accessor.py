@@ -24,6 +24,10 @@ class Survey:
                 "this dataset was not written by survey: it has no status, or no attribute scene "
                 "(arithmetic drops attributes: xr.set_options(keep_attrs=True) keeps them)"
             )
+        stacked = [dim for dim in ds.status.dims if dim in ds.coords and ds[dim].dtype == object
+                   and ds[dim].size and isinstance(ds[dim].values.flat[0], tuple)]  # fmt: skip
+        if stacked:
+            raise BadInput(f"this survey is stacked along {stacked[0]}: give it its axes back with .unstack()")
         schema.check(ds, complete=False)
         self._ds = ds
 
@@ -32,8 +36,21 @@ class Survey:
         scene = plain(self._ds.attrs["scene"])
         return f"a survey of {scene}: ds.survey has {', '.join(names)}; help(ds.survey) documents them"
 
-    def map(self, var=None, ax=None, boundaries=True, style=None, width="single"):
+    def _repr_html_(self):
+        from survey.show import notebook
+
+        return notebook.of_survey(self._ds)
+
+    def map(
+        self, var=None, ax=None, boundaries=True, style=None, width="single", *,
+        x=None, y=None, cmap=None, vmin=None, vmax=None, robust=None,
+    ):  # fmt: skip
         """Draw the stability map, or the variable `var`; along one axis, its curve and error band.
+
+        `var`: a name, or booleans at the points, such as `a.survey.where("stable") & b.survey.where("stable")`. `x`
+        and `y`: which axes are drawn; others at their first value, unless a `slice` fixes them. `cmap`, `vmin`, `vmax`:
+        colours of a variable of numbers; by default they span its values but for 1 % at either end, where the colour
+        bar has arrows (`robust=False`: all of them), and diverge about 0 where values have both signs.
 
         Solutions of Abel's equation at several angles are curves, one for each value of the first parameter, up to
         their turning points; at one angle (`ds.survey.slice(phi=1.0).survey.map("w")`) they are a map.
@@ -44,13 +61,41 @@ class Survey:
         (`ax.figure.savefig("map.pdf")`). `style="paper"`: for print, hatched, without title, a single or double column
         wide; `survey plot --style paper` also embeds the fonts as journals require.
         """
+        from survey.analysis import verdicts
         from survey.show import figures
         from survey.show.style import figure_size
 
+        ds = self._ds
+        if isinstance(var, xr.DataArray):
+            ds, var = verdicts.combined(ds, var), "combined"
+        colours = {"cmap": cmap, "vmin": vmin, "vmax": vmax, "robust": robust}
         with _settings(style):
             ax = _new_axes(figure_size(style, width)) if ax is None else ax
-            figures.onto(ax, self._ds, var, boundaries, style)
+            figures.onto(ax, ds, var, boundaries, style, (x, y), colours)
         return ax
+
+    def counts(self):
+        """{"verdict" (if there is one), "status": {kind: number of points}}; a point without an answer counts, among
+        the verdicts, by its status."""
+        from survey.file import labels
+
+        return labels.counts(self._ds)
+
+    def where(self, name):
+        """True where the verdict, or the status, is `name` (a boolean DataArray): `ds.survey.where("stable")`.
+
+        Masks of several surveys combine with `&`, `|` and `~`, and `map` draws the result. An undecided point is in no
+        mask but that of "undecided", so `~where("stable")` contains it.
+        """
+        from survey.analysis import verdicts
+
+        return verdicts.where(self._ds, name)
+
+    def names(self):
+        """The verdict of every point as a word, its status where it has no answer: for `groupby` and legends."""
+        from survey.analysis import verdicts
+
+        return verdicts.names(self._ds)
 
     def point(self, **coords):
         """Everything known about the nearest point: a `survey.analysis.point.Point`; its `dataset` is the point's."""

@@ -15,15 +15,17 @@ import survey.scenes
 from survey import measures, status
 from survey.errors import BadInput
 from survey.file import disk, reading, schema
-from survey.file.labels import count, counts, describe, flag_codes, layout, percent
-from survey.grid import Grid, fixed, lines, ranges
-from survey.request import earlier, trust, user_scene
+from survey.file.labels import count, counts, flag_codes, layout, percent
+from survey.file.labels import describe as labelled
+from survey.grid import Grid, fixed, lines
+from survey.request import earlier, physical, trust, user_scene
 from survey.request.checks import check_options, check_parameters, check_request, methods_of
 from survey.request.function_scene import FunctionScene
 from survey.request.hill_scene import is_number
 from survey.request.workflow import check, read
 from survey.scene import Option, Output, Parameter, Request, condition, exists
-from survey.sweep import engine, solve
+from survey.sweep import announce, engine, solve
+from survey.sweep.progress import Progress
 from survey.wording import counted, short, shown
 
 
@@ -31,7 +33,7 @@ def run(
     workflow: str | os.PathLike[str] | Mapping[str, Any],
     output: str | os.PathLike[str] | None = None,
     workers: int | None = None,
-    scheduler: str | None = None,
+    scheduler: Any = None,
     fresh: bool = False,
     block_timeout: float | None = None,
     reuse: str | os.PathLike[str] | None = None,
@@ -44,7 +46,7 @@ def run(
         `survey.abel`, `survey.floquet` or `survey.orbit` returns).
     output : path of the netCDF file, instead of the workflow's.
     workers : number of worker processes; by default threads of this process.
-    scheduler : address or scheduler file of a dask.distributed cluster.
+    scheduler : address or scheduler file of a dask.distributed cluster, or a Client of it.
     fresh : replace what earlier runs have left at the output: a finished file, or the blocks of an interrupted run.
         Otherwise a finished file of the same workflow is returned as it is (nothing is computed, pictures are drawn
         again), and one of another workflow is refused.
@@ -63,13 +65,20 @@ def run(
     ------
     survey.BadInput, survey.Damaged, survey.Stopped (resumable): one line each.
     """
+    if isinstance(workflow, (xr.Dataset, xr.DataArray)):
+        raise BadInput("run: this is a dataset, not a workflow; give the path of a workflow file, or a mapping; "
+                       "ds.survey.zoom() and survey.evaluate solve further points")  # fmt: skip
     checked = (read if isinstance(workflow, (str, os.PathLike)) else check)(workflow, output=output)
     if workers is not None and (not isinstance(workers, int) or workers < 1):
         raise BadInput(f"workers = {shown(workers)}: it must be a positive integer, or None for threads")
     if block_timeout is not None and not (is_number(block_timeout) and 0 < block_timeout < np.inf):
         raise BadInput(f"block_timeout = {shown(block_timeout)}: it must be a positive number of seconds, or None")
     held = earlier.find(checked, reuse)[0] if reuse is not None else None
-    engine.run(checked, workers, scheduler, fresh, block_timeout=block_timeout, earlier=held)
+    silent = not announce.is_watched()
+    with Progress(announce.console(), checked, silent) as progress:
+        engine.run(
+            checked, workers, scheduler, fresh, None if silent else progress, block_timeout=block_timeout, earlier=held
+        )
     ds = reading.load(checked.path)
     draw(ds, checked)
     return ds
@@ -134,9 +143,12 @@ def evaluate(
     >>> ds.verdict.dims
     ('k',)
     """
+    if isinstance(scene, (xr.Dataset, xr.DataArray)):
+        raise BadInput("evaluate: this is a dataset, not a scene; give a scene's name first, such as 'satellite'")
     scene, module = user_scene.find(scene)
     names = {option.name for option in module.OPTIONS}
-    given = {key: _labelled(key, value) for key, value in parameters.items() if key not in names}
+    named = {key: value for key, value in parameters.items() if key not in names}
+    given = {key: _labelled(key, value) for key, value in physical.resolved(module, named).items()}
     options = check_options(module, {key: parameters[key] for key in parameters if key in names}, given)
     used = check_parameters(module, scene, options, given)
     if variables is not None:
@@ -150,8 +162,16 @@ def evaluate(
         return _lazy(module, scene, request, given)
     grid = _grid(used, given)
     user_scene.check(module, grid)
-    arrays = solve.compute(grid, module, request)
-    ds, own = count(describe(grid, module, scene, request, arrays), arrays), _own_coordinates(given)
+    try:
+        with announce.watched(scene, module, grid.points, lambda: _seconds(module, request, grid)) as progress:
+            found = solve.compute(grid, module, request, progress=progress)
+        ds = count(labelled(grid, module, scene, request, found), found)
+    except MemoryError:
+        raise BadInput(
+            f"evaluate: {counted(grid.points, 'point')} do not fit in memory; use survey.run, which writes a file, or "
+            "dask arrays (DataArray.chunk), or fewer points or variables"
+        ) from None
+    own = _own_coordinates(given)
     return ds.assign_coords(own) if own else ds
 
 
@@ -234,7 +254,14 @@ def _check_dimensions(module: Any, given: dict[str, xr.DataArray]) -> None:
 def _check_single_values(used: dict[str, Parameter], given: dict[str, xr.DataArray]) -> None:
     for key, array in given.items():
         if array.ndim == 0 and not array.chunks and not used[key].holds(array.values):
-            raise BadInput(f"{key} = {float(array):g} is outside its domain; allowed: {used[key].domain}")
+            raise BadInput(f"{key} = {float(array):g} is outside its domain; allowed: {used[key].domain}"
+                           f"{physical.hint(used[key], float(array))}")  # fmt: skip
+
+
+def _seconds(module: Any, request: Request, grid: Grid) -> float:
+    """Rough seconds on one thread."""
+    sizes = {name: values.size for name, (_, values) in grid.parameters.items()}
+    return float(module.cost(request.options, sizes) * grid.points)
 
 
 def _grid(used: dict[str, Parameter], given: dict[str, xr.DataArray]) -> Grid:
@@ -264,7 +291,7 @@ def _lazy(module: Any, scene: str, request: Request, given: dict[str, xr.DataArr
     table = layout(module, request)
     names = list(given)
     axes = {name: (array.dims, array) for name, array in given.items()}
-    request = replace(request, lines=lines(axes), fixed=fixed(axes), ranges=ranges(axes))
+    request = replace(request, lines=lines(axes), fixed=fixed(axes))
 
     def solve_arrays(*arrays: Any) -> tuple[Any, ...]:
         shape = np.broadcast_shapes(*(array.shape for array in arrays))
@@ -286,7 +313,7 @@ def _lazy(module: Any, scene: str, request: Request, given: dict[str, xr.DataArr
     sizes = dict(zip(results[-1].dims, results[-1].shape, strict=True))
     values = {key: (array.dims, array.data) for key, array in given.items()}
     data = {name: array.data for name, array in arrays.items()}
-    return describe(Grid(sizes, values), module, scene, request, data).assign_coords(_own_coordinates(given))
+    return labelled(Grid(sizes, values), module, scene, request, data).assign_coords(_own_coordinates(given))
 
 
 def scene(name: Any) -> dict[str, Any]:
@@ -296,7 +323,7 @@ def scene(name: Any) -> dict[str, Any]:
         "name": name,
         "title": module.TITLE,
         "about": inspect.cleandoc(module.__doc__),
-        "parameters": {p.name: _parameter_line(module, p) for p in module.PARAMETERS},
+        "parameters": {p.name: _parameter_line(module, p) for p in module.PARAMETERS} | physical.described(module),
         "options": {
             o.name: f"{o.long_name}: {' | '.join(o.choices)} (default {o.default}){_option_condition(o)}"
             for o in module.OPTIONS
@@ -310,6 +337,33 @@ def scene(name: Any) -> dict[str, Any]:
         | {m: _method_line(module, m) for m in methods_of(module)},
         "references": list(module.REFERENCES),
     }
+
+
+class Description(dict[str, Any]):
+    """What `describe` returns: a mapping, shown as a table."""
+
+    def __repr__(self) -> str:
+        lines = [f"{self['name']}: {self['title']}"]
+        for heading in ("parameters", "options", "outputs", "status", "methods"):
+            rows = self[heading]
+            width = max(map(len, rows), default=0)
+            lines += ["", f"{heading}:", *(f"  {key:<{width}}  {text}" for key, text in rows.items())] if rows else []
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        from survey.show import notebook
+
+        rows = [(heading, key, text) for heading in ("parameters", "options", "outputs", "status", "methods")
+                for key, text in self[heading].items()]  # fmt: skip
+        return str(notebook.table(f"{self['name']}: {self['title']}", rows))
+
+
+def describe(scene: Any) -> Description:
+    """A scene's parameters, options, outputs, statuses and methods, shown as a table: `survey.describe("satellite")`.
+
+    `scene` is what `survey.evaluate` takes. The result is a mapping, with the equations under "about".
+    """
+    return Description(globals()["scene"](scene))
 
 
 def summary(ds: xr.Dataset) -> dict[str, Any]:
@@ -348,11 +402,12 @@ def areas(ds: xr.Dataset) -> dict[str, str]:
 
 def _option_condition(option: Option) -> str:
     text = f"; only with {option.only_with}" if option.only_with else ""
+    text += "".join(f"; only when {name} = {' | '.join(allowed)}" for name, allowed in option.when.items())
     return text + (f"; not with {option.replaced_by}, which replaces it" if option.replaced_by else "")
 
 
 def _parameter_line(module: Any, p: Parameter) -> str:
-    unit = " (no unit)" if p.units == "1" else f" ({p.units})"
+    unit = " (any consistent units)" if p.units == "1" else f" ({p.units})"
     need = (
         f"default {p.default:g}"
         if p.default is not None
@@ -381,5 +436,6 @@ def _output_text(o: Output) -> str:
 
 def _method_line(module: Any, name: str) -> str:
     method = measures.method(name)
-    first, when = inspect.cleandoc(method.__doc__).splitlines()[0], condition(module, getattr(method, "WHEN", {}))
+    docstring, when = inspect.cleandoc(method.__doc__), condition(module, getattr(method, "WHEN", {}))
+    first = getattr(method, "ABOUT", {}).get(module.FAMILY, docstring.splitlines()[0])
     return first.removesuffix(".") + when if when else first

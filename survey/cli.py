@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from survey import __version__
 from survey.errors import BadInput, SurveyError, Untrusted
 from survey.wording import counted, plain, reason_of
 
@@ -56,13 +57,69 @@ def complain(message, code):
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(package_name="survey")
+@click.version_option(__version__, prog_name="survey")
 def program():
     """Stability maps of mechanical systems: every point with an error bar, and a verdict that respects it."""
 
 
+def _scene_names(_context, _parameter, incomplete):
+    """Completion of a scene's name."""
+    import survey.scenes
+
+    return [name for name in survey.scenes() if name.startswith(incomplete)]
+
+
+class _Files(click.ParamType):
+    """A path; completed with the files of one kind, and folders."""
+
+    name = "path"
+
+    def __init__(self, suffix):
+        self.suffix = suffix
+
+    def shell_complete(self, ctx, param, incomplete):
+        from click.shell_completion import CompletionItem
+
+        folder = os.path.dirname(incomplete)
+        found = [os.path.join(folder, name) for name in sorted(os.listdir(folder or "."))]
+        return [
+            CompletionItem(path + "/" * os.path.isdir(path))
+            for path in found
+            if path.startswith(incomplete) and (path.endswith(self.suffix) or os.path.isdir(path))
+        ]
+
+
+WORKFLOW = _Files(".toml")
+
+
 @program.command()
-@click.argument("workflow")
+@click.argument("scene", shell_complete=_scene_names)
+@click.option("-o", "--output", metavar="FILE.toml", help="The workflow file; by default SCENE.toml.")
+def init(scene, output):
+    """Write a commented workflow of the scene to start from; it runs as it is."""
+    from survey.request import starter
+
+    text = starter.workflow(scene)
+    path = output or f"{os.path.basename(scene).removesuffix('.py')}.toml"
+    try:
+        with open(path, "x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise BadInput(f"{path} exists; name another file with -o") from None
+    err.print(plain(f"wrote {path}; run it with: survey run {shlex.quote(path)}"), markup=False)
+    out.print(plain(path), markup=False)
+
+
+@program.command()
+def schema():
+    """Print the JSON schema of a workflow file, by which editors complete and check it."""
+    from survey.request import starter
+
+    _show(starter.schema(), True)
+
+
+@program.command()
+@click.argument("workflow", type=WORKFLOW)
 @click.option("-o", "--output", metavar="OUT.nc", help="The netCDF file, instead of the workflow's output.path.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Replace a key, such as axes.k.num=40.")
 @click.option("--workers", type=click.IntRange(1), help="Worker processes; by default threads of this process.")
@@ -81,28 +138,65 @@ def run(workflow, output, overrides, workers, scheduler, block_timeout, fresh, r
     from survey.request import earlier
     from survey.request.workflow import read
     from survey.sweep import engine
-    from survey.sweep.progress import Progress
 
-    checked, finished = read(workflow, overrides, output), None
-    resume_command = shlex.join(["survey", *(word for word in sys.argv[1:] if word != "--fresh")])
+    checked = read(workflow, overrides, output)
     held, told = earlier.find(checked, reuse) if reuse else (None, "")
     if told and not quiet:
         err.print(plain(told), markup=False)
+
+    def start(progress, resume_command):
+        return engine.run(checked, workers, scheduler, fresh, progress, resume_command, block_timeout, held)
+
+    return _carry_out(checked, quiet, start)
+
+
+def _carry_out(checked, quiet, start, further=()):
+    """Run the engine by `start(progress, resume_command)`, draw, and say what was written; the exit code.
+
+    `further`: paths of other files that it writes.
+    """
+    from survey.sweep.progress import Progress
+
+    finished, resume_command = None, shlex.join(["survey", *(word for word in sys.argv[1:] if word != "--fresh")])
     _stop_on_sigterm()
     try:
         with Progress(err, checked, silent=quiet) as progress:
-            finished = engine.run(checked, workers, scheduler, fresh, progress, resume_command, block_timeout, held)
+            finished = start(progress, resume_command)
             pictures = _draw(checked)
     except KeyboardInterrupt as stop:
         traceback.clear_frames(stop.__traceback__)  # the semaphores they hold would be reported as leaked
         _end_interrupted(stop.args[0] if stop.args else 130, checked.path, finished, resume_command)
     if not quiet:
-        _summarise(finished, [checked.path, *pictures])
+        _summarise(finished, [checked.path, *further, *pictures])
     return 1 if _failed(finished) else 0
 
 
 @program.command()
-@click.argument("workflow")
+@click.argument("workflow", type=WORKFLOW)
+@click.option("-o", "--output", metavar="OUT.nc", help="The netCDF file, instead of the workflow's with _proved added.")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Replace a key: refine.width=0.01.")
+@click.option("--fresh", is_flag=True, help="Delete what an earlier, interrupted run has proved.")
+@click.option("--quiet", is_flag=True, help="No progress and no closing lines.")
+def prove(workflow, output, overrides, fresh, quiet):
+    """Prove a stability map: OUT.nc with its cells, and OUT.cert, which `survey-check` verifies by itself."""
+    from dataclasses import replace
+
+    from survey.request.workflow import read
+    from survey.sweep import engine, proofs
+
+    checked = read(workflow, overrides, output, proves=True)
+    if output is None:
+        checked = replace(checked, path=checked.path.with_stem(f"{checked.path.stem}_proved"))
+    proofs.equation_of(checked)  # refuses what cannot be proved
+    certificate = checked.path.with_suffix(".cert")
+    code = _carry_out(checked, quiet, lambda *more: engine.run(checked, None, None, fresh, *more), [certificate])
+    if not quiet:
+        err.print(f"verify it, also on another machine: survey-check {certificate}", markup=False)
+    return code
+
+
+@program.command()
+@click.argument("workflow", type=WORKFLOW)
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Replace a key, such as axes.k.num=40.")
 @click.option("-o", "--output", metavar="OUT.nc", help="The netCDF file, instead of the workflow's output.path.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
@@ -256,22 +350,24 @@ def view(path, port, link, no_browser, trust_scene):
 
 
 @program.command()
-@click.argument("name", required=False)
+@click.argument("name", required=False, shell_complete=_scene_names)
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def scenes(name, as_json):
     """List the scenes; or show one scene's equations, parameters, outputs and sources."""
+    if name is None:
+        import survey.scenes
+
+        return _show(survey.scenes(), as_json)
     from survey import api
 
-    if name is None:
-        _show(api.scenes(), as_json)
-    elif as_json:
+    if as_json:
         _show(api.scene(name), True)
     else:
         _describe(api.scene(name))
 
 
 @program.command()
-@click.argument("scene")
+@click.argument("scene", shell_complete=_scene_names)
 @click.option("--peers", is_flag=True, help="Also measure the best other programs, where installed.")
 @click.option("-o", "--output", metavar="DIR", default=".", show_default=True, help="Folder for CSV, JSON and PNG.")
 def precision(scene, peers, output):

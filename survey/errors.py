@@ -13,6 +13,10 @@ class SurveyError(Exception):
     def __init__(self, *parts: object) -> None:
         super().__init__(*(plain(str(part)) for part in parts))  # it may quote an untrusted file
 
+    def _render_traceback_(self, *_: object, **__: object) -> list[str]:
+        """What IPython shows instead of a traceback: the line."""
+        return [f"{type(self).__name__}: {self}"]
+
 
 class BadInput(SurveyError, ValueError):
     """The input is refused before any work: the line names the key, the value, what is allowed and what to do."""

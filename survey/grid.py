@@ -2,6 +2,7 @@
 
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise, product
 from math import ceil, prod
 
@@ -29,17 +30,17 @@ class Grid:
     def points(self):
         return prod(self.shape)
 
-    @property
+    @cached_property
     def lines(self):
         """`lines` of its parameters."""
         return lines(self.parameters)
 
-    @property
+    @cached_property
     def ranges(self):
         """`ranges` of its parameters."""
         return ranges(self.parameters)
 
-    @property
+    @cached_property
     def fixed(self):
         """The names of the parameters that are single numbers."""
         return fixed(self.parameters)
@@ -153,6 +154,12 @@ def coordinates(start, stop, num, spacing="linear"):
             raise BadInput(f"start = {start:g}, stop = {stop:g} with spacing = 'log': both must be positive")
         return np.geomspace(start, stop, num)
     return np.linspace(start, stop, num)
+
+
+def positions(values):
+    """Coordinates as floats; labels by their number, counted from 0."""
+    values = np.asarray(values)
+    return values.astype(float) if values.dtype.kind in "iufb" else np.arange(values.size, dtype=float)
 
 
 def logarithmic(values):

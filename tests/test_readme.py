@@ -107,8 +107,13 @@ def test_the_examples_of_own_scenes_run(name, tmp_path):
 
 def test_every_command_in_the_table_runs(folder):
     commands = re.findall(r"^\| `(survey [^`]*)`", README, re.MULTILINE)
-    assert len(commands) == 9
-    names = {"WORKFLOW.toml": "small.toml", "OUT.nc": "satellite_prolate.nc", "[NAME]": "satellite"}
+    assert len(commands) == 10
+    names = {
+        "WORKFLOW.toml": "small.toml",
+        "OUT.nc": "satellite_prolate.nc",
+        "[NAME]": "satellite",
+        "SCENE": "satellite",
+    }
     for command in commands:
         for word, name in names.items():
             command = command.replace(word, name)

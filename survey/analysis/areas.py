@@ -9,6 +9,7 @@ from survey import measures, status
 from survey.errors import BadInput
 from survey.file import schema
 from survey.file.labels import flag_codes, percent, undecided_share
+from survey.grid import positions
 from survey.request import user_scene
 
 NO_ANSWER = -2
@@ -66,7 +67,7 @@ def _of_cells(ds):
 def _counted(ds, codes):
     """Area of each verdict code (each cell between neighbours is divided among its corners), and its least and most."""
     dims = ds.status.dims
-    widths = [abs(np.diff(ds[dim].values.astype(float))) for dim in dims]
+    widths = [abs(np.diff(positions(ds[dim].values))) for dim in dims]
     rest = int(np.prod(ds.status.shape[1:]))
     step = max(1, SLAB // rest)
     area, least, most = np.zeros((3, len(codes)))

@@ -7,6 +7,7 @@ from survey import modules
 from survey.errors import BadInput
 from survey.file import schema
 from survey.file.labels import flag_codes
+from survey.grid import positions
 
 
 def find(ds, kind=None, index=None):
@@ -107,7 +108,7 @@ def _along(ds, verdict, i):
     found = {"below": low[tuple(indices)], "above": high[tuple(indices)]}
     indices.insert(i, indices.pop(0))
     for at, dim in enumerate(ds.verdict.dims):
-        values = ds[dim].values.astype(float)
+        values = positions(ds[dim].values)
         here = values[indices[at]]
         after = values[indices[at] + 1] if at == i else here
         found[dim], found[f"{dim}_error"] = 0.5 * (here + after), 0.5 * abs(after - here)

@@ -48,11 +48,14 @@ def nearest_indices(ds, coords):
 
     A number may lie beyond an end by up to half a step.
     """
-    axes = [dim for dim in ds.status.dims if dim in ds.coords and ds[dim].dtype.kind in "iuf"]
+    axes = list(ds.status.dims)
     indices = {}
     for name, value in coords.items():
         if name not in axes:
             raise BadInput(modules.unknown("axis", name, axes))
+        if name not in ds.coords or ds[name].dtype.kind not in "iuf":
+            indices[name] = _place(ds, name, value)
+            continue
         values = ds[name].values
         if not np.isfinite(values).all():
             raise Damaged(f"the axis {name} contains values that are not finite")
@@ -67,14 +70,29 @@ def nearest_indices(ds, coords):
     return indices
 
 
+def _place(ds, name, value):
+    """The index of a label, or of a number counted from 0, along a dimension whose coordinate is not numeric."""
+    labels = [str(label) for label in ds[name].values] if name in ds.coords else []
+    if str(value) in labels:
+        return labels.index(str(value))
+    if isinstance(value, (int, np.integer)) and not isinstance(value, bool) and 0 <= value < ds.sizes[name]:
+        return int(value)
+    if labels:
+        raise BadInput(f"{name}: {modules.unknown('label', str(value), labels)}")
+    raise BadInput(f"{name} = {value!r}: it has no coordinate; give a number from 0 to {ds.sizes[name] - 1}")
+
+
 def plane(ds, at):
     """The survey at the axis values nearest to `at`, and at these labels of other dimensions.
 
     `at` maps names to text. A dimension beyond the two that are drawn is kept, with length one.
     """
+    alone = len([dim for dim in ds.status.dims if dim not in at]) < 2  # then a row is drawn
     for name, text in at.items():
         if name in ds.status.dims:
-            i, drawn = nearest_indices(ds, {name: _number(name, text)})[name], name in ds.status.dims[:2]
+            labelled = name not in ds.coords or ds[name].dtype.kind not in "iuf"
+            i = nearest_indices(ds, {name: text if labelled else _number(name, text)})[name]
+            drawn = alone or name in ds.status.dims[:2]
             ds = of_points(ds).isel({name: i}) if drawn else ds.isel({name: [i]})
             continue
         others = [dim for dim in ds.dims if dim in ds.coords and dim not in ds.status.dims]

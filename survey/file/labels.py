@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from survey import status
+from survey import __version__, status
 from survey.file import schema
 from survey.scene import exists
 
@@ -243,7 +243,7 @@ def provenance():
 
     commit, dirty = _commit()
     return {
-        "version_survey": version("survey"),
+        "version_survey": __version__,
         "version_numba": version("numba"),
         "version_llvmlite": version("llvmlite"),
         "version_numpy": version("numpy"),

@@ -24,6 +24,13 @@ from survey.kernels.unroll import largest, unroll
 
 ORDER = 16
 SERVES = ("danby", "floquet", "hill", "orbit")
+_ABOUT = "Midpoint Taylor, order 16: power series about the middle of each step, "
+ABOUT = {
+    "danby": _ABOUT + "of the propagator of the four linear equations about L4, over half a period.",
+    "floquet": _ABOUT + "of the propagator of x' = A(t) x, of n states.",
+    "hill": _ABOUT + "of both fundamental solutions of y'' + z y = 0.",
+    "orbit": _ABOUT + "of the orbit and of the propagator of small deviations from it.",
+}
 COST = {"danby": 10.0}  # time, relative to the default of each family
 
 _DEGREE = 9

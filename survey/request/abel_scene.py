@@ -41,7 +41,7 @@ STATUS = gyrostat.STATUS | {
 TRIED = (0.25, -1.5, 2.5)  # angles at which f and g are tried as Python
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class AbelScene(FunctionScene):
     """What a scene's module offers (see `survey.scenes`), for a user's f and g; `about` is its docstring."""
 

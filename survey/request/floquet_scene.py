@@ -21,7 +21,7 @@ STATUS = {
 }
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FloquetScene(TracedScene):
     """What a scene's module offers (see `survey.scenes`), for a user's A, or M, C, K; `about` is its docstring."""
 

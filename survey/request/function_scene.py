@@ -1,12 +1,16 @@
 """What the scenes of a user's functions share: how they travel to other processes, and how they refuse."""
 
+import html
+import re
 from collections.abc import Callable
 from dataclasses import fields
 
 import numpy as np
 
 from survey.errors import BadInput
+from survey.wording import plain
 
+_KEYS = re.compile(r"\b(PARAMETERS|PERIOD|EVEN|BREAKS|STATES|STRUCTURE|START|CONTINUATION)\b")
 _known = {}  # by hash: a worker process compiles a scene once, for all of its blocks
 
 
@@ -22,6 +26,27 @@ class FunctionScene:
     def __post_init__(self):
         object.__setattr__(self, "__doc__", self.about)
 
+    def __repr__(self):
+        return "\n".join([self.TITLE, *(f"  {name}: {text}" for name, text in self._rows())])
+
+    def _repr_html_(self):
+        rows = "".join(
+            f"<tr><th>{html.escape(name)}</th><td style='text-align:left'>{html.escape(plain(text))}</td></tr>"
+            for name, text in self._rows()
+        )
+        title = html.escape(plain(self.TITLE))
+        return f"<div class='tex2jax_ignore mathjax_ignore'><table><caption>{title}</caption>{rows}</table></div>"
+
+    def _rows(self):
+        """Yield (what, text) of the scene: what survey.evaluate takes and gives."""
+        yield "scene", self.NAME
+        for p in self.PARAMETERS:
+            default = "" if p.default is None else f", default {p.default:g}"
+            yield p.name, f"{p.long_name}, {p.domain}{default}" if p.long_name != p.name else f"{p.domain}{default}"
+        for option in self.OPTIONS:
+            yield option.name, f"{' | '.join(option.choices)} (default {option.default})"
+        yield "outputs", ", ".join(dict.fromkeys(o.name for o in self.OUTPUTS))
+
     def __reduce__(self):
         return _restored, (type(self), self.HASH, [getattr(self, field.name) for field in fields(self)])
 
@@ -35,7 +60,7 @@ class FunctionScene:
         return ", ".join(f"{p.name} = {value:g}" for p, value in zip(self.own, point, strict=True))
 
     def _refuse(self, what, remedy):
-        raise BadInput(f"{self.NAME}: {what}; {remedy}")
+        raise refusal(self.NAME, f"{what}; {remedy}")
 
     def _refuse_index(self, call, error):
         """Refuse a function that raised this IndexError, as `call` is written."""
@@ -43,6 +68,11 @@ class FunctionScene:
         if "only integers" in str(error):
             self._refuse(f"{call} accesses a parameter by name, but p is an array", "write p[0], p[1], ...")
         self._refuse(f"{call} indexes beyond an array ({error})", f"PARAMETERS names {n}: p[0] to p[{n - 1}]")
+
+
+def refusal(name, message):
+    """The BadInput of a scene: what its file calls EVEN is `even` to who gave it to `survey.hill`, and so on."""
+    return BadInput(f"{name}: {message if name.endswith('.py') else _KEYS.sub(lambda key: key[0].lower(), message)}")
 
 
 def _restored(kind, digest, values):

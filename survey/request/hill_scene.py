@@ -3,13 +3,16 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from itertools import pairwise
 
 import numpy as np
 
 from survey import status
+from survey.errors import BadInput
 from survey.kernels.math.roundoff import EPS
 from survey.measures.hill import dependence, monodromy, motion, multiprecision, user_equation, user_rows, why
 from survey.measures.rows import Rows
+from survey.proof import formulas
 from survey.request.function_scene import FunctionScene
 from survey.scene import Parameter
 
@@ -33,7 +36,7 @@ STATUS = {
 }
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class HillScene(FunctionScene):
     """What a scene's module offers (see `survey.scenes`), for a user's z; `about` is its docstring."""
 
@@ -99,34 +102,31 @@ class HillScene(FunctionScene):
             return self._solve_rows(point, request, axes)
         box = self._box_axes(point, request) if request.method == "auto" else None
         points, shape = self._points(point)
-        period, edges, slack = self._ranges(points)
-        if box is not None:
-            out = self._solve_scattered(points, box, request)
-            out["period"] = np.where(out["status"] == status.OK, period[:, None], np.nan)
-            out["period_error"] = EPS * out["period"]
-            return {name: values.reshape(shape) for name, values in out.items()}
-        problem, rough = self._called(
-            user_equation.problem, self.z, points, edges, period, slack, self.EVEN, self._more_digits
-        )
-        out = self._answers(problem, rough, period, request)
+        out = self._solve_points(points, request) if box is None else self._solve_scattered(points, box, request)
         return {name: values.reshape(shape) for name, values in out.items()}
+
+    def _solve_points(self, points, request):
+        """The outputs (N, 1) of points one by one."""
+        problem, rough = self._problem(points)
+        return self._answers(problem, rough, self._ranges(points)[0], request)
+
+    def _problem(self, points):
+        period, edges, slack = self._ranges(points)
+        given = (edges, period, slack, self.EVEN, self._more_digits)
+        return self._called(user_equation.problem, self.z, points, *given)
 
     def _solve_scattered(self, points, axes, request):
         """The outputs (N, 1) of points on their own, from series on the box that holds them."""
         rough = np.zeros(len(points), np.bool_)
 
         def problem_of(left):
-            period, edges, slack = self._ranges(points[left])
-            problem, rough[left] = self._called(
-                user_equation.problem, self.z, points[left], edges, period, slack, self.EVEN, self._more_digits
-            )
+            problem, rough[left] = self._problem(points[left])
             return problem
 
         box = user_rows.box(self.z, self.HASH, axes, points[0], self._ranges, self.EVEN)
         position, p = np.ascontiguousarray(points[:, axes.across]), np.ascontiguousarray(points[:, axes.lane])
         out = self._called(monodromy.solve_scattered, box, position, p, problem_of, request.rtol, request.variables)
-        out["status"] = np.where(rough[:, None], status.NO_CONVERGENCE, out["status"]).astype(np.int8)
-        return out
+        return self._labelled(out, rough, np.full(len(points), self._ranges(points[:1])[0][0]))
 
     def _box_axes(self, point, request):
         """The parameters on the axes of a box that holds points on their own, two of which alone differ; or None."""
@@ -157,12 +157,18 @@ class HillScene(FunctionScene):
             points[:, i] = axes.line[1] if i == axes.lane else block.per_row(point[name])
         out = {}
         for rows in self._families(points, axes):
-            period, _, _ = self._ranges(points[rows])
             problem, rough = self._called(
                 user_rows.problem, self.z, self.HASH, axes, points[rows], lanes[rows], self._ranges, self.EVEN,
                 self._more_digits,
             )  # fmt: skip
-            for name, values in self._answers(problem, rough, period, request).items():
+            found = self._answers(problem, rough, self._ranges(points[rows])[0], request)
+            bad = np.flatnonzero(np.isnan(problem.span))
+            if bad.size:  # z may be smooth, or finite, at some of its points
+                alone = np.repeat(points[rows[bad]], lanes.shape[1], axis=0)
+                alone[:, axes.lane] = lanes[rows[bad]].reshape(-1)
+                for name, values in self._solve_points(alone, request).items():
+                    found[name][bad] = values.reshape(bad.size, -1)
+            for name, values in found.items():
                 out.setdefault(name, np.empty(lanes.shape, values.dtype))[rows] = values
         return {name: block.back(values) for name, values in out.items()}
 
@@ -176,6 +182,10 @@ class HillScene(FunctionScene):
 
     def _answers(self, problem, rough, period, request):
         out = self._called(monodromy.solve, problem, request.method, request.rtol, request.variables)
+        return self._labelled(out, rough, period)
+
+    def _labelled(self, out, rough, period):
+        """The outputs with the period, and the status of points whose z is rough."""
         out["status"] = np.where(rough[:, None], status.NO_CONVERGENCE, out["status"]).astype(np.int8)
         out["period"] = np.where(out["status"] == status.OK, period[:, None], np.nan)
         out["period_error"] = (4 if callable(self.period) else 1) * EPS * out["period"]
@@ -198,6 +208,22 @@ class HillScene(FunctionScene):
             return user_rows.Axes(lane, lines[lane])
         across = max(across, key=lambda i: lines[i][0])
         return user_rows.Axes(lane, lines[lane], across, lines[across])
+
+    def equation(self, names, ends, options):
+        """The equation in formulas (see `survey.scenes`); raises BadInput where z has none."""
+        values = [ends[p.name][0] if p.name in ends else float(names[p.name]) for p in self.PARAMETERS]
+        if callable(self.period) or callable(self.breaks):
+            raise BadInput(f"prove: {self.NAME}: PERIOD and BREAKS must be numbers, not functions of p")
+        _, edges, _ = self._ranges(np.array([values]))
+        written = [names[p.name] for p in self.PARAMETERS]
+        try:
+            pieces = [
+                (formulas.number(float(high)), formulas.formula(self.z, written, (low, high)))
+                for low, high in pairwise(edges[0])
+            ]
+        except multiprecision.Unsupported as error:
+            raise BadInput(f"prove: {self.NAME}: z has no formula ({error})") from None
+        return "even" if self.EVEN else "periodic", pieces
 
     def why(self, answer):
         """Why the point has its verdict (see `survey.scenes`)."""
@@ -299,6 +325,10 @@ class HillScene(FunctionScene):
                 f"EVEN = True, but z(T - u) is not z(u) at {self._where(points[i])}, T = {period[i]:g}",
                 "set EVEN = False, or correct z or PERIOD",
             )
+        of_z, of_ranges = _dependence(self, (None,) * len(self.PARAMETERS))
+        for i in np.flatnonzero(np.array(of_z) <= 1):  # a mean of two z has no other spikes than these
+            if not of_ranges[i]:
+                finite &= (points[:, i] == points[:, i].min()) | (points[:, i] == points[:, i].max())
         self._check_spikes(points[finite], edges[finite], slack[finite])
         if not self.EVEN:
             self._check_period(points, period, size.max(axis=1))

@@ -7,6 +7,7 @@ The file of a Hill equation y'' + z(u, p) y = 0 holds
     PERIOD       T, a number or a function of p
     EVEN         True if z(T - u) = z(u), which halves the work and makes edges certain; False by default
     BREAKS       where z or a derivative jumps, in [0, T]: number(s), or a function of p; none by default
+    DAMPING      c of y'' + 2 c y' + z y = 0: a number, or the name of the parameter that is c; 0 by default
 
 that of an Abel equation w w' = f(phi, p) w + g(phi, p), or phi' = w, w' = f(phi, p) w + g(phi, p) in time,
 
@@ -84,7 +85,7 @@ import numpy.typing as npt
 from survey.errors import BadInput, Untrusted
 from survey.measures.hill import monodromy
 from survey.request import trust
-from survey.request.function_scene import FunctionScene
+from survey.request.function_scene import FunctionScene, refusal
 from survey.request.hill_scene import SAME, HillScene, is_number, reason
 from survey.scene import Parameter
 from survey.scenes import load
@@ -93,6 +94,7 @@ from survey.wording import reason_of, short, shown
 # The other scenes, and the measures behind them, are imported when one is made: most runs need none.
 if TYPE_CHECKING:
     from survey.request.abel_scene import AbelScene
+    from survey.request.damped_scene import DampedScene
     from survey.request.floquet_scene import FloquetScene
     from survey.request.orbit_scene import OrbitScene
 
@@ -127,9 +129,10 @@ def hill(
     parameters: str | Parameter | Iterable[str | Parameter],
     even: bool = False,
     breaks: npt.ArrayLike | Callable[[Any], npt.ArrayLike] = (),
+    damping: float | str = 0.0,
     title: str | None = None,
-) -> HillScene:
-    """The scene of y'' + z(u, p) y = 0, for `survey.evaluate` and `survey.run`.
+) -> HillScene | DampedScene:
+    """The scene of y'' + z(u, p) y = 0, or y'' + 2 c y' + z(u, p) y = 0, for `survey.evaluate` and `survey.run`.
 
     Parameters
     ----------
@@ -138,6 +141,8 @@ def hill(
     parameters : their names, or `survey.scene.Parameter`s.
     even : is z(T - u) = z(u)? It is checked.
     breaks : where z or a derivative jumps, in [0, T]: number(s), or a function of p.
+    damping : c, a number, or the name of the parameter that is c (it is added to `parameters`, the last, if it is not
+        among them). Then `exponent` and `verdict` are those of the damped motion: stable where all motions decay.
 
     Raises survey.BadInput with one line that names what is wrong.
 
@@ -155,7 +160,8 @@ def hill(
         text = inspect.getsource(function)
     except (OSError, TypeError):
         text = ""
-    scene = _hill(z, period, parameters, even, breaks, name, text, title, inspect.getdoc(function), ())
+    about = inspect.getdoc(function)
+    scene = _hill(z, period, parameters, even, breaks, damping, name, text, title, about, ())
     _made[scene.HASH] = scene
     return scene
 
@@ -286,8 +292,8 @@ def orbit(
         differentiated. If it is, it is compared with that.
     continuation : name, least and greatest value of a parameter along which orbits are followed, also round folds, from
         those that are found from the start at 9 values. So points have all orbits of these curves, on any grid:
-        the output `orbits` is their number, and the parameter `branch` (1, 2, ..., by the mean square of the states;
-        1 by default) says which one is meant.
+        the output `orbits` is their number, and the parameter `branch` says which one is meant: 1, 2, ..., by the mean
+        square of the states, or -1, -2, ... from the largest; 1 by default.
 
     Raises survey.BadInput with one line that names what is wrong.
 
@@ -436,19 +442,19 @@ def _from_text(name: str, text: str) -> FunctionScene:
         of_orbit = getattr(module, "jacobian", None), getattr(module, "CONTINUATION", None)
         system = module.PERIOD, module.PARAMETERS, module.STATES, module.START
         return _orbit(module.f, *system, *of_orbit, name, text, title, about, references)
-    optional = getattr(module, "EVEN", False), getattr(module, "BREAKS", ())
+    optional = getattr(module, "EVEN", False), getattr(module, "BREAKS", ()), getattr(module, "DAMPING", 0.0)
     about = module.__doc__ or inspect.getdoc(getattr(module.z, "py_func", module.z))
     return _hill(module.z, module.PERIOD, module.PARAMETERS, *optional, name, text, title, about, references)
 
 
 def _hill(
-    z: Any, period: Any, parameters: Any, even: Any, breaks: Any,
+    z: Any, period: Any, parameters: Any, even: Any, breaks: Any, damping: Any,
     name: str, text: str, title: str | None, about: str | None, references: Iterable[str],
-) -> HillScene:  # fmt: skip
+) -> HillScene | DampedScene:  # fmt: skip
     """The checked scene; raises BadInput."""
 
     def refuse(message: str) -> NoReturn:
-        raise BadInput(f"{name}: {message}")
+        raise refusal(name, message)
 
     if not callable(z) or _arguments(z) != 2:
         refuse("z must be a function of two arguments, z(u, p); the parameters are p[0], p[1], ...")
@@ -459,13 +465,26 @@ def _hill(
     if not callable(period) and not (is_number(period) and 0 < period < np.inf):
         refuse(f"PERIOD = {period!r}: it must be a positive number, or a function of p that returns one")
     breaks = _checked_breaks(breaks, period, refuse)
-    about = inspect.cleandoc(about or f"y'' + z(u, p) y = 0, p = ({', '.join(names)}).")
-    bits = text.encode() if name.endswith(".py") else _bits((z, period, breaks, parameters, even))
-    return HillScene(
-        z=z, period=period, breaks=breaks, PARAMETERS=parameters, EVEN=bool(even), NAME=name, TEXT=text,
-        HASH=hashlib.sha256(bits).hexdigest(), TITLE=title or about.splitlines()[0].rstrip("."), about=about,
-        REFERENCES=tuple(references) or REFERENCES,
+    c, place = None, None
+    if isinstance(damping, str) or damping != 0:
+        from survey.request.damped_scene import DampedScene, checked_damping
+
+        c, place = checked_damping(damping, refuse)
+        if place is not None and place not in names:
+            parameters = _parameters((*parameters, place), monodromy.OUTPUTS, (), refuse)
+            names.append(place)
+    damped = c is not None or place is not None
+    equation = f"y'' + 2 {place or 'c'} y' + z(u, p) y = 0" if damped else "y'' + z(u, p) y = 0"
+    about = inspect.cleandoc(about or f"{equation}, p = ({', '.join(names)}).")
+    known = (z, period, breaks, parameters, even, *([damping] if damped else []))
+    shared = dict(
+        z=z, period=period, breaks=breaks, PARAMETERS=parameters, NAME=name, TEXT=text,
+        HASH=hashlib.sha256(text.encode() if name.endswith(".py") else _bits(known)).hexdigest(),
+        TITLE=title or about.splitlines()[0].rstrip("."), about=about, REFERENCES=tuple(references) or REFERENCES,
     )  # fmt: skip
+    if damped:
+        return DampedScene(damping=c, place=names.index(place) if place else None, even=bool(even), **shared)
+    return HillScene(EVEN=bool(even), **shared)
 
 
 def _abel(
@@ -477,7 +496,7 @@ def _abel(
     from survey.scenes import gyrostat
 
     def refuse(message: str) -> NoReturn:
-        raise BadInput(f"{name}: {message}")
+        raise refusal(name, message)
 
     for letter, function in (("f", f), ("g", g)):
         if not callable(function) or _arguments(function) != 2:
@@ -506,7 +525,7 @@ def _floquet(
     from survey.request.floquet_scene import LARGEST, FloquetScene
 
     def refuse(message: str) -> NoReturn:
-        raise BadInput(f"{name}: {message}")
+        raise refusal(name, message)
 
     if ("A" in matrices) == ("K" in matrices) or (len(matrices) > 1 and "A" in matrices):
         refuse("give either A(t, p, out), or K(t, p, out) with or without M and C")
@@ -546,7 +565,7 @@ def _orbit(
     from survey.request.orbit_scene import LARGEST, OrbitScene
 
     def refuse(message: str) -> NoReturn:
-        raise BadInput(f"{name}: {message}")
+        raise refusal(name, message)
 
     for letter, function in (("f", f), ("jacobian", jacobian)):
         if not callable(function) or _arguments(function) != 4:

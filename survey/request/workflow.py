@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from survey import modules
 from survey.errors import BadInput
 from survey.grid import Grid
-from survey.request import user_scene
+from survey.request import physical, user_scene
 from survey.request.axes import as_float, check_domain, check_size, grid_of, values_of
 from survey.request.checks import check_options, check_parameters, check_request, unknown_parameter
 from survey.request.edges_and_cells import check_boundaries, check_refine
@@ -44,9 +44,10 @@ class Workflow:
     boundaries: str | None = None
     refine: Mapping[str, tuple[float, bool]] | None = None
     style: str = "screen"
+    proves: bool = False  # the cells of `refine` are theorems
 
 
-def read(path, overrides=(), output=None):
+def read(path, overrides=(), output=None, proves=False):
     """The checked Workflow in the TOML file `path`, with `KEY=VALUE` overrides; raises BadInput in one line."""
     path = Path(path)
     try:
@@ -59,7 +60,7 @@ def read(path, overrides=(), output=None):
     if overrides:
         changes = "".join(f" --set {override}" for override in overrides)
         text = f"# {plain(f'{path.name}{changes}')}\n\n{_as_toml(data)}"
-    return check(data, text, output, default_path=path.with_suffix(".nc").name, near=path.parent)
+    return check(data, text, output, default_path=path.with_suffix(".nc").name, near=path.parent, proves=proves)
 
 
 def _parsed(text, path):
@@ -81,7 +82,7 @@ def _as_toml(data):
 
 
 @np.errstate(all="ignore")  # overflow on an axis is found by its values
-def check(data, text="", output=None, default_path="survey.nc", near=None):
+def check(data, text="", output=None, default_path="survey.nc", near=None, proves=False):
     """The checked Workflow of the mapping `data` (a parsed workflow file); `text` is what it was parsed from.
 
     The path of a scene's file is relative to the current folder, or else to the folder `near`.
@@ -102,12 +103,14 @@ def check(data, text="", output=None, default_path="survey.nc", near=None):
     name, scene = user_scene.find(given_scene, near)
     numbers = {p.name for p in scene.PARAMETERS if p.number_option and is_number(file.options.get(p.name))}
     file.axes |= {key: as_float(f"options.{key}", file.options.pop(key)) for key in sorted(numbers - set(file.axes))}
-    options = check_options(scene, file.options, file.axes, "options.")
     check_size(file.axes)
-    given = {key: values_of(f"axes.{key}", axis) for key, axis in file.axes.items()}
+    given = _in_own_terms(scene, file)
+    options = check_options(scene, file.options, given, "options.")
     parameters = check_parameters(scene, name, options, given, "axes.")
     for key, values in given.items():
-        check_domain(parameters[key], values)
+        group = parameters[key].instead_of or key
+        others = [p.name for p in scene.PARAMETERS if group in (p.name, p.instead_of) and p.name != key]
+        check_domain(parameters[key], values, others)
     solver = file.solver
     request = check_request(scene, options, solver.method, solver.rtol, file.output.variables, ("solver.", "output."))
     for figure in file.output.figures:
@@ -127,9 +130,23 @@ def check(data, text="", output=None, default_path="survey.nc", near=None):
         figures=tuple(file.output.figures),
         text=text or _as_toml(data),
         boundaries=check_boundaries(scene, name, file.boundaries, given),
-        refine=check_refine(scene, name, file, given),
+        refine=check_refine(scene, name, file, given, proves),
+        proves=proves,
         style=file.output.style,
     )
+
+
+def _in_own_terms(scene, file):
+    """The values of all axes by parameter; physical input, such as degrees, in the scene's own terms."""
+    given = {key: values_of(f"axes.{key}", axis) for key, axis in file.axes.items()}
+    known = {p.name for p in scene.PARAMETERS} | {option.name for option in scene.OPTIONS}
+    if isinstance(file.options.get("body"), str) and "mu" in known and "body" not in known:
+        given["body"] = file.options.pop("body")
+    if set(given) <= known:
+        return given
+    found = physical.resolved(scene, given)
+    values = {key: np.asarray(getattr(value, "values", value)) for key, value in found.items()}
+    return {key: value if value.ndim else np.float64(value) for key, value in values.items()}
 
 
 def _check_names(data, scene, near):
@@ -140,7 +157,7 @@ def _check_names(data, scene, near):
     name, scene = user_scene.find(scene, near)
     known = [p.name for p in scene.PARAMETERS]
     for key in axes:
-        if key not in known and key not in {option.name for option in scene.OPTIONS}:
+        if key not in {*known, *(option.name for option in scene.OPTIONS), *physical.words(scene)}:
             raise BadInput(f"axes.{short(key, 40)}: {unknown_parameter(name, key, known)}")
 
 

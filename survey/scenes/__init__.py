@@ -1,6 +1,7 @@
 """The scenes: one physical system per file. `survey/scene.py` holds the words in which a scene describes itself.
 
 A scene module holds what CONTRACT lists, and no other public name; the table is checked when the scene is loaded.
+Another package brings scenes by entry points of the group "survey.scenes": `NAME = "package.module"`.
 
 `solve(point, request)` answers one block. `point` maps each parameter that exists to a float64 array; all have the same
 number of dimensions and broadcast to the block's shape: an axis of the block is long in the arrays that vary along it
@@ -19,12 +20,19 @@ point, {name: array}, flags as words. `compile_ahead` runs in a process of its o
 for it (`survey.kernels.jit.wait_for_other_compiler`) where it needs what is compiled there.
 """
 
+import ast
 import sys
 from functools import cache
+from importlib.metadata import entry_points
+from pathlib import Path
 from types import ModuleType
 
 from survey import contract, modules
 from survey.contract import Function, Value
+from survey.errors import BadInput
+from survey.wording import short
+
+GROUP = "survey.scenes"  # of entry points
 
 CONTRACT = {
     "TITLE": Value("one line", str, needed=True),
@@ -50,6 +58,11 @@ CONTRACT = {
         "survey.scene.Trajectory: the motion at one point up to `time`, or as long as suits if that is None",
         ("point", "answer", "options", "time"),
     ),
+    "equation": Function(
+        "for `survey prove`: (kind, [(end, z), ...]), Hill's equation in formulas for `survey/proof/checker.py`; "
+        "`names`: for each parameter its name, or its value as a text; `ends`: {axis: (least, largest value)}",
+        ("names", "ends", "options"),
+    ),
     "compile_ahead": Function(
         "compile some kernels of a map of these variables, by calls on next to nothing; see above", ("variables",)
     ),
@@ -60,14 +73,46 @@ class _Folder(ModuleType):
     """`survey.scenes` is this folder; called, it gives {name: title} of the scenes."""
 
     def __call__(self):
-        return {name: load(name).TITLE for name in modules.names(self)}
+        return {name: _title(name) for name in modules.names(self)} | {name: load(name).TITLE for name in brought()}
 
 
 def load(name):
     """The scene `name`, a module. Raises BadInput if there is none, or if it does not keep to CONTRACT."""
-    module = modules.load(sys.modules[__name__], name, "scene")
+    others = brought()
+    if isinstance(name, str) and name in others:
+        module = _loaded(name, others[name])
+    else:
+        module = modules.load(sys.modules[__name__], name, "scene", others)
     _check(module)
     return module
+
+
+def _title(name):
+    """TITLE of a scene, from its source: importing all scenes would take seconds."""
+    source = next((Path(folder) / f"{name}.py" for folder in sys.modules[__name__].__path__), None)
+    if f"{__name__}.{name}" not in sys.modules and source and source.is_file():
+        for node in ast.parse(source.read_bytes()).body:
+            if isinstance(node, ast.Assign) and any(getattr(to, "id", "") == "TITLE" for to in node.targets):
+                return ast.literal_eval(node.value) if isinstance(node.value, ast.Constant) else load(name).TITLE
+    return load(name).TITLE
+
+
+@cache
+def brought():
+    """{name: entry point} of the scenes of other packages; those of this package come first."""
+    own = modules.names(sys.modules[__name__])
+    return {point.name: point for point in entry_points(group=GROUP) if point.name not in own}
+
+
+def _loaded(name, point):
+    """The module of an entry point; raises BadInput if it cannot be imported."""
+    try:
+        return point.load()
+    except Exception as error:
+        raise BadInput(
+            f"the scene {name} of the package {point.dist.name if point.dist else point.value} cannot be loaded "
+            f"({type(error).__name__}: {short(error, 150)})"
+        ) from None
 
 
 @cache

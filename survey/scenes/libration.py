@@ -5,6 +5,9 @@
 is the normal form at L4 (or L5: the same numbers) to order 6 in the coordinates; r1, r2 are the actions of the motions
 in the plane of the primaries, r3 that across it.
 
+Model: the spatial restricted three-body problem, six-dimensional, as a formal series in three actions. Not where its
+remainder counts (`workflows/libration_effective.py`), and no proof of Lyapunov stability.
+
 Parameter: mu (mass of the smaller primary over that of both, 1e-100 <= mu <= 1/2), taken as the float64 it is. Unit of
 time: the primaries turn by one radian.
 

@@ -1,5 +1,8 @@
 """Mathieu's equation, the yardstick of parametric resonance: y'' + (a - 2 q cos 2t) y = 0, period T = pi.
 
+Model: a pendulum's equation, linearised about its rest, or one coordinate of an ion in a quadrupole trap, which is
+linear as it stands. Not for a pendulum's finite angles, or for several ions.
+
 Parameters, in order: a (characteristic value) and q (parametric excitation), up to 1e12, without units, in the
 notation of DLMF 28.2.1.
 
@@ -45,8 +48,8 @@ _HALF_PERIOD = pi / 2
 
 
 def cost(options, sizes):
-    """Seconds per point, roughly: a point of a dense row, its share of the outputs included."""
-    return 1e-6
+    """Seconds per point, roughly."""
+    return monodromy.cost(sizes.get("q", 1), sizes.get("a", 1))
 
 
 def solve(point, request):
@@ -75,6 +78,11 @@ def compile_ahead(variables):
 def trajectory(point, answer, options, time=None):
     """Solutions and multipliers of a point (see `survey.scenes`)."""
     return motion.solve(_problem(np.array([point["q"]]), np.array([[point["a"]]])), answer, time)
+
+
+def equation(names, ends, options):
+    """The equation in formulas (see `survey.scenes`)."""
+    return "even", [("pi/2", f"{names['a']} - 2*{names['q']}*cos(2*u)")]
 
 
 def _problem(q, a, line=None, ends=None):

@@ -8,6 +8,9 @@ obey Hill's equation, in u = omega_p t, omega_p^2 = 3 omega_0^2 |I - Iz| / I, wi
     c = 1 - k^2   prolate, alpha = Iz/I < 1   (printed + k^2 in Astakhova's eq. 3: see the errata in satellite.md)
     c = -k^2      oblate,  alpha > 1;         T = 4 K(k), or 2 K(1/k) / k for rotations
 
+Model: the body's rotation in three dimensions. Without spin the plane of the orbit is invariant, and linear motion
+across it is this equation, exactly. Not for spin, finite tilts, eccentric orbits, bodies without axis of symmetry.
+
 Parameters, in order: k >= 0, k != 1; or one_minus_k = 1 - k <= 1, != 0, where 1 - k is small (negative: rotations);
 or amplitude = asin k (rad), a libration's. rho, any sign: rho^2 = 1 / (3 |1 - alpha|), so rho >= 1/sqrt(3) is a body;
 rho < 0 is a retrograde rotation. Or, instead of rho and the body, inertia_ratio = alpha: 0 a thin rod, 2 a disc.
@@ -22,6 +25,7 @@ from math import pi
 import numpy as np
 
 from survey import status
+from survey.errors import BadInput
 from survey.kernels.hill import satellite as motion
 from survey.kernels.hill import taylor_double
 from survey.kernels.hill.answers import LARGEST, NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE
@@ -76,8 +80,9 @@ _PERIOD_ULPS = 6
 
 
 def cost(options, sizes):
-    """Seconds per point, roughly: a point of a dense row, its share of the outputs included."""
-    return 1e-6
+    """Seconds per point, roughly."""
+    rows = max(sizes.get(name, 1) for name in ("k", "one_minus_k", "amplitude"))
+    return monodromy.cost(rows, max(sizes.get(name, 1) for name in ("rho", "inertia_ratio")))
 
 
 def solve(point, request):
@@ -94,6 +99,52 @@ def solve(point, request):
         for oblate in np.unique(alpha > 1)
     ]
     return {name: np.where(alpha > 1, bodies[-1][name], bodies[0][name]) for name in bodies[0]}
+
+
+def equation(names, ends, options):
+    """The equation in formulas (see `survey.scenes`), in the angle u = am of a libration, u = x of a rotation.
+
+    As a function of u, y has an equation with a first derivative, which y = A^(-1/4) v removes; at u = 0 and at the
+    half period A > 0 and A' = 0, so that the factors of v have the signs of those of y.
+    """
+    k = next(
+        text.format(names[name])
+        for name, text in (("k", "{}"), ("one_minus_k", "(1 - {})"), ("amplitude", "sin({})"))
+        if name in names
+    )
+    rho, oblate = _body(names, ends, options)
+    rest = f"cos({names['amplitude']})**2" if "amplitude" in names else f"(1 - {k}**2)"
+    c = f"(-{k}**2)" if oblate else rest
+    if _rotates(names, ends):
+        a = f"(cos(u)**2 - {rest})"
+        z = f"2 + (2*{rho}*sqrt({a}) + {rho}**2 + {c})/{a} + cos(2*u)/(2*{a}) + 3*sin(2*u)**2/(16*{a}**2)"
+        return "even", [("pi/2", z)]
+    a = f"(cos(u)**2 + {rest}*sin(u)**2)"
+    w = f"{k}*cos(u)"
+    z = f"(2*({w})**2 + 2*{rho}*{w} + {rho}**2 + {c})/{a} + {k}**2*cos(2*u)/(2*{a})"
+    return "even", [("pi", f"{z} + 3*({k}**2*sin(2*u)/{a})**2/16")]
+
+
+def _body(names, ends, options):
+    """(rho as a formula, is the body oblate?); raises BadInput if the map contains bodies without a preferred axis."""
+    if "rho" in names:
+        return names["rho"], options["body"] == "oblate"
+    alpha = names["inertia_ratio"]
+    low, high = ends.get("inertia_ratio") or (float(alpha), float(alpha))
+    if low <= 1 <= high:
+        raise BadInput("prove: the axis inertia_ratio contains 1, where rho is infinite; end it before, or begin after")
+    rho = f"sqrt(3*({alpha} - 1))" if low > 1 else f"sqrt(3*(1 - {alpha}))"
+    return f"({'-' if str(options['direction']) == '-1' else ''}1/{rho})", low > 1
+
+
+def _rotates(names, ends):
+    """Are the motions rotations? Raises BadInput if the map contains the separatrix."""
+    name = next(name for name in ("k", "one_minus_k", "amplitude") if name in names)
+    edge = {"k": 1.0, "one_minus_k": 0.0, "amplitude": pi / 2}[name]
+    low, high = ends.get(name) or (float(names[name]),) * 2
+    if low <= edge <= high:
+        raise BadInput(f"prove: the axis {name} contains {edge:g}, the separatrix; end it before, or begin after")
+    return low < edge if name == "one_minus_k" else low > edge
 
 
 def compile_ahead(variables):
@@ -120,24 +171,24 @@ def _solve(shared, rho, oblate, request, low=None, line=None, ends=None):
     row = Motion(*(block.per_row(values) for values in shared), bool(oblate))
     problem = _problem(row, block.per_point(rho), None if low is None else block.per_point(low), line, ends)
     out = monodromy.solve(problem, request.method, request.rtol, _wanted(request))
-    return _derived(out, row, problem.p, block, request)
+    return _derived(out, row, problem.p, block, request, row.period)
 
 
 def _wanted(request):
     return set(request.variables) | ({"exponent"} if "exponent_per_orbit" in request.variables else set())
 
 
-def _derived(out, row, rho, block, request):
-    """The outputs in the block's shape, with those that follow from the others, rows `row` and `rho` (rows, lanes)."""
+def _derived(out, row, rho, block, request, period):
+    """The outputs in the block's shape, with those that follow from the others, the rows' motions and `rho`."""
     wanted, ok = _wanted(request), out["status"] == status.OK
     ok = out["status"] == status.OK
     if "period" in wanted:
-        out["period"] = np.where(ok, row.period[:, None], np.nan)
+        out["period"] = np.where(ok, period[:, None], np.nan)
         out["period_error"] = _PERIOD_ULPS * EPS * out["period"]
     if "exponent_per_orbit" in wanted:
-        _per_orbit(out, abs(rho) * (row.period[:, None] / (2 * pi)))
+        _per_orbit(out, abs(rho) * (period[:, None] / (2 * pi)))
     if "lyapunov" in wanted:
-        out["lyapunov"] = (row.lyapunov(rho) & ok).astype(np.int8)
+        out["lyapunov"] = (row.lyapunov(rho, period) & ok).astype(np.int8)
     return {name: block.back(values) for name, values in out.items()}
 
 
@@ -153,7 +204,11 @@ def _solve_scattered(box, shared, rho, oblate, request):
         return _problem(Motion(*(values[points] for values in columns), bool(oblate)), rho[points, None])
 
     out = monodromy.solve_scattered(box, position, rho, problem_of, request.rtol, _wanted(request))
-    return _derived(out, row, rho[:, None], block, request)
+    period = None
+    if not _wanted(request).isdisjoint({"period", "exponent_per_orbit", "lyapunov"}):
+        integral = row.integrals[0]
+        period = np.where(row.rotates, 2 * integral / np.maximum(row.k, 1), 4 * integral)
+    return _derived(out, row, rho[:, None], block, request, period)
 
 
 def _box(request, oblate):

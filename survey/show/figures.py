@@ -16,7 +16,9 @@ from survey.show.layout import alone, fit
 from survey.show.maps import draw_map
 from survey.show.profiles import draw_profile
 from survey.show.style import figure_size, style_named
-from survey.show.text import title_of
+from survey.show.text import literal, title_of
+
+MOST_LABELS = 30  # on an axis
 
 
 def save(ds, path, name=None, style=None, width="single"):
@@ -33,31 +35,60 @@ def draw(ds, name=None, style=None, width="single"):
     return figure
 
 
-def onto(axes, ds, name=None, boundaries=True, style=None):
-    """Draw one variable (the verdict, or the first output) onto matplotlib axes; raises BadInput for an unknown one."""
+def onto(axes, ds, name=None, boundaries=True, style=None, across=(None, None), colours=None):
+    """Draw one variable (the verdict, or the first output) onto matplotlib axes; raises BadInput for an unknown one.
+
+    `across`: the axes that are drawn, or None; `colours`: cmap, vmin, vmax, robust of a variable of numbers, or None.
+    """
     paper = style_named(style).paper
     drawable = [key for key in ds.data_vars if not key.endswith("_error") and set(ds[key].dims) >= set(ds.status.dims)
                 and ds[key].dtype.kind in "iuf"]  # fmt: skip
     name = name or ("verdict" if "verdict" in ds else drawable[0])
     if name not in drawable:
         raise BadInput(modules.unknown("variable", name, drawable))
-    part, variable, state = _flat(ds, name)
+    labels = {dim: [str(label) for label in ds[dim].values] for dim in ds.status.dims
+              if dim in ds.coords and ds[dim].dtype.kind not in "iuf"}  # fmt: skip
+    for dim in ds.status.dims:
+        if dim in labels or dim not in ds.coords:
+            ds = ds.drop_vars(dim, errors="ignore").assign_coords({dim: np.arange(ds.sizes[dim])})
+    part, variable, state = _flat(ds, name, _chosen(ds, across))
     for text in axes.findobj(Text):  # perhaps made while the user had LaTeX on
         text.set_usetex(False)
     if variable.ndim == 2 and variable.dims[-1] == family.ANGLE and family.over_angles(ds):
         family.draw_family(axes, part, variable, paper)
     elif variable.ndim == 2:
-        draw_map(axes, ds, variable, state, boundaries, paper)
+        draw_map(axes, ds, variable, state, boundaries, paper, colours or {})
     elif variable.ndim == 1:
         draw_profile(axes, part, variable, state, paper)
     else:
         raise BadInput(f"{name} is a single number; a figure needs at least one axis")
+    for dim, setting in zip(variable.dims, (axes.set_xticks, axes.set_yticks), strict=False):
+        if dim in labels:
+            words = [literal(text, 40) for text in labels[dim][:MOST_LABELS]]
+            setting(range(len(words)), words)
     if not paper:
         axes.set_title(title_of(ds, variable), fontsize=10 if alone(axes) else 8)
     fit(axes)
 
 
-def _flat(ds, name):
+def _chosen(ds, across):
+    """The one or two axes to be drawn, or None; raises BadInput for an unknown one."""
+    known = list(ds.status.dims)
+    for key, name in zip("xy", across, strict=True):
+        if name is not None and name not in known:
+            raise BadInput(f"{key}: {modules.unknown('axis', name, known)}")
+    x, y = across
+    if x is not None and x == y:
+        raise BadInput(f"x and y are both {x!r}; give two axes")
+    if y is not None:
+        x = next((name for name in known if name != y), None) if x is None else x
+        return [x, y] if x is not None else None
+    if x is None:
+        return None
+    return [x, *[name for name in known if name != x][:1]]
+
+
+def _flat(ds, name, chosen=None):
     """The survey, the variable and the status on at most two of the survey's dimensions.
 
     The first position along any other, but the last angle of Abel solutions, of which w and t are curves over it.
@@ -66,6 +97,7 @@ def _flat(ds, name):
     if family.over_angles(ds):
         others, at = [dim for dim in ds.status.dims if dim != family.ANGLE], {family.ANGLE: -1}
         keep = [others[0], family.ANGLE] if name in family.AT_TURNING else others[:2]
+    keep = chosen or keep
     part = ds.isel({dim: at.get(dim, 0) for dim in (*ds.status.dims, *ds[name].dims) if dim not in keep})
     unsorted = [dim for dim in keep if not _is_monotonic(part[dim].values)]
     part = part.sortby(unsorted) if unsorted else part

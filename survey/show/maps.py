@@ -6,7 +6,8 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from survey import status
+from survey import modules, status
+from survey.errors import BadInput
 from survey.file.labels import flag_codes, scene_statuses
 from survey.file.overview import Overview, Points
 from survey.grid import logarithmic
@@ -21,11 +22,15 @@ from survey.show.text import WIDE, label_of, spaced
 MAX_DRAWN = 2000  # points along an axis: in a picture of a larger map a cell stands for several points
 MOST_COUNTS = 10  # that have a colour each
 MAX_CELLS = 1000  # along an axis of such a picture: each costs a hundred bytes
+SEQUENTIAL, DIVERGING = "viridis", "RdBu_r"  # of values of one sign, and about 0
 CELLS_PER_PIXEL = 0.8  # of the axes, before legend and labels take their share
 
 
-def draw_map(axes, ds, variable, state, boundaries, paper):
-    """Draw a variable over its two axes, `state` being the status; with colour bar, boundaries and legend."""
+def draw_map(axes, ds, variable, state, boundaries, paper, asked):
+    """Draw a variable over its two axes, `state` being the status; with colour bar, boundaries and legend.
+
+    `asked`: cmap, vmin, vmax, robust of its colours, None where they are not given.
+    """
     scales = ["log" if logarithmic(variable[dim].values) else "linear" for dim in variable.dims]
     ticks = MaxNLocator(integer=True) if variable.dtype.kind == "i" else None
     variable, state, number = _shown(axes, ds, variable, state, style_named("paper" if paper else None).dpi)
@@ -39,12 +44,12 @@ def draw_map(axes, ds, variable, state, boundaries, paper):
         handles += marks_without_answer(axes, x, y, failed, outside, number, paper)
     else:
         shown = np.ma.masked_invalid(np.where(failed | outside, np.nan, variable.values.astype(float)))
-        colours = counts(shown) if ticks else None
-        colours = colours or {"cmap": "viridis"} | colour_limits(shown)
+        colours = colours_of_numbers(shown, variable, asked, ticks is not None)
         drawn = axes.pcolormesh(x, y, shown.T, shading="nearest", rasterized=True, **colours)
         if not shown.mask.all():
-            ticks = np.unique(shown.compressed()) if "norm" in colours else ticks
-            axes.figure.colorbar(drawn, ax=axes, label=label_of(variable), ticks=ticks)
+            ticks = np.unique(shown.compressed()) if "norm" in colours and ticks else ticks
+            extend = "neither" if "norm" in colours and ticks is not None else clipped(shown, *drawn.get_clim())
+            axes.figure.colorbar(drawn, ax=axes, label=label_of(variable), ticks=ticks, extend=extend)
         axes.set_facecolor("#dddddd")
         missing = shown.mask & ~(failed | outside)
         handles = _undefined(axes, x, y, ds, state, missing, number, paper)
@@ -128,6 +133,43 @@ def counts(shown):
         return None
     edges = np.arange(values.min() - 0.5, values.max() + 1.0)
     return {"cmap": colormaps["viridis"].resampled(len(edges) - 1), "norm": BoundaryNorm(edges, len(edges) - 1)}
+
+
+def colours_of_numbers(shown, variable, asked, whole):
+    """Colour map and limits: as asked; else a colour for each of a few counts; else by the values.
+
+    Quantities of both signs have a diverging map about 0.
+    """
+    given = {key: asked[key] for key in ("vmin", "vmax") if asked.get(key) is not None}
+    if whole and not given and asked.get("cmap") is None:
+        few = counts(shown)
+        if few:
+            return few
+    limits = (_full(shown) if asked.get("robust") is False else colour_limits(shown)) | given
+    low, high = limits.get("vmin"), limits.get("vmax")
+    signed = low is not None and high is not None and low < 0.0 < high and not whole
+    if signed and not given:
+        most = max(-low, high)
+        limits = {"vmin": -most, "vmax": most}
+    return {"cmap": _colour_map(asked.get("cmap"), DIVERGING if signed else SEQUENTIAL)} | limits
+
+
+def _colour_map(name, default):
+    """The colour map; raises BadInput for an unknown one."""
+    if name is not None and isinstance(name, str) and name not in colormaps:
+        raise BadInput(f"cmap: {modules.unknown('colour map', name, list(colormaps))}")
+    return default if name is None else name
+
+
+def clipped(shown, low, high):
+    """Which end of the colour bar has an arrow: values lie beyond it."""
+    below, above = bool((shown < low).any()), bool((shown > high).any())
+    return "both" if below and above else "min" if below else "max" if above else "neither"
+
+
+def _full(shown):
+    values = shown.compressed()
+    return {"vmin": float(values.min()), "vmax": float(values.max())} if values.size and np.ptp(values) > 0 else {}
 
 
 def colour_limits(shown):

@@ -15,7 +15,7 @@ from collections import Counter
 
 from survey.errors import BadInput, Stopped, SurveyError
 from survey.sweep.dispatch import Patience
-from survey.wording import reason_of
+from survey.wording import reason_of, shown
 
 SCHEDULER_SECONDS = 10
 WORKERLESS_SECONDS = 60
@@ -27,13 +27,18 @@ ENCRYPTED = ("tls", "wss")
 
 
 def client_of(address):
-    """A client of the dask cluster at `address` (or in a scheduler file). Raises BadInput or Stopped."""
+    """A client of the dask cluster at `address`, in a scheduler file, or of a Client. Raises BadInput or Stopped."""
     try:
         from dask.distributed import Client
     except ImportError:
         raise BadInput("--scheduler needs dask.distributed: pip install distributed") from None
-    where = _address_in(address)
-    security = _security(where)
+    if isinstance(address, Client):  # it stays its owner's, and open
+        where, security = address.scheduler.address, address.security
+    elif isinstance(address, (str, os.PathLike)):
+        where = _address_in(os.fspath(address))
+        security = _security(where)
+    else:
+        raise BadInput(f"scheduler = {shown(address)}: give an address, a scheduler file, or a dask.distributed Client")
     try:
         client = Client(address=where, security=security, timeout=SCHEDULER_SECONDS, set_as_default=False)
     except (OSError, ValueError) as error:

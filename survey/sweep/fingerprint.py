@@ -5,9 +5,11 @@ import json
 import socket
 from functools import cache
 from importlib.metadata import version
+from pathlib import Path
 
 import numpy as np
 
+from survey import __version__
 from survey.errors import Stopped
 from survey.kernels import jit
 from survey.sweep.cost import block_geometry
@@ -16,7 +18,7 @@ from survey.sweep.cost import block_geometry
 @cache
 def code_version():
     """What identifies the code that solves blocks: it must be the same on every worker, but not the processor."""
-    return {"survey": version("survey"), "sources": jit.SOURCE_HASH}
+    return {"survey": __version__, "sources": jit.SOURCE_HASH}
 
 
 def compilers():
@@ -50,5 +52,13 @@ def fingerprint(workflow):
         "variables": sorted(request.variables),
         "block_geometry": block_geometry(workflow),
         "kernels": jit.SOURCE_HASH,
-        "scene_hash": getattr(workflow.scene, "HASH", ""),
-    }
+        "scene_hash": getattr(workflow.scene, "HASH", "") or _hash_of_plugin(workflow.scene),
+    } | ({"proves": True} if workflow.proves else {})
+
+
+def _hash_of_plugin(scene):
+    """Hash of the source of a scene that another package brings; "" for those here, which `kernels` covers."""
+    file = getattr(scene, "__file__", None)
+    if file is None or scene.__name__.startswith("survey."):
+        return ""
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()

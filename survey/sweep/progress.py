@@ -6,6 +6,7 @@ from datetime import timedelta
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
 
+from survey.sweep import announce
 from survey.wording import counted
 
 LOG_SECONDS = 60
@@ -21,7 +22,12 @@ class Progress:
         self.bar = self.task = None
 
     def __enter__(self):
-        if self.console.is_terminal and not self.silent:
+        if self.silent:
+            return self
+        self.naming = announce.compiling(self.workflow.name, getattr(self.workflow, "scene", None), self._say)
+        if getattr(self.workflow, "scene", None) is not None:
+            self.naming.__enter__()
+        if self.console.is_terminal or self.console.is_jupyter:
             columns = (
                 TextColumn("{task.description}"),
                 BarColumn(),
@@ -35,6 +41,8 @@ class Progress:
     def __exit__(self, *_):
         if self.bar:
             self.bar.stop()
+        if not self.silent and getattr(self.workflow, "scene", None) is not None:
+            self.naming.__exit__(None, None, None)
 
     def __call__(self, done, total, reused, what="blocks", left=None):
         """`left()` estimates the seconds left; without it they are extrapolated from what is done."""
@@ -81,6 +89,9 @@ class Progress:
         elif time.monotonic() - self.logged > LOG_SECONDS:
             self.logged = time.monotonic()
             self._line(f"{text}, ETA {left:.0f} s or more")
+
+    def _say(self, text):
+        self.console.print(text, markup=False)
 
     def _line(self, text):
         self.console.print(f"{self.workflow.name}: {text}", markup=False)

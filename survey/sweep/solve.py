@@ -53,8 +53,8 @@ def stored(scene, request, solved, shape):
     return arrays
 
 
-def compute(grid, scene, request, threads=None):
-    """All variables of the grid, in memory: {name: array in the grid's shape}."""
+def compute(grid, scene, request, threads=None, progress=None):
+    """All variables of the grid, in memory: {name: array in the grid's shape}; `progress(done, total)` of blocks."""
     result = {name: np.empty(grid.shape + extra, kind) for name, (kind, _, extra) in layout(scene, request).items()}
 
     def task(block):
@@ -65,5 +65,8 @@ def compute(grid, scene, request, threads=None):
     if len(blocks) == 1:
         task(blocks[0])
     else:
-        dispatch.on_threads(lambda number: task(blocks[number]), range(len(blocks)), threads=threads)
+        if progress:
+            progress(0, len(blocks))
+        report = (lambda done, _=None: progress(done, len(blocks))) if progress else None
+        dispatch.on_threads(lambda number: task(blocks[number]), range(len(blocks)), report, threads=threads)
     return result

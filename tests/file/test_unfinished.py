@@ -94,7 +94,7 @@ def test_other_code_is_told_plainly(left, small):
         arrays = blocks.unpack(file.read_bytes())
         with open(file, "wb") as opened:
             blocks.pack(arrays, opened, "of that version")
-    now = manifest["code"] | {"survey": fingerprint.version("survey")}
+    now = manifest["code"] | {"survey": survey.__version__}
     assert f"blocks from another version of the code (survey 0.0.9 -> {now['survey']}); go back to that" in refusal(
         small
     )

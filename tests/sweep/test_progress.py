@@ -1,11 +1,12 @@
 """The bar on a terminal; the lines of a log are seen in test_cli and test_promises."""
 
 import io
+import time
 import types
 
 from rich.console import Console
 
-from survey.sweep import progress
+from survey.sweep import announce, progress
 
 
 def test_the_bar_tells_more_than_a_day(monkeypatch):
@@ -18,3 +19,36 @@ def test_the_bar_tells_more_than_a_day(monkeypatch):
             bar(1, 10, 0, left=lambda seconds=seconds: seconds)
             assert bar.bar.tasks[0].fields["eta"] == text
     assert "gyrostat: 1 point in 10 blocks, 0 already done" in console.file.getvalue()
+
+
+def test_compiling_is_named_once_it_takes_a_moment(monkeypatch):
+    import numba
+
+    monkeypatch.setattr(announce, "PATIENCE", 0.0)
+    said = []
+    scene = types.SimpleNamespace(FAMILY="cylinder")
+    with announce.compiling("gyrostat", scene, said.append):
+        function_of_own = numba.njit(lambda x: x + 1.0)
+        assert function_of_own(1.0) == 2.0
+        time.sleep(0.2)
+    assert said == ["compiling gyrostat, once on this machine, about 40 s"]
+    said.clear()
+    with announce.compiling("gyrostat", scene, said.append):
+        function_of_own(2.0)  # compiled already
+        time.sleep(0.1)
+    assert said == []
+
+
+def test_a_notebook_and_a_terminal_see_a_bar_and_a_script_nothing(monkeypatch):
+    console = Console(file=io.StringIO(), force_jupyter=False, force_terminal=True, width=120, highlight=False)
+    monkeypatch.setattr(announce, "console", lambda: console)
+    monkeypatch.setattr(announce, "LONG", 0.0)
+    scene = types.SimpleNamespace(FAMILY="hill")
+    with announce.watched("mathieu", scene, 10, lambda: 1.0) as progress:
+        assert progress is None
+    monkeypatch.setattr(announce, "is_watched", lambda: True)
+    with announce.watched("mathieu", scene, 10, lambda: 1.0) as progress:
+        progress(0, 2)
+        progress(1, 2)
+        progress(2, 2)
+    assert "mathieu: 10 points in 2 blocks" in console.file.getvalue()

@@ -128,9 +128,10 @@ def factors(coefficients, bars, x, even, turns, left, right, share, full_period,
 
 
 @kernel
-def points(coefficients, bars, x, even, scale, turns, nodes, share, full_period, results):
+def points(coefficients, number, bars, x, even, scale, turns, nodes, share, full_period, results):
     """As `factors` at points on their own, x (2, N) across and along the rows, from series `coefficients` (4, terms
-    along, terms across) of a panel within `bars` (4); the last of the four is multiplied by `scale` (N).
+    along, terms across) of a panel within `bars` (4); the last of the four is multiplied by `scale` (N). Only the first
+    `number` (4, terms along) of the terms across count.
 
     `nodes` (4, N) are the two nodes across the rows, and the two along them, around each point, `share` (2, N) of the
     way between, and `turns` (5, nodes across, nodes along).
@@ -148,7 +149,9 @@ def points(coefficients, bars, x, even, scale, turns, nodes, share, full_period,
             for i in range(count):
                 sums[f, i] = 0.0
             for k in range(terms):
-                _sum(coefficients[f, k], rows, part, count)
+                if number[f, k] == 0:
+                    continue
+                _sum(coefficients[f, k, : number[f, k]], rows, part, count)
                 along = odd[k] if even and f == 3 else table[k]
                 for i in range(count):
                     sums[f, i] += along[i] * part[i]

@@ -18,8 +18,9 @@ Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013),
 """
 
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -45,6 +46,8 @@ RETRIES = 2
 _ONE_AT_A_TIME = threading.Lock()
 ANSWERS = frozenset({"discriminant", "exponent"})
 DISCRIMINANT = np.array([name == "discriminant" for name in kernels.FLOATS])
+# The parts of the axis across points on their own.
+ROWS_PER_PART, MOST_PARTS = 130, 8
 # Points of a call that answers from factors: their temporaries stay in the processor's cache.
 CALL_POINTS = 8192
 
@@ -115,27 +118,59 @@ def scattered(box, method, asked, answers, position, p):
     """Answer points on their own (N each) from the series of their `box`; returns those (N, bool) to be solved."""
     sought, axis, open_points = _sought(asked, factors_only=True), _axis(box.line, box.even), np.ones(p.size, np.bool_)
     with _ONE_AT_A_TIME:
-        served = panels(box.row_axis, method, asked.rtol, axis, sought)
+        served = [panel for part in _parts(box.row_axis) for panel in panels(part, method, asked.rtol, axis, sought)]
     for low, high, series, bars, turns in served:
         inside = np.flatnonzero(open_points & (position >= low) & (position <= high))
-        padded = np.zeros((4, series.shape[2], -(-series.shape[1] // TERMS) * TERMS))
-        padded[:, :, : series.shape[1]] = series.transpose(0, 2, 1)
+        padded, number, bars = _shortened(series, bars)
         for some in np.split(inside, range(CALL_POINTS, inside.size, CALL_POINTS)):
-            x = np.stack(
-                [(position[some] - 0.5 * (low + high)) / (0.5 * (high - low)), (p[some] - axis.middle) / axis.radius]
+            if not some.size:
+                continue
+            across, along = (
+                (position[some] - 0.5 * (low + high)) / (0.5 * (high - low)),
+                (p[some] - axis.middle) / axis.radius,
             )
-            odd, results = _odd(box.row_axis, axis, position[some]), np.empty((some.size, RESULTS))
-            number = turns.shape[2] * (2 if axis.even else 1)
-            *across, one = _between(x[0], turns.shape[1], turns.shape[1])
-            *along, other = _between(abs(x[1]) if axis.even else x[1], number, turns.shape[2])
-            around, share = np.stack([*across, *along]), np.stack([one, other])
-            points(padded, bars, x, axis.even, odd, turns, around, share, box.full_period, results)
-            found = Answers(some.size, asked)
-            found.assess(results, None)
-            good = np.flatnonzero(~found.missed & (found.status == status.OK))
-            answers.replace(some[good], found, good)
-            open_points[some[good]] = False
+            results = _at_points(box, axis, padded, number, bars, turns, across, along, position[some])
+            if some[-1] - some[0] == some.size - 1:
+                found, own = answers, slice(some[0], some[-1] + 1)
+                found.assess(results, None, first=some[0])
+            else:
+                found, own = Answers(some.size, asked), slice(None)
+                found.assess(results, None)
+                answers.replace(some, found)
+            failed = found.status[own] != status.OK
+            open_points[some] = found.missed[own] | failed
+            answers.status[some[failed]] = status.OK  # what this leaves without an answer is solved again
     return open_points
+
+
+def _parts(row_axis):
+    """The axis in parts: the more points there are, the more of them pay, on which series have fewer terms."""
+    parts = int(np.clip(row_axis.number // ROWS_PER_PART, 1, MOST_PARTS))
+    ends = np.linspace(row_axis.low, row_axis.high, parts + 1)
+    return [replace(row_axis, low=float(low), high=float(high)) for low, high in pairwise(ends)]
+
+
+def _shortened(series, bars):
+    """The series (4, across, along) as `points` takes them: the number of terms across that count for each along, and
+    the bounds with what is left out, a tenth of them.
+    """
+    by_terms = series.transpose(0, 2, 1)
+    rest = np.cumsum(abs(by_terms[:, :, ::-1]), axis=2)[:, :, ::-1]
+    number = (rest > 0.1 * bars[:, None, None] / by_terms.shape[1]).sum(axis=2)
+    padded = np.zeros((*by_terms.shape[:2], -(-by_terms.shape[2] // TERMS) * TERMS))
+    padded[:, :, : by_terms.shape[2]] = by_terms
+    return padded, -(-number // TERMS) * TERMS, 1.1 * bars
+
+
+def _at_points(box, axis, series, number, bars, turns, across, along, position):
+    """The results (N, RESULTS) at x `across` and `along` the rows of a panel."""
+    results, nodes = np.empty((position.size, RESULTS)), turns.shape[2] * (2 if axis.even else 1)
+    *one, share = _between(across, turns.shape[1], turns.shape[1])
+    *other, further = _between(abs(along) if axis.even else along, nodes, turns.shape[2])
+    x, around, shares = np.stack([across, along]), np.stack([*one, *other]), np.stack([share, further])
+    odd = _odd(box.row_axis, axis, position)
+    points(series, number, bars, x, axis.even, odd, turns, around, shares, box.full_period, results)
+    return results
 
 
 @dataclass(frozen=True)

@@ -80,7 +80,8 @@ def _row_axis(z, key, axes, points, ranges, even):
 
 def box(z, key, axes, point, ranges, even):
     """The box of points on their own between the ends of both axes; all other parameters are those of a `point`."""
-    row_axis = _row_axis(z, key, axes, point[None], ranges, even)
+    point = _with(_with(point[None], axes.lane, axes.line[1]), axes.across, axes.row_line[1])
+    row_axis = _row_axis(z, key, axes, point, ranges, even)
     return monodromy.Box(row_axis, axes.line, full_period=not even)
 
 

@@ -161,6 +161,39 @@ def test_any_block_has_the_same_bits(scene, row, lane, names):
             np.testing.assert_array_equal(part[name], whole[name][rows_of, lanes_of], err_msg=name)
 
 
+SCATTERED = [
+    ("satellite", {"k": (0.01, 0.99), "rho": (-2.0, 4.0)}, {"body": "prolate"}),
+    ("satellite", {"one_minus_k": (-3.0, -0.05), "rho": (-3.0, 2.0)}, {"body": "oblate"}),
+    ("mathieu", {"q": (-4.0, 9.0), "a": (-10.0, 40.0)}, {}),
+]
+
+
+@pytest.mark.parametrize("variables", [None, ["discriminant", "verdict"]])
+@pytest.mark.parametrize(("scene", "ranges", "options"), SCATTERED)
+def test_scattered_points_agree_with_points_on_their_own(scene, ranges, options, variables, monkeypatch):
+    from survey.sweep import cost
+
+    random = np.random.default_rng(4)
+    given = {name: xr.DataArray(random.uniform(*ends, 6000), dims="point") for name, ends in ranges.items()}
+    for name in given:
+        given[name][[10, 20]] = 0.0 if name in ("rho", "q") else given[name][10]  # where exact rules decide
+    given["rho" if "rho" in given else "a"][30] = np.nan
+    many = survey.evaluate(scene, **given, **options, variables=variables)
+    few = survey.evaluate(scene, **{name: v[:1500] for name, v in given.items()}, **options, rtol=1e-13)
+    one = many.isel(point=slice(0, 1500))
+    assert (one.status.values == few.status.values).all() and int(one.status[30]) != 0
+    for name in error_bars(one):
+        off, bars = abs(one[name].values - few[name].values), one[f"{name}_error"].values.astype(float)
+        assert (off <= bars + few[f"{name}_error"].values)[np.isfinite(bars)].all(), name
+        assert (bars <= 1.001e-10 * (1 + abs(one[name].values)))[np.isfinite(bars)].mean() > 0.99
+    both = (one.verdict.values >= 0) & (few.verdict.values >= 0)
+    assert both.mean() > 0.99 and (one.verdict.values == few.verdict.values)[both].all()
+    assert int(one.verdict[10]) == int(few.verdict[10])
+    with monkeypatch.context() as patch:
+        patch.setattr(cost, "BLOCK_POINTS", 1700)
+        xr.testing.assert_identical(survey.evaluate(scene, **given, **options, variables=variables), many)
+
+
 def test_a_sparse_axis_is_solved_point_by_point(served):
     survey.evaluate("satellite", k=[0.3, 0.4], rho=np.linspace(0.6, 4.0, 20), variables=["discriminant"])
     assert served == [(40, 40)]

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 import survey
+from survey import status
 from survey.file.labels import error_bars
 from survey.measures.hill import user_equation, user_rows
 
@@ -101,3 +102,40 @@ def test_large_cancelling_terms_widen_the_bars():
         bars = one[f"{name}_error"].astype(float) + other[f"{name}_error"].astype(float)
         assert (abs(one[name] - other[name]) <= bars).all()
         assert float(other[f"{name}_error"].median()) > 50 * float(one[f"{name}_error"].median())
+
+
+@pytest.mark.parametrize("variables", [None, ["discriminant", "verdict"]])
+@pytest.mark.parametrize("even", [True, False])
+def test_scattered_points_are_served_by_series(rows, even, variables):
+    scene = survey.hill(
+        lambda u, p: p[0] + 2 * p[1] * cos(2 * u - (0.0 if even else 0.3)), period=pi, parameters=("a", "q"), even=even
+    )
+    random = np.random.default_rng(2)
+    a, q = random.uniform(-5, 30, 6000), random.uniform(-3, 6, 6000)
+    a[0], q[9] = np.nan, np.inf
+    given = {name: xr.DataArray(values, dims="point") for name, values in (("a", a), ("q", q))}
+    own = survey.evaluate(scene, **given, variables=variables)
+    assert rows["rows"] > 0 and set(np.flatnonzero(own.status.values)) == {0, 9}
+    scene = survey.evaluate("mathieu", a=given["a"][:800], q=-given["q"][:800], rtol=1e-12)
+    first = own.isel(point=slice(0, 800))
+    for name in ("discriminant", "exponent", "rotation_number") if variables is None else ("discriminant",):
+        bars = first[f"{name}_error"].astype(float) + scene[f"{name}_error"].astype(float)
+        off = abs(first[name] - scene[name]).values
+        assert (off <= bars.values)[np.isfinite(bars.values)].all(), name
+    both = (first.verdict >= 0) & (scene.verdict >= 0)
+    assert float(both.mean()) > 0.99 and bool((first.verdict == scene.verdict).where(both, True).all())
+
+
+def test_a_row_that_is_rough_leaves_the_others():
+    """|cos u| counts in the second of five rows alone, where the check of the axes' ends and middles does not look."""
+    scene = survey.hill(
+        lambda u, p: p[0] + exp(-1e4 * (p[1] - 0.25) ** 2) * abs(cos(u)),
+        period=2 * pi,
+        parameters=("a", "c"),
+        even=True,
+    )
+    ds = survey.evaluate(scene, a=np.linspace(0.1, 4, 12), c=np.linspace(0, 1, 5))
+    assert set(ds.status.sel(c=0.25).values.tolist()) == {status.NO_CONVERGENCE}
+    assert (ds.status.drop_sel(c=0.25) == 0).all()
+    free = 2 * np.cos(2 * pi * np.sqrt(ds.a))
+    assert (abs(ds.discriminant - free).drop_sel(c=0.25) <= ds.discriminant_error.drop_sel(c=0.25) + 1e-14).all()

@@ -1,0 +1,130 @@
+"""The scene of y'' + 2 c y' + z(u, p) y = 0, with y = e^(-c u) x: x'' + (z - c^2) x = 0 is Hill's equation.
+
+The multipliers are those of x times e^(-c T), so that the damped motion grows by the exponent of x less c T.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from survey import status
+from survey.kernels.jit import inline
+from survey.kernels.math.roundoff import EPS
+from survey.measures.hill import monodromy
+from survey.request.function_scene import FunctionScene
+from survey.request.hill_scene import HillScene
+from survey.scene import Output, Parameter, named
+
+KEPT = ("discriminant", "rotation_number", "period", "verdict")
+WORDS = {
+    "discriminant": "trace of the monodromy matrix over one period T",
+    "rotation_number": "rotation number per period",
+    "verdict": "stability of the damped motion; stable with c > 0: all motions decay",
+}
+ROUNDING = 8.0 * EPS  # of c T and of e^(-c T), relative
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DampedScene(FunctionScene):
+    """What a scene's module offers (see `survey.scenes`); `damping` is c, or the place of the parameter that is c."""
+
+    z: Callable
+    damping: float | None
+    place: int | None
+    period: float | Callable
+    breaks: tuple[float, ...] | Callable
+    PARAMETERS: tuple[Parameter, ...]
+    even: bool
+    NAME: str
+    TEXT: str
+    HASH: str
+    TITLE: str
+    about: str
+    REFERENCES: tuple[str, ...]
+    FAMILY = "hill"
+    AUDIT = ("dop853",)
+    OPTIONS = ()
+    DAMPED = True
+
+    @property
+    def own(self):
+        """The parameters of z and c: all that there are."""
+        return self.PARAMETERS
+
+    @property
+    def STATUS(self):
+        return self._inner.STATUS
+
+    @property
+    def NOTES(self):
+        return self._inner.NOTES
+
+    @property
+    def OUTPUTS(self):
+        """Those of Hill's equation that have a meaning here, and the exponent of the damped motion."""
+        kept = (replace(o, long_name=WORDS.get(o.name, o.long_name)) for o in monodromy.OUTPUTS if o.name in KEPT)
+        grows = "growth exponent of the amplitude per period, negative where all motions decay"
+        return (*kept, Output("exponent", grows, r"\mu T"))
+
+    @cached_property
+    def _inner(self):
+        """The scene of x, over the same parameters."""
+        shared = ("period", "breaks", "PARAMETERS", "NAME", "TEXT", "HASH", "TITLE", "about", "REFERENCES")
+        given = {name: getattr(self, name) for name in shared}
+        return HillScene(z=_less_square(self.z, self.damping, self.place), EVEN=self.even, **given)
+
+    def cost(self, options, sizes):
+        """Seconds per point, roughly."""
+        return self._inner.cost(options, sizes)
+
+    def check(self, points):
+        """Raise BadInput if z cannot be used at these points (N, n)."""
+        self._inner.check(points)
+
+    def solve(self, point, request):
+        """The requested outputs of a block (see `survey.scenes`)."""
+        wanted = frozenset({"discriminant", "exponent", "verdict", "period", "rotation_number"})
+        out = self._inner.solve(point, replace(request, variables=wanted))
+        c = self._damping(point, out["status"].shape)
+        turn = c * out["period"]
+        bar = abs(turn) * (ROUNDING + out["period_error"] / out["period"])
+        exponent, off = out["exponent"] - turn, out["exponent_error"] + bar + EPS * abs(out["exponent"])
+        certain = np.where(exponent + off < 0.0, 1, np.where(exponent - off > 0.0, 0, -1))
+        verdict = np.where(c == 0.0, out["verdict"], np.where(out["status"] == status.OK, certain, -1))
+        with np.errstate(over="ignore", invalid="ignore"):
+            factor = np.exp(-turn)
+            trace = out["discriminant"] * factor
+            error = factor * out["discriminant_error"] + abs(trace) * (np.expm1(2.0 * bar) + ROUNDING)
+        known = {"discriminant": trace, "discriminant_error": error, "exponent": exponent, "exponent_error": off}
+        return {**out, **known, "verdict": verdict.astype(np.int8)}
+
+    def _damping(self, point, shape):
+        given = self.damping if self.place is None else point[self.PARAMETERS[self.place].name]
+        return np.broadcast_to(np.asarray(given, float), shape)
+
+    def why(self, answer):
+        """Why the point has its verdict (see `survey.scenes`)."""
+        sign = {"stable": "< 0: all motions decay", "unstable": "> 0: one grows"}.get(answer["verdict"], "is open")
+        return f"{named(answer, 'exponent')} per period {sign}"
+
+
+def _less_square(z, damping, place):
+    """z - c^2, as numba and Python run it."""
+    inner = inline(getattr(z, "py_func", z))
+    if place is None:
+        square = damping * damping
+        return lambda u, p: inner(u, p) - square
+    return lambda u, p: inner(u, p) - p[place] * p[place]
+
+
+def checked_damping(damping, refuse):
+    """(number or None, name of a parameter or None); raises BadInput."""
+    if isinstance(damping, str):
+        if not damping.isidentifier():
+            refuse(f"damping = {damping!r}: it must be a number or the name of a parameter")
+        return None, damping
+    if isinstance(damping, bool) or not isinstance(damping, (int, float, np.number)) or not np.isfinite(damping):
+        refuse(f"damping = {damping!r}: it must be a finite number, or the name of a parameter")
+    return float(damping), None

@@ -1,0 +1,65 @@
+"""Physical input against the scenes' own parameters."""
+
+import numpy as np
+import pytest
+
+import survey
+from survey.errors import BadInput
+
+
+def test_degrees():
+    ds = survey.evaluate("satellite", amplitude_deg=[10.0, 30.0], rho=1.2)
+    own = survey.evaluate("satellite", amplitude=np.radians([10.0, 30.0]), rho=1.2)
+    np.testing.assert_array_equal(ds.discriminant, own.discriminant)
+    np.testing.assert_array_equal(ds.amplitude, np.radians([10.0, 30.0]))
+    with pytest.raises(BadInput, match=r"amplitude = 30 is outside .* if it is in degrees, give amplitude_deg = 30"):
+        survey.evaluate("satellite", amplitude=30.0, rho=1.2)
+    with pytest.raises(BadInput, match="amplitude is given twice"):
+        survey.evaluate("satellite", amplitude=0.3, amplitude_deg=30.0, rho=1.2)
+
+
+def test_moments_of_inertia():
+    ds = survey.evaluate("satellite", k=0.5, A=1520.0, B=1520.0, C=288.8)
+    assert float(ds.inertia_ratio) == pytest.approx(0.19, abs=1e-15)
+    assert float(survey.evaluate("satellite", k=0.5, A=288.8, B=1520.0, C=1520.0).inertia_ratio) == float(
+        ds.inertia_ratio
+    )
+    with pytest.raises(BadInput, match="two moments of inertia must be equal"):
+        survey.evaluate("satellite", k=0.5, A=1.0, B=2.0, C=2.5)
+    with pytest.raises(BadInput, match="C is missing: give all of A, B, C"):
+        survey.evaluate("satellite", k=0.5, A=1.0, B=2.0)
+
+
+def test_masses_and_bodies():
+    """1 / mu of the Earth and the Moon is 82.30057 (DE440: Earth / Moon = 81.30057)."""
+    ds = survey.evaluate("libration", body="Earth-Moon")
+    assert 1.0 / float(ds.mu) == pytest.approx(82.300568, abs=1e-6) and ds.body.item() == "Earth-Moon"
+    by_mass = survey.evaluate("libration", m1=81.300568, m2=1.0)
+    assert float(by_mass.mu) == pytest.approx(float(ds.mu), rel=1e-8)
+    several = survey.evaluate("libration_elliptic", body=["Sun-Jupiter", "Earth-Moon"])
+    assert several.verdict.dims == ("body",) and several.body.values.tolist() == ["Sun-Jupiter", "Earth-Moon"]
+    assert several.e.values.tolist() == [0.04838624, 0.0549] and (several.verdict == 1).all()
+    assert 1.0 / float(several.mu[0]) == pytest.approx(1048.35, abs=0.01)
+    assert float(survey.evaluate("libration_elliptic", body="Earth-Moon", e=0.1).e) == 0.1
+    with pytest.raises(BadInput, match="unknown pair 'Earth-Mon'; did you mean 'Earth-Moon'"):
+        survey.evaluate("libration", body="Earth-Mon")
+
+
+def test_a_workflow_takes_it_too(tmp_path):
+    axes = {"amplitude_deg": {"start": 10.0, "stop": 60.0, "num": 6}, "rho": 1.2}
+    ds = survey.run({"scene": "satellite", "axes": axes}, output=tmp_path / "s.nc")
+    np.testing.assert_array_equal(ds.amplitude, np.radians(np.linspace(10.0, 60.0, 6)))
+    asked = {
+        "scene": "libration_elliptic",
+        "options": {"body": "Earth-Moon"},
+        "axes": {"e": {"start": 0.0, "stop": 0.1, "num": 3}},
+    }
+    ds = survey.run(asked, output=tmp_path / "l.nc")
+    assert 1.0 / float(ds.mu) == pytest.approx(82.300568, abs=1e-6) and ds.sizes["e"] == 3
+
+
+def test_a_scene_says_what_it_takes():
+    told = survey.describe("satellite")["parameters"]
+    assert "in degrees" in told["amplitude_deg"] and "any unit" in told["A, B, C"]
+    assert "Sun-Jupiter" in survey.describe("libration_elliptic")["parameters"]["body"]
+    assert "any consistent units" in survey.describe("brun")["parameters"]["A"]

@@ -1,0 +1,97 @@
+"""Datasets that users make of surveys are drawn and asked like others, or refused in a line."""
+
+import contextlib
+
+import matplotlib
+import numpy as np
+import pytest
+import xarray as xr
+
+import survey
+from survey.errors import BadInput, SurveyError
+
+matplotlib.use("Agg")
+
+
+@pytest.fixture(scope="module")
+def bodies():
+    return survey.evaluate("libration_elliptic", body=["Sun-Jupiter", "Earth-Moon", "Sun-Mars"])
+
+
+@pytest.fixture(scope="module")
+def samples():
+    points = {"a": xr.DataArray([0.1, 0.5, 1.2], dims="sample"), "q": xr.DataArray([0.1, 0.5, 0.2], dims="sample")}
+    return survey.evaluate("mathieu", **points)
+
+
+@pytest.fixture(scope="module")
+def grid():
+    return survey.evaluate("mathieu", a=[0.1, 0.5, 1.2], q=[0.1, 0.3])
+
+
+def test_labels_are_coordinates(bodies):
+    assert bodies.survey.point(body="Earth-Moon").parameters["e"] == 0.0549
+    assert bodies.survey.point(body=1).parameters["e"] == 0.0549
+    axes = bodies.survey.map("a")
+    assert [text.get_text() for text in axes.get_xticklabels()] == ["Sun-Jupiter", "Earth-Moon", "Sun-Mars"]
+    with pytest.raises(BadInput, match="body: unknown label 'Earth'"):
+        bodies.survey.point(body="Earth")
+    wide = survey.evaluate("libration_elliptic", mu=bodies.mu, e=[0.0, 0.1])
+    assert [text.get_text() for text in wide.survey.map().get_xticklabels()][1] == "Earth-Moon"
+
+
+def test_dimensions_without_coordinates(samples):
+    assert samples.survey.point(sample=2).parameters == {"a": 1.2, "q": 0.2}
+    assert samples.survey.map("exponent") is not None and samples.survey.slice(sample=0).status.ndim == 0
+    with pytest.raises(BadInput, match="it has no coordinate; give a number from 0 to 2"):
+        samples.survey.point(sample=3)
+
+
+@pytest.mark.parametrize("name", ["bodies", "samples", "grid"])
+@pytest.mark.parametrize(
+    "ask", ["map", "boundary", "areas", "counts", "names", "_repr_html_", "margin", "zoom", "slice", "compare"]
+)
+def test_every_question_is_answered_or_refused_in_a_line(name, ask, request):
+    ds = request.getfixturevalue(name)
+    with contextlib.suppress(SurveyError):
+        getattr(ds.survey, ask)(*([ds] if ask == "compare" else []))
+    for made in (xr.concat([ds, ds], "run"), ds.isel({ds.status.dims[0]: slice(None, None, -1)})):
+        with contextlib.suppress(SurveyError):
+            getattr(made.survey, ask)(*([made] if ask == "compare" else []))
+
+
+def test_what_is_no_survey_is_told(grid):
+    with pytest.raises(BadInput, match=r"stacked along z: give it its axes back with \.unstack"):
+        grid.stack(z=("a", "q")).survey.map()
+    with pytest.raises(BadInput, match="this is a dataset, not a workflow"):
+        survey.run(grid)
+    with pytest.raises(BadInput, match="this is a dataset, not a scene"):
+        survey.evaluate(grid)
+    wide = np.linspace(0, 1, 10**6)
+    with pytest.raises(BadInput, match="points do not fit in memory"):
+        survey.evaluate("mathieu", a=wide, q=wide)
+    with pytest.raises(BadInput, match="an address, a scheduler file, or a"):
+        survey.run({"scene": "mathieu", "axes": {"a": 1.0, "q": 0.1}}, output="x.nc", scheduler=3)
+
+
+def test_a_client_is_a_scheduler(tmp_path):
+    distributed = pytest.importorskip("distributed")
+    asked = {"scene": "mathieu", "axes": {"a": {"values": [1.0, 2.0]}, "q": 0.1}}
+    with distributed.Client(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as client:
+        ds = survey.run(asked, output=tmp_path / "o.nc", scheduler=client)
+        assert client.submit(lambda: 1).result() == 1  # it is still its owner's
+    np.testing.assert_array_equal(ds.verdict, survey.evaluate("mathieu", a=[1.0, 2.0], q=0.1).verdict)
+
+
+def test_two_fixed_axes_leave_a_row(tmp_path, program):
+    axes = {"c": {"values": [0.0, 0.1]}, "q": {"values": [0.1, 0.3]}, "a": {"start": 0.0, "stop": 2.0, "num": 9}}
+    (tmp_path / "z.py").write_text(
+        "from math import cos, pi\nPARAMETERS = ('a', 'q')\nPERIOD = pi\nEVEN = True\nDAMPING = 'c'\n"
+        "def z(u, p):\n    return p[0] - 2 * p[1] * cos(2 * u)\n"
+    )
+    survey.run({"scene": str(tmp_path / "z.py"), "axes": axes}, output=tmp_path / "o.nc")
+    from survey.analysis.point import plane
+
+    row = plane(survey.open(tmp_path / "o.nc"), {"q": "0.3", "c": "0.1"})
+    assert row.status.dims == ("a",)
+    assert program("plot", "o.nc", "--at", "q=0.3", "--at", "c=0.1", "--var", "exponent").returncode == 0
