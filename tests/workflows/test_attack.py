@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from attack import brun, brun_truth, command, compare, danby, gyrostat_truth, hill
+from attack import brun, brun_truth, command, compare, danby, floquet, gyrostat_truth, hill
 from brun_truth import truth as brun_in_full
 from mpmath import mp, mpf
 
@@ -114,6 +114,37 @@ def test_truth_of_satellites(k, rho, oblate):
         out = hill.solved(hill.K, k, hill.RHO, rho, 1.0, oblate)[0]
         for i, true in enumerate((y[3], y[5], y[4], y[6], half)):
             assert abs(in_full(out, i) - true) < 1e-28 * (1 + abs(true))
+
+
+def floquet_rows(kind, number):
+    """(rows of parameters, exact monodromy matrices) of a batch of this kind, as its truth has them."""
+    seen = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(floquet, "_compared", lambda _answer, found, _period, **_more: seen.extend(found))
+        batch = getattr(floquet, f"_{kind}")(np.random.default_rng(4), number, "auto", 1e-10)
+        batch.truth(batch.given, {})
+    return np.column_stack(list(batch.given.values())), [found[2] for found in seen]
+
+
+def test_truth_of_linear_periodic_systems():
+    """exp(G B) by mpmath, and damped Mathieu equations by its Taylor series, 30 digits."""
+    with mp.workdps(50):
+        for row, M in zip(*floquet_rows("scaled", 3), strict=True):
+            n, (c, w, T) = len(M), map(mpf, row[-3:])
+            B = mp.matrix(row[: n * n].reshape(n, n).tolist()) * (T + c * mp.sin(w * T) / w)
+            exact = mp.expm(B, method="taylor")
+            assert mp.norm(exact - mp.matrix(M)) < 1e-30 * mp.norm(exact)
+    with mp.workdps(32):
+        for (a, q, s, c, T), M in zip(*floquet_rows("damped", 1), strict=True):
+            x = 2 * mpf(np.pi) / mpf(T)
+
+            def slope(t, y, a=a, q=q, s=s, c=c, x=x):
+                z = a + q * mp.cos(x * t) + s * mp.cos(2 * x * t)
+                return [y[1], -z * y[0] - 2 * c * y[1], y[3], -z * y[2] - 2 * c * y[3]]
+
+            y = mp.odefun(slope, 0, [1, 0, 0, 1], tol=mpf(10) ** -28)(mpf(T))
+            for i, j, value in ((0, 0, y[0]), (1, 0, y[1]), (0, 1, y[2]), (1, 1, y[3])):
+                assert abs(M[i][j] - value) < 1e-24 * (1 + abs(value))
 
 
 def test_truth_of_danbys_map():

@@ -85,7 +85,7 @@ def test_a_spike_that_a_run_would_miss_is_refused_with_its_place_and_resolved_wi
         out[0, 1], out[1, 0] = 1.0, -4.0 - math.exp(-x * x) / (math.sqrt(math.pi) * p[1])
 
     given = {"period": 1.0, "parameters": ("at", "width"), "states": ("y", "v")}
-    with pytest.raises(survey.BadInput, match=r"A has a spike near t = 0\.304.*name its position in BREAKS"):
+    with pytest.raises(survey.BadInput, match=r"A has a spike near t = 0\.304.*name its position in breaks"):
         survey.evaluate(survey.floquet(narrow, **given), at=0.3045, width=5e-4)
     near = {"breaks": lambda p: [p[0] - 8 * p[1], p[0], p[0] + 8 * p[1]]}
     named = survey.evaluate(survey.floquet(narrow, **given, **near), at=0.3045, width=5e-4, variables=["monodromy"])
