@@ -28,8 +28,12 @@ def questions():
             if _is_primary(scene, o.only_with)
             for choice in o.choices
         ]
-        for combination in [*itertools.product(*choices), *also]:
-            yield pytest.param(scene, dict(combination), id="-".join([name, *(value for _, value in combination)]))
+        whens, seen = {option.name: option for option in scene.OPTIONS}, []
+        for combination in map(dict, [*itertools.product(*choices), *also]):
+            options = {key: value for key, value in combination.items() if exists(whens[key], combination)}
+            if options not in seen:
+                seen.append(options)
+                yield pytest.param(scene, options, id="-".join([name, *options.values()]))
 
 
 def _needed(scene, option):

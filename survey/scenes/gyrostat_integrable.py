@@ -186,7 +186,7 @@ def _trigonometric(given, options):
     product = A11 * C23 / (B12 * B31)
     inner = np.array([_under_root(*constants) for constants in zip(A11, C23, B12, B31, strict=True)])
     upper = 0.5 + np.sqrt(np.where((inner < 0.0) & (inner >= -_SAME), 0.0, inner))
-    mu = upper if options["root"] == "upper" else product / upper
+    mu = upper if options.get("root", "upper") == "upper" else product / upper
     d_mu = 8 * _ULP * np.abs(mu) + np.sqrt(np.maximum(-inner, 0.0))
     n_star, share = -mu * (S2 * B31 / (C23 * A11)), d_mu / np.abs(mu) + 5 * _ULP
     b12, b31 = mu * B12 / A11, mu * B31 / A11

@@ -208,3 +208,10 @@ def test_a_motion_can_be_drawn():
     ds = solved("elliptic", C22=1.1, S2=0.5, w0=1.0)
     motion = ds.survey.trajectory(figure=False)
     assert float(motion.phi[0]) == 0.0 and float(motion.w[0]) == 1.0 and "period" in str(ds.survey.point())
+
+
+def test_the_root_is_refused_where_it_has_no_effect():
+    given = {"A11": 2.0, "C22": 0.4, "C33": 0.1, "C23": 0.2, "S2": 0.1, "S3": 0.3, "w0": 0.5, "t": 1.0}
+    with pytest.raises(survey.BadInput, match="root exists only with case = trigonometric"):
+        survey.evaluate("gyrostat_integrable", case="elliptic", root="lower", **given)
+    assert survey.evaluate("gyrostat_integrable", case="elliptic", **given).status == 0
