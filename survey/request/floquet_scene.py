@@ -104,7 +104,17 @@ class FloquetScene(TracedScene):
         if self.structure == "none":
             return f"{radius}: it is certainly below 1"
         kind = "symplectic" if self.structure == "symplectic" else "reversible"
+        if self.structure == "symplectic" and self._met(answer):
+            return "all multipliers are on the unit circle: where error bars meet, Krein signs are the same"
         return f"all multipliers are simple and on the unit circle, within their error bars: the system is {kind}"
+
+    def _met(self, answer):
+        """Do the error bars of two multipliers meet?"""
+        if "multiplier_re_error" not in answer:
+            return False
+        value = np.asarray(answer["multiplier_re"]) + 1j * np.asarray(answer["multiplier_im"])
+        bar, one = np.asarray(answer["multiplier_re_error"]), np.eye(value.size, dtype=bool)
+        return bool((~one & (abs(value[:, None] - value) <= bar[:, None] + bar)).any())
 
     def trajectory(self, point, answer, options, time=None):
         """A motion and the multipliers of a point (see `survey.scenes`)."""

@@ -220,6 +220,42 @@ def krein(own):
     return np.where(own.on_circle, sign, 0.0).astype(np.int8)
 
 
+def clusters(own, which):
+    """Krein signs (N, n) of clusters of multipliers in symplectic systems, of the points `which`; 0 elsewhere.
+
+    A cluster is what discs that meet hold together. Where v* (i J) v has one sign on its invariant subspace, M is
+    unitary there in that form: all of the cluster are on the unit circle, and stay there. With V the columns of the
+    discs, the subspace is V_1 + V_2 X, |X| <= 2 |C_21| / s where s^2 = (gap - |C_11| - |C_22|)^2 - 4 |C_12| |C_21| > 0,
+    C the couplings and gap the distance of the clusters' centres (Stewart).
+    """
+    signs = np.zeros(own.centre.shape, dtype=np.int8)
+    n = own.centre.shape[1]
+    m = n // 2
+    for p in which:
+        V, C, centre = own.V[p], own.coupling[p], own.centre[p]
+        if not (np.isfinite(C).all() and np.isfinite(V).all()):
+            continue
+        J = np.concatenate([V[m:], -V[:m]])
+        form = 1j * (V.conj().T @ J)
+        form = 0.5 * (form + form.conj().T)
+        size = abs(V).T @ np.concatenate([abs(V[m:]), abs(V[:m])])
+        for one in np.unique(own.together[p], axis=0):
+            if one.sum() < 2:
+                continue
+            two, inner = ~one, np.linalg.eigvalsh(form[np.ix_(one, one)])
+            blocks = [np.linalg.norm(C[np.ix_(a, b)]) for a in (one, two) for b in (one, two)]
+            gap = abs(centre[one][:, None] - centre[two]).min() if two.any() else np.inf
+            apart = gap - blocks[0] - blocks[3]
+            if not apart > 0 or not apart**2 > 4.0 * blocks[1] * blocks[2]:
+                continue
+            x = 2.0 * blocks[2] / np.sqrt(apart**2 - 4.0 * blocks[1] * blocks[2]) if two.any() else 0.0
+            doubt = 2.0 * x * np.linalg.norm(form[np.ix_(one, two)]) + x * x * np.linalg.norm(form[np.ix_(two, two)])
+            doubt += 16 * n * EPS * np.linalg.norm(size) * (1.0 + x) ** 2
+            if abs(inner).min() > 1.01 * doubt and (inner[0] > 0) == (inner[-1] > 0):
+                signs[p, one] = np.sign(inner[0])
+    return signs
+
+
 def crossing(own, verdict, paired, signs=None):
     """How stability is lost nearest, or has been lost (N).
 

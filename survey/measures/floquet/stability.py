@@ -1,8 +1,8 @@
 """Floquet's question: is x' = A(t) x stable? Multipliers, spectral radius, verdict, and how stability is lost.
 
 stable      asymptotically: every multiplier is certainly inside the unit circle; for symplectic and reversible systems
-            strongly: they are simple and on the circle, and stay there when the system is changed a little within
-            its kind
+            strongly: they are on the circle, and simple or, where they meet, of one Krein sign, and stay there when
+            the system is changed a little within its kind
 unstable    one is certainly outside
 undecided   the error bounds allow either
 """
@@ -65,6 +65,10 @@ def assess(matrices, structure, rtol, asked, period=None):
     discs = multipliers.Discs(matrices)
     found.verdict = multipliers.verdicts(discs, M, E, paired)
     signs = multipliers.krein(discs) if structure == "symplectic" else None
+    if signs is not None:
+        together = multipliers.clusters(discs, np.flatnonzero(found.verdict == UNDECIDED))
+        found.verdict[(together.any(axis=1)) & (discs.on_circle | (together != 0)).all(axis=1)] = STABLE
+        signs = np.where(together != 0, together, signs).astype(np.int8)
     found.crossing = multipliers.crossing(discs, found.verdict, paired, signs)
     if signs is not None:
         found.signs[:] = signs.T

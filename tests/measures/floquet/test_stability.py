@@ -275,3 +275,41 @@ def test_satellites_map(body):
     trace = ours.multiplier_re.sum("multiplier")
     bar = ours.multiplier_re_error.sum("multiplier") + known.discriminant_error
     assert (abs(trace - known.discriminant) <= bar + 1e-13 * abs(known.discriminant)).all()
+
+
+def two_oscillators(second, tilt=0.7):
+    """Two Mathieu equations, the second's energy `second` (1, -1), in coordinates turned by a symplectic rotation."""
+    c, s = math.cos(tilt), math.sin(tilt)
+    turn = np.array([[c, s], [-s, c]])
+
+    def A(t, p, out):
+        k = [p[0] - 2 * p[1] * math.cos(2 * t), p[0] + p[2] - 2 * p[1] * math.cos(2 * t)]
+        sign = (1, second)
+        for i in range(2):
+            for j in range(2):
+                out[i, 2 + j] = sum(turn[m, i] * sign[m] * turn[m, j] for m in range(2))
+                out[2 + i, j] = -sum(turn[m, i] * sign[m] * k[m] * turn[m, j] for m in range(2))
+
+    names = {"parameters": ("a", "q", "off"), "states": ("x", "y", "u", "v"), "structure": "symplectic"}
+    return survey.floquet(A, period=math.pi, **names)
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-15, 3e-13])
+def test_multipliers_that_meet_with_one_krein_sign_are_stable(off):
+    a, q = np.linspace(0.3, 3.3, 13), np.linspace(0.05, 0.5, 7)
+    known = survey.evaluate("mathieu", a=a, q=q).verdict
+    same = survey.evaluate(two_oscillators(1), a=a, q=q, off=off)
+    assert (same.verdict == known).where(same.verdict >= 0, True).all()
+    assert (same.verdict == 1).sum() > 0.9 * (known == 1).sum()
+    stable = (same.verdict == 1).values
+    assert (np.sort(same.krein.values[stable], axis=-1) == [-1, -1, 1, 1]).all()
+    other = survey.evaluate(two_oscillators(-1), a=a, q=q, off=off)
+    assert (known.where(other.verdict == 1, 1) == 1).all()
+    assert off > 1e-14 or not (other.verdict == 1).any()  # farther apart they are told from one another
+    assert (other.verdict == -1).any()
+    assert (other.krein.values[(other.verdict == -1).values] == 0).all()
+
+
+def test_the_reason_of_a_cluster_is_told():
+    ds = survey.evaluate(two_oscillators(1), a=[2.0], q=[0.1], off=0.0)
+    assert "Krein signs are the same" in str(ds.survey.point(a=2.0, q=0.1))
