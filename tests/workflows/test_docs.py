@@ -260,7 +260,7 @@ def test_a_scene_with_its_mathematics_has_its_notebook_and_its_kept_file():
     """A scene is whole in its own file; published ones have NAME.md, a notebook and a golden file besides."""
     named = {path.stem for path in (ROOT / "survey/scenes").glob("*.md")}
     assert named <= set(modules.names(survey.scenes))
-    assert {path.stem for path in NOTEBOOKS} == named | {"abel", "own_hill", "overnight"}
+    assert {path.stem for path in NOTEBOOKS} == named | {"abel", "own_hill", "own_system", "overnight"}
     assert {path.stem for path in (ROOT / "tests/golden").glob("*.toml")} == named
 
 
