@@ -3,8 +3,8 @@ r"""Ions in a quadrupole with a buffer gas: two Mathieu equations with damping.
 $$\ddot x + 2 k \dot x + (a - 2 q \cos 2t)\, x = 0, \qquad
 \ddot y + 2 k \dot y - (a - 2 q \cos 2t)\, y = 0.$$
 
-Without the gas (k = 0) ions are kept where both equations are stable: the first region reaches q = 0.908046 at a = 0, and
-its apex is (a, q) = (0.236994, 0.705996). With $y = e^{-kt} v$ the damped equation is Mathieu's again, at
+Without the gas (k = 0) ions are kept where both equations are stable: the first region reaches q = 0.908046 at a = 0,
+and its apex is (a, q) = (0.236994, 0.705996). With $y = e^{-kt} v$ the damped equation is Mathieu's again, at
 $a - k^2$, and multipliers are smaller by $e^{-k\pi}$: the gas widens the region.
 """
 

@@ -20,8 +20,8 @@ REFERENCES = (
     "E. I. Butikov, American Journal of Physics 69 (2001) 755",
 )
 PARAMETERS = (
-    Parameter("kappa", "gravity, g / (l Omega^2)", r"\kappa"),
-    Parameter("beta", "amplitude of the pivot over the pendulum's length", r"\beta", minimum=0.0),
+    Parameter("kappa", "reduced gravity", r"\kappa"),
+    Parameter("beta", "relative amplitude of the pivot", r"\beta", minimum=0.0),
     Parameter("zeta", "damping", r"\zeta", default=0.01, minimum=0.0),
 )
 STATES = ("theta",)

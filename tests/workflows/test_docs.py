@@ -261,7 +261,7 @@ def test_a_scene_with_its_mathematics_has_its_notebook_and_its_kept_file():
     named = {path.stem for path in (ROOT / "survey/scenes").glob("*.md")}
     assert named <= set(modules.names(survey.scenes))
     named -= {"gyrostat_integrable"}  # it is in the notebook of `gyrostat`, whose values it has in closed form
-    assert {path.stem for path in NOTEBOOKS} == named | {"abel", "own_hill", "overnight"}
+    assert {path.stem for path in NOTEBOOKS} == named | {"abel", "own_hill", "own_system", "overnight"}
     assert {path.stem for path in (ROOT / "tests/golden").glob("*.toml")} == named
 
 

@@ -6,6 +6,7 @@ import ground_resonance
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import fsolve
 
 import survey
 
@@ -48,3 +49,79 @@ def test_ground_resonance_by_plain_integration(lost):
     assert abs(float(ds.exponent) - np.log(abs(exact).max()) / period) < 1e-7
     off = abs(ds.monodromy.values - solved.y[:, -1].reshape(12, 12))
     assert (off <= ds.monodromy_error.values + 1e-8 * abs(ds.monodromy.values).max()).all()
+
+
+def test_a_quadrupoles_damping_in_closed_form():
+    """y = exp(-k t) v: Mathieu's equation at a - k^2, by a scene that shares nothing with the system's."""
+    scene, period = str(FOLDER / "ion_trap.py"), np.pi
+    q, a, k = np.linspace(0.1, 1.4, 7), np.linspace(-0.5, 0.6, 6), [0.02, 0.3]
+    ds = survey.evaluate(scene, q=q, a=a, k=k)
+    for i, damping in enumerate(k):
+        growth, bars = [], []
+        for sign in (1, -1):
+            one = survey.evaluate("mathieu", a=sign * a - damping**2, q=q).transpose("q", "a", ...)
+            growth.append(np.maximum(one.exponent.values, 0.0) / period - damping)
+            bars.append(one.exponent_error.values / period)
+        exact, bar = np.max(growth, axis=0), np.max(bars, axis=0)
+        ours = ds.isel(k=i).transpose("q", "a", ...)
+        assert (abs(ours.exponent.values - exact) <= ours.exponent_error.values + bar + 1e-15).all()
+        assert (ours.verdict.values == (exact < 0)).all()
+
+
+def test_the_quadrupoles_first_region():
+    """Its corner and its tip, 0.908046 at a = 0 without damping; here with next to none."""
+    scene = str(FOLDER / "ion_trap.py")
+    edge = survey.evaluate(scene, q=[0.908046 - 1e-5, 0.908046 + 1e-5], a=0.0, k=1e-7)
+    assert edge.verdict.values.tolist() == [1, 0]
+    corner = survey.evaluate(scene, q=0.705996, a=[0.236994 - 1e-4, 0.236994 + 1e-4], k=1e-7)
+    assert corner.verdict.values.tolist() == [1, 0]
+
+
+def test_kapitzas_limit():
+    """beta^2 > 2 kappa, as both go to 0: the ratio at the edge is 2 (1 + O(kappa))."""
+    for kappa in (1e-3, 1e-4):
+        beta = np.sqrt(2 * kappa * (1 + 8 * kappa * np.array([-1.0, 1.0])))
+        ds = survey.evaluate(str(FOLDER / "kapitza.py"), kappa=kappa, beta=beta, zeta=1e-9)
+        assert ds.verdict.values.tolist() == [0, 1]
+
+
+def test_duffings_folds_against_scipy():
+    """x(T) = x(0), det(M - 1) = 0 solved with SciPy's integrator: there the number of orbits changes."""
+    F, zeta = 0.3, 0.05
+
+    def shot(y):
+        x, v, omega = y
+
+        def rhs(t, y):
+            force = F * np.cos(omega * t) - 2 * zeta * y[1] - y[0] - y[0] ** 3
+            rest = -(1 + 3 * y[0] ** 2)
+            return [y[1], force, y[4], y[5], rest * y[2] - 2 * zeta * y[4], rest * y[3] - 2 * zeta * y[5]]
+
+        y = solve_ivp(rhs, (0, 2 * np.pi / omega), [x, v, 1, 0, 0, 1], "DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
+        return [y[0] - x, y[1] - v, (y[2] - 1) * (y[5] - 1) - y[3] * y[4]]
+
+    scene, omega = str(FOLDER / "duffing.py"), np.linspace(1.1, 2.6, 76)
+    ds = survey.evaluate(scene, omega=omega, F=F, zeta=zeta, branch=2.0)
+    inside = np.flatnonzero(ds.orbits.values == 3)
+    assert (np.diff(inside) == 1).all() and 0 < inside[0] and inside[-1] < 75
+    for k, side in ((inside[0], -1), (inside[-1], 1)):
+        fold = fsolve(shot, [*ds.x0.values[k], omega[k]], xtol=1e-9)[2]
+        assert 0 < side * (fold - omega[k]) < 0.0201
+        beside = survey.evaluate(scene, omega=fold + 1e-4 * np.array([-1, 1]), F=F, zeta=zeta)
+        assert beside.orbits.values.tolist() == [1, 3][::-side]
+
+
+def test_entrainment_by_averaging():
+    """rho ((1 - rho)^2 + sigma^2) = F^2 / 4; stable where rho > 1/2 and (1 - rho)(1 - 3 rho) + sigma^2 > 0."""
+    mu = 0.02
+    for sigma, low, high in ((0.2, 0.1, 1.5), (0.9, 0.5, 2.0)):
+        rho = np.linspace(1e-3, 2.0, 400001)
+        force = 2 * np.sqrt(rho * ((1 - rho) ** 2 + sigma**2))
+        stable = (rho > 0.5) & ((1 - rho) * (1 - 3 * rho) + sigma**2 > 0)
+        edge = force[stable].min()
+        assert low < edge < high
+        omega = (-mu * sigma + np.sqrt((mu * sigma) ** 2 + 4)) / 2
+        ds = survey.evaluate(
+            str(FOLDER / "entrainment.py"), omega=omega, F=edge * np.array([0.97, 1.03]), mu=mu, branch=-1.0
+        )  # fmt: skip
+        assert ds.verdict.values.tolist() == [0, 1]

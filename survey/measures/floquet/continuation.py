@@ -24,7 +24,7 @@ MOST_STEPS = 400  # in each direction
 CORRECTIONS, CORRECTED, CONTRACTION = 5, 1e-3, 0.5
 GROWTH, LEAST = 1.5, 1e-2  # of steps; the size of a state, relative to the largest one
 TURN, LITTLE = 0.35, 0.12  # of the tangent in a step, in radians: too much, and so little that steps become longer
-DIFFERENCE = 1e-6  # of l, for derivatives that give directions alone
+DIFFERENCE = 1e-7  # of l, for derivatives that give directions alone
 SAME, SAME_SIZE = 1e-3, 1e-2  # relative: what lies on a curve already
 
 
@@ -157,7 +157,7 @@ class _Walk:
         K, m = y.shape
         self.step, self.kept = np.full(K, FIRST_STEP), [([], [], []) for _ in range(K)]
         self.size, self.tangent, self.plane = np.ones((K, m)), np.zeros((K, m)), np.full((2, K, self.n), np.nan)
-        self.size[:, : self.n] = moduli
+        self.size[:, : self.n] = _floored(moduli)
         self.tangent[:, -1] = sign
         everyone = np.arange(K)
         if self.free:
@@ -232,12 +232,12 @@ class _Walk:
         n = self.n
         points, x, T = self._real(those, y)
         X, M, moduli = self._flow(points, x, T)
-        inward = np.where(y[:, -1] < 0.5, DIFFERENCE, -DIFFERENCE)
+        inward = np.where(y[:, -1] < 0.99, DIFFERENCE, -DIFFERENCE)
         shifted = y.copy()
         shifted[:, -1] += inward
         by_l = (self._flow(*self._real(those, shifted), derived=False)[0] - X) / inward[:, None]
         value, slope, size = X - x, M - np.eye(n), np.ones_like(y)
-        size[:, :n] = np.maximum(moduli, LEAST * moduli.max(axis=1, keepdims=True))
+        size[:, :n] = _floored(moduli)
         if self.free:
             c, at = self.plane[:, those]
             value = np.concatenate([value, (c * (x - at)).sum(axis=1)[:, None]], axis=1)
@@ -266,6 +266,11 @@ class _Walk:
         for inside, programs in self.equation.traced(points, x):
             f[inside] = programs.slopes(programs.numbers(points[inside]), np.zeros(inside.size), x[inside])[0]
         return f
+
+
+def _floored(moduli):
+    """Sizes of states, from their largest moduli (K, n): one that is 0 all the time has one too."""
+    return np.maximum(moduli, LEAST * moduli.max(axis=1, keepdims=True))
 
 
 def _turn(a, b):

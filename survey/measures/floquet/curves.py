@@ -37,6 +37,8 @@ RTOL, ROUGH = 1e-13, 1e-9  # of M for points of curves, and to see where these a
 
 def refusal(axes, scene):
     """Why there are no curves on a map of these axes, in words; None if there are."""
+    if scene is not None and scene.FAMILY == "orbit":
+        return "curves are drawn for linear systems, not for periodic orbits, which end at folds"
     return None if len(axes) in (2, 3) else f"curves are drawn on two axes, or three, not on {len(axes)}"
 
 
