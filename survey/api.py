@@ -17,7 +17,7 @@ from survey.errors import BadInput
 from survey.file import disk, reading, schema
 from survey.file.labels import count, counts, flag_codes, layout, percent
 from survey.file.labels import describe as labelled
-from survey.grid import Grid, lines
+from survey.grid import Grid, fixed, lines
 from survey.request import earlier, physical, trust, user_scene
 from survey.request.checks import check_options, check_parameters, check_request, methods_of
 from survey.request.function_scene import FunctionScene
@@ -165,13 +165,14 @@ def evaluate(
     try:
         with announce.watched(scene, module, grid.points, lambda: _seconds(module, request, grid)) as progress:
             found = solve.compute(grid, module, request, progress=progress)
-        ds = labelled(grid, module, scene, request, found)
+        ds = count(labelled(grid, module, scene, request, found), found)
     except MemoryError:
         raise BadInput(
             f"evaluate: {counted(grid.points, 'point')} do not fit in memory; use survey.run, which writes a file, or "
             "dask arrays (DataArray.chunk), or fewer points or variables"
         ) from None
-    return count(ds.assign_coords(_own_coordinates(given)))
+    own = _own_coordinates(given)
+    return ds.assign_coords(own) if own else ds
 
 
 def open(path: str | os.PathLike[str], *, trust_scene: bool = False) -> xr.Dataset:
@@ -218,7 +219,7 @@ def _labelled(key: str, value: Any) -> xr.DataArray:
         raise _not_real(key, value.values)
     if value.size == 0:
         raise BadInput(f"{short(key, 40)}: an empty array has no points; give at least one value")
-    return value.astype(float)
+    return value.astype(float) if value.chunks else value.copy(data=np.array(value.values, dtype=float))
 
 
 def _array(key: str, value: Any) -> npt.NDArray[Any]:
@@ -289,7 +290,8 @@ def _lazy(module: Any, scene: str, request: Request, given: dict[str, xr.DataArr
     """The same dataset, its values computed block by block when they are asked for."""
     table = layout(module, request)
     names = list(given)
-    request = replace(request, lines=lines({name: (array.dims, array) for name, array in given.items()}))
+    axes = {name: (array.dims, array) for name, array in given.items()}
+    request = replace(request, lines=lines(axes), fixed=fixed(axes))
 
     def solve_arrays(*arrays: Any) -> tuple[Any, ...]:
         shape = np.broadcast_shapes(*(array.shape for array in arrays))
@@ -400,6 +402,7 @@ def areas(ds: xr.Dataset) -> dict[str, str]:
 
 def _option_condition(option: Option) -> str:
     text = f"; only with {option.only_with}" if option.only_with else ""
+    text += "".join(f"; only when {name} = {' | '.join(allowed)}" for name, allowed in option.when.items())
     return text + (f"; not with {option.replaced_by}, which replaces it" if option.replaced_by else "")
 
 
@@ -433,5 +436,6 @@ def _output_text(o: Output) -> str:
 
 def _method_line(module: Any, name: str) -> str:
     method = measures.method(name)
-    first, when = inspect.cleandoc(method.__doc__).splitlines()[0], condition(module, getattr(method, "WHEN", {}))
+    docstring, when = inspect.cleandoc(method.__doc__), condition(module, getattr(method, "WHEN", {}))
+    first = getattr(method, "ABOUT", {}).get(module.FAMILY, docstring.splitlines()[0])
     return first.removesuffix(".") + when if when else first

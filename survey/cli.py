@@ -138,24 +138,61 @@ def run(workflow, output, overrides, workers, scheduler, block_timeout, fresh, r
     from survey.request import earlier
     from survey.request.workflow import read
     from survey.sweep import engine
-    from survey.sweep.progress import Progress
 
-    checked, finished = read(workflow, overrides, output), None
-    resume_command = shlex.join(["survey", *(word for word in sys.argv[1:] if word != "--fresh")])
+    checked = read(workflow, overrides, output)
     held, told = earlier.find(checked, reuse) if reuse else (None, "")
     if told and not quiet:
         err.print(plain(told), markup=False)
+
+    def start(progress, resume_command):
+        return engine.run(checked, workers, scheduler, fresh, progress, resume_command, block_timeout, held)
+
+    return _carry_out(checked, quiet, start)
+
+
+def _carry_out(checked, quiet, start, further=()):
+    """Run the engine by `start(progress, resume_command)`, draw, and say what was written; the exit code.
+
+    `further`: paths of other files that it writes.
+    """
+    from survey.sweep.progress import Progress
+
+    finished, resume_command = None, shlex.join(["survey", *(word for word in sys.argv[1:] if word != "--fresh")])
     _stop_on_sigterm()
     try:
         with Progress(err, checked, silent=quiet) as progress:
-            finished = engine.run(checked, workers, scheduler, fresh, progress, resume_command, block_timeout, held)
+            finished = start(progress, resume_command)
             pictures = _draw(checked)
     except KeyboardInterrupt as stop:
         traceback.clear_frames(stop.__traceback__)  # the semaphores they hold would be reported as leaked
         _end_interrupted(stop.args[0] if stop.args else 130, checked.path, finished, resume_command)
     if not quiet:
-        _summarise(finished, [checked.path, *pictures])
+        _summarise(finished, [checked.path, *further, *pictures])
     return 1 if _failed(finished) else 0
+
+
+@program.command()
+@click.argument("workflow", type=WORKFLOW)
+@click.option("-o", "--output", metavar="OUT.nc", help="The netCDF file, instead of the workflow's with _proved added.")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Replace a key: refine.width=0.01.")
+@click.option("--fresh", is_flag=True, help="Delete what an earlier, interrupted run has proved.")
+@click.option("--quiet", is_flag=True, help="No progress and no closing lines.")
+def prove(workflow, output, overrides, fresh, quiet):
+    """Prove a stability map: OUT.nc with its cells, and OUT.cert, which `survey-check` verifies by itself."""
+    from dataclasses import replace
+
+    from survey.request.workflow import read
+    from survey.sweep import engine, proofs
+
+    checked = read(workflow, overrides, output, proves=True)
+    if output is None:
+        checked = replace(checked, path=checked.path.with_stem(f"{checked.path.stem}_proved"))
+    proofs.equation_of(checked)  # refuses what cannot be proved
+    certificate = checked.path.with_suffix(".cert")
+    code = _carry_out(checked, quiet, lambda *more: engine.run(checked, None, None, fresh, *more), [certificate])
+    if not quiet:
+        err.print(f"verify it, also on another machine: survey-check {certificate}", markup=False)
+    return code
 
 
 @program.command()
@@ -317,11 +354,13 @@ def view(path, port, link, no_browser, trust_scene):
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def scenes(name, as_json):
     """List the scenes; or show one scene's equations, parameters, outputs and sources."""
+    if name is None:
+        import survey.scenes
+
+        return _show(survey.scenes(), as_json)
     from survey import api
 
-    if name is None:
-        _show(api.scenes(), as_json)
-    elif as_json:
+    if as_json:
         _show(api.scene(name), True)
     else:
         _describe(api.scene(name))

@@ -2,6 +2,7 @@
 
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise, product
 from math import ceil, prod
 
@@ -29,10 +30,20 @@ class Grid:
     def points(self):
         return prod(self.shape)
 
-    @property
+    @cached_property
     def lines(self):
         """`lines` of its parameters."""
         return lines(self.parameters)
+
+    @cached_property
+    def ranges(self):
+        """`ranges` of its parameters."""
+        return ranges(self.parameters)
+
+    @cached_property
+    def fixed(self):
+        """The names of the parameters that are single numbers."""
+        return fixed(self.parameters)
 
     def blocks(self, points_per_block):
         """Blocks, slices per dimension, of at most `points_per_block` points: the first dimensions are cut first."""
@@ -91,10 +102,29 @@ def lines(parameters):
     found = {}
     for name, (dims, values) in parameters.items():
         if len(dims) == 1 and sum(dims[0] in other for other, _ in parameters.values()) == 1:
-            values = np.asarray(values)
-            finite = values[np.isfinite(values)]
-            found[name] = values.size, float(finite.min(initial=np.inf)), float(finite.max(initial=-np.inf))
+            found[name] = np.size(values), *_ends(values)
     return found
+
+
+def ranges(parameters):
+    """{name: (number, least, greatest)} of each parameter that shares an axis with another, as `lines`."""
+    alone, found = lines(parameters), {}
+    for name, (dims, values) in parameters.items():
+        if dims and name not in alone:
+            found[name] = np.size(values), *_ends(values)
+    return found
+
+
+def _ends(values):
+    """The least and the greatest of the finite values."""
+    values = np.asarray(values)
+    finite = values[np.isfinite(values)]
+    return float(finite.min(initial=np.inf)), float(finite.max(initial=-np.inf))
+
+
+def fixed(parameters):
+    """The names of those of the `parameters` {name: (its dimensions, its values)} that are single numbers."""
+    return frozenset(name for name, (dims, _) in parameters.items() if not dims)
 
 
 def halved(lengths, most):

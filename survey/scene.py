@@ -57,7 +57,8 @@ class Parameter:
 class Option:
     """A switch of the scene; the first choice is the default unless `default` says otherwise.
 
-    It exists only with the parameter `only_with`, and not beside the parameter `replaced_by`, which specifies the same.
+    It exists only with the parameter `only_with`, only where other options have the values that `when` allows, and not
+    beside the parameter `replaced_by`, which specifies the same.
     """
 
     name: str
@@ -66,6 +67,7 @@ class Option:
     default: str = ""
     only_with: str = ""
     replaced_by: str = ""
+    when: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "default", self.default or self.choices[0])
@@ -108,6 +110,8 @@ class Request:
     rtol: float = 1e-10
     variables: frozenset[str] = frozenset()
     lines: Mapping[str, tuple[int, float, float]] = field(default_factory=dict)
+    fixed: frozenset[str] = frozenset()
+    ranges: Mapping[str, tuple[int, float, float]] = field(default_factory=dict)
 
     def line(self, name: str) -> tuple[int, float, float] | None:
         """(number, least, greatest) of the full axis of the parameter `name`, which no other shares; or None.
@@ -151,6 +155,6 @@ def condition(scene: Any, when: Mapping[str, tuple[str, ...]], own: str = "") ->
     return "".join(f"; only {word}" for word in words)
 
 
-def exists(item: Parameter | Output, options: Mapping[str, str]) -> bool:
+def exists(item: Parameter | Output | Option, options: Mapping[str, str]) -> bool:
     """Does this parameter or output exist under these option values?"""
     return all(options.get(name, "") in allowed for name, allowed in item.when.items())

@@ -54,7 +54,7 @@ def truth(case):
 
 
 def rotation(discriminant, zeros):
-    """theta_total / 2 pi from the discriminant and the zeros of y1 and y2 in T / 2 (satellite.md, section 5)."""
+    """theta_total / 2 pi from the discriminant and the zeros of y1 and y2 in T / 2 (see satellite.md)."""
     if abs(discriminant) >= 2:
         return mpf(zeros + ((zeros % 2 == 1) != (discriminant < 0))) / 2
     theta = mp.acos(discriminant / 2)

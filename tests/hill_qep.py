@@ -1,4 +1,4 @@
-"""Edges of tongues by the Fourier quadratic eigenproblem (scenes/satellite.md, section 5): no integrator.
+"""Edges of tongues by the Fourier quadratic eigenproblem (scenes/satellite.md): no integrator.
 
 y = sum of a_j cos or sin(f_j u), z = g(u) + 2 rho w(u) + rho^2 with g, w by their cosine series: in each of the four
 classes (A0 + rho A1 + rho^2) a = 0, linearised to twice its size.

@@ -390,7 +390,7 @@ PAGE = """# Critical mass ratios of the triangular libration points
 Made by `python workflows/libration_critical.py`; `libration_critical_values.csv` holds the same numbers. Each is a zero
 of an integer polynomial in omega2^2, enclosed by an exact change of sign and counted by Sturm's theorem, so that none
 is missing in 0 < mu <= mu_R. All digits are right, within {error}. The polynomials come from the closed forms
-(`survey/scenes/libration.md`, section 3), and are as sure as these are.
+(`survey/scenes/libration.md`), and are as sure as these are.
 
 ## What divides the interval of linear stability
 
@@ -407,7 +407,7 @@ The intervals of the source's theorem:
 L4 and L5 are formally stable in the intervals (3.1). In (3.2), which are {share:.3f} % of the interval of linear
 stability, the form M of order 6 does not vanish on the one ray that order 4 leaves open: it is {below:.6f} just above
 mu_c, {above:.6f} just below mu_d, and has its only pole at mu2. That proves formal stability but where omega1 and
-omega2 are both rational, which no float64 mu makes them (`survey/scenes/libration.md`, section 5).
+omega2 are both rational, which no float64 mu makes them (`survey/scenes/libration.md`).
 
 ## Certified by exact arithmetic
 

@@ -3,7 +3,7 @@
     python workflows/libration_elliptic_boundaries.py [-o results]
 
 On A and B a pair of multipliers meets at -1, on KC two pairs meet on the circle. A and KC are tangent at the tip, where
-all four multipliers are -1: it is found as the common zero of A and t (`survey/scenes/libration_elliptic.md`, 5).
+all four multipliers are -1: it is found as the common zero of A and t (`survey/scenes/libration_elliptic.md`).
 """
 
 import csv

@@ -148,7 +148,7 @@ revolution; its bars are below 1e-12.
 Towards the separatrix the tongues of the rod repeat forever: two tongues on, |1 - k| is smaller by exp(-sqrt(3) pi) =
 {ratio:.6e} for librations, by its square for rotations (as the last tongues of the file, within {deviation}). The
 disc is unstable all the way: its growth per orbit tends to 2 pi sqrt(2) = {limit:.6f}. Rotations with k > 1000 are
-stable: tongue n = 1 lies within 1 / (2 k^2) of rho / k = 0 (`survey/scenes/satellite.md`, section 4).
+stable: tongue n = 1 lies within 1 / (2 k^2) of rho / k = 0 (`survey/scenes/satellite.md`: What is known).
 """
 LIBRATIONS = """
 ## {title}

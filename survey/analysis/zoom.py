@@ -23,7 +23,7 @@ def sweep(ds, ranges, num=None, output=None):
     if output is not None:
         return api.run(data, output=output)
     found = solve.compute(checked.grid, checked.scene, checked.request)
-    finer = count(describe(checked.grid, checked.scene, checked.name, checked.request, found))
+    finer = count(describe(checked.grid, checked.scene, checked.name, checked.request, found), found)
     for further in edges_and_cells.find(checked, lambda name, make: make()):
         finer = finer.assign(further.variables).assign_attrs(further.attrs)
     return finer.assign_attrs(title=checked.title, workflow=checked.text)

@@ -58,8 +58,13 @@ def describe(grid, scene, name, request, arrays):
     """The dataset of a survey: `arrays` holds the variables of `layout` in the grid's shape."""
     import xarray as xr
 
-    data = {key: (dims, arrays[key], attrs) for key, (dims, attrs) in variables(grid, scene, request).items()}
-    return xr.Dataset(data, coordinates(grid, scene, request), attributes(scene, name, request))
+    # made here, as xarray takes longer to find out what they are
+    data = {
+        key: xr.Variable(dims, arrays[key], attrs, fastpath=True)
+        for key, (dims, attrs) in variables(grid, scene, request).items()
+    }
+    coords = {key: xr.Variable(*of, fastpath=True) for key, of in coordinates(grid, scene, request).items()}
+    return xr.Dataset(data, coords, attributes(scene, name, request))
 
 
 def coordinates(grid, scene, request):
@@ -101,7 +106,7 @@ def attributes(scene, name, request):
         "method": request.method,
         "rtol": request.rtol,
         "references": "; ".join(scene.REFERENCES),
-        "source": f"survey {__version__}: scene {name}, method {request.method}",
+        "source": f"survey {provenance()['version_survey']}: scene {name}, method {request.method}",
         **provenance(),
         **({"scene_text": scene.TEXT, "scene_hash": scene.HASH} if hasattr(scene, "TEXT") else {}),
         **getattr(scene, "NOTES", {}),
@@ -187,12 +192,12 @@ def tally(ds):
     return Tally({name: ds[name].attrs for name in ("status", "verdict") if name in ds}, ds.attrs["rtol"])
 
 
-def count(ds):
-    """Add the counts of `Tally` to the attributes of `ds`, which is in memory."""
-    total = tally(ds)
-    names = ["status", *total.codes, *error_bars(ds), *(f"{name}_error" for name in error_bars(ds))]
-    point = ds.status.dims
-    total.add({name: ds[name].transpose(*point, ...).values for name in names})
+def count(ds, arrays):
+    """Add the counts of `Tally` over the `arrays` of `ds` (see `describe`) to its attributes."""
+    total = Tally(
+        {name: ds.variables[name].attrs for name in ("status", "verdict") if name in arrays}, ds.attrs["rtol"]
+    )
+    total.add(arrays)
     ds.attrs |= total.attributes
     return ds
 

@@ -19,7 +19,7 @@ STEP = 1e-5  # of differences, in units of the map and of x
 FURTHEST = 0.4  # change of x over one step
 LEAST, MOST = 3e-5, 2000  # step on the map at which a curve is given up, and points of a curve
 SLOW = 12  # points that have not come further than as many of the LEAST steps end a curve
-SAME = np.array([0.05, 3e-4, 3e-4])  # of x and of the map: curves so near to one another are one
+SAME, APART = 3e-4, 0.05  # of the map, and of x: curves so near to one another are one
 WIDEST = 1e-6  # error of a point that is kept
 TINY = 1e-300
 
@@ -36,26 +36,33 @@ class Track:
 
     def certain(self):
         """The runs of points that are certain."""
-        return [replace_all(self, part) for part in runs(self.sure)]
+        return [part_of(self, part) for part in runs(self.sure)]
 
-    def passes(self, u):
-        """Does the curve pass u = (x, position)?"""
-        points = np.column_stack([self.place, self.x])
-        if len(points) < 2:
+    def passes(self, u, turn):
+        """Does the curve pass u = (x, position)? x and x + turn are the same."""
+        if len(self.x) < 2:
             return False
-        low, chord = points[:-1], np.diff(points, axis=0)
-        share = np.clip(((u - low) * chord).sum(axis=1) / np.maximum((chord * chord).sum(axis=1), TINY), 0.0, 1.0)
-        return bool((abs(low + share[:, None] * chord - u) < SAME).all(axis=1).any())
+        low, chord = self.x[:-1], np.diff(self.x, axis=0)
+        share = ((u[1:] - low) * chord).sum(axis=1) / np.maximum((chord * chord).sum(axis=1), TINY)
+        off = abs(low + np.clip(share, 0.0, 1.0)[:, None] * chord - u[1:]).max(axis=1)
+        least, most = np.minimum(self.place[:-1], self.place[1:]), np.maximum(self.place[:-1], self.place[1:])
+        return bool(((off < SAME) & ((u[0] - least + APART) % turn < most - least + 2.0 * APART)).any())
 
-    def within(self, other):
+    def within(self, other, turn):
         """Does nearly all of this curve lie on the other?"""
         points = np.column_stack([self.place, self.x])
-        return np.mean([other.passes(u) for u in points]) > 0.9
+        return np.mean([other.passes(u, turn) for u in points]) > 0.9
 
 
-def replace_all(track, part):
+def part_of(track, part):
     """The points `part` of a Track."""
     return Track(*(getattr(track, name)[part] for name in Track.__dataclass_fields__))
+
+
+def with_points(track, places, others):
+    """The Track with a point of each of the `others` put in before its point of the number in `places`."""
+    pairs = [(name, np.concatenate([getattr(other, name) for other in others])) for name in Track.__dataclass_fields__]
+    return Track(*(np.insert(getattr(track, name), places, values, axis=0) for name, values in pairs))
 
 
 @dataclass(frozen=True)
@@ -227,8 +234,9 @@ def _near(u, tangent, new, ahead):
 def from_lattice(number, things, function_of, grain):
     """[(label, Track)] of all curves that part the nodes of a lattice of so many lines each way.
 
-    things(position) -> [(label, side, place, a)] where b = 0; function_of(label): what a Follower takes. A curve is
-    begun where, from one node to the next, a changes its sign on things of one label and side that are near.
+    things(position) -> [(label, side, place, a)] where b = 0; function_of(label): what a Follower takes, and by how
+    much places differ that are the same (an infinite number if none are). A curve is begun where, from one node to the
+    next, a changes its sign on things of one label and side that are near.
     """
     ticks = np.linspace(0.0, 1.0, number)
     known = [[things(np.array([one, two])) for two in ticks] for one in ticks]
@@ -239,16 +247,24 @@ def from_lattice(number, things, function_of, grain):
                 if k < number and m < number:
                     here, there = np.array([ticks[i], ticks[j]]), np.array([ticks[k], ticks[m]])
                     for label, start in _changes(known[i][j], known[k][m], here, there):
-                        if not any(own == label and track.passes(start) for own, track in found):
-                            _add(found, label, Follower(function_of(label), grain), start)
+                        _add(found, label, *function_of(label), grain, start)
     found.sort(key=lambda one: -len(one[1].x))
-    return [(label, track) for i, (label, track) in enumerate(found)
-            if not any(own == label and track.within(longer) for own, longer in found[:i])]  # fmt: skip
+    alone = []
+    for label, track in found:
+        if not any(own == label and track.within(longer, function_of(label)[1]) for own, longer in alone):
+            alone.append((label, track))
+    return alone
 
 
-def _add(found, label, follower, start):
-    landed = follower.landed(start)
-    if landed is None or any(own == label and track.passes(landed[0]) for own, track in found):
+def _add(found, label, function, turn, grain, start):
+    """Add the curve through a point next to `start`, unless it is known."""
+
+    def known(u):
+        return any(own == label and track.passes(u, turn) for own, track in found)
+
+    follower = Follower(function, grain)
+    landed = None if known(start) else follower.landed(start)
+    if landed is None or known(landed[0]):
         return
     track = follower.track(landed[0])
     if track is not None:

@@ -13,6 +13,7 @@ CONTRACT = {
     "ORDER": Value("order of convergence; 0: a closed form", int, needed=True),
     "SERVES": Value("names of the families that it serves, such as ('hill', 'cylinder')", tuple, needed=True),
     "COST": Value("{family: how many times the scene's rough cost of a point it takes}; 1 if not given", dict),
+    "ABOUT": Value("{family: what it does for that family, in a line}; the docstring's first if not given", dict),
     "WHEN": Value("{option: values} for which it answers, as in a scene's outputs; always if not given", dict),
     "ADAPTIVE": Value("does it choose its own steps, from a tolerance? False if not given", bool),
 }

@@ -3,7 +3,7 @@
 Domain: trajectory and abel; b = 0 and g = 0 exactly, (61) within 64 roundings (which go into the bar); status
 `no_closed_form` elsewhere. Near multiple roots, where digits are lost, `no_convergence`. Uniform rotation is b = g = 0.
 
-Source: M. E. Lesina, Ya. V. Zinovyeva (2004), (50), (61)-(68), as corrected in `scenes/gyrostat.md`, section 2.
+Source: M. E. Lesina, Ya. V. Zinovyeva (2004), (50), (61)-(68), as corrected in `scenes/gyrostat.md`.
 """
 
 import math

@@ -39,9 +39,20 @@ from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.kernels.math.runge_kutta import fundamental
 
 ORDER = 8
-SERVES = ("abel", "body", "cylinder", "danby", "floquet", "hill")
+SERVES = ("abel", "body", "cylinder", "danby", "floquet", "hill", "orbit")
 # time, relative to the default of each family
-COST = {"abel": 20.0, "body": 60.0, "cylinder": 60.0, "danby": 2500.0, "floquet": 10.0, "hill": 80.0}
+COST = {"abel": 20.0, "body": 60.0, "cylinder": 60.0, "danby": 2500.0, "floquet": 10.0, "hill": 80.0, "orbit": 20.0}
+_ABOUT = "DOP853, order 8, adaptive: "
+_CHECK = "steps of its own at every point. The independent check."
+ABOUT = {
+    "abel": _ABOUT + "phi' = w, w' = f w + g in time, " + _CHECK,
+    "body": _ABOUT + "the six equations (1)-(6) in time, " + _CHECK,
+    "cylinder": _ABOUT + "phi' = w, w' = f w + g in time, " + _CHECK,
+    "danby": _ABOUT + "the four linear equations about L4 in the eccentric anomaly, " + _CHECK,
+    "floquet": _ABOUT + "x' = A(t) x, " + _CHECK,
+    "hill": _ABOUT + "y'' + z y = 0, " + _CHECK,
+    "orbit": _ABOUT + "x' = f(t, x) and its variational equation, " + _CHECK,
+}
 FLOW_FINEST = 1e-16  # useful tolerance for flows on the cylinder
 FLOW_WORK = 4  # steps, relative to the Taylor method
 _FIRST = LOW + 1  # stages lie in the lines of the table after the low series
@@ -59,6 +70,7 @@ _SLOPE_ROUNDINGS = 4.0
 
 
 floquet_factors = runge_kutta.factors
+orbit_motion = runge_kutta.motion
 
 
 def floquet_reach(rtol):

@@ -2,7 +2,7 @@
 
 Domain: 0 < mu < mu_R, every mu that is a float64, those next to the resonances and to mu_R included. The forms of order
 4 are those of A. Deprit, A. Deprit-Bartholome, Astron. J. 72 (1967) 173, in the plane; the others were found by exact
-rational reconstruction (`scenes/libration.md`, section 3).
+rational reconstruction (`scenes/libration.md`).
 """
 
 from survey.kernels.libration.closed_forms import ROWS, closed_forms, tabulate

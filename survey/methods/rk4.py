@@ -41,6 +41,13 @@ COST = {
     "danby": 5000.0,
     "hill": 13.0,
 }  # time, relative to the default of each family
+_ABOUT = "The classical Runge-Kutta method, order 4, each step two halves checked by a whole, for comparison: "
+ABOUT = {
+    "body": _ABOUT + "the six equations (1)-(6) in time.",
+    "cylinder": _ABOUT + "phi' = w, w' = f w + g in time.",
+    "danby": _ABOUT + "the four linear equations about L4 in the true anomaly.",
+    "hill": _ABOUT + "y'' + z y = 0.",
+}
 FLOW_FINEST = 1e-13  # useful tolerance for flows on the cylinder
 FLOW_WORK = 50  # steps, relative to the Taylor method
 NODES = (0.0, 0.25, 0.5, 0.75, 1.0)

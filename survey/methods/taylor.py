@@ -26,6 +26,12 @@ from survey.kernels.jit import inline, kernel
 
 ORDER = 20
 SERVES = ("abel", "body", "cylinder")
+_ABOUT = "Taylor series in time, order 20, variable steps: "
+ABOUT = {
+    "abel": _ABOUT + "phi' = w, w' = f w + g, from the record of the functions; the default.",
+    "body": _ABOUT + "the six equations (1)-(6); the default.",
+    "cylinder": _ABOUT + "phi' = w, w' = f w + g; the default.",
+}
 _FALL = 1.0 / 50.0  # by more, two terms further on, no series is trusted to fall
 FLOW_FINEST = 1e-17  # useful truncation error of a step
 FLOW_WORK = 1  # steps, relative to this method

@@ -24,6 +24,13 @@ from survey.kernels.unroll import largest, unroll
 
 ORDER = 16
 SERVES = ("danby", "floquet", "hill", "orbit")
+_ABOUT = "Midpoint Taylor, order 16: power series about the middle of each step, "
+ABOUT = {
+    "danby": _ABOUT + "of the propagator of the four linear equations about L4, over half a period.",
+    "floquet": _ABOUT + "of the propagator of x' = A(t) x, of n states.",
+    "hill": _ABOUT + "of both fundamental solutions of y'' + z y = 0.",
+    "orbit": _ABOUT + "of the orbit and of the propagator of small deviations from it.",
+}
 COST = {"danby": 10.0}  # time, relative to the default of each family
 
 _DEGREE = 9
@@ -69,7 +76,8 @@ def _product(matrix, k, x, i):
 @splice
 def _hill_row(samples, h, coefficients):
     """Per function, in units of -4/h^2: powers of x, the last two Legendre coefficients, the largest sample, and what
-    components of degree >= 20 add to the low coefficients, where the Gauss points take them for these.
+    components of degree >= 20 add to the low coefficients, where the Gauss points take them for these. What rounding
+    is relative to may be larger than the samples: then it follows them.
     """
     count = samples.shape[2]
     paired, series = np.empty((_HALF, count)), np.empty((_HALF, count))
@@ -96,6 +104,10 @@ def _hill_row(samples, h, coefficients):
             for i in range(count):
                 coefficients[first + _TAIL, i] += 0.25 * h[i] * h[i] * abs(series[_HALF - 1, i])
                 coefficients[first + _ALIAS, i] += 0.25 * h[i] * h[i] * abs(series[_HALF - 2, i])
+        if samples.shape[1] > 2 * _HALF:
+            for i in range(count):
+                given = 0.25 * h[i] * h[i] * samples[c, 2 * _HALF, i]
+                coefficients[first + _SIZE, i] = max(coefficients[first + _SIZE, i], given)
         for i in range(count):  # at the rate at which the last four fall, five times two degrees on
             tail = coefficients[first + _TAIL, i]
             rate = min(max(tail / coefficients[first + _ALIAS, i], _SLOWEST), 1.0)

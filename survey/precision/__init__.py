@@ -11,7 +11,7 @@ Everything specific to a scene is in the file of its name in `cases/`:
     LIMITED                the method whose operations, at the machine's peak rate, give the least time in the chart
     operations_of(run)     its operations while `run()` solves a work with it (both optional)
     MOST                   {method: number of points that it is timed on}, for slow ones (optional)
-    SCENE                  the scene, where a scene has several charts and the file another name (optional)
+    SCENE                  the scene, where the file has another name: its name, or the object of one's own (optional)
 
 Where a parameter for which one solution serves all values (times, angles) varies along the last axis, samples of the
 work keep whole rows.
@@ -38,6 +38,7 @@ from survey.errors import BadInput
 from survey.file.labels import provenance
 from survey.grid import lines
 from survey.measures.cylinder import fate
+from survey.measures.floquet import dense as floquet
 from survey.measures.hill import dense
 from survey.precision import cases, flops
 from survey.precision import peers as programs
@@ -142,8 +143,9 @@ def measure(scene, case, peers=False, say=lambda line: None):
 
 
 def _scene(chart, case):
-    """The module of a chart's scene."""
-    return scenes.load(getattr(case, "SCENE", chart))
+    """The scene of a chart: a module, or one of one's own."""
+    scene = getattr(case, "SCENE", chart)
+    return scenes.load(scene) if isinstance(scene, str) else scene
 
 
 def missing(peers):
@@ -205,6 +207,7 @@ def _solver(module, method, error):
         ndim = max(np.ndim(values) for values in point.values()) or 1
         arrays = {key: np.asarray(point.get(key, p.default), float) for key, p in used.items()}
         dense.panels.cache_clear()  # every call includes its set-up
+        floquet.panels.cache_clear()
         fate.forget()
         return module.solve({key: v if v.ndim else v.reshape((1,) * ndim) for key, v in arrays.items()}, request)
 
@@ -269,12 +272,12 @@ def _against(solve, references, name, rtol):
 
 
 def _per_point(solve, point, options, rtol):
-    """Median seconds per point of a few calls."""
+    """Median seconds of processor time per point of a few calls: all run on one thread, beside others perhaps."""
     times, begin = [], time.perf_counter()
     while len(times) < REPEATS and (not times or time.perf_counter() - begin < ENOUGH_SECONDS):
-        start = time.perf_counter()
+        start = time.process_time()
         solve(point, options, rtol)
-        times.append(time.perf_counter() - start)
+        times.append(time.process_time() - start)
     return float(np.median(times)) / _points(point)
 
 

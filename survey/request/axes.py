@@ -43,13 +43,19 @@ def values_of(key, axis):
     return values
 
 
-def check_domain(parameter, values):
-    """Raise BadInput if a single value or an end of an axis lies outside the parameter's domain."""
+def check_domain(parameter, values, others=()):
+    """Raise BadInput if a single value or an end of an axis lies outside the parameter's domain.
+
+    `others`: names of the parameters that may take its place.
+    """
     ends = np.atleast_1d(values)[[0, -1]]
     for value in ends[~parameter.holds(ends)]:
         what = "is" if np.ndim(values) == 0 else "has an end"
-        raise BadInput(f"axes.{parameter.name} {what} {value:g}, outside its domain; allowed: {parameter.domain}"
-                       f"{physical.hint(parameter, float(value))}")  # fmt: skip
+        instead = f"; instead of {parameter.name} you can give {' or '.join(others)}" if others else ""
+        raise BadInput(
+            f"axes.{parameter.name} {what} {value:g}, outside its domain; allowed: {parameter.domain}{instead}"
+            f"{physical.hint(parameter, float(value))}"
+        )
 
 
 def grid_of(parameters, given):

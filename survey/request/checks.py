@@ -28,7 +28,14 @@ def check_options(scene, given, parameters=(), table=""):
         if option.only_with and option.only_with not in parameters:
             raise BadInput(f"{table}{key} requires the parameter {option.only_with}; give that too, or leave this out")
     exist = [o for o in known.values() if o.replaced_by not in parameters and o.only_with in ("", *parameters)]
-    return {option.name: str(given.get(option.name, option.default)) for option in exist}
+    values = {option.name: str(given.get(option.name, option.default)) for option in exist}
+    for option in exist:
+        if not exists(option, values):
+            if option.name in given:
+                allowed = ", ".join(f"{key} = {' | '.join(them)}" for key, them in option.when.items())
+                raise BadInput(f"{table}{option.name} exists only with {allowed}; change that, or leave this out")
+            del values[option.name]
+    return values
 
 
 def check_parameters(scene, name, options, given, table=""):
@@ -74,7 +81,7 @@ def _why_excluded(scene, when, key, given, table):
 
 def unknown_parameter(scene, key, known):
     """One line for a parameter that the scene of this name does not have."""
-    return modules.unknown(f"parameter of scene {scene}", key, known)
+    return modules.unknown(f"parameter of scene {scene}", key, known, more=("rtol", "method", "variables"))
 
 
 def check_request(scene, options, method, rtol, variables, tables=("", "")):

@@ -64,7 +64,7 @@ def check_even(scene, name, table):
         raise BadInput(f"{table}: the z of {name} is not even, so it has no half-period factors; leave the table out")
 
 
-def check_refine(scene, name, file, given):
+def check_refine(scene, name, file, given, proves=False):
     """{axis: (width of the smallest cells as a fraction of the axis, is it logarithmic?)}; None if not requested.
 
     On a logarithmic axis the fraction is of its logarithm, and a width per axis is a ratio less 1.
@@ -74,7 +74,8 @@ def check_refine(scene, name, file, given):
     axes = {key: values for key, values in given.items() if np.ndim(values)}
     if measures.question(scene.FAMILY, "cells") is None:
         raise BadInput(f"refine: [refine] is not supported for the scene {name}; leave the table out")
-    check_even(scene, name, "refine")
+    if not proves:  # proofs need no factors at T/2
+        check_even(scene, name, "refine")
     if len(axes) != 2 or min(values.size for values in axes.values()) < 2:
         raise BadInput("refine: cells need exactly two axes of two values or more; fix the other parameters")
     widths = _check_width_table(file.refine.width, axes)

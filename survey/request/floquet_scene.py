@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from survey.measures.floquet import dense, motion, stability
+from survey.measures.floquet import dense, monodromy, motion, probing, stability
 from survey.measures.floquet.system import System
 from survey.request.traced_scene import TracedScene
 from survey.scene import Parameter, plus_minus
@@ -66,8 +66,14 @@ class FloquetScene(TracedScene):
 
     @property
     def NOTES(self):
-        """What the system is, as global attributes of a file."""
-        return {"states": ", ".join(self.states), "structure": self.structure}
+        """What the system is, and how A is known, as global attributes of a file."""
+        known = f"a spike of A narrower at half its height than T/{round(1 / probing.WIDTH)} may go unseen"
+        return {
+            "states": ", ".join(self.states),
+            "structure": self.structure,
+            "A_resolved_width": probing.WIDTH,
+            "A_resolution": f"{known} unless its position is one of BREAKS (A_resolved_width is a fraction of T)",
+        }
 
     def cost(self, options, sizes):
         """Seconds per point, roughly."""
@@ -129,20 +135,27 @@ class FloquetScene(TracedScene):
         for own, programs in groups:
             for i in known[own]:
                 self._compare(programs, given[i], period[i], edges[i])
+        spikes = self._called(lambda: probing.spikes(monodromy.Points(system, given)))
+        for i in np.flatnonzero(np.isfinite(spikes)):
+            self._refuse(
+                f"A has a spike near t = {spikes[i]:.6g} at {self._where(given[i])}, too narrow to be seen in a run",
+                "name its position in BREAKS",
+            )
 
     def _compare(self, programs, point, period, edges):
         """Refuse what the recorded operations show: another value than the code's, no period, no structure."""
-        n, size, plain, recorded = len(self.states), 0.0, [], []
+        n, size, plain, recorded, bars = len(self.states), 0.0, [], [], []
         for k, program in enumerate(programs):
             t = edges[k] + (edges[k + 1] - edges[k]) * (0.01 + 0.98 * TRIED)
-            A, _E = program.at(point[None], t[None], n)
+            A, E = program.at(point[None], t[None], n)
             recorded.append(A[0])
+            bars.append(E[0])
             plain.append(None if "A" not in self.matrices else [self._plain("A", time, point) for time in t])
         size = max(abs(A).max() for A in recorded)
         if not np.isfinite(size):
             self._refuse(f"A has no finite value at {self._where(point)}", "correct it, or the domains of PARAMETERS")
-        for own, other in zip(recorded, plain, strict=True):
-            if other is not None and not (abs(own - np.array(other)) <= SAME * size).all():
+        for own, bar, other in zip(recorded, bars, plain, strict=True):
+            if other is not None and not (abs(own - np.array(other)) <= SAME * size + bar).all():
                 self._refuse(
                     f"A(t, p, out) gives other values when its operations are recorded, at {self._where(point)}",
                     "use + - * / ** and functions of math or numpy alone",

@@ -1,6 +1,7 @@
 """What the scenes of a user's functions share: how they travel to other processes, and how they refuse."""
 
 import html
+import re
 from collections.abc import Callable
 from dataclasses import fields
 
@@ -9,6 +10,7 @@ import numpy as np
 from survey.errors import BadInput
 from survey.wording import plain
 
+_KEYS = re.compile(r"\b(PARAMETERS|PERIOD|EVEN|BREAKS|STATES|STRUCTURE|START|CONTINUATION)\b")
 _known = {}  # by hash: a worker process compiles a scene once, for all of its blocks
 
 
@@ -58,7 +60,7 @@ class FunctionScene:
         return ", ".join(f"{p.name} = {value:g}" for p, value in zip(self.own, point, strict=True))
 
     def _refuse(self, what, remedy):
-        raise BadInput(f"{self.NAME}: {what}; {remedy}")
+        raise refusal(self.NAME, f"{what}; {remedy}")
 
     def _refuse_index(self, call, error):
         """Refuse a function that raised this IndexError, as `call` is written."""
@@ -66,6 +68,11 @@ class FunctionScene:
         if "only integers" in str(error):
             self._refuse(f"{call} accesses a parameter by name, but p is an array", "write p[0], p[1], ...")
         self._refuse(f"{call} indexes beyond an array ({error})", f"PARAMETERS names {n}: p[0] to p[{n - 1}]")
+
+
+def refusal(name, message):
+    """The BadInput of a scene: what its file calls EVEN is `even` to who gave it to `survey.hill`, and so on."""
+    return BadInput(f"{name}: {message if name.endswith('.py') else _KEYS.sub(lambda key: key[0].lower(), message)}")
 
 
 def _restored(kind, digest, values):

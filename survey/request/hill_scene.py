@@ -2,13 +2,17 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
+from itertools import pairwise
 
 import numpy as np
 
 from survey import status
+from survey.errors import BadInput
 from survey.kernels.math.roundoff import EPS
-from survey.measures.hill import monodromy, motion, multiprecision, user_equation, why
+from survey.measures.hill import dependence, monodromy, motion, multiprecision, user_equation, user_rows, why
+from survey.measures.rows import Rows
+from survey.proof import formulas
 from survey.request.function_scene import FunctionScene
 from survey.scene import Parameter
 
@@ -21,6 +25,8 @@ LONG_NAMES = {
 SYMBOLS = {"y1": "y_1(T)", "y2": "y_2(T)", "dy1": "y_1'(T)", "dy2": "y_2'(T)"}
 # Breaks closer to each other or to the ends than this fraction of the period count as one.
 SAME = 8 * user_equation.SLACK
+# Points of an axis from which on rows pay.
+LANES = 8
 # Beginnings of those lines of numba's messages that do not say what is wrong.
 CHATTER = ("Failed in", "During", "This error", "There are", "- Of which", "Overload", "File ", "Unknown", "^", "[1]")
 # Meaning of two of the common codes here.
@@ -83,21 +89,141 @@ class HillScene(FunctionScene):
         }
 
     def cost(self, options, sizes):
-        """Seconds per point, roughly."""
-        return 2e-5 if self.EVEN else 3e-5
+        """Seconds per point, roughly: those of rows share their samples."""
+        of_z, of_ranges = _dependence(self, (None,) * len(self.PARAMETERS))
+        names = [p.name for p in self.PARAMETERS]
+        rows = [sizes.get(name, 1) >= LANES and of_z[i] <= 1 and not of_ranges[i] for i, name in enumerate(names)]
+        return 1e-6 if any(rows) else 1e-5
 
     def solve(self, point, request):
         """The requested outputs of a block (see `survey.scenes`)."""
+        axes = self._axes(point, request) if request.method == "auto" else None
+        if axes is not None:
+            return self._solve_rows(point, request, axes)
+        box = self._box_axes(point, request) if request.method == "auto" else None
         points, shape = self._points(point)
+        out = self._solve_points(points, request) if box is None else self._solve_scattered(points, box, request)
+        return {name: values.reshape(shape) for name, values in out.items()}
+
+    def _solve_points(self, points, request):
+        """The outputs (N, 1) of points one by one."""
+        problem, rough = self._problem(points)
+        return self._answers(problem, rough, self._ranges(points)[0], request)
+
+    def _problem(self, points):
         period, edges, slack = self._ranges(points)
-        edges[~np.isfinite(points).all(axis=1)] = np.nan
-        exact = None if self._obstacle else self._exact
-        problem, rough = self._called(user_equation.problem, self.z, points, edges, period, slack, self.EVEN, exact)
+        given = (edges, period, slack, self.EVEN, self._more_digits)
+        return self._called(user_equation.problem, self.z, points, *given)
+
+    def _solve_scattered(self, points, axes, request):
+        """The outputs (N, 1) of points on their own, from series on the box that holds them."""
+        rough = np.zeros(len(points), np.bool_)
+
+        def problem_of(left):
+            problem, rough[left] = self._problem(points[left])
+            return problem
+
+        box = user_rows.box(self.z, self.HASH, axes, points[0], self._ranges, self.EVEN)
+        position, p = np.ascontiguousarray(points[:, axes.across]), np.ascontiguousarray(points[:, axes.lane])
+        out = self._called(monodromy.solve_scattered, box, position, p, problem_of, request.rtol, request.variables)
+        return self._labelled(out, rough, np.full(len(points), self._ranges(points[:1])[0][0]))
+
+    def _box_axes(self, point, request):
+        """The parameters on the axes of a box that holds points on their own, two of which alone differ; or None."""
+        ranges = {i: request.ranges[p.name] for i, p in enumerate(self.PARAMETERS) if p.name in request.ranges}
+        free = [i for i, p in enumerate(self.PARAMETERS) if p.name not in request.fixed]
+        if len(ranges) != 2 or set(ranges) != set(free) or callable(self.period) or callable(self.breaks):
+            return None
+        number = monodromy.boxed(min(given[0] for given in ranges.values()))
+        if number is None or any(not given[2] > given[1] for given in ranges.values()):
+            return None
+        of_z, _ = _dependence(self, self._numbers(point, request))
+        for lane, across in (free, free[::-1]):
+            if of_z[lane] <= 1 and of_z[across] <= dependence.ENTIRE:
+                return user_rows.Axes(lane, (number, *ranges[lane][1:]), across, (number, *ranges[across][1:]))
+        return None
+
+    def _numbers(self, point, request):
+        """The parameters that are single numbers; None for others."""
+        names = [p.name for p in self.PARAMETERS]
+        return tuple(float(np.ravel(point[name])[0]) if name in request.fixed else None for name in names)
+
+    def _solve_rows(self, point, request, axes):
+        """As `solve`, in rows along an axis of which z is a linear function."""
+        names = [p.name for p in self.PARAMETERS]
+        block = Rows([point[name] for i, name in enumerate(names) if i != axes.lane], point[names[axes.lane]])
+        lanes, points = block.per_point(point[names[axes.lane]]), np.zeros((block.rows, len(names)))
+        for i, name in enumerate(names):
+            points[:, i] = axes.line[1] if i == axes.lane else block.per_row(point[name])
+        out = {}
+        for rows in self._families(points, axes):
+            problem, rough = self._called(
+                user_rows.problem, self.z, self.HASH, axes, points[rows], lanes[rows], self._ranges, self.EVEN,
+                self._more_digits,
+            )  # fmt: skip
+            found = self._answers(problem, rough, self._ranges(points[rows])[0], request)
+            bad = np.flatnonzero(np.isnan(problem.span))
+            if bad.size:  # z may be smooth, or finite, at some of its points
+                alone = np.repeat(points[rows[bad]], lanes.shape[1], axis=0)
+                alone[:, axes.lane] = lanes[rows[bad]].reshape(-1)
+                for name, values in self._solve_points(alone, request).items():
+                    found[name][bad] = values.reshape(bad.size, -1)
+            for name, values in found.items():
+                out.setdefault(name, np.empty(lanes.shape, values.dtype))[rows] = values
+        return {name: block.back(values) for name, values in out.items()}
+
+    def _families(self, points, axes):
+        """The rows that a series across them serves: they differ in one parameter; all of them if there is no such."""
+        if axes.across is None:
+            return [np.arange(len(points))]
+        others = np.delete(points, [axes.lane, axes.across], axis=1)
+        _, family = np.unique(others, axis=0, return_inverse=True)
+        return [np.flatnonzero(family.reshape(-1) == i) for i in range(family.max() + 1)]
+
+    def _answers(self, problem, rough, period, request):
         out = self._called(monodromy.solve, problem, request.method, request.rtol, request.variables)
+        return self._labelled(out, rough, period)
+
+    def _labelled(self, out, rough, period):
+        """The outputs with the period, and the status of points whose z is rough."""
         out["status"] = np.where(rough[:, None], status.NO_CONVERGENCE, out["status"]).astype(np.int8)
         out["period"] = np.where(out["status"] == status.OK, period[:, None], np.nan)
         out["period_error"] = (4 if callable(self.period) else 1) * EPS * out["period"]
-        return {name: values.reshape(shape) for name, values in out.items()}
+        return out
+
+    def _axes(self, point, request):
+        """The axes along and across the rows of a map of this request; None where z is linear along none."""
+        names = [p.name for p in self.PARAMETERS]
+        lines = {i: request.line(name) for i, name in enumerate(names)}
+        lines = {i: line for i, line in lines.items() if line and line[0] >= LANES and line[2] > line[1]}
+        if not lines:
+            return None
+        of_z, of_ranges = _dependence(self, self._numbers(point, request))
+        lanes = [i for i in lines if of_z[i] <= 1 and not of_ranges[i]]
+        if not lanes:
+            return None
+        lane = max(lanes, key=lambda i: lines[i][0])
+        across = [i for i in lines if i != lane and of_z[i] <= dependence.ENTIRE and not of_ranges[i]]
+        if not across:
+            return user_rows.Axes(lane, lines[lane])
+        across = max(across, key=lambda i: lines[i][0])
+        return user_rows.Axes(lane, lines[lane], across, lines[across])
+
+    def equation(self, names, ends, options):
+        """The equation in formulas (see `survey.scenes`); raises BadInput where z has none."""
+        values = [ends[p.name][0] if p.name in ends else float(names[p.name]) for p in self.PARAMETERS]
+        if callable(self.period) or callable(self.breaks):
+            raise BadInput(f"prove: {self.NAME}: PERIOD and BREAKS must be numbers, not functions of p")
+        _, edges, _ = self._ranges(np.array([values]))
+        written = [names[p.name] for p in self.PARAMETERS]
+        try:
+            pieces = [
+                (formulas.number(float(high)), formulas.formula(self.z, written, (low, high)))
+                for low, high in pairwise(edges[0])
+            ]
+        except multiprecision.Unsupported as error:
+            raise BadInput(f"prove: {self.NAME}: z has no formula ({error})") from None
+        return "even" if self.EVEN else "periodic", pieces
 
     def why(self, answer):
         """Why the point has its verdict (see `survey.scenes`)."""
@@ -120,10 +246,11 @@ class HillScene(FunctionScene):
         most = max((len(row) for row in rows), default=2)
         edges = np.array([[*row, *[row[-1]] * (most - len(row))] for row in rows]).reshape(len(rows), most)
         slack = np.array([user_equation.SLACK * (some.size > 0) for some in breaks]) * period
-        if each is points:
-            return period, edges, slack
-        number = len(points)
-        return np.full(number, period[0]), np.tile(edges, (number, 1)), np.full(number, slack[0])
+        if each is not points:
+            number = len(points)
+            period, edges, slack = np.full(number, period[0]), np.tile(edges, (number, 1)), np.full(number, slack[0])
+        edges[~np.isfinite(points).all(axis=1)] = np.nan
+        return period, edges, slack
 
     def _row(self, breaks, period):
         """0, the breaks inside the part that is solved, and its end."""
@@ -136,6 +263,10 @@ class HillScene(FunctionScene):
             if position - row[-1] > near and end - position > near:
                 row.append(position)
         return [*row, end]
+
+    @property
+    def _more_digits(self):
+        return None if self._obstacle else self._exact
 
     @cached_property
     def _lifted(self):
@@ -194,6 +325,10 @@ class HillScene(FunctionScene):
                 f"EVEN = True, but z(T - u) is not z(u) at {self._where(points[i])}, T = {period[i]:g}",
                 "set EVEN = False, or correct z or PERIOD",
             )
+        of_z, of_ranges = _dependence(self, (None,) * len(self.PARAMETERS))
+        for i in np.flatnonzero(np.array(of_z) <= 1):  # a mean of two z has no other spikes than these
+            if not of_ranges[i]:
+                finite &= (points[:, i] == points[:, i].min()) | (points[:, i] == points[:, i].max())
         self._check_spikes(points[finite], edges[finite], slack[finite])
         if not self.EVEN:
             self._check_period(points, period, size.max(axis=1))
@@ -264,6 +399,24 @@ class HillScene(FunctionScene):
             return function(*arguments)
         except user_equation.Raised as error:
             self._refuse(f"z(u, p) raises {error.__cause__!r}", "make it return nan there")
+
+
+@lru_cache(maxsize=64)
+def _dependence(scene, fixed):
+    """The degrees of z, and of the period and the breaks, in each parameter but those `fixed` numbers; OPAQUE if
+    unknown.
+    """
+    nothing = [dependence.OPAQUE] * len(fixed)
+    example = np.array([[1.0 if value is None else value for value in fixed]])
+    try:
+        ranges = [dependence.degrees(f, fixed) for f in (scene.period, scene.breaks) if callable(f)]
+        of_ranges = [max(degrees) for degrees in zip(*ranges, strict=True)] or [0] * len(fixed)
+        _, edges, _ = scene._ranges(example)
+        ends = np.stack([edges[0, :-1], edges[0, 1:]], axis=1)
+        u = ends[:, :1] + np.diff(ends, axis=1) * user_equation.chebyshev_points(user_equation.SIZES[0])
+        return dependence.degrees(scene.z, fixed, u[:, 1:-1].ravel().tolist()), of_ranges
+    except dependence.Unknown:
+        return nothing, nothing
 
 
 def _at_full_period(output):

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from survey.measures.floquet import orbit
+from survey.measures.floquet import orbit, orbit_motion
 from survey.measures.floquet.continuation import Range
 from survey.measures.floquet.equation import Equation
 from survey.request.floquet_scene import SAME, TRIED
@@ -14,9 +14,10 @@ from survey.request.traced_scene import TracedScene
 from survey.scene import Parameter, plus_minus
 
 LARGEST = 16  # states
+ELSEWHERE = "give a better start, or another point"
 BRANCH = Parameter(
-    "branch", "number of the orbit among those of the point, by the mean square of its states", "i",
-    default=1.0, minimum=1.0, maximum=99.0, uncut=True,
+    "branch", "number of the orbit among those of the point, by the mean square of its states; from the last if < 0",
+    "i", default=1.0, minimum=-99.0, maximum=99.0, excluded=(0.0,), uncut=True,
 )  # fmt: skip
 STATUS = {
     "invalid_parameters": "outside the domain, or the start or the period is not finite, or the period not positive",
@@ -43,7 +44,7 @@ class OrbitScene(TracedScene):
     about: str
     REFERENCES: tuple[str, ...]
     FAMILY = "orbit"
-    AUDIT = ()
+    AUDIT = ("dop853",)
     OPTIONS = ()
     STATUS = STATUS
 
@@ -106,6 +107,13 @@ class OrbitScene(TracedScene):
             "unstable": ": it is certainly above 1",
             "stable": ": it is certainly below 1",
         }.get(str(answer["verdict"]), ": the error bar allows multipliers outside the unit circle, and inside or on it")
+
+    def trajectory(self, point, answer, options, time=None):
+        """The orbit and the multipliers of a point (see `survey.scenes`)."""
+        if not np.isfinite(answer["x0"]).all():
+            self._refuse(f"no orbit is shown to exist at {self._where([point[p.name] for p in self.own])}", ELSEWHERE)
+        points = np.array([[point[p.name] for p in self.own]])
+        return self._called(orbit_motion.solve, self._equation, self.states, points, answer, time)
 
     def check(self, points):
         """Raise BadInput if f cannot be used, or contradicts the scene's other entries at these points (N, n)."""

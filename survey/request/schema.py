@@ -72,6 +72,7 @@ class File(Table):
     refine: RefineTable | None = None
 
 
+REMEDIES = {"step": "; give num, the number of values from start to stop, both included"}
 TABLES = {
     "solver": SolverTable,
     "output": OutputTable,
@@ -96,7 +97,8 @@ def complaint(error):
     if first["type"] == extra and first["loc"][-1] == "values":
         return f"{key} cannot be combined with other keys; give either values alone, or start, stop and num"
     if first["type"] == extra:
-        return f"unknown key {key}{_nearest(first['loc'])}{more}"
+        remedy = REMEDIES.get(first["loc"][-1], "") if len(first["loc"]) > 1 else ""
+        return f"unknown key {key}{remedy or _nearest(first['loc'])}{more}"
     if first["type"] == "missing":
         return f"{key} is missing; add it to the workflow{more}"
     if key.startswith("axes.") and isinstance(first["input"], list):
@@ -112,6 +114,10 @@ def complaint(error):
 
 def _nearest(location):
     """The keys that are allowed beside an unknown one, the nearest first."""
+    meant = modules.OTHER_WORDS.get(location[-1], location[-1])
+    for name in ("solver", "output") if len(location) == 1 else ():
+        if meant in TABLES[name].model_fields:
+            return f"; put {meant} under [{name}]"
     table = TABLES.get(location[0], File) if len(location) > 1 else File
     known = list(table.model_fields) + (["values"] if table is Spread else [])
     return modules.unknown("", str(location[-1]), known).removeprefix(f"unknown  {shown(str(location[-1]))}")

@@ -47,7 +47,8 @@ narrower than both may go unseen; near BREAKS the samples are as dense as necess
 
 A (or M, C, K) is run once, as Python, to record its operations on t and p; the record gives the power series of A in
 every step, for all points, and bounds of the rounding. Branches are followed as the code takes them: points that take
-others are recorded on their own. What depends on t must be analytic between BREAKS.
+others are recorded on their own. What depends on t must be analytic between BREAKS. A spike is seen if it is T/128 wide
+at half its height (`A_resolved_width`); a narrower one may go unseen, unless its position is one of BREAKS.
 
 f(t, x, p, out) is recorded likewise, and its derivatives by x are those of the record; it must be analytic in t and x:
 branches may depend on parameters alone.
@@ -84,7 +85,7 @@ import numpy.typing as npt
 from survey.errors import BadInput, Untrusted
 from survey.measures.hill import monodromy
 from survey.request import trust
-from survey.request.function_scene import FunctionScene
+from survey.request.function_scene import FunctionScene, refusal
 from survey.request.hill_scene import SAME, HillScene, is_number, reason
 from survey.scene import Parameter
 from survey.scenes import load
@@ -291,8 +292,8 @@ def orbit(
         differentiated. If it is, it is compared with that.
     continuation : name, least and greatest value of a parameter along which orbits are followed, also round folds, from
         those that are found from the start at 9 values. So points have all orbits of these curves, on any grid:
-        the output `orbits` is their number, and the parameter `branch` (1, 2, ..., by the mean square of the states;
-        1 by default) says which one is meant.
+        the output `orbits` is their number, and the parameter `branch` says which one is meant: 1, 2, ..., by the mean
+        square of the states, or -1, -2, ... from the largest; 1 by default.
 
     Raises survey.BadInput with one line that names what is wrong.
 
@@ -453,7 +454,7 @@ def _hill(
     """The checked scene; raises BadInput."""
 
     def refuse(message: str) -> NoReturn:
-        raise BadInput(f"{name}: {message}")
+        raise refusal(name, message)
 
     if not callable(z) or _arguments(z) != 2:
         refuse("z must be a function of two arguments, z(u, p); the parameters are p[0], p[1], ...")
@@ -495,7 +496,7 @@ def _abel(
     from survey.scenes import gyrostat
 
     def refuse(message: str) -> NoReturn:
-        raise BadInput(f"{name}: {message}")
+        raise refusal(name, message)
 
     for letter, function in (("f", f), ("g", g)):
         if not callable(function) or _arguments(function) != 2:
@@ -524,7 +525,7 @@ def _floquet(
     from survey.request.floquet_scene import LARGEST, FloquetScene
 
     def refuse(message: str) -> NoReturn:
-        raise BadInput(f"{name}: {message}")
+        raise refusal(name, message)
 
     if ("A" in matrices) == ("K" in matrices) or (len(matrices) > 1 and "A" in matrices):
         refuse("give either A(t, p, out), or K(t, p, out) with or without M and C")
@@ -564,7 +565,7 @@ def _orbit(
     from survey.request.orbit_scene import LARGEST, OrbitScene
 
     def refuse(message: str) -> NoReturn:
-        raise BadInput(f"{name}: {message}")
+        raise refusal(name, message)
 
     for letter, function in (("f", f), ("jacobian", jacobian)):
         if not callable(function) or _arguments(function) != 4:

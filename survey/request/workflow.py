@@ -44,9 +44,10 @@ class Workflow:
     boundaries: str | None = None
     refine: Mapping[str, tuple[float, bool]] | None = None
     style: str = "screen"
+    proves: bool = False  # the cells of `refine` are theorems
 
 
-def read(path, overrides=(), output=None):
+def read(path, overrides=(), output=None, proves=False):
     """The checked Workflow in the TOML file `path`, with `KEY=VALUE` overrides; raises BadInput in one line."""
     path = Path(path)
     try:
@@ -59,7 +60,7 @@ def read(path, overrides=(), output=None):
     if overrides:
         changes = "".join(f" --set {override}" for override in overrides)
         text = f"# {plain(f'{path.name}{changes}')}\n\n{_as_toml(data)}"
-    return check(data, text, output, default_path=path.with_suffix(".nc").name, near=path.parent)
+    return check(data, text, output, default_path=path.with_suffix(".nc").name, near=path.parent, proves=proves)
 
 
 def _parsed(text, path):
@@ -81,7 +82,7 @@ def _as_toml(data):
 
 
 @np.errstate(all="ignore")  # overflow on an axis is found by its values
-def check(data, text="", output=None, default_path="survey.nc", near=None):
+def check(data, text="", output=None, default_path="survey.nc", near=None, proves=False):
     """The checked Workflow of the mapping `data` (a parsed workflow file); `text` is what it was parsed from.
 
     The path of a scene's file is relative to the current folder, or else to the folder `near`.
@@ -107,7 +108,9 @@ def check(data, text="", output=None, default_path="survey.nc", near=None):
     options = check_options(scene, file.options, given, "options.")
     parameters = check_parameters(scene, name, options, given, "axes.")
     for key, values in given.items():
-        check_domain(parameters[key], values)
+        group = parameters[key].instead_of or key
+        others = [p.name for p in scene.PARAMETERS if group in (p.name, p.instead_of) and p.name != key]
+        check_domain(parameters[key], values, others)
     solver = file.solver
     request = check_request(scene, options, solver.method, solver.rtol, file.output.variables, ("solver.", "output."))
     for figure in file.output.figures:
@@ -127,7 +130,8 @@ def check(data, text="", output=None, default_path="survey.nc", near=None):
         figures=tuple(file.output.figures),
         text=text or _as_toml(data),
         boundaries=check_boundaries(scene, name, file.boundaries, given),
-        refine=check_refine(scene, name, file, given),
+        refine=check_refine(scene, name, file, given, proves),
+        proves=proves,
         style=file.output.style,
     )
 

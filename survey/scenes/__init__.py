@@ -20,9 +20,11 @@ point, {name: array}, flags as words. `compile_ahead` runs in a process of its o
 for it (`survey.kernels.jit.wait_for_other_compiler`) where it needs what is compiled there.
 """
 
+import ast
 import sys
 from functools import cache
 from importlib.metadata import entry_points
+from pathlib import Path
 from types import ModuleType
 
 from survey import contract, modules
@@ -56,6 +58,11 @@ CONTRACT = {
         "survey.scene.Trajectory: the motion at one point up to `time`, or as long as suits if that is None",
         ("point", "answer", "options", "time"),
     ),
+    "equation": Function(
+        "for `survey prove`: (kind, [(end, z), ...]), Hill's equation in formulas for `survey/proof/checker.py`; "
+        "`names`: for each parameter its name, or its value as a text; `ends`: {axis: (least, largest value)}",
+        ("names", "ends", "options"),
+    ),
     "compile_ahead": Function(
         "compile some kernels of a map of these variables, by calls on next to nothing; see above", ("variables",)
     ),
@@ -66,7 +73,7 @@ class _Folder(ModuleType):
     """`survey.scenes` is this folder; called, it gives {name: title} of the scenes."""
 
     def __call__(self):
-        return {name: load(name).TITLE for name in [*modules.names(self), *brought()]}
+        return {name: _title(name) for name in modules.names(self)} | {name: load(name).TITLE for name in brought()}
 
 
 def load(name):
@@ -78,6 +85,16 @@ def load(name):
         module = modules.load(sys.modules[__name__], name, "scene", others)
     _check(module)
     return module
+
+
+def _title(name):
+    """TITLE of a scene, from its source: importing all scenes would take seconds."""
+    source = next((Path(folder) / f"{name}.py" for folder in sys.modules[__name__].__path__), None)
+    if f"{__name__}.{name}" not in sys.modules and source and source.is_file():
+        for node in ast.parse(source.read_bytes()).body:
+            if isinstance(node, ast.Assign) and any(getattr(to, "id", "") == "TITLE" for to in node.targets):
+                return ast.literal_eval(node.value) if isinstance(node.value, ast.Constant) else load(name).TITLE
+    return load(name).TITLE
 
 
 @cache

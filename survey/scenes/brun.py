@@ -6,6 +6,9 @@ conserved, k = epsilon A (A - C) and L = 2 A h - (A/C) p_phi^2 - epsilon A^2 + p
     A^2 u'^2 = (1 - u^2)(L + k u^2) - (p_phi^2 + p_psi^2 - 2 p_psi p_phi u)                            (S2)
     psi' = [(p_psi - p_phi)/(1 - u) + (p_psi + p_phi)/(1 + u)] / (2 A)                                 (S4)
 
+Model: Euler's and Poisson's equations, reduced to one quadrature by three integrals, exactly, for any A = B. Not for
+A != B, or a centre that moves; the potential is that of the gravity gradient, with errors of order 1/R.
+
 Parameters, in order: A > 0 and C (0 < C <= 2 A), moments of inertia; epsilon = 3 mu / R^3, any sign; an initial state:
 theta0 in [0, pi] (0 only if p_psi = p_phi), p_theta0, p_psi, p_phi; and, if wanted, t (psi = phi = 0 at t = 0). Or,
 instead of all these, the scaled integrals l = L/|k|, alpha = p_phi/sqrt|k|, beta = p_psi/sqrt|k| with the option `sign`

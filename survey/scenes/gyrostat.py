@@ -3,6 +3,9 @@
     f = b12 cos phi - b31 sin phi,
     g = -d cos phi sin phi - c23 cos 2phi + s2 cos phi - s3 sin phi                              (57)
 
+Model: the six equations of `gyrostat_body`, on a set that is invariant under conditions necessary and sufficient for
+it. Not for motions beside the set, which may leave it: `gyrostat_body` tells.
+
 Parameters, in order: b12, b31 (components of B over A11), d = c22 - c33 and c23 (of C), s2, s3 (of s), up to
 1e12; phi0 (rad) and w0, the initial angle and velocity. In (57) phi is the independent variable and
 w w_phi = f w + g; here the system is solved in time, so turning points (w = 0) are passed.
@@ -13,7 +16,7 @@ Integrable strata: I0 (g = 0), I1 (b = 0, H conserved), I2 (K = L = 0). Symmetri
 (phi, w, b31, c23, s2) -> -(...); phi -> phi + pi, (b, s) -> -(b, s); rotations of axes 2 and 3.
 
 Source: M. E. Lesina, Ya. V. Zinovyeva, "The gyrostat with Barnett-London effect" (2004), checked and corrected in
-`gyrostat.md` beside this file (whose section 5 is the classification that the fates follow).
+`gyrostat.md` beside this file (with the classification that the fates follow).
 
 A fate is decided by the monotone return maps and by proven regions of attraction, never by a limit of steps; the
 cycles are those that a lattice of return maps shows, with dips followed down to folds. b = 0 and g = 0 are taken
@@ -34,7 +37,7 @@ first passes phi0, before it turns; `w_start` is w there. Where there is no such
 phi0, the status is `invalid_parameters`. For b = 0 these are closed forms at any t, also into a second saddle of the
 same energy; so are motions whose phi0 = 0 and w0 give exactly the energy of a saddle (at no other phi0 can binary64
 do that). Degenerate equilibria count as saddles: they have branches here where b = 0 and the root of g is exactly
-multiple.
+multiple. On a stable branch the fate is the saddle; on an unstable one it is where that branch ends.
 
 An Abel solution has status `ok` where it certainly reaches phi, `turning` where it turns before phi or so near to it
 that phi lies within `phi_turning_error` of `phi_turning`.
@@ -69,10 +72,21 @@ the system, without an initial state).
 import numpy as np
 
 from survey import methods
-from survey.measures.cylinder import auto, blocks, destinations, orbit, portrait, separatrix, solution
+from survey.measures.cylinder import (
+    auto,
+    blocks,
+    destinations,
+    fate,
+    orbit,
+    portrait,
+    separatrix,
+    separatrix_fate,
+    solution,
+)
 from survey.measures.cylinder.fate import NO_TURNS
 from survey.modules import load
 from survey.scene import Option, Output, Parameter, Request, named, plus_minus
+from survey.status import INVALID_PARAMETERS
 
 TITLE = "Gyrostat with Barnett-London effect, rotation about axis 1"
 FAMILY = "cylinder"
@@ -102,7 +116,7 @@ PARAMETERS = (
               **_FAR),
     Parameter("w0", "initial angular velocity", "w_0", default=0.0, when=_STARTS, **_LARGE),
     Parameter("saddle", "number of the saddle on a separatrix of which the solution lies, by angle in [0, 2 pi)", "n_S",
-              instead_of="w0", minimum=1.0, maximum=4.0, when={"question": _QUESTIONS[1:3]}),
+              instead_of="w0", minimum=1.0, maximum=4.0, when=_STARTS),
     Parameter("t", "time from the initial state (negative: before it)", "t", when=_TIME, uncut=True, **_LARGE),
     Parameter("phi", "angle of rotation at which w and t are asked, unwrapped", r"\varphi", units="rad", when=_ABEL,
               uncut=True, **_FAR),
@@ -212,6 +226,8 @@ def cost(options, sizes):
     """Seconds per point, rough: one solution serves its dense outputs, one set of cycles all fates of a system."""
     if options["question"] == "portrait":
         return 2e-2
+    if "separatrix" in options and options["question"] == "fate":
+        return 5e-3
     if "separatrix" in options:  # in double-double arithmetic, but where b = 0
         return 2e-3 / sizes.get("t", sizes.get("phi")) + 4e-6
     if options["question"] == "trajectory":
@@ -225,6 +241,8 @@ def solve(point, request):
     """Every output at every point of the block."""
     method = load(methods, "taylor" if request.method == "auto" else request.method, "method")
     question = request.options.get("question", "fate")
+    if question == "fate" and "separatrix" in request.options:
+        return _fates_on_separatrices(point, request, method)
     if question in ("fate", "portrait"):
         answers = blocks.fates if question == "fate" else blocks.portraits
         return answers(point, _SYSTEM, np.asarray, method, request.rtol)
@@ -300,8 +318,28 @@ def _separatrix(point, request, question):
     measure = separatrix.trajectories if in_time else separatrix.abel
     *results, heads = measure(method, rows, columns, request.rtol, stable, left)
     results = (blocks.at_times if in_time else blocks.at_angles)(results, good, back)
+    return results | _heads(heads, lambda column: back(np.broadcast_to(column[:, None], columns.shape)))
+
+
+def _heads(heads, back):
+    """The saddle and the velocity at phi0, from the HEADS of `separatrix`."""
+    results = {}
     for name, value, bar in (("phi_saddle", separatrix.SADDLE, separatrix.SADDLE_BAR),
                              ("w_start", separatrix.START, separatrix.START_BAR)):  # fmt: skip
         for key, at in ((name, value), (f"{name}_error", bar)):
-            results[key] = back(np.broadcast_to(heads[:, at, None], columns.shape))
+            results[key] = back(heads[:, at])
     return results
+
+
+def _fates_on_separatrices(point, request, method):
+    """The question `fate`, of solutions that start on a separatrix."""
+    given = np.broadcast_arrays(*(np.asarray(point[name], dtype=float) for name in (*_SYSTEM, "phi0", "saddle")))
+    rows, shape = np.stack([array.ravel() for array in given], axis=-1), given[0].shape
+    good = np.isfinite(rows).all(axis=1)
+    stable, left = request.options["separatrix"] == "stable", request.options["side"] == "left"
+    found, heads = separatrix_fate.solve(method, rows[good], request.rtol, stable, left)
+    found |= _heads(heads, lambda column: column)
+    results = fate.empty(len(rows), INVALID_PARAMETERS)
+    for name, values in found.items():
+        results.setdefault(name, np.full(len(rows), np.nan))[good] = values
+    return {name: values.reshape(shape) for name, values in results.items()}

@@ -20,6 +20,9 @@ tells whether the limit is stable on the set, `observable` whether it is beside 
 equations at an equilibrium, by the multipliers along a cycle. Those that belong to the integrals k (7) and |nu| (8)
 are trivial and taken out; two remain in case B, three in case A, where k varies along the set, four about the vertical.
 
+Model: all six equations; fates on the invariant set by its flow on the cylinder, and beside it by the linear equations
+of deviations, exact to first order. Not for finite deviations, but by the question `trajectory`.
+
 What is known. In case B the divergence of deviations is (B12, B31) S^-1 (-cos phi, sin phi), S = (A22 A23; A23 A33),
 whatever the other parameters. If S = a 1 it is -(A11 / a) f, f that of the scene `gyrostat`: where the reduced flow
 contracts, deviations from the set grow, so that no attracting equilibrium or cycle of a body with A22 = A33, A23 = 0 is

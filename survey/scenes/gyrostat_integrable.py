@@ -7,6 +7,9 @@ trigonometric  (58)-(61): A11 phi' = mu (B12 sin phi + B31 cos phi - S2 B31 / C2
 elliptic       (62)-(68): A11 phi'^2 = n + (C22 - C33) cos 2phi / 2 - C23 sin 2phi + 2 S2 sin phi + 2 S3 cos phi
 quartic        (64)-(68): u'^2 = P4(u) / 4 of u = tan(phi / 2), P4 = a0 u^4 + 4 a1 u^3 + 6 a2 u^2 + 4 a3 u + a4
 
+Model: the flow of the scene `gyrostat`, itself a reduction of the whole body, where further conditions on the constants
+give closed forms. Without these conditions: `gyrostat`.
+
 Parameters, in order: A11; B12, B31; theta0, the angle between the axis of rotation and the vertical; n, or instead of
 it k, the constant of (7), which with lambda1 gives n = k / cos theta0 - lambda1; C22, C33, C23; S2, S3; the quartic's
 a0, a1, a2, a3, a4; phi0; w0, where the energy leaves it free; t. At phi0 the constants give phi' but, where its square
@@ -21,7 +24,8 @@ the invariants g2, g3; the discriminant of P4 is 256 G. G < 0: two real roots; G
 a separatrix, or a degenerate rest. Where the constants make G exactly 0 (all a0 to a4, or the others at phi0 = 0) the
 solution is that on the separatrix, (66), exactly.
 
-Source: M. E. Lesina, Ya. V. Zinovyeva, "The gyrostat with Barnett-London effect" (2004), corrected in `gyrostat.md`.
+Source: M. E. Lesina, Ya. V. Zinovyeva, "The gyrostat with Barnett-London effect" (2004), corrected in `gyrostat.md`;
+`gyrostat_integrable.md` beside this file.
 The conditions under which a body moves so are checked by the scene `gyrostat_body`; the scene `gyrostat` takes the
 outputs reduced_NAME. All error bars cover the rounding of the reduction.
 """
@@ -75,7 +79,7 @@ PARAMETERS = (
 )  # fmt: skip
 OPTIONS = (
     Option("case", _CASES, "which of the integrable cases"),
-    Option("root", ("upper", "lower"), "which of the two roots mu of (61)", only_with="C23"),
+    Option("root", ("upper", "lower"), "which of the two roots mu of (61)", when=_TRIGONOMETRIC),
     Option("direction", ("1", "-1"), "sign of the initial angular velocity", only_with="a0"),
 )  # fmt: skip
 STATUS = {
@@ -182,7 +186,7 @@ def _trigonometric(given, options):
     product = A11 * C23 / (B12 * B31)
     inner = np.array([_under_root(*constants) for constants in zip(A11, C23, B12, B31, strict=True)])
     upper = 0.5 + np.sqrt(np.where((inner < 0.0) & (inner >= -_SAME), 0.0, inner))
-    mu = upper if options.get("root", "upper") == "upper" else product / upper
+    mu = upper if options["root"] == "upper" else product / upper
     d_mu = 8 * _ULP * np.abs(mu) + np.sqrt(np.maximum(-inner, 0.0))
     n_star, share = -mu * (S2 * B31 / (C23 * A11)), d_mu / np.abs(mu) + 5 * _ULP
     b12, b31 = mu * B12 / A11, mu * B31 / A11

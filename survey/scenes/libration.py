@@ -5,6 +5,9 @@
 is the normal form at L4 (or L5: the same numbers) to order 6 in the coordinates; r1, r2 are the actions of the motions
 in the plane of the primaries, r3 that across it.
 
+Model: the spatial restricted three-body problem, six-dimensional, as a formal series in three actions. Not where its
+remainder counts (`workflows/libration_effective.py`), and no proof of Lyapunov stability.
+
 Parameter: mu (mass of the smaller primary over that of both, 1e-100 <= mu <= 1/2), taken as the float64 it is. Unit of
 time: the primaries turn by one radian.
 
@@ -17,7 +20,7 @@ What is proved, and what is not. Verdict 1 is proved for every such mu: L and H 
 frequencies, and L^4 + (H - L)^2 is definite. Verdict 2 is proved where omega1, omega2, 1 satisfy at most one
 independent relation k . omega = 0 over the integers. Where they satisfy two (omega1 and omega2 both rational: a
 countable, dense set of mu, the rank-2 resonances), only L and H are sure to be formal integrals, no function of them is
-definite, and "M is not 0" does not settle the point. No float64 is such a mu (`libration.md`, section 5), so verdict 2
+definite, and "M is not 0" does not settle the point. No float64 is such a mu (`libration.md`), so verdict 2
 is proved for the very number given, and not for all real mu beside it.
 The closed forms of order 6 were found by exact rational reconstruction and hold at 110 rational points and against
 Lie series to 90 digits; they are not derived symbolically. Formal stability is not Lyapunov stability.

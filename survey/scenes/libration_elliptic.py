@@ -6,6 +6,9 @@
 in the true anomaly f, period 2 pi, in pulsating axes along the principal directions of the potential; out of the plane
 zeta'' + zeta = 0, which is stable.
 
+Model: the elliptic restricted problem, six-dimensional, linearised about the point, which is at rest in these axes;
+half a period suffices, by symmetry. Not for displacements that are not small.
+
 Parameters, in order: mu (mass ratio of the lesser primary, 0 to 1/2) and e (eccentricity, 0 <= e < 1), without units.
 
 Outputs: a and b, the coefficients of the monodromy's characteristic polynomial l^4 - a l^3 + b l^2 - a l + 1; the

@@ -1,5 +1,8 @@
 """Mathieu's equation, the yardstick of parametric resonance: y'' + (a - 2 q cos 2t) y = 0, period T = pi.
 
+Model: a pendulum's equation, linearised about its rest, or one coordinate of an ion in a quadrupole trap, which is
+linear as it stands. Not for a pendulum's finite angles, or for several ions.
+
 Parameters, in order: a (characteristic value) and q (parametric excitation), up to 1e12, without units, in the
 notation of DLMF 28.2.1.
 
@@ -45,15 +48,23 @@ _HALF_PERIOD = pi / 2
 
 
 def cost(options, sizes):
-    """Seconds per point, roughly: a point of a dense row, its share of the outputs included."""
-    return 1e-6
+    """Seconds per point, roughly."""
+    return monodromy.cost(sizes.get("q", 1), sizes.get("a", 1))
 
 
 def solve(point, request):
     """All outputs of a block that the request wants (see `survey.scenes`)."""
-    block = Rows((point["q"],), point["a"])
-    problem = _problem(block.per_row(point["q"]), block.per_point(point["a"]), request.line("a"), request.line("q"))
-    out = monodromy.solve(problem, request.method, request.rtol, request.variables)
+    block, box = Rows((point["q"],), point["a"]), _box(request)
+    if box is None:
+        problem = _problem(block.per_row(point["q"]), block.per_point(point["a"]), request.line("a"), request.line("q"))
+        out = monodromy.solve(problem, request.method, request.rtol, request.variables)
+    else:
+        block = Rows((point["q"], point["a"]))
+        q, a = block.per_row(point["q"]), block.per_row(point["a"])
+        position = np.where(q == 0, np.nan, q)  # there exact rules decide
+        out = monodromy.solve_scattered(
+            box, position, a, lambda points: _problem(q[points], a[points, None]), request.rtol, request.variables
+        )
     out["period"] = np.where(out["status"] == status.OK, pi, np.nan)
     out["period_error"] = 1.3e-16 + 0.0 * out["period"]  # pi is rounded
     return {name: block.back(values) for name, values in out.items()}
@@ -69,6 +80,11 @@ def trajectory(point, answer, options, time=None):
     return motion.solve(_problem(np.array([point["q"]]), np.array([[point["a"]]])), answer, time)
 
 
+def equation(names, ends, options):
+    """The equation in formulas (see `survey.scenes`)."""
+    return "even", [("pi/2", f"{names['a']} - 2*{names['q']}*cos(2*u)")]
+
+
 def _problem(q, a, line=None, ends=None):
     rule, constant = _rules(q, a)
     return monodromy.Problem(
@@ -82,9 +98,22 @@ def _problem(q, a, line=None, ends=None):
         constant=constant,
         line=line,
         span_low=np.full(q.size, dd.HALF_PI[1]),
-        row_axis=monodromy.RowAxis("mathieu", *ends, at=lambda q: _problem(q, np.zeros((q.size, 0)))) if ends else None,
+        row_axis=_row_axis(*ends) if ends else None,
         positions=q,
     )
+
+
+def _row_axis(number, low, high):
+    return monodromy.RowAxis("mathieu", number, low, high, at=lambda q: _problem(q, np.zeros((q.size, 0))))
+
+
+def _box(request):
+    """Where the points of a survey lie whose a and q share an axis; None if there are few."""
+    a, q = request.ranges.get("a"), request.ranges.get("q")
+    number = monodromy.boxed(min(a[0], q[0])) if a and q and request.method == "auto" else None
+    if number is None or not (a[2] > a[1] and q[2] > q[1]):
+        return None
+    return monodromy.Box(_row_axis(number, *q[1:]), (number, *a[1:]))
 
 
 def _rules(q, a):

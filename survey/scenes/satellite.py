@@ -8,6 +8,9 @@ obey Hill's equation, in u = omega_p t, omega_p^2 = 3 omega_0^2 |I - Iz| / I, wi
     c = 1 - k^2   prolate, alpha = Iz/I < 1   (printed + k^2 in Astakhova's eq. 3: see the errata in satellite.md)
     c = -k^2      oblate,  alpha > 1;         T = 4 K(k), or 2 K(1/k) / k for rotations
 
+Model: the body's rotation in three dimensions. Without spin the plane of the orbit is invariant, and linear motion
+across it is this equation, exactly. Not for spin, finite tilts, eccentric orbits, bodies without axis of symmetry.
+
 Parameters, in order: k >= 0, k != 1; or one_minus_k = 1 - k <= 1, != 0, where 1 - k is small (negative: rotations);
 or amplitude = asin k (rad), a libration's. rho, any sign: rho^2 = 1 / (3 |1 - alpha|), so rho >= 1/sqrt(3) is a body;
 rho < 0 is a retrograde rotation. Or, instead of rho and the body, inertia_ratio = alpha: 0 a thin rod, 2 a disc.
@@ -22,6 +25,7 @@ from math import pi
 import numpy as np
 
 from survey import status
+from survey.errors import BadInput
 from survey.kernels.hill import satellite as motion
 from survey.kernels.hill import taylor_double
 from survey.kernels.hill.answers import LARGEST, NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE
@@ -76,8 +80,9 @@ _PERIOD_ULPS = 6
 
 
 def cost(options, sizes):
-    """Seconds per point, roughly: a point of a dense row, its share of the outputs included."""
-    return 1e-6
+    """Seconds per point, roughly."""
+    rows = max(sizes.get(name, 1) for name in ("k", "one_minus_k", "amplitude"))
+    return monodromy.cost(rows, max(sizes.get(name, 1) for name in ("rho", "inertia_ratio")))
 
 
 def solve(point, request):
@@ -88,11 +93,58 @@ def solve(point, request):
         return _solve(shared, point["rho"], oblate, request, line=request.line("rho"), ends=_ends(request))
     alpha = np.asarray(point["inertia_ratio"], dtype=float)
     rho, low = rates(alpha, request.options["direction"])
+    line, ends = _line_of_rho(request), _ends(request)
     bodies = [
-        _solve(shared, np.where((alpha > 1) == oblate, rho, np.nan), oblate, request, low)
+        _solve(shared, np.where((alpha > 1) == oblate, rho, np.nan), oblate, request, low, line, ends)
         for oblate in np.unique(alpha > 1)
     ]
     return {name: np.where(alpha > 1, bodies[-1][name], bodies[0][name]) for name in bodies[0]}
+
+
+def equation(names, ends, options):
+    """The equation in formulas (see `survey.scenes`), in the angle u = am of a libration, u = x of a rotation.
+
+    As a function of u, y has an equation with a first derivative, which y = A^(-1/4) v removes; at u = 0 and at the
+    half period A > 0 and A' = 0, so that the factors of v have the signs of those of y.
+    """
+    k = next(
+        text.format(names[name])
+        for name, text in (("k", "{}"), ("one_minus_k", "(1 - {})"), ("amplitude", "sin({})"))
+        if name in names
+    )
+    rho, oblate = _body(names, ends, options)
+    rest = f"cos({names['amplitude']})**2" if "amplitude" in names else f"(1 - {k}**2)"
+    c = f"(-{k}**2)" if oblate else rest
+    if _rotates(names, ends):
+        a = f"(cos(u)**2 - {rest})"
+        z = f"2 + (2*{rho}*sqrt({a}) + {rho}**2 + {c})/{a} + cos(2*u)/(2*{a}) + 3*sin(2*u)**2/(16*{a}**2)"
+        return "even", [("pi/2", z)]
+    a = f"(cos(u)**2 + {rest}*sin(u)**2)"
+    w = f"{k}*cos(u)"
+    z = f"(2*({w})**2 + 2*{rho}*{w} + {rho}**2 + {c})/{a} + {k}**2*cos(2*u)/(2*{a})"
+    return "even", [("pi", f"{z} + 3*({k}**2*sin(2*u)/{a})**2/16")]
+
+
+def _body(names, ends, options):
+    """(rho as a formula, is the body oblate?); raises BadInput if the map contains bodies without a preferred axis."""
+    if "rho" in names:
+        return names["rho"], options["body"] == "oblate"
+    alpha = names["inertia_ratio"]
+    low, high = ends.get("inertia_ratio") or (float(alpha), float(alpha))
+    if low <= 1 <= high:
+        raise BadInput("prove: the axis inertia_ratio contains 1, where rho is infinite; end it before, or begin after")
+    rho = f"sqrt(3*({alpha} - 1))" if low > 1 else f"sqrt(3*(1 - {alpha}))"
+    return f"({'-' if str(options['direction']) == '-1' else ''}1/{rho})", low > 1
+
+
+def _rotates(names, ends):
+    """Are the motions rotations? Raises BadInput if the map contains the separatrix."""
+    name = next(name for name in ("k", "one_minus_k", "amplitude") if name in names)
+    edge = {"k": 1.0, "one_minus_k": 0.0, "amplitude": pi / 2}[name]
+    low, high = ends.get(name) or (float(names[name]),) * 2
+    if low <= edge <= high:
+        raise BadInput(f"prove: the axis {name} contains {edge:g}, the separatrix; end it before, or begin after")
+    return low < edge if name == "one_minus_k" else low > edge
 
 
 def compile_ahead(variables):
@@ -112,20 +164,66 @@ def trajectory(point, answer, options, time=None):
 
 def _solve(shared, rho, oblate, request, low=None, line=None, ends=None):
     """The outputs for one kind of body; points not of it have rho = NaN. `low` is what float64 took from rho."""
+    box = None if low is not None else _box(request, oblate)
+    if box is not None:
+        return _solve_scattered(box, shared, rho, oblate, request)
     block = Rows(shared, rho)
     row = Motion(*(block.per_row(values) for values in shared), bool(oblate))
     problem = _problem(row, block.per_point(rho), None if low is None else block.per_point(low), line, ends)
-    wanted = set(request.variables) | ({"exponent"} if "exponent_per_orbit" in request.variables else set())
-    out = monodromy.solve(problem, request.method, request.rtol, wanted)
+    out = monodromy.solve(problem, request.method, request.rtol, _wanted(request))
+    return _derived(out, row, problem.p, block, request, row.period)
+
+
+def _wanted(request):
+    return set(request.variables) | ({"exponent"} if "exponent_per_orbit" in request.variables else set())
+
+
+def _derived(out, row, rho, block, request, period):
+    """The outputs in the block's shape, with those that follow from the others, the rows' motions and `rho`."""
+    wanted, ok = _wanted(request), out["status"] == status.OK
     ok = out["status"] == status.OK
     if "period" in wanted:
-        out["period"] = np.where(ok, row.period[:, None], np.nan)
+        out["period"] = np.where(ok, period[:, None], np.nan)
         out["period_error"] = _PERIOD_ULPS * EPS * out["period"]
     if "exponent_per_orbit" in wanted:
-        _per_orbit(out, abs(problem.p) * (row.period[:, None] / (2 * pi)))
+        _per_orbit(out, abs(rho) * (period[:, None] / (2 * pi)))
     if "lyapunov" in wanted:
-        out["lyapunov"] = (row.lyapunov(problem.p) & ok).astype(np.int8)
+        out["lyapunov"] = (row.lyapunov(rho, period) & ok).astype(np.int8)
     return {name: block.back(values) for name, values in out.items()}
+
+
+def _solve_scattered(box, shared, rho, oblate, request):
+    """As `_solve`, of points on their own that a `box` holds."""
+    block = Rows((*shared, rho))
+    columns, rho = [block.per_row(values) for values in shared], block.per_row(rho)
+    row = Motion(*columns, bool(oblate))
+    # exact rules decide at k = 0 and rho = 0
+    position = np.where((row.k == 0) | (rho == 0), np.nan, -2 * np.log(row.kc))
+
+    def problem_of(points):
+        return _problem(Motion(*(values[points] for values in columns), bool(oblate)), rho[points, None])
+
+    out = monodromy.solve_scattered(box, position, rho, problem_of, request.rtol, _wanted(request))
+    period = None
+    if not _wanted(request).isdisjoint({"period", "exponent_per_orbit", "lyapunov"}):
+        integral = row.integrals[0]
+        period = np.where(row.rotates, 2 * integral / np.maximum(row.k, 1), 4 * integral)
+    return _derived(out, row, rho[:, None], block, request, period)
+
+
+def _box(request, oblate):
+    """Where the points of a survey lie whose rho shares an axis with k; None if there are few, or of both kinds."""
+    rho = request.ranges.get("rho")
+    for name in ("k", "one_minus_k", "amplitude"):
+        given = request.ranges.get(name)
+        if given is None or rho is None or request.method != "auto":
+            continue
+        number = monodromy.boxed(min(given[0], rho[0]))
+        ends = _ends_of(name, number, *given[1:]) if number else None
+        if ends and ends[2] > ends[1] and rho[2] > rho[1]:
+            librates = bool((moduli({name: np.array(given[1:])})[0] < 1).all())
+            return monodromy.Box(_row_axis(oblate, not librates, ends), (number, *rho[1:]), even=librates)
+    return None
 
 
 def _per_orbit(out, orbits):
@@ -138,14 +236,27 @@ def _per_orbit(out, orbits):
     monodromy.overflow(out, out["exponent_per_orbit_error"] > LARGEST)
 
 
+def _line_of_rho(request):
+    """The axis of rho that an axis of inertia ratios gives, if it has bodies of one kind."""
+    line = request.line("inertia_ratio")
+    if line is None or line[1] <= 1 <= line[2]:
+        return None
+    rho, _ = rates(np.array(line[1:]), request.options["direction"])
+    return line[0], float(rho.min()), float(rho.max())
+
+
 def _ends(request):
     """(number, least and greatest s = -log |1 - k^2| or -log(1 - 1/k^2)) of an axis of one family of motions."""
     for name in ("k", "one_minus_k", "amplitude"):
         line = request.line(name)
         if line is not None:
-            k, kc, _, _ = moduli({name: np.array(line[1:])})
-            return (line[0], *np.sort(-2 * np.log(kc))) if (k > 1).all() or (k < 1).all() else None
+            return _ends_of(name, *line)
     return None
+
+
+def _ends_of(name, number, low, high):
+    k, kc, _, _ = moduli({name: np.array([low, high])})
+    return (number, *np.sort(-2 * np.log(kc))) if (k > 1).all() or (k < 1).all() else None
 
 
 def _at(s, oblate, rotates):
@@ -155,10 +266,11 @@ def _at(s, oblate, rotates):
     return _problem(Motion(k, kc, k, np.full_like(k, motion.K), oblate), np.zeros((s.size, 0)))
 
 
-def _row_axis(row, ends):
-    rotates = bool(row.rotates.any())
-    key = "satellite", row.oblate, rotates
-    return monodromy.RowAxis(key, *ends, at=lambda s: _at(s, row.oblate, rotates))
+def _row_axis(oblate, rotates, ends):
+    key = "satellite", oblate, rotates
+    # y1 - y2' of a libration is odd in k
+    odd = None if rotates else lambda s: np.sqrt(-np.expm1(-s))
+    return monodromy.RowAxis(key, *ends, at=lambda s: _at(s, oblate, rotates), odd=odd)
 
 
 def _problem(row, rho, low=None, line=None, ends=None):
@@ -178,7 +290,7 @@ def _problem(row, rho, low=None, line=None, ends=None):
         constant=constant,
         line=line,
         even=~row.rotates,
-        row_axis=_row_axis(row, ends) if ends else None,
+        row_axis=_row_axis(row.oblate, bool(row.rotates.any()), ends) if ends else None,
         positions=-2 * np.log(row.kc) if ends else None,
     )
 

@@ -30,6 +30,11 @@ def scene_cost(scene, request, grid):
     return scene.cost(request.options, {name: values.size for name, (_, values) in grid.parameters.items()})
 
 
+def lone_cost(scene, request, grid):
+    """As `scene_cost`, of points on their own, as edges and cells ask for."""
+    return scene.cost(request.options, dict.fromkeys(grid.parameters, 1))
+
+
 def points_per_block(scene, request, grid):
     """The number of points for which a block takes about BLOCK_SECONDS of kernel time."""
     return int(np.clip(BLOCK_SECONDS / seconds_per_point(scene, request, grid), 1, BLOCK_POINTS))

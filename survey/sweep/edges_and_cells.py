@@ -1,6 +1,6 @@
 """What [boundaries] and [refine] add to the file of a map: edges of tongues and curves, and cells."""
 
-from survey.sweep import boundaries, dispatch, refine
+from survey.sweep import boundaries, dispatch, proofs, refine
 
 
 def find(workflow, once, progress=None):
@@ -8,7 +8,9 @@ def find(workflow, once, progress=None):
     found, parts = [], requested(workflow)
     if "edges" in parts:
         found.append(parts["edges"].find(workflow, _on_threads(progress), once))
-    if "cells" in parts:
+    if workflow.proves:
+        found.append(proofs.find(workflow, once, progress))
+    elif "cells" in parts:
         found.append(parts["cells"].find(workflow, _on_threads(), once, getattr(progress, "refining", None)))
     return found
 

@@ -53,7 +53,7 @@ def fingerprint(workflow):
         "block_geometry": block_geometry(workflow),
         "kernels": jit.SOURCE_HASH,
         "scene_hash": getattr(workflow.scene, "HASH", "") or _hash_of_plugin(workflow.scene),
-    }
+    } | ({"proves": True} if workflow.proves else {})
 
 
 def _hash_of_plugin(scene):

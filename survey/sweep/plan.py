@@ -9,7 +9,7 @@ from survey.file import unfinished
 from survey.file.labels import layout
 from survey.kernels import jit
 from survey.sweep import edges_and_cells
-from survey.sweep.cost import blocks_of, bytes_per_point, scene_cost, seconds_per_point
+from survey.sweep.cost import blocks_of, bytes_per_point, lone_cost, seconds_per_point
 from survey.sweep.dispatch import cpus
 from survey.wording import counted
 
@@ -24,7 +24,7 @@ def plan(workflow):
     seconds = grid.points * seconds_per_point(scene, request, grid)
     parts = {}
     for name, module in edges_and_cells.requested(workflow).items():
-        parts[name], more = module.plan(workflow, scene_cost(scene, request, grid))
+        parts[name], more = module.plan(workflow, lone_cost(scene, request, grid))
         seconds += more
     return {
         "scene": workflow.name,

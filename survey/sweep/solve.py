@@ -12,7 +12,12 @@ from survey.sweep.cost import points_per_block
 
 def solve_block(scene, request, grid, block):
     """The variables of `layout` in one block of the grid."""
-    return solve_point(scene, replace(request, lines=grid.lines), grid.point(block), _shape(grid, block))
+    return solve_point(
+        scene,
+        replace(request, lines=grid.lines, fixed=grid.fixed, ranges=grid.ranges),
+        grid.point(block),
+        _shape(grid, block),
+    )
 
 
 def _shape(grid, block):

@@ -1,4 +1,4 @@
-"""Brun's problem: reference values, and what is known of the motion (sections 2 to 4 of `brun.md`)."""
+"""Brun's problem: reference values, and what is known of the motion (`brun.md`)."""
 
 import json
 from importlib.resources import files

@@ -172,19 +172,19 @@ def test_lyapunov_never_certifies_an_unstable_point(body):
     certified = out["lyapunov"] == 1
     assert certified.sum() > 30
     assert np.all(np.isin(out["verdict"][certified], [1, 2]))
-    # No libration that is a body (rho >= 1/sqrt 3) is certified, whatever the paper says: satellite.md, section 2.
+    # No libration that is a body (rho >= 1/sqrt 3) is certified, whatever the paper says: satellite.md: What is known.
     assert not np.any(certified & (k < 1) & (abs(rho) >= 3**-0.5))
 
 
 @pytest.mark.parametrize(("rho", "largest"), [(0.57735, 3.224854), (1.0, 2.144280)])
 def test_largest_discriminant_near_the_separatrix(rho, largest):
-    """Scattering by the separatrix predicts the maximum over K (satellite.md, section 3)."""
+    """Scattering by the separatrix predicts the maximum over K (satellite.md: What is known)."""
     out = solve(one_minus_k=np.geomspace(1e-9, 1e-7, 4000), rho=rho)
     assert abs(np.max(abs(out["discriminant"])) / largest - 1) < 1e-5
 
 
 def edges(k, n, window, body):
-    """Edges of tongue n: zeros in `window` of the two factors that vanish there, by bisection (satellite.md, 4)."""
+    """Edges of tongue n: zeros in `window` of the two factors that vanish there, by bisection."""
     grid = np.linspace(*window, 4001)
     out = solve(body, k=k, rho=grid, rtol=1e-13)
     ends = []
@@ -210,7 +210,7 @@ def test_tongue_widths(body, centre, n, factor):
 
 
 def test_critical_amplitudes_of_rod_and_disc():
-    """Thin rod and disc, rho = 1/sqrt 3: the amplitudes of satellite.md, section 4, in degrees; rotations in k."""
+    """Thin rod and disc, rho = 1/sqrt 3: the amplitudes of satellite.md: What is known, in degrees; rotations in k."""
     rod = solve("prolate", k=np.sin(np.radians([58.05, 58.07, 75.49, 75.51])), rho=3**-0.5)
     assert list(rod["verdict"]) == [1, 0, 0, 1]
     disc = solve("oblate", k=np.sin(np.radians([8.92, 8.94])), rho=3**-0.5)
@@ -305,7 +305,7 @@ def test_plain_python_gives_the_same_bits():
 
 
 def test_inertia_ratio_and_amplitude_are_other_words_for_rho_and_k():
-    """alpha = 1/2 and 3/2 give rho^2 = 2/3; critical amplitudes of the rod and the disc (satellite.md, section 4)."""
+    """alpha = 1/2 and 3/2 give rho^2 = 2/3; critical amplitudes of the rod and the disc."""
     amplitude = np.array([0.1, 0.8, 1.5])
     named = survey.evaluate("satellite", inertia_ratio=[0.5, 1.5], amplitude=amplitude)
     for place, body in enumerate(("prolate", "oblate")):

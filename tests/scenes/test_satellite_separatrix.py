@@ -1,4 +1,4 @@
-"""Satellites close to the separatrix and at large rho (satellite.md, section 7), against double-double and mpmath."""
+"""Satellites close to the separatrix and at large rho (satellite.md: Numerics), against double-double and mpmath."""
 
 import numpy as np
 import pytest

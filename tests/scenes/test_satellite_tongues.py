@@ -1,4 +1,4 @@
-"""Narrow tongues of librations (satellite.md, section 7): no verdict is wrong, every point inside a tongue is found.
+"""Narrow tongues of librations (satellite.md: Numerics): no verdict is wrong, every point inside a tongue is found.
 
 The truth is the edges by Hill's method in mpmath: z = 2 w^2 + 2 rho w + rho^2 + c is a cosine series in v = pi u / 2K,
 and a factor vanishes where the matrix that the equation makes of its solution's Fourier series is singular.
@@ -55,7 +55,7 @@ def edge(family, k, factor, near, size=16):
 
 
 def tongue(family, n, k):
-    """Both edges of tongue n, ascending (satellite.md, section 4: where it opens, and how it bends)."""
+    """Both edges of tongue n, ascending (satellite.md: What is known: where it opens, and how it bends)."""
     opens = (n * n / 4 - 1) ** 0.5 if family == "PL" else n / 2
     bends = {("PL", 3): -13 / 32, ("PL", 4): -4 / 5, ("PL", 5): -43 / 32}.get((family, n), 0) / opens
     with mp.workdps(DIGITS):

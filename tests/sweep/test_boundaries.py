@@ -55,7 +55,7 @@ def test_the_plan_counts_rows_and_bytes(path):
 
 
 def test_the_tongue_n_2_opens_with_half_the_square(path):
-    """Oblate tongue n = 2: k^2 / 2 wide about 1 + k^2 / 12 (satellite.md, section 4)."""
+    """Oblate tongue n = 2: k^2 / 2 wide about 1 + k^2 / 12 (satellite.md: What is known)."""
     ds = xr.load_dataset(path)
     first = slice(0, int(ds.edge_count[0]))
     own = ds.edge_position.values[first][ds.edge_index.values[first] == 2]

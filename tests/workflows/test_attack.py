@@ -22,7 +22,7 @@ def found(family, seed, size, index=0):
 
 @pytest.mark.parametrize(("family", "size"), [("satellite", 400), ("mathieu", 300), ("libration_elliptic", 300),
                                               ("gyrostat", 300), ("brun", 400), ("libration", 60),
-                                              ("own", 60)])  # fmt: skip
+                                              ("own", 60), ("floquet", 80)])  # fmt: skip
 def test_there_are_no_faults(family, size):
     counts, faults = found(family, 3, size)
     assert counts["points"] >= size

@@ -82,7 +82,7 @@ def test_the_command_finds_the_kept_edges_again(case):
 
 
 def test_the_largest_growth_of_the_rod():
-    """Tongue n = 3, e^0.987 at 67.6 degrees (satellite.md, section 4): by mpmath there and beside it."""
+    """Tongue n = 3, e^0.987 at 67.6 degrees (satellite.md: What is known): by mpmath there and beside it."""
     case = critical.CASES[0]
     x, value = critical.largest(case, *(edge.x for edge in critical.edges(case)[:2]))
     assert 90 - np.degrees(critical.rest(np.exp(-x))) == pytest.approx(67.6, abs=0.05)

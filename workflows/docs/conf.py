@@ -1,19 +1,18 @@
 """Sphinx's configuration; `build.py` beside this file assembles the pages and calls it. No network is needed."""
 
 import re
-import sys
-from pathlib import Path
 
 import numpy.typing as npt
+from docutils import nodes
 from sphinx.util.typing import stringify_annotation
 
 import survey.api  # so that the API pages show what users call  # noqa: F401
 
 project = "survey"
 author = "the survey founders"
-sys.path.insert(0, str(Path(__file__).parent))
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx_click", "formulas"]
-html_math_renderer = "drawn"
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx_click"]
+mathjax_path = "mathjax/tex-svg.js"  # one file, without a network: see static/mathjax
+mathjax3_config = {"svg": {"fontCache": "none"}, "options": {"enableMenu": False}}
 html_theme = "furo"
 html_title = "survey"
 html_static_path = ["static"]
@@ -35,8 +34,16 @@ ARRAY_LIKE = stringify_annotation(npt.ArrayLike, "smart")
 
 
 def setup(app):
+    app.connect("doctree-read", _as_written)
     app.connect("autodoc-process-docstring", _plain)
     app.connect("autodoc-process-signature", _short)
+
+
+def _as_written(app, doctree):
+    r"""Displayed formulas go to MathJax as they are: Sphinx would put several lines into `split`, which has no \tag."""
+    for node in doctree.findall(nodes.math_block):
+        node["no-wrap"] = node["nowrap"] = True  # the second until Sphinx 8.2
+        node[:] = [nodes.Text(rf"\[{node.astext()}\]")]
 
 
 def _plain(app, what, name, thing, options, lines):

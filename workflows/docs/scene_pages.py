@@ -1,4 +1,4 @@
-"""A page for each scene that is found in its folder: what it answers, its pictures, its mathematics with the errata."""
+"""A page for each scene that is found in its folder: its explanation, pictures, parameters, outputs and methods."""
 
 import re
 from pathlib import Path
@@ -19,7 +19,7 @@ def pages():
     index = [
         "# The scenes",
         "",
-        "A scene is a physical system and the questions asked of it.",
+        "A scene is a physical system and the questions asked of it. [Which one fits](../choose.md)?",
         "",
         "| scene | answers |",
     ]
@@ -30,13 +30,20 @@ def pages():
 
 def _page(name):
     scene = survey.api.scene(name)
-    parts = [f"# {name}", scene["title"] + ".", f"```text\n{scene['about']}\n```"]
-    parts += [*_results(name, survey.api.scenes()), "## In words", f"The output of `survey scenes {name}`."]
+    parts = [f"# {name}", f"**{escaped(scene['title'])}.**", _explanation(name) or f"```text\n{scene['about']}\n```"]
+    parts += [*_results(name, survey.api.scenes()), "## Reference", f"What `survey scenes {name}` prints."]
     for heading in LISTS:
         rows = [f"| `{key}` | {escaped(words).replace('|', chr(92) + '|')} |" for key, words in scene[heading].items()]
         parts += ["\n".join([f"| {heading} | |", "|---|---|", *rows])] if rows else []
     parts += ["Sources:", "\n".join(f"- {escaped(line)}" for line in scene["references"])]
-    return "\n\n".join(parts + _mathematics(name)) + "\n"
+    return "\n\n".join(parts) + "\n"
+
+
+def _explanation(name):
+    """NAME.md, without its title, as it stands beside the scene; "" if there is none."""
+    path = ROOT / f"survey/scenes/{name}.md"
+    text = path.read_text().partition("\n")[2].strip() if path.exists() else ""
+    return text.replace("](../../results/", "](../results/").replace("](../../workflows/docs/", "](../")
 
 
 def _results(name, names):
@@ -64,60 +71,7 @@ def _title(path):
     return path.read_text().splitlines()[0].removeprefix("# ")
 
 
-def _mathematics(name):
-    path = ROOT / f"survey/scenes/{name}.md"
-    if not path.exists():
-        return []
-    title, text = path.read_text().split("\n", 1)
-    return [f"## Mathematics and errata\n\n*{escaped(title.removeprefix('# '))}*", notes(text)]
-
-
 def escaped(text):
-    """Plain text as Markdown: stars, underscores, angles and brackets outside of code are themselves."""
+    """Plain text as Markdown: stars, underscores, angles, dollars and brackets outside of code are themselves."""
     parts = re.split(r"(`[^`]*`|\*\*[^*\n]+\*\*)", text)
-    return "".join(part if i % 2 else re.sub(r"([*_<\[\]\\~])", r"\\\1", part) for i, part in enumerate(parts))
-
-
-def notes(text):
-    """The mathematics as Markdown: headings one lower, indented lines as they stand, numbered equations apart.
-
-    Indented lines that continue an item of a list stay in it; a formula there begins a line.
-    """
-    out, before = [], "blank"
-    for line in text.splitlines():
-        kind = _kind(line)
-        if kind == "indented" and before == "item":
-            kind, out[-1] = "item", out[-1] + "\\" * line.lstrip().startswith("(")
-        if before == "indented" and kind == "blank":
-            continue
-        if kind != before and "indented" in (kind, before):
-            out.append("\n```text" if kind == "indented" else "```\n")
-        elif kind == "numbered" or (before == "row" and kind != "row"):
-            out.append("")
-        out.append(_shown(kind, line))
-        before = kind
-    return "\n".join([*out, "```" if before == "indented" else ""])
-
-
-def _shown(kind, line):
-    if kind == "heading":
-        return f"\n#{line}\n"
-    if kind == "indented":
-        return line.replace("**", "")
-    if kind == "item":
-        return re.sub("^[*-] ", "* ", line[:2]) + escaped(line[2:])
-    return re.sub(r"^([>+])", r"\\\1", escaped(line))
-
-
-def _kind(line):
-    if not line.strip():
-        return "blank"
-    if line.startswith("#"):
-        return "heading"
-    if line.startswith("|") and line.endswith("|"):
-        return "row"
-    if re.match(r"[*-] ", line):
-        return "item"
-    if line.startswith("  "):
-        return "indented"
-    return "numbered" if re.match(r"\*?\*?\(S?\d", line) else "text"
+    return "".join(part if i % 2 else re.sub(r"([*_<$\[\]\\~])", r"\\\1", part) for i, part in enumerate(parts))

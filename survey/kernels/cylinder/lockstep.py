@@ -8,8 +8,8 @@ turned by a (symmetry S4 of `gyrostat.md`) c23 = 0, and psi = phi - a obeys, wit
 three Cauchy products. Each step computes S and C afresh. Errors are carried as in `steps`, by the
 variational equation in its Lienard form (`flow.variation`), to order LOW.
 
-A lane whose next time lies within its step is evaluated there and then continues from where the step began: so steps
-never depend on the requested times, and no solution on its neighbours. A lane that has finished takes the next row.
+Steps never depend on the requested times: those within a step are evaluated from its series, BLOCK at a time. Nor does
+any solution depend on its neighbours. A lane that has finished takes the next row.
 """
 
 import math
@@ -63,7 +63,10 @@ STATE = 13
 FIXED = 10
 ROWS = TABLE + 2 * STATE + FIXED + 1
 
-_GOING, _AT, _LOST = 0.0, 1.0, 2.0  # what a step has made of a lane
+_PASSED, _LOST = 1.0, 2.0  # what a step has made of a lane, or the sum of both: it has passed its next time
+BLOCK = 8
+# Where the columns of a block begin; one flat array: LLVM sees that they do not overlap.
+_DT, _PSI, _V, _SAA, _SBB, _SIZE = range(0, 6 * BLOCK, BLOCK)
 # Shorter steps have only a share of the tolerance, so that many short ones add up to what a few long ones do.
 _SHORT = 1.0 / 8.0
 COARSEST = 1e-11  # per step: above, the terms that follow the last two may be no smaller than these
@@ -197,7 +200,7 @@ def step(T, state, before, fixed, fate, tolerance):
 
 @inline
 def advance(T, state, before, fixed, fate, tolerance):
-    """One step of every lane, to its next time where that lies within the step; `before` keeps the state before it."""
+    """One step of every lane; `before` keeps the state before it."""
     for k in range(STATE):
         for i in range(LANES):
             before[k, i] = state[k, i]
@@ -212,10 +215,8 @@ def advance(T, state, before, fixed, fate, tolerance):
         # within `flow.longest_step` w has one zero at most
         square = fixed[PDG, i] + fixed[PF, i] * (abs(w) + 0.25 * fixed[PF, i])
         rate = math.sqrt(max(math.sqrt(math.sqrt(math.sqrt(size))), square) + 1e-300)
-        h = 1.0 / rate
-        rest = (fixed[NEXT, i] - state[TIME, i]) - state[TIME_LOW, i]
-        at = rest < h
-        dt = rest if at else h
+        dt = 1.0 / rate
+        passed = (fixed[NEXT, i] - state[TIME, i]) - state[TIME_LOW, i] < dt
         x, v = T[W + ORDER, i] * (1.0 / (ORDER + 1)), T[W + ORDER, i]
         for k in range(ORDER - 1, 0, -1):
             x, v = x * dt + T[W + k, i] * (1.0 / (k + 1)), v * dt + T[W + k, i]
@@ -230,11 +231,42 @@ def advance(T, state, before, fixed, fate, tolerance):
         state[SAA, i], state[SAB, i], sbb = ellipse(carried, jacobian, dt, v, ends, fixed[PF, i], fixed[PG, i])
         n = state[STEPS, i] + 1.0
         state[SBB, i], state[STEPS, i] = sbb, n
-        high = state[TIME, i] + h
-        state[TIME_LOW, i] += h - (high - state[TIME, i])
+        high = state[TIME, i] + dt
+        state[TIME_LOW, i] += dt - (high - state[TIME, i])
         state[TIME, i], state[PSI, i], state[V, i], state[RATE, i] = high, x, v, rate
         good = state[SAA, i] < TRUST and sbb < (1.0 + abs(v)) * (1.0 + abs(v))
-        fate[i] = _AT if at else (_GOING if good else _LOST)
+        fate[i] = (_PASSED if passed else 0.0) + (0.0 if good else _LOST)
+
+
+@unroll
+def coefficients(T, i):
+    return tuple(T[W + n, i] for n in range(ORDER + 1))
+
+
+@unroll
+def variations(T, i):
+    return tuple(T[row + n, i] for row in (U1, Z1, U2, Z2, F_) for n in range(LOW + 1))
+
+
+@unroll
+def varied(series_of, dt):
+    """The Jacobian (psi_psi, psi_w, w_psi, w_w) at dt, as in `flow.jacobian`."""
+    u1, z1, u2, z2, f = (polynomial(series_of[row * (LOW + 1) : (row + 1) * (LOW + 1)], dt) for row in range(5))
+    return u1, u2, z1 + f * u1, z2 + f * u2
+
+
+def polynomial(coefficients, x):
+    *lower, total = coefficients
+    for coefficient in reversed(lower):
+        total = total * x + coefficient
+    return total
+
+
+@inline
+def last_terms(T, i):
+    """`ends` of `lockstep.ellipse`."""
+    last, previous = abs(T[W + ORDER, i]), abs(T[W + ORDER - 1, i])
+    return last, previous, FALL * abs(T[W + ORDER - 2, i]), FALL * abs(T[W + ORDER - 3, i])
 
 
 @inline
@@ -295,22 +327,55 @@ def enter(p, phi0, w0, state, fixed, i):
     state[SIGN, i] = start_sign(p, rest, w0)
 
 
-@inline
-def _record(state, before, fixed, i, floats, turnings):
-    """Record lane i at its next time and return to where the step began; False where the bar is too wide."""
-    n, v, turns, angle = state[STEPS, i], state[V, i], state[TURNS, i], fixed[TURN, i]
-    wide, high = bar(n, state[SAA, i]), bar(n, state[SBB, i])
-    if not (wide < TRUST and high < TRUST * (1.0 + abs(v))):
-        return False
-    floats[rc.PHI], floats[rc.W] = (state[PSI, i] + angle) + turns * TWO_PI, v
-    floats[rc.PHI_BAR], floats[rc.W_BAR] = wide + 3e-16 * (abs(turns) * TWO_PI + abs(angle)), high
+@unroll
+def _moved(c, dt):
+    """The change of psi, and w, at dt, as in `advance`."""
+    x, v = c[ORDER] * (1.0 / (ORDER + 1)), c[ORDER]
+    for k in range(ORDER - 1, 0, -1):
+        x, v = x * dt + c[k] * (1.0 / (k + 1)), v * dt + c[k]
+    return (x * dt + c[0]) * dt, c[0] + v * dt
+
+
+@kernel
+def _evaluate(T, before, fixed, i, block):
+    """Fill the block: psi, w and the squares of their errors at its times DT in the step of lane i."""
+    c, vary, ends = coefficients(T, i), variations(T, i), last_terms(T, i)
+    psi, most_f, most_g = before[PSI, i], fixed[PF, i], fixed[PG, i]
+    carried = before[SAA, i], before[SAB, i], before[SBB, i]
+    for j in range(BLOCK):
+        dt = block[_DT + j]
+        x, v = _moved(c, dt)
+        saa, _sab, sbb = ellipse(carried, varied(vary, dt), dt, v, ends, most_f, most_g)
+        block[_PSI + j], block[_V + j], block[_SAA + j], block[_SBB + j] = psi + x, v, saa, sbb
+
+
+@kernel
+def _record(T, state, before, fixed, i, block, times, first, floats, turnings):
+    """Record lane i at its times, from the `first` on, within the step; returns the next, or -1: a bar is too wide."""
+    h, t, t_low, size = 1.0 / state[RATE, i], before[TIME, i], before[TIME_LOW, i], len(times)
+    n, turns, angle = state[STEPS, i], state[TURNS, i], fixed[TURN, i]
     from_rest = before[STEPS, i] == 0.0 and before[V, i] == 0.0  # then w is 0 at the start and nowhere else
-    sure = before[UNSURE, i] < 3.0 and before[COUNT, i] >= 0.0 and (abs(v) > high or from_rest)
-    passed = before[SIGN, i] * v < 0.0 and not from_rest
-    turnings[0] = int(before[COUNT, i]) + passed if sure else UNDETERMINED
-    for k in range(STATE):
-        state[k, i] = before[k, i]
-    return True
+    known = before[UNSURE, i] < 3.0 and before[COUNT, i] >= 0.0
+    while first < size and (times[first] - t) - t_low < h:
+        count = 0
+        while count < BLOCK and first + count < size and (times[first + count] - t) - t_low < h:
+            block[_DT + count] = (times[first + count] - t) - t_low
+            count += 1
+        for j in range(count, BLOCK):
+            block[_DT + j] = 0.0
+        _evaluate(T, before, fixed, i, block)
+        for j in range(count):
+            v, wide, high = block[_V + j], bar(n, block[_SAA + j]), bar(n, block[_SBB + j])
+            if not (wide < TRUST and high < TRUST * (1.0 + abs(v))):
+                return -1
+            row = floats[first + j]
+            row[rc.PHI], row[rc.W] = (block[_PSI + j] + angle) + turns * TWO_PI, v
+            row[rc.PHI_BAR], row[rc.W_BAR] = wide + 3e-16 * (abs(turns) * TWO_PI + abs(angle)), high
+            sure = known and (abs(v) > high or from_rest)
+            passed = before[SIGN, i] * v < 0.0 and not from_rest
+            turnings[first + j] = int(before[COUNT, i]) + passed if sure else UNDETERMINED
+        first += count
+    return first
 
 
 @kernel
@@ -328,26 +393,25 @@ def _refill(P, starts, times, waiting, state, fixed, row, column, status):
 
 
 @kernel
-def _collect(times, limit, state, before, fixed, fate, row, column, floats, turnings, status):
-    """Record what the lanes have reached and free those that have ended; returns whether any has."""
+def _collect(T, times, limit, state, before, fixed, fate, block, row, column, floats, turnings, status):
+    """Record what the lanes have passed and free those that have ended; returns whether any has."""
     freed = False
     for i in range(LANES):
-        if row[i] < 0 or (fate[i] == _GOING and state[STEPS, i] < limit):
+        if row[i] < 0 or (fate[i] == 0.0 and state[STEPS, i] < limit):
             continue
-        r, j = row[i], column[i]
-        ending = -1
-        if fate[i] == _AT:
-            if not _record(state, before, fixed, i, floats[r, j], turnings[r, j : j + 1]):
+        r, ending = row[i], -1
+        if fate[i] == _PASSED or fate[i] == _PASSED + _LOST:
+            j = _record(T, state, before, fixed, i, block, times[r], column[i], floats[r], turnings[r])
+            if j < 0:
                 ending = NO_CONVERGENCE
-            elif j + 1 == times.shape[1] or not math.isfinite(times[r, j + 1]):
+            elif j == times.shape[1] or not math.isfinite(times[r, j]):
                 ending = OK
             else:
-                column[i] = j + 1
-                fixed[NEXT, i] = times[r, j + 1]
-        elif fate[i] == _GOING:
-            ending = STEP_LIMIT
-        else:
+                column[i], fixed[NEXT, i] = j, times[r, j]
+        if ending < 0 and fate[i] >= _LOST:
             ending = NO_CONVERGENCE if math.isfinite(state[V, i]) else OVERFLOW
+        if ending < 0 and state[STEPS, i] >= limit:
+            ending = STEP_LIMIT
         if ending >= 0:
             status[r], row[i], freed = ending, -1, True
     return freed
@@ -371,11 +435,11 @@ def trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
     work = np.zeros((ROWS, LANES))  # one array: LLVM sees that its rows do not overlap
     T, state, before, fixed, fate = split(work)
     tolerance = min(tolerance, COARSEST)
-    row, column = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
+    row, column, block = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64), np.zeros(_SIZE)
     waiting, steps = _refill(P, starts, times, 0, state, fixed, row, column, status), 0
     while busy(row):
         step(T, state, before, fixed, fate, tolerance)
         steps += LANES
-        if _collect(times, limit, state, before, fixed, fate, row, column, floats, turnings, status):
+        if _collect(T, times, limit, state, before, fixed, fate, block, row, column, floats, turnings, status):
             waiting = _refill(P, starts, times, waiting, state, fixed, row, column, status)
     return steps

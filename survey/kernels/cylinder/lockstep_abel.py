@@ -27,10 +27,7 @@ from survey.kernels.cylinder.flow import (
 )
 from survey.kernels.cylinder.lockstep import (
     COARSEST,
-    F_,
-    FALL,
     LANES,
-    LOW,
     NEAREST,
     NEXT,
     ORDER,
@@ -53,19 +50,19 @@ from survey.kernels.cylinder.lockstep import (
     TIME_LOW,
     TURN,
     TURNS,
-    U1,
-    U2,
-    Z1,
-    Z2,
     V,
-    W,
     advance,
     busy,
+    coefficients,
     ellipse,
     enter,
+    last_terms,
+    polynomial,
     series,
     sine_cosine,
     split,
+    variations,
+    varied,
 )
 from survey.kernels.cylinder.steps import (
     EQUILIBRIUM,
@@ -104,36 +101,12 @@ _GOING = -1
 
 
 @unroll
-def _coefficients(T, i):
-    return tuple(T[W + n, i] for n in range(ORDER + 1))
-
-
-@unroll
-def _variations(T, i):
-    return tuple(T[row + n, i] for row in (U1, Z1, U2, Z2, F_) for n in range(LOW + 1))
-
-
-@unroll
 def _moved(c, dt):
     """The change of psi, and w, at dt."""
     square = dt * dt  # even and odd powers apart: half as long a chain
     x = [c[n] * (1.0 / (n + 1)) for n in range(ORDER + 1)]
-    rise, v = (_polynomial(a[2::2], square) * dt + _polynomial(a[1::2], square) for a in (x, c))
+    rise, v = (polynomial(a[2::2], square) * dt + polynomial(a[1::2], square) for a in (x, c))
     return (rise * dt + c[0]) * dt, c[0] + v * dt
-
-
-@unroll
-def _varied(series_of, dt):
-    """The Jacobian (psi_psi, psi_w, w_psi, w_w) at dt, as in `flow.jacobian`."""
-    u1, z1, u2, z2, f = (_polynomial(series_of[row * (LOW + 1) : (row + 1) * (LOW + 1)], dt) for row in range(5))
-    return u1, u2, z1 + f * u1, z2 + f * u2
-
-
-def _polynomial(coefficients, x):
-    *lower, total = coefficients
-    for coefficient in reversed(lower):
-        total = total * x + coefficient
-    return total
 
 
 @inline
@@ -142,13 +115,6 @@ def _nearer(c, rise, dt, reach):
     x, v = _moved(c, dt)
     miss = rise - x
     return min(max(dt + miss / max(v, 1e-300), 0.0), reach), v, miss
-
-
-@inline
-def _last_terms(T, i):
-    """`ends` of `lockstep.ellipse`."""
-    last, previous = abs(T[W + ORDER, i]), abs(T[W + ORDER - 1, i])
-    return last, previous, FALL * abs(T[W + ORDER - 2, i]), FALL * abs(T[W + ORDER - 3, i])
 
 
 @inline
@@ -162,13 +128,13 @@ def _at(_p, given, dt):
 @kernel
 def _cross(T, state, before, fixed, i, reach, end, block, size):
     """Fill the block from its GOALs, the first `size` of which count, at up to `reach` in the step; there w = `end`."""
-    c, vary = _coefficients(T, i), _variations(T, i)
+    c, vary = coefficients(T, i), variations(T, i)
     psi, w, n, t, t_low = before[PSI, i], before[V, i], state[STEPS, i], before[TIME, i], before[TIME_LOW, i]
     carried = before[SAA, i], before[SAB, i], before[SBB, i]
     p12, p31, p2, p3, pd, most_f, most_g = (
         fixed[P12, i], fixed[P31, i], fixed[P2, i], fixed[P3, i], fixed[PD, i], fixed[PF, i], fixed[PG, i]
     )  # fmt: skip
-    ends = _last_terms(T, i)
+    ends = last_terms(T, i)
     bend = (end - w) / reach
     for j in range(BLOCK):
         rise = max(block[GOAL + j] - psi, 0.0)
@@ -189,7 +155,7 @@ def _cross(T, state, before, fixed, i, reach, end, block, size):
         dt = block[DT + j]
         x, v = _moved(c, dt)
         x += psi
-        a, b, d = ellipse(carried, _varied(vary, dt), dt, v, ends, most_f, most_g)
+        a, b, d = ellipse(carried, varied(vary, dt), dt, v, ends, most_f, most_g)
         a += block[SQUARE + j] + (4e-16 * dt * v) * (4e-16 * dt * v)
         k = (x * (1.0 / TWO_PI) + NEAREST) - NEAREST
         sine, cosine = sine_cosine((x - k * TWO_PI) - k * TWO_PI_LOW)
@@ -212,14 +178,14 @@ def _pass(T, state, before, fixed, q, i, block, targets, j, doubt, started, floa
     saa, sbb = state[SAA, i], state[SBB, i]
     turned = v1 <= 0.0
     if turned:
-        c = _coefficients(T, i)
+        c = coefficients(T, i)
         given = (q, (before[PSI, i], c), True)
         reach = bracketed(to_rest, _at, given, 0.5 * reach, (0.0, reach), (1e-17 + 1e-16 * reach, 0.0), 60)[1]
         x, v1 = _moved(c, reach)
         x1 = before[PSI, i] + x
         carried = before[SAA, i], before[SAB, i], before[SBB, i]
-        jacobian = _varied(_variations(T, i), reach)
-        saa, _sab, sbb = ellipse(carried, jacobian, reach, v1, _last_terms(T, i), fixed[PF, i], fixed[PG, i])
+        jacobian = varied(variations(T, i), reach)
+        saa, _sab, sbb = ellipse(carried, jacobian, reach, v1, last_terms(T, i), fixed[PF, i], fixed[PG, i])
     while j < size and unturned(targets[j], turns) - angle <= x1:
         count = 0
         while count < BLOCK and j + count < size and unturned(targets[j + count], turns) - angle <= x1:

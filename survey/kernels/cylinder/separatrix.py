@@ -13,7 +13,7 @@ Between v0 and v, tanh(Lt/2) = L (v0 - v)/(r0 + r).
 All here is the branch that leaves the saddle to the right, w > 0; the caller mirrors. What is lost where terms cancel
 is computed in double-double arithmetic: the discriminant a^2 - A b, and m = A v0 + a -+ L r0, their product.
 
-Source: M. E. Lesina, Ya. V. Zinovyeva (2004), (66), as corrected in `scenes/gyrostat.md`, section 2.
+Source: M. E. Lesina, Ya. V. Zinovyeva (2004), (66), as corrected in `scenes/gyrostat.md`.
 """
 
 import math

@@ -9,7 +9,7 @@ Numbers miss (61) by roundings at least: g = (mu - 1) f (mu F + n) + R, |R| <= `
 
 One lane is one solution at one time; no lane calls libm. The solutions start with w0 >= 0, others are mirrored.
 
-Source: M. E. Lesina, Ya. V. Zinovyeva (2004), (50), (61), as corrected in `scenes/gyrostat.md`, section 2.
+Source: M. E. Lesina, Ya. V. Zinovyeva (2004), (50), (61), as corrected in `scenes/gyrostat.md`.
 """
 
 import math

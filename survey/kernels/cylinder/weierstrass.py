@@ -13,7 +13,7 @@ One lane is one solution at one time; no lane calls libm. Every error bound is c
 a bound of an error, "e_" of a relative one. `delay` is an error in time; it acts through w and w'.
 
 Sources: E. T. Whittaker, G. N. Watson, A Course of Modern Analysis, 20.6; DLMF 23.10, 23.22(ii); J.-B. Bost, J.-F.
-Mestre, Gaz. Math. 38 (1988) 36-64 (isogenies); `scenes/gyrostat.md`, section 2, (62)-(68).
+Mestre, Gaz. Math. 38 (1988) 36-64 (isogenies); `scenes/gyrostat.md`, (62)-(68).
 """
 
 import math

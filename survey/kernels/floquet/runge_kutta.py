@@ -82,5 +82,53 @@ def factors(
                 off = max(off, h * combined(abs(e5[q, lane]), abs(e3[q, lane])))
             rounding = ROUNDOFF_UP * ((n + 24.0) * WEIGHT * h * norm[lane] + largest)
             total = SAFETY * off + rounding + h * noise[point[task]] * n * largest
-            error[task] = total if math.isfinite(total) else math.inf
-            doubt[task] = n * error[task] * (1.0 + n * largest)
+            error[task] = n * total if math.isfinite(total) else math.inf
+            doubt[task] = error[task] * (1.0 + n * largest)
+
+
+@kernel
+def motion(operations, signs, inside, order, terms, numbers, places, x0, span, steps, X, M):
+    """Fill X (N, n), the states of x' = f(t, x) at t = span (N) from x0 at 0, and M = dX/dx0 (N, n, n).
+
+    In steps[i] equal steps; numbers (N, count), places (n) of the states among them, as in `flow.flow`.
+    """
+    n = x0.shape[1]
+    S, V, t, zero = np.zeros((len(operations), 1, 1)), np.empty((numbers.shape[1], 1)), np.empty(1), np.zeros(1)
+    y, K, new = np.empty((n, n + 1)), np.empty((STAGES, n, n + 1)), np.empty((n, n + 1))
+    for i in range(len(x0)):
+        for k in range(numbers.shape[1]):
+            V[k, 0] = numbers[i, k]
+        y[:] = 0.0
+        for c in range(n):  # the state, then the columns of M
+            y[c, 0], y[c, c + 1] = x0[i, c], 1.0
+        h = span[i] / steps[i]
+        for step in range(steps[i]):
+            for stage in range(STAGES + 1):
+                for r in range(n):
+                    for c in range(n + 1):
+                        total = 0.0
+                        for k in range(stage):
+                            total += (B[k] if stage == STAGES else A[stage, k]) * K[k, r, c]
+                        new[r, c] = y[r, c] + h * total
+                if stage == STAGES:
+                    break
+                t[0] = (step + C[stage]) * h
+                for c in range(n):
+                    V[places[c], 0] = new[c, 0]
+                extend(operations, signs, inside, order, V, t, zero, S, 0)
+                own = K[stage]
+                own[:] = 0.0
+                for c in range(n):
+                    for k in range(operations[order[c], 3], operations[order[c], 4]):
+                        own[c, 0] += S[inside[k, 0], 0, 0] * V[inside[k, 1], 0]
+                for q in range(len(terms)):
+                    value = S[terms[q, BASIS], 0, 0] * V[terms[q, NUMBER], 0]
+                    for c in range(n):
+                        own[terms[q, ROW], c + 1] += value * new[terms[q, COLUMN], c + 1]
+            for r in range(n):
+                for c in range(n + 1):
+                    y[r, c] = new[r, c]
+        for r in range(n):
+            X[i, r] = y[r, 0]
+            for c in range(n):
+                M[i, r, c] = y[r, c + 1]

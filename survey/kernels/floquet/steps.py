@@ -30,7 +30,7 @@ def lanes_of(n):
 def factors(
     operations, signs, inside, order, used, terms, numbers, scale, noise, n, point, middle, half, F, error, doubt
 ):
-    """Fill F (tasks, n, n), bounds `error` (tasks) of their entries, and `doubt` (tasks), their relative size.
+    """Fill F (tasks, n, n), bounds `error` (tasks) of its rows' errors and `doubt` (tasks) of their relative size.
 
     Task k is the step of `point[k]` from middle[k] - half[k] to middle[k] + half[k]. numbers (N, count), scale (N, n):
     A_ij is taken times scale_j / scale_i, powers of 2.
@@ -76,7 +76,7 @@ def factors(
             cut, rounding, total = _missing(a, w, e, s, lane)
             delta = cut + rounding + 2.0 * ROUNDOFF_UP * total
             error[start + lane] = _over(plus, minus, lane, lanes, n, delta, U, inverse, work, F[start + lane])
-            doubt[start + lane] = n * error[start + lane] * total * total
+            doubt[start + lane] = error[start + lane] * total * total
 
 
 @kernel
@@ -184,13 +184,16 @@ def _ends(X, plus, minus):
 @kernel
 def _missing(a, w, e, s, lane):
     """What the series lacks beyond its last term, its rounding, and the sum of its terms' norms, in lane lane."""
-    total = rounding = 0.0
+    total = rounding = largest = 0.0
     for k in range(ORDER + 1):
         total += w[k, lane]
         rounding += e[k, lane]
+        largest = max(largest, a[k, lane])
     # A's own coefficients beyond the last known are taken to fall as the last four did
     last, before = a[ORDER, lane] + a[ORDER - 1, lane], a[ORDER - 2, lane] + a[ORDER - 3, lane]
     fall = math.sqrt(last / before) if before > 0.0 else 0.0
+    if last <= ROUNDOFF_UP * largest:  # beside zeros of coefficients the fall is an accident
+        fall = min(fall, 0.94)
     rest = 2.0 * last * fall / (1.0 - fall) if fall < 0.95 else (0.0 if last == 0.0 else math.inf)
     cut = 0.0
     for k in range(ORDER, ORDER + BEYOND):
@@ -199,14 +202,16 @@ def _missing(a, w, e, s, lane):
             new += a[j, lane] * w[k - j, lane]
         w[k + 1, lane] = new * s[lane] / (k + 1)
         cut += w[k + 1, lane]
-    ratio = w[ORDER + BEYOND, lane] / w[ORDER + BEYOND - 1, lane] if w[ORDER + BEYOND - 1, lane] > 0.0 else 0.0
-    cut = cut + w[ORDER + BEYOND, lane] * ratio / (1.0 - ratio) if ratio < 0.95 else math.inf
+    # over two orders, as even and odd ones may differ
+    end, earlier = w[ORDER + BEYOND, lane] + w[ORDER + BEYOND - 1, lane], w[ORDER + BEYOND - 2, lane]
+    ratio = w[ORDER + BEYOND, lane] / earlier if earlier > 0.0 else 0.0
+    cut = cut + end * ratio / (1.0 - ratio) if ratio < 0.9 else math.inf
     return cut + s[lane] * rest * total / (ORDER + 1), rounding, total
 
 
 @kernel
 def _over(plus, minus, lane, lanes, n, delta, U, inverse, work, F):
-    """Fill F = U(1) U(-1)^-1 of lane lane; returns the bound of its entries, `delta` being that of the rows of U."""
+    """Fill F = U(1) U(-1)^-1 of lane lane; returns the bound of its rows' errors, `delta` being that of U's."""
     up = down = 0.0
     for i in range(n):
         total = other = 0.0
@@ -219,9 +224,9 @@ def _over(plus, minus, lane, lanes, n, delta, U, inverse, work, F):
     if not _invert(work, inverse, n) or not math.isfinite(delta):
         F[:] = math.nan
         return math.inf
-    widest = left = tall = 0.0
+    broad = left = tall = 0.0
     for i in range(n):
-        row = 0.0
+        row = of_inverse = of_rest = 0.0
         for j in range(n):
             sum_of, residual = 0.0, (-1.0 if i == j else 0.0)
             for k in range(n):
@@ -229,11 +234,11 @@ def _over(plus, minus, lane, lanes, n, delta, U, inverse, work, F):
                 residual += U[i, k] * inverse[k, j]
             F[i, j] = sum_of
             row += abs(sum_of)
-            left = max(left, abs(residual))
-            widest = max(widest, abs(inverse[i, j]))
-        tall = max(tall, row)
+            of_rest += abs(residual)
+            of_inverse += abs(inverse[i, j])
+        tall, left, broad = max(tall, row), max(left, of_rest), max(broad, of_inverse)
     rounding = (n + 2.0) * ROUNDOFF_UP * (up + tall * down)
-    return widest * (delta * (1.0 + tall) + rounding) + tall * left
+    return broad * (delta * (1.0 + tall) + rounding) + tall * left
 
 
 @kernel
@@ -265,13 +270,25 @@ def _invert(work, inverse, n):
 
 
 @kernel
-def column_sums(A, out):
-    """Fill out (n) with the sums of the moduli in the columns of A (n, n)."""
+def column_tops(A, out):
+    """Fill out (n) with the largest moduli in the columns of A (n, n)."""
     for c in range(len(A)):
-        total = 0.0
+        top = 0.0
         for j in range(len(A)):
+            top = max(top, abs(A[j, c]))
+        out[c] = top
+
+
+@kernel
+def row_norm(A):
+    """The largest sum of the moduli in a row of A (n, n)."""
+    norm = 0.0
+    for j in range(len(A)):
+        total = 0.0
+        for c in range(len(A)):
             total += abs(A[j, c])
-        out[c] = total
+        norm = max(norm, total)
+    return norm
 
 
 @kernel
@@ -316,27 +333,25 @@ def copy(A, out):
 def products(F, error, doubt, first, n, M, E, R):
     """Fill M (N, n, n), the product of the steps first[i] to first[i + 1] of each point, and bounds E of its entries.
 
-    To first order the error is the sum over the steps of (F_last ... F_k+1) d_k (F_k-1 ... F_1), |d_k| <= error[k] in
-    every entry; `doubt` bounds the relative size of what is left out. R is the part of E that multiplying leaves.
+    To first order the error is the sum over the steps of (F_last ... F_k+1) d_k (F_k-1 ... F_1), the sums of |d_k| in
+    a row being error[k] at most; `doubt` bounds the relative size of what is left out. R is the part of E that
+    multiplying leaves.
     """
     longest = 0
     for i in range(len(M)):
         longest = max(longest, first[i + 1] - first[i])
-    before, rounding = np.empty((longest + 1, n)), np.empty(longest + 1)  # sums of the columns of |F_k-1 ... F_1|
+    before, rounding = np.empty((longest + 1, n)), np.empty(longest + 1)  # the largest in columns of |F_k-1 ... F_1|
     A, B = np.empty((n, n)), np.empty((n, n))
     for i in range(len(M)):
         steps = first[i + 1] - first[i]
         set_identity(A)
         more = 0.0
         for k in range(steps):
-            step, largest = F[first[i] + k], 0.0
-            for j in range(n):
-                for c in range(n):
-                    largest = max(largest, abs(step[j, c]))
-            column_sums(A, before[k])
+            step = F[first[i] + k]
+            column_tops(A, before[k])
             multiply(step, A, 0.0, B)
             A, B = B, A
-            rounding[k] = n * ROUNDOFF_UP * largest
+            rounding[k] = n * ROUNDOFF_UP * row_norm(step)
             more += doubt[first[i] + k]
         copy(A, M[i])
         E[i] = 0.0
@@ -370,7 +385,7 @@ def carried(F, error, doubt, first, which, n, V, W, B):
         copy(V[i], A)
         more = 0.0
         for k in range(first[i + 1] - first[i]):
-            column_sums(A, before[k])
+            column_tops(A, before[k])
             multiply(F[first[i] + k], A, 0.0j, Z)
             A, Z = Z, A
             more += doubt[first[i] + k]
@@ -396,7 +411,7 @@ def gradients(F, error, doubt, first, B, out):
     n, K, longest = F.shape[1], B.shape[1], 0
     for i in range(len(B)):
         longest = max(longest, first[i + 1] - first[i])
-    before, sums = np.empty((longest + 1, n, n)), np.empty(n)
+    before, tops = np.empty((longest + 1, n, n)), np.empty(n)
     A, Z = np.empty((n, n)), np.empty((n, n))
     for i in range(len(B)):
         steps, more = first[i + 1] - first[i], 0.0
@@ -409,17 +424,16 @@ def gradients(F, error, doubt, first, B, out):
             A[:] = B[i, q]
             for k in range(steps - 1, -1, -1):
                 # A is B L
-                step, own, largest, total, rounded = F[first[i] + k], error[first[i] + k], 0.0, 0.0, 0.0
+                step, total, rounded = F[first[i] + k], 0.0, 0.0
                 multiply(before[k], A, 0.0, Z)
-                column_sums(before[k], sums)
-                for j in range(n):
-                    row = 0.0
-                    for c in range(n):
-                        total += abs(Z[j, c])
-                        row += abs(A[j, c])
-                        largest = max(largest, abs(step[j, c]))
-                    rounded += row * sums[j]
-                out[i, q] += own * total + n * ROUNDOFF_UP * largest * rounded
+                column_tops(before[k], tops)
+                for c in range(n):
+                    largest = 0.0
+                    for j in range(n):
+                        largest = max(largest, abs(Z[j, c]))
+                        rounded += abs(A[j, c]) * tops[j]
+                    total += largest
+                out[i, q] += error[first[i] + k] * total + n * ROUNDOFF_UP * row_norm(step) * rounded
                 multiply(A, step, 0.0, Z)
                 A[:] = Z
             out[i, q] *= math.exp(min(2.0 * more, 700.0)) * (1.0 + 1e-9)

@@ -84,21 +84,23 @@ def segments(rung, top, order, rows, on_rung, starts):
 
 
 @kernel
-def measure(results, squares, rule, wanted, rtol, full_period, overflow, floats, verdict, missed, status):
-    """What follows from `results` (N, RESULTS) by arithmetic: `floats` (14, N), `verdict`, who has `missed` `rtol`.
+def measure(first, results, squares, rule, wanted, rtol, full_period, overflow, floats, verdict, missed, status):
+    """What follows from `results` (n, RESULTS) of n of N points, from the `first` on, by arithmetic: `floats` (14, N),
+    `verdict`, who has `missed` `rtol`.
 
     Points whose `status` is not 0 are skipped; those that leave the range of floats get the status `overflow`.
     `rule` (N, or empty) holds what exact rules say, `wanted` (7) which columns count for `missed`; `full_period` as in
-    `_squares`; `squares` (N, 4, or empty) holds what it finds, where more digits of it are known.
+    `_squares`; `squares` (n, 4, or empty) holds what it finds, where more digits of it are known.
     """
-    for i in range(len(results)):
+    for row in range(len(results)):
+        i = first + row
         missed[i] = False
         verdict[i] = UNDECIDED
         if status[i] != 0:
             for c in range(len(floats)):
                 floats[c, i] = np.nan
             continue
-        sine, sine_bar, cosine, cosine_bar = _squares(results[i], squares, i, full_period)
+        sine, sine_bar, cosine, cosine_bar = _squares(results[row], squares, row, full_period)
         decided = decide(sine, sine_bar, cosine, cosine_bar, rule[i] if len(rule) > 0 else NO_RULE)
         # D from 2 - 4 sin^2 or 4 cos^2 - 2, whichever has the smaller bar.
         by_sine = sine_bar <= cosine_bar
@@ -108,7 +110,7 @@ def measure(results, squares, rule, wanted, rtol, full_period, overflow, floats,
             d, bar = 2.0 if d > 0.0 else -2.0, 0.0
         within = isfinite(d) and bar < LARGEST
         for c in range(4):
-            within &= results[i, lanes.Y1_BAR + c] < LARGEST
+            within &= results[row, lanes.Y1_BAR + c] < LARGEST
         if not within:
             status[i] = overflow
             for c in range(len(floats)):
@@ -120,7 +122,7 @@ def measure(results, squares, rule, wanted, rtol, full_period, overflow, floats,
             floats[DISCRIMINANT, i], floats[DISCRIMINANT + 1, i] = d, bar
             wide |= not bar <= rtol * (1.0 + abs(d))
         for c in range(4):
-            at, value, bar = FACTOR_ROWS[c], results[i, lanes.Y1 + c], results[i, lanes.Y1_BAR + c]
+            at, value, bar = FACTOR_ROWS[c], results[row, lanes.Y1 + c], results[row, lanes.Y1_BAR + c]
             if wanted[at // 2]:
                 floats[at, i], floats[at + 1, i] = value, bar
                 wide |= not bar <= rtol * (1.0 + abs(value))
@@ -128,27 +130,28 @@ def measure(results, squares, rule, wanted, rtol, full_period, overflow, floats,
 
 
 @kernel
-def transcendental(results, squares, wanted, rtol, full_period, floats, verdict, missed, status):
+def transcendental(first, results, squares, wanted, rtol, full_period, floats, verdict, missed, status):
     """The columns of `measure` that are no arithmetic: exponent and rotation number, if wanted, and who misses."""
-    for i in range(len(results)):
+    for row in range(len(results)):
+        i = first + row
         if status[i] != 0:
             continue
-        sine, sine_bar, cosine, cosine_bar = _squares(results[i], squares, i, full_period)
+        sine, sine_bar, cosine, cosine_bar = _squares(results[row], squares, row, full_period)
         if wanted[EXPONENT // 2]:
             by_sine = sine < cosine
             growth, bar = -sine if by_sine else -cosine, sine_bar if by_sine else cosine_bar
             missed[i] |= _grows(growth, bar, rtol, floats[:, i], verdict[i])
         if wanted[ROTATION // 2]:
-            zeros, doubt = results[i, lanes.Y1_ZEROS] + results[i, lanes.Y2_ZEROS], 0.0
+            zeros, doubt = results[row, lanes.Y1_ZEROS] + results[row, lanes.Y2_ZEROS], 0.0
             if full_period:  # where y2's last zero may lie on either side of T: sin^2 of the angle is at most -y1' y2
-                zeros, bar = results[i, lanes.Y2_ZEROS], results[i, lanes.Y2_BAR]
-                if abs(results[i, lanes.Y2]) <= bar:
-                    doubt = min(bar * (abs(results[i, lanes.DY1]) + results[i, lanes.DY1_BAR]), 1.0)
+                zeros, bar = results[row, lanes.Y2_ZEROS], results[row, lanes.Y2_BAR]
+                if abs(results[row, lanes.Y2]) <= bar:
+                    doubt = min(bar * (abs(results[row, lanes.DY1]) + results[row, lanes.DY1_BAR]), 1.0)
             x, bar = _rotation(sine, sine_bar, cosine, cosine_bar, verdict[i], zeros)
             bar += sqrt(doubt) if verdict[i] != UNSTABLE else 0.0
             if not full_period:  # a zero next to T/2 may be miscounted where the other product's sign leaves it open
-                lost1 = abs(results[i, lanes.Y1]) <= results[i, lanes.Y1_BAR] and not sine > sine_bar
-                lost2 = abs(results[i, lanes.Y2]) <= results[i, lanes.Y2_BAR] and not cosine > cosine_bar
+                lost1 = abs(results[row, lanes.Y1]) <= results[row, lanes.Y1_BAR] and not sine > sine_bar
+                lost2 = abs(results[row, lanes.Y2]) <= results[row, lanes.Y2_BAR] and not cosine > cosine_bar
                 bar += 0.5 * lost1 + 0.5 * lost2
             floats[ROTATION, i], floats[ROTATION + 1, i] = x, bar
             missed[i] |= not bar <= rtol * (1.0 + x)

@@ -2,7 +2,7 @@
 
 A row is `rows[r]` = (k, k', half period, oblate, given, which): for rotations k > 1 and k' is the complement of 1/k;
 `given` is the parameter of this row that is known exactly, and `which` says which one it is.
-`scenes/satellite.md`, section 1: z = (rho + w)^2 + g with g = dn^2 (PL), -k^2 sn^2 (OL), cn^2 (PR),
+`scenes/satellite.md`: The equation: z = (rho + w)^2 + g with g = dn^2 (PL), -k^2 sn^2 (OL), cn^2 (PR),
 -sn^2 (OR): no cancelling constant.
 """
 

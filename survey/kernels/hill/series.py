@@ -1,10 +1,12 @@
-"""Discriminants of many rows from their Chebyshev series: rows share nothing, lanes of a row share their coefficients.
+"""Discriminants, or factors, of many rows from their Chebyshev series: rows share nothing, lanes of a row share their
+coefficients.
 
 Source: J. C. Mason, D. C. Handscomb, Chebyshev Polynomials (2003), 2.4.1.
 """
 
 import numpy as np
 
+from survey.kernels import lanes
 from survey.kernels.hill.answers import STABLE, UNDECIDED, UNSTABLE
 from survey.kernels.jit import kernel, splice
 
@@ -72,3 +74,137 @@ def _decide(d, bar, floats, rtol, verdict, missed):
     if not bar <= rtol:
         for i in range(len(verdict)):
             missed[i] |= not bar <= rtol * (1.0 + abs(d[i]))
+
+
+@splice
+def _table(x, even, odd, tile):
+    """T_k at x (or of y = 2 x^2 - 1 if `even`; T_{2k + 1} if `odd`) in the first lanes of the rows of `tile`."""
+    for i in range(len(x)):
+        y = 2.0 * x[i] * x[i] - 1.0 if even or odd else x[i]
+        tile[0, i] = x[i] if odd else 1.0
+        tile[1, i] = (2.0 * y - 1.0) * x[i] if odd else y
+    for k in range(2, len(tile)):
+        for i in range(len(x)):
+            y = 2.0 * x[i] * x[i] - 1.0 if even or odd else x[i]
+            tile[k, i] = 2.0 * y * tile[k - 1, i] - tile[k - 2, i]
+
+
+@kernel
+def factors(coefficients, bars, x, even, turns, left, right, share, full_period, results):
+    """The results (R x, RESULTS) of R rows at x: y1, y1', y2, y2' from their series `coefficients` (4, R, terms) within
+    `bars` (4, R); if `even`, from those of (y1 + y2') / 2, y1', y2 and, odd, (y1 - y2') / 2.
+
+    The numbers of zeros follow from `turns` (5, R, nodes), rotation numbers, and the least and the largest number of
+    zeros of y1 and of y2, at the nodes `left` and `right` of x, `share` of the way between; NaN where they do not tell.
+    """
+    _, rows, terms = coefficients.shape
+    table, odd, sums = np.empty((terms, TILE)), np.empty((terms, TILE)), np.empty((4, TILE))
+    for start in range(0, len(x), TILE):
+        count = min(TILE, len(x) - start)
+        _table(x[start : start + count], even, False, table)
+        if even:
+            _table(x[start : start + count], even, True, odd)
+        for j in range(rows):
+            for f in range(4):
+                _sum(coefficients[f, j], odd if even and f == 3 else table, sums[f], count)
+            y1_bar, dy2_bar = bars[0, j], bars[3, j]
+            if even:
+                y1_bar = dy2_bar = y1_bar + dy2_bar
+                for i in range(count):
+                    sums[0, i], sums[3, i] = sums[0, i] + sums[3, i], sums[0, i] - sums[3, i]
+            for i in range(count):
+                own = results[j * len(x) + start + i]
+                for f in range(4):
+                    own[lanes.Y1 + f] = sums[f, i]
+                own[lanes.Y1_BAR], own[lanes.DY1_BAR] = y1_bar, bars[1, j]
+                own[lanes.Y2_BAR], own[lanes.DY2_BAR] = bars[2, j], dy2_bar
+                one, other = left[start + i], right[start + i]
+                near = turns[0, j, one] + share[start + i] * (turns[0, j, other] - turns[0, j, one])
+                _count(
+                    own, even and x[start + i] < 0.0, full_period, near, one == other,
+                    min(turns[1, j, one], turns[1, j, other]), max(turns[2, j, one], turns[2, j, other]),
+                    min(turns[3, j, one], turns[3, j, other]), max(turns[4, j, one], turns[4, j, other]),
+                )  # fmt: skip
+
+
+@kernel
+def points(coefficients, number, bars, x, even, scale, turns, nodes, share, full_period, results):
+    """As `factors` at points on their own, x (2, N) across and along the rows, from series `coefficients` (4, terms
+    along, terms across) of a panel within `bars` (4); the last of the four is multiplied by `scale` (N). Only the first
+    `number` (4, terms along) of the terms across count.
+
+    `nodes` (4, N) are the two nodes across the rows, and the two along them, around each point, `share` (2, N) of the
+    way between, and `turns` (5, nodes across, nodes along).
+    """
+    _, terms, across = coefficients.shape
+    table, odd, rows = np.empty((terms, TILE)), np.empty((terms, TILE)), np.empty((across, TILE))
+    sums, part = np.empty((4, TILE)), np.empty(TILE)
+    for start in range(0, x.shape[1], TILE):
+        count = min(TILE, x.shape[1] - start)
+        _table(x[0, start : start + count], False, False, rows)
+        _table(x[1, start : start + count], even, False, table)
+        if even:
+            _table(x[1, start : start + count], even, True, odd)
+        for f in range(4):
+            for i in range(count):
+                sums[f, i] = 0.0
+            for k in range(terms):
+                if number[f, k] == 0:
+                    continue
+                _sum(coefficients[f, k, : number[f, k]], rows, part, count)
+                along = odd[k] if even and f == 3 else table[k]
+                for i in range(count):
+                    sums[f, i] += along[i] * part[i]
+        for i in range(count):
+            own, at = results[start + i], start + i
+            y1, dy2, y1_bar, dy2_bar = sums[0, i], sums[3, i], bars[0], bars[3]
+            if even:
+                dy2_bar = y1_bar = y1_bar + dy2_bar * scale[at]
+                y1, dy2 = y1 + dy2 * scale[at], y1 - dy2 * scale[at]
+            own[lanes.Y1], own[lanes.DY1], own[lanes.Y2], own[lanes.DY2] = y1, sums[1, i], sums[2, i], dy2
+            own[lanes.Y1_BAR], own[lanes.DY1_BAR] = y1_bar, bars[1]
+            own[lanes.Y2_BAR], own[lanes.DY2_BAR] = bars[2], dy2_bar
+            a, b, c, d = nodes[0, at], nodes[1, at], nodes[2, at], nodes[3, at]
+            low = turns[0, a, c] + share[0, at] * (turns[0, b, c] - turns[0, a, c])
+            high = turns[0, a, d] + share[0, at] * (turns[0, b, d] - turns[0, a, d])
+            _count(
+                own, even and x[1, at] < 0.0, full_period, low + share[1, at] * (high - low), c == d,
+                min(min(turns[1, a, c], turns[1, b, c]), min(turns[1, a, d], turns[1, b, d])),
+                max(max(turns[2, a, c], turns[2, b, c]), max(turns[2, a, d], turns[2, b, d])),
+                min(min(turns[3, a, c], turns[3, b, c]), min(turns[3, a, d], turns[3, b, d])),
+                max(max(turns[4, a, c], turns[4, b, c]), max(turns[4, a, d], turns[4, b, d])),
+            )  # fmt: skip
+
+
+@splice
+def _count(own, mirrored, full_period, near, beyond, m_low, m_high, d_low, d_high):
+    """Numbers of zeros, NaN where they are not known: between these of y1, and of y2, at nodes around the point, or
+    `beyond` the last. `near` is the rotation number between those of nodes.
+
+    A point -p, `mirrored`, has the rotation number of p, whose y1 is the y2' of -p.
+    """
+    y1, m = own[lanes.DY2] if mirrored else own[lanes.Y1], 0.0
+    if not full_period:
+        m = _zeros(m_low, m_high, y1 < 0.0)
+    d = _zeros(d_low, d_high, own[lanes.Y2] < 0.0)
+    if beyond and not full_period:  # one of the two may have changed
+        if m != m:
+            m = _nearest(2.0 * near - 0.5 - d, y1 < 0.0)
+        elif d != d:
+            d = _nearest(2.0 * near - 0.5 - m, own[lanes.Y2] < 0.0)
+    known = abs(m + d + 0.5 - 2.0 * near) <= 1.0 and not (mirrored and abs(y1) <= own[lanes.Y1_BAR])
+    own[lanes.Y1_ZEROS], own[lanes.Y2_ZEROS] = (m, d) if known else (np.nan, np.nan)
+
+
+@splice
+def _nearest(x, odd):
+    """The odd, or even, number nearest to x."""
+    parity = 1.0 if odd else 0.0
+    return parity + 2.0 * np.floor(0.5 * (x - parity) + 0.5)
+
+
+@splice
+def _zeros(low, high, odd):
+    """The number from `low` to `high`, which differ by 1 at most, that is odd or even; else NaN."""
+    value = low if (low % 2.0 == 1.0) == odd else low + 1.0
+    return value if value <= high and high - low <= 1.0 else np.nan

@@ -3,7 +3,7 @@
 Each form is numerator(v) / common * product of FORM_FACTORS ** powers, with u = omega1^2 = 1 - v, x = u v, s = u - v:
 the coefficients of orders 4 and 6, their combinations a20, a11, a02 of (3.10), and D4, D6, which are the forms N and
 M of (1.4), (3.14) at (omega2, omega1, 0). For their origin, and how far they are proved, see
-`scenes/libration.md`, section 3; the combinations follow from the coefficients by exact algebra.
+`scenes/libration.md`; the combinations follow from the coefficients by exact algebra.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """Danby's problem in lanes: the monodromy of the elliptic triangular points over half a period, and its factors.
 
 In the true anomaly f, with r(f) = 1 / (1 + e cos f), rotated axes and the state (x, q, p, m) = (xi, eta' + xi,
-xi' - eta, -eta) (`scenes/libration_elliptic.md`, section 2):
+xi' - eta, -eta) (`scenes/libration_elliptic.md`):
 
     x' = p - m      m' = x - q      q' = -x' - d2 r m      p' = -m' + d1 r x
 

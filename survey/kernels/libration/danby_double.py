@@ -15,7 +15,7 @@ from math import asinh, ceil, sinh, sqrt
 
 import numpy as np
 
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.libration.traces import INVARIANTS, A, C, D, T
 from survey.kernels.math import double as dd
 from survey.kernels.math.roundoff import PAIR_ROUNDOFF
@@ -27,7 +27,16 @@ RATIO = 0.3  # half a step over the distance to the nearest singularity: i, or i
 # Of a coefficient, relative to its terms: two products and sums, and what their constants miss; of a sum of products.
 ROUNDING, PRODUCT = 20.0 * PAIR_ROUNDOFF, 6.0 * PAIR_ROUNDOFF
 MARGIN = 1.01  # for what is of second order in the bars
-X, G, K, M = range(4)
+# Lanes are the columns of so many points. The working table is flat, rows of lanes one after the other, so that LLVM
+# sees how far apart they are: of a step the constants of x and m (TURN), of g and k (RATE); of series x, g, k, m the
+# last coefficient a_n (NOW), c_n = n a_n (SCALED), c_(n-1) (BEFORE) and the sums over both parities, all of them pairs;
+# bounds of the errors of a_n, c_n, c_(n-1) and of the sums; 1 while a series goes on.
+COLUMNS, POINTS = 4, 4
+LANES = COLUMNS * POINTS
+TURN, TURN_1, TURN_2, RATE_G, RATE_K, RATE_1, RATE_2, NOW = range(0, 16 * LANES, 2 * LANES)
+X, G, K, M, _SERIES = range(0, 10 * LANES, 2 * LANES)
+SCALED, BEFORE, SUM, OTHER, OFF, SCALED_OFF, BEFORE_OFF, BOUND, TAIL, LIVE = (NOW + i * _SERIES for i in range(1, 11))
+SIZE = LIVE + LANES
 # Columns A to T of `traces` are leading parts; LOW columns further on follows what rounding left of them, and BARS
 # further on the bounds of their errors.
 LOW, BARS, RESULTS = INVARIANTS, 2 * INVARIANTS, 3 * INVARIANTS
@@ -44,29 +53,63 @@ def rates(mu, out):
 
 
 @kernel
-def chain(e, both, out):
-    """Fill `out` (N, RESULTS) for points e (N) with their rates `both` (N, 4)."""
-    series, errors = np.zeros((4, 2, ORDERS + 2)), np.zeros((4, ORDERS + 2))
-    ends, doubt = np.zeros((2, 2, 4, 4)), np.zeros((2, 4, 4))
-    step, composed = np.zeros((2, 4, 4)), np.zeros((2, 4, 4))
-    off, constants = np.zeros((4, 4)), np.zeros((2, 3, 4))
+def shapes(e, out):
+    """1 + e and 1 - e as pairs, (N, 4)."""
     for i in range(len(e)):
-        composed[:], spread, steps = 0.0, np.zeros((4, 4)), 0
-        for j in range(4):
-            composed[0, j, j] = 1.0
+        out[i, 0], out[i, 1] = dd.two_sum(1.0, e[i])
+        out[i, 2], out[i, 3] = dd.two_sum(1.0, -e[i])
+
+
+@kernel
+def chain(shapes, rates, out):
+    """Fill `out` (N, RESULTS) for points with their `shapes` and `rates` (N, 4 each).
+
+    Neighbours with as many steps go together; the bits of a point do not depend on them.
+    """
+    work = np.zeros(SIZE)
+    ends, doubt = np.zeros((2, 2, 4, 4)), np.zeros((2, 4, 4))
+    step, off = np.zeros((2, 4, 4)), np.zeros((4, 4))
+    composed, spread = np.zeros((POINTS, 2, 4, 4)), np.zeros((POINTS, 4, 4))
+    first = 0
+    while first < len(out):
+        numbers = steps_of(1.0), steps_of(nearest(shapes[first]))
+        count = 1
+        while count < POINTS and first + count < len(out):
+            if steps_of(nearest(shapes[first + count])) != numbers[1]:
+                break
+            count += 1
+        for i in range(POINTS):
+            for j in range(4):
+                for k in range(4):
+                    composed[i, 0, j, k] = 1.0 if j == k else 0.0
+                    composed[i, 1, j, k] = spread[i, j, k] = 0.0
         for part in range(2):
-            side = 1.0 - 2.0 * part
-            near = sqrt((1.0 - e[i]) / (1.0 + e[i])) if part else 1.0
-            number = ceil(asinh(1.0 / near) / (2.0 * RATIO))
-            for n in range(number):
-                left, right = step_end(n, number, near, part), step_end(n + 1, number, near, part)
-                prepare(left, right, dd.two_sum(1.0, side * e[i]), dd.two_sum(1.0, -side * e[i]), both[i], constants)
-                for c in range(4):
-                    column(c, constants, series, errors, ends, doubt)
-                propagator(ends, doubt, step, off)
-                advance(step, off, composed, spread)
-            steps += number
-        finish(composed, spread, steps, out[i])
+            for n in range(numbers[part]):
+                for i in range(POINTS):
+                    at = first + min(i, count - 1)
+                    near = nearest(shapes[at]) if part else 1.0
+                    left, right = step_end(n, numbers[part], near, part), step_end(n + 1, numbers[part], near, part)
+                    prepare(left, right, shapes[at], part, rates[at], work, COLUMNS * i)
+                columns(work)
+                for i in range(count):
+                    collect(work, COLUMNS * i, ends, doubt)
+                    propagator(ends, doubt, step, off)
+                    advance(step, off, composed[i], spread[i])
+        for i in range(count):
+            finish(composed[i], spread[i], numbers[0] + numbers[1], out[first + i])
+        first += count
+
+
+@inline
+def nearest(shape):
+    """How far off u = 0 the singularities of the second part are."""
+    return sqrt(shape[2] / shape[0])
+
+
+@inline
+def steps_of(near):
+    """The number of steps of a part whose singularities are `near`."""
+    return ceil(asinh(1.0 / near) / (2.0 * RATIO))
 
 
 @inline
@@ -78,91 +121,115 @@ def step_end(n, number, near, part):
 
 
 @inline
-def prepare(left, right, b0, b2, both, constants):
-    """The constants of a step in z, u = middle + half z: of each series that of its driver, and those of z and z^2."""
+def pair(work, at):
+    return work[at], work[at + LANES]
+
+
+@inline
+def put(work, at, number):
+    work[at], work[at + LANES] = number
+
+
+@kernel
+def prepare(left, right, shape, part, rates, work, lane):
+    """The constants of a step in z, u = middle + half z, and the first coefficients, in the lanes of one point."""
+    more, less = (shape[0], shape[1]), (shape[2], shape[3])
+    b0, b2 = (less, more) if part else (more, less)
     middle, half = dd.scaled(dd.two_sum(left, right), 0.5), dd.scaled(dd.two_sum(right, -left), 0.5)
     square, linear, last = dd.square(middle), dd.scaled(dd.mul(middle, half), 2.0), dd.square(half)
     a0, c0 = dd.shifted(square, 1.0), dd.add(b0, dd.mul(b2, square))
-    turn, by_r = dd.scaled(dd.div(half, a0), 2.0), dd.scaled(dd.div(half, c0), 2.0)
-    for i in (X, M):
-        store(constants, 0, i, turn)
-        store(constants, 1, i, dd.div(linear, a0))
-        store(constants, 2, i, dd.div(last, a0))
-    for i in (G, K):
-        rate = (both[0], both[1]) if i == K else (-both[2], -both[3])
-        store(constants, 0, i, dd.mul(by_r, rate))
-        store(constants, 1, i, dd.div(dd.mul(b2, linear), c0))
-        store(constants, 2, i, dd.div(dd.mul(b2, last), c0))
+    by_r = dd.scaled(dd.div(half, c0), 2.0)
+    put(work, TURN + lane, dd.scaled(dd.div(half, a0), 2.0))
+    put(work, TURN_1 + lane, dd.div(linear, a0))
+    put(work, TURN_2 + lane, dd.div(last, a0))
+    put(work, RATE_G + lane, dd.mul(by_r, (-rates[2], -rates[3])))
+    put(work, RATE_K + lane, dd.mul(by_r, (rates[0], rates[1])))
+    put(work, RATE_1 + lane, dd.div(dd.mul(b2, linear), c0))
+    put(work, RATE_2 + lane, dd.div(dd.mul(b2, last), c0))
+    for c in range(lane, lane + COLUMNS):
+        for row in range(0, NOW, LANES):
+            work[row + c] = work[row + lane]
+        for row in range(NOW, SIZE, LANES):
+            work[row + c] = 0.0
+        work[LIVE + c] = 1.0
+    # the columns start with x, q, p or m = 1: g = q + x, k = p + m
+    for at in (NOW + lane, SUM + lane):
+        work[at + X] = work[at + G] = work[at + G + 1] = 1.0
+        work[at + K + 2] = work[at + K + 3] = work[at + M + 3] = 1.0
 
 
-@inline
-def store(constants, row, i, number):
-    constants[0, row, i], constants[1, row, i] = number
-
-
-@inline
-def column(c, constants, series, errors, ends, doubt):
-    """Column c of the propagators from a step's middle to its ends (1, -1), and bounds of its errors.
-
-    Entry n + 1 of a series is its n-th coefficient, entry 0 that of -1.
-    """
-    series[:, :, 1], errors[:, 1] = 0.0, 0.0
-    series[X, 0, 1], series[G, 0, 1] = 1.0 * (c == 0), 1.0 * (c < 2)
-    series[K, 0, 1], series[M, 0, 1] = 1.0 * (c > 1), 1.0 * (c == 3)
-    last = ORDERS
-    for n in range(ORDERS):
-        for i in range(4):
-            follow(i, n, constants, series, errors)
-        if n > FIRST and max(np.abs(series[:, 0, n + 1]).max(), np.abs(series[:, 0, n + 2]).max()) < SMALL:
-            last = n + 1
+@kernel
+def columns(work):
+    """All series from a step's middle: sums of even orders in SUM, of odd ones in OTHER, and bounds of their errors."""
+    for n in range(0, ORDERS, 2):
+        extend(work, n)
+        extend(work, n + 1)
+        live = 0.0
+        for i in range(LANES):
+            live += work[LIVE + i]
+        if live == 0.0:
             break
-    sums(series, errors, last, c, ends, doubt)
 
 
-@inline
-def follow(i, n, constants, series, errors):
-    """Coefficient n + 1 of series i, and its bound: (rate driver - c1 n a_n - c2 (n - 1) a_(n-1)) / (n + 1)."""
-    first, other = (X, G) if i == M else (K, M) if i == X else (X, X) if i == K else (M, M)
-    two = 2.0 if i == M else 1.0
-    driver = dd.scaled((series[first, 0, n + 1], series[first, 1, n + 1]), two)
-    size, error = abs(driver[0]), two * errors[first, n + 1]
-    if first != other:
-        less = 3.0 - two
-        driver = dd.sub(driver, dd.scaled((series[other, 0, n + 1], series[other, 1, n + 1]), less))
-        size, error = size + less * abs(series[other, 0, n + 1]), error + less * errors[other, n + 1]
-    now, before = (series[i, 0, n + 1], series[i, 1, n + 1]), (series[i, 0, n], series[i, 1, n])
-    rate, one = (constants[0, 0, i], constants[1, 0, i]), (constants[0, 1, i], constants[1, 1, i])
-    s = dd.sub(dd.mul(rate, driver), dd.times(dd.mul(one, now), float(n)))
-    s = dd.sub(s, dd.times(dd.mul((constants[0, 2, i], constants[1, 2, i]), before), n - 1.0))
-    series[i, 0, n + 2], series[i, 1, n + 2] = dd.over(s, n + 1.0)
-    bound = abs(rate[0]) * (error + ROUNDING * size) + abs(one[0]) * n * (errors[i, n + 1] + ROUNDING * abs(now[0]))
-    bound += abs(constants[0, 2, i] * (n - 1.0)) * (errors[i, n] + ROUNDING * abs(before[0]))
-    errors[i, n + 2] = bound / (n + 1.0)
+@kernel
+def extend(work, n):
+    """Coefficient n + 1 of all series; the sum over its parity and the other one change places."""
+    least = SMALL if n > FIRST else 0.0
+    for i in range(LANES):
+        x, g, k, m = pair(work, NOW + X + i), pair(work, NOW + G + i), pair(work, NOW + K + i), pair(work, NOW + M + i)
+        off_x, off_g, off_k, off_m = work[OFF + X + i], work[OFF + G + i], work[OFF + K + i], work[OFF + M + i]
+        by_x = dd.loose(k, (-2.0 * m[0], -2.0 * m[1]))
+        by_m = dd.loose((2.0 * x[0], 2.0 * x[1]), (-g[0], -g[1]))
+        doubt_x = off_k + 2.0 * off_m + ROUNDING * (abs(k[0]) + 2.0 * abs(m[0]))
+        doubt_m = 2.0 * off_x + off_g + ROUNDING * (2.0 * abs(x[0]) + abs(g[0]))
+        follow(work, i, X, n, by_x, doubt_x, TURN, TURN_1, TURN_2)
+        follow(work, i, M, n, by_m, doubt_m, TURN, TURN_1, TURN_2)
+        follow(work, i, G, n, m, off_m + ROUNDING * abs(m[0]), RATE_G, RATE_1, RATE_2)
+        follow(work, i, K, n, x, off_x + ROUNDING * abs(x[0]), RATE_K, RATE_1, RATE_2)
+        last = (abs(x[0]) + abs(g[0])) + (abs(k[0]) + abs(m[0]))
+        last += (abs(work[NOW + X + i]) + abs(work[NOW + G + i])) + (abs(work[NOW + K + i]) + abs(work[NOW + M + i]))
+        work[LIVE + i] = 0.0 if last < least else work[LIVE + i]
 
 
-@inline
-def sums(series, errors, last, c, ends, doubt):
-    """The series x, g, k, m at 1 and -1, then q = g - x and p = k - m: column c of `ends` and of `doubt`."""
-    for i in range(4):
-        both, bound = np.zeros((2, 2)), SMALL
-        for n in range(last, -1, -1):
-            s = dd.add((both[n % 2, 0], both[n % 2, 1]), (series[i, 0, n + 1], series[i, 1, n + 1]))
-            both[n % 2, 0], both[n % 2, 1] = s
-            bound += errors[i, n + 1] + PAIR_ROUNDOFF * abs(s[0])
-        even, odd = (both[0, 0], both[0, 1]), (both[1, 0], both[1, 1])
-        # each coefficient that follows is less than half of that before
-        bound += 2.0 * (abs(series[i, 0, last + 1]) + abs(series[i, 0, last])) + PAIR_ROUNDOFF * (
-            abs(even[0]) + abs(odd[0])
-        )
-        ends[0, 0, i, c], ends[0, 1, i, c] = dd.add(even, odd)
-        ends[1, 0, i, c], ends[1, 1, i, c] = dd.sub(even, odd)
-        doubt[0, i, c] = doubt[1, i, c] = bound
-    for side in range(2):
-        for i in (G, K):
-            other = X if i == G else M
-            s = dd.sub((ends[side, 0, i, c], ends[side, 1, i, c]), (ends[side, 0, other, c], ends[side, 1, other, c]))
-            ends[side, 0, i, c], ends[side, 1, i, c] = s
-            doubt[side, i, c] += doubt[side, other, c] + PAIR_ROUNDOFF * abs(s[0])
+@splice
+def follow(work, i, row, n, driver, doubt, rate, one, two):
+    """a_(n+1) of the series `row`: (n + 1) a_(n+1) = c_(n+1) = rate driver - one c_n - two c_(n-1), and its bound."""
+    r, p, q = pair(work, rate + i), pair(work, one + i), pair(work, two + i)
+    at = row + i
+    c, b, live = pair(work, SCALED + at), pair(work, BEFORE + at), work[LIVE + i]
+    new = dd.sum_of_products(r, driver, p, (-c[0], -c[1]), q, (-b[0], -b[1]))
+    bound = abs(r[0]) * doubt + abs(p[0]) * (work[SCALED_OFF + at] + ROUNDING * abs(c[0]))
+    bound += abs(q[0]) * (work[BEFORE_OFF + at] + ROUNDING * abs(b[0]))
+    a, off = dd.over(new, n + 1.0), bound / (n + 1.0)
+    tail = 2.0 * (abs(a[0]) + abs(work[NOW + at]))  # each coefficient that follows is less than half of that before
+    work[TAIL + at] = tail if live > 0.0 else work[TAIL + at]
+    total = dd.add(pair(work, OTHER + at), (live * a[0], live * a[1]))
+    work[BOUND + at] += live * (off + PAIR_ROUNDOFF * abs(total[0]))
+    put(work, OTHER + at, pair(work, SUM + at))
+    put(work, SUM + at, total)
+    put(work, BEFORE + at, c)
+    put(work, SCALED + at, new)
+    put(work, NOW + at, a)
+    work[BEFORE_OFF + at], work[SCALED_OFF + at], work[OFF + at] = work[SCALED_OFF + at], bound, off
+
+
+@kernel
+def collect(work, lane, ends, doubt):
+    """The propagators (2, 4, 4) from the middle to the ends 1 and -1 of one point, in x, q, p, m; bounds of errors."""
+    for c in range(4):
+        for i in range(4):
+            at = lane + c + i * G
+            even, odd = pair(work, SUM + at), pair(work, OTHER + at)
+            bound = work[BOUND + at] + work[TAIL + at] + SMALL + PAIR_ROUNDOFF * (abs(even[0]) + abs(odd[0]))
+            ends[0, 0, i, c], ends[0, 1, i, c] = dd.add(even, odd)
+            ends[1, 0, i, c], ends[1, 1, i, c] = dd.sub(even, odd)
+            doubt[0, i, c] = doubt[1, i, c] = bound
+        for side in range(2):
+            for i, other in ((1, 0), (2, 3)):  # q = g - x, p = k - m
+                two = ends[side, 0, other, c], ends[side, 1, other, c]
+                s = dd.sub((ends[side, 0, i, c], ends[side, 1, i, c]), two)
+                ends[side, 0, i, c], ends[side, 1, i, c] = s
+                doubt[side, i, c] += doubt[side, other, c] + PAIR_ROUNDOFF * abs(s[0])
 
 
 @inline

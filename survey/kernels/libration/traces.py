@@ -14,6 +14,7 @@ from math import isfinite, sqrt
 import numpy as np
 
 from survey.kernels.jit import inline, kernel
+from survey.kernels.math import double as dd
 from survey.kernels.math.roundoff import EPS
 
 LARGEST = float(np.finfo(np.float32).max)  # bars are kept as float32
@@ -146,8 +147,9 @@ def dense(series, bars, rows, mu, rtol, overflow, floats, verdict, collision, mi
         for first in range(0, mu.shape[1], TILE):
             count = min(TILE, mu.shape[1] - first)
             for i in range(count):
-                m = mu[rows[r], first + i]
-                x[i] = 4.0 * sqrt(1.0 - 3.0 * m * (1.0 - m)) - 3.0
+                square = dd.shifted(dd.times(dd.square(dd.two_sum(0.5, -mu[rows[r], first + i])), 3.0), 0.25)
+                s = dd.positive_root(square)
+                x[i] = (4.0 * s[0] - 3.0) + 4.0 * s[1]  # within half an EPS
             for j in range(INVARIANTS):
                 for i in range(count):  # Clenshaw; NODES is a constant, so that the inner loop is unrolled
                     one = two = 0.0

@@ -50,6 +50,13 @@ def by_columns(n):
     return to_coefficients(np.cos(np.pi * np.arange(n)[:, None] * (2 * np.arange(n) + 1) / (2 * n))).T
 
 
+@cache
+def odd_columns(half):
+    """As `by_columns` of odd functions, from values at the first `half` nodes to the coefficients of T_{2k+1}."""
+    theta, k = np.pi * (2 * np.arange(half) + 1) / (4 * half), 2 * np.arange(half) + 1
+    return 2 / half * np.cos(theta[:, None] * k)
+
+
 def lebesgue(degree):
     """Bound of the Lebesgue constant of interpolation of this degree, or a lower one (Trefethen, theorem 15.2)."""
     return 2 / np.pi * np.log(degree + 1) + 1

@@ -117,6 +117,20 @@ def mul(a, b):
 
 
 @inline
+def sum_of_products(a, b, c, d, e, f):
+    """a b + c d + e f, within 3 PAIR_ROUNDOFF of the sum of |terms|."""
+    p, x = two_prod(a[0], b[0])
+    q, y = two_prod(c[0], d[0])
+    r, z = two_prod(e[0], f[0])
+    s, u = two_sum(p, q)
+    s, v = two_sum(s, r)
+    x += a[0] * b[1] + a[1] * b[0]
+    y += c[0] * d[1] + c[1] * d[0]
+    z += e[0] * f[1] + e[1] * f[0]
+    return two_sum(s, (u + v) + ((x + y) + z))
+
+
+@inline
 def times(a, number):
     """a times a float64."""
     p, e = two_prod(a[0], number)

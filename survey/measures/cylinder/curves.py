@@ -77,4 +77,5 @@ def closed(square, axes, fixed, options):
 
 def seconds(axes):
     """Estimated seconds on one thread of the curves on one map, measured."""
-    return 0.1 if set(axes[:2]) == set(STATE) else 10.0
+    own = set(axes[:2])
+    return 0.1 if own == set(STATE) else 10.0 if own <= set(SYSTEM) else 60.0

@@ -148,7 +148,7 @@ def found(plane):
             found = here.node(kind, place) if here else (0,) * 5
             return found[1:] if found[0] == own else np.full(4, np.nan)
 
-        return function
+        return function, TWO_PI if kind == LIBRATION else math.inf
 
     for (kind, _class), track in tracks.from_lattice(LINES, things, function_of, plane.square.grain):
         for part in track.certain():

@@ -43,7 +43,7 @@ def table(method, s, rtol):
     if s.stratum == I1:
         for row in saddles:
             for at, side in enumerate((-1.0, 1.0)):
-                reached = _level_end(s, row, side)
+                reached = level_end(s, row, side)
                 end[row, at::2], limit[row, at::2] = (EQUILIBRIUM, reached + 1) if reached >= 0 else (UNDECIDED, 0)
         return end, limit
     for first, flow in ((0, s), (2, backward(s))):
@@ -81,7 +81,7 @@ def _number(s, end, index):
     return before[end] + index + 1 if end in before and index >= 0 else 0
 
 
-def _level_end(s, row, side):
+def level_end(s, row, side):
     """b = 0: the equilibrium that the branches on this side of the saddle `row` tend to, or -1 where that is open."""
     level = Level(s.p, s.equilibria[row])
     far, turns = far_end(level, s, side)

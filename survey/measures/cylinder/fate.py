@@ -36,6 +36,7 @@ MOST_OF_PROGRAM = 16  # equilibria
 UNKNOWN, NO_ENDS = 21, 22  # as in the STATUS of scenes/gyrostat.py and of request/abel_scene.py
 COARSEST = 1e-9  # rtol: with wider bars more fates stay open, and to decide these costs more than smaller steps
 LEAST = 1e-6  # slowest rotation of the lattice, in velocities of the system
+COLUMNS_OF = {"verdict": rc.VERDICT, "turnings": rc.TURNINGS, "net_turns": rc.NET_TURNS, "status": rc.STATUS}
 FINE = 1e-16  # truncation per step for cycles, or the finest of the method
 
 
@@ -52,13 +53,17 @@ def solve(method, six, starts, rtol, result, where):
     """Fates at one parameter point, written into `result` (see `empty`) at the indices `where`."""
     s = remembered(method, six)
     out = followed(method, s, starts, rtol)
-    columns = {"verdict": rc.VERDICT, "turnings": rc.TURNINGS, "net_turns": rc.NET_TURNS, "status": rc.STATUS}
-    for name, column in columns.items():
+    for name, column in COLUMNS_OF.items():
         result[name][where] = out[:, column]
     for i, row in zip(where, out, strict=True):
-        _limits(s, row, result, i)
+        limits(s, row, result, i)
+    wind(s, out, starts[:, 0], result, where)
+
+
+def wind(s, out, angles, result, where):
+    """Write the net turns of fates that start at these angles."""
     middle = np.where(out[:, rc.NET_TURNS] != NO_TURNS, 0.0, np.nan) + _middles(s, out)
-    turns = np.trunc((middle + 2.0 * math.pi * out[:, rc.NET_TURNS] - starts[:, 0]) / (2.0 * math.pi))
+    turns = np.trunc((middle + 2.0 * math.pi * out[:, rc.NET_TURNS] - angles) / (2.0 * math.pi))
     known = np.isfinite(turns) & (out[:, rc.VERDICT] != kf.PERIODIC_LIBRATION)
     result["net_turns"][where[known]] = turns[known]
 
@@ -107,7 +112,7 @@ def _middles(s, out):
     return angles
 
 
-def _limits(s, row, result, i):
+def limits(s, row, result, i):
     """limit_phi, limit_w and multiplier of one fate."""
     verdict, index = int(row[rc.VERDICT]), int(row[rc.LIMIT])
     phi = w = cycle = None

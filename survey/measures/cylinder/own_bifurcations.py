@@ -3,7 +3,7 @@
     ends    the first of mean(f), mean(g), K, L (see `ends`) that does not vanish all over the map is 0
     fold    g = g' = 0; cusps where g'' = 0
     Hopf    f = g = 0, g' < 0; with f, g in powers of the angle super- or subcritical as f2 - f1 g2 / g1 < 0 or > 0,
-            generalised where that is 0; it ends in f = g = g' = 0, a Bogdanov-Takens point
+            generalised where that is 0; the curve ends in f = g = g' = 0, a Bogdanov-Takens point
 
 and saddle connections (`connections`) and folds of cycles (`cycle_folds`). Values of f and g are those of balls that
 hold every rounding. Points of codimension two lie on the curves that are followed (`survey.measures.tracks`).
@@ -13,6 +13,7 @@ Source: Yu. A. Kuznetsov, Elements of Applied Bifurcation Theory (2004), chapter
 
 from dataclasses import dataclass
 from functools import lru_cache, partial
+from itertools import pairwise
 
 import numpy as np
 
@@ -73,7 +74,7 @@ def found(plane):
     for things, function, drawn in ((_extrema, _fold, _folds), (_rests, _hopf, _hopfs)):
         at = partial(_at, plane, function)
         for _label, track in tracks.from_lattice(
-            LINES, partial(things, plane), lambda _, at=at: at, plane.square.grain
+            LINES, partial(things, plane), lambda _, at=at: (at, TWO_PI), plane.square.grain
         ):
             for part in track.certain():
                 yield from drawn(plane, part)
@@ -124,34 +125,50 @@ def _curve(plane, kind, part):
 
 
 def _folds(plane, part):
-    """A fold, with its cusps and Bogdanov-Takens points."""
+    """A fold, and its cusps."""
     yield _curve(plane, "fold", part)
-    yield from _marks(plane, part, "cusp", _fold, lambda s: (s[G2, 0], s[G2, 1]))
-    yield from _marks(plane, part, "bogdanov_takens", _fold, lambda s: (s[F0, 0], s[F0, 1]))
+    for _place, mark in _marks(plane, part, _fold, lambda s: (s[G2, 0], s[G2, 1])):
+        yield _curve(plane, "cusp", mark)
 
 
 def bend(s):
-    """What is < 0 at a supercritical Hopf point, and its bar."""
-    value = s[F2, 0] - s[F1, 0] * s[G2, 0] / s[G1, 0]
-    terms = abs(s[:, 0])
-    shares = s[:, 1] / np.maximum(terms, bifurcations.TINY)
-    rest = terms[F1] * terms[G2] / terms[G1] * (shares[[F1, G2, G1]].sum() + 4.0 * pg.ROUNDOFF_UP)
-    return value, s[F2, 1] + rest + 2.0 * pg.ROUNDOFF_UP * abs(value)
+    """f2 g1 - f1 g2, which is > 0 at a supercritical Hopf point, and its bar."""
+    pairs = (F2, G1), (F1, G2)
+    one, two = (s[i, 0] * s[j, 0] for i, j in pairs)
+    bars = [abs(s[i, 0]) * s[j, 1] + abs(s[j, 0]) * s[i, 1] + s[i, 1] * s[j, 1] for i, j in pairs]
+    return one - two, sum(bars) + 4.0 * pg.ROUNDOFF_UP * (abs(one) + abs(two))
 
 
 def _hopfs(plane, part):
-    """The parts of a curve f = g = 0 where g' < 0, and their generalised Hopf points."""
-    known = [series(plane.flow(x), phi) for x, phi in zip(part.x, part.place, strict=True)]
-    steep = np.array([s[G1, 0] + s[G1, 1] < 0.0 for s in known])
-    kinds = np.array([0 if not real else np.sign(bend(s)[0]) for real, s in zip(steep, known, strict=True)])
-    for kind, name in ((-1, "supercritical_hopf"), (1, "subcritical_hopf")):
-        for run in contours.runs(kinds == kind):
-            yield _curve(plane, name, tracks.replace_all(part, run))
-    yield from _marks(plane, part, "generalised_hopf", _hopf, bend, steep)
+    """The parts of a curve f = g = 0 where g' < 0, with the points at their ends."""
+    slopes, bends = (list(_marks(plane, part, _hopf, third)) for third in (lambda s: (s[G1, 0], s[G1, 1]), bend))
+    for _place, mark in slopes:
+        yield _curve(plane, "bogdanov_takens", mark)
+    bends = [(place, mark) for place, mark in bends if _series(plane, mark, 0)[G1, 0] < 0.0]
+    for _place, mark in bends:
+        yield _curve(plane, "generalised_hopf", mark)
+    marks = sorted(slopes + bends, key=lambda one: one[0])
+    places = [place for place, _ in marks]
+    whole = tracks.with_points(part, places, [mark for _, mark in marks]) if marks else part
+    cuts = [0, *(place + i for i, place in enumerate(places)), len(whole.x) - 1]
+    for low, high in pairwise(cuts):
+        if high > low:
+            s = _series(plane, whole, (low + high + 1) // 2 if high > low + 1 else low + (low in cuts[1:]))
+            if s[G1, 0] < 0.0:
+                kind = "supercritical_hopf" if bend(s)[0] > 0.0 else "subcritical_hopf"
+                yield _curve(plane, kind, tracks.part_of(whole, slice(low, high + 1)))
 
 
-def _marks(plane, part, kind, function, third, where=None):
-    """The points of a curve at which third(series) -> (value, bar) is 0 too, with the bars of their three equations."""
+def _series(plane, track, i):
+    """The `series` at a point of a Track."""
+    return series(plane.flow(track.x[i]), track.place[i])
+
+
+def _marks(plane, part, function, third):
+    """(number of the point after it, Track of it) where third(series) -> (value, bar) passes 0 on a curve.
+
+    The errors are those that the bars of its three equations leave.
+    """
 
     def equations(u):
         row = plane.flow(u[1:])
@@ -164,9 +181,8 @@ def _marks(plane, part, kind, function, third, where=None):
     points = np.column_stack([part.place, part.x])
     values = np.array([equations(u)[2, 0] for u in points])
     for i in np.flatnonzero(values[1:] * values[:-1] < 0.0):
-        if where is not None and not (where[i] and where[i + 1]):
-            continue
-        u, step = points[i] + (points[i + 1] - points[i]) * values[i] / (values[i] - values[i + 1]), np.inf
+        u = points[i] + (points[i + 1] - points[i]) * values[i] / (values[i] - values[i + 1])
+        step = now = slopes = np.full((3, 3), np.nan)
         for _ in range(20):
             ends_of = [[equations(u + side * tracks.STEP * axis)[:, 0] for side in (1.0, -1.0)] for axis in np.eye(3)]
             slopes = np.array([(high - low) / (2.0 * tracks.STEP) for high, low in ends_of]).T
@@ -177,11 +193,11 @@ def _marks(plane, part, kind, function, third, where=None):
             u = u + step
             if abs(step).max() < 1e-13:
                 break
-        if not abs(step).max() < 1e-9 or not tracks.inside(u[None, 1:])[0]:
-            continue
-        bars = 2.0 * abs(np.linalg.inv(slopes)) @ (abs(now[:, 0]) + now[:, 1]) + 4.0 * plane.square.grain
-        known = {"equilibrium_phi": (u[:1] % TWO_PI, bars[:1])}
-        yield kind, plane.square.parameters(u[None, 1:]), np.array([np.hypot(*bars[1:])]), known
+        near = abs(u - points[i]).max() < 2.0 * abs(points[i + 1] - points[i]).max()
+        if near and abs(step).max() < 1e-9 and tracks.inside(u[None, 1:])[0]:
+            bars = 2.0 * abs(np.linalg.inv(slopes)) @ (abs(now[:, 0]) + now[:, 1]) + 4.0 * plane.square.grain
+            error = np.array([np.hypot(*bars[1:])])
+            yield i + 1, tracks.Track(u[None, 1:], error, u[:1], bars[:1], np.array([True]))
 
 
 def _ends(plane):

@@ -4,7 +4,7 @@
 
 Rows are systems: d, c23, s2, s3 and n, all over A11, or the coefficients a0 to a4.
 
-Source: M. E. Lesina, Ya. V. Zinovyeva (2004), as corrected in `scenes/gyrostat.md`, section 2.
+Source: M. E. Lesina, Ya. V. Zinovyeva (2004), as corrected in `scenes/gyrostat.md`.
 """
 
 from fractions import Fraction

@@ -29,7 +29,7 @@ _ULP = 2.3e-16
 def trajectories(method, rows, times, rtol, stable, left):
     """As `solution.trajectories`, and the HEADS of each row; with None the best method is chosen."""
     floats, turnings, status = solution._nothing(times.shape)
-    starts = _Starts(method, rows, stable, left)
+    starts = Starts(method, rows, stable, left)
     sign_w, sign_t = (-1.0 if stable != left else 1.0), (-1.0 if stable else 1.0)
     order = np.argsort(sign_t * times, axis=1, kind="stable")
     for i in range(len(rows)):
@@ -53,7 +53,7 @@ def trajectories(method, rows, times, rtol, stable, left):
 def abel(method, rows, targets, rtol, stable, left):
     """As `solution.abel`, and the HEADS of each row; with None the best method is chosen."""
     floats, status = np.full((*targets.shape, rc.STATE), np.nan), np.zeros(targets.shape, np.int64)
-    starts = _Starts(method, rows, stable, left)
+    starts = Starts(method, rows, stable, left)
     side, sign_w = (-1.0 if left else 1.0), (-1.0 if stable != left else 1.0)
     order = np.argsort(side * targets, axis=1, kind="stable")
     for i in range(len(rows)):
@@ -71,7 +71,7 @@ def abel(method, rows, targets, rtol, stable, left):
     return *results, starts.heads
 
 
-class _Starts:
+class Starts:
     """The branches on which rows start, as branches that leave a saddle to the right; their status and HEADS."""
 
     def __init__(self, method, rows, stable, left):
@@ -200,7 +200,7 @@ def branch_of(row):
     for off, number in sorted(missed):
         for stable in (False, True):
             left = (w0 < 0.0) != stable
-            if off < 1e-9 * size and _Starts(closed, np.array([[*row[:7], number]]), stable, left).status[0] == OK:
+            if off < 1e-9 * size and Starts(closed, np.array([[*row[:7], number]]), stable, left).status[0] == OK:
                 return number, stable, left
     return None
 

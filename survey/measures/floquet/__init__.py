@@ -14,8 +14,8 @@ METHODS = {
             ("rtol",),
         ),
         "floquet_factors": Function(
-            "fill F (tasks, n, n), bounds `error` (tasks) of the errors of its entries and `doubt` (tasks), how large "
-            "these are relative to F; task k is the step of length 2 half[k] about middle[k] of the point point[k]. "
+            "fill F (tasks, n, n), bounds `error` (tasks) of the sums of its errors in a row and `doubt` (tasks), how "
+            "large these are relative to F; task k is the step of length 2 half[k] about middle[k] of point point[k]. "
             "The first six say how A is computed from numbers (N, count), see `kernels.floquet.program`; A_ij is taken "
             "times scale_j / scale_i, from scale (N, n), and `noise` (N) bounds the rounding of its rows",
             ("operations", "signs", "inside", "order", "used", "terms", "numbers", "scale", "noise", "n", "point",
@@ -23,4 +23,10 @@ METHODS = {
         ),
     }
 }  # fmt: skip
-METHODS["orbit"] = METHODS["floquet"]  # for the linear system along an orbit, whose series begin with its states
+METHODS["orbit"] = METHODS["floquet"] | {  # for the linear system along an orbit, whose series begin with its states
+    "orbit_motion": Function(
+        "instead of proofs: fill X (N, n), the states at span (N) from x0 (N, n) at 0, and M (N, n, n), their "
+        "derivatives by x0, in `steps` (N) equal steps; the other arguments are as in `kernels.floquet.flow.flow`",
+        ("operations", "signs", "inside", "order", "terms", "numbers", "places", "x0", "span", "steps", "X", "M"),
+    ),
+}

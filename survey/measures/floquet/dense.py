@@ -26,9 +26,9 @@ from survey.kernels.math.roundoff import EPS
 from survey.measures.floquet import monodromy
 from survey.measures.floquet.answers import Answers
 
-DEGREES = np.array([8, 12, 16, 20, 24, 28, 32, 40, 48])
-PROBED = 56  # nodes of the lines that show the degrees that are needed
-POINTS_PER_NODE = 2.5  # a panel pays if there are this many points for each that it solves
+DEGREES = np.array([8, 12, 16, 20, 24, 28, 32, 40])
+PROBED = 48  # nodes of the lines that show the degrees that are needed
+POINTS_PER_NODE = 4  # a panel pays if there are this many points for each that it solves
 SMALLEST = 16  # points of an axis
 BEST = 1e-14  # accuracy of M at the nodes
 MOST_DEEP = 12  # halvings
@@ -230,8 +230,8 @@ def _panel(key, sides, budget):
 def _degrees(key, middle, radius, budget):
     """The number of nodes that each side asks for, beyond DEGREES if none is enough; and the points solved."""
     sides = len(middle)
-    ends = [np.zeros(1)] if sides == 1 else [np.array([-1.0, 0.1, 1.0])]
-    if PROBED * sides * len(ends[0]) > budget:
+    ends = [np.zeros(1)] if sides == 1 else [np.array([-0.97, 0.97])]
+    if 2.0 * PROBED * sides * len(ends[0]) > budget:
         return None, 0
     x, needed = chebyshev.symmetric_nodes(PROBED), []
     lines = [np.stack([x if k == side else np.full(PROBED, end) for k in range(sides)], axis=1)

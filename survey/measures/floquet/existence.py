@@ -133,6 +133,18 @@ class Path:
         spread(self.F, np.ascontiguousarray(delta), self.first, wide, off)
         return wide, off
 
+    def tube(self, radius, delta, wide, off):
+        """How far motions that begin within radius (N) are from the series, at the steps' beginnings and throughout."""
+        begins = np.concatenate([[0.0], (wide[:-1] * radius[self.point[:-1], None] + off[:-1]).max(axis=1)])
+        begins[self.first[:-1]] = radius
+        return begins, WIDER * (np.exp(self.h * self.norm) * begins + delta.max(axis=1))
+
+    def bars(self, dx):
+        """Error bounds of the series X (tasks, n, NODES), if x(0) is known to within dx (N, n)."""
+        radius, delta = (dx / self.scale).max(axis=1), self.defect / self.scale[self.point]
+        tube = self.tube(radius, delta, *self._spread(delta))[1]
+        return self.noise_X + (tube[:, None] * self.scale[self.point])[:, :, None]
+
     def certify(self, x, T, plane, factor):
         """Shown of the orbits near x (N, n), T (N), within `factor` |B G|."""
         n, N, point, last, s = self.n, len(x), self.point, self.last, self.scale
@@ -158,9 +170,7 @@ class Path:
         near = (size * off_G[:, None, :]).sum(axis=2).max(axis=1)
         radius = factor * near
         # the tube, in the maximum norm of balanced units
-        begins = np.concatenate([[0.0], (wide[:-1] * radius[point[:-1], None] + off[:-1]).max(axis=1)])
-        begins[self.first[:-1]] = radius
-        tube = WIDER * (np.exp(self.h * self.norm) * begins + delta.max(axis=1))
+        begins, tube = self.tube(radius, delta, wide, off)
         width = self.noise_X + (tube[:, None] * s[point])[:, :, None]
         noise = WIDER * SAMPLED * self._rows(self._along(self.programs.A, width)[1])
         error = self.error + self.h * noise * np.exp(self.h * (self.norm + noise))

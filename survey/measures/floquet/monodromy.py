@@ -13,6 +13,7 @@ import numpy as np
 from survey import measures
 from survey.kernels.floquet import steps
 from survey.kernels.math.roundoff import ROUNDOFF_UP
+from survey.measures.floquet import probing
 
 # Times at which A is looked at, as shares of a piece.
 TIMES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(12) + 0.5) / 12)
@@ -55,17 +56,19 @@ class Points:
             numbers = program.numbers(self.points[own])
             A, E = program.at(self.points[own], low + (high - low) * TIMES, self.n, numbers)
             largest = np.maximum(largest, abs(A).max(axis=1))
-            spread.append((numbers[0], A, E.max(axis=1)))
+            spread.append((numbers, A, E.max(axis=1)))
         scale = balanced(largest)
         ratio = scale[:, None, :] / scale[:, :, None]
-        for k, (_numbers, A, errors) in enumerate(spread):
+        for k, (numbers, A, errors) in enumerate(spread):
             A = A * ratio[:, None]
-            length = self.edges[own, k + 1] - self.edges[own, k]
-            self.rate[own, k] = rates(A) / np.where(length > 0, length, 1.0)
-            self.size[own, k] = abs(A).sum(axis=-1).max(axis=(1, 2))
+            low, high = self.edges[own, k, None], self.edges[own, k + 1, None]
+            length = (high - low)[:, 0]
+            rate = probing.combined(rates(A), programs[k], numbers, low, high, ratio)
+            self.rate[own, k] = rate / np.where(length > 0, length, 1.0)
+            self.size[own, k] = np.where(np.isnan(rate), np.nan, abs(A).sum(axis=-1).max(axis=(1, 2)))
             self.noise[own, k] = 2.0 * (errors * ratio).sum(axis=-1).max(axis=-1)
         self.scale[own] = scale
-        self.groups.append((own, programs, [numbers for numbers, _sizes, _errors in spread]))
+        self.groups.append((own, programs, [numbers[0] for numbers, _sizes, _errors in spread]))
 
     def steps(self, reach, factor, those):
         """Numbers of steps (K, P) of some points, `factor` (K) times what norm and rate ask for."""

@@ -46,7 +46,10 @@ class Discs:
             left = np.flatnonzero(good & self._doubtful())
             if left.size:
                 off = np.cos(1.0 + 7.0 * np.arange(n * n)).reshape(n, n)  # no special direction
-                self._coordinates(left, M, E, M[left] + times * E[left].max(axis=(1, 2), keepdims=True) * off)
+                with np.errstate(over="ignore"):
+                    near = M[left] + times * E[left].max(axis=(1, 2), keepdims=True) * off
+                finite = np.isfinite(near).all(axis=(1, 2))
+                self._coordinates(left[finite], M, E, near[finite])
         self.together = self._touching()
         self._narrow()
         self._sort()

@@ -15,6 +15,7 @@ from survey.kernels.floquet.flow import ORDER
 from survey.measures.floquet import existence, monodromy, stability
 from survey.measures.floquet.continuation import Curves
 from survey.measures.floquet.newton import chosen, located
+from survey.measures.floquet.recomputed import recomputed
 from survey.scene import Output
 
 NO_ORBIT = status.FIRST_OF_SCENE
@@ -58,7 +59,7 @@ def solve_branches(equation, points, branch, continued, method, rtol, wanted):
     parts, of_point = [], [[] for _ in different]
     count = 0
     for first in range(0, len(rows), ROWS):
-        curves = Curves(equation, continued, rows[first : first + ROWS], method.floquet_reach(rtol))
+        curves = Curves(equation, continued, rows[first : first + ROWS], _reach(rtol))
         where, x, T = [], [], []
         for k in range(len(curves.rows)):
             mine = np.flatnonzero(row == first + k)
@@ -81,8 +82,8 @@ def solve_branches(equation, points, branch, continued, method, rtol, wanted):
     out = {name: np.concatenate([*(part[name] for part in parts), empty[name]]) for name in empty}
     pick = np.full(len(points), count)
     for i, k, number in zip(np.flatnonzero(known), place, branch[known].astype(int), strict=True):
-        if number <= len(order[k]):
-            pick[i] = order[k][number - 1]
+        if abs(number) <= len(order[k]):
+            pick[i] = order[k][number - (number > 0)]
     out = {name: values[pick] for name, values in out.items()}
     out["status"] = np.where(known, out["status"], status.INVALID_PARAMETERS).astype(out["status"].dtype)
     if NUMBER.name in wanted:
@@ -124,7 +125,7 @@ def _chunk(equation, points, method, rtol, wanted):
 
 def _shown(equation, points, guess, period, method, rtol, relax=True):
     """What is Found from these guesses."""
-    N, n, reach = len(points), equation.n, method.floquet_reach(rtol)
+    N, n, reach = len(points), equation.n, _reach(rtol)
     found = Found(N, n, equation.free)
     orbits, good = located(equation, points, reach, guess, period, relax)
     for inside, programs in equation.traced(points[good], guess[good]):
@@ -136,12 +137,18 @@ def _shown(equation, points, guess, period, method, rtol, relax=True):
             if some.size:
                 those = own[some]
                 plane = (orbits.phase[those], orbits.guess[those]) if equation.free else None
-                shown = existence.certified(
-                    programs, chosen(numbers, some), orbits.x[those], orbits.T[those], orbits.guess[those], plane,
-                    orbits.steps[those], method, reach,
-                )  # fmt: skip
+                near = programs, chosen(numbers, some), orbits.x[those], orbits.T[those]
+                if hasattr(method, "orbit_motion"):
+                    shown = recomputed(*near, plane, orbits.steps[those], method)
+                else:
+                    shown = existence.certified(*near, orbits.guess[those], plane, orbits.steps[those], method, reach)
                 found.put(those, shown)
     return found
+
+
+def _reach(rtol):
+    """That of the Taylor series, by which orbits are found for all methods."""
+    return monodromy.method_of("auto").floquet_reach(rtol)
 
 
 class Found:

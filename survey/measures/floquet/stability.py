@@ -54,8 +54,11 @@ LADDER = answers.Ladder(1.5 ** np.arange(16), np.arange(16) + 1, None, most=16)
 CHUNK = 65536  # points n^2 that are solved together: bounds the memory
 
 
-def assess(matrices, structure, rtol, asked):
-    """The Answers of points from their Matrices; `asked` holds the names of the outputs that are wanted."""
+def assess(matrices, structure, rtol, asked, period=None):
+    """The Answers of points from their Matrices; `asked` holds the names of the outputs that are wanted.
+
+    `period` (N) is needed for the accuracy of the exponent.
+    """
     M, E = matrices.M, matrices.E
     N, n = M.shape[:2]
     found, paired = Answers(N, n), structure != "none"
@@ -82,9 +85,28 @@ def assess(matrices, structure, rtol, asked):
     found.missed = lost | ((found.verdict == UNDECIDED) & ("verdict" in asked))
     found.missed |= (wide & ("multiplier_re" in asked)) | (far & ("spectral_radius" in asked))
     found.missed |= rough & ("monodromy" in asked)
+    if period is not None and "exponent" in asked:
+        found.missed |= wide_exponents(found, period, rtol)
     found.status[:] = np.where(lost, status.OVERFLOW, status.OK)
     found.verdict[lost], found.crossing[lost] = UNDECIDED, UNDECIDED
     return found
+
+
+def exponents(answer, period):
+    """The largest characteristic exponents (N) and their error bounds, NaN where the radius may be 0."""
+    value, bar = answer.floats[-2], answer.floats[-1]
+    with np.errstate(all="ignore"):
+        positive = value > bar
+        found = np.where(positive, np.log(value) / period, np.nan)
+        off = np.where(positive, -np.log1p(-bar / value) / period, np.nan) * (1 + 4 * EPS)
+        return found, off + 4 * EPS * abs(found)
+
+
+def wide_exponents(answer, period, rtol):
+    """Where (N) the exponent, if there is one, is not known to the asked accuracy."""
+    found, off = exponents(answer, period)
+    with np.errstate(invalid="ignore"):
+        return off > rtol * (1 + abs(found))
 
 
 def solve(system, structure, points, method, rtol, wanted, lines=None):
@@ -97,13 +119,16 @@ def solve(system, structure, points, method, rtol, wanted, lines=None):
     flat = points.reshape(-1, points.shape[-1])
     answer, left = Answers(len(flat), n), np.arange(len(flat))
     results = monodromy.Matrices.empty(len(flat) if "monodromy" in wanted else 0, n)
+    period = system.periods(flat) if wanted & {"period", "exponent"} else None
     if method == "auto" and dense.serves(system, structure, wanted, lines or {}):
-        left = np.flatnonzero(dense.solve(system, structure, points, rtol, wanted, lines, answer))
+        open_ = dense.solve(system, structure, points, rtol, wanted, lines, answer)
+        if "exponent" in wanted:
+            open_ |= wide_exponents(answer, period, rtol)
+        left = np.flatnonzero(open_)
     method, chunk = monodromy.method_of(method), max(1, CHUNK // (n * n))
     for i in range(0, left.size, chunk):
         some = left[i : i + chunk]
         _solve_some(system, structure, flat[some], method, rtol, wanted, some, answer, results)
-    period = system.periods(flat) if wanted & {"period", "exponent"} else None
     out = outputs(answer, results, period, callable(system.period), wanted)
     return {name: values.reshape(*shape, *values.shape[1:]) for name, values in out.items()}
 
@@ -120,13 +145,13 @@ def _solve_some(system, structure, given, method, rtol, wanted, places, answer, 
         sharp = bool(rung.size and rung.min() > 0)  # all are on the first rung, or none is
         return monodromy.solve(points, method, rtol, LADDER.rungs[rung], where[those], sharp)
 
-    def assessed(_those, found):
-        return assess(found, structure, rtol, asked)
+    def assessed(those, found):
+        return assess(found, structure, rtol, asked, points.period[where[those]])
 
     if where.size:
         rung = np.zeros(where.size, dtype=np.int64)
         own = solved(np.arange(where.size), rung)
-        best = assessed(None, own)
+        best = assessed(slice(None), own)
         LADDER.climb(rung, own, best, solved, assessed)
         answer.replace(places[where], best)
         if len(results.M):
@@ -152,11 +177,7 @@ def outputs(answer, results, period, computed, wanted):
     if "krein" in wanted:
         out["krein"] = np.where(ok, answer.signs, 0).T.astype(np.int8)
     if "exponent" in wanted:
-        with np.errstate(all="ignore"):
-            positive = value > bar
-            exponent = np.where(positive, np.log(value) / period, np.nan)
-            exponent_bar = np.where(positive, -np.log1p(-bar / value) / period, np.nan) * (1 + 4 * EPS)
-        out |= {"exponent": exponent, "exponent_error": exponent_bar + 4 * EPS * abs(exponent)}
+        out["exponent"], out["exponent_error"] = exponents(answer, period)
     if "period" in wanted:
         period = np.where(ok, period, np.nan)
         out |= {"period": period, "period_error": (4 if computed else 1) * EPS * period}

@@ -16,6 +16,7 @@ from survey.measures.floquet import trace
 from survey.measures.floquet.trace import ONE, Graph, Symbol, Unsupported
 
 KEPT = 256  # traces
+SMALL = 0.1  # a pivot, relative to the largest entry of its row
 RECORDED = 64  # points from which on it pays to record PERIOD
 LOCK = threading.Lock()
 
@@ -182,14 +183,14 @@ class System:
         m = self.n // 2
         given = {name: self._filled(graph, name, m) for name in self.matrices}
         K, C = (dense(given.get(name, {}), m) for name in "KC")
-        inverse = inverted(dense(given["M"], m), graph) if "M" in given else identity(m)
         entries = {}
         if not self.symplectic:
             entries = {(i, m + i): 1.0 for i in range(m)}
-            for left, block in ((0, K), (m, C)):
-                for (i, j), value in times(inverse, block, m).items():
-                    entries[m + i, left + j] = -value
-            return entries
+            sides = [[*K[i], *C[i]] for i in range(m)]
+            sides = solved(dense(given["M"], m), sides, graph) if "M" in given else sides
+            filled = {(m + i, j): -x for i, row in enumerate(sides) for j, x in enumerate(row) if not _is_zero(x)}
+            return entries | filled
+        inverse = solved(dense(given["M"], m), identity(m), graph) if "M" in given else identity(m)
         for name in "MC":
             if any(isinstance(x, Symbol) and not x.is_number for x in given.get(name, {}).values()):
                 raise Unsupported(f"{name}(t, p, out) depends on t, so that the momenta are not M q' + C q / 2; give A")
@@ -238,26 +239,56 @@ def times(left, right, m):
     return found
 
 
-def inverted(rows, graph):
-    """The rows of the inverse matrix, by Gauss-Jordan elimination with the pivots of the example."""
+def solved(rows, sides, graph):
+    """The rows of X where M X = sides, by elimination; M is given by its rows.
+
+    Pivots are not small at the example, constants rather than functions of t, and of those that fill in least: what is
+    eliminated is made of series, and each product costs.
+    """
     m = len(rows)
-    work, out = [list(row) for row in rows], identity(m)
-    for k in range(m):
-        best = max(range(k, m), key=lambda i: abs(graph.lift(work[i][k]).value))
-        if graph.lift(work[best][k]).value == 0.0:
-            raise Unsupported("M(t, p, out) is singular")
-        work[k], work[best], out[k], out[best] = work[best], work[k], out[best], out[k]
-        pivot = work[k][k]
-        if isinstance(pivot, Symbol) or pivot != 1.0:
-            work[k] = [x if _is_zero(x) else x / pivot for x in work[k]]
-            out[k] = [x if _is_zero(x) else x / pivot for x in out[k]]
-        for i in range(m):
-            factor = work[i][k]
-            if i == k or _is_zero(factor):
-                continue
-            for rows_ in (work, out):
-                rows_[i] = [
-                    x if _is_zero(y) else -(factor * y) if _is_zero(x) else x - factor * y
-                    for x, y in zip(rows_[i], rows_[k], strict=True)
-                ]
+    work, sides = [list(row) for row in rows], [list(row) for row in sides]
+    left, columns, order = list(range(m)), list(range(m)), []
+    while left:
+        i, j = _pivot(work, left, columns, graph)
+        left.remove(i)
+        columns.remove(j)
+        order.append((i, j))
+        for k in left:
+            if not _is_zero(work[k][j]):
+                factor = work[k][j] / work[i][j]
+                work[k] = _less(work[k], factor, work[i], columns)
+                sides[k] = _less(sides[k], factor, sides[i], range(len(sides[i])))
+    out = [None] * m
+    for i, j in reversed(order):
+        row = sides[i]
+        for other in range(m):
+            if out[other] is not None and not _is_zero(work[i][other]):
+                row = _less(row, work[i][other], out[other], range(len(row)))
+        pivot = work[i][j]
+        plain = not isinstance(pivot, Symbol) and pivot == 1.0
+        out[j] = row if plain else [x if _is_zero(x) else x / pivot for x in row]
     return out
+
+
+def _less(row, factor, other, columns):
+    """The row less the factor times the other one, in some columns."""
+    found = list(row)
+    for c in columns:
+        if not _is_zero(other[c]):
+            product = factor * other[c]
+            found[c] = -product if _is_zero(row[c]) else row[c] - product
+    return found
+
+
+def _pivot(work, left, columns, graph):
+    """The row and the column of the next pivot."""
+    found, size = [], {(i, j): abs(graph.lift(work[i][j]).value) for i in left for j in columns}
+    in_row = {i: sum(not _is_zero(work[i][j]) for j in columns) for i in left}
+    in_column = {j: sum(not _is_zero(work[i][j]) for i in left) for j in columns}
+    for i, j in size:
+        if size[i, j] > 0.0 and size[i, j] >= SMALL * max(size[i, k] for k in columns):
+            varies = isinstance(work[i][j], Symbol) and not work[i][j].is_number
+            found.append((varies, (in_row[i] - 1) * (in_column[j] - 1), -size[i, j], i, j))
+    if not found:
+        raise Unsupported("M(t, p, out) is singular")
+    return min(found)[3:]

@@ -55,6 +55,11 @@ def solve(problem, asked, answers, decide=True):
         answers.replace(decided, other, decided)
 
 
+def scattered(box, asked, answers, position, p):
+    """Answer points on their own from series; returns those (N, bool) that are left (see `dense.scattered`)."""
+    return dense.scattered(box, taylor16, asked, answers, position, p)
+
+
 def _exactly(problem, answers, points, asked, most):
     """Solve the `points` in double-double, where at most `most` steps suffice; the others keep their answers."""
     if not points.size:

@@ -27,8 +27,9 @@ TURN = np.cos(2 * BEND)  # a step that turns more is repeated
 OFF = 0.05  # of a step: how long the corrector may be
 STEPS = 10_000
 NEAR = 0.02  # of a step: how far a seed may lie from the curve that goes through it
+REACH = 2.0  # of a step: no point of it is farther from its beginning
 WIDE = 1e-7  # half the width of the first bracket of a point
-CHUNK = 256  # points bracketed together
+CHUNK = 1024  # points bracketed together
 
 
 @dataclass
@@ -220,16 +221,19 @@ def _joined(trail, ended, closed):
 def _on(path, x, towards):
     """Which of the positions x (n, 2), with tangents `towards`, lie on the path (its cubic Hermite pieces)?"""
     found = np.zeros(len(x), bool)
-    a, b, ta, tb = path.x[:-1], path.x[1:], path.along[:-1], path.along[1:]
-    length = np.hypot(*(b - a).T)
-    for i in range(len(x)):
+    length = np.hypot(*np.diff(path.x, axis=0).T)
+    for first in range(0, len(x), CHUNK):
+        away = x[first : first + CHUNK, None] - path.x[:-1]
+        i, piece = np.nonzero((away**2).sum(axis=2) <= (REACH * length) ** 2)
+        i += first
+        a, b, ta, tb = path.x[piece], path.x[piece + 1], path.along[piece], path.along[piece + 1]
+        whole = length[piece]
         with np.errstate(all="ignore"):
-            s = np.clip(((x[i] - a) * (b - a)).sum(axis=1) / length**2, 0, 1)[:, None]
+            s = np.clip(((x[i] - a) * (b - a)).sum(axis=1) / whole**2, 0, 1)[:, None]
         curve = (1 + 2 * s) * (1 - s) ** 2 * a + s**2 * (3 - 2 * s) * b
-        curve += length[:, None] * (s * (1 - s) ** 2 * ta - s**2 * (1 - s) * tb)
-        tangent = (1 - s) * ta + s * tb
-        same = (tangent * towards[i]).sum(axis=1) > TURN
-        found[i] = (same & (np.hypot(*(curve - x[i]).T) <= NEAR * length)).any()
+        curve += whole[:, None] * (s * (1 - s) ** 2 * ta - s**2 * (1 - s) * tb)
+        same = (((1 - s) * ta + s * tb) * towards[i]).sum(axis=1) > TURN
+        found[i[same & (np.hypot(*(curve - x[i]).T) <= NEAR * whole)]] = True
     return found
 
 

@@ -1,27 +1,34 @@
-"""Dense maps of a Hill problem: the discriminant as a Chebyshev series in p, and across rows, solved at nodes alone.
+"""Dense maps of a Hill problem by Chebyshev series in p, and across rows, solved at nodes alone: of the discriminant,
+or, where more is asked, of the four factors.
 
-D is an entire function of p (z is a polynomial in p), so its series on the axis converges faster than any power; where
-p -> -p exchanges y1 and y2', D is a series in p^2 and its nodes those of one half axis. Where the rows are an axis too,
-D's coefficients are series across it, solved at its nodes; a panel of rows on which they do not converge is halved,
-and the rest is served row by row.
+All are entire functions of p (z is a polynomial in p), so that the series on an axis converge faster than any power.
+Where p -> -p exchanges y1 and y2', D is a series in p^2 and its nodes those of one half axis; so are y1', y2 and
+y1 + y2', and y1 - y2' is odd. Where the rows are an axis too, the coefficients are series across it, solved at its
+nodes; a panel of rows on which they do not converge is halved, and the rest is served row by row.
 
-The error bound of D: those at the nodes times the Lebesgue constants, the tails of the series, and rounding. Points
+The error bound: those at the nodes times the Lebesgue constants, the tails of the series, and rounding. Points
 whose verdict or accuracy it leaves open count as `missed`, and are solved one by one from their factors. All depends on
 the row and on the axes of the map, never on the block.
+
+Rotation numbers need the numbers of zeros of y1 and y2. The signs at T/2 tell their parity, and the numbers at the
+nodes around a point, between which they lie, the rest; a point where that is ambiguous, or contradicts the rotation
+number between those at the nodes, counts as missed.
 
 Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 4, 8 and 15.
 """
 
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
+from survey import status
 from survey.kernels.hill import answers as kernels
-from survey.kernels.hill.series import TERMS, discriminants
+from survey.kernels.hill.series import TERMS, discriminants, factors, points
 from survey.kernels.jit import wait_for_other_compiler
-from survey.kernels.lanes import RESULTS
+from survey.kernels.lanes import RESULTS, Y1_ZEROS
 from survey.kernels.math import chebyshev
 from survey.measures.hill import pointwise
 from survey.measures.hill.answers import Answers, Asked
@@ -39,12 +46,39 @@ RETRIES = 2
 _ONE_AT_A_TIME = threading.Lock()
 ANSWERS = frozenset({"discriminant", "exponent"})
 DISCRIMINANT = np.array([name == "discriminant" for name in kernels.FLOATS])
+# The parts of the axis across points on their own.
+ROWS_PER_PART, MOST_PARTS = 130, 8
+# Points of a call that answers from factors: their temporaries stay in the processor's cache.
+CALL_POINTS = 8192
+
+
+@dataclass(frozen=True)
+class Sought:
+    """The functions that are expanded, as rows of `floats`: D, or the factors; and are rotation numbers wanted?"""
+
+    rows: tuple[int, ...]
+    turns: bool = False
+
+    @property
+    def factors(self):
+        return len(self.rows) > 1
+
+    @property
+    def wanted(self):
+        """What is asked of the nodes."""
+        return np.array([2 * i in self.rows or (self.turns and 2 * i == kernels.ROTATION) for i in range(7)])
 
 
 def serves(problem, asked):
-    """Is the row dense enough, and is nothing asked but what follows from D?"""
+    """Is there an axis along the rows?"""
+    return problem.line is not None and problem.line[2] > problem.line[1]
+
+
+def _sought(asked, factors_only=False):
     named = {name for name, wanted in zip(kernels.FLOATS, asked.wanted, strict=True) if wanted}
-    return problem.line is not None and named <= ANSWERS and problem.line[2] > problem.line[1]
+    if named <= ANSWERS and not factors_only:
+        return Sought((kernels.DISCRIMINANT,))
+    return Sought(tuple(kernels.FACTOR_ROWS.tolist()), "rotation_number" in named)
 
 
 def compile_ahead(sample, no_rows, variables):
@@ -62,6 +96,8 @@ def compile_ahead(sample, no_rows, variables):
         _discriminants(answers, np.zeros(1, int), np.ones((1, TERMS)), np.ones(1), np.ones(1))
         if grows:
             kernels.exponents(np.zeros(1, int), 1, 1.0, answers.floats, answers.verdict, answers.missed)
+    else:
+        _factors(np.ones((4, 1, TERMS)), np.ones((4, 1)), np.ones(1), False, np.zeros((5, 1, 2)), 2, False)
     answers.assess(np.ones((1, RESULTS)), None)
 
 
@@ -76,6 +112,65 @@ def solve(problem, method, asked, answers):
             rows = _surfaces(problem, method, asked, answers, rows, axis, open_points)
         _rows(problem, method, asked, answers, rows, axis, open_points)
     return open_points.reshape(-1)
+
+
+def scattered(box, method, asked, answers, position, p):
+    """Answer points on their own (N each) from the series of their `box`; returns those (N, bool) to be solved."""
+    sought, axis, open_points = _sought(asked, factors_only=True), _axis(box.line, box.even), np.ones(p.size, np.bool_)
+    with _ONE_AT_A_TIME:
+        served = [panel for part in _parts(box.row_axis) for panel in panels(part, method, asked.rtol, axis, sought)]
+    for low, high, series, bars, turns in served:
+        inside = np.flatnonzero(open_points & (position >= low) & (position <= high))
+        padded, number, bars = _shortened(series, bars)
+        for some in np.split(inside, range(CALL_POINTS, inside.size, CALL_POINTS)):
+            if not some.size:
+                continue
+            across, along = (
+                (position[some] - 0.5 * (low + high)) / (0.5 * (high - low)),
+                (p[some] - axis.middle) / axis.radius,
+            )
+            results = _at_points(box, axis, padded, number, bars, turns, across, along, position[some])
+            if some[-1] - some[0] == some.size - 1:
+                found, own = answers, slice(some[0], some[-1] + 1)
+                found.assess(results, None, first=some[0])
+            else:
+                found, own = Answers(some.size, asked), slice(None)
+                found.assess(results, None)
+                answers.replace(some, found)
+            failed = found.status[own] != status.OK
+            open_points[some] = found.missed[own] | failed
+            answers.status[some[failed]] = status.OK  # what this leaves without an answer is solved again
+    return open_points
+
+
+def _parts(row_axis):
+    """The axis in parts: the more points there are, the more of them pay, on which series have fewer terms."""
+    parts = int(np.clip(row_axis.number // ROWS_PER_PART, 1, MOST_PARTS))
+    ends = np.linspace(row_axis.low, row_axis.high, parts + 1)
+    return [replace(row_axis, low=float(low), high=float(high)) for low, high in pairwise(ends)]
+
+
+def _shortened(series, bars):
+    """The series (4, across, along) as `points` takes them: the number of terms across that count for each along, and
+    the bounds with what is left out, a tenth of them.
+    """
+    by_terms = series.transpose(0, 2, 1)
+    rest = np.cumsum(abs(by_terms[:, :, ::-1]), axis=2)[:, :, ::-1]
+    number = (rest > 0.1 * bars[:, None, None] / by_terms.shape[1]).sum(axis=2)
+    padded = np.zeros((*by_terms.shape[:2], -(-by_terms.shape[2] // TERMS) * TERMS))
+    padded[:, :, : by_terms.shape[2]] = by_terms
+    return padded, -(-number // TERMS) * TERMS, 1.1 * bars
+
+
+def _at_points(box, axis, series, number, bars, turns, across, along, position):
+    """The results (N, RESULTS) at x `across` and `along` the rows of a panel."""
+    results, nodes = np.empty((position.size, RESULTS)), turns.shape[2] * (2 if axis.even else 1)
+    *one, share = _between(across, turns.shape[1], turns.shape[1])
+    *other, further = _between(abs(along) if axis.even else along, nodes, turns.shape[2])
+    x, around, shares = np.stack([across, along]), np.stack([*one, *other]), np.stack([share, further])
+    odd = _odd(box.row_axis, axis, position)
+    points(series, number, bars, x, axis.even, odd, turns, around, shares, box.full_period, results)
+    return results
 
 
 @dataclass(frozen=True)
@@ -102,28 +197,70 @@ def _axis(line, symmetric):
 
 def _rows(problem, method, asked, answers, chosen, axis, open_points):
     """Answer the points of the `chosen` rows, each by a series of its own."""
-    degree = np.full(problem.span.size, DEGREES.size)
-    degree[chosen] = _degrees(problem, axis, asked.rtol)[chosen]
+    sought, degree = _sought(asked), np.full(problem.span.size, DEGREES.size)
+    degree[chosen] = _degrees(problem, axis, asked.rtol, sought)[chosen]
     first = degree.copy()
     for at in range(axis.most):  # a row whose series has not converged goes on to the next degree
         rows = np.flatnonzero((degree == at) & (at <= first + RETRIES))
         if rows.size:
-            values, series, bars = _series(problem, method, NODES_SHARE * asked.rtol, rows, int(DEGREES[at]), axis)
-            served = _served(values, bars[:, None], asked.rtol).mean(axis=1)
+            share = NODES_SHARE * asked.rtol
+            values, series, bars, turns = _series(problem, method, share, rows, int(DEGREES[at]), axis, sought)
+            served = _served(values, bars[:, :, None], asked.rtol).mean(axis=2).min(axis=0)
             good = (served >= MOST) | ((served > 0) & (at == first[rows] + RETRIES))
             degree[rows[~good]] += 1
-            rows, series, bars = rows[good], np.ascontiguousarray(series[good]), bars[good]
+            rows, series, bars = rows[good], np.ascontiguousarray(series[:, good]), bars[:, good]
+            turns = None if turns is None else turns[:, good]
         if rows.size:
-            _answer(problem, asked, answers, rows, series, bars, axis, open_points)
+            _answer(problem, asked, answers, rows, series, bars, turns, axis, open_points)
 
 
-def _answer(problem, asked, answers, rows, series, bars, axis, open_points):
+def _answer(problem, asked, answers, rows, series, bars, turns, axis, open_points):
     wait_for_other_compiler()
     x = (problem.p[rows[0]] - axis.middle) / axis.radius  # all rows have the same points
-    _discriminants(answers, rows, series, bars, 2 * x * x - 1 if axis.even else x)
+    if len(series) > 1:
+        _answer_by_factors(problem, asked, answers, rows, series, bars, turns, axis, x, open_points)
+        return
+    _discriminants(answers, rows, series[0], bars[0], 2 * x * x - 1 if axis.even else x)
     if asked.wanted[kernels.EXPONENT // 2]:
         kernels.exponents(rows * x.size, x.size, asked.rtol, answers.floats, answers.verdict, answers.missed)
     open_points[rows] = answers.missed.reshape(problem.p.shape)[rows]
+
+
+def _answer_by_factors(problem, asked, answers, rows, series, bars, turns, axis, x, open_points):
+    """Answer the points x of the rows from the series (4, R, n) of their factors, and `turns` (5, R, nodes)."""
+    padded = np.zeros((*series.shape[:2], -(-series.shape[2] // TERMS) * TERMS))
+    padded[:, :, : series.shape[2]] = series
+    number = turns.shape[2] * (2 if axis.even else 1)
+    rule = None if problem.rule is None else problem.rule.reshape(-1)
+    most, apart = max(1, CALL_POINTS // x.size), np.flatnonzero(np.diff(rows) != 1) + 1
+    for part in np.split(np.arange(rows.size), apart):
+        for some in (part[i : i + most] for i in range(0, part.size, most)):
+            some = slice(some[0], some[-1] + 1)
+            results = _factors(padded[:, some], bars[:, some], x, axis.even, turns[:, some], number, asked.full_period)
+            answers.assess(results, rule, first=rows[some.start] * x.size)
+    # what this leaves without an answer is solved again
+    failed = answers.status != status.OK
+    answers.status[failed] = status.OK
+    open_points[rows] = (answers.missed | failed).reshape(problem.p.shape)[rows]
+
+
+def _factors(series, bars, x, even, turns, number, full_period):
+    """The results (R x, RESULTS) of the points x of rows; the nodes of the `turns` are the first of `number`."""
+    left, right, share = _between(abs(x) if even else x, number, turns.shape[2])
+    results = np.empty((turns.shape[1] * x.size, RESULTS))
+    series, bars, turns = (np.ascontiguousarray(values) for values in (series, bars, turns))
+    factors(series, bars, x, even, turns, left, right, share, full_period, results)
+    return results
+
+
+def _between(x, number, kept):
+    """Which of the `kept` first of `number` nodes are on both sides of x (twice the last where there is none beyond),
+    and the share of the way from one to the other.
+    """
+    place = np.arccos(np.clip(np.nan_to_num(x), -1, 1)) * (number / np.pi) - 0.5
+    left = np.clip(np.floor(place), 0, kept - 1).astype(np.int64)
+    right = np.clip(np.floor(place) + 1, 0, kept - 1).astype(np.int64)
+    return left, right, np.where(right > left, place - left, 0.0)
 
 
 def _discriminants(answers, rows, series, bars, x):
@@ -136,24 +273,44 @@ def _discriminants(answers, rows, series, bars, x):
 def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
     """Answer those `chosen` rows that a series across rows serves; returns the others."""
     with _ONE_AT_A_TIME:
-        served = panels(problem.row_axis, method, asked.rtol, axis)
+        served = panels(problem.row_axis, method, asked.rtol, axis, _sought(asked))
     position, left = problem.positions[chosen], np.ones(chosen.size, np.bool_)
-    for low, high, series, bar in served:
+    for low, high, series, bars, turns in served:
         inside = left & (position >= low) & (position <= high)
-        rows, own = chosen[inside], np.empty((np.count_nonzero(inside), series.shape[1]))
+        rows, own = chosen[inside], np.empty((len(series), np.count_nonzero(inside), series.shape[2]))
         if rows.size:
             x = (position[inside] - 0.5 * (low + high)) / (0.5 * (high - low))
-            chebyshev.restrict(series, x, np.empty((2, own.shape[1])), own)
-            _answer(problem, asked, answers, rows, own, np.full(rows.size, bar), axis, open_points)
+            for of, out in zip(series, own, strict=True):
+                chebyshev.restrict(of, x, np.empty((2, series.shape[2])), out)
+            bar, odd = np.repeat(bars[:, None], rows.size, axis=1), _odd(problem.row_axis, axis, position[inside])
+            if len(own) > 1:
+                own[3], bar[3] = own[3] * odd[:, None], bar[3] * odd
+            _answer(problem, asked, answers, rows, own, bar, _across(turns, x), axis, open_points)
         left &= ~inside
     return chosen[left]
 
 
-@lru_cache(maxsize=64)
-def panels(row_axis, method, rtol, axis):
-    """[(low, high, series of D, its bound)] of the panels of rows on which D converges, the same for all blocks.
+def _odd(row_axis, axis, positions):
+    """What y1 - y2' is divided by to be analytic in the position (R): see `RowAxis`."""
+    return row_axis.odd(positions) if axis.even and row_axis.odd else np.ones(positions.size)
 
-    The axis of rows is halved until D has converged to `rtol`, as long as all that is solved for it pays.
+
+def _across(turns, x):
+    """The `turns` (5, R, m) of rows at x from those (5, n, m) at nodes: means, the least and the largest numbers."""
+    if turns is None:
+        return None
+    left, right, share = _between(x, turns.shape[1], turns.shape[1])
+    one, other = turns[:, left], turns[:, right]
+    mean, low, high = one[0] + share[:, None] * (other[0] - one[0]), np.minimum(one, other), np.maximum(one, other)
+    return np.stack([mean, low[1], high[2], low[3], high[4]])
+
+
+@lru_cache(maxsize=64)
+def panels(row_axis, method, rtol, axis, sought):
+    """[(low, high, series (F, n, m), bounds (F), `turns` at the nodes)] of the panels of rows on which what is sought
+    converges, the same for all blocks.
+
+    The axis of rows is halved until it has converged to `rtol`, as long as all that is solved for it pays.
     """
     left, found, budget = [(row_axis.low, row_axis.high, 1.0)], [], row_axis.number / ROWS_PER_NODE
     while left:
@@ -161,7 +318,8 @@ def panels(row_axis, method, rtol, axis):
         if not high > low:
             continue
         middle, radius = 0.5 * (low + high), 0.5 * (high - low)
-        surface, spent = _surface(row_axis, method, rtol, middle, radius, axis, min(budget, share * row_axis.number))
+        most = min(budget, share * row_axis.number)
+        surface, spent = _surface(row_axis, method, rtol, middle, radius, axis, most, sought)
         budget -= spent
         if surface is not None:
             found.append((low, high, *surface))
@@ -170,33 +328,44 @@ def panels(row_axis, method, rtol, axis):
     return found
 
 
-def _surface(row_axis, method, rtol, middle, radius, axis, budget):
-    """((coefficients of T_j in s by T_k in p, bound), or None where `rtol` is not met; rows solved, in `budget`)."""
+def _surface(row_axis, method, rtol, middle, radius, axis, budget, sought):
+    """((coefficients (F) of T_j in s by T_k in p, bounds (F), `turns` at the nodes), or None where `rtol` is
+    not met; rows solved, in `budget`).
+    """
     ends = row_axis.at(middle + radius * np.array([-1.0, 1.0]))
     size = np.sqrt((ends.bound * np.abs([1.0, axis.radius, axis.radius**2])).sum(axis=1))
-    at = int(_enough(np.abs(np.diff(ends.span * size)), rtol)[0])  # half the change of D's phase
-    degree, spent, doubt = int(_degrees(ends, axis, rtol).max()), 0, np.inf
+    kind = np.abs(np.diff(ends.span * size))  # half the change of D's phase
+    at = int(_enough(0.5 * kind if sought.factors else kind, rtol)[0])
+    degree, spent, doubt = int(_degrees(ends, axis, rtol, sought).max()), 0, np.inf
     while at < DEGREES.size and degree < axis.most and spent + DEGREES[at] <= budget:
         n, before = int(DEGREES[at]), doubt
         spent += n
         nodes = row_axis.at(middle + radius * chebyshev.symmetric_nodes(n))
-        values, series, bars = _series(nodes, method, 0.0, np.arange(n), int(DEGREES[degree]), axis)
-        surface, tail = chebyshev.transform(series, chebyshev.by_columns(n), (4 + abs(middle) + radius) / radius)
-        doubt = tail + chebyshev.lebesgue(n) * bars.max()
-        if _served(values, doubt, rtol).mean() >= MOST:
-            return (surface, doubt), spent
+        values, series, bars, turns = _series(nodes, method, 0.0, np.arange(n), int(DEGREES[degree]), axis, sought)
+        matrix, ulps = chebyshev.by_columns(n), (4 + abs(middle) + radius) / radius
+        if sought.factors:
+            odd = _odd(row_axis, axis, middle + radius * chebyshev.symmetric_nodes(n))
+            series[3], bars[3] = series[3] / odd[:, None], bars[3] / odd
+        surfaces, tails = zip(*(chebyshev.transform(of, matrix, ulps) for of in series), strict=True)
+        tails = np.array(tails)
+        doubts = tails + chebyshev.lebesgue(n) * bars.max(axis=1)
+        if _served(values, doubts[:, None, None], rtol).mean(axis=(1, 2)).min() >= MOST:
+            return (np.array(surfaces), doubts, turns), spent
+        worst = doubts.argmax()
+        doubt, tail = doubts[worst], tails[worst]
         if not doubt < 0.5 * before:
             break
         at, degree = (at + 1, degree) if tail > 0.5 * doubt else (at, degree + 1)
     return None, spent
 
 
-def _degrees(problem, axis, rtol):
-    """The index in DEGREES of what each row's D needs; beyond DEGREES where none is enough."""
+def _degrees(problem, axis, rtol, sought):
+    """The index in DEGREES of what each row's D, or its factors, need; beyond DEGREES where none is enough."""
+    share = 0.5 if sought.factors else 1.0  # they are those of half a period
     if problem.c2:
-        return _enough(2 * problem.span * axis.radius * np.sqrt(problem.c2), rtol)
+        return _enough(share * (2 * problem.span * axis.radius * np.sqrt(problem.c2)), rtol)
     # cos(span sqrt(p)) on an axis of length 2 radius is half as rich as cos(span p) on its square root
-    return _enough(problem.span * np.sqrt(2 * axis.radius * problem.bound[:, 1]), rtol)
+    return _enough(share * (problem.span * np.sqrt(2 * axis.radius * problem.bound[:, 1])), rtol)
 
 
 def _enough(kind, rtol):
@@ -210,21 +379,38 @@ def _enough(kind, rtol):
     return np.where(enough.any(axis=1), enough.argmax(axis=1), DEGREES.size)
 
 
-def _series(problem, method, rtol, rows, n, axis):
-    """D at nodes (rows, n; n/2 if even), its coefficients (of T_k(2 (p/radius)^2 - 1) if even), and its bound (rows).
+def _series(problem, method, rtol, rows, n, axis, sought):
+    """What is sought at nodes (F, rows, n; n/2 if even), its coefficients, their bounds (F, rows), and, of factors, the
+    `turns` (5, rows, n) there: rotation numbers, and the least and the largest numbers of zeros of y1, and of y2.
 
-    Nodes are solved to `rtol` or as well as can be; an error bound is not finite where there is none.
+    If even, the coefficients are those of T_k(2 (p/radius)^2 - 1), and of factors those of (y1 + y2') / 2, y1', y2 and,
+    of T_{2k + 1}(p/radius), (y1 - y2') / 2. Nodes are solved to `rtol` or as well as can be; an error bound is not
+    finite where there is none.
     """
     x = chebyshev.symmetric_nodes(n)
     x = x[: n // 2] if axis.even else x
     nodes = problem.at(rows, np.broadcast_to(axis.middle + axis.radius * x, (rows.size, x.size)).copy())
-    finer = Asked(max(rtol, BEST), DISCRIMINANT, together=True)
+    finer = Asked(max(rtol, BEST), sought.wanted, together=True, full_period=problem.full_period)
     own = Answers(nodes.p.size, finer)
     pointwise.solve(nodes, method, finer, own)
-    values, bars = (own.floats[c].reshape(nodes.p.shape) for c in (kernels.DISCRIMINANT, kernels.DISCRIMINANT + 1))
+    found = own.floats.reshape(len(own.floats), *nodes.p.shape)
+    values, bars = found[list(sought.rows)], found[[row + 1 for row in sought.rows]].max(axis=2)
+    turns = None
+    if sought.factors:
+        zeros = own.results[:, Y1_ZEROS:].T.reshape(2, *nodes.p.shape)
+        turns = np.stack([found[kernels.ROTATION] if sought.turns else zeros[0], *np.repeat(zeros, 2, axis=0)])
     ulps = (abs(axis.middle) + axis.radius) / axis.radius
-    series, doubts = chebyshev.expand(values, chebyshev.by_columns(x.size), ulps)
-    return values, series, doubts + chebyshev.lebesgue(x.size) * bars.max(axis=1)
+    matrix, odd = chebyshev.by_columns(x.size), sought.factors and axis.even
+    if odd:
+        y1, dy1, y2, dy2 = values
+        values = np.stack([0.5 * (y1 + dy2), dy1, y2, 0.5 * (y1 - dy2)])
+        bars[[0, 3]] = 0.5 * (bars[0] + bars[3])
+    expanded = [chebyshev.expand(of, matrix, ulps) for of in values[: 3 if odd else None]]
+    if odd:  # T_{2k + 1}, whose arguments' rounding weighs four times as much
+        series, doubts = chebyshev.expand(values[3], chebyshev.odd_columns(x.size), ulps)
+        expanded.append((series, 4 * doubts))
+    series, doubts = (np.stack(of) for of in zip(*expanded, strict=True))
+    return values, series, doubts + chebyshev.lebesgue(n if odd else x.size) * bars, turns
 
 
 def _served(values, bar, rtol):

@@ -28,6 +28,8 @@ OUTPUTS = (
     Output("edge_index", "number of the tongue: twice its rotation number", "n", integer=True),
 )
 NODES = 24
+# Cells of a panel in which zeros are looked for, and steps of Newton's method in one.
+CELLS, NEWTON = 192, 5
 # The last coefficients of a converged series, relative to its largest.
 CONVERGED = 1e-9
 # Panels are halved DEEP times; up to DEEPEST about FEW points of a row, where edges accumulate, not where F is noise.
@@ -97,11 +99,10 @@ def _candidates(solve, rows, low, high, panels):
         if depth >= DEEP:
             rough &= np.bincount(row[rough], minlength=row.max() + 1)[row] <= FEW
         known = np.isfinite(size).all(axis=0) & ~rough
-        for kind, panel in zip(*np.nonzero((size > noise) & known), strict=True):
-            zeros = _zeros(series[kind, panel])
-            number = np.full(zeros.size, 1)
-            at = middle[panel] + radius[panel] * zeros
-            found.append((number * row[panel], number * kind, at, number * radius[panel]))
+        kind, panel = np.nonzero((size > noise) & known)
+        which, zeros = _all_zeros(series[kind, panel])
+        kind, panel = kind[which], panel[which]
+        found.append((row[panel], kind, middle[panel] + radius[panel] * zeros, radius[panel]))
         row = np.repeat(row[rough], 2)
         left, right = _halves(left[rough], middle[rough]), _halves(middle[rough], right[rough])
         if not row.size:
@@ -111,6 +112,34 @@ def _candidates(solve, rows, low, high, panels):
 
 def _halves(one, other):
     return np.stack([one, other], axis=1).reshape(-1)
+
+
+def _all_zeros(series):
+    """(which series, zero) of all real zeros in [-1, 1] of the series (n, NODES).
+
+    In theta = arccos x a series is seen to have no zero in a cell, or to be monotonic there, from its value and slope
+    in the middle and a bound of its second derivative; where that leaves a cell open, eigenvalues tell.
+    """
+    k, half = np.arange(NODES), 0.5 * np.pi / CELLS
+    edges = np.pi * np.arange(CELLS + 1) / CELLS
+    at_edges = series @ np.cos(k[:, None] * edges)
+    middle = series @ np.cos(k[:, None] * (edges[:-1] + half))
+    slope, bend = abs(series @ (k[:, None] * np.sin(k[:, None] * (edges[:-1] + half)))), abs(series) @ (k * k)
+    none = abs(middle) > half * slope + (0.5 * half * half) * bend[:, None]
+    changes = (at_edges[:, 1:] < 0) != (at_edges[:, :-1] < 0)
+    clear = (none | (slope > half * bend[:, None])).all(axis=1)
+    which, cell = np.nonzero(changes & ~none & clear[:, None])
+    theta, own = edges[cell] + half, series[which]
+    for _ in range(NEWTON):
+        angles = k * theta[:, None]
+        step = (own * np.cos(angles)).sum(axis=1) / (own * k * np.sin(angles)).sum(axis=1)
+        theta = np.clip(theta + step, edges[cell], edges[cell + 1])
+    found = [(which, np.cos(theta))]
+    for i in np.flatnonzero(~clear):
+        zeros = _zeros(series[i])
+        found.append((np.full(zeros.size, i), zeros))
+    which, zeros = (np.concatenate(values) for values in zip(*found, strict=True))
+    return which, zeros
 
 
 def _zeros(series):

@@ -36,11 +36,17 @@ def solve(problem, method, asked, answers, where=None):
         return
     inside = where.reshape(problem.p.shape)
     rows = np.flatnonzero(inside.any(axis=1))  # leave out those that have no such point
-    part = problem.at(rows, problem.p[rows], None if problem.rule is None else problem.rule[rows])
-    chosen = np.flatnonzero(inside[rows])
-    found = Answers(chosen.size, asked)
-    _solve(part, method, asked, found, chosen)
-    answers.replace(np.flatnonzero(where), found)
+    count = inside[rows].sum(axis=1)
+    chosen = np.arange(count.max(initial=1)) < count[:, None]  # the points of each row, side by side
+    p, points = np.full(chosen.shape, np.nan), np.flatnonzero(where)
+    p[chosen] = problem.p.reshape(-1)[points]
+    rule = None
+    if problem.rule is not None:
+        rule = np.zeros(chosen.shape, problem.rule.dtype)
+        rule[chosen] = problem.rule.reshape(-1)[points]
+    found = Answers(points.size, asked)
+    _solve(problem.at(rows, p, rule), method, asked, found, np.flatnonzero(chosen))
+    answers.replace(points, found)
 
 
 def _solve(problem, method, asked, answers, chosen):
@@ -72,6 +78,7 @@ def _solve(problem, method, asked, answers, chosen):
     answers.status[(answers.status == status.OK) & np.isnan(results[:, Y1_ZEROS])] = status.STEP_LIMIT
     answers.assess(results, rule)
     ladder.climb(rung, results, answers, again, assess)
+    answers.results = results
 
 
 def _first_steps(problem, method, asked):

@@ -87,9 +87,9 @@ class Motion:
         conjugate, _ = complete_integrals(self.kc, np.minimum(self.k, 1 / np.maximum(self.k, 1)))
         return np.maximum(self.k, 1) / conjugate
 
-    def lyapunov(self, rho):
+    def lyapunov(self, rho, period):
         """Does Lyapunov's criterion (corrected: T int z <= 4, and z >= 0) certify stability, rounding aside?"""
-        k, period, rotates = self.k[:, None], self.period[:, None], self.rotates[:, None]
+        k, period, rotates = self.k[:, None], period[:, None], self.rotates[:, None]
         first, second = (values[:, None] for values in self.integrals)
         squares = np.where(rotates, 2 * k * second, 8 * (second - self.kc[:, None] ** 2 * first))
         drift = np.where(rotates, pi * rho, 0.0)  # integral of w over T, times rho: am advances by pi

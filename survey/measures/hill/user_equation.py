@@ -122,6 +122,46 @@ def at(z, points, u):
     return out
 
 
+class Steps:
+    """How the steps of rows are distributed over the pieces between breaks: by `size` and `rate` of z (R, P)."""
+
+    def __init__(self, edges, slack, size, rate):
+        self.edges, self.slack, self.rate = edges, slack, rate
+        self.length, self.end = np.diff(edges, axis=1), edges[:, -1]
+        self.pieces = np.count_nonzero(self.length > 0, axis=1)
+        self.more = np.where(self.pieces > 1, self.pieces, 0) / self.end
+        # Each piece gets steps by its weight: enough in all that each has what it needs, and one more.
+        self.weight = self.length * np.maximum(np.maximum(BY_PHASE * np.sqrt(size), rate), 1 / self.end[:, None])
+        self.total = np.cumsum(self.weight, axis=1)[:, -1:]
+        self.need = self.length * self.total / (np.where(self.weight > 0, self.weight, 1) * self.end[:, None])
+
+    def frequency(self, size):
+        """What stands for the fastest phase of a whole row with this `size` of z."""
+        return (self.need * np.sqrt(size)).max(axis=1) + pointwise.LONGEST * self.more
+
+    @property
+    def rates(self):
+        """What stands for the rate of a whole row."""
+        return (self.need * self.rate).max(axis=1) + 2 * self.more
+
+    def of(self, rows, number):
+        """Starts and lengths of the steps (rows, number), and the ends between which z may be asked for in each."""
+        i, length, weight = np.arange(rows.size)[:, None], self.length[rows], self.weight[rows]
+        share = (number - self.pieces[rows, None]) * (weight / self.total[rows])
+        count = np.floor(share).astype(int) + (length > 0)
+        count[i[:, 0], weight.argmax(axis=1)] += number - count.sum(axis=1)
+        last, k = np.cumsum(count, axis=1), np.arange(number)
+        piece = (k[:, None] >= last[:, None]).sum(axis=2)
+        low, high = self.edges[rows[:, None], piece], self.edges[rows[:, None], piece + 1]
+        h, slack = (high - low) / count[i, piece], self.slack[rows, None]
+        return low + (k - (last - count)[i, piece]) * h, h, low + slack, high - slack
+
+    def at_nodes(self, rows, nodes, number):
+        """u (rows, number, nodes) at the `nodes` (fractions) of the steps."""
+        start, h, low, high = (values[:, :, None] for values in self.of(rows, number))
+        return np.clip(start + h * nodes, low, high)
+
+
 def problem(z, points, edges, period, slack, even, exact=None):
     """The Hill problem of z at the points (N, n), and where z is `rough`, not smooth between its breaks.
 
@@ -131,59 +171,52 @@ def problem(z, points, edges, period, slack, even, exact=None):
     fewer, its last one repeated. Points whose z is rough, not finite, or not even where it should be, have span NaN.
     """
     size, rate, scale, rough = measured(z, points, edges, period if even else None, slack)
-    length, end = np.diff(edges, axis=1), edges[:, -1]
-    pieces = np.count_nonzero(length > 0, axis=1)
-    frequency, more = np.sqrt(size), np.where(pieces > 1, pieces, 0) / end
-    # Each piece gets steps by its weight: enough in all that each has what it needs, and one more.
-    weight = length * np.maximum(np.maximum(BY_PHASE * frequency, rate), 1 / end[:, None])
-    total = np.cumsum(weight, axis=1)[:, -1:]
-    need = length * total / (np.where(weight > 0, weight, 1) * end[:, None])
-    frequency = (need * frequency).max(axis=1) + pointwise.LONGEST * more
-
-    def steps(rows, number):
-        """Starts and lengths of the steps (rows, number), and the ends between which z may be asked for in each."""
-        i = np.arange(rows.size)[:, None]
-        count = np.floor((number - pieces[rows, None]) * (weight[rows] / total[rows])).astype(int) + (length[rows] > 0)
-        count[i[:, 0], weight[rows].argmax(axis=1)] += number - count.sum(axis=1)
-        last, k = np.cumsum(count, axis=1), np.arange(number)
-        piece = (k[:, None] >= last[:, None]).sum(axis=2)
-        low, high = edges[rows[:, None], piece], edges[rows[:, None], piece + 1]
-        h = (high - low) / count[i, piece]
-        return low + (k - (last - count)[i, piece]) * h, h, low + slack[rows, None], high - slack[rows, None]
+    steps = Steps(edges, slack, size, rate)
 
     def sample(rows, nodes, number):
-        start, h, low, high = (values[:, :, None] for values in steps(rows, number))
-        u = np.clip(start + h * nodes, low, high)
+        u = steps.at_nodes(rows, nodes, number)
         out = np.empty((rows.size, number, 2, nodes.size))
         out[:, :, 1] = scale[rows, None, None]
         out[:, :, 0] = at(z, points[rows], u.reshape(rows.size, -1)).reshape(u.shape) - out[:, :, 1]
         return out
 
     def walk(rows, p, tolerance):
-        out, reached = np.full((rows.size, RESULTS), np.nan), np.zeros(rows.size, np.bool_)
-        own = points[rows], edges[rows], pieces[rows], slack[rows], STRIDE / rate[rows].max(axis=1), scale[rows]
-        kernels(z).walk(*own, tolerance, out, reached)
-        return out, reached
+        return walked(z, points[rows], rows, steps, scale, tolerance)
 
     def exactly(rows, p, low, number):
-        out = np.full((rows.size, RESULTS + (0 if even else sampled_double.SQUARES)), np.nan)
-        for i in np.flatnonzero(number <= EXACT_STEPS):
-            start = steps(rows[i : i + 1], number[i])[0][0]
-            with multiprecision.LOCK:
-                found = multiprecision.series(*exact(points[rows[i]], edges[rows[i]]), start, sampled_double.NODES)
-            if found is None or not _agree(z, points[rows[i]], scale[rows[i]], *found[3:]):
-                continue
-            terms, lengths, sizes = found[:3]
-            sampled_double.solve(terms, sampled_double.missing(*sizes), lengths, not even, out[i])
-        return out
+        return solved_exactly(z, points[rows], rows, steps, scale, even, exact, number)
 
+    frequency = steps.frequency(size)
     own = monodromy.Problem(
-        p=np.ones((len(points), 1)), span=np.where(rough | np.isnan(scale), np.nan, end), c2=0.0,
-        bound=np.column_stack([frequency**2, 0 * end, 0 * end]), rate=(need * rate).max(axis=1) + 2 * more,
-        sample=sample, walk=walk, cut=lambda rows, number: steps(rows, number)[1], full_period=not even,
+        p=np.ones((len(points), 1)), span=np.where(rough | np.isnan(scale), np.nan, steps.end), c2=0.0,
+        bound=np.column_stack([frequency**2, 0 * frequency, 0 * frequency]), rate=steps.rates,
+        sample=sample, walk=walk, cut=lambda rows, number: steps.of(rows, number)[1], full_period=not even,
         exact=exactly if exact else None,
     )  # fmt: skip
     return own, rough
+
+
+def walked(z, points, rows, steps, scale, tolerance):
+    """The results of the `points`, each of one of the `rows`, by DOP853, and which of them reached the end."""
+    out, reached = np.full((rows.size, RESULTS), np.nan), np.zeros(rows.size, np.bool_)
+    stride = STRIDE / steps.rate[rows].max(axis=1)
+    own = points, steps.edges[rows], steps.pieces[rows], steps.slack[rows], stride, scale[rows]
+    kernels(z).walk(*own, tolerance, out, reached)
+    return out, reached
+
+
+def solved_exactly(z, points, rows, steps, scale, even, exact, number):
+    """The results of the `points`, each of one of the `rows`, in double-double, in its `number` of steps."""
+    out = np.full((rows.size, RESULTS + (0 if even else sampled_double.SQUARES)), np.nan)
+    for i in np.flatnonzero(number <= EXACT_STEPS):
+        start = steps.of(rows[i : i + 1], number[i])[0][0]
+        with multiprecision.LOCK:
+            found = multiprecision.series(*exact(points[i], steps.edges[rows[i]]), start, sampled_double.NODES)
+        if found is None or not _agree(z, points[i], scale[rows[i]], *found[3:]):
+            continue
+        terms, lengths, sizes = found[:3]
+        sampled_double.solve(terms, sampled_double.missing(*sizes), lengths, not even, out[i])
+    return out
 
 
 def _agree(z, point, scale, u, values):

@@ -1,13 +1,12 @@
 """Danby's question: are the triangular points of the elliptic problem stable? Trace invariants, verdict, collision.
 
 The monodromy's characteristic polynomial is l^4 - a l^3 + b l^2 - a l + 1. By the reversibility half a period gives all
-(`traces`; `scenes/libration_elliptic.md`, section 3): stable <=> A B > 0, C D > 0, K > 0 and 0 < t < 2, decided by the
+(`traces`; `scenes/libration_elliptic.md`): stable <=> A B > 0, C D > 0, K > 0 and 0 < t < 2, decided by the
 error bounds of these; A B = 0 means multipliers -1, K = 0 two pairs that meet.
 
-Points climb a ladder of steps (`survey.measures.answers`). A dense row (one e, many mu) is five Chebyshev series in
-s = sqrt(1 - 3 mu (1 - mu)), of which A to t are entire functions: they are solved at NODES values of s in [1/2, 1],
-and what they leave undecided or too inaccurate is solved point by point. e = 0 has its closed form, and so has mu = 0.
-What float64 leaves open, or not as accurate as asked, is solved in double-double (`measures.libration.danby_double`).
+Points climb a ladder of steps (`survey.measures.answers`). Dense rows (one e, many mu) are five Chebyshev series in
+s = sqrt(1 - 3 mu (1 - mu)), which come from series in both parameters (`panels`). e = 0 has its closed form, and so has
+mu = 0. What these leave open, or not as accurate as asked, is solved in double-double (`danby_double`).
 """
 
 from functools import lru_cache
@@ -27,10 +26,9 @@ from survey.kernels.libration.traces import (
     UNDECIDED,
     UNSTABLE,
 )
-from survey.kernels.math.chebyshev import angles, lebesgue, nodes, to_coefficients
 from survey.kernels.math.roundoff import EPS
 from survey.measures.answers import Ladder
-from survey.measures.libration import danby_double
+from survey.measures.libration import danby_double, panels
 from survey.measures.libration.answers import Answers
 from survey.methods import taylor16
 from survey.scene import Output
@@ -49,13 +47,9 @@ _NUMBERS = np.array([2, 3, 4, 5, 6, 7, 8, *((5 + i % 4) << (i // 4 + 1) for i in
 STEPS = Ladder(_NUMBERS, np.arange(_NUMBERS.size) + 3, slice(INVARIANTS, RESULTS), most=5)
 TOLERANCES = Ladder(10.0 ** -np.arange(4.0, 16.0), np.arange(12) + 1, slice(INVARIANTS, RESULTS), most=5)
 FINEST = 1e-14
-# The least number of points in a row for which a series pays; the share of the asked accuracy for its values; the share
-# of its nodes that miss it in a hard row.
-DENSE, SHARE, HARD = 3 * NODES, 0.05, 0.25
+DENSE = 3 * NODES  # the least number of points in a row for which a series pays
 # Keep a kernel call below about a second: steps, or points of an adaptive method.
 CALL_WORK, WALKS = 3_000_000, 500
-TO_SERIES = to_coefficients(np.cos(np.outer(np.arange(NODES), angles(NODES))))
-LEBESGUE = lebesgue(NODES - 1)
 
 
 def solve(e, mu, method="auto", rtol=1e-10, dense=False):
@@ -69,17 +63,16 @@ def solve(e, mu, method="auto", rtol=1e-10, dense=False):
     closed = valid & ~left
     if closed.any():
         answers.replace(np.flatnonzero(closed), closed_form(mu[closed], rtol))
-    hard = ()
     if method == "auto" and dense:
-        left, hard = _by_series(e, mu, rtol, answers, left)
-    if left.any():
+        _by_series(e, mu, rtol, answers, left)
+    elif left.any():
         used = taylor16 if method == "auto" else measures.method(method)
         points = np.flatnonzero(left)
         answers.replace(points, _point_by_point(e[points // mu.shape[1]], *rates(mu[left]), used, rtol))
     if method == "auto":
         points = np.flatnonzero((valid & (mu > 0)).reshape(-1) & answers.unsettled)
         if points.size:
-            danby_double.solve(e, mu, rtol, answers, points, hard)
+            danby_double.solve(e, mu, rtol, answers, points, dense)
     answers.status[~valid.reshape(-1)] = status.INVALID_PARAMETERS
     answers.floats[:, answers.status != status.OK] = np.nan
     names = ("a", "a_error", "b", "b_error")
@@ -102,25 +95,11 @@ def factors(e, mu, rtol=1e-13):
 
 
 def _by_series(e, mu, rtol, answers, left):
-    """Answer the points `left` (R, L) from their rows' series; returns those that missed what was asked, and hard rows.
-
-    Hard is a row where float64 misses `rtol` at a quarter of the nodes: points of other rows are few in double-double.
-    """
-    rows = np.flatnonzero(left.any(axis=1))
-    s = 0.75 + 0.25 * nodes(NODES)
-    d1, d2 = np.tile(1.5 * (1.0 + s), rows.size), np.tile(1.5 * (1.0 - s), rows.size)
-    results = np.empty((rows.size * NODES, RESULTS))
-    own = _point_by_point(np.repeat(e[rows], NODES), d1, d2, taylor16, max(SHARE * rtol, 1e-13), results)
-    results = results.reshape(rows.size, NODES, RESULTS)
-    series = np.ascontiguousarray(np.swapaxes(TO_SERIES @ results[..., :INVARIANTS], 1, 2))
-    tail = abs(series[..., -2:]).sum(axis=-1)
-    with np.errstate(over="ignore"):  # then the points miss what was asked
-        bars = LEBESGUE * results[..., INVARIANTS:].max(axis=1) + tail + 16 * EPS * abs(series).sum(axis=-1)
-    sound = (own.status == status.OK).reshape(rows.size, NODES).all(axis=1)
+    """Answer the points `left` (R, L) from their rows' series; those that miss `rtol` remain `missed`."""
+    some = np.flatnonzero(left.any(axis=1))
+    series, bars = panels.rows(e[some])
     answers.missed |= left.reshape(-1)
-    traces.dense(series[sound], bars[sound], rows[sound], mu, rtol, status.OVERFLOW, *answers.all)
-    hard = own.inaccurate(rtol).reshape(rows.size, NODES).mean(axis=1) >= HARD
-    return answers.missed.reshape(mu.shape) & left, rows[hard]
+    traces.dense(series, bars, some, mu, rtol, status.OVERFLOW, *answers.all)
 
 
 def _point_by_point(e, d1, d2, method, rtol, results=None):

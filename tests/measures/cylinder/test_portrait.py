@@ -213,7 +213,7 @@ def test_far_cycle():
 
 
 def test_hopf():
-    """Amplitude of the cycle born at f = 0: per turn ln(m) = 0 at a^2 = -8 f omega / (3 K) (gyrostat.md, section 4)."""
+    """Amplitude of the cycle born at f = 0: per turn ln(m) = 0 at a^2 = -8 f omega / (3 K) (gyrostat.md)."""
     for f in (1e-3, 1e-4):  # at phi = 0: f = b12, g' = -d - s3, K = b12 s3 - b31 s2 ~ -b31 s2; g = -c23 + s2 = 0
         b31, s2, d, s3 = 0.5, 0.8, 0.3, 0.9
         found = portraits((f, b31, d, s2, s2, s3))

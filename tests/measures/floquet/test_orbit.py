@@ -294,15 +294,15 @@ def skewed(t, x, p, out):
         ({"f": short}, "indexes beyond an array"),
         ({"f": fails}, "fails \\(KeyError"),
         ({"f": lambda t, x, p, out: [x[0]]}, "shape \\(1,\\)"),
-        ({"period": -1.0}, "PERIOD = -1.0"),
+        ({"period": -1.0}, "period = -1.0"),
         ({"period": 3.0}, "differs from f\\(t\\)"),
         ({"period": None, "start": (1.0, 0.0, 6.0)}, "f\\(t, x, p, out\\) depends on t"),
-        ({"period": None}, "START must be 3 numbers"),
-        ({"start": (1.0,)}, "START must be 2 numbers"),
-        ({"start": lambda p: (1.0, 0.0, 2.0)}, "START\\(p\\) returns \\(3,\\) numbers, not 2"),
-        ({"start": lambda p: 1 / 0}, "START\\(p\\) fails \\(ZeroDivisionError"),
-        ({"states": ("x", "x")}, "STATES"),
-        ({"parameters": "x0"}, "PARAMETERS"),
+        ({"period": None}, "start must be 3 numbers"),
+        ({"start": (1.0,)}, "start must be 2 numbers"),
+        ({"start": lambda p: (1.0, 0.0, 2.0)}, "start\\(p\\) returns \\(3,\\) numbers, not 2"),
+        ({"start": lambda p: 1 / 0}, "start\\(p\\) fails \\(ZeroDivisionError"),
+        ({"states": ("x", "x")}, "states"),
+        ({"parameters": "x0"}, "parameters"),
         ({"jacobian": skewed}, "is not df/dx"),
     ],
 )
@@ -331,3 +331,43 @@ def test_a_file_and_a_run(tmp_path):
     assert (ds.status == 0).all()
     assert ds.state.values.tolist() == ["x", "v"]
     assert "certainly" in ds.survey.point(F=0.1, w=1.3).why
+
+
+def test_the_orbit_of_a_point_against_scipy():
+    ds = survey.evaluate(van_der_pol(), mu=1.3)
+    motion = ds.survey.trajectory(time=10.0)
+    assert motion.attrs["panels"] == "plane x v; lines t x v; multipliers"
+    assert motion.t.values[-1] <= 10.0 < motion.t.values[-1] + 0.5 and (np.diff(motion.t) > 0).all()
+    rhs = lambda t, y: (y[1], 1.3 * (1 - y[0] ** 2) * y[1] - y[0])  # noqa: E731
+    truth = solve_ivp(rhs, (0.0, 10.0), ds.x0.values, "DOP853", motion.t.values, rtol=1e-13, atol=1e-15).y
+    for name, values in zip("xv", truth, strict=True):
+        assert (abs(motion[name] - values) <= motion[f"{name}_error"] + 2e-12).all()
+        assert float(motion[f"{name}_error"].max()) < 1e-11
+    with pytest.raises(survey.BadInput, match="no orbit is shown to exist at mu = 0;"):
+        survey.evaluate(van_der_pol(), mu=0.0).survey.trajectory()
+
+
+@pytest.mark.parametrize("period, start", [(None, (1.9, 0.1, 6.0)), (2 * math.pi, (0.3, 0.1))])
+def test_a_second_method_agrees(period, start):
+    """The audit's: DOP853 with the variational equation, instead of Taylor series and a proof."""
+
+    def f(t, x, p, out):
+        force = 0 if period is None else 0.3 * math.cos(t)
+        out[0], out[1], out[2] = x[1], p[0] * (1 - x[0] ** 2) * x[1] - x[0] + force, x[0] - x[2]
+
+    scene = survey.orbit(f, states=("x", "v", "z"), period=period, parameters="mu", start=(*start[:2], 0.1, *start[2:]))
+    mu = np.linspace(-0.5, 2.5, 9)[[0, 3, 5, 7, 8]]
+    one, two = (survey.evaluate(scene, mu=mu, method=name) for name in ("auto", "dop853"))
+    assert (one.status == two.status).all() and (one.verdict == two.verdict).all() and int((one.status == 0).sum()) >= 2
+    for name in ("x0", "period", "multiplier_re", "multiplier_im", "spectral_radius", "exponent"):
+        off = abs(one[name] - two[name]).where(one.status == 0, 0.0)
+        assert (off <= (one[f"{name}_error"] + two[f"{name}_error"]).where(one.status == 0, 0.0)).all(), name
+        if name in ("x0", "spectral_radius"):
+            assert float(two[f"{name}_error"].max()) < 1e-7 and float(off.max()) > 0
+
+
+def test_multipliers_to_25_digits():
+    """Liouville's formula along van der Pol's cycle, by mpmath (28 digits) from Andersen's and Geer's amplitude."""
+    ds = survey.evaluate(van_der_pol(), mu=1.0)
+    off = abs(mpmath.mpf(float(ds.multiplier_re[0])) - mpmath.mpf("0.0008596950636038051861590281585"))
+    assert off <= float(ds.multiplier_re_error[0]) < 3e-12

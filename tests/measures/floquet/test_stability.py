@@ -240,3 +240,38 @@ def test_bits_do_not_depend_on_the_block():
         one = survey.evaluate(scene, a=a[i], q=q[k], c=0.1)
         for name in whole.data_vars:
             assert np.array_equal(whole[name].isel(a=i, q=k).values, one[name].values, equal_nan=True)
+
+
+def test_bars_next_to_the_largest_float_leave_the_verdict_open():
+    """Where a thousand times the bars overflows, the eigenvalues of a matrix with infinities were asked for."""
+    M, E = np.array([[[1.0, 0.5], [0.25, 1.0]]]), np.full((1, 2, 2), 1e306)
+    assert verdicts(Discs(monodromy.Matrices.plain(M, E)), M, E, False).tolist() == [-1]
+
+
+def test_even_and_odd_orders_of_a_series_may_differ():
+    """A is small where its parts cancel, so that steps are long: with three of them the last bounds once alternated."""
+    B = np.array([[[-4e-8, 1.00272], [-1.00272, -4e-8]]])
+    ds = evaluated(2, B)
+    assert int(ds.verdict[0]) == 1 and float(ds.spectral_radius_error[0]) < 1e-10
+
+
+@pytest.mark.parametrize("body", ["prolate", "oblate"])
+def test_satellites_map(body):
+    """Librations in the angle am u, reversible and of period 2 pi: the same verdicts as the scene's."""
+
+    def A(t, p, out):
+        k, rho = p
+        c = 1 - k * k if body == "prolate" else -k * k
+        speed = 1 - k * k * math.sin(t) ** 2
+        out[0, 1] = 1.0
+        out[1, 0] = -(2 * k * k * math.cos(t) ** 2 + 2 * rho * k * math.cos(t) + rho * rho + c) / speed
+        out[1, 1] = 0.5 * k * k * math.sin(2 * t) / speed
+
+    names = {"parameters": ("k", "rho"), "states": ("y", "dy"), "structure": "reversible"}
+    scene = survey.floquet(A, period=2 * math.pi, **names)
+    axes = {"k": np.linspace(0.05, 0.93, 40), "rho": np.linspace(0.6, 3.1, 36)}
+    ours, known = survey.evaluate(scene, **axes), survey.evaluate("satellite", **axes, body=body)
+    assert (ours.verdict == known.verdict).all()
+    trace = ours.multiplier_re.sum("multiplier")
+    bar = ours.multiplier_re_error.sum("multiplier") + known.discriminant_error
+    assert (abs(trace - known.discriminant) <= bar + 1e-13 * abs(known.discriminant)).all()

@@ -72,7 +72,7 @@ def test_the_area_of_a_satellites_tongue_is_the_integral_of_its_edges():
 
 @pytest.mark.parametrize(("start", "share"), [(0, 0.148), (1, 0.54)])
 def test_the_unstable_shares_of_librations(start, share):
-    """14.8 % of prolate and 54 % of oblate bodies and amplitudes (satellite.md, section 4)."""
+    """14.8 % of prolate and 54 % of oblate bodies and amplitudes (satellite.md: What is known)."""
     solve = solver(satellite, "inertia_ratio", "amplitude", direction="1", rtol=1e-9)
     cells = hill_cells.find(solve, Side(start, start + 1, 7), Side(0, 1.57, 7))
     low, high = cells.unstable / cells.total, 1 - cells.stable / cells.total

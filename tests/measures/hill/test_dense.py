@@ -1,10 +1,11 @@
-"""Dense rows by their Chebyshev series: within the bars of points solved one by one, in any block."""
+"""Dense rows and maps by their Chebyshev series: within the bars of points solved one by one, in any block."""
 
 import numpy as np
 import pytest
 import xarray as xr
 
 import survey
+from survey.file.labels import error_bars
 from survey.measures.hill import dense as hill_dense
 from survey.scene import Request
 from survey.scenes import mathieu, satellite
@@ -67,7 +68,15 @@ MAPS = [
     ("satellite", {"amplitude": (0.1, 1.3), "rho": (-1.0, 3.0)}, {"body": "oblate"}, 1),
     ("satellite", {"k": (1.02, 3.0), "rho": (-4.0, 4.0)}, {"body": "oblate"}, 1),
     ("satellite", {"k": (0.9, 0.9001), "rho": (50.0, 50.01)}, {"body": "prolate"}, 1),
+    ("satellite", {"amplitude": (0.0, 1.5), "inertia_ratio": (0.02, 0.97)}, {}, 1),
+    ("satellite", {"k": (1.02, 3.0), "inertia_ratio": (1.1, 2.0)}, {"direction": "-1"}, 0),
     ("mathieu", {"q": (-2.0, 3.0), "a": (-1.0, 60.0)}, {}, 1),
+]
+# Wide gaps, narrow bands, long periods.
+STEEP = [
+    ("mathieu", {"q": (0.0, 120.0), "a": (-250.0, 250.0)}, {}, 0),
+    ("satellite", {"one_minus_k": (1e-9, 1e-6), "rho": (-3.0, 6.0)}, {"body": "oblate"}, 0),
+    ("satellite", {"k": (1.0001, 1.2), "rho": (-1.5, 0.5)}, {"body": "prolate"}, 0),
 ]
 
 
@@ -85,6 +94,30 @@ def test_dense_maps_agree_with_their_points(surfaces, scene, ranges, options, fe
     for name in ("discriminant", "exponent"):
         off = abs(mine[name].values - alone[name].values)
         assert (off <= mine[f"{name}_error"].values.astype(float) + alone[f"{name}_error"].values).all(), name
+    both = (mine.verdict.values >= 0) & (alone.verdict.values >= 0)
+    assert both.mean() > 0.99 and (mine.verdict.values == alone.verdict.values)[both].all()
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-10])
+@pytest.mark.parametrize(("scene", "ranges", "options", "fewest"), [*MAPS, *STEEP])
+def test_all_outputs_of_maps_agree_with_their_points(served, scene, ranges, options, fewest, rtol):
+    """The factors by series, and rotation numbers from the zeros that nodes around and signs tell."""
+    (row, rows), (lane, lanes) = ranges.items()
+    axes = {row: np.linspace(*rows, 300), lane: np.linspace(*lanes, 240)}
+    dense = survey.evaluate(scene, **axes, **options, rtol=rtol)
+    left, points = map(sum, zip(*served, strict=True))
+    assert left < 0.45 * points or not fewest
+    random = np.random.default_rng(0)
+    places = {name: xr.DataArray(random.integers(0, axes[name].size, 3000), dims="point") for name in axes}
+    mine = dense.isel(places)
+    points = {name: mine[name].drop_vars(list(axes)) for name in axes}
+    alone = survey.evaluate(scene, **points, **options, rtol=1e-13, method="taylor16")
+    assert (mine.status.values == alone.status.values).all()
+    for name in error_bars(mine):
+        off = abs(mine[name].values - alone[name].values)
+        bars = mine[f"{name}_error"].values.astype(float) + alone[f"{name}_error"].values
+        assert (off <= bars)[np.isfinite(bars)].all(), name
+        assert (np.isfinite(mine[name].values) == np.isfinite(alone[name].values)).all(), name
     both = (mine.verdict.values >= 0) & (alone.verdict.values >= 0)
     assert both.mean() > 0.99 and (mine.verdict.values == alone.verdict.values)[both].all()
 
@@ -111,11 +144,12 @@ def test_mathieu_rows_are_served_too(served):
     assert ((dense.verdict == alone.verdict) | (alone.verdict < 0)).all()
 
 
+@pytest.mark.parametrize("names", [NAMES, NAMES | {"y1", "y2", "dy1", "dy2", "rotation_number"}])
 @pytest.mark.parametrize(("scene", "row", "lane"), [(satellite, "k", "rho"), (mathieu, "q", "a")])
-def test_any_block_has_the_same_bits(scene, row, lane):
+def test_any_block_has_the_same_bits(scene, row, lane, names):
     rows, lanes = np.linspace(0.05, 0.95, 6)[:, None], np.linspace(0.6, 4.0, 300)[None, :]
     options = {"body": "prolate"} if scene is satellite else {}
-    request = Request(options, "auto", 1e-10, NAMES, {lane: (300, 0.6, 4.0)})
+    request = Request(options, "auto", 1e-10, names, {lane: (300, 0.6, 4.0)})
     whole = scene.solve({row: rows, lane: lanes}, request)
     for rows_of, lanes_of in [
         (slice(2, 3), slice(None)),
@@ -123,8 +157,41 @@ def test_any_block_has_the_same_bits(scene, row, lane):
         (slice(4, 6), slice(290, 300)),
     ]:
         part = scene.solve({row: rows[rows_of], lane: lanes[:, lanes_of]}, request)
-        for name in ("discriminant", "discriminant_error", "exponent", "verdict"):
+        for name in whole:
             np.testing.assert_array_equal(part[name], whole[name][rows_of, lanes_of], err_msg=name)
+
+
+SCATTERED = [
+    ("satellite", {"k": (0.01, 0.99), "rho": (-2.0, 4.0)}, {"body": "prolate"}),
+    ("satellite", {"one_minus_k": (-3.0, -0.05), "rho": (-3.0, 2.0)}, {"body": "oblate"}),
+    ("mathieu", {"q": (-4.0, 9.0), "a": (-10.0, 40.0)}, {}),
+]
+
+
+@pytest.mark.parametrize("variables", [None, ["discriminant", "verdict"]])
+@pytest.mark.parametrize(("scene", "ranges", "options"), SCATTERED)
+def test_scattered_points_agree_with_points_on_their_own(scene, ranges, options, variables, monkeypatch):
+    from survey.sweep import cost
+
+    random = np.random.default_rng(4)
+    given = {name: xr.DataArray(random.uniform(*ends, 6000), dims="point") for name, ends in ranges.items()}
+    for name in given:
+        given[name][[10, 20]] = 0.0 if name in ("rho", "q") else given[name][10]  # where exact rules decide
+    given["rho" if "rho" in given else "a"][30] = np.nan
+    many = survey.evaluate(scene, **given, **options, variables=variables)
+    few = survey.evaluate(scene, **{name: v[:1500] for name, v in given.items()}, **options, rtol=1e-13)
+    one = many.isel(point=slice(0, 1500))
+    assert (one.status.values == few.status.values).all() and int(one.status[30]) != 0
+    for name in error_bars(one):
+        off, bars = abs(one[name].values - few[name].values), one[f"{name}_error"].values.astype(float)
+        assert (off <= bars + few[f"{name}_error"].values)[np.isfinite(bars)].all(), name
+        assert (bars <= 1.001e-10 * (1 + abs(one[name].values)))[np.isfinite(bars)].mean() > 0.99
+    both = (one.verdict.values >= 0) & (few.verdict.values >= 0)
+    assert both.mean() > 0.99 and (one.verdict.values == few.verdict.values)[both].all()
+    assert int(one.verdict[10]) == int(few.verdict[10])
+    with monkeypatch.context() as patch:
+        patch.setattr(cost, "BLOCK_POINTS", 1700)
+        xr.testing.assert_identical(survey.evaluate(scene, **given, **options, variables=variables), many)
 
 
 def test_a_sparse_axis_is_solved_point_by_point(served):

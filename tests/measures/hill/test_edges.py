@@ -54,7 +54,7 @@ def test_edges_are_where_the_verdict_changes_and_the_count_is_the_rotation_numbe
 
 
 def test_width_of_a_tongue_is_its_power_of_k():
-    """Prolate tongue n = 5: (25/4608) k^5 (satellite.md, section 4), resolved where it is 2e-12 wide."""
+    """Prolate tongue n = 5: (25/4608) k^5 (satellite.md: What is known), resolved where it is 2e-12 wide."""
     k = np.array([0.013, 0.1])
     edges = hill_edges.find(solver(satellite, "k", k, "rho", body="prolate"), 2, 2.2, 2.35)
     for row, value in enumerate(k):
@@ -65,7 +65,7 @@ def test_width_of_a_tongue_is_its_power_of_k():
 
 
 def test_a_fold_of_rotations_keeps_both_edges():
-    """Prolate rotations: as 1/k grows the tongues near r = 0 and r = -2 meet (satellite.md, section 4)."""
+    """Prolate rotations: as 1/k grows the tongues near r = 0 and r = -2 meet (satellite.md: What is known)."""
     k = 1 / np.array([0.6, 0.97])
     edges = hill_edges.find(solver(satellite, "k", k, "rho", body="prolate"), 2, -3.0, 0.5)
     assert edges.complete.all() and edges.row.size > 4

@@ -281,7 +281,7 @@ SPIKE = survey.hill(spike, period=1.0, parameters=("a", "area", "at", "w"))
 
 def test_a_spike_that_a_run_would_miss_is_refused_with_its_place_and_resolved_with_a_break_there():
     point = {"a": 4.0, "area": 2.0, "at": 0.3045, "w": 2e-4}
-    with pytest.raises(survey.BadInput, match=r"z has a spike near u = 0\.304.*T/128; name its position in BREAKS"):
+    with pytest.raises(survey.BadInput, match=r"z has a spike near u = 0\.304.*T/128; name its position in breaks"):
         survey.evaluate(SPIKE, **point)
     breaks = {"breaks": lambda p: [p[2] - 8 * p[3], p[2], p[2] + 8 * p[3]]}
     named = survey.evaluate(survey.hill(spike, period=1.0, parameters=SPIKE.PARAMETERS, **breaks), **point)

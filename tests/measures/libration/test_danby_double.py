@@ -11,8 +11,7 @@ from mpmath import mp, mpf
 
 import survey
 from survey import status
-from survey.kernels.libration import danby_double as kernels
-from survey.measures.libration import danby, danby_double
+from survey.measures.libration import danby, danby_double, panels
 from survey.measures.libration.answers import Answers
 from survey.sweep import cost
 
@@ -25,10 +24,7 @@ TIES = ((0.0, 0.0350, 0.0358), (0.2, 0.0405, 0.0412))
 
 def results(mu, e):
     mu, e = (np.array(np.broadcast_to(values, np.broadcast(mu, e).shape), dtype=float) for values in (mu, e))
-    both, out = np.empty((mu.size, 4)), np.empty((mu.size, kernels.RESULTS))
-    kernels.rates(mu, both)
-    kernels.chain(e, both, out)
-    return out
+    return danby_double._results(e.ravel(), mu.ravel())
 
 
 def row(edge, number=401):
@@ -125,7 +121,7 @@ def test_a_row_in_double_double_has_the_same_bits_in_any_block(monkeypatch):
 
 
 def test_places_and_weights_of_the_series_are_exact_to_the_last_digit():
-    both, matrix = danby_double.tables()
+    both, matrix = panels.tables()
     with mp.workdps(40):
         for k in range(len(both)):
             angle = mp.pi * (2 * k + 1) / (2 * len(both))

@@ -52,7 +52,7 @@ def beside(x, number=12):
 
 
 def discriminant(k, level, a, b):
-    """Of P, exactly, over 256: its sign tells the roots' pattern (section 2 of `brun.md`)."""
+    """Of P, exactly, over 256: its sign tells the roots' pattern (`brun.md`)."""
     k, level, a, b = (Fraction(float(x)) for x in (k, level, a, b))
     c = level - a * a - b * b
     g2 = (k - level) ** 2 / 12 - k * c

@@ -1,0 +1,136 @@
+"""Danby's half-period factors as Chebyshev series in two variables: y = artanh e, panel by panel, and 4 s - 3.
+
+A to t are entire functions of s, and analytic in y but for |Im y| >= pi / 2, where 1 + e cos f vanishes. They grow
+about as exp(2 y), then as exp(4 y), by which they are divided: on panels of length 1, the first and the others.
+"""
+
+from math import log1p
+
+import numpy as np
+
+from survey.kernels.jit import inline, kernel
+from survey.kernels.libration.danby_double import BARS, LOW
+from survey.kernels.libration.traces import INVARIANTS, NODES
+from survey.kernels.math import double as dd
+from survey.kernels.math.roundoff import EPS
+
+TERMS = 26  # in y; NODES in 4 s - 3
+
+
+@kernel
+def fit(results, matrix, weights, series, sizes, bars):
+    """Series (5, 2, n, n), pairs, from `results` (n^2, RESULTS of `danby_double`) at nodes, those of s inner.
+
+    `matrix` (2, n, n) makes coefficients of values; `weights` (n, 2) divide the values at the nodes by their growth.
+    `bars` (5) become the largest bounds of the values' errors, `sizes` (5) the largest of the values.
+    """
+    n = len(weights)
+    along = np.empty((2, n, n))
+    for j in range(INVARIANTS):
+        bars[j] = sizes[j] = 0.0
+        for i in range(n):
+            weight = weights[i, 0], weights[i, 1]
+            for k in range(n):
+                s, row = (0.0, 0.0), n * i
+                for m in range(n):
+                    value = results[row + m, j], results[row + m, LOW + j]
+                    s = dd.loose(s, dd.mul((matrix[0, k, m], matrix[1, k, m]), value))
+                along[0, i, k], along[1, i, k] = dd.mul(weight, s)
+                bars[j] = max(bars[j], weight[0] * results[row + k, BARS + j])
+                sizes[j] = max(sizes[j], weight[0] * abs(results[row + k, j]))
+        for k in range(n):
+            for m in range(n):
+                s = (0.0, 0.0)
+                for i in range(n):
+                    s = dd.loose(s, dd.mul((matrix[0, k, i], matrix[1, k, i]), (along[0, i, m], along[1, i, m])))
+                series[j, 0, k, m], series[j, 1, k, m] = s
+
+
+@inline
+def artanh(x):
+    return 0.5 * log1p(2.0 * x / (1.0 - x))
+
+
+@inline
+def position(e, middle):
+    """x in [-1, 1] of e on its panel, within 2.5 EPS; `middle` is the e in its middle and 1 - e there, pairs."""
+    far, rest = dd.two_sum(e, -middle[0])
+    return 2.0 * artanh((far + (rest - middle[1])) / ((1.0 - e) + e * middle[2]))
+
+
+@inline
+def cosines(x, out):
+    """T_n(x)."""
+    out[0], out[1] = 1.0, x
+    for n in range(2, len(out)):
+        out[n] = 2.0 * x * out[n - 1] - out[n - 2]
+
+
+@kernel
+def panels(e, out):
+    """Fill `out` (N) with the number of the panel of each e."""
+    for i in range(len(e)):
+        out[i] = int(artanh(e[i]))
+
+
+@kernel
+def rows(e, first, middle, coefficients, bars, series, row_bars):
+    """The series (N, 5, NODES) in 4 s - 3 of rows e, all of one panel, and bounds (N, 5) that hold for the row.
+
+    `coefficients` (5, TERMS, NODES) and `bars` (5) are those of the panel, `first` is it the
+    first one? `middle` see `position`.
+    """
+    weights = np.empty(TERMS)
+    for i in range(len(e)):
+        growth = (1.0 + e[i]) / (1.0 - e[i])
+        growth = growth if first else growth * growth
+        cosines(position(e[i], middle), weights)
+        for j in range(INVARIANTS):
+            for m in range(NODES):
+                series[i, j, m] = 0.0
+            for k in range(TERMS):
+                for m in range(NODES):
+                    series[i, j, m] += weights[k] * coefficients[j, k, m]
+            size = 0.0
+            for m in range(NODES):
+                series[i, j, m] *= growth
+                size += abs(series[i, j, m])
+            row_bars[i, j] = growth * bars[j] + 4.0 * EPS * size
+
+
+@inline
+def exponential(x):
+    """exp x of a float64 |x| <= 1, as a pair."""
+    s = (1.0, 0.0)
+    for n in range(30, 0, -1):
+        s = dd.shifted(dd.over(dd.times(s, x), float(n)), 1.0)
+    return s
+
+
+@inline
+def exact_position(e, middle):
+    """As `position`, as a pair: one step of Newton's, from what float64 finds."""
+    far = dd.sub(dd.two_sum(0.0, e), (middle[0], middle[1]))
+    wanted = dd.div(far, dd.add(dd.two_sum(1.0, -e), dd.times((middle[2], middle[3]), e)))
+    y = artanh(wanted[0])
+    square = exponential(2.0 * y)
+    there = dd.div(dd.shifted(square, -1.0), dd.shifted(square, 1.0))
+    gap = dd.div(dd.sub(wanted, there), dd.shifted(dd.neg(dd.mul(wanted, there)), 1.0))
+    return dd.scaled(dd.add((y, 0.0), gap), 2.0)
+
+
+@kernel
+def row(e, first, middle, coefficients, bars, series, row_bars):
+    """As `rows`, of one row in double-double: series (5, 2, n) from coefficients (5, 2, n, n)."""
+    x, n = exact_position(e, middle), series.shape[2]
+    growth = dd.div(dd.two_sum(1.0, e), dd.two_sum(1.0, -e))
+    growth = growth if first else dd.square(growth)
+    for j in range(INVARIANTS):
+        for m in range(n):
+            one, two = (0.0, 0.0), (0.0, 0.0)
+            for k in range(n - 1, -1, -1):  # Clenshaw
+                twice = dd.scaled(dd.mul(x, one), 2.0 if k else 1.0)
+                last = dd.add((coefficients[j, 0, k, m], coefficients[j, 1, k, m]), dd.sub(twice, two))
+                one, two = last, one
+            series[j, 0, m], series[j, 1, m] = dd.mul(growth, one)
+        row_bars[j] = 1.01 * growth[0] * bars[j]

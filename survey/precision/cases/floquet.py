@@ -1,0 +1,90 @@
+"""The chart of a system of one's own: two coupled, damped Mathieu oscillators; errors of the spectral radius.
+
+    x'' + C x' + (K + e Q cos W t) x = 0,  C = diag(0.02, 0.05), K = diag(1.69, 0.49), Q = (1, 0.7; 0.7, 0.5)
+
+Peers integrate the four columns of the variational equations over a period, with cos W t and sin W t as states.
+"""
+
+import json
+from functools import cache
+from importlib import resources
+
+import numpy as np
+
+from survey.precision.peers import System
+from survey.request.user_scene import floquet
+
+ERROR = "spectral_radius"
+MOST = {"taylor16": 4_000, "dop853": 500}  # points that a slow method is timed on
+
+
+def _stiffness(t, p, out):
+    wave = p[1] * np.cos(p[0] * t)
+    out[0, 0], out[1, 1] = 1.69 + wave, 0.49 + 0.5 * wave
+    out[0, 1] = out[1, 0] = 0.7 * wave
+
+
+def _damping(t, p, out):
+    out[0, 0], out[1, 1] = 0.02, 0.05
+
+
+def _period(p):
+    return 2.0 * np.pi / p[0]
+
+
+SCENE = floquet(K=_stiffness, C=_damping, period=_period, parameters=("W", "e"), states=("x", "y"))
+
+
+@cache
+def references(_work=None):
+    """The reference points, the same for every work (error below 1e-28)."""
+    data = json.loads(resources.files("survey.reference").joinpath("floquet_map.json").read_text())
+    return [
+        ({"W": row["W"], "e": row["e"]}, {}, {ERROR: float(row["spectral_radius"])}, row["stable"])
+        for row in data["points"]
+    ]
+
+
+def works():
+    """A line, a map, and points that share nothing."""
+    random = np.random.default_rng(1)
+    scattered = {"W": random.uniform(1.0, 2.6, 20_000), "e": random.uniform(0.0, 0.6, 20_000)}
+    line, whole = _map(np.array([0.3]), 10_000), _map(np.linspace(0.0, 0.6, 400), 600)
+    return {"line": (line, {}), "map 400x600": (whole, {}), "scattered": (scattered, {})}
+
+
+def _map(e, number):
+    return {"e": e[:, None], "W": np.linspace(1.0, 2.6, number)[None, :]}
+
+
+def system(point, options):
+    """A period of the four columns."""
+    W, e = (np.ravel(values) for values in np.broadcast_arrays(point["W"], point["e"]))
+    start = np.concatenate([[1.0, 0.0], np.eye(4).ravel()])
+    return System(
+        slope=_slope,
+        start=np.tile(start, (e.size, 1)),
+        parameters=np.column_stack([W, e]),
+        span=2.0 * np.pi / W,
+        steps=1.0 / W,
+    )
+
+
+def _slope(state, parameters, _sin, _cos):
+    """The columns (x, y, x', y') one after the other."""
+    c, s = state[0], state[1]
+    W, e = parameters[0], parameters[1]
+    wave = e * c
+    k1, k2, k3 = 1.69 + wave, 0.49 + 0.5 * wave, 0.7 * wave
+    slopes = [-1.0 * (W * s), W * c]
+    for first in (2, 6, 10, 14):
+        x, y, u, v = state[first], state[first + 1], state[first + 2], state[first + 3]
+        slopes += [u, v, -1.0 * (k1 * x + k3 * y) - 0.02 * u, -1.0 * (k3 * x + k2 * y) - 0.05 * v]
+    return tuple(slopes)
+
+
+def outcome(ends):
+    """The spectral radius and, as a user of an integrator would have it, the verdict."""
+    columns = np.swapaxes(ends[:, 2:].reshape(-1, 4, 4), 1, 2)
+    radius = abs(np.linalg.eigvals(columns)).max(axis=1)
+    return {ERROR: radius, "verdict": (radius < 1.0).astype(int)}

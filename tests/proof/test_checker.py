@@ -1,0 +1,275 @@
+"""What `survey-check` proves, against mpmath, closed forms and other methods; and what it must refuse."""
+
+import json
+import subprocess
+import sys
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+import xarray as xr
+
+pytest.importorskip("flint")
+
+from flint import arb, ctx
+
+import survey
+from survey.proof import checker, search
+
+MATHIEU = ("even", [["pi/2", "a - 2*q*cos(2*u)"]], ["a", "q"])
+MEISSNER = ("periodic", [["1", "a + b"], ["5/2", "a - b"]], ["a", "b"])
+SIDES = [[Fraction(1), Fraction(4)], [Fraction(1, 2), Fraction(3)]]
+DEPTH = 5
+
+
+@pytest.fixture(autouse=True)
+def _bits():
+    ctx.prec = search.BITS
+
+
+@cache
+def proof(system="mathieu"):
+    """The text of a certificate of this map, halved DEPTH times."""
+    ctx.prec = search.BITS
+    kind, pieces, names = MATHIEU if system == "mathieu" else MEISSNER
+    equation = checker.Equation(kind, pieces, names)
+    layout, panels = search.panels(equation, SIDES, DEPTH, 1e-6)
+    found = [checker.shares_of(panel["cells"]) for panel in panels]
+    shares = checker.weighed(checker.places([1, 1], layout), found)
+    return json.dumps(signed({
+        "format": checker.FORMAT, "title": "a test", "bits": search.BITS,
+        "equation": {"kind": kind, "pieces": pieces}, "parameters": names,
+        "rectangle": [[str(end) for end in side] for side in SIDES],
+        "panels": {"across": [1, 1], "layout": layout, "list": panels},
+        "shares": {letter: str(part) for letter, part in shares.items()},
+    }))  # fmt: skip
+
+
+def signed(data):
+    """The data with their digest."""
+    return data | {"sha256": checker.digest(data)}
+
+
+def true_factors(a, q):
+    """The factors of Mathieu's equation at pi/2 to 25 digits, by DLMF 28.2's equation and mpmath's Taylor series."""
+    with mpmath.workdps(25):
+        solution = mpmath.odefun(
+            lambda t, y: [y[1], -(a - 2 * q * mpmath.cos(2 * t)) * y[0], y[3], -(a - 2 * q * mpmath.cos(2 * t)) * y[2]],
+            0, [1, 0, 0, 1],
+        )  # fmt: skip
+        return [+value for value in solution(mpmath.pi / 2)]
+
+
+def inside(ball, value):
+    """Does the ball contain the number of mpmath, which has 20 digits?"""
+    return (ball - arb(mpmath.nstr(value, 25)) + arb(0, "1e-20")).contains(0)
+
+
+def test_node_values_enclose_the_solutions():
+    equation = checker.Equation(*MATHIEU)
+    for a, q in ((1.5, 2.0), (12.0, -0.375)):
+        truth = true_factors(mpmath.mpf(a), mpmath.mpf(q))
+        point = {"a": arb(a), "q": arb(q)}
+        for order in (12, 24):
+            found = equation.factors(equation.steps(point, order), order, point)
+            assert all(inside(ball, value) for ball, value in zip(found, truth, strict=True)), (a, q, order)
+            assert all(ball.rad() < 10.0 ** (4 - 0.8 * order) for ball in found)
+
+
+def test_steps_of_few_terms_say_so():
+    """With few terms the sums leave out much: the balls must be wide, and still contain the truth."""
+    equation, point = checker.Equation(*MATHIEU), {"a": arb(2), "q": arb(1)}
+    found = equation.factors(equation.steps(point, 3), 3, point)
+    assert all(inside(ball, value) for ball, value in zip(found, true_factors(2, 1), strict=True))
+    assert max(float(ball.rad()) for ball in found) > 1e-4
+
+
+def errors(number, system=MATHIEU, nodes=8):
+    """(true interpolation error, bound) of the four factors at random points of a panel."""
+    equation = checker.Equation(*system)
+    plan = search.plan(equation, SIDES, 1e-6) | {"nodes": [nodes, nodes], "order": 32}
+    panel = checker.Panel(equation, SIDES, plan)
+    tables, bounds = panel.polynomials()
+    rng, order = np.random.default_rng(1), 40
+    box = {name: centre + half * arb(0, 1) for name, (centre, half) in zip(equation.names, panel.sides, strict=True)}
+    steps = equation.steps(box, order)
+    for x, y in rng.uniform(-1, 1, (number, 2)):
+        place = [centre + half * arb(v) for (centre, half), v in zip(panel.sides, (x, y), strict=True)]
+        truth = equation.factors(steps, order, dict(zip(equation.names, place, strict=True)))
+        rows = [checker.bernstein([arb(v)] + [arb(0)] * (nodes - 1)) for v in (x, y)]
+        for table, exact, bound in zip(tables, truth, bounds, strict=True):
+            yield abs((rows[0] * table * rows[1].transpose())[0, 0] - exact), bound
+
+
+@pytest.mark.parametrize("number", [40, pytest.param(1000, marks=pytest.mark.slow)])
+def test_the_truncation_bound_exceeds_the_true_error(number):
+    ratios = [float(error / bound) for error, bound in errors(number)]
+    assert max(ratios) < 1
+    assert max(ratios) > 1e-6  # a bound too small by 10^6 would fail above
+
+
+def test_a_wrong_growth_is_found(monkeypatch):
+    right = checker.Equation.growth
+    monkeypatch.setattr(checker.Equation, "growth", staticmethod(lambda arc, w: right(arc, w) / 10**6))
+    assert any(error > bound for error, bound in errors(40))
+
+
+def test_a_certificate_is_proved():
+    statement = checker.check(proof())
+    assert "0 <= u <= pi/2" in statement and "1 <= a <= 4" in statement
+    assert float(Fraction(json.loads(proof())["shares"]["o"])) < 0.2
+
+
+def decided(text, rng):
+    """(verdicts, first parameters, second parameters): a random point of each decided cell."""
+    certificate, found = checker.Certificate(text), []
+    for place, data in zip(certificate.places, certificate.panels, strict=True):
+        waiting = [place]
+        for letter in data["cells"]:
+            part = waiting.pop()
+            if letter == "+":
+                waiting += checker.quarters(part)
+            elif letter in "su":
+                ends = checker.within(certificate.sides, part)
+                found.append((letter == "s", *(rng.uniform(float(low), float(high)) for low, high in ends)))
+    verdicts, first, second = (np.array(column) for column in zip(*found, strict=True))
+    assert 0 < verdicts.sum() < len(verdicts)
+    return verdicts, first, second
+
+
+def test_no_cell_contradicts_the_map():
+    """Against the package's own kernels, in binary64 with error bounds, which share nothing with the checker."""
+    verdicts, a, q = decided(proof(), np.random.default_rng(2))
+    ds = survey.evaluate("mathieu", a=xr.DataArray(a, dims="point"), q=xr.DataArray(q, dims="point"))
+    assert not (ds.verdict == ~verdicts).any()
+    assert (ds.verdict == verdicts).mean() > 0.99
+
+
+def test_a_piecewise_constant_z_that_is_not_even():
+    """Against the closed form of Meissner's equation: D is a sum of cosines."""
+    checker.check(proof("meissner"))
+    verdicts, a, b = decided(proof("meissner"), np.random.default_rng(3))
+    p, q = np.emath.sqrt(a + b), np.emath.sqrt(a - b)
+    trace = 2 * np.cos(p) * np.cos(1.5 * q) - (p / q + q / p) * np.sin(p) * np.sin(1.5 * q)
+    assert ((abs(trace) < 2) == verdicts).all()
+
+
+def test_the_checker_needs_nothing_but_flint(tmp_path):
+    """Copied elsewhere and run in isolation, it proves the same."""
+    source = Path(checker.__file__).read_text()
+    assert len(source.splitlines()) < 500
+    assert "import survey" not in source and "from survey" not in source
+    (tmp_path / "alone.py").write_text(source)
+    (tmp_path / "map.cert").write_text(proof())
+    ran = subprocess.run(
+        [sys.executable, "-I", "alone.py", "map.cert", "-j", "2"], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert ran.returncode == 0 and ran.stdout.startswith("PROVED\n"), ran
+
+
+def flipped(letter, other, number=0):
+    """A mutation: one cell with another letter."""
+
+    def mutate(data):
+        panel = max(data["panels"]["list"], key=lambda panel: panel["cells"].count(letter))
+        at = [i for i, found in enumerate(panel["cells"]) if found == letter][number]
+        panel["cells"] = panel["cells"][:at] + other + panel["cells"][at + 1 :]
+
+    return mutate
+
+
+def panels(**changes):
+    """A mutation: every panel with other keys."""
+    return lambda data: [panel.update(changes) for panel in data["panels"]["list"]]
+
+
+def at(*path, value):
+    """A mutation: one value replaced."""
+
+    def mutate(data):
+        for key in path[:-1]:
+            data = data[key]
+        data[path[-1]] = value
+
+    return mutate
+
+
+def formula(text):
+    """A mutation: another z."""
+    return at("equation", "pieces", value=[["pi/2", text]])
+
+
+MUTATIONS = {
+    "a stable cell is called unstable": flipped("s", "u"),
+    "an unstable cell is called stable": flipped("u", "s"),
+    "an open cell is called stable": flipped("o", "s"),
+    "an open cell is called unstable": flipped("o", "u", -1),
+    "a decided cell is called open": flipped("s", "o"),
+    "a cell of an unknown kind": flipped("s", "x"),
+    "a cell is missing": flipped("s", ""),
+    "a cell too many": flipped("s", "ss"),
+    "too few nodes": panels(nodes=[2, 2]),
+    "an ellipse that is a segment": panels(ellipses=["1", "1"]),
+    "ellipses so large that the factors grow": panels(ellipses=["1000", "1000"]),
+    "a rate of zero": panels(rates=["0", "1"]),
+    "a rate that is far off": panels(rates=["1/1000", "1/1000"]),
+    "Taylor series of few terms": panels(order=2),
+    "an order that is no number": panels(order="24"),
+    "another sign of a": formula("-a - 2*q*cos(2*u)"),
+    "another excitation": formula("a - 4*q*cos(2*u)"),
+    "a singular z": formula("a - 2*q*cos(2*u) + 1/(u - 1)"),
+    "a z with code": formula("a - 2*q*cos(2*u) + __import__('os').system('true')"),
+    "a z with an attribute": formula("a.real - 2*q*cos(2*u)"),
+    "another half period": at("equation", "pieces", value=[["3/2", "a - 2*q*cos(2*u)"]]),
+    "a half period that is negative": at("equation", "pieces", value=[["-pi/2", "a - 2*q*cos(2*u)"]]),
+    "another kind of z": at("equation", "kind", value="periodic"),
+    "another rectangle": at("rectangle", value=[["1", "5"], ["1/2", "3"]]),
+    "a rectangle without area": at("rectangle", value=[["1", "1"], ["1/2", "3"]]),
+    "too few bits": at("bits", value=8),
+    "shares that are not those of the cells": at("shares", "s", value="1/2"),
+    "panels that do not cover the rectangle": at("panels", "across", value=[1, 2]),
+    "a layout of another number of panels": at("panels", "layout", value="+...."),
+    "a layout that ends early": at("panels", "layout", value="+"),
+    "parameters of one name": at("parameters", value=["a", "a"]),
+    "a parameter named like a function": at("parameters", value=["cos", "q"]),
+    "no parameters": at("parameters", value=None),
+    "another format": at("format", value="survey-certificate 9"),
+    "no panels": at("panels", value={}),
+}
+
+
+@pytest.mark.parametrize("what", MUTATIONS)
+def test_a_mutated_certificate_is_refused(what, tmp_path, capsys):
+    """Each mutation is signed again, so that it is refused for what it states."""
+    data = json.loads(proof())
+    MUTATIONS[what](data)
+    path = tmp_path / "mutated.cert"
+    path.write_text(json.dumps(signed(data)))
+    assert checker.main([str(path)]) == 1
+    said = capsys.readouterr()
+    assert said.out.startswith("NOT PROVED") and said.out.count("\n") == 1 and not said.err
+
+
+@pytest.mark.parametrize("cut", [10, 500, -3])
+def test_a_truncated_or_changed_file_is_refused(cut, tmp_path, capsys):
+    path = tmp_path / "cut.cert"
+    path.write_text(proof()[:cut])
+    assert checker.main([str(path)]) == 1
+    path.write_text(proof().replace("a test", "A test"))
+    assert checker.main([str(path)]) == 1
+    assert "digest" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("text", ["", "a +", "u if u else a", "[a]", "a**0.5", "a**b", "abs(a)", "sin(a, a)", "a @ b",
+                                  "'a'", "True", "1j", "x", "a and b", "(" * 300 + "a" + ")" * 300])  # fmt: skip
+def test_formulas_hold_arithmetic_alone(text):
+    with pytest.raises(checker.Failed):
+        checker.Formula(text, ["u", "a", "b"])
+
+
+def test_decimals_are_exact():
+    tenth = checker.Formula("0.1 + 0.2 - 3e-1", [])()
+    assert tenth.contains(0) and tenth.rad() < 1e-25

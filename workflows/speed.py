@@ -1,0 +1,489 @@
+"""Ratios of speed: the time of heyoka's batch integrator over that of survey, both interleaved in one run on one core.
+
+    python workflows/speed.py [PART ...]    prints `name ratio`, and to stderr times, errors and what is below its floor
+
+Above 1 survey is faster. All is called as users call it, by `survey.evaluate` and `survey.run`, labels and files
+included; "all" means every output of the scene, else the named ones. Both sides meet |error| <= 1e-9 (1 + |value|),
+checked against heyoka at a tolerance of 1e-15. heyoka at its best: batches of 16, fast_math, half periods by symmetry,
+elliptic and circular functions as states, points sorted by effort; it gives the factors of Hill's equation alone.
+Times are of the processor (`time.process_time`), medians of REPEATS interleaved repetitions; ranges of parameters move
+by a rounding from one to the next, so that no map is remembered. Needs heyoka; exit code 1 where a ratio is below its
+floor or an error too large.
+
+FLOORS are 0.7 of the ratios measured on an Intel Xeon (AVX-512), one thread, 2026-11-23.
+"""
+
+import os
+import statistics
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
+import heyoka as hy  # noqa: E402
+import numpy as np  # noqa: E402
+import xarray as xr  # noqa: E402
+from scipy.optimize.elementwise import find_root  # noqa: E402
+from scipy.special import ellipkm1  # noqa: E402
+
+import survey  # noqa: E402
+
+FLOORS = {
+    "hill_row": 1.6,
+    "hill_row_all": 0.74,
+    "hill_map_400x600": 10,
+    "hill_map_400x600_all": 1.6,
+    "hill_map_2000x2000": 24,
+    "hill_scattered_30000": 0.45,
+    "hill_scattered_30000_all": 0.4,
+    "hill_scattered_300000": 0.48,
+    "hill_scattered_300000_all": 0.41,
+    "hill_amplitude_x_inertia_ratio": 2,
+    "hill_amplitude_x_inertia_ratio_all": 1.2,
+    "mathieu_scattered": 0.45,
+    "own_hill_row": 0.071,
+    "own_hill_map": 0.084,
+    "own_hill_map_all": 0.081,
+    "own_hill_scattered": 0.081,
+    "own_square_wave": 0.0057,
+    "tongue_edges": 0.1,
+}
+REPEATS = 9
+WORST = 1e-9
+LANES = 16
+SAMPLE = 16_000  # points that heyoka solves of a map
+PAR = [hy.par[i] for i in range(6)]
+OWN = '''"""Mathieu's equation with a second harmonic."""
+from math import cos, pi
+
+PARAMETERS = ("a", "q", "r")
+PERIOD = pi
+EVEN = True
+
+
+def z(u, p):
+    return p[0] + p[1] * cos(2 * u) + p[2] * cos(4 * u)
+'''
+WAVE = '''"""Meissner's equation: a square wave."""
+from math import cos, pi
+
+PARAMETERS = ("a", "b")
+PERIOD = 2 * pi
+BREAKS = (pi / 2, 3 * pi / 2)
+EVEN = True
+
+
+def z(u, p):
+    return p[0] + (p[1] if cos(u) > 0 else -p[1])
+'''
+
+
+class Batch:
+    """heyoka's batch integrator over many points: `run(states, parameters, spans, order)`, states at the ends."""
+
+    def __init__(self, equations, parameters, tolerance):
+        n = len(equations)
+        self.ta = hy.taylor_adaptive_batch(
+            equations, np.zeros((n, LANES)), pars=np.zeros((parameters, LANES)), tol=tolerance, fast_math=True
+        )
+        self.state, self.pars = self.ta.state, self.ta.pars
+
+    def run(self, states, parameters, spans, order):
+        pad = np.concatenate([order, np.repeat(order[-1:], -order.size % LANES)])
+        states, parameters, spans = states[:, pad], parameters[:, pad], spans[pad]
+        ends = np.empty_like(states)
+        for i in range(0, pad.size, LANES):
+            self.state[:], self.pars[:] = states[:, i : i + LANES], parameters[:, i : i + LANES]
+            self.ta.set_time(0.0)
+            self.ta.propagate_until(spans[i : i + LANES])
+            ends[:, i : i + LANES] = self.state
+        out = np.empty((len(states), order.size))
+        out[:, order] = ends[:, : order.size]
+        return out
+
+
+class Harness:
+    """Measured ratios, printed as they come; `failed` where one is below its floor or an error is too large."""
+
+    def __init__(self):
+        self.failed = False
+
+    def compare(self, name, ours, points, theirs, their_points, check=None):
+        """Print the ratio of the medians of CPU time per point; `check()` gives the larger error of both sides."""
+        ours(0), theirs()
+        times = [], []
+        for i in range(REPEATS):
+            for kept, call in zip(times, (lambda i=i: ours(i + 1), theirs), strict=True):
+                begin = time.process_time()
+                call()
+                kept.append(time.process_time() - begin)
+        mine, other = (statistics.median(kept) / n for kept, n in zip(times, (points, their_points), strict=True))
+        ratio, error = other / mine, check() if check else 0.0
+        low = ratio < FLOORS.get(name, 0.0)
+        print(f"{name} {ratio:.3g}", flush=True)
+        words = f"    {mine * 1e6:.4g} us against {other * 1e6:.4g} us a point, error {error:.1e}"
+        print(words + (f"; BELOW ITS FLOOR {FLOORS[name]:.3g}" if low else ""), file=sys.stderr, flush=True)
+        self.failed |= low or not error <= WORST
+
+
+def relative(values, exact):
+    return float(np.nanmax(abs(values - exact) / (1 + abs(exact))))
+
+
+def moved(axis, i):
+    """The axis, a rounding longer each time."""
+    return axis * (1 + 2.0**-50 * i) if axis.size > 1 else axis
+
+
+def some_of(size):
+    return np.random.default_rng(3).permutation(size)[:SAMPLE]
+
+
+def evaluated(scene, i, given, **options):
+    return survey.evaluate(scene, **{name: moved(axis, i) for name, axis in given.items()}, **options)
+
+
+DECIDED = ("discriminant", "verdict")
+
+
+# ------------------------------------------------------------------------------------------------ Hill, satellite
+def satellite_equations():
+    w, wp, y, v, z, u = hy.make_vars("w", "wp", "y", "v", "z", "u")
+    square = w * w
+    q = square + (PAR[1] * w + PAR[2])
+    return [(w, wp), (wp, w * (PAR[0] - square)), (y, v), (v, -q * y), (z, u), (u, -q * z)]
+
+
+def satellite_by(batch, k, rho, oblate=False):
+    """The discriminant, and the factors y1, y1', y2, y2', from half a period."""
+    zero, one, short = np.zeros(k.size), np.ones(k.size), (1 - k) * (1 + k)
+    span = 2 * ellipkm1(short)
+    states = np.stack([np.sqrt(2) * k, zero, one, zero, zero, one])
+    parameters = np.stack([2 * k * k - 1, np.sqrt(2) * rho, rho * rho + (-k * k if oblate else short)])
+    e = batch.run(states, parameters, span, np.argsort(span * (abs(rho) + k + 1)))
+    return 2 * (e[2] * e[5] + e[3] * e[4]), e[2:]
+
+
+def hill(harness):
+    """Maps, a row and scattered points of the satellite; the discriminant and the verdict, or all outputs."""
+    fast, exact = (Batch(satellite_equations(), 3, tol) for tol in (1e-9, 1e-15))
+    rng = np.random.default_rng(1)
+
+    def case(name, given, points, sample, **options):
+        """`given` for survey; the sampled k, rho of it for heyoka."""
+        k, rho = sample
+
+        def theirs():
+            return satellite_by(fast, k, rho)
+
+        def against(what, variables):
+            def ours(i):
+                return evaluated("satellite", i, given, variables=variables, **options)
+
+            def check():
+                right, mine = satellite_by(exact, k, rho)[0], ours(0).discriminant.values.ravel()[some_of(points)]
+                return max(relative(mine, right), relative(theirs()[0], right))
+
+            harness.compare(name + what, ours, points, theirs, k.size, check)
+
+        against("", DECIDED)
+        if points < 1e6:
+            against("_all", None)
+
+    def grid(first, second):
+        some = some_of(first.size * second.size)
+        return tuple(v.ravel()[some] for v in np.meshgrid(first, second, indexing="ij"))
+
+    row = np.linspace(0.6, 4, 10_000)
+    half = np.array([0.5])
+    case("hill_row", {"rho": row}, row.size, grid(half, row), k=0.5)
+    for sizes in ((400, 600), (2000, 2000)):
+        k, rho = np.linspace(0, 0.99, sizes[0]), np.linspace(0.6, 4, sizes[1])
+        case("hill_map_{}x{}".format(*sizes), {"k": k, "rho": rho}, k.size * rho.size, grid(k, rho))
+    for n in (30_000, 300_000):
+        k, rho = rng.uniform(0.01, 0.99, n), rng.uniform(0.6, 4, n)
+        scattered = {name: xr.DataArray(v, dims="point") for name, v in (("k", k), ("rho", rho))}
+        case(f"hill_scattered_{n}", scattered, n, (k[some_of(n)], rho[some_of(n)]))
+    amplitude, alpha = np.linspace(0.0, 1.5, 200), np.linspace(0.02, 0.97, 300)
+    b, a = grid(amplitude, alpha)
+    given = {"amplitude": amplitude, "inertia_ratio": alpha}
+    case("hill_amplitude_x_inertia_ratio", given, 60_000, (np.sin(b), 1 / np.sqrt(3 * (1 - a))))
+
+
+def mathieu(harness):
+    """Scattered points of Mathieu's equation."""
+    c, s, y, v, z, u = hy.make_vars("c", "s", "y", "v", "z", "u")
+    q = PAR[0] + PAR[1] * c
+    equations = [(c, -2.0 * s), (s, 2.0 * c), (y, v), (v, -q * y), (z, u), (u, -q * z)]
+    fast, exact = (Batch(equations, 2, tol) for tol in (1e-9, 1e-15))
+    n, rng = 30_000, np.random.default_rng(1)
+    a, b = rng.uniform(0, 25, n), rng.uniform(0.1, 8, n)
+    scattered = {name: xr.DataArray(v, dims="point") for name, v in (("a", a), ("q", b))}
+    some = some_of(n)
+
+    def theirs(batch=fast):
+        one, zero = np.ones(some.size), np.zeros(some.size)
+        parameters = np.stack([a[some], -2 * b[some]])
+        e = batch.run(np.stack([one, zero, one, zero, zero, one]), parameters, 0.5 * np.pi * one, np.argsort(a[some]))
+        return 2 * (e[2] * e[5] + e[3] * e[4])
+
+    def ours(i):
+        return evaluated("mathieu", i, scattered, variables=DECIDED)
+
+    def check():
+        right = theirs(exact)
+        return max(relative(ours(0).discriminant.values[some], right), relative(theirs(), right))
+
+    harness.compare("mathieu_scattered", ours, n, theirs, some.size, check)
+
+
+# ---------------------------------------------------------------------------------------------- a user's equation
+def own(harness):
+    """A row, a map and scattered points of one's own equation with two harmonics."""
+    path = Path(harness.folder) / "two_harmonics.py"
+    path.write_text(OWN)
+    c, s, y, v, z, u = hy.make_vars("c", "s", "y", "v", "z", "u")
+    q = (PAR[0] - PAR[2]) + PAR[1] * c + 2.0 * PAR[2] * (c * c)
+    equations = [(c, -2.0 * s), (s, 2.0 * c), (y, v), (v, -q * y), (z, u), (u, -q * z)]
+    fast, exact = (Batch(equations, 3, tol) for tol in (1e-9, 1e-15))
+    rng = np.random.default_rng(2)
+
+    def case(name, given, points, a, b, variables=DECIDED, **options):
+        def theirs(batch=fast):
+            one, zero = np.ones(a.size), np.zeros(a.size)
+            parameters = np.stack([a, b, 1.3 * one])
+            e = batch.run(np.stack([one, zero, one, zero, zero, one]), parameters, 0.5 * np.pi * one, np.argsort(a))
+            return 2 * (e[2] * e[5] + e[3] * e[4])
+
+        def ours(i):
+            return evaluated(path, i, given, r=1.3, variables=variables, **options)
+
+        def check():
+            right, mine = theirs(exact), ours(0).discriminant.values.ravel()[some_of(points)]
+            return max(relative(mine, right), relative(theirs(), right))
+
+        harness.compare(name, ours, points, theirs, a.size, check)
+
+    a, b = np.linspace(0, 25, 300), np.linspace(0, 15, 200)
+    bs, as_ = (v.ravel()[some_of(60_000)] for v in np.meshgrid(b, a, indexing="ij"))
+    row = np.linspace(0, 25, 10_000)
+    case("own_hill_row", {"a": row}, row.size, row[some_of(row.size)], np.full(row.size, 3.0), q=3.0)
+    case("own_hill_map", {"q": b, "a": a}, 60_000, as_, bs)
+    case("own_hill_map_all", {"q": b, "a": a}, 60_000, as_, bs, variables=None)
+    n = 30_000
+    ar, br = rng.uniform(0, 25, n), rng.uniform(0, 15, n)
+    scattered = {name: xr.DataArray(v, dims="point") for name, v in (("a", ar), ("q", br))}
+    case("own_hill_scattered", scattered, n, ar[some_of(n)], br[some_of(n)])
+
+
+def wave(harness):
+    """Meissner's equation as one's own, against its closed form in NumPy."""
+    path = Path(harness.folder) / "square_wave.py"
+    path.write_text(WAVE)
+    a, b = np.linspace(0.05, 8, 300), np.linspace(0, 4, 200)
+    bs, as_ = (v.ravel() for v in np.meshgrid(b, a, indexing="ij"))
+
+    def theirs():
+        """M of half a period, from y = 1, y' = 0 and from y = 0, y' = 1: two lengths pi / 2."""
+        first, second = (np.emath.sqrt(as_ + sign * bs) for sign in (1, -1))
+        with np.errstate(all="ignore"):
+            (c1, s1), (c2, s2) = ((np.cos(w * np.pi / 2), np.sin(w * np.pi / 2)) for w in (first, second))
+            y1, dy2 = c2 * c1 - s2 / second * first * s1, c2 * c1 - second * s2 * s1 / first
+        return (2 * (2 * y1 * dy2 - 1)).real
+
+    def ours(i):
+        return evaluated(path, i, {"b": b, "a": a}, variables=DECIDED)
+
+    def check():
+        mine, right = ours(0).discriminant.transpose("b", "a").values.ravel(), theirs()
+        known = np.isfinite(right)
+        return relative(mine[known], right[known])
+
+    harness.compare("own_square_wave", ours, as_.size, theirs, as_.size, check)
+
+
+# -------------------------------------------------------------------------------------------------- tongues' edges
+def edges(harness):
+    """Edges of tongues in 500 rows, the file included, against heyoka and SciPy's vectorised root finder."""
+    rows, batch = 500, Batch(satellite_equations(), 3, 1e-12)
+    k, rho = np.linspace(0, 0.98, rows), np.linspace(0.57735, 3.2, 300)
+
+    def factors(k, rho):
+        return satellite_by(batch, k, rho, oblate=True)[1]
+
+    def theirs():
+        signs = np.sign(factors(*(v.ravel() for v in np.meshgrid(k, rho, indexing="ij"))).reshape(4, rows, -1))
+        kind, row, at = np.nonzero(signs[:, :, 1:] != signs[:, :, :-1])
+
+        def f(x, kind, k):
+            kind, k = (np.ravel(np.broadcast_to(v, x.shape)) for v in (kind, k))
+            return factors(k, np.ravel(x))[kind.astype(int), np.arange(x.size)].reshape(x.shape)
+
+        tolerances = {"xatol": 1e-12, "xrtol": 1e-12}
+        return np.sort(find_root(f, (rho[at], rho[at + 1]), args=(kind, k[row]), tolerances=tolerances).x)
+
+    def ours(i):
+        path = Path(harness.folder) / f"edges_{i}.nc"
+        path.unlink(missing_ok=True)
+        axes = {"k": {"values": list(moved(k, i))}, "rho": {"start": 0.57735, "stop": 3.2, "num": 2}}
+        return survey.run({
+            "scene": "satellite", "options": {"body": "oblate"}, "boundaries": {"axis": "rho"}, "axes": axes,
+            "output": {"path": str(path), "variables": ["verdict"]},
+        })  # fmt: skip
+
+    a, b = np.sort(ours(0).edge_position.values), theirs()
+    print(f"    edges: {a.size} against {b.size}", file=sys.stderr)
+    error = float(abs(a - b).max()) if a.size == b.size else 0.0  # narrow tongues are seen by us alone
+    harness.compare("tongue_edges", ours, a.size, theirs, b.size, lambda: error)
+
+
+# ------------------------------------------------------------------------------------------------------- gyrostat
+NAMES = ("b12", "b31", "d", "c23", "s2", "s3")
+
+
+def abel(harness):
+    """(phi, w) of a gyrostat at t = 20, and at 200 times up to it."""
+    n, rng = 8192, np.random.default_rng(1)
+    p = rng.uniform(-0.5, 0.5, (6, n))
+    start = np.stack([rng.uniform(0, 2 * np.pi, n), rng.uniform(0.5, 3, n)])
+    phi, w = hy.make_vars("phi", "w")
+    s, c = hy.sin(phi), hy.cos(phi)  # in axes turned so that c23 = 0: the cheapest for heyoka
+    equations = [(phi, w), (w, (PAR[0] * c - PAR[1] * s) * w - PAR[2] * (c * s) + PAR[3] * c - PAR[4] * s)]
+    turn = -0.5 * np.arctan2(2 * p[3], p[2])
+    ca, sa = np.cos(turn), np.sin(turn)
+    turned = np.stack([p[0] * ca - p[1] * sa, p[0] * sa + p[1] * ca, np.hypot(p[2], 2 * p[3]),
+                       p[4] * ca - p[5] * sa, p[4] * sa + p[5] * ca])  # fmt: skip
+    states = np.stack([start[0] - turn, start[1]])
+    order = np.argsort(abs(turned).sum(0) + abs(start[1]))
+    fast, exact = Batch(equations, 5, 1e-12), Batch(equations, 5, 1e-17)
+    given = {
+        name: xr.DataArray(values, dims="p") for name, values in zip((*NAMES, "phi0", "w0"), (*p, *start), strict=True)
+    }
+
+    def theirs(batch=fast):
+        ends = batch.run(states, turned, np.full(n, 20.0), order)
+        return np.stack([ends[0] + turn, ends[1]])
+
+    def ours(t=20.0, given=given):
+        return survey.evaluate("gyrostat", question="trajectory", t=t, rtol=1e-7, variables=["phi", "w"], **given)
+
+    def check():
+        right, ds = theirs(exact), ours()
+        return max(relative(np.stack([ds.phi.values, ds.w.values]), right), relative(theirs(), right))
+
+    harness.compare("gyrostat_trajectory", lambda i: ours(), n, theirs, n, check)
+    times, few = np.linspace(0, 20, 201), 1024
+    grid = np.repeat(times[:, None], LANES, 1)
+    chosen = order[:: n // few][:few]
+    part = {name: values[chosen] for name, values in given.items()}
+
+    def dense():
+        out = np.empty((times.size, 2, few))
+        for i in range(0, few, LANES):
+            own_ = chosen[i : i + LANES]
+            fast.state[:], fast.pars[:] = states[:, own_], turned[:, own_]
+            fast.ta.set_time(0.0)
+            reached = fast.ta.propagate_grid(grid)
+            out[:, :, i : i + LANES] = reached[1] if isinstance(reached, tuple) else reached
+        return out[1:, 0] + turn[chosen]
+
+    def difference():
+        return relative(ours(times[1:], part).phi.transpose("t", "p").values, dense())
+
+    harness.compare("gyrostat_200_times", lambda i: ours(times[1:], part), 200 * few, dense, 200 * few, difference)
+
+
+# ---------------------------------------------------------------------------------------------------------- Danby
+def danby(harness):
+    """A map of the elliptic restricted problem's triangular points."""
+    mu, e = np.linspace(1e-4, 0.05, 600), np.linspace(1e-3, 0.7, 400)
+    es, ms = (v.ravel() for v in np.meshgrid(e, mu, indexing="ij"))
+    some = np.random.default_rng(0).permutation(es.size)[:8000]
+    es, ms = es[some], ms[some]
+    c, s, *y = hy.make_vars("c", "s", *(f"y{i}" for i in range(16)))
+    r = 1.0 / (1.0 + PAR[0] * c)
+    equations = [(c, -s), (s, c)]
+    for x, q, p, m in (y[i : i + 4] for i in range(0, 16, 4)):
+        equations += [(x, p - m), (q, m - p - PAR[2] * (r * m)), (p, PAR[1] * (r * x) - (x - q)), (m, x - q)]
+    fast, exact = (Batch(equations, 3, tol) for tol in (5e-10, 1e-16))
+    root = np.sqrt(1 - 3 * ms * (1 - ms))
+    parameters = np.stack([es, 1.5 * (1 + root), 1.5 * (3 * ms * (1 - ms)) / (1 + root)])
+    states = np.repeat(np.concatenate([[1.0, 0.0], np.eye(4).ravel()])[:, None], es.size, 1)
+
+    def theirs(batch=fast):
+        ends = batch.run(states, parameters, np.full(es.size, np.pi), np.argsort(es))
+        columns = np.moveaxis(ends[2:].reshape(4, 4, -1), 2, 0)
+        first, last = columns[:, :2, :2], columns[:, 2:, 2:]
+        t = (first * last).sum(axis=(1, 2))
+        return 6 - 8 * t + 16 * np.linalg.det(first) * np.linalg.det(last)
+
+    def ours(i):
+        return evaluated("libration_elliptic", i, {"mu": mu, "e": e}, variables=["b", "verdict"])
+
+    def check():
+        right, mine = theirs(exact), ours(0).b.transpose("e", "mu").values.ravel()[some]
+        return max(relative(mine, right), relative(theirs(), right))
+
+    harness.compare("danby_map", ours, mu.size * e.size, theirs, es.size, check)
+
+
+# ----------------------------------------------------------------------------------------------------------- Brun
+def brun(harness):
+    """Period, precession and spin of Brun's problem; heyoka is given the period."""
+    n, rng = 60_000, np.random.default_rng(1)
+    size = 10.0 ** rng.uniform(-0.5, 0.5, n)
+    body = {"A": size, "C": size * rng.uniform(0.05, 1.99, n)}
+    body |= {"epsilon": rng.choice([-1.0, 1.0], n) * 10.0 ** rng.uniform(-2, 1, n)}
+    body |= {"theta0": rng.uniform(0.3, 2.84, n)} | {
+        name: rng.normal(size=n) for name in ("p_theta0", "p_psi", "p_phi")
+    }
+    given = {name: xr.DataArray(values, dims="p") for name, values in body.items()}
+
+    def ours(i, variables=("period", "precession", "spin", "verdict")):
+        return survey.evaluate("brun", variables=variables, **given)
+
+    answer = {name: v.values for name, v in ours(0, ("period", "precession", "u_min", "u_max")).items()}
+    u, v, psi, phi = hy.make_vars("u", "v", "psi", "phi")
+    up, down = PAR[3] / (1.0 - u), PAR[4] / (1.0 + u)
+    equations = [(u, v), (v, PAR[2] + u * (PAR[1] - PAR[0] * u * u)), (psi, up + down), (phi, down - up)]
+    a, b, p = (body[name] / body["A"] for name in ("p_phi", "p_psi", "p_theta0"))
+    cosine, sine, k = np.cos(body["theta0"]), np.sin(body["theta0"]), body["epsilon"] * (1 - body["C"] / body["A"])
+    level = p * p + ((b - a * cosine) / sine) ** 2 - k * cosine**2 + a * a
+    # heyoka loses its digits near the poles: it is given the states that stay off them
+    off = np.isfinite(answer["period"]) & (answer["u_max"] < 0.97) & (answer["u_min"] > -0.97)
+    off = np.flatnonzero(off)[:12_000]
+    states = np.stack([cosine, -sine * p, 0 * a, 0 * a])[:, off]
+    parameters = np.stack([2 * k, k - level, a * b, 0.5 * (b - a), 0.5 * (b + a)])[:, off]
+    span = answer["period"][off]
+    order = np.argsort(span * np.sqrt(abs(k) + abs(level))[off])
+    fast = Batch(equations, 5, 1e-11)
+
+    def theirs():
+        return fast.run(states, parameters, span, order)
+
+    def check():
+        error = abs(theirs()[2] - answer["precession"][off]) / (1 + abs(answer["precession"][off]))
+        return float(np.quantile(error, 0.99))
+
+    harness.compare("brun_periods", ours, n, theirs, off.size, check)
+
+
+PARTS = {part.__name__: part for part in (hill, mathieu, own, wave, edges, abel, danby, brun)}
+
+
+def main():
+    names = sys.argv[1:] or list(PARTS)
+    if not set(names) <= set(PARTS):
+        sys.exit(f"speed.py [{' | '.join(PARTS)}] ...")
+    harness = Harness()
+    with tempfile.TemporaryDirectory() as harness.folder:
+        for name in names:
+            PARTS[name](harness)
+    sys.exit(harness.failed)
+
+
+if __name__ == "__main__":
+    main()
