@@ -12,6 +12,7 @@ from matplotlib.text import Text
 from survey import modules
 from survey.errors import BadInput
 from survey.show import family
+from survey.show.ensemble import draw_ensemble, is_ensemble
 from survey.show.layout import alone, fit
 from survey.show.maps import draw_map
 from survey.show.profiles import draw_profile
@@ -44,16 +45,25 @@ def onto(axes, ds, name=None, boundaries=True, style=None, across=(None, None), 
     drawable = [key for key in ds.data_vars if not key.endswith("_error") and set(ds[key].dims) >= set(ds.status.dims)
                 and ds[key].dtype.kind in "iuf"]  # fmt: skip
     name = name or ("verdict" if "verdict" in ds else drawable[0])
-    if name not in drawable:
+    bars = [f"{key}_error" for key in drawable if f"{key}_error" in ds]
+    if name not in drawable and name not in bars:
         raise BadInput(modules.unknown("variable", name, drawable))
-    labels = {dim: [str(label) for label in ds[dim].values] for dim in ds.status.dims
-              if dim in ds.coords and ds[dim].dtype.kind not in "iuf"}  # fmt: skip
-    for dim in ds.status.dims:
-        if dim in labels or dim not in ds.coords:
-            ds = ds.drop_vars(dim, errors="ignore").assign_coords({dim: np.arange(ds.sizes[dim])})
-    part, variable, state = _flat(ds, name, _chosen(ds, across))
     for text in axes.findobj(Text):  # perhaps made while the user had LaTeX on
         text.set_usetex(False)
+    if is_ensemble(ds):
+        draw_ensemble(axes, ds, name, paper, colours or {})
+        if not paper:
+            axes.set_title(title_of(ds, ds[name]), fontsize=10 if alone(axes) else 8)
+        fit(axes)
+        return
+    chosen = _chosen(ds, across)
+    drawn = chosen or ds.status.dims[:2]
+    labels = {dim: [str(label) for label in ds[dim].values] for dim in drawn
+              if dim in ds.coords and ds[dim].dtype.kind not in "iuf"}  # fmt: skip
+    for dim in drawn:
+        if dim in labels or dim not in ds.coords:
+            ds = ds.drop_vars(dim, errors="ignore").assign_coords({dim: np.arange(ds.sizes[dim])})
+    part, variable, state = _flat(ds, name, chosen)
     if variable.ndim == 2 and variable.dims[-1] == family.ANGLE and family.over_angles(ds):
         family.draw_family(axes, part, variable, paper)
     elif variable.ndim == 2:

@@ -2,7 +2,7 @@
 
 import numpy as np
 from matplotlib import colormaps
-from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
@@ -22,6 +22,7 @@ from survey.show.text import WIDE, label_of, spaced
 MAX_DRAWN = 2000  # points along an axis: in a picture of a larger map a cell stands for several points
 MOST_COUNTS = 10  # that have a colour each
 MAX_CELLS = 1000  # along an axis of such a picture: each costs a hundred bytes
+EDGED, EDGES = "discriminant", (-2.0, 2.0)  # whose lines at these values are the edges of stability
 SEQUENTIAL, DIVERGING = "viridis", "RdBu_r"  # of values of one sign, and about 0
 CELLS_PER_PIXEL = 0.8  # of the axes, before legend and labels take their share
 
@@ -47,9 +48,12 @@ def draw_map(axes, ds, variable, state, boundaries, paper, asked):
         colours = colours_of_numbers(shown, variable, asked, ticks is not None)
         drawn = axes.pcolormesh(x, y, shown.T, shading="nearest", rasterized=True, **colours)
         if not shown.mask.all():
-            ticks = np.unique(shown.compressed()) if "norm" in colours and ticks else ticks
-            extend = "neither" if "norm" in colours and ticks is not None else clipped(shown, *drawn.get_clim())
+            few = isinstance(colours.get("norm"), BoundaryNorm)
+            ticks = np.unique(shown.compressed()) if few else ticks
+            extend = "neither" if few else clipped(shown, *drawn.get_clim())
             axes.figure.colorbar(drawn, ax=axes, label=label_of(variable), ticks=ticks, extend=extend)
+        if variable.name == EDGED and min(shown.shape) > 1 and shown.count():
+            axes.contour(x, y, shown.T, levels=EDGES, colors="black", linewidths=0.6)
         axes.set_facecolor("#dddddd")
         missing = shown.mask & ~(failed | outside)
         handles = _undefined(axes, x, y, ds, state, missing, number, paper)
@@ -140,6 +144,10 @@ def colours_of_numbers(shown, variable, asked, whole):
 
     Quantities of both signs have a diverging map about 0.
     """
+    if str(variable.name).endswith("_error") and not any(asked.get(key) is not None for key in ("vmin", "vmax")):
+        low, high = _positive(shown)
+        if high > 100.0 * low > 0.0:
+            return {"cmap": _colour_map(asked.get("cmap"), SEQUENTIAL), "norm": LogNorm(low, high)}
     given = {key: asked[key] for key in ("vmin", "vmax") if asked.get(key) is not None}
     if whole and not given and asked.get("cmap") is None:
         few = counts(shown)
@@ -165,6 +173,13 @@ def clipped(shown, low, high):
     """Which end of the colour bar has an arrow: values lie beyond it."""
     below, above = bool((shown < low).any()), bool((shown > high).any())
     return "both" if below and above else "min" if below else "max" if above else "neither"
+
+
+def _positive(shown):
+    """The ends of the positive values, but for 1 % at either end."""
+    values = shown.compressed()
+    values = values[values > 0.0]
+    return np.percentile(values, [1, 99]) if values.size else (0.0, 0.0)
 
 
 def _full(shown):

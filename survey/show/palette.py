@@ -7,7 +7,8 @@ from survey.file.labels import flag_codes, scene_statuses
 
 # after Okabe and Ito, safe for the colour-blind, the first two far apart in grey print too;
 # black is kept for undecided, white with hatching for failed
-COLOURS = ("#D55E00", "#A6D8F5", "#E69F00", "#F0E442", "#009E73", "#CC79A7", "#0072B2", "#999999", "#B8E0D2", "#5D3A9B")
+COLOURS = ("#D55E00", "#A6D8F5", "#E69F00", "#F0E442", "#009E73", "#CC79A7", "#0072B2", "#999999", "#B8E0D2", "#5D3A9B",
+           "#8C564B")  # fmt: skip
 UNDECIDED = "#000000"
 NOTHING = "#EDEDED"  # the flag "none"
 # where the outputs are undefined, by the scene's own statuses: in print between unstable, stable and black
@@ -32,7 +33,8 @@ def kinds_of(ds, variable, state):
 def colours_of(table):
     """A colour per meaning; "ok" takes that of stable, "none" stays pale."""
     meant = [name for name in table if name not in ("undecided", "ok", "none")]
-    first = [c for c in COLOURS if "ok" not in table or c != COLOURS[1]]
+    kept = set() if any("unstable" in name for name in meant) else {COLOURS[0]}  # orange means unstable alone
+    first = [c for c in COLOURS if c not in kept | ({COLOURS[1]} if "ok" in table else set())]
     return {"undecided": UNDECIDED, "ok": COLOURS[1], "none": NOTHING} | dict(zip(meant, first, strict=False))
 
 

@@ -27,6 +27,9 @@ def draw_profile(axes, ds, variable, state, paper):
         label = textwrap.fill(literal(variable.attrs.get("long_name", variable.name)), 60)
         label = formula(variable.attrs.get("symbol") or variable.name, variable.name) if paper else label
         axes.plot(x, variable, lw=1.2, color="#0072B2", label=label)
+        if variable.name == "discriminant":
+            for edge in (-2.0, 2.0):
+                axes.axhline(edge, color="black", lw=0.6, ls=(0, (5, 2)))
     if f"{variable.name}_error" in ds:
         bar = ds[f"{variable.name}_error"].isel({d: 0 for d in ds[variable.name].dims if d not in variable.dims})
         axes.fill_between(x, variable - bar, variable + bar, color="#56B4E9", alpha=0.5, lw=0, label="error bar")

@@ -18,7 +18,10 @@ class Style:
 
 
 _WIDE = (7.2, 5.2)
-_RC = {"text.usetex": False}  # an untrusted file must not reach LaTeX, which reads and writes files
+_RC = {
+    "text.usetex": False,
+    "axes.formatter.use_mathtext": True,
+}  # an untrusted file must not reach LaTeX, which reads and writes files
 STYLES = {
     "screen": Style({"single": _WIDE, "double": _WIDE}, 150, rc=_RC),
     # columns of 85 and 175 mm; fonts are embedded as TrueType (42), as journals ask

@@ -49,17 +49,16 @@ def label_of(variable, width=40):
     text = literal(variable.attrs.get("long_name", variable.name))
     shown = _is_formula(symbol) and "flag_values" not in variable.attrs
     shown = shown and not (symbol == variable.name and "_" in symbol)  # a name, not a formula with a subscript
-    text = (
-        "$$" if text == symbol else f"{text}, $$" if shown else text
-    )  # TeX is longer than what it shows: inserted last
-    text += "" if units in ("1", "") else f" ({literal(units)})"
-    wrapped = textwrap.fill(text, width, break_long_words=False)
+    # TeX is longer than what it shows: inserted last; a name that only spells its symbol would repeat it
+    text = "$$" if shown and text in (symbol, symbol.lstrip("\\")) else f"{text}, $$" if shown else text
+    text += "" if units in ("1", "") else f"\N{NO-BREAK SPACE}({literal(units)})"
+    wrapped = textwrap.fill(text, width, break_long_words=False).replace("\N{NO-BREAK SPACE}", " ")
     return wrapped.replace("$$", f"${symbol}$") if shown else wrapped
 
 
 def title_of(ds, variable):
-    """The survey's title, what is drawn, and the numbers that are fixed and not zero."""
-    lines = [literal(ds.attrs.get("title", "")), literal(variable.attrs.get("long_name", variable.name))]
+    """The survey's title, what is drawn, the options that are words, and the numbers that are fixed and not zero."""
+    title, name = literal(ds.attrs.get("title", "")), literal(variable.attrs.get("long_name", variable.name))
     fixed = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "fi"]
     fixed = [c for c in fixed if c.name in ds.dims or float(c) != 0]
     position = {name: f" ({_place(ds[name], c)} of {ds.sizes[name]})"
@@ -67,8 +66,16 @@ def title_of(ds, variable):
     numbers = [f"{_equal(c)}{position.get(c.name, '')}" for c in fixed]
     labels = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "UO"]
     numbers = ", ".join(numbers + [f"{literal(c.name)} {literal(c.item())}{position.get(c.name, '')}" for c in labels])
-    lines[1] += f" ({literal(ds.attrs['options'])})" if ds.attrs.get("options") else ""
+    words = _options(ds)
+    lines = [title] if name.lower() in title.lower() else [title, name]
+    lines[-1] += f" ({words})" if words and words not in title else ""
     return "\n".join([*lines, numbers] if numbers else lines)
+
+
+def _options(ds):
+    """The options that say something in words, such as `prolate`; which question is asked, what is drawn says."""
+    pairs = [part.partition("=")[::2] for part in str(ds.attrs.get("options", "")).split(", ")]
+    return ", ".join(spaced(value) for key, value in pairs if key != "question" and value[:1].isalpha())
 
 
 def _place(axis, coordinate):

@@ -1,0 +1,51 @@
+"""Points that lie on no grid, such as samples: scattered over the first two parameters that vary along them."""
+
+import numpy as np
+from matplotlib.patches import Patch
+
+from survey import status
+from survey.show.layout import add_legend
+from survey.show.maps import colours_of_numbers
+from survey.show.palette import kinds_of
+from survey.show.text import WIDE, label_of, spaced
+
+SIZE = 14.0  # of a mark, in points^2
+
+
+def is_ensemble(ds):
+    """Are these points along one dimension without a coordinate, along which two parameters or more vary?"""
+    return len(ds.status.dims) == 1 and ds.status.dims[0] not in ds.coords and len(_parameters(ds)) > 1
+
+
+def _parameters(ds):
+    """The coordinates of numbers along the points."""
+    return [c for c in ds.coords.values() if c.dims == ds.status.dims and c.dtype.kind in "iuf"]
+
+
+def draw_ensemble(axes, ds, name, paper, asked):
+    """Scatter a variable over two parameters: a colour for each verdict, or a colour bar; `asked` as in `draw_map`."""
+    x, y = _parameters(ds)[:2]
+    variable, state = ds[name].load(), ds.status.load()
+    if "flag_values" in variable.attrs:
+        shown, table, palette = kinds_of(ds, variable, state)
+        handles = []
+        for kind, code in table.items():
+            here = (shown == code).filled(False)
+            if here.any():
+                axes.scatter(x.values[here], y.values[here], SIZE, palette[kind], edgecolors="black", linewidths=0.3)
+                label = spaced(kind) if paper else f"{spaced(kind)} ({int(here.sum()):,})"
+                handles.append(Patch(facecolor=palette[kind], edgecolor="black", lw=0.5, label=label))
+    else:
+        lost = np.isin(state.values, list(status.UNANSWERED))
+        shown = np.ma.masked_invalid(np.where(lost, np.nan, variable.values.astype(float)))
+        colours = colours_of_numbers(shown, variable, asked, variable.dtype.kind == "i")
+        drawn = axes.scatter(x.values, y.values, SIZE, shown, **colours)
+        axes.figure.colorbar(drawn, ax=axes, label=label_of(variable))
+        handles = []
+    bad = np.isin(state.values, list(status.UNANSWERED))
+    if bad.any():
+        axes.plot(x.values[bad], y.values[bad], "x", color="#999999", ms=4)
+        handles.append(Patch(color="#999999", label=f"no answer ({int(bad.sum()):,})"))
+    axes.set(xlabel=label_of(x, WIDE), ylabel=label_of(y))
+    if handles:
+        add_legend(axes, handles)

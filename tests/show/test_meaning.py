@@ -1,0 +1,68 @@
+"""What pictures say: labels without repetition, one meaning for one colour, lines at |D| = 2, ensembles, error bars."""
+
+import matplotlib
+import numpy as np
+import pytest
+import xarray as xr
+
+import survey
+from survey.show import palette
+from survey.show.text import label_of, title_of
+
+matplotlib.use("Agg")
+
+
+@pytest.fixture(scope="module")
+def ds():
+    return survey.evaluate("mathieu", a=np.linspace(-0.5, 3.0, 30), q=np.linspace(0.0, 1.0, 20))
+
+
+def test_a_symbol_stands_once_and_the_unit_on_its_line():
+    named = xr.DataArray(0.0, name="delta", attrs={"long_name": "delta", "symbol": r"\delta", "units": "1"})
+    assert label_of(named) == r"$\delta$"
+    long = xr.DataArray(0.0, name="x", attrs={"long_name": "a long name of a quantity", "symbol": "x", "units": "rad"})
+    for width in range(10, 40):
+        assert "$x$ (rad)" in label_of(long, width)
+
+
+def test_titles_have_no_internals_and_repeat_nothing(ds):
+    shown = ds.assign_attrs(
+        title="A map, stability of the linear motion", options="question=fate, direction=1, body=prolate"
+    )
+    assert title_of(shown, shown.verdict) == "A map, stability of the linear motion (prolate)"
+
+
+def test_orange_means_unstable_alone():
+    assert palette.colours_of({"undecided": -1, "unstable": 0, "stable": 1})["unstable"] == palette.COLOURS[0]
+    fates = survey.scenes.load("gyrostat").OUTPUTS
+    for output in fates:
+        if output.flags is not None:
+            colours = palette.colours_of(output.flags)
+            meant = [colours[name] for name in output.flags if name != "undecided"]
+            assert palette.COLOURS[0] not in meant and len(set(meant)) == len(meant)
+
+
+def test_the_discriminant_has_lines_at_2_and_a_diverging_map(ds):
+    axes = ds.survey.map("discriminant")
+    lines = [c for c in axes.collections if type(c).__name__ == "QuadContourSet"]
+    assert [sorted(c.levels) for c in lines] == [[-2.0, 2.0]] and axes.collections[0].get_cmap().name == "RdBu_r"
+    row = ds.survey.slice(q=0.5).survey.map("discriminant")
+    assert sorted(line.get_ydata()[0] for line in row.lines if len(set(line.get_ydata())) == 1) == [-2.0, 2.0]
+
+
+def test_error_bars_are_drawn(ds):
+    drawn = ds.survey.map("discriminant_error").collections[0]
+    np.testing.assert_allclose(np.nanmax(drawn.get_array()), float(ds.discriminant_error.max()))
+    with pytest.raises(survey.BadInput, match="unknown variable 'verdict_error'"):
+        ds.survey.map("verdict_error")
+
+
+def test_ensembles_are_scattered_over_their_parameters():
+    random = np.random.default_rng(1)
+    points = {name: xr.DataArray(random.uniform(0.0, 2.0, 40), dims="sample") for name in ("a", "q")}
+    made = survey.evaluate("mathieu", **points)
+    axes = made.survey.map()
+    assert axes.get_xlabel().endswith("$a$") and axes.get_ylabel().endswith("$q$")
+    offsets = np.concatenate([c.get_offsets() for c in axes.collections])
+    assert sorted(map(tuple, offsets)) == sorted(zip(made.a.values, made.q.values, strict=True))
+    assert made.survey.map("discriminant").collections[0].get_offsets().shape == (40, 2)
