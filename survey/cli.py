@@ -150,27 +150,6 @@ def run(workflow, output, overrides, workers, scheduler, block_timeout, fresh, r
     return _carry_out(checked, quiet, start)
 
 
-def _carry_out(checked, quiet, start, further=()):
-    """Run the engine by `start(progress, resume_command)`, draw, and say what was written; the exit code.
-
-    `further`: paths of other files that it writes.
-    """
-    from survey.sweep.progress import Progress
-
-    finished, resume_command = None, shlex.join(["survey", *(word for word in sys.argv[1:] if word != "--fresh")])
-    _stop_on_sigterm()
-    try:
-        with Progress(err, checked, silent=quiet) as progress:
-            finished = start(progress, resume_command)
-            pictures = _draw(checked)
-    except KeyboardInterrupt as stop:
-        traceback.clear_frames(stop.__traceback__)  # the semaphores they hold would be reported as leaked
-        _end_interrupted(stop.args[0] if stop.args else 130, checked.path, finished, resume_command)
-    if not quiet:
-        _summarise(finished, [checked.path, *further, *pictures])
-    return 1 if _failed(finished) else 0
-
-
 @program.command()
 @click.argument("workflow", type=WORKFLOW)
 @click.option("-o", "--output", metavar="OUT.nc", help="The netCDF file, instead of the workflow's with _proved added.")
@@ -408,6 +387,27 @@ def _describe(scene):
         for key, text in rows.items():
             click.echo(f"  {key:<{width}}  {text}".rstrip())
         click.echo()
+
+
+def _carry_out(checked, quiet, start, further=()):
+    """Run the engine by `start(progress, resume_command)`, draw, and say what was written; the exit code.
+
+    `further`: paths of other files that it writes.
+    """
+    from survey.sweep.progress import Progress
+
+    finished, resume_command = None, shlex.join(["survey", *(word for word in sys.argv[1:] if word != "--fresh")])
+    _stop_on_sigterm()
+    try:
+        with Progress(err, checked, silent=quiet) as progress:
+            finished = start(progress, resume_command)
+            pictures = _draw(checked)
+    except KeyboardInterrupt as stop:
+        traceback.clear_frames(stop.__traceback__)  # the semaphores they hold would be reported as leaked
+        _end_interrupted(stop.args[0] if stop.args else 130, checked.path, finished, resume_command)
+    if not quiet:
+        _summarise(finished, [checked.path, *further, *pictures])
+    return 1 if _failed(finished) else 0
 
 
 def _draw(workflow):

@@ -112,7 +112,7 @@ def measure(scene, case, peers=False, say=lambda line: None):
     runs = {(method, ""): (_solver(module, method, case.ERROR), fewer.get(method)) for method in methods}
     absent = missing(peers)
     for name in absent:
-        say(f"{name} is not installed and is missing from the chart: pip install 'survey[bench]'")
+        say(f"{name} is not installed and is missing from the chart: pip install 'stability-survey[bench]'")
     for name in sorted(set(modules.names(programs)) - set(absent)) if peers else ():
         peer = modules.load(programs, name, "peer")
         runs["", name] = _peer(case, peer), peer.POINTS

@@ -30,7 +30,7 @@ def equation_of(workflow):
     try:
         import flint  # noqa: F401
     except ImportError:
-        raise BadInput("prove: python-flint is missing; install it with pip install 'survey[prove]'") from None
+        raise BadInput("prove: python-flint is missing; install it with pip install python-flint") from None
     scene = workflow.scene
     if not hasattr(scene, "equation"):
         raise BadInput(f"prove: the scene {workflow.name} has no formulas to prove; choose mathieu or satellite")
