@@ -45,7 +45,7 @@ def test_the_typed_view_names_what_the_package_has():
 def test_the_distribution_is_described_and_its_version_is_the_packages():
     assert PROJECT["name"] != "survey" and "version" in PROJECT["dynamic"]
     assert "Typing :: Typed" in PROJECT["classifiers"]
-    tested = yaml.safe_load((ABOUT / "workflows/ci.yml").read_text())["jobs"]["check"]["strategy"]["matrix"]
+    tested = yaml.safe_load((ABOUT / "workflows" / "ci.yml").read_text())["jobs"]["check"]["strategy"]["matrix"]
     named = [c.rpartition(" ")[2] for c in PROJECT["classifiers"] if re.search(r"Python :: 3\.\d+$", c)]
     assert sorted(tested["python"]) == sorted(named) and len(tested["os"]) == 3
 

@@ -192,8 +192,9 @@ def tally(ds):
     return Tally({name: ds[name].attrs for name in ("status", "verdict") if name in ds}, ds.attrs["rtol"])
 
 
-def count(ds, arrays):
-    """Add the counts of `Tally` over the `arrays` of `ds` (see `describe`) to its attributes."""
+def count(ds, arrays=None):
+    """Add the counts of `Tally` over the `arrays` of `ds` (see `describe`; its variables) to its attributes."""
+    arrays = {name: ds[name].values for name in ds.data_vars} if arrays is None else arrays
     total = Tally(
         {name: ds.variables[name].attrs for name in ("status", "verdict") if name in arrays}, ds.attrs["rtol"]
     )

@@ -39,7 +39,8 @@ def number(value):
     if turns and abs(float(turns) * math.pi - value) <= 2 * math.ulp(value):
         times = "" if abs(turns.numerator) == 1 else f"{abs(turns.numerator)}*"
         over = "" if turns.denominator == 1 else f"/{turns.denominator}"
-        return f"({'-' if turns < 0 else ''}{times}pi{over})"
+        text = f"{'-' if turns < 0 else ''}{times}pi{over}"
+        return text if text == "pi" else f"({text})"
     return repr(value + 0) if value >= 0 else f"({value + 0!r})"
 
 
@@ -92,9 +93,9 @@ class Symbol:
         return self
 
     def __pow__(self, exponent):
+        if not isinstance(exponent, Symbol) and exponent == 0.5:
+            return _Functions().sqrt(self)
         if isinstance(exponent, Symbol) or exponent != int(exponent) or abs(exponent) > 64:
-            if exponent == 0.5:
-                return _Functions().sqrt(self)
             raise Unsupported("it raises to a power that is not a whole number of at most 64")
         text = f"({self.text})**{abs(int(exponent))}"
         samples = self.samples and tuple(_quotient(1, x ** -int(exponent)) if exponent < 0 else x ** int(exponent)
@@ -131,7 +132,9 @@ class Symbol:
     def __bool__(self):
         raise Unsupported("it asks whether a number that is not known is zero")
 
-    __eq__ = __bool__
+    def __eq__(self, other):
+        raise Unsupported("it asks whether numbers that are not known are equal")
+
     __hash__ = None
 
 

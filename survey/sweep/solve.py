@@ -65,8 +65,9 @@ def compute(grid, scene, request, threads=None, progress=None):
     if len(blocks) == 1:
         task(blocks[0])
     else:
-        if progress:
-            progress(0, len(blocks))
-        report = (lambda done, _=None: progress(done, len(blocks))) if progress else None
+        def report(done, _=None):
+            if progress:
+                progress(done, len(blocks))
+
         dispatch.on_threads(lambda number: task(blocks[number]), range(len(blocks)), report, threads=threads)
     return result

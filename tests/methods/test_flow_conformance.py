@@ -44,8 +44,8 @@ def wide_end(method, span, steps):
     """The state after equal steps of the widened method."""
     gyrostat = widened(flow.gyrostat)
     values = widened(flow.values, gyrostat=gyrostat)
-    series = widened(flow.series)
-    inner = {"gyrostat": gyrostat, "inside": widened(flow.inside)}
+    series = widened(flow._series_of_gyrostat)
+    inner = {"gyrostat": gyrostat, "values": values, "inside": widened(flow.inside)}
     if hasattr(method, "_flow_at"):
         inner["_flow_at"] = widened(method._flow_at)
     if hasattr(method, "_flow_classical"):

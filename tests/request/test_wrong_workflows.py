@@ -331,7 +331,7 @@ def test_objects_of_any_kind_are_refused_by_evaluate_in_one_line(folder, monkeyp
     class Reached(SurveyError):
         pass
 
-    def compute(*_):
+    def compute(*_, **__):
         raise Reached("this is where points are solved")
 
     monkeypatch.setattr(solve, "compute", compute)

@@ -116,7 +116,7 @@ def test_branches_that_are_no_numbers():
 
 @pytest.mark.parametrize("given", [("k", 0.0, 1.0), ("w", 2.0, 1.0), ("w", 0.0), "w", ("w", 0.0, math.inf), 3.0])
 def test_bad_ranges(given):
-    with pytest.raises(survey.BadInput, match="CONTINUATION") as caught:
+    with pytest.raises(survey.BadInput, match="continuation") as caught:
         scene(continuation=given)
     assert "\n" not in str(caught.value)
 

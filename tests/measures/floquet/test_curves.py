@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy import special
 import xarray as xr
 from danby_exact import factors
 from floquet_truth import PERIOD
@@ -274,9 +275,14 @@ def test_conserved_quantities_and_three_axes():
     assert np.isnan(ds.curve_outside.values).all()  # a multiplier at 1 is neither outside nor inside
 
 
+def test_on_one_axis_there_are_edges():
+    """The ends b_1 and a_1 of the first tongue."""
+    ds = found(mathieu("symplectic"), a=(0.0, 1.6), q=0.3)
+    known = [special.mathieu_b(1, 0.3), special.mathieu_a(1, 0.3)]
+    assert (abs(ds.edge_position - known) <= ds.edge_position_error + 1e-14).all()
+
+
 def test_refusals():
-    with pytest.raises(BadInput, match="two axes, or three"):
-        found(mathieu("symplectic"), a=(0.0, 1.0), q=0.3)
     with pytest.raises(BadInput, match=r"boundaries\.axis"):
         table = {name: {"start": 0.0, "stop": 1.0, "num": 3} for name in ("a", "q")}
         check({"scene": mathieu("symplectic"), "axes": table, "boundaries": {"axis": "a"}})

@@ -241,7 +241,7 @@ def test_a_logarithmic_axis():
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"axes": {"l": 0.1, "alpha": 0.1, "beta": {"values": [1.0, 2.0]}}}, "not on beta"),
+        ({"axes": {"l": 0.1, "alpha": 0.1, "beta": 0.2}}, "not on none"),
         ({"axes": {"l": {"values": [0.1, 0.2]}, "beta": {"values": [0.1]}, "alpha": 0.1}}, "beta has one value"),
         ({"boundaries": {"axis": "beta"}}, "no axis is searched"),
         ({"axes": {n: {"values": [0.1, 0.2]} for n in ("t", "p_psi")} | {"A": 2.0, "C": 1.0, "epsilon": 0.6,
