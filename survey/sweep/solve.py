@@ -65,6 +65,7 @@ def compute(grid, scene, request, threads=None, progress=None):
     if len(blocks) == 1:
         task(blocks[0])
     else:
+
         def report(done, _=None):
             if progress:
                 progress(done, len(blocks))

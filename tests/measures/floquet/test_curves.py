@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from scipy import special
 import xarray as xr
 from danby_exact import factors
 from floquet_truth import PERIOD
 from mpmath import mp, mpf
+from scipy import special
 from scipy.special import mathieu_a, mathieu_b
 
 import survey
