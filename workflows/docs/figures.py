@@ -50,6 +50,8 @@ def _fit(command, figure):
         names = [f"precision_{words[2]}.png"]
     elif words[:2] == ["survey", "run"]:
         names = [] if "output.figures=[]" in words else _of_workflow(ROOT / words[2])
+    elif words[:2] == ["survey", "prove"]:
+        names = _of_workflow(ROOT / words[2], "_proved")
     elif words[0] == "survey":
         names = []
     else:  # {...} in a name may be anything; a script may be a folder
@@ -61,10 +63,10 @@ def _fit(command, figure):
     return max((len(f) for f, p in zip(fixed, patterns, strict=True) if re.fullmatch(p, figure)), default=0)
 
 
-def _of_workflow(path):
+def _of_workflow(path, ending=""):
     """The figures that a workflow draws beside its output: OUT.png, and OUT_NAME.png from the second on."""
     output = tomllib.loads(path.read_text())["output"]
-    stem = Path(output["path"]).stem
+    stem = Path(output["path"]).stem + ending
     return [f"{stem}.png" if i == 0 else f"{stem}_{name}.png" for i, name in enumerate(output.get("figures", []))]
 
 
