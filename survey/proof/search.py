@@ -14,10 +14,11 @@ from survey.proof import checker
 BITS = 96  # of the balls
 ORDERS = range(12, 80, 4)  # of the Taylor series
 NODES = (6, 8, 10, 12, 14, 16, 18, 20)
-ELLIPSES = (20, 12, 8, 6, 4.5, 3.5, 2.8, 2.3, 1.9, 1.6)
+ELLIPSES = (1.6, 1.9, 2.3, 2.8, 3.5, 4.5, 6, 8, 12, 20)
 RATES = np.geomspace(0.3, 1.3, 8)  # w relative to the square root of the largest |z|, which are tried
 UNIT = 2.0**-53
 PANEL = "."  # in a layout
+SMALLEST = 2  # halvings of a panel: for fewer cells it is not worth its nodes
 
 
 def plan(equation, sides, tolerance):
@@ -41,9 +42,9 @@ def _ellipse(equation, sides, name, tolerance):
     for r in ELLIPSES:
         try:
             arcs = equation.on_ellipse(sides, name, arb(r))
-        except checker.Failed as failed:
+        except checker.Failed as failed:  # z is singular in the larger ones, too
             why = failed
-            continue
+            break
         parts = [[(length, z.real.mid(), z.imag.mid(), z.rad()) for length, z in arc] for arc in arcs]
         length, real, imaginary, radius = np.moveaxis(np.array(parts, float), -1, 0)
         top = np.sqrt(np.abs(real).max() + radius.max())
@@ -53,7 +54,7 @@ def _ellipse(equation, sides, name, tolerance):
             n = next((n for n in NODES if bound * r ** (1 - n) < 0.2 * tolerance), None)
             if n and (best is None or (n, bound * r ** (1 - n)) < best[:2]):
                 best = n, bound * r ** (1 - n), r, float(w)
-        if best and best[0] < NODES[-1] and r < best[2]:
+        if best and r > 2 * best[2]:
             break
     if best is None:
         raise why or checker.Failed("no ellipse has a small enough bound: smaller panels are needed")
@@ -80,7 +81,7 @@ def panels(equation, sides, depth, tolerance):
         panel = checker.Panel(equation, sides, found)
         return PANEL, [found | {"cells": cells(panel, depth)}]
     except checker.Failed:
-        if not depth:
+        if depth <= SMALLEST:
             return PANEL, [open_panel()]
     quarters = [checker.within(sides, place) for place in reversed(checker.quarters(((Fraction(0), Fraction(1)),) * 2))]
     layouts, lists = zip(*(panels(equation, quarter, depth - 1, tolerance) for quarter in quarters), strict=True)
