@@ -37,13 +37,13 @@ UNKNOWN, NO_ENDS = 21, 22  # as in the STATUS of scenes/gyrostat.py and of reque
 COARSEST = 1e-9  # rtol: with wider bars more fates stay open, and to decide these costs more than smaller steps
 LEAST = 1e-6  # slowest rotation of the lattice, in velocities of the system
 COLUMNS_OF = {"verdict": rc.VERDICT, "turnings": rc.TURNINGS, "net_turns": rc.NET_TURNS, "status": rc.STATUS}
+LIMITS = [name + end for name in ("limit_phi", "limit_w", "multiplier") for end in ("", "_error")]
 FINE = 1e-16  # truncation per step for cycles, or the finest of the method
 
 
 def empty(size, status):
     """The outputs of `solve` for `size` states, filled with what does not apply."""
-    floats = ("limit_phi", "limit_w", "multiplier")
-    result = {name + end: np.full(size, np.nan) for name in floats for end in ("", "_error")}
+    result = {name: np.full(size, np.nan) for name in LIMITS}
     for name, fill in (("verdict", -1), ("turnings", kf.UNDETERMINED), ("net_turns", NO_TURNS), ("status", status)):
         result[name] = np.full(size, fill, dtype=np.int64)
     return result
@@ -52,12 +52,29 @@ def empty(size, status):
 def solve(method, six, starts, rtol, result, where):
     """Fates at one parameter point, written into `result` (see `empty`) at the indices `where`."""
     s = remembered(method, six)
-    out = followed(method, s, starts, rtol)
+    write(s, followed(method, s, starts, rtol), starts, result, where)
+
+
+def write(s, out, starts, result, where):
+    """Write the fates `out` (VERDICT to STATUS of `records`) of the skeleton's starts into `result`."""
     for name, column in COLUMNS_OF.items():
         result[name][where] = out[:, column]
-    for i, row in zip(where, out, strict=True):
-        limits(s, row, result, i)
+    for first, alike in _alike(out):
+        limits(s, out[first], result, where[first])
+        for name in LIMITS:
+            result[name][where[alike]] = result[name][where[first]]
     wind(s, out, starts[:, 0], result, where)
+
+
+def _alike(out):
+    """(the first, where) of the fates with one verdict and one limit."""
+    if out.shape[1] != rc.FATE:  # g = 0: each motion ends at an angle of its own
+        yield from ((i, slice(i, i + 1)) for i in range(len(out)))
+        return
+    kinds = (64.0 * out[:, rc.VERDICT] + out[:, rc.LIMIT]).astype(np.int64)
+    for kind in np.unique(kinds):
+        alike = np.flatnonzero(kinds == kind)
+        yield alike[0], alike
 
 
 def wind(s, out, angles, result, where):
@@ -103,12 +120,13 @@ def _handed_over(method, s, start, tolerance, out):
 def _middles(s, out):
     """Angle that counts for net_turns: the equilibrium, or the middle of a libration cycle."""
     angles = np.full(len(out), np.nan)
-    for i, row in enumerate(out):
+    for first, alike in _alike(out):
+        row = out[first]
         if row[rc.VERDICT] in (kf.EQUILIBRIUM, kf.EQUILIBRIUM_START) and row[rc.LIMIT] >= 0:
-            angles[i] = s.equilibria[int(row[rc.LIMIT]), eq.ANGLE]
+            angles[alike] = s.equilibria[int(row[rc.LIMIT]), eq.ANGLE]
         elif row[rc.VERDICT] == kf.LIBRATION:
             cycle = s.librations[int(row[rc.LIMIT])]
-            angles[i] = 0.5 * (cycle[rt.CYCLE_X] + cycle[rt.CYCLE_LEFT])
+            angles[alike] = 0.5 * (cycle[rt.CYCLE_X] + cycle[rt.CYCLE_LEFT])
     return angles
 
 
