@@ -9,6 +9,7 @@ as on the way to an unstable cycle, or leave the range of the map.
 
 import math
 import sys
+import threading
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -31,8 +32,10 @@ PIECES = 8_000, 96_000  # of one curve: the least and the greatest number at whi
 LOOSE = 1e-3  # bar of a cycle, in the same units, beyond which only starts far from it are told
 NARROWEST = 1e-9  # gaps, relative, in which fates are told
 BACK = np.array([-1.0, -1.0, 1.0, 1.0, 1.0, 1.0])  # S1, see `solution`
+SHARP = 1e-13  # error of a state that is no more than rounding beside the least bar of a piece
 FEWEST = 1_000  # starts of one system: fewer are followed
 SYSTEMS = 8  # whose curves are kept: on maps of more, blocks would find them again
+_LOCK = threading.Lock()
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,14 @@ class Basins:
         return out, known
 
 
+    def told(self, state):
+        """The fate of a state (PHI to W_BAR of `records`) if it is known far better than the curves; else None."""
+        if not state[rc.PHI_BAR] + state[rc.W_BAR] < SHARP * min(1.0, self.p[BOUND_F] + math.sqrt(self.p[BOUND_DG])):
+            return None
+        out, known = self.of(np.ascontiguousarray(state[None, :2]))
+        return out[0] if known[0] else None
+
+
 @dataclass(frozen=True)
 class Map:
     """What of a whole survey decides how far curves are followed: the starts of one system, their largest |w|."""
@@ -85,12 +96,13 @@ def followed(method, six, s, starts, rtol, whole=None):
     """`fate.followed`, of as few starts as can be where the Map `whole` says that there are many."""
     basins = None
     if whole is not None and hasattr(method, "flow_pieces"):
-        basins = _remembered(method.__name__, tuple(float(value) for value in six), float(rtol), whole)
+        with _LOCK:  # threads that wait find it done
+            basins = _remembered(method.__name__, tuple(float(value) for value in six), float(rtol), whole)
     if basins is None:
         return fate.followed(method, s, starts, rtol)
     out, known = basins.of(starts)
     if not known.all():
-        out[~known] = fate.followed(method, s, starts[~known], rtol)
+        out[~known] = fate.followed(method, s, starts[~known], rtol, basins.told)
     return out
 
 
@@ -98,6 +110,11 @@ def followed(method, six, s, starts, rtol, whole=None):
 def _remembered(method, six, rtol, whole):
     """The Basins of a system, or None; blocks of one survey share them."""
     return found(sys.modules[method], fate.remembered(sys.modules[method], six), rtol, whole)
+
+
+def forget():
+    """Forget all Basins, so that the next call is timed with its own."""
+    _remembered.cache_clear()
 
 
 def found(method, s, rtol, whole):

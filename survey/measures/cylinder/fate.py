@@ -31,6 +31,7 @@ MORE = 10  # times the budget for those that use it up
 MOST = 2_000_000  # steps in all
 BATCH = 50  # fates per kernel call, so that a call stays below a second
 HANDED_OVER = np.geomspace(0.5, 2000.0, 28)  # times, in those of the system, at which float64 takes over again
+SELDOM = 3  # every third time, where what is told at all of them was not enough
 MIRROR = np.array([1.0, -1.0, 1.0, -1.0, -1.0, 1.0])  # S2, see `solution`
 MOST_OF_PROGRAM = 16  # equilibria
 UNKNOWN, NO_ENDS = 21, 22  # as in the STATUS of scenes/gyrostat.py and of request/abel_scene.py
@@ -85,8 +86,11 @@ def wind(s, out, angles, result, where):
     result["net_turns"][where[known]] = turns[known]
 
 
-def followed(method, s, starts, rtol):
-    """`fates` of the skeleton s, solved again with a greater budget or finer steps where they are not decided."""
+def followed(method, s, starts, rtol, told=None):
+    """`fates` of the skeleton s, solved again with a greater budget or finer steps where they are not decided.
+
+    `told` (see `basins`) gives the fate of a later state of the same motion, or None.
+    """
     first, second = tolerances(method, min(rtol, COARSEST))
     out = fates(method, s, starts, first)
     for code, tolerance in ((STEP_LIMIT, first), (SEPARATRIX, second)):
@@ -97,24 +101,28 @@ def followed(method, s, starts, rtol):
         s.stratum not in (I0, I1) and starts.shape[1] == 2 and len(s.p) == COLUMNS
     ):  # no better than the bars of a start can its fate be
         for i in np.flatnonzero(out[:, rc.STATUS] == SEPARATRIX):
-            _handed_over(method, s, starts[i], first, out[i])
+            _handed_over(method, s, starts[i], first, out[i], told)
     return out
 
 
-def _handed_over(method, s, start, tolerance, out):
+def _handed_over(method, s, start, tolerance, out, told=None):
     """Follow one start in double-double past what float64 cannot decide, until its fate from there on is decided."""
     times = HANDED_OVER / (s.p[BOUND_F] + math.sqrt(s.p[BOUND_DG]) + abs(start[1]))
     row, done = np.concatenate([s.p[:6], start])[None], 0
-    for last in (10, 19, len(times)):  # most are decided early, and what comes later costs most
-        floats, turnings, status = trajectories(taylor_double, row, times[None, :last], 0.0)
-        for state, turned, code in list(zip(floats[0], turnings[0], status[0], strict=True))[done:]:
-            later = fates(method, s, state[None], tolerance)[0] if code == OK else [kf.UNDECIDED]
-            if later[rc.VERDICT] != kf.UNDECIDED:
-                out[:] = later
-                if later[rc.TURNINGS] >= 0:
-                    out[rc.TURNINGS] = later[rc.TURNINGS] + turned if turned >= 0 else kf.UNDETERMINED
-                return
-        done = last
+    ways = ([told] if told else []) + [lambda state: fates(method, s, state[None], tolerance)[0]]
+    for later_of in ways:  # what is told costs nothing, so it is asked at all times first
+        for last in (10, 19, len(times)):  # most are decided early, and what comes later costs most
+            floats, turnings, status = trajectories(taylor_double, row, times[None, :last], 0.0)
+            states = list(zip(floats[0], turnings[0], status[0], strict=True))[done:]
+            for state, turned, code in states[SELDOM - 1 :: SELDOM] if told and later_of is not told else states:
+                later = later_of(state) if code == OK else None
+                if later is not None and later[rc.VERDICT] != kf.UNDECIDED:
+                    out[:] = later
+                    if later[rc.TURNINGS] >= 0:
+                        out[rc.TURNINGS] = later[rc.TURNINGS] + turned if turned >= 0 else kf.UNDETERMINED
+                    return
+            done = last
+        done = 0
 
 
 def _middles(s, out):

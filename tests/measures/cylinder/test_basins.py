@@ -6,7 +6,7 @@ import pytest
 import survey
 from survey.kernels.cylinder import fate as kf
 from survey.kernels.cylinder import records as rc
-from survey.measures.cylinder import basins, fate
+from survey.measures.cylinder import basins, equation, fate
 from survey.methods import taylor
 from survey.scene import Request
 
@@ -81,3 +81,20 @@ def test_a_map_says_what_its_points_say():
         row = survey.evaluate("gyrostat", phi0=phi0[i], w0=w0, **parameters)
         for name in row.data_vars:
             assert np.array_equal(whole[name].isel(phi0=i), row[name], equal_nan=True), name
+
+
+def _damping(phi, p):
+    return p[0] * np.cos(phi) - p[1] * np.sin(2.0 * phi)
+
+
+def _torque(phi, p):
+    return p[1] * np.sin(phi) + 0.6 * np.cos(phi) - 0.8 * np.sin(2.0 * phi)
+
+
+@pytest.mark.parametrize("point", [(0.5, -0.4), (0.3, 0.5)])
+def test_own_flows_are_told_alike(point):
+    """A user's f and g on the cylinder: the same door, the same fates as those followed."""
+    (row,) = equation.flows(_damping, _torque, np.array([point]), True)
+    random = np.random.default_rng(7)
+    share, wrong = compared(row, np.stack([random.uniform(-7.0, 7.0, 60), random.normal(size=60) * 2.0], axis=1))
+    assert wrong == 0 and share > 0.8
