@@ -15,7 +15,7 @@ from survey.show.boundaries import draw_boundaries, in_plane
 from survey.show.cells import draw_cells
 from survey.show.layout import add_legend
 from survey.show.marks import hatched, marks, marks_without_answer
-from survey.show.palette import UNDECIDED, greys, hatch_of, kinds_of
+from survey.show.palette import UNDECIDED, colours_of, greys, hatch_of, kinds_of
 from survey.show.style import style_named
 from survey.show.text import WIDE, label_of, spaced
 
@@ -68,7 +68,8 @@ def draw_map(axes, ds, variable, state, boundaries, paper, asked):
         missing &= ~np.isin(state.values, list(scene_statuses(ds).values()))
         handles += [Patch(color="#dddddd", label="does not apply")] if missing.any() else []
     if boundaries and "curve_count" in ds:
-        handles += draw_boundaries(axes, in_plane(ds, variable), x, y)
+        gaps = colours_of(flag_codes(variable.attrs)).get("unstable") if "flag_values" in variable.attrs else None
+        handles += draw_boundaries(axes, in_plane(ds, variable), x, y, gaps)
     if handles:
         add_legend(axes, handles)
     axes.set(xlabel=label_of(x, WIDE), ylabel=label_of(y))
