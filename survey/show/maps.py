@@ -55,7 +55,7 @@ def draw_map(axes, ds, variable, state, boundaries, paper, asked):
             few = isinstance(colours.get("norm"), BoundaryNorm)
             ticks = np.unique(shown.compressed()) if few else ticks
             extend = "neither" if few else clipped(shown, *drawn.get_clim())
-            axes.figure.colorbar(drawn, ax=axes, label=label_of(variable), ticks=ticks, extend=extend)
+            axes.figure.colorbar(drawn, ax=axes, label=label_of(variable, WIDE), ticks=ticks, extend=extend)
         if variable.name == EDGED and min(shown.shape) > 1 and shown.count():
             axes.contour(x, y, shown.T, levels=EDGES, colors="black", linewidths=0.6)
         axes.set_facecolor("#dddddd")
@@ -72,7 +72,7 @@ def draw_map(axes, ds, variable, state, boundaries, paper, asked):
         handles += draw_boundaries(axes, in_plane(ds, variable), x, y, gaps)
     if handles:
         add_legend(axes, handles)
-    axes.set(xlabel=label_of(x, WIDE), ylabel=label_of(y))
+    axes.set(xlabel=label_of(x, WIDE), ylabel=label_of(y, WIDE))
     for setting, scale in zip((axes.set_xscale, axes.set_yscale), scales, strict=True):
         if scale == "log":
             setting(scale)
