@@ -9,7 +9,8 @@ from survey.file.labels import flag_codes, scene_statuses
 # black is kept for undecided, white with hatching for failed
 COLOURS = ("#D55E00", "#A6D8F5", "#E69F00", "#F0E442", "#009E73", "#CC79A7", "#0072B2", "#999999", "#B8E0D2", "#5D3A9B",
            "#8C564B", "#D9B38C")  # fmt: skip
-UNSTABLE, STABLE = (COLOURS[0], COLOURS[2]), (COLOURS[1], COLOURS[6])  # and nothing else: of whom there may be two
+UNSTABLE, STABLE = (COLOURS[0], COLOURS[10]), (COLOURS[1], COLOURS[6])  # there may be two of each
+MARGINAL = COLOURS[2]
 OTHERS = tuple(COLOURS[i] for i in (11, 4, 5, 3, 9, 8, 10, 2, 6, 7))
 UNDECIDED = "#000000"
 NOTHING = "#EDEDED"  # the flag "none"
@@ -34,7 +35,7 @@ def kinds_of(ds, variable, state):
 
 def colours_of(table):
     """A colour per meaning: orange is unstable and nothing else, light blue stable or "ok"; "none" stays pale."""
-    found = {"undecided": UNDECIDED, "ok": COLOURS[1], "none": NOTHING}
+    found = {"undecided": UNDECIDED, "ok": COLOURS[1], "none": NOTHING, "marginal": MARGINAL}
     meant = [name for name in table if name not in found]
     unstable = [name for name in meant if "unstable" in name]
     stable = [name for name in meant if "stab" in name and name not in unstable]
