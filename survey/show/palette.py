@@ -8,10 +8,10 @@ from survey.file.labels import flag_codes, scene_statuses
 # after Okabe and Ito, safe for the colour-blind, the first two far apart in grey print too;
 # black is kept for undecided, white with hatching for failed
 COLOURS = ("#D55E00", "#A6D8F5", "#E69F00", "#F0E442", "#009E73", "#CC79A7", "#0072B2", "#999999", "#B8E0D2", "#5D3A9B",
-           "#8C564B", "#D9B38C", "#BCBD22")  # fmt: skip
+           "#8C564B", "#D9B38C", "#BCBD22", "#C49CDE")  # fmt: skip
 UNSTABLE, STABLE = (COLOURS[0], COLOURS[10]), (COLOURS[1], COLOURS[6])  # there may be two of each
 MARGINAL = COLOURS[2]
-OTHERS = tuple(COLOURS[i] for i in (11, 4, 5, 3, 9, 8, 10, 12, 6, 7))
+OTHERS = tuple(COLOURS[i] for i in (11, 4, 5, 3, 9, 8, 10, 12, 6, 13, 7))
 UNDECIDED = "#000000"
 NOTHING = "#EDEDED"  # the flag "none"
 # where the outputs are undefined, by the scene's own statuses: in print between unstable, stable and black
