@@ -55,7 +55,7 @@ def label_of(variable, width=40):
         "$$" if shown and text in (symbol, symbol.lstrip("\\")) else f"{text},\N{NO-BREAK SPACE}$$" if shown else text
     )
     text += "" if units in ("1", "") else f"\N{NO-BREAK SPACE}({literal(units)})"
-    wrapped = textwrap.fill(text, width, break_long_words=False)  # a symbol never stands alone in a line
+    wrapped = textwrap.fill(text, width, break_long_words=False).replace("\N{NO-BREAK SPACE}", " ")
     return wrapped.replace("$$", f"${symbol}$") if shown else wrapped
 
 
