@@ -31,8 +31,9 @@ def _space(axes, most):
 
 
 def wrap(text, space):
-    """Break the lines of a matplotlib Text that are longer than `space` pixels, but no formula, nor before one that ends a
-    label, nor between it and its unit.
+    """Break the lines of a matplotlib Text that are longer than `space` pixels.
+
+    A formula stays whole, and at the end of a label beside its name and unit.
     """
     original = text.get_text()
     for length in range(max(map(len, original.split("\n"))), 9, -3):
