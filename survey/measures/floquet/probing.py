@@ -43,6 +43,8 @@ def rates(program, numbers, low, high, ratio, number=NUMBER):
     `ratio` (N, n, n): what entries of A are multiplied by in balanced units.
     """
     places = suspects(program)
+    if not places:
+        return np.zeros((0, len(low)))
     t = low + (high - low) * (0.5 - 0.5 * np.cos(np.pi * (np.arange(number) + 0.5) / number))
     found = np.zeros((len(places), len(low)))
     for k, (values, bars) in enumerate(_values(program, numbers, t, places)):
