@@ -105,7 +105,7 @@ def serves(system, structure, wanted, lines):
 
 
 def serves_scattered(system, structure, wanted, ranges):
-    """May series answer points on their own, the parameters of which lie within `ranges`, {column: (number, low, high)}?"""
+    """May series answer points on their own, whose parameters lie within `ranges`, {column: (number, low, high)}?"""
     known = _of_series(system, structure, wanted) and len(ranges) == 2
     return known and all(number >= FEWEST and high > low for number, low, high in ranges.values())
 
