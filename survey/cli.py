@@ -180,11 +180,13 @@ def prove(workflow, output, overrides, fresh, quiet):
 @click.option("-o", "--output", metavar="OUT.nc", help="The netCDF file, instead of the workflow's output.path.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def plan(workflow, overrides, output, as_json):
-    """Points, blocks, bytes, method and estimated time; no kernel is called."""
+    """Points, blocks, size, method and estimated time, by what this machine has needed so far; no kernel is called."""
     from survey.request.workflow import read
     from survey.sweep import plan
 
-    _show(plan.plan(read(workflow, overrides, output)), as_json)
+    planned = plan.plan(read(workflow, overrides, output))
+    numbers = () if as_json else ("bytes", "estimated_seconds")  # of which the size and the time are the words
+    _show({key: value for key, value in planned.items() if key not in numbers}, as_json)
 
 
 @program.command()
