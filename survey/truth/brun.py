@@ -82,7 +82,7 @@ def integrals(sign):
         points = np.ascontiguousarray(np.column_stack([given[name] for name in ("l", "alpha", "beta")]))
         ok = answer["status"] == 0
         out = np.full((len(points), 2, brun_sums.COLUMNS), np.nan)
-        brun_sums.integrals(points[ok], float(sign), float(given["ratio"]), NODES, part := out[ok])
+        brun_sums.integrals(points[ok], float(sign), float(np.ravel(given["ratio"])[0]), NODES, part := out[ok])
         out[ok] = part
         wells = np.isfinite(out[..., 0]).sum(axis=1)
         out[wells != np.isfinite(answer["u_min"]).sum(axis=1)] = np.nan  # a well at a point, or a separatrix

@@ -66,10 +66,16 @@ def along(given, answer):
         for a, b in (("phi_turning", "w"), ("t_turning", "t"))
     ]
     out, doubt = _twice(gyrostat_flow.along, points, pick, bars, (0, 2))
-    true = _spread(ok, out[:, 4])
     with np.errstate(invalid="ignore"):
         apart = np.abs(given["phi"] - answer["phi_turning"]) > answer["phi_turning_error"]
-        wrong = ((status == 0) & (true == 1)) | (turned & (true == 0) & apart)
+    early = turned[ok] & (out[:, 4] == 0) & ~apart[ok]
+    if early.any():  # within its bar: held against the turning point beyond
+        further = points[early]
+        further[:, 8] += np.sign(further[:, 8] - further[:, 6])
+        found = [part[early] for part in (*pick, *bars)]
+        out[early], doubt[early] = _twice(gyrostat_flow.along, further, found[:2], found[2:], (0, 2))
+    true = _spread(ok, out[:, 4])
+    wrong = ((status == 0) & (true == 1)) | (turned & (true == 0))
     found = {"wrong": {"turning": wrong}}
     for names, here in ((("w", "t"), true == 0), (("phi_turning", "t_turning"), true == 1)):
         for name, c, j in zip(names, (0, 2), (0, 1), strict=True):
