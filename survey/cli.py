@@ -359,6 +359,18 @@ def precision(scene, peers, output):
         out.print(str(path), markup=False)
 
 
+@program.command()
+@click.argument("scene", shell_complete=_scene_names)
+@click.option("--share", type=float, default=1.0, metavar="S", help="Of the points along each axis: below 1 coarser.")
+@click.option("-o", "--output", metavar="DIR", default=".", show_default=True, help="Folder for JSON, page and PNG.")
+def failures(scene, share, output):
+    """Where each method fails: its true error and its error bar over the planes on which it should break."""
+    from survey.failures import write
+
+    for path in write(scene, output, share, say=lambda line: err.print(plain(line), markup=False)):
+        out.print(str(path), markup=False)
+
+
 def _show(table, as_json):
     """A mapping as JSON or as two columns."""
     if as_json:
