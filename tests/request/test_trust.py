@@ -72,7 +72,7 @@ def test_a_strange_survey_whose_points_are_taken_over_runs_nothing(strange, monk
     held, told = earlier.find(ours, strange.path)
     assert held is None and "another scene ('evil.py', not 'mathieu')" in told and not strange.ran
     text = strange.file.read_text()
-    strange.file.write_text(text.replace('open("', '#("'))
+    strange.file.write_text(text.replace("\nopen(", "\n# open("))
     own = workflow.check({"scene": "evil.py", "axes": axes}, output="new.nc")
     strange.file.write_text(text)
     held, told = earlier.find(own, strange.path)
