@@ -9,7 +9,7 @@ import numpy as np
 from survey.measures.floquet import dense, monodromy, motion, probing, stability
 from survey.measures.floquet.system import System
 from survey.request.traced_scene import TracedScene
-from survey.scene import Parameter, plus_minus
+from survey.scene import plus_minus
 
 LARGEST = 64  # states
 TRIED = np.array([0.0, 0.11, 0.29, 0.47, 0.62, 0.83])  # of a period: where A is tried as Python
@@ -30,7 +30,6 @@ class FloquetScene(TracedScene):
     breaks: tuple[float, ...] | Callable
     states: tuple[str, ...]
     structure: str
-    PARAMETERS: tuple[Parameter, ...]
     NAME: str
     TEXT: str
     HASH: str
@@ -41,11 +40,6 @@ class FloquetScene(TracedScene):
     AUDIT = ("dop853",)
     OPTIONS = ()
     STATUS = STATUS
-
-    @property
-    def own(self):
-        """The parameters of A: all that there are."""
-        return self.PARAMETERS
 
     @cached_property
     def _system(self):
