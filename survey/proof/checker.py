@@ -18,9 +18,9 @@ y1, y2 are the solutions with y1 = 1, y1' = 0 and y2 = 0, y2' = 1 at u = 0, and 
    x = h/R. On every ray from u0 the maximum norm of v = (w y, y') satisfies |v|' <= w |v|, so |w y| <= e^(wR) |v(u0)|
    on the disc, and by Cauchy the Taylor coefficients of y satisfy |a_n| <= M R^-n, M = e^(wR) max(|y|, |y'|/w) at u0.
    At u0 + h the sums up to degree N are off by at most M x^(N+1) / (1 - x), for y' by (M/R) (N+1) x^N / (1 - x)^2.
-3. GROWTH (`Equation.growth`). For complex z and a constant w > 0, the Euclidean norm of (w y, y') grows at most at the
-   rate |w^2 - conj z| / (2 w), the logarithmic norm of [[0, w], [-z/w, 0]]; so
-   |(w y, y')(S)| <= exp(int_0^S |w^2 - conj z| / (2 w) du) |(w y, y')(0)|.
+3. GROWTH (`growth`). For complex z and a constant w > 0, the Euclidean norm of (sqrt(w) y, y'/sqrt(w)) grows at most
+   at the rate |w^2 - conj z| / (2 w), the logarithmic norm of [[0, w], [-z/w, 0]]. Where w changes from v to w, the
+   norm grows at most by max(v/w, w/v)^(1/2). So with w constant on parts of [0, S] it grows at most by the product G.
 4. PARAMETERS (`Equation.truncation`). A panel is a rectangle of parameters, mapped to [-1, 1]^2. If a factor f is
    analytic, |f| <= M, for p1 in the Bernstein ellipse E_r (semi-axes (r +- 1/r)/2) and real p2, its interpolant I1 f
    at the n Chebyshev points of the first kind satisfies |f - I1 f| <= 4 M r^(1-n) / (r - 1): its coefficients are at
@@ -39,9 +39,9 @@ import sys
 from argparse import ArgumentParser
 from contextlib import nullcontext
 from fractions import Fraction
-from functools import lru_cache, partial
-from itertools import product
-from math import comb
+from functools import lru_cache, partial, reduce
+from itertools import pairwise, product
+from math import comb, prod
 from multiprocessing import get_context
 
 from flint import acb, arb, arb_mat, arb_series, ctx
@@ -50,9 +50,10 @@ FORMAT = "survey-certificate 1"
 STABLE, UNSTABLE, OPEN, SPLIT = "s", "u", "o", "+"  # cells; "+" is followed by its four quarters
 VERDICTS = {STABLE: "stable", UNSTABLE: "unstable", OPEN: "open"}
 QUARTERS = ((1, 1), (1, 0), (0, 1), (0, 0))  # (upper half of p2?, of p1?): the last one is the first in the text
-RATIO, FAR = arb(1) / 8, 4  # h / R of a step; a step is halved unless w R < FAR
-SHORTEST = Fraction(1, 2**20)  # step, as a part of a piece
+RATIO, FAR = arb(1) / 4, 8  # h / R of a step; a step is halved unless w R < FAR
+SHORTEST, SMALLEST = Fraction(1, 2**20), Fraction(1, 2**11)  # step, and part that bounds growth, as parts of a piece
 ARCS, BOXES, COVER = 24, 32, 4  # parts of half an ellipse, of a piece of [0, S] (at least), of a box's side
+WIDE = arb(1) / 8  # a part of [0, S] is halved while the ball of z times its length exceeds this, relative to sqrt |z|
 DEEPEST, LARGEST = 24, 2**23  # halvings of a panel; characters of a certificate
 MALFORMED = (KeyError, TypeError, ValueError, IndexError, AttributeError, RecursionError, ArithmeticError)
 
@@ -114,13 +115,16 @@ OPERATIONS = {
 
 
 class Formula:
-    """An expression in `names` and pi: + - * /, ** with whole exponents, exact decimals, FUNCTIONS; nothing else."""
+    """An expression in `names` and pi: + - * /, ** with whole exponents, exact decimals, FUNCTIONS; nothing else.
+
+    What stands in it more than once is evaluated once.
+    """
 
     def __init__(self, text, names):
         need(isinstance(text, str) and len(text) < 20_000, "a formula is not a text, or too long")
         self.text, self.names = text, {*names, "pi"}
         try:
-            self.value = self._read(ast.parse(text, mode="eval").body)
+            self.value = self._once(ast.parse(text, mode="eval").body)
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             raise Failed(f"this is not a formula: {text[:80]!r}") from None
 
@@ -128,26 +132,37 @@ class Formula:
         """Its value for balls, complex balls, or power series of balls."""
         return self.value({"pi": arb.pi(), **values})
 
+    def _once(self, node):
+        """The node as a function of {text: value}, which keeps its value there."""
+        text, found = ast.unparse(node), self._read(node)
+
+        def value(values):
+            if text not in values:
+                values[text] = found(values)
+            return values[text]
+
+        return value
+
     def _read(self, node):
-        """The node as a function of {name: value}."""
+        """The node as a function of {text: value}."""
         if isinstance(node, ast.Constant) and type(node.value) in (int, float):
             number = Fraction(ast.get_source_segment(self.text, node))
             return lambda values: exact(number)
         if isinstance(node, ast.Name) and node.id in self.names:
             return lambda values: values[node.id]
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
-            operand = self._read(node.operand)
+            operand = self._once(node.operand)
             return lambda values: -operand(values)
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
             need(isinstance(node.right, ast.Constant), "an exponent is not a number")
-            base, exponent = self._read(node.left), whole(node.right.value, 0, 64, "an exponent")
+            base, exponent = self._once(node.left), whole(node.right.value, 0, 64, "an exponent")
             return lambda values: power(base(values), exponent)
         if isinstance(node, ast.BinOp) and type(node.op) in OPERATIONS:
-            left, right, operation = self._read(node.left), self._read(node.right), OPERATIONS[type(node.op)]
+            left, right, operation = self._once(node.left), self._once(node.right), OPERATIONS[type(node.op)]
             return lambda values: operation(left(values), right(values))
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in FUNCTIONS:
             need(len(node.args) == 1 and not node.keywords, f"{node.func.id} takes one argument")
-            argument, function = self._read(node.args[0]), FUNCTIONS[node.func.id]
+            argument, function = self._once(node.args[0]), FUNCTIONS[node.func.id]
             return lambda values: function(argument(values))
         raise Failed(f"{ast.get_source_segment(self.text, node)!r} is not allowed in a formula")
 
@@ -200,19 +215,23 @@ class Equation:
     def truncation(self, sides, counts, ellipses, rates):
         """Bounds of |f - I1 I2 f| for each factor f; `sides`: (centre, half length) of both parameters."""
         parts = []
-        for name, n, r, w in zip(self.names, counts, ellipses, rates, strict=True):
-            growth = arb(0)
-            for arc in self.on_ellipse(sides, name, r):
-                growth = growth.max(self.growth(arc, w))
-            part = 4 * growth * r ** (1 - n) / (r - 1)
-            parts.append((part, part * w, part / w, part) if self.even else (2 * part, 2 * part))
+        for name, n, r, least in zip(self.names, counts, ellipses, rates, strict=True):
+            grown = zip(*(growth(arc, least) for arc in self.on_ellipse(sides, name, r)), strict=True)
+            y1, dy1, y2, dy2 = (4 * reduce(arb.max, sizes) * r ** (1 - n) / (r - 1) for sizes in grown)
+            parts.append((y1, dy1, y2, dy2) if self.even else (y1 + dy2, y1 + dy2))
         norm = 1 + 2 / arb.pi() * arb(counts[0]).log()
         return [(first + norm * second).upper() for first, second in zip(*parts, strict=True)]
 
-    @staticmethod
-    def growth(arc, w):
-        """exp(int_0^S |w^2 - conj z| / (2 w) du), from [(length of a part of [0, S], z there)]."""
-        return sum((length * (w * w - z.conjugate()).abs_upper() / (2 * w) for length, z in arc), arb(0)).exp()
+    def cover(self, sides, name, r):
+        """Parameters that cover the upper half of E_r of one of them: (arcs of its border, boxes of its inside)."""
+        real = {name: centre + half * arb(0, 1) for name, (centre, half) in zip(self.names, sides, strict=True)}
+        centre, half = sides[self.names.index(name)]
+        across, up = half * (r + 1 / r) / 2, half * (r - 1 / r) / 2
+        turns = [acb(0, arb.pi() * share(number, ARCS)).exp() for number in range(ARCS)]
+        parts = [share(k, COVER) for k in range(COVER)]
+        arcs = [acb(centre + across * turn.real, up * turn.imag) for turn in turns]
+        boxes = [acb(centre + across * (2 * x - 1), up * y) for x, y in product(parts, parts)]
+        return [[{**real, name: place} for place in places] for places in (arcs, boxes)]
 
     def on_ellipse(self, sides, name, r):
         """For arcs that cover the upper half of E_r of one parameter: [(length of a part of [0, S], z there)].
@@ -220,30 +239,33 @@ class Equation:
         The lower half is its mirror image, since z is real for real parameters. Raises Failed unless z is analytic in
         E_r, that is finite on boxes that cover its upper half.
         """
-        real = {name: centre + half * arb(0, 1) for name, (centre, half) in zip(self.names, sides, strict=True)}
-        centre, half = sides[self.names.index(name)]
-        across, up = half * (r + 1 / r) / 2, half * (r - 1 / r) / 2
-        turns = [acb(0, arb.pi() * share(number, ARCS)).exp() for number in range(ARCS)]
-        arcs = [acb(centre + across * turn.real, up * turn.imag) for turn in turns]
-        parts = [share(k, COVER) for k in range(COVER)]
-        inside = [acb(centre + across * (2 * x - 1), up * y) for x, y in product(parts, parts)]
+        arcs, boxes = self.cover(sides, name, r)
         found = [[] for _ in arcs]
         for start, end, _, z in self.pieces:
-            waiting = [(Fraction(k, BOXES), Fraction(k + 1, BOXES)) for k in range(BOXES)]
+            waiting = [(Fraction(k, BOXES), Fraction(k + 1, BOXES)) for k in reversed(range(BOXES))]
             while waiting:
                 low, high = waiting.pop()
-                need(high - low > SHORTEST, f"z is singular for a complex {name} inside an ellipse")
+                need(high - low > SMALLEST, f"z is singular, or changes too fast, for complex {name} in an ellipse")
+                length = (end - start) * exact(high - low)
                 u = start + (end - start) * exact(low).union(exact(high))
-                values = []
-                for place in (*arcs, *inside):
-                    values.append(acb(z(u=u, **{**real, name: place})))
-                    if not values[-1].is_finite():
-                        waiting += [((low + high) / 2, high), (low, (low + high) / 2)]
-                        break
+                values = [acb(z(u=u, **place)) for place in arcs]
+                sharp = all(length * x.rad() < WIDE * (1 + x.abs_upper().sqrt()) for x in values)
+                if sharp and all(acb(z(u=u, **place)).is_finite() for place in boxes):
+                    for arc, value in zip(found, values, strict=True):
+                        arc.append((length, value))
                 else:
-                    for arc, value in zip(found, values, strict=False):
-                        arc.append(((end - start) * exact(high - low), value))
+                    waiting += [((low + high) / 2, high), (low, (low + high) / 2)]
         return found
+
+
+def growth(arc, least):
+    """Bounds of |y1|, |y1'|, |y2|, |y2'| at S, from [(length of a part of [0, S], z there)]; w is at least `least`."""
+    rates = [least.max(z.mid().abs_upper().sqrt().mid()) for _, z in arc]
+    parts = zip(arc, rates, strict=True)
+    exponent = sum((part * (w * w - z.conjugate()).abs_upper() / (2 * w) for (part, z), w in parts), arb(0))
+    grown = exponent.exp() * prod((v / w).max(w / v).sqrt() for v, w in pairwise(rates))
+    first, last = rates[0].sqrt(), rates[-1].sqrt()
+    return grown * first / last, grown * first * last, grown / (first * last), grown * last / first
 
 
 def step(z_n, h, order, y, dy, y_missed, dy_missed):
