@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """survey-check OUT.cert: proves the stability map that a certificate states, or says what fails.
 
-This file needs Python and python-flint (ball arithmetic, https://flintlib.org) and nothing else: it can be copied, read
-in an hour, and run alone, `python checker.py OUT.cert`. It believes no number of the certificate. What is proved is
-printed by `Certificate.statement`; the lemmas below have their proofs in the documentation, on the page "Proved maps".
+This file needs Python and python-flint (ball arithmetic, https://flintlib.org) alone: it can be copied, read in
+an hour, and run, `python checker.py OUT.cert`. It believes no number of the certificate. What is proved is printed by
+`Certificate.statement`; the lemmas below have their proofs in the documentation, on the page "Proved maps".
 
 HILL'S EQUATION y'' + z(u, p) y = 0, with two real parameters p = (p1, p2) in a rectangle. A certificate gives z by
 formulas on consecutive pieces of [0, S], and a kind:
@@ -19,8 +19,8 @@ y1, y2 are the solutions with y1 = 1, y1' = 0 and y2 = 0, y2' = 1 at u = 0, and 
    on the disc, and by Cauchy the Taylor coefficients of y satisfy |a_n| <= M R^-n, M = e^(wR) max(|y|, |y'|/w) at u0.
    At u0 + h the sums up to degree N are off by at most M x^(N+1) / (1 - x), for y' by (M/R) (N+1) x^N / (1 - x)^2.
 3. GROWTH (`growth`). For complex z and a constant w > 0, the Euclidean norm of (sqrt(w) y, y'/sqrt(w)) grows at most
-   at the rate |w^2 - conj z| / (2 w), the logarithmic norm of [[0, w], [-z/w, 0]]. Where w changes from v to w, the
-   norm grows at most by max(v/w, w/v)^(1/2). So with w constant on parts of [0, S] it grows at most by the product G.
+   at the rate |w^2 - conj z| / (2 w), the logarithmic norm of [[0, w], [-z/w, 0]]. Where w is changed from v to w it
+   grows at most by max(v/w, w/v)^(1/2). So with constants w on parts of [0, S] it grows at most by the product of all.
 4. PARAMETERS (`Equation.truncation`). A panel is a rectangle of parameters, mapped to [-1, 1]^2. If a factor f is
    analytic, |f| <= M, for p1 in the Bernstein ellipse E_r (semi-axes (r +- 1/r)/2) and real p2, its interpolant I1 f
    at the n Chebyshev points of the first kind satisfies |f - I1 f| <= 4 M r^(1-n) / (r - 1): its coefficients are at
@@ -41,8 +41,9 @@ from contextlib import nullcontext
 from fractions import Fraction
 from functools import lru_cache, partial, reduce
 from itertools import pairwise, product
-from math import comb, prod
+from math import ceil, comb, floor, prod
 from multiprocessing import get_context
+from operator import add, mul, sub, truediv
 
 from flint import acb, arb, arb_mat, arb_series, ctx
 
@@ -54,7 +55,7 @@ RATIO, FAR = arb(1) / 4, 8  # h / R of a step; a step is halved unless w R < FAR
 SHORTEST, SMALLEST = Fraction(1, 2**20), Fraction(1, 2**11)  # step, and part that bounds growth, as parts of a piece
 ARCS, BOXES, COVER = 24, 32, 4  # parts of half an ellipse, of a piece of [0, S] (at least), of a box's side
 WIDE = arb(1) / 8  # a part of [0, S] is halved while the ball of z times its length exceeds this, relative to sqrt |z|
-DEEPEST, LARGEST = 24, 2**23  # halvings of a panel; characters of a certificate
+LARGEST = 2**23  # characters of a certificate
 MALFORMED = (KeyError, TypeError, ValueError, IndexError, AttributeError, RecursionError, ArithmeticError)
 
 
@@ -83,9 +84,9 @@ def whole(value, least, most, what):
     return value
 
 
-def share(number, of):
-    """The ball of [number, number + 1] / of."""
-    return (arb(number) / of).union(arb(number + 1) / of)
+def parts(n):
+    """The balls of [0, 1/n], [1/n, 2/n], ..., [1 - 1/n, 1]."""
+    return [(arb(k) / n).union(arb(k + 1) / n) for k in range(n)]
 
 
 def power(x, n):
@@ -94,77 +95,63 @@ def power(x, n):
     return found if n < 2 else found * power(x * x, n // 2)
 
 
-def of_exponentials(sign):
-    """(e^x + sign e^-x) / 2."""
-    return lambda x: (x.exp() + sign * (-x).exp()) / 2
-
-
 def with_branch_cut(name):
     """A function which is not a number for complex balls that meet its branch cut, where it is not analytic."""
     return lambda x: getattr(x, name)(analytic=True) if isinstance(x, acb) else getattr(x, name)()
 
 
 FUNCTIONS = {
-    "sin": lambda x: x.sin(), "cos": lambda x: x.cos(), "tan": lambda x: x.sin() / x.cos(), "exp": lambda x: x.exp(),
-    "cosh": of_exponentials(1), "sinh": of_exponentials(-1), "tanh": lambda x: 1 - 2 / ((2 * x).exp() + 1),
+    "sin": lambda x: x.sin(), "cos": lambda x: x.cos(), "exp": lambda x: x.exp(),
     "log": with_branch_cut("log"), "sqrt": with_branch_cut("sqrt"),
 }  # fmt: skip
-OPERATIONS = {
-    ast.Add: lambda x, y: x + y, ast.Sub: lambda x, y: x - y, ast.Mult: lambda x, y: x * y, ast.Div: lambda x, y: x / y,
-}  # fmt: skip
+OPERATIONS = {ast.Add: add, ast.Sub: sub, ast.Mult: mul, ast.Div: truediv}
 
 
 class Formula:
-    """An expression in `names` and pi: + - * /, ** with whole exponents, exact decimals, FUNCTIONS; nothing else.
-
-    What stands in it more than once is evaluated once.
-    """
+    """An expression in `names` and pi: + - * /, ** with whole exponents, exact decimals, FUNCTIONS; nothing else."""
 
     def __init__(self, text, names):
         need(isinstance(text, str) and len(text) < 20_000, "a formula is not a text, or too long")
-        self.text, self.names = text, {*names, "pi"}
+        self.text, self.names, self.parts = text, {*names, "pi"}, {}  # what stands in it twice is evaluated once
         try:
-            self.value = self._once(ast.parse(text, mode="eval").body)
+            self.whole = self._read(ast.parse(text, mode="eval").body)
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             raise Failed(f"this is not a formula: {text[:80]!r}") from None
 
     def __call__(self, **values):
         """Its value for balls, complex balls, or power series of balls."""
-        return self.value({"pi": arb.pi(), **values})
-
-    def _once(self, node):
-        """The node as a function of {text: value}, which keeps its value there."""
-        text, found = ast.unparse(node), self._read(node)
-
-        def value(values):
-            if text not in values:
-                values[text] = found(values)
-            return values[text]
-
-        return value
+        values["pi"] = arb.pi()
+        for text, part in self.parts.items():
+            values[text] = part(values)
+        return values[self.whole]
 
     def _read(self, node):
+        """The text of a node, whose value `parts` computes from those before it."""
+        text = ast.get_source_segment(self.text, node)
+        if not (isinstance(node, ast.Name) and node.id in self.names) and text not in self.parts:
+            self.parts[text] = self._part(node, text)
+        return text
+
+    def _part(self, node, text):
         """The node as a function of {text: value}."""
         if isinstance(node, ast.Constant) and type(node.value) in (int, float):
-            number = Fraction(ast.get_source_segment(self.text, node))
+            number = Fraction(text)
             return lambda values: exact(number)
-        if isinstance(node, ast.Name) and node.id in self.names:
-            return lambda values: values[node.id]
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
-            operand = self._once(node.operand)
-            return lambda values: -operand(values)
+            operand = self._read(node.operand)
+            return lambda values: -values[operand]
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
             need(isinstance(node.right, ast.Constant), "an exponent is not a number")
-            base, exponent = self._once(node.left), whole(node.right.value, 0, 64, "an exponent")
-            return lambda values: power(base(values), exponent)
+            base, exponent = self._read(node.left), whole(node.right.value, 0, 64, "an exponent")
+            return lambda values: power(values[base], exponent)
         if isinstance(node, ast.BinOp) and type(node.op) in OPERATIONS:
-            left, right, operation = self._once(node.left), self._once(node.right), OPERATIONS[type(node.op)]
-            return lambda values: operation(left(values), right(values))
+            left, right, operation = self._read(node.left), self._read(node.right), OPERATIONS[type(node.op)]
+            return lambda values: operation(values[left], values[right])
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in FUNCTIONS:
             need(len(node.args) == 1 and not node.keywords, f"{node.func.id} takes one argument")
-            argument, function = self._once(node.args[0]), FUNCTIONS[node.func.id]
-            return lambda values: function(argument(values))
-        raise Failed(f"{ast.get_source_segment(self.text, node)!r} is not allowed in a formula")
+            argument, function = self._read(node.args[0]), FUNCTIONS[node.func.id]
+            return lambda values: function(values[argument])
+        raise Failed(f"{text!r} is not allowed in a formula")
 
 
 class Equation:
@@ -182,22 +169,30 @@ class Equation:
 
     def steps(self, box, order):
         """[(u0, h, z, bounds of what is left out of (y1, y1') and of (y2, y2'))]; `box` covers the parameters."""
+
+        def tried(u0, h, z):
+            radius = h / RATIO
+            size = acb(z(u=acb(u0 + radius * arb(0, 1), radius * arb(0, 1)), **box)).abs_upper()
+            w = size.sqrt().upper() + exact(SHORTEST)
+            y = (w * radius).exp() * RATIO ** (order + 1) / (1 - RATIO)
+            dy = (w * radius).exp() / radius * (order + 1) * RATIO**order / (1 - RATIO) ** 2
+            return (u0, h, z, ((y, dy), (y / w, dy / w))) if w * radius < FAR else None  # or z is not finite there
+
+        return self.bisected(1, SHORTEST, tried, "z is too large, or singular too near to the real axis")
+
+    def bisected(self, count, shortest, tried, why):
+        """What `tried(start, length, z)` finds on parts of the pieces of [0, S], which are halved where it is None."""
         found = []
         for start, end, _, z in self.pieces:
-            waiting = [(Fraction(0), Fraction(1))]
+            waiting = [(Fraction(k, count), Fraction(1, count)) for k in reversed(range(count))]
             while waiting:
-                low, high = waiting.pop()
-                need(high - low > SHORTEST, "z is too large, or singular too near to the real axis")
-                u0, h = start + (end - start) * exact(low), (end - start) * exact(high - low)
-                radius = h / RATIO
-                size = acb(z(u=acb(u0 + radius * arb(0, 1), radius * arb(0, 1)), **box)).abs_upper()
-                w = size.sqrt().upper() + exact(SHORTEST)
-                if not w * radius < FAR:  # or z is not finite on the disc
-                    waiting += [((low + high) / 2, high), (low, (low + high) / 2)]
-                    continue
-                y = (w * radius).exp() * RATIO ** (order + 1) / (1 - RATIO)
-                dy = (w * radius).exp() / radius * (order + 1) * RATIO**order / (1 - RATIO) ** 2
-                found.append((u0, h, z, ((y, dy), (y / w, dy / w))))
+                low, length = waiting.pop()
+                need(length > shortest, why)
+                value = tried(start + (end - start) * exact(low), (end - start) * exact(length), z)
+                if value is None:
+                    waiting += [(low + length / 2, length / 2), (low, length / 2)]
+                else:
+                    found.append(value)
         return found
 
     def factors(self, steps, order, point):
@@ -227,10 +222,8 @@ class Equation:
         real = {name: centre + half * arb(0, 1) for name, (centre, half) in zip(self.names, sides, strict=True)}
         centre, half = sides[self.names.index(name)]
         across, up = half * (r + 1 / r) / 2, half * (r - 1 / r) / 2
-        turns = [acb(0, arb.pi() * share(number, ARCS)).exp() for number in range(ARCS)]
-        parts = [share(k, COVER) for k in range(COVER)]
-        arcs = [acb(centre + across * turn.real, up * turn.imag) for turn in turns]
-        boxes = [acb(centre + across * (2 * x - 1), up * y) for x, y in product(parts, parts)]
+        arcs = [acb(centre + across * x.cos_pi(), up * x.sin_pi()) for x in parts(ARCS)]
+        boxes = [acb(centre + across * (2 * x - 1), up * y) for x, y in product(parts(COVER), repeat=2)]
         return [[{**real, name: place} for place in places] for places in (arcs, boxes)]
 
     def on_ellipse(self, sides, name, r):
@@ -240,31 +233,24 @@ class Equation:
         E_r, that is finite on boxes that cover its upper half.
         """
         arcs, boxes = self.cover(sides, name, r)
-        found = [[] for _ in arcs]
-        for start, end, _, z in self.pieces:
-            waiting = [(Fraction(k, BOXES), Fraction(k + 1, BOXES)) for k in reversed(range(BOXES))]
-            while waiting:
-                low, high = waiting.pop()
-                need(high - low > SMALLEST, f"z is singular, or changes too fast, for complex {name} in an ellipse")
-                length = (end - start) * exact(high - low)
-                u = start + (end - start) * exact(low).union(exact(high))
-                values = [acb(z(u=u, **place)) for place in arcs]
-                sharp = all(length * x.rad() < WIDE * (1 + x.abs_upper().sqrt()) for x in values)
-                if sharp and all(acb(z(u=u, **place)).is_finite() for place in boxes):
-                    for arc, value in zip(found, values, strict=True):
-                        arc.append((length, value))
-                else:
-                    waiting += [((low + high) / 2, high), (low, (low + high) / 2)]
-        return found
+
+        def tried(start, length, z):
+            u = start.union(start + length)
+            values = [acb(z(u=u, **place)) for place in arcs]
+            sharp = all(length * x.rad() < WIDE * (1 + x.abs_upper().sqrt()) for x in values)
+            if sharp and all(acb(z(u=u, **place)).is_finite() for place in boxes):
+                return [(length, value) for value in values]
+
+        why = f"z is singular, or changes too fast, for complex {name} in an ellipse"
+        return list(zip(*self.bisected(BOXES, SMALLEST, tried, why), strict=True))
 
 
 def growth(arc, least):
     """Bounds of |y1|, |y1'|, |y2|, |y2'| at S, from [(length of a part of [0, S], z there)]; w is at least `least`."""
-    rates = [least.max(z.mid().abs_upper().sqrt().mid()) for _, z in arc]
-    parts = zip(arc, rates, strict=True)
-    exponent = sum((part * (w * w - z.conjugate()).abs_upper() / (2 * w) for (part, z), w in parts), arb(0))
-    grown = exponent.exp() * prod((v / w).max(w / v).sqrt() for v, w in pairwise(rates))
-    first, last = rates[0].sqrt(), rates[-1].sqrt()
+    steps = [(length, z, least.max(z.mid().abs_upper().sqrt().mid())) for length, z in arc]
+    exponent = sum((length * (w * w - z.conjugate()).abs_upper() / (2 * w) for length, z, w in steps), arb(0))
+    grown = exponent.exp() * prod((v / w).max(w / v).sqrt() for (*_, v), (*_, w) in pairwise(steps))
+    first, last = steps[0][2].sqrt(), steps[-1][2].sqrt()
     return grown * first / last, grown * first * last, grown / (first * last), grown * last / first
 
 
@@ -339,9 +325,8 @@ class Panel:
 def bernstein(nodes):
     """The values of Bernstein's polynomials of degree n - 1 on [-1, 1] at n nodes."""
     d = len(nodes) - 1
-    return arb_mat(
-        [[comb(d, j) * power((1 + x) / 2, j) * power((1 - x) / 2, d - j) for j in range(d + 1)] for x in nodes]
-    )
+    table = [[comb(d, j) * power((1 + x) / 2, j) * power((1 - x) / 2, d - j) for j in range(d + 1)] for x in nodes]
+    return arb_mat(table)
 
 
 def halving(n):
@@ -363,7 +348,6 @@ def shares_of(cells):
     for letter in cells:
         need(waiting, "there are more cells than cover the panel")
         depth = waiting.pop()
-        need(depth <= DEEPEST, "a cell is too small")
         if letter == SPLIT:
             waiting += [depth + 1] * 4
         else:
@@ -392,8 +376,7 @@ class Certificate:
         need(good and len(names) == len(set(names)) == 2, "there must be two parameters with names of their own")
         self.equation = Equation(data["equation"]["kind"], data["equation"]["pieces"], names)
         self.sides = [tuple(rational(end) for end in side) for side in data["rectangle"]]
-        (a, b), (c, d) = self.sides
-        need(a < b and c < d, "the rectangle must have sides of positive length")
+        need(all(low < high for low, high in self.sides), "the rectangle must have sides of positive length")
         self.panels = data["panels"]["list"]
         across = [whole(n, 1, 4096, "a number of panels") for n in data["panels"]["across"]]
         self.places = places(across, data["panels"]["layout"])
@@ -406,8 +389,7 @@ class Certificate:
 
     def statement(self, shares):
         """The theorem in words; `shares`: {verdict: its share of the rectangle}."""
-        (a, b), (c, d) = self.sides
-        first, second = self.names
+        ((a, b), (c, d)), (first, second) = self.sides, self.names
         start, lines = "0", ["Consider y'' + z(u) y = 0, where"]
         for _, _, end, z in self.equation.pieces:
             lines.append(f"    z(u) = {z.text}    for {start} <= u <= {end},")
@@ -432,8 +414,8 @@ class Certificate:
 def places(across, layout):
     """The panels as parts of both sides, the second varying first; of a layout such as "..+....", "+" is quartered."""
     need(len(across) == 2 and across[0] * across[1] <= 2**16, "too many panels, or not across two sides")
-    parts = [[(Fraction(k, n), Fraction(k + 1, n)) for k in range(n)] for n in across]
-    found, waiting = [], list(product(*parts))[::-1]
+    found, sides = [], ([(Fraction(k, n), Fraction(k + 1, n)) for k in range(n)] for n in across)
+    waiting = list(product(*sides))[::-1]
     for letter in layout:
         need(waiting, "the layout has more panels than cover the rectangle")
         place = waiting.pop()
@@ -464,14 +446,13 @@ def weighed(places, found):
 
 def digest(data):
     """The SHA-256 of all but itself."""
-    body = json.dumps({key: value for key, value in data.items() if key != "sha256"}, sort_keys=True)
-    return hashlib.sha256(body.encode()).hexdigest()
+    data = {key: value for key, value in data.items() if key != "sha256"}
+    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
 
 
 def decimal(number, digits, up):
     """A rational number with so many decimals, rounded up or down."""
-    scaled = number * 10**digits
-    scaled = -(-scaled.numerator // scaled.denominator) if up else scaled.numerator // scaled.denominator
+    scaled = (ceil if up else floor)(number * 10**digits)
     return f"{scaled // 10**digits}.{scaled % 10**digits:0{digits}d}"
 
 
@@ -482,10 +463,8 @@ def proved(text, number):
     """The shares of the verdicts of one panel, or why they are not proved; perhaps in a process of its own."""
     try:
         return once_read(text).panel(number).check()
-    except Failed as failed:
-        return f"panel {number + 1}: {failed}"
-    except MALFORMED as error:
-        return f"panel {number + 1} is malformed ({type(error).__name__}: {error})"
+    except (Failed, *MALFORMED) as error:
+        return f"panel {number + 1}: {str(error) or type(error).__name__}"
 
 
 def check(text, processes=1):
@@ -506,7 +485,6 @@ def main(arguments=None):
     parser.add_argument("certificate", metavar="OUT.cert")
     parser.add_argument("-j", "--processes", type=int, default=1, metavar="N", help="processes; 1 by default")
     given = parser.parse_args(arguments)
-
     try:
         with open(given.certificate, encoding="utf-8") as file:
             statement = check(file.read(LARGEST), given.processes)
