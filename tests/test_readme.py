@@ -118,7 +118,7 @@ def test_every_command_in_the_table_runs(folder):
         for word, name in names.items():
             command = command.replace(word, name)
         if any(word in command for word in ("precision", "failures", "view", "merge")):
-            continue  # minutes, serves until it is stopped, needs two: see tests/precision, failures, viewer, analysis
+            continue  # takes minutes, serves until it is stopped, needs two: see their own tests
         done = run(f"{shlex.quote(str(BIN))}/{command}", folder)
         assert done.returncode == 0, (command, done.stderr)
 
