@@ -62,7 +62,6 @@ class Basins:
         out[finite, rc.NET_TURNS] += turned[finite]
         return out, known
 
-
     def told(self, state):
         """The fate of a state (PHI to W_BAR of `records`) if it is known far better than the curves; else None."""
         if not state[rc.PHI_BAR] + state[rc.W_BAR] < SHARP * min(1.0, self.p[BOUND_F] + math.sqrt(self.p[BOUND_DG])):
@@ -90,6 +89,11 @@ def asked(request, names):
     size = math.prod(line[0] for line in own if line) * max((line[0] for line in shared if line), default=1)
     last = own[1] or shared[1]
     return Map(size, max(abs(last[1]), abs(last[2]))) if last and size >= FEWEST else None
+
+
+def cost(starts, each, system):
+    """Seconds per start, of so many of one system: `each` where it is followed, `system` for the cycles."""
+    return (each if starts < FEWEST else 6e-6 + 0.1 / starts) + system / starts
 
 
 def followed(method, six, s, starts, rtol, whole=None):
