@@ -322,6 +322,24 @@ def plot(path, output, var, style, width, at):
 
 
 @program.command()
+@click.argument("path", metavar="OUT.nc")
+@click.option("-o", "--output", metavar="OUT.html", help="The page; by default beside the file.")
+@click.option("--at", metavar="NAME=VALUE", multiple=True, help="Show this plane of a map of more axes.")
+@click.option("--trust-scene", is_flag=True, help=TRUST)
+def share(path, output, at, trust_scene):
+    """Write the map as one HTML file that opens anywhere, offline: zoom without end, values with error bars."""
+    from survey import api
+    from survey.share import page
+
+    ds = api.open(path, trust_scene=trust_scene)
+    target = output or f"{path.removesuffix('.nc')}.html"
+    told = page.write(ds, target, dict(part.partition("=")[::2] for part in at))
+    how = "drawn from series, sharp at every scale" if told["series"] else f"of points: {told['why']}"
+    err.print(plain(f"{target}: {told['bytes']:,} bytes, {how}"), markup=False)
+    out.print(plain(target), markup=False)
+
+
+@program.command()
 @click.argument("paths", metavar="A.nc B.nc...", nargs=-1, required=True)
 @click.option("-o", "--output", metavar="C.nc", required=True, help="The netCDF file to write; it must not exist.")
 def merge(paths, output):

@@ -17,7 +17,7 @@ from survey.sweep import edges_and_cells, solve
 def sweep(ds, ranges, num=None, output=None):
     """The dataset of the finer map, in memory; or written by `survey.run` where there is an `output`."""
     ranges = _ranges(ds, ranges)
-    data = _workflow(ds, ranges, num)
+    data = workflow_of(ds, ranges, num)
     checked = workflow.check(data, output=output, default_path="zoom.nc")
     _warn(ds, ranges)
     if output is not None:
@@ -53,10 +53,11 @@ def _warn(ds, ranges):
         warnings.warn(f"zoom: {'; '.join(beyond)}; it is solved there too", stacklevel=4)
 
 
-def _workflow(ds, ranges, num):
-    """The workflow with new axes, as a mapping: from the one in the file and the attributes."""
-    data = _further(ds)
-    data |= {"title": f"{ds.attrs.get('title', '')}, a part".lstrip(", "), "scene": user_scene.of_dataset(ds)}
+def workflow_of(ds, ranges=None, num=None):
+    """The workflow, with new axes where there are `ranges`, as a mapping: from the one in the file and the attributes."""
+    ranges, data = ranges or {}, _further(ds)
+    title = f"{ds.attrs.get('title', '')}, a part".lstrip(", ") if ranges else str(ds.attrs.get("title", ""))
+    data |= {"title": title, "scene": user_scene.of_dataset(ds)}
     scene = user_scene.find(data["scene"])[1]
     data |= {"options": options_at(ds, scene), "axes": _axes(ds, ranges, num)}
     solver = {"method": ds.attrs.get("method"), "rtol": ds.attrs.get("rtol")}
