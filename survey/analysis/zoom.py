@@ -54,7 +54,7 @@ def _warn(ds, ranges):
 
 
 def workflow_of(ds, ranges=None, num=None):
-    """The workflow, with new axes where there are `ranges`, as a mapping: from the one in the file and the attributes."""
+    """The workflow as a mapping, with new axes where `ranges` are given: from the file's own and its attributes."""
     ranges, data = ranges or {}, _further(ds)
     title = f"{ds.attrs.get('title', '')}, a part".lstrip(", ") if ranges else str(ds.attrs.get("title", ""))
     data |= {"title": title, "scene": user_scene.of_dataset(ds)}

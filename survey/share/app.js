@@ -4,6 +4,8 @@ const $ = id => document.getElementById(id)
 const TEXT = JSON.parse($("data").textContent)
 const MARGIN = {left: 92, right: 30, top: 10, bottom: 62}, BLOCKS = 256, COARSE = 5, REST = 120, EDGED = ["verdict", "discriminant", "exponent"]
 const state = {view: null, show: TEXT.shown[0].name, pointer: null, lines: true}
+// A picture of another view serves a moving one while it is not larger than this.
+const MAGNIFIED = 3
 let model = null, workers = [], queue = [], generation = 0, coarse = null, front = null, frame = 0, resting = 0
 
 // ---- data
@@ -33,16 +35,18 @@ async function loadedModel() {
 // ---- the view: the ends of both axes, in the parameters, or in their logarithms
 
 const home = () => ({x: [...TEXT.axes[0].ends], y: [...TEXT.axes[1].ends]})
-const canvas = $("map"), overlay = $("overlay"), plot = {}
+const canvas = $("map"), plot = {}
+let context = null
 
 function resize() {
-  const ratio = window.devicePixelRatio || 1, box = $("figure").getBoundingClientRect()
-  Object.assign(plot, {ratio, left: MARGIN.left, top: MARGIN.top, width: Math.max(50, Math.floor(box.width - MARGIN.left - MARGIN.right)),
-    height: Math.max(50, Math.floor(box.height - MARGIN.top - MARGIN.bottom))})
-  canvas.width = Math.round(plot.width * ratio); canvas.height = Math.round(plot.height * ratio)
-  Object.assign(canvas.style, {left: plot.left + "px", top: plot.top + "px", width: plot.width + "px", height: plot.height + "px"})
-  overlay.width = Math.round(box.width * ratio); overlay.height = Math.round(box.height * ratio)
-  Object.assign(overlay.style, {width: box.width + "px", height: box.height + "px"})
+  // One opaque canvas for all: a second one above it would cost as much again in every frame. `box`: the plot in pixels.
+  const ratio = window.devicePixelRatio || 1, {width, height} = $("figure").getBoundingClientRect()
+  canvas.width = Math.max(150, Math.round(width * ratio)); canvas.height = Math.max(120, Math.round(height * ratio))
+  Object.assign(canvas.style, {width: canvas.width / ratio + "px", height: canvas.height / ratio + "px"})
+  context = canvas.getContext("2d", {alpha: false})
+  const left = Math.round(MARGIN.left * ratio), top = Math.round(MARGIN.top * ratio)
+  const box = {left, top, width: canvas.width - left - Math.round(MARGIN.right * ratio), height: canvas.height - top - Math.round(MARGIN.bottom * ratio)}
+  Object.assign(plot, {ratio, box, left: left / ratio, top: top / ratio, width: box.width / ratio, height: box.height / ratio})
   front = coarse = null
   changed()
 }
@@ -80,55 +84,65 @@ function changed() {
   if (!model || !state.view) return
   generation++
   queue = []
-  coarsely()
+  if (!enough()) coarsely()
   clearTimeout(resting)
   resting = setTimeout(sharply, REST)
   frame ||= requestAnimationFrame(redraw)
 }
 
+function placed(own) {
+  // Where a picture of another view lies in this one, in pixels of the canvas.
+  const {ratio, box} = plot, [left, top] = toPlot([own.view.x[0], own.view.y[1]]), [right, bottom] = toPlot([own.view.x[1], own.view.y[0]])
+  return [box.left + left * ratio, box.top + top * ratio, (right - left) * ratio, (bottom - top) * ratio]
+}
+
+function covers([left, top, width, height]) {
+  const {box} = plot
+  return left <= box.left + 0.5 && top <= box.top + 0.5 && left + width >= box.left + box.width - 0.5 && top + height >= box.top + box.height - 0.5
+}
+
+const magnified = own => placed(own)[2] / plot.box.width
+const enough = () => Boolean(front && covers(placed(front)) && magnified(front) < MAGNIFIED)
+
 function jobFor(left, top, width, height, step) {
-  // Pixels of the canvas from (left, top) on, `step` apart.
+  // Pixels of the plot from (left, top) on, `step` apart.
   const shown = TEXT.shown.find(own => own.name === state.show), {x, y} = state.view
-  const dx = (x[1] - x[0]) / canvas.width, dy = (y[1] - y[0]) / canvas.height
+  const dx = (x[1] - x[0]) / plot.box.width, dy = (y[1] - y[0]) / plot.box.height
   return {x: [x[0] + (left + step / 2) * dx, step * dx], y: [y[1] - (top + step / 2) * dy, -step * dy], width, height,
-    show: state.show, colours: shown.colours ?? {}, table: shown.table, range: shown.range, scale: shown.scale,
+    show: state.show, colours: shown.colours ?? {}, table: shown.table, range: shown.range,
     lines: state.lines && EDGED.includes(shown.name) && !TEXT.curves.length, thick: 1.3 * plot.ratio, phase: [left, top]}
 }
 
 function coarsely() {
-  const width = Math.ceil(canvas.width / COARSE), height = Math.ceil(canvas.height / COARSE), own = generation
   if (coarse?.waiting) return  // one at a time: it is asked again when it comes
-  const view = state.view, job = {...jobFor(0, 0, width, height, COARSE), lines: false}
-  const next = coarse = {...(coarse ?? {}), waiting: true}
-  ask(job, pixels => {
-    coarse = {view, picture: picture(pixels, width, height), waiting: false, scale: COARSE}
-    if (own !== generation) coarsely()
+  const width = Math.ceil(plot.box.width / COARSE), height = Math.ceil(plot.box.height / COARSE), own = generation
+  const {x, y} = state.view, dx = (x[1] - x[0]) / plot.box.width, dy = (y[1] - y[0]) / plot.box.height
+  const view = {x: [x[0], x[0] + width * COARSE * dx], y: [y[1] - height * COARSE * dy, y[1]]}
+  coarse = {...coarse, waiting: true}
+  ask({...jobFor(0, 0, width, height, COARSE), lines: false}, pixels => {
+    const picture = new OffscreenCanvas(width, height)
+    picture.getContext("2d").putImageData(new ImageData(pixels, width, height), 0, 0)
+    coarse = {view, picture, waiting: false}
+    if (own !== generation && !enough()) coarsely()
     frame ||= requestAnimationFrame(redraw)
-  }, () => { next.waiting = false })
-}
-
-function picture(pixels, width, height) {
-  const out = new OffscreenCanvas(width, height)
-  out.getContext("2d").putImageData(new ImageData(pixels, width, height), 0, 0)
-  return out
+  }, () => { coarse.waiting = false })
 }
 
 function sharply() {
-  const own = generation, blocks = [], copy = new OffscreenCanvas(canvas.width, canvas.height), context = copy.getContext("2d")
-  context.drawImage(canvas, 0, 0)
-  front = {view: state.view, picture: copy, scale: 1, left: 0}
-  for (let top = 0; top < canvas.height; top += BLOCKS) for (let left = 0; left < canvas.width; left += BLOCKS) {
-    blocks.push([left, top, Math.min(BLOCKS, canvas.width - left), Math.min(BLOCKS, canvas.height - top)])
+  const own = generation, blocks = [], {box} = plot, picture = new OffscreenCanvas(box.width, box.height), paper = picture.getContext("2d", {alpha: false})
+  paper.drawImage(canvas, box.left, box.top, box.width, box.height, 0, 0, box.width, box.height)
+  front = {view: state.view, picture, left: 0}
+  for (let top = 0; top < box.height; top += BLOCKS) for (let left = 0; left < box.width; left += BLOCKS) {
+    blocks.push([left, top, Math.min(BLOCKS, box.width - left), Math.min(BLOCKS, box.height - top)])
   }
-  const far = ([left, top]) => Math.hypot(left + BLOCKS / 2 - canvas.width / 2, top + BLOCKS / 2 - canvas.height / 2)
+  const far = ([left, top]) => Math.hypot(left + BLOCKS / 2 - box.width / 2, top + BLOCKS / 2 - box.height / 2)
   front.left = blocks.length
   for (const [left, top, width, height] of blocks.sort((a, b) => far(a) - far(b))) {
     ask(jobFor(left, top, width, height, 1), pixels => {
       if (own !== generation) return
-      const image = new ImageData(pixels, width, height)
-      context.putImageData(image, left, top)
-      canvas.getContext("2d").putImageData(image, left, top)
+      paper.putImageData(new ImageData(pixels, width, height), left, top)
       front.left--
+      frame ||= requestAnimationFrame(redraw)
     })
   }
 }
@@ -137,23 +151,25 @@ const idle = () => Boolean(front && front.left === 0 && !coarse?.waiting && !fra
 
 function redraw() {
   frame = 0
-  const context = canvas.getContext("2d", {alpha: false}), begun = performance.now()
+  const {box, ratio} = plot, begun = performance.now()
+  context.setTransform(1, 0, 0, 1, 0, 0)
   context.imageSmoothingEnabled = false  // measured: several times as fast, and sharp blocks follow
-  const placed = [coarse, front].filter(own => own?.picture).map(own => {
-    const [left, top] = toPlot([own.view.x[0], own.view.y[1]]), [right, bottom] = toPlot([own.view.x[1], own.view.y[0]])
-    return {own, box: [left, top, right - left, bottom - top].map(value => value * plot.ratio)}
-  })
-  const covers = ({box: [left, top, width, height]}) => left <= 0.5 && top <= 0.5 && left + width >= canvas.width - 0.5 && top + height >= canvas.height - 0.5
-  const [rough, sharp] = [placed.find(one => one.own === coarse), placed.find(one => one.own === front)]
-  const whole = sharp && covers(sharp)
+  const sharp = front && placed(front), rough = coarse?.picture && placed(coarse), whole = sharp && covers(sharp)
+  context.save()
+  context.beginPath(); context.rect(box.left, box.top, box.width, box.height); context.clip()
   if (!whole) {
     context.fillStyle = "#fff"
-    if (!rough || !covers(rough)) context.fillRect(0, 0, canvas.width, canvas.height)
-    if (rough) context.drawImage(rough.own.picture, ...rough.box)
+    if (!rough || !covers(rough)) context.fillRect(box.left, box.top, box.width, box.height)
+    if (rough) context.drawImage(coarse.picture, ...rough)
   }
-  if (sharp && (sharp.box[2] < COARSE * canvas.width || !rough)) context.drawImage(sharp.own.picture, ...sharp.box)
-  else if (rough && whole) context.drawImage(rough.own.picture, ...rough.box)
-  annotate(brush(overlay.getContext("2d")))
+  if (rough && whole && magnified(front) > COARSE && magnified(coarse) < magnified(front) / COARSE) context.drawImage(coarse.picture, ...rough)
+  else if (sharp) context.drawImage(front.picture, ...sharp)
+  context.restore()
+  context.fillStyle = "#fff"
+  const right = box.left + box.width, bottom = box.top + box.height
+  for (const edge of [[0, 0, canvas.width, box.top], [0, bottom, canvas.width, canvas.height - bottom], [0, 0, box.left, canvas.height], [right, 0, canvas.width - right, canvas.height]]) context.fillRect(...edge)
+  context.setTransform(ratio, 0, 0, ratio, 0, 0)
+  annotate(brush())
   tell()
   window.drawn = {milliseconds: performance.now() - begun, number: (window.drawn?.number ?? 0) + 1}
   keepLink()
@@ -207,10 +223,7 @@ function hire() {
 
 // ---- axes, on the screen and in SVG
 
-function brush(context) {
-  const {ratio} = plot
-  context.setTransform(ratio, 0, 0, ratio, 0, 0)
-  context.clearRect(0, 0, overlay.width / ratio, overlay.height / ratio)
+function brush() {
   return {
     line(points, colour, width, dash = []) {
       context.strokeStyle = colour; context.lineWidth = width; context.setLineDash(dash)
@@ -397,20 +410,23 @@ function save(name, blob) {
 }
 
 function savePng() {
-  const out = document.createElement("canvas"), context = out.getContext("2d"), {ratio} = plot
-  out.width = overlay.width; out.height = overlay.height
-  context.fillStyle = "#fff"; context.fillRect(0, 0, out.width, out.height)
-  context.drawImage(canvas, plot.left * ratio, plot.top * ratio)
-  context.drawImage(overlay, 0, 0)
-  out.toBlob(blob => save("png", blob))
+  canvas.toBlob(blob => save("png", blob))
+}
+
+function flat() {
+  // The map alone, without what is drawn over it.
+  const out = document.createElement("canvas"), {box} = plot
+  out.width = box.width; out.height = box.height
+  out.getContext("2d").drawImage((front ?? coarse).picture, ...placed(front ?? coarse).map((value, i) => value - [box.left, box.top, 0, 0][i]))
+  return out.toDataURL("image/png")
 }
 
 function svg() {
   const {left, top, width, height, ratio} = plot, parts = []
   annotate(svgBrush(parts))
-  return `<svg xmlns="http://www.w3.org/2000/svg" width="${overlay.width / ratio}" height="${overlay.height / ratio}" font-family="sans-serif" font-size="13">` +
+  return `<svg xmlns="http://www.w3.org/2000/svg" width="${canvas.width / ratio}" height="${canvas.height / ratio}" font-family="sans-serif" font-size="13">` +
     `<clipPath id="plot"><rect x="${left}" y="${top}" width="${width}" height="${height}"/></clipPath><rect width="100%" height="100%" fill="#fff"/>` +
-    `<image x="${left}" y="${top}" width="${width}" height="${height}" href="${canvas.toDataURL("image/png")}"/>${parts.join("")}</svg>`
+    `<image x="${left}" y="${top}" width="${width}" height="${height}" href="${flat()}"/>${parts.join("")}</svg>`
 }
 
 // ---- legend and controls
@@ -447,7 +463,7 @@ function controls() {
   $("copy").onclick = () => navigator.clipboard?.writeText(location.href)
   const figure = $("figure"), fingers = new Map(), place = event => {
     const box = canvas.getBoundingClientRect()
-    return [event.clientX - box.left, event.clientY - box.top]
+    return [event.clientX - box.left - plot.left, event.clientY - box.top - plot.top]
   }
   figure.addEventListener("wheel", event => { event.preventDefault(); zoom(Math.exp(-event.deltaY * (event.deltaMode ? 0.05 : 0.0015)), ...place(event)) }, {passive: false})
   figure.addEventListener("dblclick", event => zoom(event.shiftKey ? 0.25 : 4, ...place(event)))

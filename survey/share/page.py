@@ -134,8 +134,9 @@ def _of_model(ds, packed):
         given = _curves(ds, model.names)
     drawn = EDGES if rule == "hill" else OTHER_EDGES[rule]
     edges = [{"text": text, "colour": colour, "dash": dash} for text, colour, dash in drawn]
-    axes = [{**own, "log": False, "ends": [low, high]}
-            for own, low, high in zip(_common(ds, list(model.names))["axes"], model.low, model.high, strict=True)]  # fmt: skip
+    described = _common(ds, list(model.names))["axes"]
+    sides = zip(described, model.low, model.high, strict=True)
+    axes = [{**own, "log": False, "ends": [low, high]} for own, low, high in sides]
     return {"model": base64.b64encode(packed).decode(), "shown": shown, "edges": edges, "axes": axes,
             "hatched": "no answer"} | given  # fmt: skip
 
@@ -148,13 +149,15 @@ def _of_points(ds, axes):
     names = [name for name, v in ds.data_vars.items() if set(v.dims) == set(axes) and name != "status"]
     flags = [name for name in names if "flag_values" in ds[name].attrs]
     flags.sort(key=lambda name: name != "verdict")
-    floats = [name for name in names if ds[name].dtype.kind in "fi" and name not in flags and not name.endswith("_error")]
+    floats = [
+        name for name in names if ds[name].dtype.kind in "fi" and name not in flags and not name.endswith("_error")
+    ]
     state, shown, variables = ds.status.transpose(*axes), [], {}
     for name in flags + floats[:FLOATS]:
         variable = ds[name].transpose(*axes)
         text = plain(str(variable.attrs.get("long_name", name)))
         if name in flags:
-            _, table, colours = palette.kinds_of(ds, variable, state)
+            _, _, colours = palette.kinds_of(ds, variable, state)
             codes = flag_codes(variable.attrs)
             here = set(np.unique(variable.values).tolist())
             kinds = [other for other, code in codes.items() if code in here]
@@ -162,8 +165,9 @@ def _of_points(ds, axes):
                 "name": name, "text": text, "colours": {codes[other]: _rgb(colours[other]) for other in codes},
                 "kinds": [{"text": plain(spaced(other)), "colour": _rgb(colours[other])} for other in kinds],
             })  # fmt: skip
-            variables[name] = {"flags": {code: plain(other) for other, code in codes.items()},
-                               "values": _packed(variable.values, "i1" if variable.dtype.itemsize == 1 else "i4")}  # fmt: skip
+            kind = "i1" if variable.dtype.itemsize == 1 else "i4"
+            words = {code: plain(other) for other, code in codes.items()}
+            variables[name] = {"flags": words, "values": _packed(variable.values, kind)}
         else:
             answered = np.where(np.isin(state.values, list(status.UNANSWERED)), np.nan, variable.values.astype(float))
             shown.append({"name": name, "text": f"{name}: {text}"} | _scale(answered))
