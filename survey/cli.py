@@ -198,11 +198,13 @@ def model(workflow, output, overrides, proof):
 @click.option("-o", "--output", metavar="OUT.nc", help="The netCDF file, instead of the workflow's output.path.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def plan(workflow, overrides, output, as_json):
-    """Points, blocks, bytes, method and estimated time; no kernel is called."""
+    """Points, blocks, size, method and estimated time, by what this machine has needed so far; no kernel is called."""
     from survey.request.workflow import read
     from survey.sweep import plan
 
-    _show(plan.plan(read(workflow, overrides, output)), as_json)
+    planned = plan.plan(read(workflow, overrides, output))
+    numbers = () if as_json else ("bytes", "estimated_seconds")  # of which the size and the time are the words
+    _show({key: value for key, value in planned.items() if key not in numbers}, as_json)
 
 
 @program.command()
@@ -390,6 +392,18 @@ def precision(scene, peers, output):
     from survey.precision import write
 
     for path in write(scene, output, peers, say=lambda line: err.print(line, markup=False)):
+        out.print(str(path), markup=False)
+
+
+@program.command()
+@click.argument("scene", shell_complete=_scene_names)
+@click.option("--share", type=float, default=1.0, metavar="S", help="Of the points along each axis: below 1 coarser.")
+@click.option("-o", "--output", metavar="DIR", default=".", show_default=True, help="Folder for JSON, page and PNG.")
+def failures(scene, share, output):
+    """Where each method fails: its true error and its error bar over the planes on which it should break."""
+    from survey.failures import write
+
+    for path in write(scene, output, share, say=lambda line: err.print(plain(line), markup=False)):
         out.print(str(path), markup=False)
 
 
