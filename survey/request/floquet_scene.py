@@ -84,7 +84,9 @@ class FloquetScene(TracedScene):
         points = points.reshape(*shape, -1)
         wanted = set(request.variables) or {o.name for o in self.OUTPUTS}
         lines = {k: request.line(p.name) for k, p in enumerate(self.PARAMETERS) if request.line(p.name)}
-        given = (points, request.method, request.rtol, wanted, lines)
+        ranges = {k: request.ranges[p.name] for k, p in enumerate(self.PARAMETERS) if p.name in request.ranges}
+        free = {k for k, p in enumerate(self.PARAMETERS) if p.name not in request.fixed}
+        given = (points, request.method, request.rtol, wanted, lines, ranges if set(ranges) == free else {})
         return self._called(stability.solve, self._system, self.structure, *given)
 
     def why(self, answer):

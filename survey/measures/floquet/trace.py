@@ -541,9 +541,13 @@ class Program:
         return place == TIME or (operation == "combination" and all(b in (ONE, TIME) for b, _c in operands[0]))
 
     def _order(self):
-        """Places of the basis functions that the entries need, each after those that it is made of."""
+        """Places of the basis functions that the entries need, each after those that it is made of.
+
+        States need lower orders alone, and so do functions of their derivatives, which come last: a derivative may be
+        made of what is being visited, as that of y = sqrt x is of 1 / y.
+        """
         flow = self.graph.flow
-        found, begun = list(flow), set(flow)  # states need lower orders alone
+        found, begun, later = list(flow), set(flow), []
 
         def visit(place):
             if place in begun:
@@ -556,11 +560,13 @@ class Program:
                 if not (function and k == 1):
                     visit(b)
             found.append(place)
-            if function:  # its derivative is asked for at lower orders alone
-                visit(before[1])
+            if function:
+                later.append(before[1])
 
         for place in (*self.used, *(basis for symbol in flow.values() for basis in symbol.terms)):
             visit(int(place))
+        while later:
+            visit(later.pop())
         return np.array(found, dtype=np.int64)
 
     def numbers(self, points):
@@ -682,6 +688,19 @@ class Program:
                 if states is not None:
                     E[:, :, i, j] += len(self.terms) * ROUNDOFF_UP * abs(x * y)
         return A, E
+
+    def sampled(self, numbers, t):
+        """(terms, values, error bounds): the terms with their basis functions numbered from 0, and these functions
+        (B, N, m) at times t (N, m); where they depend on t alone t may be (1, m), and N is 1.
+        """
+        found = self.series(numbers, t, self.used)
+        wide = max((len(values) for values, _bars in found.values()), default=1)
+        out = np.empty((2, len(self.used), wide, t.shape[1]))
+        for k, place in enumerate(self.used):
+            out[0, k], out[1, k] = found[place]
+        terms = self.terms.copy()
+        terms[:, 0] = np.searchsorted(self.used, terms[:, 0])
+        return terms, *out
 
     def holds(self, points, low, high):
         """Do the guards decide for the points (N) as they did for the example? 1 yes, 0 no, -1: not within (low, high).
