@@ -1,6 +1,5 @@
 """Mistakes that a newcomer types, at the command line and in Python: one clear line each, which says what to do."""
 
-
 import numpy as np
 import pytest
 import xarray as xr

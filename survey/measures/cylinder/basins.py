@@ -62,7 +62,6 @@ class Basins:
         out[finite, rc.NET_TURNS] += turned[finite]
         return out, known
 
-
     def told(self, state):
         """The fate of a state (PHI to W_BAR of `records`) if it is known far better than the curves; else None."""
         if not state[rc.PHI_BAR] + state[rc.W_BAR] < SHARP * min(1.0, self.p[BOUND_F] + math.sqrt(self.p[BOUND_DG])):
