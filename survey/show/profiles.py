@@ -46,7 +46,9 @@ def draw_profile(axes, ds, variable, state, paper):
         if linear:
             axes.set_yscale("symlog", linthresh=linear)
         for i in poles:
-            axes.axvline(0.5 * float(x[i] + x[i + 1]), color="grey", lw=0.8, ls="--", label="pole" * (i == poles[0]))
+            axes.axvline(
+                0.5 * float(x[i] + x[i + 1]), color="grey", lw=0.8, ls="--", label="pole" if i == poles[0] else None
+            )
         for code, text in words.items():
             here = x.values[variable.values == code]
             if here.size:
