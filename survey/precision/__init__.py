@@ -39,7 +39,7 @@ from survey import modules, scenes
 from survey.errors import BadInput
 from survey.file.labels import provenance
 from survey.grid import lines
-from survey.measures.cylinder import fate
+from survey.measures.cylinder import basins, fate
 from survey.measures.floquet import dense as floquet
 from survey.measures.hill import dense
 from survey.precision import cases, flops
@@ -244,6 +244,7 @@ def _solver(module, method, error):
         dense.panels.cache_clear()  # every call includes its set-up
         floquet.panels.cache_clear()
         fate.forget()
+        basins.forget()
         return module.solve({key: v if v.ndim else v.reshape((1,) * ndim) for key, v in arrays.items()}, request)
 
     return solve
