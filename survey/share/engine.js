@@ -139,7 +139,7 @@ function edgesOf(rule, v) {
   return [Math.min(...out)]
 }
 
-const styleOf = (rule, f) => rule === "hill" ? FACTORS[f] : rule === "trace" ? [[0, 0], [1, 0]][f] : [f === 1, f === 2]
+const styleOf = (rule, f) => rule === "hill" ? FACTORS[f] : [f === 1, f === 2]
 
 // ---- a rectangle of pixels
 
@@ -256,10 +256,16 @@ function edgeAlphas(rule, values, wide, tall, thick) {
     for (let j = 1; j < tall - 1; j++) for (let i = 1; i < wide - 1; i++) {
       const at = j * wide + i, slope = 0.5 * Math.hypot(own[at + 1] - own[at - 1], own[at + wide] - own[at - wide])
       const distance = Math.abs(own[at]) / slope
-      if (distance < 0.5 * thick + 0.5) out[at] = Math.min(1, 0.5 * thick + 0.5 - distance)
+      if (distance < 0.5 * thick + 0.5 && (rule === "hill" || changes(own, at, i, j, wide, tall))) out[at] = Math.min(1, 0.5 * thick + 0.5 - distance)
     }
     return out
   })
+}
+
+function changes(own, at, i, j, wide, tall) {
+  // Does it change its sign nearby? Where it only touches 0 nothing is lost.
+  const reach = 3, a = at - Math.min(i, reach), b = at + Math.min(wide - 1 - i, reach), c = at - wide * Math.min(j, reach), d = at + wide * Math.min(tall - 1 - j, reach)
+  return own[a] < 0 !== own[b] < 0 || own[c] < 0 !== own[d] < 0
 }
 
 function coloured(value, {table, range, scale}) {
