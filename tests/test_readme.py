@@ -84,7 +84,7 @@ def test_the_scene_of_ones_own_runs(tmp_path, monkeypatch):
 def test_the_abel_equations_of_ones_own_run(capsys):
     scope = {}
     exec(fenced("python")[3], scope)
-    assert capsys.readouterr().out == "[0 1]\n" and (scope["ds"].status == 0).all()
+    assert capsys.readouterr().out == "[0. 1.]\n" and (scope["ds"].status == 0).all()
 
 
 def test_the_example_of_the_josephson_junction_runs(tmp_path):

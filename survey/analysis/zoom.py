@@ -17,7 +17,7 @@ from survey.sweep import edges_and_cells, solve
 def sweep(ds, ranges, num=None, output=None):
     """The dataset of the finer map, in memory; or written by `survey.run` where there is an `output`."""
     ranges = _ranges(ds, ranges)
-    data = workflow_of(ds, ranges, num)
+    data = _workflow(ds, ranges, num)
     checked = workflow.check(data, output=output, default_path="zoom.nc")
     _warn(ds, ranges)
     if output is not None:
@@ -53,23 +53,27 @@ def _warn(ds, ranges):
         warnings.warn(f"zoom: {'; '.join(beyond)}; it is solved there too", stacklevel=4)
 
 
-def workflow_of(ds, ranges=None, num=None):
-    """The workflow as a mapping, with new axes where `ranges` are given: from the file's own and its attributes."""
-    ranges, data = ranges or {}, _further(ds)
-    title = f"{ds.attrs.get('title', '')}, a part".lstrip(", ") if ranges else str(ds.attrs.get("title", ""))
-    data |= {"title": title, "scene": user_scene.of_dataset(ds)}
-    scene = user_scene.find(data["scene"])[1]
-    data |= {"options": options_at(ds, scene), "axes": _axes(ds, ranges, num)}
-    solver = {"method": ds.attrs.get("method"), "rtol": ds.attrs.get("rtol")}
-    data["solver"] = {key: str(v) if key == "method" else float(v) for key, v in solver.items() if v is not None}
-    known = {o.name for o in scene.OUTPUTS}
-    data["output"] = {"variables": [name for name in ds.data_vars if name in known]}
+def _workflow(ds, ranges, num):
+    """The workflow with new axes, as a mapping: from the one in the file and the attributes."""
+    data = _further(ds) | workflow_of(ds, ranges, num)
     axes = [dim for dim in ds.status.dims if dim in ds.coords]
     if data.get("boundaries", {}).get("axis") not in (None, *axes):
         del data["boundaries"]
     if len(axes) != 2:
         data.pop("refine", None)
     return data
+
+
+def workflow_of(ds, ranges=None, num=None):
+    """The workflow of the points alone, as a mapping, from the attributes: the same points, or with new axes."""
+    title = str(ds.attrs.get("title", ""))
+    data = {"title": f"{title}, a part".lstrip(", ") if ranges else title, "scene": user_scene.of_dataset(ds)}
+    scene = user_scene.find(data["scene"])[1]
+    data |= {"options": options_at(ds, scene), "axes": _axes(ds, ranges or {}, num)}
+    solver = {"method": ds.attrs.get("method"), "rtol": ds.attrs.get("rtol")}
+    data["solver"] = {key: str(v) if key == "method" else float(v) for key, v in solver.items() if v is not None}
+    known = {o.name for o in scene.OUTPUTS}
+    return data | {"output": {"variables": [name for name in ds.data_vars if name in known]}}
 
 
 def _further(ds):
