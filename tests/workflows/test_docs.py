@@ -240,6 +240,18 @@ def test_every_picture_of_a_page_lies_in_the_results(page):
         assert (ROOT / "results" / name).is_file() and "/" not in name, target
 
 
+def test_maps_of_the_documentation_are_pages_that_zoom(tool, tmp_path, monkeypatch):
+    live = tool("live_maps")
+    one = "mathieu_proved.png"
+    monkeypatch.setattr(live, "MAPS", {one: live.MAPS[one]})
+    found = live.pages(tmp_path / "maps")
+    assert sorted(path.name for path in (tmp_path / "maps").iterdir()) == ["mathieu_proved.html", one]
+    assert (tmp_path / "maps/mathieu_proved.html").stat().st_size < 500_000
+    text = live.replaced(f"before ![a map](../results/{one}) after", "scenes/mathieu.md", found)
+    assert 'src="../_static/maps/mathieu_proved.html" title="a map"' in text and "results/" not in text
+    assert f'<noscript><img src="../_static/maps/{one}" alt="a map"></noscript>' in text
+
+
 def test_the_comparison_is_what_was_measured(tool):
     comparisons = tool("comparisons")
     records = json.loads((ROOT / "results/precision_satellite.json").read_text())["records"]
