@@ -69,7 +69,8 @@ def run(
         raise BadInput("run: this is a dataset, not a workflow; give the path of a workflow file, or a mapping; "
                        "ds.survey.zoom() and survey.evaluate solve further points")  # fmt: skip
     checked = (read if isinstance(workflow, (str, os.PathLike)) else check)(workflow, output=output)
-    if workers is not None and (not isinstance(workers, int) or workers < 1):
+    number: Any = workers
+    if number is not None and (not isinstance(number, int) or number < 1):
         raise BadInput(f"workers = {shown(workers)}: it must be a positive integer, or None for threads")
     if block_timeout is not None and not (is_number(block_timeout) and 0 < block_timeout < np.inf):
         raise BadInput(f"block_timeout = {shown(block_timeout)}: it must be a positive number of seconds, or None")

@@ -176,15 +176,35 @@ def prove(workflow, output, overrides, fresh, quiet):
 
 @program.command()
 @click.argument("workflow", type=WORKFLOW)
+@click.option("-o", "--output", metavar="OUT.model", help="The model; by default beside the output, .model.")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Replace a key: solver.rtol=1e-12.")
+@click.option("--proof", metavar="PROVED.nc", help="The proof of this map (survey prove): the model carries it.")
+def model(workflow, output, overrides, proof):
+    """Write the map's series, which answer anywhere with error bars: survey.Model reads them, with numpy alone."""
+    from survey import api
+    from survey.model import build, proved
+    from survey.request.workflow import read
+
+    checked = read(workflow, overrides)
+    path = output or str(checked.path.with_suffix(".model"))
+    size = build.model(checked, path, proved.matching(api.open(proof), checked) if proof else None)
+    err.print(plain(f"wrote {path} ({size:,} bytes); in Python: survey.Model({path!r})"), markup=False)
+    out.print(plain(path), markup=False)
+
+
+@program.command()
+@click.argument("workflow", type=WORKFLOW)
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Replace a key, such as axes.k.num=40.")
 @click.option("-o", "--output", metavar="OUT.nc", help="The netCDF file, instead of the workflow's output.path.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def plan(workflow, overrides, output, as_json):
-    """Points, blocks, bytes, method and estimated time; no kernel is called."""
+    """Points, blocks, size, method and estimated time, by what this machine has needed so far; no kernel is called."""
     from survey.request.workflow import read
     from survey.sweep import plan
 
-    _show(plan.plan(read(workflow, overrides, output)), as_json)
+    planned = plan.plan(read(workflow, overrides, output))
+    numbers = () if as_json else ("bytes", "estimated_seconds")  # of which the size and the time are the words
+    _show({key: value for key, value in planned.items() if key not in numbers}, as_json)
 
 
 @program.command()
@@ -354,6 +374,18 @@ def precision(scene, peers, output):
     from survey.precision import write
 
     for path in write(scene, output, peers, say=lambda line: err.print(line, markup=False)):
+        out.print(str(path), markup=False)
+
+
+@program.command()
+@click.argument("scene", shell_complete=_scene_names)
+@click.option("--share", type=float, default=1.0, metavar="S", help="Of the points along each axis: below 1 coarser.")
+@click.option("-o", "--output", metavar="DIR", default=".", show_default=True, help="Folder for JSON, page and PNG.")
+def failures(scene, share, output):
+    """Where each method fails: its true error and its error bar over the planes on which it should break."""
+    from survey.failures import write
+
+    for path in write(scene, output, share, say=lambda line: err.print(plain(line), markup=False)):
         out.print(str(path), markup=False)
 
 

@@ -11,7 +11,7 @@ from survey import modules, status
 from survey.analysis import edge
 from survey.analysis.given import parameters
 from survey.errors import BadInput, Damaged, Untrusted
-from survey.file.labels import UNDECIDED, error_bars, fill_of, flag_codes, options_of
+from survey.file.labels import UNDECIDED, as_stored, error_bars, fill_of, flag_codes, options_of, words_of
 from survey.request import user_scene
 from survey.wording import plain
 
@@ -215,7 +215,7 @@ def _cell(text, columns=1):
 def values(ds):
     """{name: value} of everything known about a point, numpy arrays; `verdict` and other flags as words."""
     return {
-        name: meaning(v) if "flag_values" in v.attrs and v.ndim == 0 else v.values
+        name: meaning(v) if "flag_values" in v.attrs and v.ndim == 0 else as_stored(v)
         for name, v in ds.variables.items()
         if set(v.dims) <= set(ds.dims)
     }
@@ -255,7 +255,8 @@ def reading(ds, name, has_bar):
     if not np.isfinite(value):
         return "does not apply"
     if not has_bar:
-        return "does not apply" if value == fill_of(variable) else str(variable.values)
+        number = as_stored(variable)[()]
+        return "does not apply" if number == fill_of(variable) else words_of(variable).get(number, str(number))
     bar = float(ds[f"{name}_error"])
     if not 0 <= bar < np.inf:
         return f"{value!r}, its error bar is {bar}"

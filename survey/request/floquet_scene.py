@@ -9,7 +9,7 @@ import numpy as np
 from survey.measures.floquet import dense, monodromy, motion, probing, stability
 from survey.measures.floquet.system import System
 from survey.request.traced_scene import TracedScene
-from survey.scene import Parameter, plus_minus
+from survey.scene import plus_minus
 
 LARGEST = 64  # states
 TRIED = np.array([0.0, 0.11, 0.29, 0.47, 0.62, 0.83])  # of a period: where A is tried as Python
@@ -30,7 +30,6 @@ class FloquetScene(TracedScene):
     breaks: tuple[float, ...] | Callable
     states: tuple[str, ...]
     structure: str
-    PARAMETERS: tuple[Parameter, ...]
     NAME: str
     TEXT: str
     HASH: str
@@ -41,11 +40,6 @@ class FloquetScene(TracedScene):
     AUDIT = ("dop853",)
     OPTIONS = ()
     STATUS = STATUS
-
-    @property
-    def own(self):
-        """The parameters of A: all that there are."""
-        return self.PARAMETERS
 
     @cached_property
     def _system(self):
@@ -90,7 +84,9 @@ class FloquetScene(TracedScene):
         points = points.reshape(*shape, -1)
         wanted = set(request.variables) or {o.name for o in self.OUTPUTS}
         lines = {k: request.line(p.name) for k, p in enumerate(self.PARAMETERS) if request.line(p.name)}
-        given = (points, request.method, request.rtol, wanted, lines)
+        ranges = {k: request.ranges[p.name] for k, p in enumerate(self.PARAMETERS) if p.name in request.ranges}
+        free = {k for k, p in enumerate(self.PARAMETERS) if p.name not in request.fixed}
+        given = (points, request.method, request.rtol, wanted, lines, ranges if set(ranges) == free else {})
         return self._called(stability.solve, self._system, self.structure, *given)
 
     def why(self, answer):

@@ -36,7 +36,7 @@ from survey import methods
 from survey.errors import BadInput
 from survey.kernels.nutation import brun, brun_lanes
 from survey.kernels.nutation import wells as nu
-from survey.measures.nutation import derived, multiprecision, unsettled
+from survey.measures.nutation import derived, multiprecision, separatrix, unsettled
 from survey.measures.nutation import wells as nutation
 from survey.measures.rows import Rows
 from survey.modules import load
@@ -219,8 +219,15 @@ def _state(given, valid, method, request, times):
     out = _finished(out, status, valid, count, heights)
     if times is not None:
         unsettled.settle(out, points.T, multiprecision.of_state, valid, request, known=True)
-    return _with_motion(out, valid, kinds, times, lambda at: nutation.motions(
-        method, rows, kinds, starts, periods, at, a, drift)) if times is not None else out  # fmt: skip
+    if times is None:
+        return out
+    upright = (kinds == nu.SEPARATRIX) & (points[:, 3] == 0.0) & (points[:, 4] == 0.0)
+
+    def motions(at):
+        found = nutation.motions(method, rows, kinds, starts, periods, at, a, drift)
+        return separatrix.upright(found, upright, at, points[:, 5] / (2.0 * a), drift)
+
+    return _with_motion(out, valid, kinds, times, motions)
 
 
 def _too_large(points):
@@ -280,6 +287,8 @@ def trajectory(point, answer, options, time=None):
     """
     well = int(np.argmax(np.isfinite(np.ravel(answer["period"]))))
     period = float(np.ravel(answer["period"])[well])
+    if not np.isfinite(period) and "l" in point and answer["verdict"] == "separatrix":
+        return _homoclinic(point, int(options["sign"]), time)
     if not np.isfinite(period):
         raise BadInput("this motion has no period (a separatrix, or no motion at all): take a point beside it")
     state = {p.name: point[p.name] for p in PARAMETERS[:7] if p.name in point}
@@ -288,13 +297,30 @@ def trajectory(point, answer, options, time=None):
     t = np.linspace(0.0, _MOTION_PERIODS * period if time is None else time, _MOTION_POINTS)
     asked = {name: np.full((1, 1), value) for name, value in state.items()} | {"t": t[None]}
     out = {name: values[0] for name, values in solve(asked, Request({"motion": "at_t"}, rtol=1e-9)).items()}
-    words = "time, over A / sqrt|k|" if "l" in point else "time"
+    return _drawn(t, out, "l" in point, _sides(out["u"], state))
+
+
+def _homoclinic(point, sign, time):
+    """The Trajectory of the motion that leaves an unstable precession and returns, furthest from it at t = 0."""
+    saddles = separatrix.saddles(point["alpha"], point["beta"], sign)
+    if not saddles or abs(point["alpha"]) == abs(point["beta"]):
+        raise BadInput("this separatrix is next to a cusp, or passes a pole: take a point beside it")
+    drift = point["alpha"] * (1.0 - point["ratio"]) / point["ratio"]
+    loop = separatrix.Loop(*saddles[0], point["alpha"], point["beta"], sign, drift)
+    end = 12.0 / loop.rate if time is None else time
+    t = np.linspace(0.0 if time is not None else -end, end, _MOTION_POINTS)
+    return _drawn(t, loop.motion(t), True, 1.0)
+
+
+def _drawn(t, out, scaled, sides):
+    """The Trajectory of u, psi and phi at times t."""
+    words = "time, over A / sqrt|k|" if scaled else "time"
     data = {"t": ("t", t, {"long_name": words, "symbol": "t", "units": "1"})}
     for o in OUTPUTS[:3]:
         meaning = {"long_name": o.long_name, "symbol": o.symbol, "units": o.units}
         data[o.name] = ("t", out[o.name], meaning)
         data[f"{o.name}_error"] = ("t", out[f"{o.name}_error"], meaning | {"long_name": f"error bound of {o.name}"})
-    side = np.sqrt((1.0 - out["u"]) * (1.0 + out["u"])) * _sides(out["u"], state)
+    side = np.sqrt((1.0 - out["u"]) * (1.0 + out["u"])) * sides
     for name, values in {"x": side * np.cos(out["psi"]), "y": side * np.sin(out["psi"]), "z": out["u"]}.items():
         data[f"axis_{name}"] = ("t", values, {"long_name": f"component {name} of the body's axis", "units": "1"})
     return Trajectory(

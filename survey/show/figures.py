@@ -11,6 +11,7 @@ from matplotlib.text import Text
 
 from survey import modules
 from survey.errors import BadInput
+from survey.file.labels import masked
 from survey.show import family
 from survey.show.ensemble import draw_ensemble, is_ensemble
 from survey.show.layout import alone, fit
@@ -111,7 +112,7 @@ def _flat(ds, name, chosen=None):
     part = ds.isel({dim: at.get(dim, 0) for dim in (*ds.status.dims, *ds[name].dims) if dim not in keep})
     unsorted = [dim for dim in keep if not _is_monotonic(part[dim].values)]
     part = part.sortby(unsorted) if unsorted else part
-    return part, part[name].transpose(*keep), part.status.transpose(*keep)
+    return part, masked(part[name].transpose(*keep)), part.status.transpose(*keep)
 
 
 def _is_monotonic(values):

@@ -8,14 +8,14 @@ from matplotlib.ticker import MaxNLocator
 
 from survey import modules, status
 from survey.errors import BadInput
-from survey.file.labels import flag_codes, scene_statuses
+from survey.file.labels import fill_of, flag_codes, scene_statuses, words_of
 from survey.file.overview import Overview, Points
 from survey.grid import logarithmic
 from survey.show.boundaries import draw_boundaries, in_plane
 from survey.show.cells import draw_cells
 from survey.show.layout import add_legend
 from survey.show.marks import hatched, marks, marks_without_answer
-from survey.show.palette import UNDECIDED, greys, hatch_of, kinds_of
+from survey.show.palette import UNDECIDED, colours_of, greys, hatch_of, kinds_of
 from survey.show.style import style_named
 from survey.show.text import WIDE, label_of, spaced
 
@@ -24,6 +24,7 @@ MOST_COUNTS = 10  # that have a colour each
 MAX_CELLS = 1000  # along an axis of such a picture: each costs a hundred bytes
 EDGED, EDGES = "discriminant", (-2.0, 2.0)  # whose lines at these values are the edges of stability
 SEQUENTIAL, DIVERGING = "viridis", "RdBu_r"  # of values of one sign, and about 0
+IN_WORDS = "#CC79A7"  # numbers that stand for words, such as infinitely many
 CELLS_PER_PIXEL = 0.8  # of the axes, before legend and labels take their share
 
 
@@ -33,7 +34,8 @@ def draw_map(axes, ds, variable, state, boundaries, paper, asked):
     `asked`: cmap, vmin, vmax, robust of its colours, None where they are not given.
     """
     scales = ["log" if logarithmic(variable[dim].values) else "linear" for dim in variable.dims]
-    ticks = MaxNLocator(integer=True) if variable.dtype.kind == "i" else None
+    words = words_of(variable)
+    ticks = MaxNLocator(integer=True) if fill_of(variable) is not None else None
     variable, state, number = _shown(axes, ds, variable, state, style_named("paper" if paper else None).dpi)
     x, y = (variable[dim] for dim in variable.dims)
     failed = np.isin(state.values, list(status.FAILURES))
@@ -44,7 +46,9 @@ def draw_map(axes, ds, variable, state, boundaries, paper, asked):
         handles = _verdicts(axes, x, y, ds, variable, state, number, paper)
         handles += marks_without_answer(axes, x, y, failed, outside, number, paper)
     else:
-        shown = np.ma.masked_invalid(np.where(failed | outside, np.nan, variable.values.astype(float)))
+        values = variable.values.astype(float)
+        worded = {text: (values == code) & ~(failed | outside) for code, text in words.items()}
+        shown = np.ma.masked_invalid(np.where(failed | outside | np.isin(values, list(words)), np.nan, values))
         colours = colours_of_numbers(shown, variable, asked, ticks is not None)
         drawn = axes.pcolormesh(x, y, shown.T, shading="nearest", rasterized=True, **colours)
         if not shown.mask.all():
@@ -55,13 +59,17 @@ def draw_map(axes, ds, variable, state, boundaries, paper, asked):
         if variable.name == EDGED and min(shown.shape) > 1 and shown.count():
             axes.contour(x, y, shown.T, levels=EDGES, colors="black", linewidths=0.6)
         axes.set_facecolor("#dddddd")
-        missing = shown.mask & ~(failed | outside)
-        handles = _undefined(axes, x, y, ds, state, missing, number, paper)
+        missing = np.isnan(values) & ~(failed | outside)
+        handles = []
+        for text, here in worded.items():
+            handles += _area(axes, x, y, here, IN_WORDS, text, number, paper)
+        handles += _undefined(axes, x, y, ds, state, missing, number, paper)
         handles += marks_without_answer(axes, x, y, failed, outside, number, paper)
         missing &= ~np.isin(state.values, list(scene_statuses(ds).values()))
         handles += [Patch(color="#dddddd", label="does not apply")] if missing.any() else []
     if boundaries and "curve_count" in ds:
-        handles += draw_boundaries(axes, in_plane(ds, variable), x, y)
+        gaps = colours_of(flag_codes(variable.attrs)).get("unstable") if "flag_values" in variable.attrs else None
+        handles += draw_boundaries(axes, in_plane(ds, variable), x, y, gaps)
     if handles:
         add_legend(axes, handles)
     axes.set(xlabel=label_of(x, WIDE), ylabel=label_of(y))
@@ -122,12 +130,17 @@ def _undefined(axes, x, y, ds, state, missing, number, paper):
     handles = []
     codes = scene_statuses(ds)
     for name, grey in greys(ds).items():
-        here = missing & (state.values == codes[name])
-        if here.any():
-            cells = np.ma.masked_array(here, ~here)
-            axes.pcolormesh(x, y, cells.T, cmap=ListedColormap([grey]), shading="nearest", rasterized=True)
-            handles += marks(axes, x, y, here, spaced(name), number, paper, grey)
+        handles += _area(axes, x, y, missing & (state.values == codes[name]), grey, spaced(name), number, paper)
     return handles
+
+
+def _area(axes, x, y, here, colour, label, number, paper):
+    """Draw the cells `here` in a colour; returns their legend handles, none where there is no such cell."""
+    if not here.any():
+        return []
+    cells = np.ma.masked_array(here, ~here)
+    axes.pcolormesh(x, y, cells.T, cmap=ListedColormap([colour]), shading="nearest", rasterized=True)
+    return marks(axes, x, y, here, label, number, paper, colour)
 
 
 def counts(shown):

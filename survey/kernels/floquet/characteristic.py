@@ -1,4 +1,4 @@
-"""Multipliers, and what follows from them, on rows of points where the coefficients of a polynomial are series.
+"""Multipliers, and what follows from them, of points where the coefficients of a polynomial are series.
 
 The polynomial is monic: the characteristic one of M, whose roots are the multipliers l, or, of symplectic and
 reversible systems ("paired": with l, 1 / l is a multiplier), that whose roots are the s = l + 1 / l. Weierstrass's
@@ -38,15 +38,9 @@ def answer(
     multiple of LANES): T_k at the points of a row. near (R + L): the nearest node of each row, then of each column;
     starts (n1, m, d, 2): the roots at the nodes. Of K = 2 d coefficients the last d are those of the Krein form.
     """
-    K, m, d, R = len(doubts), len(table), starts.shape[2], len(x)
+    K, m, d, R, L = len(doubts), len(table), starts.shape[2], len(x), places.shape[1]
     work, own = np.empty((2, K * m)), np.empty((1, K * m))
-    c, z, y, w = np.empty((K, LANES)), np.empty((d, LANES)), np.empty((d, LANES)), np.empty((d, LANES))
-    gap, parts = np.empty((d, LANES)), np.empty((6, LANES))
-    rho, lane_z, lane_gap = np.empty(d), np.empty((d, 2)), np.empty(d)
-    re, im, bar, sign = np.empty(n), np.empty(n), np.empty(n), np.zeros(n, np.int8)
-    angle, order = np.empty(n), np.empty(n, np.int64)
-    form = np.empty((2, d))
-    L = places.shape[1]
+    c, z, y, own_places = np.empty((K, LANES)), np.empty((d, LANES)), np.empty((d, LANES)), np.empty(LANES, np.int64)
     for r in range(R):
         restrict(series, x[r : r + 1], work, own)
         for first in range(0, L, LANES):
@@ -59,43 +53,105 @@ def answer(
                     for lane in range(LANES):
                         sums[lane] += weight * one[lane]
             for lane in range(LANES):
-                column = near[R + first + min(lane, count - 1)]
+                column, own_places[lane] = first + min(lane, count - 1), places[r, first + min(lane, count - 1)]
                 for i in range(d):
-                    z[i, lane], y[i, lane] = starts[near[r], column, i, 0], starts[near[r], column, i, 1]
-            _roots(c, d, z, y, parts)
-            _corrections(c, d, doubts, z, y, w, gap, parts)
-            for lane in range(count):
-                p = places[r, first + lane]
-                widest = 0.0
+                    z[i, lane] = starts[near[r], near[R + column], i, 0]
+                    y[i, lane] = starts[near[r], near[R + column], i, 1]
+            _lanes(c, doubts, z, y, own_places, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed)
+
+
+@kernel
+def answer_points(
+    series, terms, doubts, x, near, starts, places, n, paired, asked, rtol, floats, signs, verdict, crossing, missed
+):
+    """As `answer`, of points at x (2, N), each with coordinates of its own; near (2, N).
+
+    terms (K, m): how many across the rows count of each series along them.
+    """
+    K, m, d, n1, N = len(doubts), starts.shape[1], starts.shape[2], len(series), x.shape[1]
+    across, along, part = np.empty((n1, LANES)), np.empty((m, LANES)), np.empty(LANES)
+    c, z, y, own_places = np.empty((K, LANES)), np.empty((d, LANES)), np.empty((d, LANES)), np.empty(LANES, np.int64)
+    for first in range(0, N, LANES):
+        count = min(LANES, N - first)
+        for lane in range(LANES):
+            p = first + min(lane, count - 1)
+            across[0, lane], along[0, lane], own_places[lane] = 1.0, 1.0, places[p]
+            if n1 > 1:
+                across[1, lane] = x[0, p]
+            if m > 1:
+                along[1, lane] = x[1, p]
+            for i in range(d):
+                z[i, lane] = starts[near[0, p], near[1, p], i, 0]
+                y[i, lane] = starts[near[0, p], near[1, p], i, 1]
+        _polynomials(across)
+        _polynomials(along)
+        for k in range(K):
+            sums = c[k]
+            sums[:] = 0.0
+            for j in range(m - 1, -1, -1):
+                part[:] = 0.0
+                for i in range(terms[k, j] - 1, -1, -1):
+                    weight, one = series[i, k * m + j], across[i]
+                    for lane in range(LANES):
+                        part[lane] += weight * one[lane]
+                one = along[j]
+                for lane in range(LANES):
+                    sums[lane] += part[lane] * one[lane]
+        _lanes(c, doubts, z, y, own_places, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed)
+
+
+@kernel
+def _polynomials(table):
+    """Fill rows 2, 3, ... of `table` with T_k, by its recurrence from rows 0 and 1."""
+    for k in range(2, len(table)):
+        one, two, own, x = table[k - 1], table[k - 2], table[k], table[1]
+        for lane in range(len(x)):
+            own[lane] = 2.0 * x[lane] * one[lane] - two[lane]
+
+
+@kernel
+def _lanes(c, doubts, z, y, places, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed):
+    """Answer the first `count` of LANES points from their coefficients c (K, LANES) and roots z + i y (d, LANES)."""
+    K, d = len(c), len(z)
+    w, gap, parts = np.empty((d, LANES)), np.empty((d, LANES)), np.empty((6, LANES))
+    rho, lane_z = np.empty(d), np.empty((d, 2))
+    re, im, bar, sign = np.empty(n), np.empty(n), np.empty(n), np.zeros(n, np.int8)
+    angle, order = np.empty(n), np.empty(n, np.int64)
+    form = np.empty((2, d))
+    _roots(c, d, z, y, parts)
+    _corrections(c, d, doubts, z, y, w, gap, parts)
+    for lane in range(count):
+        p = places[lane]
+        widest = 0.0
+        for i in range(d):
+            widest = max(widest, w[i, lane]) if w[i, lane] >= 0.0 else math.inf
+        clear = True
+        for i in range(d):
+            clear = clear and gap[i, lane] > 2.0 * d * (w[i, lane] + widest)
+            rho[i] = w[i, lane] * (1.0 + (d - 1) * min(1.0, 2.0 * widest / gap[i, lane]))
+            lane_z[i, 0], lane_z[i, 1] = z[i, lane], y[i, lane]
+        verdict[p], crossing[p], missed[p] = UNDECIDED, UNDECIDED, True
+        if not clear or not widest < math.inf:
+            continue
+        open_signs = False
+        if paired:
+            if K > d:
                 for i in range(d):
-                    widest = max(widest, w[i, lane]) if w[i, lane] >= 0.0 else math.inf
-                clear = True
-                for i in range(d):
-                    clear = clear and gap[i, lane] > 2.0 * d * (w[i, lane] + widest)
-                    rho[i] = w[i, lane] * (1.0 + (d - 1) * min(1.0, 2.0 * widest / gap[i, lane]))
-                    lane_z[i, 0], lane_z[i, 1], lane_gap[i] = z[i, lane], y[i, lane], gap[i, lane]
-                verdict[p], crossing[p], missed[p] = UNDECIDED, UNDECIDED, True
-                if not clear or not widest < math.inf:
-                    continue
-                open_signs = False
-                if paired:
-                    if K > d:
-                        for i in range(d):
-                            form[0, i], form[1, i] = c[d + i, lane], doubts[d + i]
-                    decided, open_signs = _paired(lane_z, rho, form, K > d, re, im, bar, sign)
-                else:
-                    for i in range(d):
-                        re[i], im[i], bar[i] = lane_z[i, 0], lane_z[i, 1], rho[i]
-                        if abs(im[i]) <= bar[i]:
-                            im[i] = 0.0  # its mirror image would be in the same disc
-                    decided = UNDECIDED
-                _write(re, im, bar, sign, decided, paired, asked, rtol, p, floats, verdict, missed)
-                if not missed[p] and (asked[MULTIPLIERS] or asked[CROSSING] or asked[KREIN]):
-                    _sort(re, im, bar, sign, floats[4 * n, p], p, floats, signs, angle, order)
-                    crossing[p] = _crossing(re, im, bar, angle, sign, verdict[p], paired, K > d)
-                    missed[p] = (asked[CROSSING] and crossing[p] == UNDECIDED) or (
-                        open_signs and (asked[KREIN] or asked[CROSSING])
-                    )
+                    form[0, i], form[1, i] = c[d + i, lane], doubts[d + i]
+            decided, open_signs = _paired(lane_z, rho, form, K > d, re, im, bar, sign)
+        else:
+            for i in range(d):
+                re[i], im[i], bar[i] = lane_z[i, 0], lane_z[i, 1], rho[i]
+                if abs(im[i]) <= bar[i]:
+                    im[i] = 0.0  # its mirror image would be in the same disc
+            decided = UNDECIDED
+        _write(re, im, bar, sign, decided, paired, asked, rtol, p, floats, verdict, missed)
+        if not missed[p] and (asked[MULTIPLIERS] or asked[CROSSING] or asked[KREIN]):
+            _sort(re, im, bar, sign, floats[4 * n, p], p, floats, signs, angle, order)
+            crossing[p] = _crossing(re, im, bar, angle, sign, verdict[p], paired, K > d)
+            missed[p] = (asked[CROSSING] and crossing[p] == UNDECIDED) or (
+                open_signs and (asked[KREIN] or asked[CROSSING])
+            )
 
 
 @kernel
@@ -247,7 +303,8 @@ def _write(re, im, bar, sign, decided, paired, asked, rtol, p, floats, verdict, 
     for i in range(n):
         size = math.sqrt(re[i] * re[i] + im[i] * im[i])
         value, top, least = max(value, size), max(top, size + bar[i]), max(least, size - bar[i])
-        wide = wide or not bar[i] <= rtol * (1.0 + size)
+        least_part = abs(re[i]) if im[i] == 0.0 else min(abs(re[i]), abs(im[i]))
+        wide = wide or not bar[i] <= rtol * (1.0 + least_part)
     top, least = top * (1.0 + 4.0 * EPS), least * (1.0 - 4.0 * EPS)
     if paired and decided == STABLE:
         value = top = least = 1.0

@@ -42,8 +42,8 @@ def factors(
     V, W = np.empty((numbers.shape[1], lanes)), np.empty((len(terms), n * lanes))
     a, w, e = np.zeros((ORDER + 1, lanes)), np.empty((ORDER + 1 + BEYOND, lanes)), np.empty((ORDER + 1, lanes))
     rows, t, s, own = np.empty((n, lanes)), np.empty(lanes), np.empty(lanes), np.empty(lanes)
-    plus, minus = np.empty((n, n * lanes)), np.empty((n, n * lanes))
-    U, inverse, work = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+    even, odd, work = np.empty((n, n * lanes)), np.empty((n, n * lanes)), np.empty((4, n, n * lanes))
+    total, of_both, of_odd, found = np.empty(lanes), np.empty(lanes), np.empty(lanes), np.empty(lanes)
     per_row, needed = np.zeros(n), np.zeros((places, n), np.bool_)
     for k in range(len(terms)):
         per_row[terms[k, ROW]] += 1.0
@@ -69,14 +69,18 @@ def factors(
             norm_of(S, W, terms, k, rows, a[k])
             if k < ORDER:
                 next_term(S, W, terms, used, needed, k, n, s, B, C, X)
-                _row_sums(X[k + 1], n, rows, w[k + 1])
+                _row_norms(X[k + 1], lanes, rows[0], w[k + 1])
                 _rounded(a, w, e, own, s, k, most)
-        _ends(X, plus, minus)
+        _halves(X, even, odd)
+        _missing(a, w, e, s, total, of_both, of_odd)
+        _over(even, odd, of_both, of_odd, work, found)
         for lane in range(min(lanes, len(point) - start)):
-            cut, rounding, total = _missing(a, w, e, s, lane)
-            delta = cut + rounding + 2.0 * ROUNDOFF_UP * total
-            error[start + lane] = _over(plus, minus, lane, lanes, n, delta, U, inverse, work, F[start + lane])
-            doubt[start + lane] = error[start + lane] * total * total
+            step = F[start + lane]
+            for i in range(n):
+                for j in range(n):
+                    step[i, j] = odd[i, j * lanes + lane] + (1.0 if i == j else 0.0)
+            error[start + lane] = found[lane]
+            doubt[start + lane] = found[lane] * total[lane] * total[lane]
 
 
 @kernel
@@ -113,11 +117,17 @@ def next_term(S, W, terms, used, needed, k, n, s, B, C, X):
         for row in range(n):
             if needed[m, row]:
                 sums = C[m, row]
+                first = (k + 1) % 4
                 sums[:] = 0.0
-                for j in range(k + 1):
+                for j in range(first):
                     basis, before = B[m, j], X[k - j, row]
                     for q in range(n * lanes):
                         sums[q] += basis[q] * before[q]
+                for j in range(first, k + 1, 4):  # four at once: sums are read and written less often
+                    b0, b1, b2, b3 = B[m, j], B[m, j + 1], B[m, j + 2], B[m, j + 3]
+                    x0, x1, x2, x3 = X[k - j, row], X[k - j - 1, row], X[k - j - 2, row], X[k - j - 3, row]
+                    for q in range(n * lanes):
+                        sums[q] += (b0[q] * x0[q] + b1[q] * x1[q]) + (b2[q] * x2[q] + b3[q] * x3[q])
     new = X[k + 1]
     new[:] = 0.0
     for q in range(len(terms)):
@@ -125,26 +135,14 @@ def next_term(S, W, terms, used, needed, k, n, s, B, C, X):
         two = X[k, terms[q, COLUMN]] if terms[q, BASIS] == ONE else C[terms[q, BASIS], terms[q, COLUMN]]
         for i in range(n * lanes):
             one[i] += weight[i] * two[i]
+    share = np.empty(lanes)
+    for lane in range(lanes):
+        share[lane] = s[lane] / (k + 1)
     for row in range(n):
         one = new[row]
         for c in range(n):
             for lane in range(lanes):
-                one[c * lanes + lane] *= s[lane] / (k + 1)
-
-
-@kernel
-def _row_sums(X, n, rows, out):
-    """The maximum norm by rows of the matrix X (n, n lanes)."""
-    lanes = len(out)
-    out[:] = 0.0
-    for i in range(n):
-        row, one = rows[i], X[i]
-        row[:] = 0.0
-        for c in range(n):
-            for lane in range(lanes):
-                row[lane] += abs(one[c * lanes + lane])
-        for lane in range(lanes):
-            out[lane] = max(out[lane], row[lane])
+                one[c * lanes + lane] *= share[lane]
 
 
 @kernel
@@ -163,110 +161,158 @@ def _rounded(a, w, e, own, s, k, most):
 
 
 @kernel
-def _ends(X, plus, minus):
-    """Fill the sums of the series at tau = 1 and -1, like X[0]."""
+def _halves(X, even, odd):
+    """Fill the sums of the terms of even and of odd order of the series at tau = 1, like X[0]."""
     for i in range(X.shape[1]):
-        one, two = plus[i], minus[i]
+        one, two = even[i], odd[i]
         one[:], two[:] = 0.0, 0.0
         for k in range(ORDER, -1, -2):
-            even = X[k, i]
+            term = X[k, i]
             for q in range(len(one)):
-                one[q] += even[q]
+                one[q] += term[q]
             if k > 0:
-                odd = X[k - 1, i]
+                term = X[k - 1, i]
                 for q in range(len(one)):
-                    two[q] += odd[q]
-        for q in range(len(one)):
-            sum_of, difference = one[q] + two[q], one[q] - two[q]
-            one[q], two[q] = sum_of, difference
+                    two[q] += term[q]
 
 
 @kernel
-def _missing(a, w, e, s, lane):
-    """What the series lacks beyond its last term, its rounding, and the sum of its terms' norms, in lane lane."""
-    total = rounding = largest = 0.0
+def _missing(a, w, e, s, total, of_both, of_odd):
+    """Fill bounds (lanes) of the errors of a series at tau = 1 and of the sum of its odd terms, and `total`, the sum of
+    its terms' norms: what it lacks beyond its last term, and its rounding.
+    """
+    lanes = len(s)
+    for lane in range(lanes):
+        total[lane] = of_both[lane] = of_odd[lane] = 0.0
     for k in range(ORDER + 1):
-        total += w[k, lane]
-        rounding += e[k, lane]
-        largest = max(largest, a[k, lane])
-    # A's own coefficients beyond the last known are taken to fall as the last four did
-    last, before = a[ORDER, lane] + a[ORDER - 1, lane], a[ORDER - 2, lane] + a[ORDER - 3, lane]
-    fall = math.sqrt(last / before) if before > 0.0 else 0.0
-    if last <= ROUNDOFF_UP * largest:  # beside zeros of coefficients the fall is an accident
-        fall = min(fall, 0.94)
-    rest = 2.0 * last * fall / (1.0 - fall) if fall < 0.95 else (0.0 if last == 0.0 else math.inf)
-    cut = 0.0
+        one, two = w[k], e[k]
+        for lane in range(lanes):
+            total[lane] += one[lane]
+            of_both[lane] += two[lane] + 2.0 * ROUNDOFF_UP * one[lane]
+        if k % 2 == 1:
+            for lane in range(lanes):
+                of_odd[lane] += two[lane] + 2.0 * ROUNDOFF_UP * one[lane]
     for k in range(ORDER, ORDER + BEYOND):
-        new = 0.0
+        new = w[k + 1]
+        new[:] = 0.0
         for j in range(min(k, ORDER) + 1):
-            new += a[j, lane] * w[k - j, lane]
-        w[k + 1, lane] = new * s[lane] / (k + 1)
-        cut += w[k + 1, lane]
-    # over two orders, as even and odd ones may differ
-    end, earlier = w[ORDER + BEYOND, lane] + w[ORDER + BEYOND - 1, lane], w[ORDER + BEYOND - 2, lane]
-    ratio = w[ORDER + BEYOND, lane] / earlier if earlier > 0.0 else 0.0
-    cut = cut + end * ratio / (1.0 - ratio) if ratio < 0.9 else math.inf
-    return cut + s[lane] * rest * total / (ORDER + 1), rounding, total
+            one, two = a[j], w[k - j]
+            for lane in range(lanes):
+                new[lane] += one[lane] * two[lane]
+        for lane in range(lanes):
+            new[lane] *= s[lane] / (k + 1)
+    for lane in range(lanes):
+        largest = cut = 0.0
+        for k in range(ORDER + 1):
+            largest = max(largest, a[k, lane])
+        for k in range(ORDER, ORDER + BEYOND):
+            cut += w[k + 1, lane]
+        # A's own coefficients beyond the last known are taken to fall as the last four did
+        last, before = a[ORDER, lane] + a[ORDER - 1, lane], a[ORDER - 2, lane] + a[ORDER - 3, lane]
+        fall = math.sqrt(last / before) if before > 0.0 else 0.0
+        if last <= ROUNDOFF_UP * largest:  # beside zeros of coefficients the fall is an accident
+            fall = min(fall, 0.94)
+        rest = 2.0 * last * fall / (1.0 - fall) if fall < 0.95 else (0.0 if last == 0.0 else math.inf)
+        # over two orders, as even and odd ones may differ
+        end, earlier = w[ORDER + BEYOND, lane] + w[ORDER + BEYOND - 1, lane], w[ORDER + BEYOND - 2, lane]
+        ratio = w[ORDER + BEYOND, lane] / earlier if earlier > 0.0 else 0.0
+        cut = cut + end * ratio / (1.0 - ratio) if ratio < 0.9 else math.inf
+        cut += s[lane] * rest * total[lane] / (ORDER + 1)
+        of_both[lane] += cut
+        of_odd[lane] += cut
 
 
 @kernel
-def _over(plus, minus, lane, lanes, n, delta, U, inverse, work, F):
-    """Fill F = U(1) U(-1)^-1 of lane lane; returns the bound of its rows' errors, `delta` being that of U's."""
-    up = down = 0.0
+def _over(even, odd, of_both, of_odd, work, error):
+    """Make `odd` G = F - 1, F the propagator over the steps, from the halves of U; fill the bounds `error` of its rows.
+
+    G = D U(-1)^-1 with D = U(1) - U(-1), twice the odd terms: exact to what is small where the step is. `work`
+    (4, n, n lanes) and `even` are used up. Of the computed V = U(-1)^-1, G V^-1 = D is off by G (1 - U(-1) V) V^-1.
+    """
+    n, lanes = len(even), len(error)
+    U, left, inverse, G = work[0], work[1], work[2], work[3]
     for i in range(n):
-        total = other = 0.0
-        for j in range(n):
-            U[i, j] = work[i, j] = minus[i, j * lanes + lane]
-            inverse[i, j] = 1.0 if i == j else 0.0
-            total += abs(plus[i, j * lanes + lane])
-            other += abs(minus[i, j * lanes + lane])
-        up, down = max(up, total), max(down, other)
-    if not _invert(work, inverse, n) or not math.isfinite(delta):
-        F[:] = math.nan
-        return math.inf
-    broad = left = tall = 0.0
+        one, two, copied, own, identity = even[i], odd[i], left[i], U[i], inverse[i]
+        for q in range(n * lanes):
+            own[q] = one[q] - two[q]
+            copied[q] = own[q]
+            two[q] *= 2.0
+            identity[q] = 0.0
+        for lane in range(lanes):
+            identity[i * lanes + lane] = 1.0
+    _invert(left, inverse, n, lanes)
+    _product(odd, inverse, lanes, G)
+    _product(U, inverse, lanes, left)
     for i in range(n):
-        row = of_inverse = of_rest = 0.0
-        for j in range(n):
-            sum_of, residual = 0.0, (-1.0 if i == j else 0.0)
-            for k in range(n):
-                sum_of += plus[i, k * lanes + lane] * inverse[k, j]
-                residual += U[i, k] * inverse[k, j]
-            F[i, j] = sum_of
-            row += abs(sum_of)
-            of_rest += abs(residual)
-            of_inverse += abs(inverse[i, j])
-        tall, left, broad = max(tall, row), max(left, of_rest), max(broad, of_inverse)
-    rounding = (n + 2.0) * ROUNDOFF_UP * (up + tall * down)
-    return broad * (delta * (1.0 + tall) + rounding) + tall * left
+        for lane in range(lanes):
+            left[i, i * lanes + lane] -= 1.0
+    norms = np.empty((5, lanes))
+    for k, matrix in enumerate((odd, U, inverse, G, left)):
+        _row_norms(matrix, lanes, even[0], norms[k])
+    across, down, broad, tall, rest = norms[0], norms[1], norms[2], norms[3], norms[4]
+    for lane in range(lanes):
+        rounding = (n + 2.0) * ROUNDOFF_UP * (across[lane] + tall[lane] * down[lane])
+        given = 2.0 * of_odd[lane] + tall[lane] * of_both[lane]
+        own = broad[lane] * (given + rounding) + tall[lane] * rest[lane] + ROUNDOFF_UP * (1.0 + tall[lane])
+        error[lane] = own if own < math.inf else math.inf
+    for i in range(n):
+        one, two = odd[i], G[i]
+        for q in range(n * lanes):
+            one[q] = two[q]
 
 
 @kernel
-def _invert(work, inverse, n):
-    """Gauss-Jordan elimination with partial pivoting; `work` is used up. False where a pivot vanishes."""
+def _row_norms(A, lanes, work, out):
+    """Fill out (lanes) with the largest sums of moduli in a row of A (n, n lanes)."""
+    n = len(A)
+    out[:] = 0.0
+    for i in range(n):
+        one = A[i]
+        for lane in range(lanes):
+            work[lane] = 0.0
+        for c in range(n):
+            for lane in range(lanes):
+                work[lane] += abs(one[c * lanes + lane])
+        for lane in range(lanes):
+            out[lane] = max(out[lane], work[lane]) if work[lane] < math.inf else math.inf
+
+
+@kernel
+def _product(A, B, lanes, out):
+    """Fill out with A B, each (n, n lanes)."""
+    n = len(A)
+    for i in range(n):
+        sums, row = out[i], A[i]
+        sums[:] = 0.0
+        for k in range(n):
+            other = B[k]
+            for c in range(n):
+                for lane in range(lanes):
+                    sums[c * lanes + lane] += row[k * lanes + lane] * other[c * lanes + lane]
+
+
+@kernel
+def _invert(work, inverse, n, lanes):
+    """Gauss-Jordan elimination of `work`, which is near 1, on `inverse`; no pivots are chosen: residuals tell."""
+    factor = np.empty(lanes)
     for k in range(n):
-        best = k
-        for i in range(k + 1, n):
-            if abs(work[i, k]) > abs(work[best, k]):
-                best = i
-        pivot = work[best, k]
-        if not abs(pivot) > 0.0:
-            return False
-        if best != k:
-            for j in range(n):
-                work[k, j], work[best, j] = work[best, j], work[k, j]
-                inverse[k, j], inverse[best, j] = inverse[best, j], inverse[k, j]
-        factor = 1.0 / pivot
+        pivot, other = work[k], inverse[k]
+        for lane in range(lanes):
+            factor[lane] = 1.0 / pivot[k * lanes + lane]
         for j in range(n):
-            work[k, j] *= factor
-            inverse[k, j] *= factor
+            for lane in range(lanes):
+                pivot[j * lanes + lane] *= factor[lane]
+                other[j * lanes + lane] *= factor[lane]
         for i in range(n):
-            if i != k and work[i, k] != 0.0:
-                factor = work[i, k]
-                for j in range(n):
-                    work[i, j] -= factor * work[k, j]
-                    inverse[i, j] -= factor * inverse[k, j]
-    return True
+            if i == k:
+                continue
+            row, right = work[i], inverse[i]
+            for lane in range(lanes):
+                factor[lane] = row[k * lanes + lane]
+            for j in range(n):
+                for lane in range(lanes):
+                    row[j * lanes + lane] -= factor[lane] * pivot[j * lanes + lane]
+                    right[j * lanes + lane] -= factor[lane] * other[j * lanes + lane]
 
 
 @kernel

@@ -30,6 +30,7 @@ DEGREES = np.array([8, 12, 16, 20, 24, 28, 32, 40])
 PROBED = 48  # nodes of the lines that show the degrees that are needed
 POINTS_PER_NODE = 4  # a panel pays if there are this many points for each that it solves
 SMALLEST = 16  # points of an axis
+FEWEST = 4096  # points on their own from which on series pay
 BEST = 1e-14  # accuracy of M at the nodes
 MOST_DEEP = 12  # halvings
 LEAST = 0.5  # the share of those that their own bounds answer, below which cutting is of no use
@@ -100,8 +101,18 @@ def axes_of(lines):
 
 def serves(system, structure, wanted, lines):
     """May series answer the points?"""
+    return _of_series(system, structure, wanted) and bool(axes_of(lines))
+
+
+def serves_scattered(system, structure, wanted, ranges):
+    """May series answer points on their own, whose parameters lie within `ranges`, {column: (number, low, high)}?"""
+    known = _of_series(system, structure, wanted) and len(ranges) == 2
+    return known and all(number >= FEWEST and high > low for number, low, high in ranges.values())
+
+
+def _of_series(system, structure, wanted):
     paired_odd = structure != "none" and system.n % 2
-    return wanted <= SERVED and system.n <= LARGEST and not paired_odd and bool(axes_of(lines))
+    return wanted <= SERVED and system.n <= LARGEST and not paired_odd
 
 
 def solve(system, structure, points, rtol, wanted, lines, answer):
@@ -147,6 +158,27 @@ def solve(system, structure, points, rtol, wanted, lines, answer):
     return left
 
 
+def scattered(system, structure, points, rtol, wanted, ranges, answer):
+    """As `solve`, of points (N, parameters) on their own that differ in the two parameters of `ranges` alone."""
+    column, left = sorted(ranges), np.ones(len(points), bool)
+    # a map of as many points
+    axes = tuple(Axis(k, int(ranges[k][0] ** 0.5), *ranges[k][1:]) for k in column)
+    fixed = points[0].copy()
+    fixed[column] = 0.0
+    if not np.isfinite(fixed).all():
+        return left
+    key = Map(system, structure, rtol, flags(wanted), axes, tuple(fixed))
+    with _ONE_AT_A_TIME:
+        found = panels(key)
+    for panel in found:
+        x = np.stack([_scaled(points[:, k], panel, side) for side, k in enumerate(column)])
+        inside = np.flatnonzero(left & (abs(x) <= 1.0).all(axis=0))
+        if inside.size:
+            _answer_points(key, panel, np.ascontiguousarray(x[:, inside]), inside, answer)
+            left[inside] = False
+    return left | answer.missed
+
+
 def _scaled(values, panel, side):
     """Positions from -1 to 1; at an end rounding may leave it by what the bounds allow for."""
     x = (values - panel.middle[side]) / panel.radius[side]
@@ -165,6 +197,21 @@ def _answer(key, panel, x, y, places, answer):
     near = np.concatenate([_nearest(x, n1), _nearest(y, n2)])
     characteristic.answer(
         panel.series, panel.doubts, np.ascontiguousarray(x), table, near, panel.starts, np.ascontiguousarray(places),
+        key.system.n, key.paired, np.array(key.asked), key.rtol, answer.floats, answer.signs,
+        answer.verdict, answer.crossing, answer.missed,
+    )  # fmt: skip
+
+
+def _answer_points(key, panel, x, places, answer):
+    """Answer the points of a panel at x (2, N), each between -1 and 1."""
+    n1, K = len(panel.series), len(panel.doubts)
+    n2 = panel.series.shape[1] // K
+    near = np.stack([_nearest(x[0], n1), _nearest(x[1], n2)])
+    # terms beyond these, of all n2 series, are a tenth of the bound at most
+    rest = np.cumsum(abs(panel.series[::-1]), axis=0)[::-1].reshape(n1, K, n2)
+    terms = (rest > 0.1 * panel.doubts[:, None] / n2).sum(axis=0)
+    characteristic.answer_points(
+        panel.series, terms, 1.1 * panel.doubts, x, near, panel.starts, places,
         key.system.n, key.paired, np.array(key.asked), key.rtol, answer.floats, answer.signs,
         answer.verdict, answer.crossing, answer.missed,
     )  # fmt: skip
@@ -254,17 +301,24 @@ def _degrees(key, middle, radius, budget):
 def _coefficients(key, middle, radius, x):
     """Coefficients (N, K) of the polynomial at x (N, sides) on a panel, and their bounds; None if there are none."""
     points = key.points(*(m + r * x[:, k] for k, (m, r) in enumerate(zip(middle, radius, strict=True))))
-    if not key.system.smooth(points[0]):
+    return at_points(key.system, key.structure, points)
+
+
+def at_points(system, structure, points):
+    """Coefficients (N, K) of the polynomial at the points (N, parameters), and their bounds; None where no series
+    serves.
+    """
+    if not system.smooth(points[0]):
         return None
     with np.errstate(all="ignore"):
-        own = monodromy.Points(key.system, points)
+        own = monodromy.Points(system, points)
         if not own.valid.all() or len(own.groups) != 1 or not all(p.analytic for p in own.groups[0][1]):
             return None
-        every, n = np.arange(len(points)), key.system.n
-        out = np.empty((2, len(points), n // 2 * (2 if key.structure == "symplectic" else 1) if key.paired else n))
+        every, n, paired = np.arange(len(points)), system.n, structure != "none"
+        out = np.empty((2, len(points), n // 2 * (2 if structure == "symplectic" else 1) if paired else n))
 
         def finish(some, matrices, scale, *steps_of):
-            out[:, some] = coefficients(matrices.M, matrices.E, scale, key.structure, steps_of)
+            out[:, some] = coefficients(matrices.M, matrices.E, scale, structure, steps_of)
 
         monodromy.solve(own, monodromy.method_of("auto"), BEST, np.ones(len(points)), every, finish)
     return out if np.isfinite(out).all() else None

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from survey import measures
-from survey.kernels.floquet import steps
+from survey.kernels.floquet import sizes, steps
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.measures.floquet import probing
 
@@ -23,7 +23,6 @@ RESOLVED = 1e-12  # relative to the largest Chebyshev coefficient: smaller ones 
 BY_RATE = 0.6  # what a step may span of 1 / rate, relative to the reach
 DIGITS = 48  # bits of the ends of steps
 GROWTH = 1.5  # steps, from rung to rung
-SWEEPS = 3  # of balancing
 CALL_WORK = 4_000_000  # keeps a kernel call below about a second: steps n^2
 MOST_STEPS = 100_000  # of a point
 
@@ -49,26 +48,26 @@ class Points:
     def _measure(self, own, programs):
         """Norm and noise of A on each piece of the points `own`, and the units of their states."""
         self.rough[own] = False
-        largest = np.zeros((len(own), self.n, self.n))
-        spread = []
+        points, n, N = self.points[own], self.n, len(own)
+        largest, scale, sampled = np.zeros((N, n, n)), np.empty((N, n)), []
         for k, program in enumerate(programs):
+            edges = self.edges[own[:1]] if self.system.same_ranges else self.edges[own]
+            t = edges[:, k, None] + (edges[:, k + 1] - edges[:, k])[:, None] * TIMES
+            numbers, A, E = program.numbers(points), np.empty((N, TIMES.size, n, n)), np.empty((N, n, n))
+            sizes.samples(*program.sampled(numbers, t), *numbers, A, E, largest)
+            sampled.append((numbers, A, E))
+        sizes.balance(largest, scale)
+        for k, (numbers, A, E) in enumerate(sampled):
             low, high = self.edges[own, k, None], self.edges[own, k + 1, None]
-            numbers = program.numbers(self.points[own])
-            A, E = program.at(self.points[own], low + (high - low) * TIMES, self.n, numbers)
-            largest = np.maximum(largest, abs(A).max(axis=1))
-            spread.append((numbers, A, E.max(axis=1)))
-        scale = balanced(largest)
-        ratio = scale[:, None, :] / scale[:, :, None]
-        for k, (numbers, A, errors) in enumerate(spread):
-            A = A * ratio[:, None]
-            low, high = self.edges[own, k, None], self.edges[own, k + 1, None]
+            size, rate, noise = np.empty((3, N))
+            sizes.measure(A, E, scale, WEIGHTS, TRANSFORM, RESOLVED, size, rate, noise)
             length = (high - low)[:, 0]
-            rate = probing.combined(rates(A), programs[k], numbers, low, high, ratio)
+            rate = probing.combined(rate, programs[k], numbers, low, high, scale)
             self.rate[own, k] = rate / np.where(length > 0, length, 1.0)
-            self.size[own, k] = np.where(np.isnan(rate), np.nan, abs(A).sum(axis=-1).max(axis=(1, 2)))
-            self.noise[own, k] = 2.0 * (errors * ratio).sum(axis=-1).max(axis=-1)
+            self.size[own, k] = np.where(np.isnan(rate), np.nan, size)
+            self.noise[own, k] = noise
         self.scale[own] = scale
-        self.groups.append((own, programs, [numbers[0] for numbers, _sizes, _errors in spread]))
+        self.groups.append((own, programs, [numbers[0] for numbers, _A, _E in sampled]))
 
     def steps(self, reach, factor, those):
         """Numbers of steps (K, P) of some points, `factor` (K) times what norm and rate ask for."""
@@ -79,42 +78,10 @@ class Points:
         return np.where(length > 0, np.clip(np.nan_to_num(count, nan=1.0), 1, MOST_STEPS), 0).astype(np.int64)
 
 
-def rates(A):
-    """How fast A (N, 12, n, n) at TIMES varies on a piece of length 1 (N): 1 / distance of a singularity, or frequency.
-
-    The largest k / (1 + ln(max |c| / |c_k|)) of its Chebyshev coefficients c_k, twice (see `hill.user_equation`).
-    """
-    N, times, n, _ = A.shape
-    one, c = np.zeros((times, N)), np.zeros((times, N))
-    for i in range(n):
-        for j in range(n):
-            one += WEIGHTS[(i * n + j) % 64] * A[:, :, i, j].T
-    for k in range(times):
-        for j in range(times):
-            c[k] += TRANSFORM[k, j] * one[j]
-    with np.errstate(all="ignore"):
-        c = abs(c)
-        share = c / c.max(axis=0)
-        rate = np.arange(times)[:, None] / (1.0 - np.log(share))
-        return 2.0 * np.where(share > RESOLVED, rate, 0.0).max(axis=0)
-
-
 def balanced(matrices):
     """Units of the states (N, n), powers of 2, in which rows and columns of |A| (N, n, n) are of one size (Osborne)."""
-    work, scale = matrices.copy(), np.ones(matrices.shape[:2])
-    n = matrices.shape[1]
-    diagonal = np.arange(n)
-    work[:, diagonal, diagonal] = 0.0
-    with np.errstate(all="ignore"):
-        for _ in range(SWEEPS):
-            for i in range(n):
-                row, column = work[:, i].sum(axis=1), work[:, :, i].sum(axis=1)
-                power = np.rint(0.5 * np.log2(row / column))
-                power = np.where(np.isfinite(power), np.clip(power, -500, 500), 0.0)
-                factor = np.exp2(power)
-                scale[:, i] *= factor
-                work[:, i] /= factor[:, None]
-                work[:, :, i] *= factor[:, None]
+    scale = np.empty(matrices.shape[:2])
+    sizes.balance(np.array(matrices, order="C"), scale)
     return scale
 
 

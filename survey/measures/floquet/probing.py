@@ -37,12 +37,13 @@ def suspects(program):
     return [int(place) for place in program.used if visit(int(place)) > SIMPLE]
 
 
-def rates(program, numbers, low, high, ratio, number=NUMBER):
-    """As `monodromy.rates`, of each suspect between `low` and `high` (N, 1): (suspects, N), NaN where not finite.
-
-    `ratio` (N, n, n): what entries of A are multiplied by in balanced units.
+def rates(program, numbers, low, high, scale, number=NUMBER):
+    """As `kernels.floquet.sizes.measure`, of each suspect between `low` and `high` (N, 1): (suspects, N), NaN where not
+    finite. `scale` (N, n) are the units of the states that balance A.
     """
     places = suspects(program)
+    if not places:
+        return np.zeros((0, len(low)))
     t = low + (high - low) * (0.5 - 0.5 * np.cos(np.pi * (np.arange(number) + 0.5) / number))
     found = np.zeros((len(places), len(low)))
     for k, (values, bars) in enumerate(_values(program, numbers, t, places)):
@@ -50,7 +51,8 @@ def rates(program, numbers, low, high, ratio, number=NUMBER):
         terms = program.terms[program.terms[:, pg.BASIS] == places[k]]
         with np.errstate(all="ignore"):
             share = c / c.max(axis=1, keepdims=True)
-            entries = abs(numbers[0][:, terms[:, pg.NUMBER]] * ratio[:, terms[:, pg.ROW], terms[:, pg.COLUMN]])
+            ratio = scale[:, terms[:, pg.COLUMN]] / scale[:, terms[:, pg.ROW]]
+            entries = abs(numbers[0][:, terms[:, pg.NUMBER]] * ratio)
             counts = (share > RESOLVED) & (c > bars.max(axis=1, keepdims=True))
             counts &= c * entries.max(axis=1, keepdims=True) * (high - low) > HARMLESS
             rate = 2.0 * np.where(counts, np.arange(number) / (1.0 - np.log(share)), 0.0).max(axis=1)
@@ -68,10 +70,10 @@ def spikes(points):
     """Where far more samples show a spike than those of a run (N; NaN: nowhere), of `monodromy.Points`."""
     found = np.full(len(points.points), np.nan)
     for own, programs, _numbers in points.groups:
-        ratio = points.scale[own][:, None, :] / points.scale[own][:, :, None]
+        scale = points.scale[own]
         for piece, program in enumerate(programs):
             given = program.numbers(points.points[own]), *(points.edges[own, k, None] for k in (piece, piece + 1))
-            one, fine = (rates(program, *given, ratio, number) for number in (NUMBER, CHECKED))
+            one, fine = (rates(program, *given, scale, number) for number in (NUMBER, CHECKED))
             t = given[1] + (given[2] - given[1]) * (np.arange(CHECKED) + 0.5) / CHECKED
             for k, (values, _bars) in enumerate(_values(program, given[0], t, suspects(program))):
                 hidden = np.flatnonzero(fine[k] > SEEN * np.maximum(one[k], 2.0))

@@ -83,7 +83,8 @@ def assess(matrices, structure, rtol, asked, period=None):
     found.floats[4 * n], found.floats[4 * n + 1] = value, bar
     lost = ~np.isfinite(found.floats).all(axis=0)
     with np.errstate(invalid="ignore"):
-        wide = ~(bars <= rtol * (1 + abs(centre))).all(axis=1)
+        least = np.where(real, abs(centre.real), np.minimum(abs(centre.real), abs(centre.imag)))
+        wide = ~(bars <= rtol * (1 + least)).all(axis=1)
         far = ~(bar <= rtol * (1 + value))
         rough = ~(E <= rtol * (1 + abs(M))).all(axis=(1, 2))
     found.missed = lost | ((found.verdict == UNDECIDED) & ("verdict" in asked))
@@ -113,11 +114,11 @@ def wide_exponents(answer, period, rtol):
         return off > rtol * (1 + abs(found))
 
 
-def solve(system, structure, points, method, rtol, wanted, lines=None):
+def solve(system, structure, points, method, rtol, wanted, lines=None, ranges=None):
     """The wanted outputs of the points (..., parameters), each with `_error` if it is a float, and `status`.
 
     `lines`: of parameters that have an axis of a map of their own, {number of the parameter: (points of the axis,
-    least, greatest)}.
+    least, greatest)}; `ranges`: where no parameter has one, of those that vary from point to point.
     """
     n, shape = system.n, points.shape[:-1]
     flat = points.reshape(-1, points.shape[-1])
@@ -126,6 +127,11 @@ def solve(system, structure, points, method, rtol, wanted, lines=None):
     period = system.periods(flat) if wanted & {"period", "exponent"} else None
     if method == "auto" and dense.serves(system, structure, wanted, lines or {}):
         open_ = dense.solve(system, structure, points, rtol, wanted, lines, answer)
+        if "exponent" in wanted:
+            open_ |= wide_exponents(answer, period, rtol)
+        left = np.flatnonzero(open_)
+    elif method == "auto" and dense.serves_scattered(system, structure, wanted, ranges or {}):
+        open_ = dense.scattered(system, structure, flat, rtol, wanted, ranges, answer)
         if "exponent" in wanted:
             open_ |= wide_exponents(answer, period, rtol)
         left = np.flatnonzero(open_)

@@ -47,10 +47,14 @@ class System:
     def _lifted(self):
         return {name: trace.lifted(function) for name, function in self.matrices.items()}
 
+    @property
+    def same_ranges(self):
+        """Are the period and the breaks those of all points?"""
+        return not callable(self.period) and not callable(self.breaks)
+
     def ranges(self, points):
         """Period (N) and the edges of the pieces (N, P + 1), the last one repeated where a point has fewer."""
-        vary = callable(self.period) or callable(self.breaks)
-        each = points if vary else points[:1]
+        each = points[:1] if self.same_ranges else points
         period = self.periods(each)
         if not callable(self.breaks) and not np.size(self.breaks):
             period = np.broadcast_to(period, len(points)).copy()

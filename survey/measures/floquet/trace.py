@@ -689,6 +689,19 @@ class Program:
                     E[:, :, i, j] += len(self.terms) * ROUNDOFF_UP * abs(x * y)
         return A, E
 
+    def sampled(self, numbers, t):
+        """(terms, values, error bounds): the terms with their basis functions numbered from 0, and these functions
+        (B, N, m) at times t (N, m); where they depend on t alone t may be (1, m), and N is 1.
+        """
+        found = self.series(numbers, t, self.used)
+        wide = max((len(values) for values, _bars in found.values()), default=1)
+        out = np.empty((2, len(self.used), wide, t.shape[1]))
+        for k, place in enumerate(self.used):
+            out[0, k], out[1, k] = found[place]
+        terms = self.terms.copy()
+        terms[:, 0] = np.searchsorted(self.used, terms[:, 0])
+        return terms, *out
+
     def holds(self, points, low, high):
         """Do the guards decide for the points (N) as they did for the example? 1 yes, 0 no, -1: not within (low, high).
 

@@ -111,7 +111,9 @@ def test_smooth_systems_cost_nothing_more():
         assert len(probing.suspects(program)) == suspected
         values, low = program.at(point, 2 * math.pi * monodromy.TIMES[None], 2)[0], np.zeros((1, 1))
         ratio = points.scale[:, None, :] / points.scale[:, :, None]
-        few = monodromy.rates(values * ratio[:, None])
-        assert points.rate[0, 0] == few[0] / (2 * math.pi)
-        many = probing.rates(program, program.numbers(point), low, low + 2 * math.pi, ratio)
+        one = (values * ratio[:, None] * monodromy.WEIGHTS[:4].reshape(2, 2)).sum(axis=(2, 3))[0]
+        c = abs(monodromy.TRANSFORM @ one)
+        few = 2.0 * max(k / (1.0 - math.log(c[k] / c.max())) for k in np.flatnonzero(c > 1e-12 * c.max()))
+        assert points.rate[0, 0] == pytest.approx(few / (2 * math.pi), rel=1e-9)
+        many = probing.rates(program, program.numbers(point), low, low + 2 * math.pi, points.scale)
         assert (many <= probing.SEEN * few).all()

@@ -7,8 +7,8 @@ rest of the half period follows from rho -> -rho there. Taylor series of order 3
 
 import numpy as np
 
-from attack.compiled import inline, kernel
-from attack.double import (
+from survey.truth.compiled import inline, kernel
+from survey.truth.double import (
     HALF_PI_PARTS,
     add,
     conv,

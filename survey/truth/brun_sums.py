@@ -13,8 +13,8 @@ like exp(-n).
 
 import numpy as np
 
-from attack.compiled import inline, kernel
-from attack.double import PI, add, div, mean, mul, neg, root, sine_cosine, sub, times
+from survey.truth.compiled import inline, kernel
+from survey.truth.double import PI, add, div, mean, mul, neg, root, sine_cosine, sub, times
 
 MOST = 4096
 COLUMNS = 17

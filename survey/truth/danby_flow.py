@@ -7,8 +7,8 @@ trace and the sum of its principal minors of order two are a and b, by no other 
 
 import numpy as np
 
-from attack.compiled import kernel
-from attack.double import PI, add, conv, div, get, horner, mul, neg, put, reach, root, sine_cosine, sub, times
+from survey.truth.compiled import kernel
+from survey.truth.double import PI, add, conv, div, get, horner, mul, neg, put, reach, root, sine_cosine, sub, times
 
 TERMS = 33
 TINY = 1e-31

@@ -11,7 +11,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from attack.compiled import inline
+from survey.truth.compiled import inline
 
 PI = (3.141592653589793, 1.2246467991473532e-16)
 HALF_PI_PARTS = (1.5707963267948966, 6.123233995736766e-17, -1.4973849048591833e-33)

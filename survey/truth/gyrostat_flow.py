@@ -6,8 +6,8 @@ it. Parameters are scaled by powers of two, exactly (symmetry S5), so that no se
 
 import numpy as np
 
-from attack.compiled import inline, kernel
-from attack.double import add, conv, div, get, horner, neg, put, reach, sine_cosine, slope, sub, times
+from survey.truth.compiled import inline, kernel
+from survey.truth.double import add, conv, div, get, horner, neg, put, reach, sine_cosine, slope, sub, times
 
 TERMS = 27
 TINY = 1e-32
