@@ -34,6 +34,7 @@ import numpy as np
 
 from survey import methods
 from survey.errors import BadInput
+from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.nutation import brun, brun_lanes
 from survey.kernels.nutation import wells as nu
 from survey.measures.nutation import derived, multiprecision, separatrix, unsettled
@@ -114,6 +115,8 @@ OUTPUTS = (
     *_outputs(_SCALED, ("well",)),
     Output("separatrix_distance", "L less its value on the separatrix at the same p_psi, p_phi, over |k|", r"\Delta l",
            applies="where these momenta have a separatrix (nearer than 1e38): negative in a well, positive outside"),
+    Output("saddle_growth", "growth rate of the unstable regular precession with the same p_psi, p_phi", r"\Lambda",
+           applies="where there is one that float64 tells from a stable one beside it", on_request=True),
     Output("wells", "number of wells of motion at these integrals", integer=True, applies="off separatrices"),
     Output("verdict", "what the motion is", flags=_VERDICTS, when=_STATE),
     Output("verdict", "what the motion is, the last of these that a well holds", flags=_VERDICTS, when=_SCALED),
@@ -148,7 +151,24 @@ def solve(point, request):
     if "t" not in point:
         unsettled.settle(out, _ordered(given), solver, valid, request)
     out |= derived.solve(out, request.variables)
+    if "saddle_growth" in request.variables:
+        out |= _saddle_growth(given, out["status"], request)
     return {name: _back(block, values) for name, values in out.items()}
+
+
+def _saddle_growth(given, code, request):
+    """The output of that name, where the status `code` is ok."""
+    with np.errstate(all="ignore"):
+        if "l" in given:
+            value, bar = separatrix.growth(given["alpha"], given["beta"], np.float64(request.options["sign"]))
+        else:
+            k = given["epsilon"] * given["A"] * (given["A"] - given["C"])
+            size = np.sqrt(abs(k))
+            value, bar = separatrix.growth(given["p_phi"] / size, given["p_psi"] / size, np.sign(k))
+            unit = size / given["A"]
+            value, bar = value * unit, (bar + 8 * ROUNDOFF * value) * unit
+    value, bar = (np.where(code == OK, x if x.ndim == code.ndim else x[:, None], np.nan) for x in (value, bar))
+    return {"saddle_growth": value, "saddle_growth_error": bar}
 
 
 def _ordered(given):
@@ -302,11 +322,11 @@ def trajectory(point, answer, options, time=None):
 
 def _homoclinic(point, sign, time):
     """The Trajectory of the motion that leaves an unstable precession and returns, furthest from it at t = 0."""
-    saddles = separatrix.saddles(point["alpha"], point["beta"], sign)
-    if not saddles or abs(point["alpha"]) == abs(point["beta"]):
+    u, bar = separatrix.saddles(np.array([point["alpha"]]), np.array([point["beta"]]))
+    if sign < 0 or np.isnan(u[0]) or abs(point["alpha"]) == abs(point["beta"]):
         raise BadInput("this separatrix is next to a cusp, or passes a pole: take a point beside it")
     drift = point["alpha"] * (1.0 - point["ratio"]) / point["ratio"]
-    loop = separatrix.Loop(*saddles[0], point["alpha"], point["beta"], sign, drift)
+    loop = separatrix.Loop(u[0], bar[0], point["alpha"], point["beta"], drift)
     end = 12.0 / loop.rate if time is None else time
     t = np.linspace(0.0 if time is not None else -end, end, _MOTION_POINTS)
     return _drawn(t, loop.motion(t), True, 1.0)

@@ -1,6 +1,6 @@
 """Motions on separatrices in closed form: the unstable upright rotation, and the loops that leave a saddle and return.
 
-In units A = |k| = 1, s the sign of k, P = -s (u - u0)^2 (u^2 + 2 u0 u + c): with x = rate t, kappa = s rate^2,
+In units A = k = 1, P = -(u - u0)^2 (u^2 + 2 u0 u + c): with x = rate t, kappa = rate^2,
 
     u = u0 + kappa / D,   D = 2 u0 + sigma sqrt(4 u0^2 + kappa) cosh x,   sigma = +-1 for the two loops
 
@@ -12,12 +12,13 @@ Source: derived in `scenes/brun.md`, from (S2) and (S4).
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
 from survey.kernels.math.roundoff import EPS
 
-SAMPLES = 4001  # at which saddles are looked for
+SAMPLES = 401  # at which saddles are looked for
 BISECTIONS = 60
 
 
@@ -33,27 +34,58 @@ def upright(found, those, times, turning, drift):
     return found
 
 
-def saddles(alpha, beta, sign):
-    """[(u0, its error bound)] of the saddles with these momenta, u0 in (-1/3, 1/3); of k > 0 alone."""
-    if sign < 0:
-        return []
+def saddles(alpha, beta):
+    """u0 (n) in (-1/3, 1/3) of the saddles with these momenta (n), k > 0, and error bounds; NaN where none is found.
 
-    def force(u):
-        return (alpha - beta * u) * (beta - alpha * u) + u * (1.0 - u * u) ** 2
-
-    u = np.linspace(-1.0 / 3.0, 1.0 / 3.0, SAMPLES)
-    up = np.flatnonzero((force(u[:-1]) <= 0.0) & (force(u[1:]) > 0.0))
-    return [_closed_in(force, u[i], u[i + 1], alpha, beta) for i in up]
-
-
-def _closed_in(force, low, high, alpha, beta):
+    There is one at most; one nearer to a minimum than the samples are to one another is not seen.
+    """
+    known = (abs(alpha) < 2.0) & (abs(beta) < 2.0)  # cusps bound the region: its momenta are smaller
+    alpha, beta = np.where(known, alpha, 0.0), np.where(known, beta, 0.0)
+    low = np.full(alpha.shape, np.nan)
+    nodes = np.linspace(-1.0 / 3.0, 1.0 / 3.0, SAMPLES)
+    before = _force(nodes[0], alpha, beta)
+    for one, other in pairwise(nodes):
+        after = _force(other, alpha, beta)
+        low = np.where((before <= 0.0) & (after > 0.0) & known, one, low)
+        before = after
+    high = low + nodes[1] - nodes[0]
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if force(middle) <= 0.0 else (low, middle)
+        below = _force(middle, alpha, beta) <= 0.0
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
     u = 0.5 * (low + high)
     slope = -(alpha**2 + beta**2) + 2.0 * alpha * beta * u + (1.0 - u * u) * (1.0 - 5.0 * u * u)
     noise = 8.0 * EPS * ((abs(alpha) + abs(beta)) ** 2 + abs(u))
-    return u, noise / abs(slope) + EPS
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return u, noise / abs(slope) + EPS
+
+
+def _force(u, alpha, beta):
+    """F of the mathematics page, which is an increasing zero at a saddle."""
+    return (alpha - beta * u) * (beta - alpha * u) + u * (1.0 - u * u) ** 2
+
+
+def _square(u, alpha, beta, sign):
+    """rate^2 = P''(u) / 2 at a double root u, with L from P(u) = 0."""
+    level = (alpha**2 + beta**2 - 2.0 * alpha * beta * u) / (1.0 - u * u) - sign * u * u
+    return -6.0 * sign * u * u + sign - level
+
+
+def growth(alpha, beta, sign):
+    """Growth rates (n) of the unstable precessions with these momenta, signs of k (n), and bounds; NaN: there is none.
+
+    For k < 0 those are upright rotations, alpha = +-beta, and the rate is sqrt(4 - alpha^2).
+    """
+    u, bar = saddles(alpha, beta)
+    u = np.where(sign > 0, u, np.nan)
+    upright = (sign < 0) & (abs(alpha) == abs(beta)) & (abs(alpha) < 2.0)
+    square = np.where(upright, (2.0 - alpha) * (2.0 + alpha), _square(u, alpha, beta, 1.0))
+    # to first order the energy of the saddle does not depend on its place
+    off = np.where(upright, 0.0, 12.0 * (abs(u) + bar) * bar) + 32.0 * EPS * (1.0 + alpha**2 + beta**2)
+    with np.errstate(invalid="ignore"):
+        clear = square > 2.0 * off
+        value = np.where(clear, np.sqrt(square), np.nan)
+        return value, np.where(clear, value - np.sqrt(square - off) + 4.0 * EPS * value, np.nan)
 
 
 @dataclass(frozen=True)
@@ -67,15 +99,12 @@ class Loop:
     bar: float
     alpha: float
     beta: float
-    sign: int
     drift: float
 
     @cached_property
     def kappa(self):
-        """rate^2 = P''(u0) / 2, with L from P(u0) = 0."""
-        u, a, b = self.u0, self.alpha, self.beta
-        level = (a * a + b * b - 2.0 * a * b * u) / (1.0 - u * u) - self.sign * u * u
-        return -6.0 * self.sign * u * u + self.sign - level
+        """rate^2."""
+        return _square(self.u0, self.alpha, self.beta, 1.0)
 
     @property
     def rate(self):
@@ -84,7 +113,7 @@ class Loop:
 
     @cached_property
     def _root(self):
-        return np.sqrt(4.0 * self.u0**2 + self.sign * self.kappa)
+        return np.sqrt(4.0 * self.u0**2 + self.kappa)
 
     @cached_property
     def side(self):
@@ -95,7 +124,7 @@ class Loop:
         """{name: values, name_error: bars} of u, psi, phi at times t (m)."""
         x = np.minimum(abs(t) * self.rate, 700.0)
         D = 2.0 * self.u0 + self.side * self._root * np.cosh(x)
-        u = self.u0 + self.kappa * self.sign / D
+        u = self.u0 + self.kappa / D
         minus, plus = (self._integral(end, t) for end in (1.0, -1.0))
         # psi' = ((b - a) / (1 - u) + (b + a) / (1 + u)) / 2
         one, two = 0.5 * (self.beta - self.alpha) * minus, -0.5 * (self.beta + self.alpha) * plus
@@ -112,7 +141,7 @@ class Loop:
 
     def _integral(self, end, t):
         """The integral of 1 / (end - u) from 0 to t."""
-        away, kappa = end - self.u0, self.kappa * self.sign
+        away, kappa = end - self.u0, self.kappa
         p, q = 2.0 * self.u0 * away - kappa, self.side * self._root * away
         # integral of dx / (p + q cosh x) from 0 to x, |q| > |p| as the loop does not reach the pole
         y = np.tanh(0.5 * t * self.rate)
