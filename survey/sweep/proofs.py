@@ -21,7 +21,7 @@ from survey.sweep import dispatch
 CODES = {"undecided": -1, "unstable": 0, "stable": 1}
 LABELS = ("unstable", "stable")
 DEEPEST = 20  # halvings of the rectangle
-START = 3  # of them, to make the parts that are proved one by one
+START = 2  # of them, to make the parts that are proved one by one
 FRACTION = 1e-3  # of the width of a cell: what the polynomials may leave out, in units of the factors
 
 
