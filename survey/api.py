@@ -207,6 +207,7 @@ def _as_list(variables: Any) -> list[Any]:
 
 def _labelled(key: str, value: Any) -> xr.DataArray:
     """The parameter as a float64 DataArray."""
+    given = value
     if isinstance(value, xr.Variable):
         value = xr.DataArray(value)
     if not isinstance(value, xr.DataArray):
@@ -217,7 +218,7 @@ def _labelled(key: str, value: Any) -> xr.DataArray:
             )
         value = xr.DataArray(array, dims=(key,) if array.ndim else ())
     if value.dtype.kind not in "iuf":
-        raise _not_real(key, value.values)
+        raise _not_real(key, value.values if isinstance(given, xr.DataArray) else given)
     if value.size == 0:
         raise BadInput(f"{short(key, 40)}: an empty array has no points; give at least one value")
     return value.astype(float) if value.chunks else value.copy(data=np.array(value.values, dtype=float))

@@ -164,6 +164,19 @@ class Point:
             return "the values in the file do not belong to this scene"
 
     @property
+    def python(self):
+        """The Python that solves this point again."""
+        ds = self.dataset
+        given = {n: x for n, x in self.parameters.items() if "domain: " in str(ds[n].attrs.get("comment"))}
+        given |= options_of(ds)
+        given |= {"method": ds.attrs["method"]} if ds.attrs.get("method", "auto") != "auto" else {}
+        given |= {"rtol": float(ds.attrs["rtol"])} if "rtol" in ds.attrs else {}
+        words = "".join(f", {name}={value!r}" for name, value in given.items() if name.isidentifier())
+        made = "scene_hash" in ds.attrs and not str(ds.attrs["scene"]).endswith(".py")  # by survey.hill and its kin
+        scene = "scene" if made else repr(ds.attrs["scene"])
+        return f"import survey\n\npoint = survey.evaluate({scene}{words}).survey.point()\nprint(point)\n"
+
+    @property
     def margin(self):
         """The nearest boundary in each parameter, in words; "" where none is known, or finding it takes seconds."""
         try:

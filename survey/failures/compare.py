@@ -93,8 +93,9 @@ def judged(plane, answer, rtol):
             off = np.abs((said - value) - low).astype(float)
             known = np.isfinite(off) & np.isfinite(np.broadcast_to(np.asarray(doubt, float), off.shape))
             over = np.where(known, np.maximum(off - doubt, 0.0), 0.0)
-            relative = np.where(known, off / (1.0 + np.abs(np.asarray(value, float))), np.nan)
-            checked |= _any(known & ((doubt <= bar) | (off == 0)))
+            sharp = known & ((doubt <= bar) | (off == 0) | (off > doubt))
+            relative = np.where(sharp, off / (1.0 + np.abs(np.asarray(value, float))), np.nan)
+            checked |= _any(sharp)
             ratio = np.maximum(ratio, _most(np.where(over > 0.0, over / bar, 0.0)))
             error = np.fmax(error, _most(relative))
     lie |= ratio > 1.0

@@ -37,7 +37,9 @@ def draw(planes, results, path):
         Patch(facecolor="white", edgecolor="black", hatch="////", label=f"its error bar misses rtol = {RTOL:g}"),
         Patch(facecolor="black", label="a lie: beyond its error bar"),
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=8)
+    if any(j is not None and j.unchecked.any() for of in results for _, j in of):
+        handles.append(Patch(facecolor="white", edgecolor="black", label="the truth is no sharper"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False, fontsize=8)
     figure.savefig(path, dpi=130)
     plt.close(figure)
 
@@ -51,8 +53,10 @@ def _panel(ax, found, method, norm):
         ax.text(0.5, 0.5, words, transform=ax.transAxes, ha="center", va="center", fontsize=7)
         return None
     look = {"origin": "lower", "aspect": "auto", "interpolation": "nearest"}
-    error = np.where(j.answered & np.isnan(j.error), 1e-17, j.error)  # an answer without a float: its flags are checked
+    error = np.where(j.answered & np.isnan(j.error) & ~j.unchecked, 1e-17, j.error)  # flags alone, which are right
     shown = ax.imshow(np.log10(np.maximum(error, 1e-30)), norm=norm, cmap="viridis", **look)
+    if j.unchecked.any():
+        ax.imshow(np.where(j.unchecked, 1.0, np.nan), cmap=ListedColormap(["white"]), **look)
     if j.missed.any():
         wide = np.pad(j.missed.astype(float), 1, mode="edge")
         at = [np.arange(-1, size + 1) for size in (j.missed.shape[1], j.missed.shape[0])]

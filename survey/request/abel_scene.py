@@ -91,7 +91,7 @@ class AbelScene(FunctionScene):
         names = tuple(p.name for p in self.own)
         if question in ("fate", "portrait"):
             measure = blocks.fates if question == "fate" else blocks.portraits
-            return measure(point, names, self.flows, method, request.rtol)
+            return measure(point, names, self.flows, method, request)
         names = (*names, "phi0", "w0")
         given, last, back = blocks.dense(point, names, {"trajectory": "t", "abel": "phi"}[question])
         rows = solution.rows(self.flows(given[:, :-2]), given[:, -2], given[:, -1])

@@ -245,7 +245,7 @@ def solve(point, request):
         return _fates_on_separatrices(point, request, method)
     if question in ("fate", "portrait"):
         answers = blocks.fates if question == "fate" else blocks.portraits
-        return answers(point, _SYSTEM, np.asarray, method, request.rtol)
+        return answers(point, _SYSTEM, np.asarray, method, request)
     if "separatrix" in request.options:
         return _separatrix(point, request, question)
     measure, start = auto if request.method == "auto" else solution, (*_SYSTEM, "phi0", "w0")

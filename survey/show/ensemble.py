@@ -42,7 +42,7 @@ def draw_ensemble(axes, ds, name, paper, asked):
         shown = np.ma.masked_invalid(np.where(lost | np.isin(values, list(words)), np.nan, values))
         colours = colours_of_numbers(shown, variable, asked, fill_of(variable) is not None)
         drawn = axes.scatter(x.values, y.values, SIZE, shown, **colours)
-        axes.figure.colorbar(drawn, ax=axes, label=label_of(variable))
+        axes.figure.colorbar(drawn, ax=axes, label=label_of(variable, WIDE))
         handles = []
         for code, text in words.items():
             here = (values == code) & ~lost
@@ -52,6 +52,6 @@ def draw_ensemble(axes, ds, name, paper, asked):
     if bad.any():
         axes.plot(x.values[bad], y.values[bad], "x", color="#999999", ms=4)
         handles.append(Patch(color="#999999", label=f"no answer ({int(bad.sum()):,})"))
-    axes.set(xlabel=label_of(x, WIDE), ylabel=label_of(y))
+    axes.set(xlabel=label_of(x, WIDE), ylabel=label_of(y, WIDE))
     if handles:
         add_legend(axes, handles)

@@ -6,8 +6,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from survey import modules, status
-from survey.errors import BadInput
+from survey import status
 from survey.file.labels import fill_of, flag_codes, scene_statuses, words_of
 from survey.file.overview import Overview, Points
 from survey.grid import logarithmic
@@ -55,7 +54,7 @@ def draw_map(axes, ds, variable, state, boundaries, paper, asked):
             few = isinstance(colours.get("norm"), BoundaryNorm)
             ticks = np.unique(shown.compressed()) if few else ticks
             extend = "neither" if few else clipped(shown, *drawn.get_clim())
-            axes.figure.colorbar(drawn, ax=axes, label=label_of(variable), ticks=ticks, extend=extend)
+            axes.figure.colorbar(drawn, ax=axes, label=label_of(variable, WIDE), ticks=ticks, extend=extend)
         if variable.name == EDGED and min(shown.shape) > 1 and shown.count():
             axes.contour(x, y, shown.T, levels=EDGES, colors="black", linewidths=0.6)
         axes.set_facecolor("#dddddd")
@@ -72,7 +71,7 @@ def draw_map(axes, ds, variable, state, boundaries, paper, asked):
         handles += draw_boundaries(axes, in_plane(ds, variable), x, y, gaps)
     if handles:
         add_legend(axes, handles)
-    axes.set(xlabel=label_of(x, WIDE), ylabel=label_of(y))
+    axes.set(xlabel=label_of(x, WIDE), ylabel=label_of(y, WIDE))
     for setting, scale in zip((axes.set_xscale, axes.set_yscale), scales, strict=True):
         if scale == "log":
             setting(scale)
@@ -160,7 +159,7 @@ def colours_of_numbers(shown, variable, asked, whole):
     if str(variable.name).endswith("_error") and not any(asked.get(key) is not None for key in ("vmin", "vmax")):
         low, high = _positive(shown)
         if high > 100.0 * low > 0.0:
-            return {"cmap": _colour_map(asked.get("cmap"), SEQUENTIAL), "norm": LogNorm(low, high)}
+            return {"cmap": asked.get("cmap") or SEQUENTIAL, "norm": LogNorm(low, high)}
     given = {key: asked[key] for key in ("vmin", "vmax") if asked.get(key) is not None}
     if whole and not given and asked.get("cmap") is None:
         few = counts(shown)
@@ -172,14 +171,7 @@ def colours_of_numbers(shown, variable, asked, whole):
     if signed and not given:
         most = max(-low, high)
         limits = {"vmin": -most, "vmax": most}
-    return {"cmap": _colour_map(asked.get("cmap"), DIVERGING if signed else SEQUENTIAL)} | limits
-
-
-def _colour_map(name, default):
-    """The colour map; raises BadInput for an unknown one."""
-    if name is not None and isinstance(name, str) and name not in colormaps:
-        raise BadInput(f"cmap: {modules.unknown('colour map', name, list(colormaps))}")
-    return default if name is None else name
+    return {"cmap": asked.get("cmap") or (DIVERGING if signed else SEQUENTIAL)} | limits
 
 
 def clipped(shown, low, high):

@@ -9,7 +9,7 @@ from mpmath import mp, mpf
 from survey.kernels.libration.coefficients import FORMS, LABELS
 
 DIGITS = 60
-SINGLE = ("omega1", "omega2", "a20", "a11", "a02", "D4", "D6", "M_ray")
+SINGLE = ("omega1", "omega2", "a20", "a11", "a02", "D4", "D6", "M_ray", "discriminant", "det_N", "det_bordered")
 RESONANT = ("0.0242938971420523216662227326885", "0.0135160160224525267555750091159")  # mu1, mu2
 LONG = np.longdouble
 ULP = float(np.finfo(LONG).eps)
@@ -64,7 +64,18 @@ def _known(mu):
             if alpha:
                 beta = w2 - alpha[0] * w1
                 values["M_ray"] = sum(f[n] * alpha[0] ** int(n[0]) * beta ** int(n[2]) for n in LABELS[6:])
+        values["discriminant"] = a11 * a11 - 4 * a20 * a02
+        hessian = mp.matrix(4)
+        for i, j, name in ((0, 1, "110"), (0, 2, "101"), (1, 2, "011")):
+            hessian[i, j] = hessian[j, i] = f[name]
+        for i, (name, w) in enumerate(zip(("200", "020", "002"), (w1, -w2, mpf(1)), strict=True)):
+            hessian[i, i], hessian[i, 3], hessian[3, i] = 2 * f[name], w, w
+        values["det_N"], values["det_bordered"] = mp.det(hessian[:3, :3]), mp.det(hessian)
         pairs = {name: _split(value) for name, value in values.items()}
+        root = mp.sqrt(values["discriminant"])
+        rays = [(-a11 + side * root) / (2 * a20) if a20 else mpf("nan") for side in (1, -1)]
+        pairs["alpha"] = np.array([_split(x) for x in rays]).T
+        pairs["beta"] = np.array([_split(w2 - x * w1) for x in rays]).T
         pairs["c"] = np.array([_split(f[name]) for name in LABELS]).T
         combination = VECTORS[:, 0] * LONG(1) * _long(w1) - VECTORS[:, 1] * _long(w2) + VECTORS[:, 2]
         return pairs, np.abs(combination).min(), 1 if (a02 > 0) == (D4 > 0) else 2
@@ -74,6 +85,7 @@ def truth(given, answer):
     mu = np.asarray(given["mu"], float)
     pairs = {name: np.full((2, mu.size), np.nan) for name in SINGLE}
     pairs["c"] = np.full((2, mu.size, len(LABELS)), np.nan)
+    pairs |= {name: np.full((2, mu.size, 2), np.nan) for name in ("alpha", "beta")}
     near, wrong = np.full(mu.size, np.nan, LONG), np.zeros(mu.size, bool)
     with mp.workdps(DIGITS):
         limit = (1 - mp.sqrt(mpf(23) / 27)) / 2

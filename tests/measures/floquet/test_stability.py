@@ -317,7 +317,7 @@ def test_the_reason_of_a_cluster_is_told():
 
 @pytest.mark.parametrize("power", [-0.5, -1.5])
 def test_a_root_in_a_denominator_has_its_series(power):
-    """The derivative of y = sqrt x is made of 1 / y, which needs y: y'' + a x^power y = 0; two methods."""
+    """The derivative of y = sqrt x is made of 1 / y, which needs y: y'' + a x^power y = 0."""
 
     def A(t, p, out):
         x = 1.2 + math.cos(t) ** 2
