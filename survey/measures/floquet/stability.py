@@ -54,10 +54,10 @@ LADDER = answers.Ladder(1.5 ** np.arange(16), np.arange(16) + 1, None, most=16)
 CHUNK = 65536  # points n^2 that are solved together: bounds the memory
 
 
-def assess(matrices, structure, rtol, asked, period=None):
+def assess(matrices, structure, rtol, asked, period=None, growth=None):
     """The Answers of points from their Matrices; `asked` holds the names of the outputs that are wanted.
 
-    `period` (N) is needed for the accuracy of the exponent.
+    `period` (N) is needed for the accuracy of the exponent; `growth` (2, N), if given, is that of `monodromy.Points`.
     """
     M, E = matrices.M, matrices.E
     N, n = M.shape[:2]
@@ -73,6 +73,8 @@ def assess(matrices, structure, rtol, asked, period=None):
     if signs is not None:
         found.signs[:] = signs.T
     centre, bars = multipliers.symmetric(discs) if paired else (discs.centre, discs.bars)
+    if not paired and growth is not None:
+        centre, bars = multipliers.by_determinant(discs, centre, bars, growth)
     value, bar = multipliers.radius(discs)
     if paired:  # all multipliers are on the circle, exactly
         strong = found.verdict == STABLE
@@ -156,7 +158,8 @@ def _solve_some(system, structure, given, method, rtol, wanted, places, answer, 
         return monodromy.solve(points, method, rtol, LADDER.rungs[rung], where[those], sharp)
 
     def assessed(those, found):
-        return assess(found, structure, rtol, asked, points.period[where[those]])
+        own = where[those]
+        return assess(found, structure, rtol, asked, points.period[own], points.growth[:, own])
 
     if where.size:
         rung = np.zeros(where.size, dtype=np.int64)

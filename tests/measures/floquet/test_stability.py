@@ -313,3 +313,17 @@ def test_multipliers_that_meet_with_one_krein_sign_are_stable(off):
 def test_the_reason_of_a_cluster_is_told():
     ds = survey.evaluate(two_oscillators(1), a=[2.0], q=[0.1], off=0.0)
     assert "Krein signs are the same" in str(ds.survey.point(a=2.0, q=0.1))
+
+
+def test_small_multipliers_beside_huge_ones():
+    """Where Mathieu's solutions grow by 1e4 and more, M tells nothing of what decays; the determinant does."""
+    a, q, c = np.linspace(-30.0, -4.0, 25), np.linspace(0.1, 8.0, 19), 0.3
+    ours = survey.evaluate(mathieu("none"), a=a, q=q, c=c)
+    known = survey.evaluate("mathieu", a=a - c * c, q=q)
+    mu, doubt = known.exponent.values, known.exponent_error.values
+    exact = np.exp(-c * math.pi - mu) * np.sign(known.discriminant.values)
+    off = abs(ours.multiplier_re.values[..., 1] - exact)
+    bar = ours.multiplier_re_error.values[..., 1]
+    assert (off <= bar + abs(exact) * np.expm1(doubt + 1e-14)).all()
+    assert (bar <= 1e-10 * abs(exact)).mean() > 0.95
+    assert np.median(mu) > 6 and ours.attrs["accuracy_missed"] == 0
