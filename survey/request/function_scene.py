@@ -10,7 +10,7 @@ import numpy as np
 from survey.errors import BadInput
 from survey.wording import plain
 
-_KEYS = re.compile(r"\b(PARAMETERS|PERIOD|EVEN|BREAKS|STATES|STRUCTURE|START|CONTINUATION|DAMPING)\b")
+_KEYS = re.compile(r"\b(PARAMETERS|PERIOD|EVEN|BREAKS|STATES|STRUCTURE|CONSERVED|START|CONTINUATION|DAMPING)\b")
 _known = {}  # by hash: a worker process compiles a scene once, for all of its blocks
 
 
