@@ -97,7 +97,7 @@ class FloquetScene(TracedScene):
         return self._called(stability.solve, self._system, self.structure, *given)
 
     def judged(self, values, axes, fixed, M, E):
-        """M and E (N, n, n) without the multiplier of what is conserved, at `values` (N, len(axes)), `fixed` the rest."""
+        """M and E (N, n, n) without the multiplier of what is conserved, at `values` (N, len(axes)) of the axes."""
         if self.conserved is None:
             return M, E
         given = fixed | {name: values[:, k] for k, name in enumerate(axes)}
