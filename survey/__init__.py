@@ -8,6 +8,7 @@
     survey.evaluate(survey.floquet(A, ...), p=1.0)               # your own linear periodic system x' = A(t, p) x
     survey.evaluate(survey.orbit(f, ...), p=1.0)                 # periodic orbits of your own system x' = f(t, x, p)
     survey.edge("satellite", along="rho", near=1.2, k=0.5)       # the boundaries of stability along a parameter
+    survey.Model("map.model")(k=0.5, rho=1.2)                    # a map's series, which answer anywhere: numpy alone
     survey.describe("satellite")                                 # its parameters, outputs and methods, as a table
     survey.scenes()                                              # the scenes and what they answer
     ds = survey.open("results/satellite_prolate.nc")             # open and check a file
@@ -24,7 +25,7 @@ __version__ = "0.1.0"
 
 _HOME = {name: "survey.api" for name in ("run", "evaluate", "open", "describe")}
 _HOME |= {name: "survey.request.user_scene" for name in ("hill", "abel", "floquet", "orbit")}
-_HOME |= {"concat": "survey.analysis.join", "edge": "survey.analysis.edge"}
+_HOME |= {"concat": "survey.analysis.join", "edge": "survey.analysis.edge", "Model": "survey.model.reader"}
 _HOME |= {
     "SurveyError": "survey.errors",
     "BadInput": "survey.errors",

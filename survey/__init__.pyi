@@ -11,6 +11,7 @@ from survey.errors import BadInput as BadInput
 from survey.errors import Damaged as Damaged
 from survey.errors import Stopped as Stopped
 from survey.errors import SurveyError as SurveyError
+from survey.model.reader import Model as Model
 from survey.request.user_scene import abel as abel
 from survey.request.user_scene import floquet as floquet
 from survey.request.user_scene import hill as hill

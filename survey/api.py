@@ -69,7 +69,8 @@ def run(
         raise BadInput("run: this is a dataset, not a workflow; give the path of a workflow file, or a mapping; "
                        "ds.survey.zoom() and survey.evaluate solve further points")  # fmt: skip
     checked = (read if isinstance(workflow, (str, os.PathLike)) else check)(workflow, output=output)
-    if workers is not None and (not isinstance(workers, int) or workers < 1):
+    number: Any = workers
+    if number is not None and (not isinstance(number, int) or number < 1):
         raise BadInput(f"workers = {shown(workers)}: it must be a positive integer, or None for threads")
     if block_timeout is not None and not (is_number(block_timeout) and 0 < block_timeout < np.inf):
         raise BadInput(f"block_timeout = {shown(block_timeout)}: it must be a positive number of seconds, or None")
@@ -206,6 +207,7 @@ def _as_list(variables: Any) -> list[Any]:
 
 def _labelled(key: str, value: Any) -> xr.DataArray:
     """The parameter as a float64 DataArray."""
+    given = value
     if isinstance(value, xr.Variable):
         value = xr.DataArray(value)
     if not isinstance(value, xr.DataArray):
@@ -216,7 +218,7 @@ def _labelled(key: str, value: Any) -> xr.DataArray:
             )
         value = xr.DataArray(array, dims=(key,) if array.ndim else ())
     if value.dtype.kind not in "iuf":
-        raise _not_real(key, value.values)
+        raise _not_real(key, value.values if isinstance(given, xr.DataArray) else given)
     if value.size == 0:
         raise BadInput(f"{short(key, 40)}: an empty array has no points; give at least one value")
     return value.astype(float) if value.chunks else value.copy(data=np.array(value.values, dtype=float))

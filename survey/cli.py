@@ -176,15 +176,35 @@ def prove(workflow, output, overrides, fresh, quiet):
 
 @program.command()
 @click.argument("workflow", type=WORKFLOW)
+@click.option("-o", "--output", metavar="OUT.model", help="The model; by default beside the output, .model.")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Replace a key: solver.rtol=1e-12.")
+@click.option("--proof", metavar="PROVED.nc", help="The proof of this map (survey prove): the model carries it.")
+def model(workflow, output, overrides, proof):
+    """Write the map's series, which answer anywhere with error bars: survey.Model reads them, with numpy alone."""
+    from survey import api
+    from survey.model import build, proved
+    from survey.request.workflow import read
+
+    checked = read(workflow, overrides)
+    path = output or str(checked.path.with_suffix(".model"))
+    size = build.model(checked, path, proved.matching(api.open(proof), checked) if proof else None)
+    err.print(plain(f"wrote {path} ({size:,} bytes); in Python: survey.Model({path!r})"), markup=False)
+    out.print(plain(path), markup=False)
+
+
+@program.command()
+@click.argument("workflow", type=WORKFLOW)
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Replace a key, such as axes.k.num=40.")
 @click.option("-o", "--output", metavar="OUT.nc", help="The netCDF file, instead of the workflow's output.path.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def plan(workflow, overrides, output, as_json):
-    """Points, blocks, bytes, method and estimated time; no kernel is called."""
+    """Points, blocks, size, method and estimated time, by what this machine has needed so far; no kernel is called."""
     from survey.request.workflow import read
     from survey.sweep import plan
 
-    _show(plan.plan(read(workflow, overrides, output)), as_json)
+    planned = plan.plan(read(workflow, overrides, output))
+    numbers = () if as_json else ("bytes", "estimated_seconds")  # of which the size and the time are the words
+    _show({key: value for key, value in planned.items() if key not in numbers}, as_json)
 
 
 @program.command()
@@ -193,7 +213,23 @@ def plan(workflow, overrides, output, as_json):
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the random points.")
 @click.option("--trust-scene", is_flag=True, help=TRUST)
 def verify(path, points, seed, trust_scene):
-    """Check digest, completeness and counts; solve N random points again by another method."""
+    """Check digest, completeness and counts; solve N random points again by another method. Bundles too."""
+    from survey.share import bundle
+
+    if not bundle.is_bundle(path):
+        return _verify(path, points, seed, trust_scene)
+    with bundle.unpacked(path) as folder:
+        complaints, data = bundle.complaints(folder)
+        for complaint in complaints:
+            complain(f"{path}: {complaint}", 3)
+        if complaints:
+            return 3
+        out.print(plain(f"{path}: all files are those that the bundle lists"), markup=False)
+        return _verify(str(data), points, seed, trust_scene)
+
+
+def _verify(path, points, seed, trust_scene):
+    """Verify one netCDF file; the exit code."""
     from survey.file import reading
     from survey.request import trust
 
@@ -304,6 +340,40 @@ def plot(path, output, var, style, width, at):
 
 
 @program.command()
+@click.argument("path", metavar="OUT.nc")
+@click.option("-o", "--output", metavar="OUT.html", help="The page; by default beside the file.")
+@click.option("--at", metavar="NAME=VALUE", multiple=True, help="Show this plane of a map of more axes.")
+@click.option("--trust-scene", is_flag=True, help=TRUST)
+def share(path, output, at, trust_scene):
+    """Write the map as one HTML file that opens anywhere, offline: zoom without end, values with error bars."""
+    from survey import api
+    from survey.share import page
+
+    ds = api.open(path, trust_scene=trust_scene)
+    target = output or f"{path.removesuffix('.nc')}.html"
+    told = page.write(ds, target, dict(part.partition("=")[::2] for part in at))
+    how = "drawn from series, sharp at every scale" if told["series"] else f"of points: {told['why']}"
+    err.print(plain(f"{target}: {told['bytes']:,} bytes, {how}"), markup=False)
+    out.print(plain(target), markup=False)
+
+
+@program.command()
+@click.argument("path", metavar="OUT.nc")
+@click.option("-o", "--output", metavar="OUT.zip", help="The .zip file or folder; by default OUT.zip beside the file.")
+@click.option("--author", default="", metavar="NAME", help="Who computed it, for the description.")
+@click.option("--license", "license_url", default="", metavar="URL", help="The licence of the data.")
+def bundle(path, output, author, license_url):
+    """Write a folder or zip for an archive: data, workflow, scene, pictures, versions, RO-Crate; `verify` checks it."""
+    from survey.share import bundle as bundles
+
+    target = output or f"{path.removesuffix('.nc')}.zip"
+    files = bundles.write(path, target, author, license_url)
+    err.print(plain(f"{target}: {counted(len(files), 'file')}; check it with: survey verify {shlex.quote(target)}"),
+              markup=False)  # fmt: skip
+    out.print(plain(target), markup=False)
+
+
+@program.command()
 @click.argument("paths", metavar="A.nc B.nc...", nargs=-1, required=True)
 @click.option("-o", "--output", metavar="C.nc", required=True, help="The netCDF file to write; it must not exist.")
 def merge(paths, output):
@@ -354,6 +424,18 @@ def precision(scene, peers, output):
     from survey.precision import write
 
     for path in write(scene, output, peers, say=lambda line: err.print(line, markup=False)):
+        out.print(str(path), markup=False)
+
+
+@program.command()
+@click.argument("scene", shell_complete=_scene_names)
+@click.option("--share", type=float, default=1.0, metavar="S", help="Of the points along each axis: below 1 coarser.")
+@click.option("-o", "--output", metavar="DIR", default=".", show_default=True, help="Folder for JSON, page and PNG.")
+def failures(scene, share, output):
+    """Where each method fails: its true error and its error bar over the planes on which it should break."""
+    from survey.failures import write
+
+    for path in write(scene, output, share, say=lambda line: err.print(plain(line), markup=False)):
         out.print(str(path), markup=False)
 
 

@@ -2,16 +2,17 @@
 
     python tests/brun_distances.py
 
-60 digits by `brun_truth` from the exact binary64 numbers of each state; 40 are kept. `floors`: the changes of the
-outputs that half-ulp changes of the seven numbers add up to.
+60 digits by `survey.truth.brun_digits` from the exact binary64 numbers of each state; 40 are kept. `floors`: the
+changes of the outputs that half-ulp changes of the seven numbers add up to.
 """
 
 import json
 from pathlib import Path
 
 import numpy as np
-from brun_truth import NAMES, OUTPUTS, truth
 from mpmath import mp
+
+from survey.truth.brun_digits import NAMES, OUTPUTS, truth
 
 DISTANCES = 10.0 ** -np.arange(1.0, 13.0)
 A, C, EPSILON = 2.0, 1.0, 0.6

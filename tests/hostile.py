@@ -23,6 +23,7 @@ import xarray as xr
 
 import survey
 from survey.errors import SurveyError
+from survey.request import earlier, workflow
 
 matplotlib.use("Agg")
 GOLDEN = Path(__file__).parent / "golden/mathieu.nc"  # it has edges, curves and cells
@@ -307,20 +308,31 @@ def questions(ds, path, solve, draw):
         shown = Map(path)
         return "\n".join(shown.under(shown.read(""), (0, 0))).replace("\n", " ")
 
+    def reused():
+        axes = {"a": {"start": 0.5, "stop": 9.5, "num": 4}, "q": {"start": 0.0, "stop": 5.0, "num": 3}}
+        ours = workflow.check({"scene": "mathieu", "axes": axes}, output=path.parent.parent / "reused.nc")
+        return earlier.find(ours, path)[1]
+
     asked = {
         "repr": lambda: repr(ds.survey),
+        "counts": lambda: repr(ds.survey.counts()),
+        "where": lambda: str(ds.survey.where("stable").sizes),
+        "names": lambda: str(np.unique(ds.survey.names())),
+        "joined": lambda: str(survey.concat([path, GOLDEN]).sizes),
+        "reused": reused,
         "point": lambda: repr(ds.survey.point(**middle())),
         "point's HTML": lambda: ds.survey.point(**middle())._repr_html_(),
         "slice": lambda: str(ds.survey.slice(**dict([next(iter(middle().items()))])).sizes),
         "boundary": lambda: str(ds.survey.boundary().sizes),
         "areas": lambda: str(ds.survey.areas().sizes),
         "compare": lambda: str(ds.survey.compare(ds).sizes),
+        "margin": lambda: str(ds.survey.margin(**middle()).sizes),
         "trajectory": lambda: str(ds.survey.trajectory(figure=False, **middle()).sizes),
         "zoom": zoom,
         "under the pointer": under,
     }
     if not solve and "evil" not in ds.attrs["scene"]:
-        del asked["trajectory"], asked["zoom"]
+        del asked["margin"], asked["trajectory"], asked["zoom"]
     return asked | ({"map": drawn, "page": lambda: page(path)} if draw else {})
 
 

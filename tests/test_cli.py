@@ -13,7 +13,6 @@ import netCDF4
 import pytest
 
 from survey.cli import main
-from survey.kernels import jit
 from survey.request import workflow
 from survey.sweep import plan
 
@@ -89,12 +88,17 @@ def test_no_words_show_the_help(capsys, monkeypatch):
     assert ended.value.code == 0 and "Commands:" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("new", [True, False])
-def test_the_plan_says_what_its_time_leaves_out(small, new, monkeypatch):
-    monkeypatch.setattr(jit, "is_new", lambda: new)
-    answer = plan.plan(workflow.read(small))["not_estimated"]
-    assert "writing the file" in answer and "compiling" in answer
-    assert ("none has been compiled on this machine yet" in answer) == new
+def test_the_plan_says_how_long_in_words_and_names_compiling_apart(small, monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    planned = plan.plan(workflow.read(small))
+    assert planned["time"].startswith("about ") and planned["size"].endswith("bytes")
+    assert planned["compiling"].endswith("s besides, once on this machine")
+    assert [plan.lasting(s) for s in (0.2, 44.0, 400.0, 20000.0)] == [
+        "about 1 s",
+        "about 44 s",
+        "about 6.7 min",
+        "about 5.6 h",
+    ]
 
 
 def test_plan_counts_what_run_does_and_calls_no_kernel(program, small):

@@ -117,7 +117,8 @@ def test_zoom_takes_no_path_from_the_file(folder, monkeypatch):
     path = changed(folder, workflow=text)
     monkeypatch.chdir(folder)
     before = sorted(folder.iterdir())
-    finer = survey.open(path).survey.zoom(a=(0.0, 1.0), q=(0.1, 0.5), num=2)
+    with pytest.warns(UserWarning, match="beyond the map's"):
+        finer = survey.open(path).survey.zoom(a=(0.0, 1.0), q=(0.1, 0.5), num=2)
     assert (
         finer.verdict.shape == (2, 2) and sorted(folder.iterdir()) == before and "owned" not in finer.attrs["workflow"]
     )

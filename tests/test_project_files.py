@@ -54,7 +54,7 @@ def test_the_files_that_others_expect_are_there():
     for name in ("CODE_OF_CONDUCT.md", "ISSUE_TEMPLATE/bug.yml", "ISSUE_TEMPLATE/scene.yml", "CONTRIBUTING.md"):
         assert (ABOUT / name).stat().st_size > 200, name
     hooks = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text())
-    assert {hook["id"] for repo in hooks["repos"] for hook in repo["hooks"]} >= {"ruff", "ruff-format"}
+    assert {hook["id"] for repo in hooks["repos"] for hook in repo["hooks"]} >= {"ruff-check", "ruff-format"}
     for name in ("bug.yml", "scene.yml"):
         form = yaml.safe_load((ABOUT / "ISSUE_TEMPLATE" / name).read_text())
         assert {"name", "description", "body"} <= set(form)

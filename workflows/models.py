@@ -25,7 +25,7 @@ def main():
     words.add_argument("--points", type=int, default=2000, help="random points of each check")
     given = words.parse_args()
     rng = np.random.default_rng(23)
-    rows = [check(given.points, rng) for check in (satellite, gyrostat, brun, libration_elliptic)]
+    rows = [check(given.points, rng) for check in CHECKS]
     path = given.output / "models.md"
     table = "\n".join("| " + " | ".join(row) + " |" for row in rows)
     path.write_text(PAGE.format(points=given.points, rows=table))
@@ -155,6 +155,119 @@ def libration_elliptic(number, rng):
         "`libration_elliptic`", "the elliptic problem about L4", "a and b, over their largest term", number,
         off, full, reduced,
     )  # fmt: skip
+
+
+def gyrostat_body(number, rng):
+    """A w' = (A w + lambda) x w + (B w) x nu + nu x (C nu) + s x nu, nu' = nu x w (1)-(6), of any body."""
+    number = max(number // 20, 20)
+    tensors = {}
+    for name in "ABC":
+        half = rng.uniform(-0.4, 0.4, (3, 3, number))
+        tensors[name] = half + half.swapaxes(0, 1)
+    tensors["A"] = 0.2 * tensors["A"] + np.array([1.0, 1.5, 2.0])[:, None, None] * np.eye(3)[:, :, None]
+    moment, s, w, nu = rng.uniform(-0.5, 0.5, (4, 3, number))
+    nu = nu / np.sqrt((nu * nu).sum(0))
+    body = {f"{name}{key}": along(of[int(key[0]) - 1, int(key[1]) - 1]) for name, of in tensors.items() for key in KEYS}
+    for name, vector in (("lambda", moment), ("s", s), ("omega", w), ("gamma", nu)):
+        body |= {f"{name}{i + 1}": along(vector[i]) for i in range(3)}
+    ds, reduced = timed("gyrostat_body", question="trajectory", t=5.0, **body)
+    inverse = np.linalg.inv(tensors["A"].transpose(2, 0, 1)).transpose(1, 2, 0)
+
+    def by(matrix, vector):
+        return np.einsum("ijn,jn->in", matrix, vector)
+
+    def slope(t, y):
+        w, nu = y[:3], y[3:]
+        torque = np.cross(by(tensors["A"], w) + moment, w, axis=0) + np.cross(by(tensors["B"], w), nu, axis=0)
+        torque = torque + np.cross(nu, by(tensors["C"], nu), axis=0) + np.cross(s, nu, axis=0)
+        return np.concatenate([by(inverse, torque), np.cross(nu, w, axis=0)])
+
+    clock = time.process_time()
+    end = integrate(slope, np.concatenate([w, nu]), np.full(number, 5.0), 400)
+    full = time.process_time() - clock
+    off = np.max([abs(ds[name].values - x) for name, x in zip(BODY, end, strict=True)], axis=0)
+    return row(
+        "`gyrostat_body`", "equations (1)-(6), by another program", "w and nu at t = 5", number, off, full, reduced
+    )
+
+
+def gyrostat_integrable(number, rng):
+    """The flow on the cylinder where b = 0: A11 phi'' = (C33 - C22) sin 2 phi / 2 - C23 cos 2 phi + S2 cos - S3 sin."""
+    number = max(number // 4, 50)
+    a11 = rng.uniform(0.5, 2.0, number)
+    c22, c33, c23, s2, s3 = rng.uniform(-1.0, 1.0, (5, number))
+    phi0, w0 = rng.uniform(0.0, 6.0, number), rng.uniform(3.0, 5.0, number)  # it turns for ever
+    given = {"A11": a11, "C22": c22, "C33": c33, "C23": c23, "S2": s2, "S3": s3, "phi0": phi0, "w0": w0}
+    asked = {"case": "elliptic", "t": 5.0, "variables": ["phi", "w"]} | {name: along(v) for name, v in given.items()}
+    ds, reduced = timed("gyrostat_integrable", **asked)
+
+    def slope(t, y):
+        sin, cos = np.sin(y[0]), np.cos(y[0])
+        bend = (c33 - c22) * sin * cos - c23 * (cos * cos - sin * sin) + s2 * cos - s3 * sin
+        return np.array([y[1], bend / a11])
+
+    clock = time.process_time()
+    end = integrate(slope, np.array([phi0, w0]), np.full(number, 5.0), 400)
+    full = time.process_time() - clock
+    off = np.maximum(abs(ds.phi.values - end[0]), abs(ds.w.values - end[1]))
+    return row(
+        "`gyrostat_integrable`", "the flow on the cylinder", "angle and rate at t = 5", number, off, full, reduced
+    )
+
+
+def mathieu(number, rng):
+    """A pendulum whose support moves up and down: x'' + (a - 2 q cos 2t) sin x = 0, about its rest."""
+    number = max(number // 4, 50)
+    a, q = rng.uniform(0.0, 20.0, number), rng.uniform(0.0, 8.0, number)
+    ds, reduced = timed("mathieu", a=along(a), q=along(q), variables=["discriminant"])
+
+    def slope(t, y):
+        return np.array([y[1], -(a - 2 * q * np.cos(2 * t)) * np.sin(y[0])])
+
+    clock = time.process_time()
+    trace = 0.0
+    for i in (0, 1):
+        y = np.zeros((2, number), complex)
+        y[i] += 1j * TINY
+        trace = trace + integrate(slope, y, np.full(number, np.pi), 600)[i].imag / TINY
+    full = time.process_time() - clock
+    off = abs(trace - ds.discriminant.values) / (1 + abs(trace))
+    return row("`mathieu`", "a pendulum on a moving support", "trace over a period", number, off, full, reduced)
+
+
+def libration(number, rng):
+    """The spatial circular problem about L4: the frequencies of what is small, from the flow over a unit of time."""
+    number = max(number // 4, 50)
+    mu = rng.uniform(1e-3, 0.038, number)
+    ds, reduced = timed("libration", mu=along(mu))
+    point = np.array([0.5 - mu, np.full(number, np.sqrt(0.75)), 0 * mu])
+
+    def slope(t, y):
+        x, v = y[:3], y[3:]
+        pull = 0.0
+        for mass, at in ((1 - mu, -mu), (mu, 1 - mu)):
+            apart = np.array([x[0] - at, x[1], x[2]])
+            pull = pull - mass * apart / (apart * apart).sum(0) ** 1.5
+        return np.concatenate([v, [x[0] + pull[0] + 2 * v[1], x[1] + pull[1] - 2 * v[0], pull[2]]])
+
+    clock = time.process_time()
+    matrix = np.empty((number, 6, 6))
+    for j in range(6):
+        y = np.concatenate([point, 0 * point]).astype(complex)
+        y[j] += 1j * TINY
+        matrix[:, :, j] = (integrate(slope, y, np.ones(number), 200).imag / TINY).T
+    angles = np.sort(np.angle(np.linalg.eigvals(matrix)), axis=1)[:, 3:]
+    full = time.process_time() - clock
+    said = np.sort([ds.omega2.values, ds.omega1.values, np.ones(number)], axis=0).T
+    return row(
+        "`libration`", "the spatial circular problem about L4", "omega1, omega2, 1 (order 2)", number,
+        abs(angles - said).max(axis=1), full, reduced,
+    )  # fmt: skip
+
+
+KEYS = ("11", "22", "33", "12", "23", "31")
+BODY = ("w1", "w2", "w3", "nu1", "nu2", "nu3")
+CHECKS = (satellite, mathieu, gyrostat, gyrostat_body, gyrostat_integrable, brun, libration, libration_elliptic)
 
 
 def along(values):

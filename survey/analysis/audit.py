@@ -14,7 +14,7 @@ from survey.analysis.given import options_at
 from survey.api import evaluate
 from survey.errors import Damaged
 from survey.file import schema
-from survey.file.labels import outputs_of
+from survey.file.labels import as_stored, outputs_of
 from survey.measures.hill.edges import FACTORS
 from survey.request import user_scene
 from survey.request.checks import methods_of
@@ -66,7 +66,7 @@ def _stored_as_declared(flat, outputs, module):
     good = [
         o
         for o in outputs
-        if flat[o.name].dtype.kind == o.dtype.kind
+        if as_stored(flat[o.name]).dtype.kind == o.dtype.kind
         and flat[o.name].dims == ("_point", *o.dims)
         and flat[o.name].shape[1:] == sizes[o.name]
         and (o.dtype.kind != "f" or f"{o.name}_error" in flat)
@@ -140,7 +140,7 @@ def _differences(flat, solved, outputs, decided):
     both = (flat.status == solved.status).values
     same = both & (_same_verdict(flat, solved) if "verdict" in flat else not decided)
     for o in outputs:
-        one, other = flat[o.name].values, solved[o.name].values
+        one, other = as_stored(flat[o.name]), as_stored(solved[o.name])
         wide = (slice(None),) + (None,) * (one.ndim - 1)
         if o.dtype.kind == "f":
             bar = flat[f"{o.name}_error"].values.astype(float) + solved[f"{o.name}_error"].values

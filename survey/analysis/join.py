@@ -15,7 +15,7 @@ from survey.analysis.point import of_points
 from survey.analysis.zoom import unchanged
 from survey.errors import BadInput
 from survey.file import disk, reading, schema
-from survey.file.labels import command, now, tally
+from survey.file.labels import FILL, as_stored, command, fill_of, now, tally
 from survey.file.map_file import TILE_POINTS, MapFile
 from survey.grid import halved
 from survey.request.output_path import check_path
@@ -165,10 +165,12 @@ def _workflow(text, coordinate):
 def _write(joined, output, folder):
     """Write a survey's dataset as a run does, a row of tiles at a time."""
     point = joined.status.dims
-    variables = {name: (v.dims, v.attrs) for name, v in joined.data_vars.items()}
+    masked = {name: {FILL: np.int32(fill_of(v))} for name, v in joined.data_vars.items() if fill_of(v) is not None}
+    variables = {name: (v.dims, v.attrs | masked.get(name, {})) for name, v in joined.data_vars.items()}
     coordinates = {name: (c.dims, c.values.astype("U") if c.dtype.kind == "O" else c.values, c.attrs)
                    for name, c in joined.coords.items()}  # fmt: skip
-    layout = {name: (v.dtype, None, v.shape[len(point) :]) for name, v in joined.data_vars.items()}
+    layout = {name: (np.dtype("int32") if name in masked else v.dtype, None, v.shape[len(point) :])
+              for name, v in joined.data_vars.items()}  # fmt: skip
     tile = halved(joined.status.shape, TILE_POINTS)
     file = MapFile(output, folder, coordinates, variables, layout, joined.status.shape, tile)
     try:
@@ -177,7 +179,7 @@ def _write(joined, output, folder):
             cut = slice(first, min(first + rows, joined.sizes[point[0]]))
             where = (cut, *(slice(0, joined.sizes[dim]) for dim in point[1:]))
             for name, variable in joined.data_vars.items():
-                file.write(name, variable.isel({point[0]: cut}).values, where)
+                file.write(name, as_stored(variable.isel({point[0]: cut})), where)
         kept = {key: value for key, value in joined.attrs.items() if key != "complete"}
         file.publish(kept | {"date_created": now()})
     finally:

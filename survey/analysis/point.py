@@ -11,7 +11,7 @@ from survey import modules, status
 from survey.analysis import edge
 from survey.analysis.given import parameters
 from survey.errors import BadInput, Damaged, Untrusted
-from survey.file.labels import UNDECIDED, error_bars, fill_of, flag_codes, options_of
+from survey.file.labels import UNDECIDED, as_stored, error_bars, fill_of, flag_codes, options_of, words_of
 from survey.request import user_scene
 from survey.wording import plain
 
@@ -164,6 +164,19 @@ class Point:
             return "the values in the file do not belong to this scene"
 
     @property
+    def python(self):
+        """The Python that solves this point again."""
+        ds = self.dataset
+        given = {n: x for n, x in self.parameters.items() if "domain: " in str(ds[n].attrs.get("comment"))}
+        given |= options_of(ds)
+        given |= {"method": ds.attrs["method"]} if ds.attrs.get("method", "auto") != "auto" else {}
+        given |= {"rtol": float(ds.attrs["rtol"])} if "rtol" in ds.attrs else {}
+        words = "".join(f", {name}={value!r}" for name, value in given.items() if name.isidentifier())
+        made = "scene_hash" in ds.attrs and not str(ds.attrs["scene"]).endswith(".py")  # by survey.hill and its kin
+        scene = "scene" if made else repr(ds.attrs["scene"])
+        return f"import survey\n\npoint = survey.evaluate({scene}{words}).survey.point()\nprint(point)\n"
+
+    @property
     def margin(self):
         """The nearest boundary in each parameter, in words; "" where none is known, or finding it takes seconds."""
         try:
@@ -215,7 +228,7 @@ def _cell(text, columns=1):
 def values(ds):
     """{name: value} of everything known about a point, numpy arrays; `verdict` and other flags as words."""
     return {
-        name: meaning(v) if "flag_values" in v.attrs and v.ndim == 0 else v.values
+        name: meaning(v) if "flag_values" in v.attrs and v.ndim == 0 else as_stored(v)
         for name, v in ds.variables.items()
         if set(v.dims) <= set(ds.dims)
     }
@@ -255,7 +268,8 @@ def reading(ds, name, has_bar):
     if not np.isfinite(value):
         return "does not apply"
     if not has_bar:
-        return "does not apply" if value == fill_of(variable) else str(variable.values)
+        number = as_stored(variable)[()]
+        return "does not apply" if number == fill_of(variable) else words_of(variable).get(number, str(number))
     bar = float(ds[f"{name}_error"])
     if not 0 <= bar < np.inf:
         return f"{value!r}, its error bar is {bar}"

@@ -55,20 +55,25 @@ def _warn(ds, ranges):
 
 def _workflow(ds, ranges, num):
     """The workflow with new axes, as a mapping: from the one in the file and the attributes."""
-    data = _further(ds)
-    data |= {"title": f"{ds.attrs.get('title', '')}, a part".lstrip(", "), "scene": user_scene.of_dataset(ds)}
-    scene = user_scene.find(data["scene"])[1]
-    data |= {"options": options_at(ds, scene), "axes": _axes(ds, ranges, num)}
-    solver = {"method": ds.attrs.get("method"), "rtol": ds.attrs.get("rtol")}
-    data["solver"] = {key: str(v) if key == "method" else float(v) for key, v in solver.items() if v is not None}
-    known = {o.name for o in scene.OUTPUTS}
-    data["output"] = {"variables": [name for name in ds.data_vars if name in known]}
+    data = _further(ds) | workflow_of(ds, ranges, num)
     axes = [dim for dim in ds.status.dims if dim in ds.coords]
     if data.get("boundaries", {}).get("axis") not in (None, *axes):
         del data["boundaries"]
     if len(axes) != 2:
         data.pop("refine", None)
     return data
+
+
+def workflow_of(ds, ranges=None, num=None):
+    """The workflow of the points alone, as a mapping, from the attributes: the same points, or with new axes."""
+    title = str(ds.attrs.get("title", ""))
+    data = {"title": f"{title}, a part".lstrip(", ") if ranges else title, "scene": user_scene.of_dataset(ds)}
+    scene = user_scene.find(data["scene"])[1]
+    data |= {"options": options_at(ds, scene), "axes": _axes(ds, ranges or {}, num)}
+    solver = {"method": ds.attrs.get("method"), "rtol": ds.attrs.get("rtol")}
+    data["solver"] = {key: str(v) if key == "method" else float(v) for key, v in solver.items() if v is not None}
+    known = {o.name for o in scene.OUTPUTS}
+    return data | {"output": {"variables": [name for name in ds.data_vars if name in known]}}
 
 
 def _further(ds):

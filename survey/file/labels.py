@@ -17,6 +17,7 @@ from survey.scene import exists
 
 CONVENTIONS = "CF-1.11, ACDD-1.3"
 UNDECIDED = -1  # of every verdict
+FILL = "_FillValue"  # CF's attribute: the integer that stands where none applies
 CHUNK = 2**14  # points whose temporaries fit in the cache
 
 
@@ -59,12 +60,21 @@ def describe(grid, scene, name, request, arrays):
     import xarray as xr
 
     # made here, as xarray takes longer to find out what they are
-    data = {
-        key: xr.Variable(dims, arrays[key], attrs, fastpath=True)
-        for key, (dims, attrs) in variables(grid, scene, request).items()
-    }
+    data = {key: _variable(dims, arrays[key], attrs) for key, (dims, attrs) in variables(grid, scene, request).items()}
     coords = {key: xr.Variable(*of, fastpath=True) for key, of in coordinates(grid, scene, request).items()}
     return xr.Dataset(data, coords, attributes(scene, name, request))
+
+
+def _variable(dims, values, attributes):
+    """An xarray.Variable; integers that do not apply are masked, as xarray decodes them: floats, NaN there."""
+    import xarray as xr
+
+    encoding, fill = {}, attributes.get(FILL)
+    if fill is not None:
+        encoding = {"dtype": values.dtype, FILL: fill}
+        values = np.where(values == fill, np.nan, values.astype(float))
+        attributes = {key: value for key, value in attributes.items() if key != FILL}
+    return xr.Variable(dims, values, attributes, encoding, fastpath=True)
 
 
 def coordinates(grid, scene, request):
@@ -86,7 +96,8 @@ def variables(grid, scene, request):
     dims = tuple(grid.sizes)
     table = {}
     for output in outputs_of(scene, request):
-        table[output.name] = (dims + output.dims, meaning(output))
+        masked = {FILL: output.dtype.type(output.fill)} if output.integer else {}
+        table[output.name] = (dims + output.dims, masked | meaning(output))
         if output.dtype.kind == "f":
             bar = {"long_name": f"error bound of {output.name}", "units": output.units}
             bar |= {"coverage_content_type": "qualityInformation", "symbol": rf"\delta {output.symbol or output.name}"}
@@ -322,9 +333,30 @@ def meaning(output):
 
 
 def fill_of(variable):
-    """The integer that an integer output holds where it does not apply; None for other outputs."""
-    found = re.search(r"(-?\d+) where it does not apply", variable.attrs.get("comment", ""))
+    """The integer that a file holds where an integer output does not apply; None for other outputs."""
+    found = re.search(r"(-?\d{1,10}) where it does not apply", variable.attrs.get("comment", ""))
     return int(found[1]) if found else None
+
+
+def masked(variable):
+    """The DataArray with NaN where an integer output does not apply, also of a file in which it is not masked."""
+    fill = fill_of(variable)
+    return variable if fill is None or variable.dtype.kind == "f" else variable.astype(float).where(variable != fill)
+
+
+def as_stored(variable):
+    """The values of a variable as a file holds them: those of an integer output as integers."""
+    fill, values = fill_of(variable), variable.values
+    if fill is None or values.dtype.kind != "f":
+        return values
+    with np.errstate(invalid="ignore"):
+        return np.where(np.isfinite(values), values, fill).astype(np.int32)
+
+
+def words_of(variable):
+    """{integer: what it means}, of an integer output whose `comment` says so: `-1 means infinitely many`."""
+    found = re.findall(r"(-?\d{1,10}) means ([a-z ]+)", variable.attrs.get("comment", ""))
+    return {int(number): words for number, words in found} if fill_of(variable) is not None else {}
 
 
 def flag_attributes(codes):

@@ -116,12 +116,12 @@ class File:
     def define(self, name, dims, shape, dtype, attributes, tile=None, values=None):
         """Create a variable, compressed in tiles of these lengths (if any), with floats NaN until they are written.
 
-        Dimensions that the file lacks are created.
+        Dimensions that the file lacks are created. Integers have the fill value that is among the attributes, if any.
         """
         dtype = np.dtype(dtype)
         text = dtype.kind in "UO"  # strings are not compressed: HDF5 stores them elsewhere
         packed = PACKED | {"chunks": tuple(tile)} if tile and np.prod(shape) and not text else {}
-        fill = np.nan if dtype.kind == "f" and tile is not None else None
+        fill = np.nan if dtype.kind == "f" and tile is not None else attributes.get("_FillValue")
         kind = h5py.string_dtype() if text else dtype
         with self._disk_errors():
             made = self.file.create_dataset(name, shape, kind, fillvalue=fill, track_order=True, **packed)

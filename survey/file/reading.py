@@ -12,6 +12,7 @@ from survey.errors import BadInput, Damaged, Stopped
 from survey.file import schema, unfinished
 from survey.file.disk import digest_of
 from survey.file.labels import tally
+from survey.wording import shown
 
 PIECE = 2**20  # points that are read at once where a file has no tiles
 NETCDF = (b"\x89HDF", b"CDF")  # first bytes of a netCDF file
@@ -35,7 +36,10 @@ def load(path, chunks="auto"):
     """
     import netCDF4
 
-    path = Path(path)
+    try:
+        path = Path(path)
+    except TypeError:
+        raise BadInput(f"open: give the path of a netCDF file written by survey run, not {shown(path)}") from None
     _refuse_absent(path)
     try:
         _refuse_changed(path)

@@ -21,7 +21,9 @@ QUESTIONS = {
             "(comes with `refusal`, CLASSES, TITLE and ALONG)",
             ("square", "axes", "fixed", "options"),
         ),
-        "searched": Function("the same from the outputs of the `scene`", ("scene", "square", "axes", "fixed")),
+        "searched": Function(
+            "the same from the outputs of the `scene`", ("scene", "square", "axes", "fixed", "options")
+        ),
         "refusal": Function(
             "why there are no curves on a map of these axes, in words; None if there are", ("axes", "scene")
         ),

@@ -25,6 +25,7 @@ from survey.kernels.cylinder.flow import (
     series,
     values,
 )
+from survey.kernels.floquet import classical as floquet
 from survey.kernels.hill.matrix import doubled, samples_only
 from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.lanes import chain, scatter
@@ -34,11 +35,12 @@ from survey.kernels.math.runge_kutta import classical
 from survey.kernels.unroll import unroll
 
 ORDER = 4
-SERVES = ("body", "cylinder", "danby", "hill")
+SERVES = ("body", "cylinder", "danby", "floquet", "hill")
 COST = {
     "body": 3000.0,
     "cylinder": 3000.0,
     "danby": 5000.0,
+    "floquet": 100.0,
     "hill": 13.0,
 }  # time, relative to the default of each family
 _ABOUT = "The classical Runge-Kutta method, order 4, each step two halves checked by a whole, for comparison: "
@@ -46,6 +48,7 @@ ABOUT = {
     "body": _ABOUT + "the six equations (1)-(6) in time.",
     "cylinder": _ABOUT + "phi' = w, w' = f w + g in time.",
     "danby": _ABOUT + "the four linear equations about L4 in the true anomaly.",
+    "floquet": _ABOUT + "x' = A(t) x.",
     "hill": _ABOUT + "y'' + z y = 0.",
 }
 FLOW_FINEST = 1e-13  # useful tolerance for flows on the cylinder
@@ -100,6 +103,14 @@ def hill_chain(samples, c2, h, p, order, starts, ends, out):
 @kernel
 def hill_scatter(samples, c2, h, p, order, starts, out):
     scatter(samples_only, hill_step, WIDTH, samples, c2, h, p, order, starts, out)
+
+
+floquet_factors = floquet.factors
+
+
+def floquet_reach(rtol):
+    """How far the norm of A times half a step may go for accuracy rtol."""
+    return 0.5 * (10.0 * max(rtol, 1e-13)) ** (1 / (ORDER + 1))
 
 
 @inline

@@ -9,6 +9,7 @@ import math
 
 from survey.kernels.body import motion
 from survey.kernels.cylinder import (
+    basins,
     connections,
     fate,
     gyrostat,
@@ -129,6 +130,13 @@ def flow_fates(p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance
 def flow_line(p, start, window, eqs, count, section, kind, tolerance, out):
     """See `lines.line`."""
     return lines.line(flow_setting, flow_begin, flow_at, p, start, window, eqs, count, section, kind, tolerance, out)
+
+
+@kernel
+def flow_pieces(p, start, edges, falls, eqs, count, kind, cell, top, scale, tolerance, most, out):
+    """See `basins.pieces`."""
+    return basins.pieces(flow_setting, flow_begin, flow_at, p, start, edges, falls, eqs, count, kind, cell, top, scale,
+                         tolerance, most, out)  # fmt: skip
 
 
 @kernel

@@ -6,12 +6,13 @@ Everything specific to a scene is in the file of its name in `cases/`:
     references(work)       [(parameters, options, {output: exact value}, verdict or None), ...] like the work's points,
                            the very same list for works that share it
     works()                {name of the work: (point, options)}, which is timed; the arrays of `point` broadcast
-    system(point, options) the same question as ODEs, for the peers in `survey.precision.peers`
+    system(point, options) the same question as ODEs, for the peers in `survey.precision.peers` (optional)
     outcome(ends)          {ERROR: values} from the states (points, n) at the ends of the spans, and "verdict" if any
     LIMITED                the method whose operations, at the machine's peak rate, give the least time in the chart
     operations_of(run)     its operations while `run()` solves a work with it (both optional)
     MOST                   {method: number of points that it is timed on}, for slow ones (optional)
     SCENE                  the scene, where the file has another name: its name, or the object of one's own (optional)
+    ALL                    works for which all outputs are asked, not ERROR and the verdict alone (optional)
 
 Where a parameter for which one solution serves all values (times, angles) varies along the last axis, samples of the
 work keep whole rows.
@@ -27,6 +28,7 @@ import sys
 import time
 from dataclasses import asdict, dataclass
 from functools import partial
+from importlib.metadata import version
 from math import prod
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -37,11 +39,13 @@ from survey import modules, scenes
 from survey.errors import BadInput
 from survey.file.labels import provenance
 from survey.grid import lines
-from survey.measures.cylinder import fate
+from survey.measures.cylinder import basins, fate
 from survey.measures.floquet import dense as floquet
 from survey.measures.hill import dense
 from survey.precision import cases, flops
 from survey.precision import peers as programs
+from survey.precision.cases import own_file
+from survey.request import ranges
 from survey.request.checks import check_options, check_parameters, methods_of
 from survey.scene import Request, exists
 
@@ -81,15 +85,18 @@ class Least:
 def write(scene, directory, peers=False, say=lambda line: None):
     """Measure and write precision_SCENE.json, .csv and .png into `directory`; returns the three paths."""
     directory = Path(directory)
-    case = modules.load(cases, scene, "scene with a precision chart")
+    case = _case(scene)
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise BadInput(f"-o {str(directory)!r}: cannot make this folder ({error.strerror})") from None
     records = measure(scene, case, peers, say)
-    paths = [directory / f"precision_{scene}.{kind}" for kind in ("json", "csv", "png")]
+    name = getattr(case, "NAME", scene)
+    paths = [directory / f"precision_{name}.{kind}" for kind in ("json", "csv", "png")]
     machine = provenance() | {"system": platform.platform(), "threads": 1} | limit(scene, case)
     machine["missing_peers"] = missing(peers)
+    machine |= {"load": os.getloadavg(), "entry": "scene.solve", "outputs": outputs(case), "works": described(case)}
+    machine["peers"] = {peer: version(peer) for peer in sorted({r.peer for r in records} - {""})}
     paths[0].write_text(json.dumps({"records": [asdict(r) for r in records], "machine": machine}, indent=1) + "\n")
     with open(paths[1], "w", newline="") as file:
         table = csv.DictWriter(file, list(asdict(records[0])))
@@ -97,8 +104,32 @@ def write(scene, directory, peers=False, say=lambda line: None):
         table.writerows(asdict(record) for record in records)
     from survey.precision.chart import draw
 
-    draw(records, machine, scene, case.ERROR, paths[2])
+    draw(records, machine, name, case.ERROR, paths[2])
     return paths
+
+
+def _case(scene):
+    """The case of a chart: a file in `cases`, or one made for a file of one's own."""
+    if ranges.is_file(scene):
+        return own_file.case(scene)
+    found = modules.load(cases, scene, "scene with a precision chart")
+    if found is own_file:
+        raise BadInput("own_file: name your own file, such as my_equation.py, or a workflow that names it")
+    return found
+
+
+def outputs(case):
+    """{work: the outputs that are timed}, in words."""
+    return {work: "all" if work in getattr(case, "ALL", ()) else f"{case.ERROR}, verdict" for work in case.works()}
+
+
+def described(case):
+    """{work: the number of its points, the ranges of its parameters, and its options}."""
+    return {
+        work: {"points": _points(point), **options}
+        | {name: [float(np.min(values)), float(np.max(values))] for name, values in point.items()}
+        for work, (point, options) in case.works().items()
+    }
 
 
 def measure(scene, case, peers=False, say=lambda line: None):
@@ -113,18 +144,20 @@ def measure(scene, case, peers=False, say=lambda line: None):
     absent = missing(peers)
     for name in absent:
         say(f"{name} is not installed and is missing from the chart: pip install 'stability-survey[bench]'")
-    for name in sorted(set(modules.names(programs)) - set(absent)) if peers else ():
+    for name in sorted(set(modules.names(programs)) - set(absent)) if peers and hasattr(case, "system") else ():
         peer = modules.load(programs, name, "peer")
         runs["", name] = _peer(case, peer), peer.POINTS
-    full, shared = case.works(), _shared(module)
+    full, shared, whole = case.works(), _shared(module), getattr(case, "ALL", ())
     thinned = {work: (_thinned(point), options) for work, (point, options) in full.items()}
     records = []
     for (method, peer), (solve, most) in runs.items():
         works = full if peer or method == "auto" else thinned
         timed = {work: (_sample(point, most, shared), options) for work, (point, options) in works.items()}
         compile_seconds = _first_call(solve, *timed[_smallest(works)]) if peer else _cold(scene, method)
-        for point, options in timed.values():  # every path is compiled before it is timed
-            solve(point, options, SETTINGS[0])
+        for work, (point, options) in timed.items():  # every path is compiled before it is timed
+            solve(point, options, SETTINGS[0]) if peer or work not in whole else solve(
+                point, options, SETTINGS[0], everything=True
+            )
         for setting in SETTINGS:
             errors = {}
             for work, (point, _options) in works.items():
@@ -136,7 +169,8 @@ def measure(scene, case, peers=False, say=lambda line: None):
                 error, wrong = errors[id(references)]
                 if np.isnan(error):
                     continue
-                seconds = _per_point(solve, *timed[work], setting)
+                asked = solve if peer or work not in whole else partial(solve, everything=True)
+                seconds = _per_point(asked, *timed[work], setting)
                 records.append(Record(work, method, peer, setting, error, seconds, wrong, compile_seconds))
         say(f"{scene}: {method or peer} measured")
     return records
@@ -199,16 +233,18 @@ def _within(reference, point):
 def _solver(module, method, error):
     """A function of (point, options, rtol) that calls the scene for the output `error` and the verdict; see `works`."""
 
-    def solve(point, options, rtol):
+    def solve(point, options, rtol, everything=False):
         options = check_options(module, options, point)
         used = check_parameters(module, module.TITLE, options, point)
-        wanted = frozenset(o.name for o in module.OUTPUTS if exists(o, options) and o.name in (error, "verdict"))
+        asked = [o.name for o in module.OUTPUTS if exists(o, options) and not o.on_request]
+        wanted = frozenset(name for name in asked if everything or name in (error, "verdict"))
         request = Request(options, method, rtol, wanted, _lines(point))
         ndim = max(np.ndim(values) for values in point.values()) or 1
         arrays = {key: np.asarray(point.get(key, p.default), float) for key, p in used.items()}
         dense.panels.cache_clear()  # every call includes its set-up
         floquet.panels.cache_clear()
         fate.forget()
+        basins.forget()
         return module.solve({key: v if v.ndim else v.reshape((1,) * ndim) for key, v in arrays.items()}, request)
 
     return solve
@@ -227,7 +263,7 @@ def _cold(scene, method):
 
 def first_call(scene, method):
     """Seconds of the first call of a scene's method in this process, minus those of the second."""
-    case = modules.load(cases, scene, "scene with a precision chart")
+    case = _case(scene)
     module, works = _scene(scene, case), case.works()
     point, options = works[_smallest(works)]
     point = _sample(point, getattr(case, "MOST", {}).get(method), _shared(module))
@@ -262,10 +298,11 @@ def _against(solve, references, name, rtol):
     worst, wrong = 0.0, 0
     for parameters, options, exact, verdict in references:
         solved = solve(parameters, options, rtol)
-        value = float(np.ravel(solved[name])[0])
-        if np.isnan(value) and verdict is not None and np.ravel(solved.get("verdict", 0))[0] == -1:
+        wanted = np.atleast_1d(exact[name])
+        value = np.ravel(solved[name])[: wanted.size]
+        if np.isnan(value).any() and verdict is not None and np.ravel(solved.get("verdict", 0))[0] == -1:
             continue
-        worst = float(np.maximum(worst, abs(value - exact[name]) / (1 + abs(exact[name]))))
+        worst = float(np.maximum(worst, np.max(abs(value - wanted) / (1 + abs(wanted)))))
         if verdict is not None and "verdict" in solved:
             wrong += int(np.ravel(solved["verdict"])[0]) not in (-1, verdict)
     return worst, wrong

@@ -6,16 +6,22 @@ import matplotlib.pyplot as plt
 COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999", "#5D3A9B", "#8C6D31")
 MARKERS = "osD^vP*X<>"
 LEAST_ERROR = 1e-17  # a logarithmic axis has no zero
+MOST_PANELS = 5  # in a row
 
 
 def draw(records, machine, scene, name, path):
     """Draw the records of `survey precision`, and the least times in `machine`, to `path`."""
     works = list(dict.fromkeys(record.work for record in records))
     runs = list(dict.fromkeys((record.method, record.peer) for record in records))
+    lines = -(-len(works) // MOST_PANELS)
+    columns = -(-len(works) // lines)
+    size = (max(4.6 * columns, 8.0), 1.0 + 4.6 * lines)
     figure, panels = plt.subplots(
-        1, len(works), figsize=(4.6 * len(works), 5.6), sharex=True, sharey=True, squeeze=False, layout="constrained"
+        lines, columns, figsize=size, sharex=True, sharey=True, squeeze=False, layout="constrained"
     )
-    for axes, work in zip(panels[0], works, strict=True):
+    for axes in panels.ravel()[len(works) :]:
+        axes.set_axis_off()
+    for axes, work in zip(panels.ravel(), works, strict=False):
         of_work = [record for record in records if record.work == work]
         _limit(axes, [entry for entry in machine["least"] if entry["work"] == work], of_work)
         for number, (method, peer) in enumerate(runs):
@@ -25,9 +31,12 @@ def draw(records, machine, scene, name, path):
                 _line(axes, of_run, style)
         axes.set(title=work, xlabel="time per point on one thread (s)", xscale="log", yscale="log")
         axes.grid(alpha=0.3)
-    panels[0, 0].set_ylabel(f"largest error of the {name}, relative to 1 + |value|")
-    named = {label: line for axes in panels[0] for line, label in zip(*axes.get_legend_handles_labels(), strict=True)}
-    title = "in brackets: compilation time, not included"
+    for axes in panels[:, 0]:
+        axes.set_ylabel(f"largest error of the {name}, relative to 1 + |value|")
+    named = {
+        label: line for axes in panels.ravel() for line, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    title = _asked(machine) + "in brackets: compilation time, not included"
     if machine["missing_peers"]:
         title += f"; not installed: {', '.join(machine['missing_peers'])}"
     figure.legend(
@@ -38,6 +47,18 @@ def draw(records, machine, scene, name, path):
     )
     figure.savefig(path, dpi=150)
     plt.close(figure)
+
+
+def _asked(machine):
+    """What was timed, where, and under what load, in a line."""
+    if "entry" not in machine:
+        return ""
+    load = "/".join(f"{x:.1f}" for x in machine["load"])
+    asked = sorted(set(machine["outputs"].values()))
+    words = f"timed: {machine['entry']}, outputs: {'; '.join(asked)}; one thread, processor time"
+    peers = ", ".join(f"{name} {number}" for name, number in machine.get("peers", {}).items())
+    words += f"; peers: {peers}" if peers else ""
+    return f"{words}\n{machine['cpu']}, load at the end {load} (1, 5, 15 min)\n"
 
 
 def _line(axes, records, style):

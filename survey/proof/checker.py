@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """survey-check OUT.cert: proves the stability map that a certificate states, or says what fails.
 
-This file needs Python and python-flint (ball arithmetic, https://flintlib.org) and nothing else: it can be copied, read
-in an hour, and run alone, `python checker.py OUT.cert`. It believes no number of the certificate. What is proved is
-printed by `Certificate.statement`; the lemmas below have their proofs in the documentation, on the page "Proved maps".
+This file needs Python and python-flint (ball arithmetic, https://flintlib.org) alone: it can be copied, read in
+an hour, and run, `python checker.py OUT.cert`. It believes no number of the certificate. What is proved is printed by
+`Certificate.statement`; the lemmas below have their proofs in the documentation, on the page "Proved maps".
 
 HILL'S EQUATION y'' + z(u, p) y = 0, with two real parameters p = (p1, p2) in a rectangle. A certificate gives z by
 formulas on consecutive pieces of [0, S], and a kind:
@@ -18,9 +18,9 @@ y1, y2 are the solutions with y1 = 1, y1' = 0 and y2 = 0, y2' = 1 at u = 0, and 
    x = h/R. On every ray from u0 the maximum norm of v = (w y, y') satisfies |v|' <= w |v|, so |w y| <= e^(wR) |v(u0)|
    on the disc, and by Cauchy the Taylor coefficients of y satisfy |a_n| <= M R^-n, M = e^(wR) max(|y|, |y'|/w) at u0.
    At u0 + h the sums up to degree N are off by at most M x^(N+1) / (1 - x), for y' by (M/R) (N+1) x^N / (1 - x)^2.
-3. GROWTH (`Equation.growth`). For complex z and a constant w > 0, the Euclidean norm of (w y, y') grows at most at the
-   rate |w^2 - conj z| / (2 w), the logarithmic norm of [[0, w], [-z/w, 0]]; so
-   |(w y, y')(S)| <= exp(int_0^S |w^2 - conj z| / (2 w) du) |(w y, y')(0)|.
+3. GROWTH (`growth`). For complex z and a constant w > 0, the Euclidean norm of (sqrt(w) y, y'/sqrt(w)) grows at most
+   at the rate |w^2 - conj z| / (2 w), the logarithmic norm of [[0, w], [-z/w, 0]]. Where w is changed from v to w it
+   grows at most by max(v/w, w/v)^(1/2). So with constants w on parts of [0, S] it grows at most by the product of all.
 4. PARAMETERS (`Equation.truncation`). A panel is a rectangle of parameters, mapped to [-1, 1]^2. If a factor f is
    analytic, |f| <= M, for p1 in the Bernstein ellipse E_r (semi-axes (r +- 1/r)/2) and real p2, its interpolant I1 f
    at the n Chebyshev points of the first kind satisfies |f - I1 f| <= 4 M r^(1-n) / (r - 1): its coefficients are at
@@ -39,10 +39,11 @@ import sys
 from argparse import ArgumentParser
 from contextlib import nullcontext
 from fractions import Fraction
-from functools import lru_cache, partial
-from itertools import product
-from math import comb
+from functools import lru_cache, partial, reduce
+from itertools import pairwise, product
+from math import ceil, comb, floor, prod
 from multiprocessing import get_context
+from operator import add, mul, sub, truediv
 
 from flint import acb, arb, arb_mat, arb_series, ctx
 
@@ -50,10 +51,11 @@ FORMAT = "survey-certificate 1"
 STABLE, UNSTABLE, OPEN, SPLIT = "s", "u", "o", "+"  # cells; "+" is followed by its four quarters
 VERDICTS = {STABLE: "stable", UNSTABLE: "unstable", OPEN: "open"}
 QUARTERS = ((1, 1), (1, 0), (0, 1), (0, 0))  # (upper half of p2?, of p1?): the last one is the first in the text
-RATIO, FAR = arb(1) / 8, 4  # h / R of a step; a step is halved unless w R < FAR
-SHORTEST = Fraction(1, 2**20)  # step, as a part of a piece
+RATIO, FAR = arb(1) / 4, 8  # h / R of a step; a step is halved unless w R < FAR
+SHORTEST, SMALLEST = Fraction(1, 2**20), Fraction(1, 2**11)  # step, and part that bounds growth, as parts of a piece
 ARCS, BOXES, COVER = 24, 32, 4  # parts of half an ellipse, of a piece of [0, S] (at least), of a box's side
-DEEPEST, LARGEST = 24, 2**23  # halvings of a panel; characters of a certificate
+WIDE = arb(1) / 8  # a part of [0, S] is halved while the ball of z times its length exceeds this, relative to sqrt |z|
+LARGEST = 2**23  # characters of a certificate
 MALFORMED = (KeyError, TypeError, ValueError, IndexError, AttributeError, RecursionError, ArithmeticError)
 
 
@@ -82,9 +84,9 @@ def whole(value, least, most, what):
     return value
 
 
-def share(number, of):
-    """The ball of [number, number + 1] / of."""
-    return (arb(number) / of).union(arb(number + 1) / of)
+def parts(n):
+    """The balls of [0, 1/n], [1/n, 2/n], ..., [1 - 1/n, 1]."""
+    return [(arb(k) / n).union(arb(k + 1) / n) for k in range(n)]
 
 
 def power(x, n):
@@ -93,24 +95,16 @@ def power(x, n):
     return found if n < 2 else found * power(x * x, n // 2)
 
 
-def of_exponentials(sign):
-    """(e^x + sign e^-x) / 2."""
-    return lambda x: (x.exp() + sign * (-x).exp()) / 2
-
-
 def with_branch_cut(name):
     """A function which is not a number for complex balls that meet its branch cut, where it is not analytic."""
     return lambda x: getattr(x, name)(analytic=True) if isinstance(x, acb) else getattr(x, name)()
 
 
 FUNCTIONS = {
-    "sin": lambda x: x.sin(), "cos": lambda x: x.cos(), "tan": lambda x: x.sin() / x.cos(), "exp": lambda x: x.exp(),
-    "cosh": of_exponentials(1), "sinh": of_exponentials(-1), "tanh": lambda x: 1 - 2 / ((2 * x).exp() + 1),
+    "sin": lambda x: x.sin(), "cos": lambda x: x.cos(), "exp": lambda x: x.exp(),
     "log": with_branch_cut("log"), "sqrt": with_branch_cut("sqrt"),
 }  # fmt: skip
-OPERATIONS = {
-    ast.Add: lambda x, y: x + y, ast.Sub: lambda x, y: x - y, ast.Mult: lambda x, y: x * y, ast.Div: lambda x, y: x / y,
-}  # fmt: skip
+OPERATIONS = {ast.Add: add, ast.Sub: sub, ast.Mult: mul, ast.Div: truediv}
 
 
 class Formula:
@@ -118,38 +112,46 @@ class Formula:
 
     def __init__(self, text, names):
         need(isinstance(text, str) and len(text) < 20_000, "a formula is not a text, or too long")
-        self.text, self.names = text, {*names, "pi"}
+        self.text, self.names, self.parts = text, {*names, "pi"}, {}  # what stands in it twice is evaluated once
         try:
-            self.value = self._read(ast.parse(text, mode="eval").body)
+            self.whole = self._read(ast.parse(text, mode="eval").body)
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             raise Failed(f"this is not a formula: {text[:80]!r}") from None
 
     def __call__(self, **values):
         """Its value for balls, complex balls, or power series of balls."""
-        return self.value({"pi": arb.pi(), **values})
+        values["pi"] = arb.pi()
+        for text, part in self.parts.items():
+            values[text] = part(values)
+        return values[self.whole]
 
     def _read(self, node):
-        """The node as a function of {name: value}."""
+        """The text of a node, whose value `parts` computes from those before it."""
+        text = ast.get_source_segment(self.text, node)
+        if not (isinstance(node, ast.Name) and node.id in self.names) and text not in self.parts:
+            self.parts[text] = self._part(node, text)
+        return text
+
+    def _part(self, node, text):
+        """The node as a function of {text: value}."""
         if isinstance(node, ast.Constant) and type(node.value) in (int, float):
-            number = Fraction(ast.get_source_segment(self.text, node))
+            number = Fraction(text)
             return lambda values: exact(number)
-        if isinstance(node, ast.Name) and node.id in self.names:
-            return lambda values: values[node.id]
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
             operand = self._read(node.operand)
-            return lambda values: -operand(values)
+            return lambda values: -values[operand]
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
             need(isinstance(node.right, ast.Constant), "an exponent is not a number")
             base, exponent = self._read(node.left), whole(node.right.value, 0, 64, "an exponent")
-            return lambda values: power(base(values), exponent)
+            return lambda values: power(values[base], exponent)
         if isinstance(node, ast.BinOp) and type(node.op) in OPERATIONS:
             left, right, operation = self._read(node.left), self._read(node.right), OPERATIONS[type(node.op)]
-            return lambda values: operation(left(values), right(values))
+            return lambda values: operation(values[left], values[right])
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in FUNCTIONS:
             need(len(node.args) == 1 and not node.keywords, f"{node.func.id} takes one argument")
             argument, function = self._read(node.args[0]), FUNCTIONS[node.func.id]
-            return lambda values: function(argument(values))
-        raise Failed(f"{ast.get_source_segment(self.text, node)!r} is not allowed in a formula")
+            return lambda values: function(values[argument])
+        raise Failed(f"{text!r} is not allowed in a formula")
 
 
 class Equation:
@@ -167,22 +169,30 @@ class Equation:
 
     def steps(self, box, order):
         """[(u0, h, z, bounds of what is left out of (y1, y1') and of (y2, y2'))]; `box` covers the parameters."""
+
+        def tried(u0, h, z):
+            radius = h / RATIO
+            size = acb(z(u=acb(u0 + radius * arb(0, 1), radius * arb(0, 1)), **box)).abs_upper()
+            w = size.sqrt().upper() + exact(SHORTEST)
+            y = (w * radius).exp() * RATIO ** (order + 1) / (1 - RATIO)
+            dy = (w * radius).exp() / radius * (order + 1) * RATIO**order / (1 - RATIO) ** 2
+            return (u0, h, z, ((y, dy), (y / w, dy / w))) if w * radius < FAR else None  # or z is not finite there
+
+        return self.bisected(1, SHORTEST, tried, "z is too large, or singular too near to the real axis")
+
+    def bisected(self, count, shortest, tried, why):
+        """What `tried(start, length, z)` finds on parts of the pieces of [0, S], which are halved where it is None."""
         found = []
         for start, end, _, z in self.pieces:
-            waiting = [(Fraction(0), Fraction(1))]
+            waiting = [(Fraction(k, count), Fraction(1, count)) for k in reversed(range(count))]
             while waiting:
-                low, high = waiting.pop()
-                need(high - low > SHORTEST, "z is too large, or singular too near to the real axis")
-                u0, h = start + (end - start) * exact(low), (end - start) * exact(high - low)
-                radius = h / RATIO
-                size = acb(z(u=acb(u0 + radius * arb(0, 1), radius * arb(0, 1)), **box)).abs_upper()
-                w = size.sqrt().upper() + exact(SHORTEST)
-                if not w * radius < FAR:  # or z is not finite on the disc
-                    waiting += [((low + high) / 2, high), (low, (low + high) / 2)]
-                    continue
-                y = (w * radius).exp() * RATIO ** (order + 1) / (1 - RATIO)
-                dy = (w * radius).exp() / radius * (order + 1) * RATIO**order / (1 - RATIO) ** 2
-                found.append((u0, h, z, ((y, dy), (y / w, dy / w))))
+                low, length = waiting.pop()
+                need(length > shortest, why)
+                value = tried(start + (end - start) * exact(low), (end - start) * exact(length), z)
+                if value is None:
+                    waiting += [(low + length / 2, length / 2), (low, length / 2)]
+                else:
+                    found.append(value)
         return found
 
     def factors(self, steps, order, point):
@@ -200,19 +210,21 @@ class Equation:
     def truncation(self, sides, counts, ellipses, rates):
         """Bounds of |f - I1 I2 f| for each factor f; `sides`: (centre, half length) of both parameters."""
         parts = []
-        for name, n, r, w in zip(self.names, counts, ellipses, rates, strict=True):
-            growth = arb(0)
-            for arc in self.on_ellipse(sides, name, r):
-                growth = growth.max(self.growth(arc, w))
-            part = 4 * growth * r ** (1 - n) / (r - 1)
-            parts.append((part, part * w, part / w, part) if self.even else (2 * part, 2 * part))
+        for name, n, r, least in zip(self.names, counts, ellipses, rates, strict=True):
+            grown = zip(*(growth(arc, least) for arc in self.on_ellipse(sides, name, r)), strict=True)
+            y1, dy1, y2, dy2 = (4 * reduce(arb.max, sizes) * r ** (1 - n) / (r - 1) for sizes in grown)
+            parts.append((y1, dy1, y2, dy2) if self.even else (y1 + dy2, y1 + dy2))
         norm = 1 + 2 / arb.pi() * arb(counts[0]).log()
         return [(first + norm * second).upper() for first, second in zip(*parts, strict=True)]
 
-    @staticmethod
-    def growth(arc, w):
-        """exp(int_0^S |w^2 - conj z| / (2 w) du), from [(length of a part of [0, S], z there)]."""
-        return sum((length * (w * w - z.conjugate()).abs_upper() / (2 * w) for length, z in arc), arb(0)).exp()
+    def cover(self, sides, name, r):
+        """Parameters that cover the upper half of E_r of one of them: (arcs of its border, boxes of its inside)."""
+        real = {name: centre + half * arb(0, 1) for name, (centre, half) in zip(self.names, sides, strict=True)}
+        centre, half = sides[self.names.index(name)]
+        across, up = half * (r + 1 / r) / 2, half * (r - 1 / r) / 2
+        arcs = [acb(centre + across * x.cos_pi(), up * x.sin_pi()) for x in parts(ARCS)]
+        boxes = [acb(centre + across * (2 * x - 1), up * y) for x, y in product(parts(COVER), repeat=2)]
+        return [[{**real, name: place} for place in places] for places in (arcs, boxes)]
 
     def on_ellipse(self, sides, name, r):
         """For arcs that cover the upper half of E_r of one parameter: [(length of a part of [0, S], z there)].
@@ -220,30 +232,26 @@ class Equation:
         The lower half is its mirror image, since z is real for real parameters. Raises Failed unless z is analytic in
         E_r, that is finite on boxes that cover its upper half.
         """
-        real = {name: centre + half * arb(0, 1) for name, (centre, half) in zip(self.names, sides, strict=True)}
-        centre, half = sides[self.names.index(name)]
-        across, up = half * (r + 1 / r) / 2, half * (r - 1 / r) / 2
-        turns = [acb(0, arb.pi() * share(number, ARCS)).exp() for number in range(ARCS)]
-        arcs = [acb(centre + across * turn.real, up * turn.imag) for turn in turns]
-        parts = [share(k, COVER) for k in range(COVER)]
-        inside = [acb(centre + across * (2 * x - 1), up * y) for x, y in product(parts, parts)]
-        found = [[] for _ in arcs]
-        for start, end, _, z in self.pieces:
-            waiting = [(Fraction(k, BOXES), Fraction(k + 1, BOXES)) for k in range(BOXES)]
-            while waiting:
-                low, high = waiting.pop()
-                need(high - low > SHORTEST, f"z is singular for a complex {name} inside an ellipse")
-                u = start + (end - start) * exact(low).union(exact(high))
-                values = []
-                for place in (*arcs, *inside):
-                    values.append(acb(z(u=u, **{**real, name: place})))
-                    if not values[-1].is_finite():
-                        waiting += [((low + high) / 2, high), (low, (low + high) / 2)]
-                        break
-                else:
-                    for arc, value in zip(found, values, strict=False):
-                        arc.append(((end - start) * exact(high - low), value))
-        return found
+        arcs, boxes = self.cover(sides, name, r)
+
+        def tried(start, length, z):
+            u = start.union(start + length)
+            values = [acb(z(u=u, **place)) for place in arcs]
+            sharp = all(length * x.rad() < WIDE * (1 + x.abs_upper().sqrt()) for x in values)
+            if sharp and all(acb(z(u=u, **place)).is_finite() for place in boxes):
+                return [(length, value) for value in values]
+
+        why = f"z is singular, or changes too fast, for complex {name} in an ellipse"
+        return list(zip(*self.bisected(BOXES, SMALLEST, tried, why), strict=True))
+
+
+def growth(arc, least):
+    """Bounds of |y1|, |y1'|, |y2|, |y2'| at S, from [(length of a part of [0, S], z there)]; w is at least `least`."""
+    steps = [(length, z, least.max(z.mid().abs_upper().sqrt().mid())) for length, z in arc]
+    exponent = sum((length * (w * w - z.conjugate()).abs_upper() / (2 * w) for length, z, w in steps), arb(0))
+    grown = exponent.exp() * prod((v / w).max(w / v).sqrt() for (*_, v), (*_, w) in pairwise(steps))
+    first, last = steps[0][2].sqrt(), steps[-1][2].sqrt()
+    return grown * first / last, grown * first * last, grown / (first * last), grown * last / first
 
 
 def step(z_n, h, order, y, dy, y_missed, dy_missed):
@@ -317,9 +325,8 @@ class Panel:
 def bernstein(nodes):
     """The values of Bernstein's polynomials of degree n - 1 on [-1, 1] at n nodes."""
     d = len(nodes) - 1
-    return arb_mat(
-        [[comb(d, j) * power((1 + x) / 2, j) * power((1 - x) / 2, d - j) for j in range(d + 1)] for x in nodes]
-    )
+    table = [[comb(d, j) * power((1 + x) / 2, j) * power((1 - x) / 2, d - j) for j in range(d + 1)] for x in nodes]
+    return arb_mat(table)
 
 
 def halving(n):
@@ -341,7 +348,6 @@ def shares_of(cells):
     for letter in cells:
         need(waiting, "there are more cells than cover the panel")
         depth = waiting.pop()
-        need(depth <= DEEPEST, "a cell is too small")
         if letter == SPLIT:
             waiting += [depth + 1] * 4
         else:
@@ -370,8 +376,7 @@ class Certificate:
         need(good and len(names) == len(set(names)) == 2, "there must be two parameters with names of their own")
         self.equation = Equation(data["equation"]["kind"], data["equation"]["pieces"], names)
         self.sides = [tuple(rational(end) for end in side) for side in data["rectangle"]]
-        (a, b), (c, d) = self.sides
-        need(a < b and c < d, "the rectangle must have sides of positive length")
+        need(all(low < high for low, high in self.sides), "the rectangle must have sides of positive length")
         self.panels = data["panels"]["list"]
         across = [whole(n, 1, 4096, "a number of panels") for n in data["panels"]["across"]]
         self.places = places(across, data["panels"]["layout"])
@@ -384,8 +389,7 @@ class Certificate:
 
     def statement(self, shares):
         """The theorem in words; `shares`: {verdict: its share of the rectangle}."""
-        (a, b), (c, d) = self.sides
-        first, second = self.names
+        ((a, b), (c, d)), (first, second) = self.sides, self.names
         start, lines = "0", ["Consider y'' + z(u) y = 0, where"]
         for _, _, end, z in self.equation.pieces:
             lines.append(f"    z(u) = {z.text}    for {start} <= u <= {end},")
@@ -410,8 +414,8 @@ class Certificate:
 def places(across, layout):
     """The panels as parts of both sides, the second varying first; of a layout such as "..+....", "+" is quartered."""
     need(len(across) == 2 and across[0] * across[1] <= 2**16, "too many panels, or not across two sides")
-    parts = [[(Fraction(k, n), Fraction(k + 1, n)) for k in range(n)] for n in across]
-    found, waiting = [], list(product(*parts))[::-1]
+    found, sides = [], ([(Fraction(k, n), Fraction(k + 1, n)) for k in range(n)] for n in across)
+    waiting = list(product(*sides))[::-1]
     for letter in layout:
         need(waiting, "the layout has more panels than cover the rectangle")
         place = waiting.pop()
@@ -442,14 +446,13 @@ def weighed(places, found):
 
 def digest(data):
     """The SHA-256 of all but itself."""
-    body = json.dumps({key: value for key, value in data.items() if key != "sha256"}, sort_keys=True)
-    return hashlib.sha256(body.encode()).hexdigest()
+    data = {key: value for key, value in data.items() if key != "sha256"}
+    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
 
 
 def decimal(number, digits, up):
     """A rational number with so many decimals, rounded up or down."""
-    scaled = number * 10**digits
-    scaled = -(-scaled.numerator // scaled.denominator) if up else scaled.numerator // scaled.denominator
+    scaled = (ceil if up else floor)(number * 10**digits)
     return f"{scaled // 10**digits}.{scaled % 10**digits:0{digits}d}"
 
 
@@ -460,10 +463,8 @@ def proved(text, number):
     """The shares of the verdicts of one panel, or why they are not proved; perhaps in a process of its own."""
     try:
         return once_read(text).panel(number).check()
-    except Failed as failed:
-        return f"panel {number + 1}: {failed}"
-    except MALFORMED as error:
-        return f"panel {number + 1} is malformed ({type(error).__name__}: {error})"
+    except (Failed, *MALFORMED) as error:
+        return f"panel {number + 1}: {str(error) or type(error).__name__}"
 
 
 def check(text, processes=1):
@@ -484,7 +485,6 @@ def main(arguments=None):
     parser.add_argument("certificate", metavar="OUT.cert")
     parser.add_argument("-j", "--processes", type=int, default=1, metavar="N", help="processes; 1 by default")
     given = parser.parse_args(arguments)
-
     try:
         with open(given.certificate, encoding="utf-8") as file:
             statement = check(file.read(LARGEST), given.processes)

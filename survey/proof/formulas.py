@@ -10,7 +10,11 @@ from fractions import Fraction
 
 from survey.measures.hill.multiprecision import Unsupported, lift
 
-FUNCTIONS = ("sin", "cos", "tan", "exp", "sinh", "cosh", "tanh", "log", "sqrt")
+FUNCTIONS = {  # in those that `survey-check` has
+    "sin": "sin({0})", "cos": "cos({0})", "tan": "(sin({0})/cos({0}))", "exp": "exp({0})",
+    "sinh": "((exp({0}) - exp(-{0}))/2)", "cosh": "((exp({0}) + exp(-{0}))/2)",
+    "tanh": "(1 - 2/(exp(2*{0}) + 1))", "log": "log({0})", "sqrt": "sqrt({0})",
+}  # fmt: skip
 TRIED = 33  # positions within a piece at which a comparison must turn out alike
 LARGEST_DENOMINATOR = 12
 
@@ -164,4 +168,5 @@ def _call(name, x):
     own = getattr(math, name)
     if not isinstance(x, Symbol):
         return own(x)
-    return Symbol(f"{name}({x.text})", x.samples and tuple(own(value) for value in x.samples))
+    text = f"({x.text})" if "-{0}" in FUNCTIONS[name] or "*{0}" in FUNCTIONS[name] else x.text
+    return Symbol(FUNCTIONS[name].format(text), x.samples and tuple(own(value) for value in x.samples))

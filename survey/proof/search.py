@@ -4,18 +4,20 @@ The nodes and the bounds are the checker's own (`survey.proof.checker`), in ball
 many at a time, with a bound of all rounding: nothing is stated that does not hold with a margin.
 """
 
+import math
 from fractions import Fraction
 
 import numpy as np
-from flint import arb
+from flint import acb, arb
 
 from survey.proof import checker
 
 BITS = 96  # of the balls
 ORDERS = range(12, 80, 4)  # of the Taylor series
-NODES = (6, 8, 10, 12, 14, 16, 18, 20)
+NODES = (6, 8, 10, 12, 14, 16, 18, 20, 24, 28, 32)
 ELLIPSES = (1.6, 1.9, 2.3, 2.8, 3.5, 4.5, 6, 8, 12, 20)
-RATES = np.geomspace(0.3, 1.3, 8)  # w relative to the square root of the largest |z|, which are tried
+RATES = np.geomspace(0.03, 1.3, 10)  # least w relative to the square root of the largest |z|, which are tried
+SAMPLES, CHECKED = 96, 12  # positions in a piece at which z is sampled; every so many of them it must be analytic
 UNIT = 2.0**-53
 PANEL = "."  # in a layout
 SMALLEST = 2  # halvings of a panel: for fewer cells it is not worth its nodes
@@ -30,35 +32,71 @@ def plan(equation, sides, tolerance):
     chosen = [_ellipse(equation, sides, name, tolerance) for name in equation.names]
     nodes, ellipses, rates = zip(*chosen, strict=True)
     return {
-        "nodes": list(nodes), "ellipses": [str(Fraction(r).limit_denominator(10)) for r in ellipses],
-        "rates": [str(Fraction(w).limit_denominator(1000)) for w in rates],
+        "nodes": list(nodes), "ellipses": [str(r) for r in ellipses], "rates": [str(w) for w in rates],
         "order": _order(equation, sides, tolerance), "cells": checker.OPEN,
     }  # fmt: skip
 
 
 def _ellipse(equation, sides, name, tolerance):
-    """(number of nodes, r, w) for one parameter: the fewest nodes."""
-    best, why = None, None
-    for r in ELLIPSES:
+    """(number of nodes, r, least w) for one parameter: the fewest nodes."""
+    tried, why = [], checker.Failed("no ellipse has a small enough bound: smaller panels are needed")
+    for r in map(arb, ELLIPSES):
+        length, z = _sampled(equation, sides, name, r)
+        if not np.isfinite(z).all():  # z is singular in this ellipse, and in larger ones
+            break
+        local = np.sqrt(np.abs(z))
+        for w in (local.max() * RATES).tolist():
+            bound = 4 * _growth(length, z, np.maximum(local, w)) / (float(r) - 1)
+            n = next((n for n in NODES if bound * float(r) ** (1 - n) < 0.1 * tolerance), None)
+            if n:
+                tried.append((n, bound * float(r) ** (1 - n), r, w))
+    for n, _, r, w in _best_of_each(tried):
+        least = _rational(w, 1000)
         try:
-            arcs = equation.on_ellipse(sides, name, arb(r))
-        except checker.Failed as failed:  # z is singular in the larger ones, too
+            grown = [checker.growth(arc, checker.exact(least)) for arc in equation.on_ellipse(sides, name, r)]
+        except checker.Failed as failed:
             why = failed
-            break
-        parts = [[(length, z.real.mid(), z.imag.mid(), z.rad()) for length, z in arc] for arc in arcs]
-        length, real, imaginary, radius = np.moveaxis(np.array(parts, float), -1, 0)
-        top = np.sqrt(np.abs(real).max() + radius.max())
-        for w in top * RATES:
-            exponent = (length * (np.hypot(w * w - real, imaginary) + radius) / (2 * w)).sum(1).max()
-            bound = 4 * np.exp(min(exponent, 700.0)) * max(w, 1 / w, 1) / (r - 1)
-            n = next((n for n in NODES if bound * r ** (1 - n) < 0.2 * tolerance), None)
-            if n and (best is None or (n, bound * r ** (1 - n)) < best[:2]):
-                best = n, bound * r ** (1 - n), r, float(w)
-        if best and r > 2 * best[2]:
-            break
-    if best is None:
-        raise why or checker.Failed("no ellipse has a small enough bound: smaller panels are needed")
-    return best[0], best[2], best[3]
+            continue
+        bound = 4 * float(max(x.upper() for sizes in grown for x in sizes) / (r - 1))
+        for more in NODES[NODES.index(n) :]:
+            if bound * float(r) ** (1 - more) < 0.2 * tolerance:
+                return more, _rational(float(r), 10), least
+    raise why
+
+
+def _rational(number, denominator):
+    return max(Fraction(number).limit_denominator(denominator), Fraction(1, denominator))
+
+
+def _best_of_each(tried):
+    """The tries in the order of their numbers of nodes, one of each ellipse."""
+    seen = {}
+    for found in sorted(tried, key=lambda found: found[:2]):
+        seen.setdefault(float(found[2]), found)
+    return list(seen.values())[:2]
+
+
+def _sampled(equation, sides, name, r):
+    """(the length of each sample of u, z at them on the border of the ellipse), no bounds; NaN where z is singular."""
+    arcs, boxes = equation.cover(sides, name, r)
+    lengths, rows = [], []
+    for start, end, _, z in equation.pieces:
+        for k in range(SAMPLES):
+            u = start + (end - start) * (arb(2 * k + 1) / (2 * SAMPLES))
+            lengths.append(float((end - start) / SAMPLES))
+            rows.append([complex(acb(z(u=u, **{key: x.mid() for key, x in place.items()}))) for place in arcs])
+            if k % CHECKED == 0 and not all(acb(z(u=u, **place)).is_finite() for place in boxes):
+                rows[-1] = [math.nan] * len(arcs)
+                return np.array(lengths), np.array(rows)
+    return np.array(lengths), np.array(rows)
+
+
+def _growth(length, z, w):
+    """About the largest bound of the factors that `checker.growth` finds; samples of u along the first axis."""
+    exponent = (length[:, None] * abs(w**2 - z.conj()) / (2 * w)).sum(0) + 0.5 * abs(np.diff(np.log(w), axis=0)).sum(0)
+    first, last = np.log(w[0]), np.log(w[-1])
+    exponent += 0.5 * np.maximum(abs(first - last), abs(first + last))
+    return math.exp(min(exponent.max(), 700.0))
 
 
 def _order(equation, sides, tolerance):

@@ -12,7 +12,7 @@ from survey.measures.hill.multiprecision import Unsupported
 from survey.modules import load
 from survey.request.function_scene import FunctionScene
 from survey.request.hill_scene import is_number, reason
-from survey.scene import Option, Output, Parameter, Request, named
+from survey.scene import Option, Output, Request, named
 from survey.scenes import gyrostat
 
 ON_A_LINE = ("trajectory", "abel")  # the questions without a period
@@ -48,7 +48,6 @@ class AbelScene(FunctionScene):
     f: Callable
     g: Callable
     period: float | None
-    own: tuple[Parameter, ...]
     NAME: str
     TEXT: str
     HASH: str
@@ -92,7 +91,7 @@ class AbelScene(FunctionScene):
         names = tuple(p.name for p in self.own)
         if question in ("fate", "portrait"):
             measure = blocks.fates if question == "fate" else blocks.portraits
-            return measure(point, names, self.flows, method, request.rtol)
+            return measure(point, names, self.flows, method, request)
         names = (*names, "phi0", "w0")
         given, last, back = blocks.dense(point, names, {"trajectory": "t", "abel": "phi"}[question])
         rows = solution.rows(self.flows(given[:, :-2]), given[:, -2], given[:, -1])

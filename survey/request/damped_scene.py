@@ -15,7 +15,7 @@ from survey.kernels.math.roundoff import EPS
 from survey.measures.hill import monodromy
 from survey.request.function_scene import FunctionScene
 from survey.request.hill_scene import HillScene
-from survey.scene import Output, Parameter, named
+from survey.scene import Output, named
 
 KEPT = ("discriminant", "rotation_number", "period", "verdict")
 WORDS = {
@@ -35,7 +35,6 @@ class DampedScene(FunctionScene):
     place: int | None
     period: float | Callable
     breaks: tuple[float, ...] | Callable
-    PARAMETERS: tuple[Parameter, ...]
     even: bool
     NAME: str
     TEXT: str
@@ -47,11 +46,6 @@ class DampedScene(FunctionScene):
     AUDIT = ("dop853",)
     OPTIONS = ()
     DAMPED = True
-
-    @property
-    def own(self):
-        """The parameters of z and c: all that there are."""
-        return self.PARAMETERS
 
     @property
     def STATUS(self):
@@ -71,7 +65,7 @@ class DampedScene(FunctionScene):
     @cached_property
     def _inner(self):
         """The scene of x, over the same parameters."""
-        shared = ("period", "breaks", "PARAMETERS", "NAME", "TEXT", "HASH", "TITLE", "about", "REFERENCES")
+        shared = ("period", "breaks", "own", "NAME", "TEXT", "HASH", "TITLE", "about", "REFERENCES")
         given = {name: getattr(self, name) for name in shared}
         return HillScene(z=_less_square(self.z, self.damping, self.place), EVEN=self.even, **given)
 

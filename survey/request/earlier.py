@@ -14,7 +14,6 @@ from survey.sweep.reuse import Earlier
 from survey.wording import short, shown
 
 FURTHER = ("boundaries", "refine")  # found anew
-NAMES = {"scene_hash": "text of your own scene"}
 
 
 def find(workflow, path):
@@ -36,13 +35,18 @@ def _unlike(workflow, attributes):
     if finished.lost(attributes):
         return "workers died while it was computed"
     try:
+        data = tomllib.loads(attributes["workflow"])
+        if data.get("scene") != workflow.name:
+            return f"another scene ({shown(data.get('scene'))}, not {shown(workflow.name)})"
+        if attributes.get("scene_hash") != getattr(workflow.scene, "HASH", None):
+            return "another text of your own scene"
         old = _checked(workflow, attributes)
-    except (KeyError, ValueError) as error:  # BadInput is a ValueError
+    except (KeyError, TypeError, ValueError) as error:  # BadInput is a ValueError
         return f"its workflow cannot be read ({short(error, 150)})"
     before, now = fingerprint(old), fingerprint(workflow)
-    for key in ("scene", "scene_hash", "options", "method", "rtol"):
+    for key in ("options", "method", "rtol"):
         if before[key] != now[key]:
-            return f"another {NAMES.get(key, key)} ({shown(before[key])}, not {shown(now[key])})"
+            return f"another {key} ({shown(before[key])}, not {shown(now[key])})"
     more = sorted(workflow.request.variables - old.request.variables)
     if more:
         return f"it has no {', '.join(more)}, and all values of a point are found together"
@@ -52,11 +56,11 @@ def _unlike(workflow, attributes):
 
 
 def _checked(workflow, attributes):
-    """The workflow of the file, as this version of the code understands it."""
+    """The workflow of the file, as this version of the code understands it, with our scene: it may name code."""
     data = {key: table for key, table in tomllib.loads(attributes["workflow"]).items() if key not in FURTHER}
     data.get("output", {}).pop("figures", None)
-    own = data.get("scene") == workflow.name and "scene_hash" in attributes
-    return workflows.check(data | ({"scene": workflow.scene} if own else {}), output=workflow.path)
+    ours = workflow.scene if hasattr(workflow.scene, "HASH") else workflow.name
+    return workflows.check(data | {"scene": ours}, output=workflow.path)
 
 
 def _common(workflow, ds, path):

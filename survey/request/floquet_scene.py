@@ -9,7 +9,7 @@ import numpy as np
 from survey.measures.floquet import dense, monodromy, motion, probing, stability
 from survey.measures.floquet.system import System
 from survey.request.traced_scene import TracedScene
-from survey.scene import Parameter, plus_minus
+from survey.scene import plus_minus
 
 LARGEST = 64  # states
 TRIED = np.array([0.0, 0.11, 0.29, 0.47, 0.62, 0.83])  # of a period: where A is tried as Python
@@ -31,7 +31,6 @@ class FloquetScene(TracedScene):
     states: tuple[str, ...]
     structure: str
     conserved: tuple[float, ...] | Callable | None
-    PARAMETERS: tuple[Parameter, ...]
     NAME: str
     TEXT: str
     HASH: str
@@ -42,11 +41,6 @@ class FloquetScene(TracedScene):
     AUDIT = ("dop853",)
     OPTIONS = ()
     STATUS = STATUS
-
-    @property
-    def own(self):
-        """The parameters of A: all that there are."""
-        return self.PARAMETERS
 
     @cached_property
     def _system(self):

@@ -2,29 +2,42 @@
 
 import html
 import re
-from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
 from survey.errors import BadInput
+from survey.scene import Parameter
 from survey.wording import plain
 
 _KEYS = re.compile(r"\b(PARAMETERS|PERIOD|EVEN|BREAKS|STATES|STRUCTURE|CONSERVED|START|CONTINUATION|DAMPING)\b")
 _known = {}  # by hash: a worker process compiles a scene once, for all of its blocks
 
 
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class FunctionScene:
-    """Base of `HillScene`, `AbelScene` and `TracedScene`; `own`: parameters of the functions."""
+    """Base of the scenes of a user's functions; `own`: the functions' parameters, `about`: the scene's docstring."""
 
+    own: tuple[Parameter, ...]
     NAME: str
+    TEXT: str
     HASH: str
+    TITLE: str
     about: str
-    own: tuple
-    check: Callable[..., None]  # refuses functions that are wrong at these points
+    REFERENCES: tuple[str, ...]
 
     def __post_init__(self):
         object.__setattr__(self, "__doc__", self.about)
+
+    @property
+    def PARAMETERS(self):
+        """All parameters: those of the functions, unless a family adds its own."""
+        return self.own
+
+    def check(self, points: Any) -> None:
+        """Raise BadInput if the functions are wrong at these points (N, n)."""
+        raise NotImplementedError
 
     def __repr__(self):
         return "\n".join([self.TITLE, *(f"  {name}: {text}" for name, text in self._rows())])
@@ -48,7 +61,7 @@ class FunctionScene:
         yield "outputs", ", ".join(dict.fromkeys(o.name for o in self.OUTPUTS))
 
     def __reduce__(self):
-        return _restored, (type(self), self.HASH, [getattr(self, field.name) for field in fields(self)])
+        return _restored, (type(self), self.HASH, {field.name: getattr(self, field.name) for field in fields(self)})
 
     def _points(self, point):
         """The parameters of the functions at the points of a block (N, n), and the block's shape."""
@@ -77,4 +90,4 @@ def refusal(name, message):
 
 def _restored(kind, digest, values):
     """The scene with these values; the same object for the same hash, so that its kernels are compiled once."""
-    return _known.setdefault(digest, kind(*values))
+    return _known.setdefault(digest, kind(**values))

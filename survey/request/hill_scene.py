@@ -14,7 +14,6 @@ from survey.measures.hill import dependence, monodromy, motion, multiprecision, 
 from survey.measures.rows import Rows
 from survey.proof import formulas
 from survey.request.function_scene import FunctionScene
-from survey.scene import Parameter
 
 LONG_NAMES = {
     "y1": "y1(T), where y1(0) = 1, y1'(0) = 0",
@@ -43,7 +42,6 @@ class HillScene(FunctionScene):
     z: Callable
     period: float | Callable
     breaks: tuple[float, ...] | Callable
-    PARAMETERS: tuple[Parameter, ...]
     EVEN: bool
     NAME: str
     TEXT: str
@@ -55,11 +53,6 @@ class HillScene(FunctionScene):
     AUDIT = ("dop853",)
     OPTIONS = ()
     STATUS = STATUS
-
-    @property
-    def own(self):
-        """The parameters of z: all that there are."""
-        return self.PARAMETERS
 
     @property
     def OUTPUTS(self):

@@ -36,7 +36,6 @@ class OrbitScene(TracedScene):
     jacobian: Callable | None
     states: tuple[str, ...]
     continued: Range | None
-    own: tuple[Parameter, ...]
     NAME: str
     TEXT: str
     HASH: str

@@ -28,12 +28,12 @@ def workflow(scene):
     lines = [f'title = "{module.TITLE}"', f'scene = "{name}"', *_options(module, options), "", "[axes]"]
     lines += ['# in this order the dimensions; { start, stop, num, spacing = "log" }, { values = [...] }, or a number']
     for p, number in zip(axes, NUMBERS, strict=False):
-        low, high = _ends(p)
+        low, high = ends(p)
         lines += [f"{p.name} = {{ start = {low:g}, stop = {high:g}, num = {number} }}  # {_about(p)}"]
     for p in existing:
         if p in axes:
             continue
-        line = f"{p.name} = {p.default if p.default is not None else _inside(p):g}  # {_about(p)}"
+        line = f"{p.name} = {p.default if p.default is not None else inside(p):g}  # {_about(p)}"
         lines += [line if p.default is None else f"# {line}"]
     lines += [f"# {p.name} instead of {p.instead_of}: {_about(p)}" for p in module.PARAMETERS
               if p.instead_of in used]  # fmt: skip
@@ -71,7 +71,7 @@ def _about(p):
     return f"{p.long_name}{unit}; {p.domain}"
 
 
-def _ends(p):
+def ends(p):
     """(start, stop) of an axis inside the parameter's domain, between the values that it excludes."""
     low = p.minimum if abs(p.minimum) <= 10 * FAR else (0.0 if p.minimum >= 0 else -FAR)
     low = LEAST if 0.0 < low < TINY else low
@@ -84,6 +84,6 @@ def _ends(p):
     return float(f"{low:.3g}"), float(f"{high:.3g}")
 
 
-def _inside(p):
-    low, high = _ends(p)
+def inside(p):
+    low, high = ends(p)
     return next((x for x in (0.5, 1.0) if low < x < high and p.holds([x]).all()), round(low + 0.3 * (high - low), 3))

@@ -483,9 +483,8 @@ def _hill(
     about = inspect.cleandoc(about or f"{equation}, p = ({', '.join(names)}).")
     known = (z, period, breaks, parameters, even, *([damping] if damped else []))
     shared = dict(
-        z=z, period=period, breaks=breaks, PARAMETERS=parameters, NAME=name, TEXT=text,
-        HASH=hashlib.sha256(text.encode() if name.endswith(".py") else _bits(known)).hexdigest(),
-        TITLE=title or about.splitlines()[0].rstrip("."), about=about, REFERENCES=tuple(references) or REFERENCES,
+        z=z, period=period, breaks=breaks, own=parameters,
+        **_described(name, text, title, about, references or REFERENCES, known),
     )  # fmt: skip
     if damped:
         return DampedScene(damping=c, place=names.index(place) if place else None, even=bool(even), **shared)
@@ -513,12 +512,9 @@ def _abel(
         refuse(f"PERIOD = {period!r}: it must be 2 pi, to which phi can be scaled, or None")
     names = ", ".join(p.name for p in parameters)
     about = inspect.cleandoc(about or f"w w' = f(phi, p) w + g(phi, p), p = ({names}).")
-    bits = text.encode() if name.endswith(".py") else _bits((f, g, period, parameters))
-    return AbelScene(
-        f=f, g=g, period=period, own=parameters, NAME=name, TEXT=text, HASH=hashlib.sha256(bits).hexdigest(),
-        TITLE=title or about.splitlines()[0].rstrip("."), about=about,
-        REFERENCES=tuple(references) or ABEL_REFERENCES,
-    )  # fmt: skip
+    known = (f, g, period, parameters)
+    described = _described(name, text, title, about, references or ABEL_REFERENCES, known)
+    return AbelScene(f=f, g=g, period=period, own=parameters, **described)
 
 
 def _floquet(
@@ -560,12 +556,9 @@ def _floquet(
     about = inspect.cleandoc(about or f"{equation}, p = ({', '.join(p.name for p in parameters)}).")
     given = (*matrices.items(), period, breaks, parameters, names, structure)
     given += () if conserved is None else (conserved,)
-    bits = text.encode() if name.endswith(".py") else _bits(given)
     return FloquetScene(
         matrices=matrices, period=period, breaks=breaks, states=names, structure=structure, conserved=conserved,
-        PARAMETERS=parameters, NAME=name, TEXT=text, HASH=hashlib.sha256(bits).hexdigest(),
-        TITLE=title or about.splitlines()[0].rstrip("."),
-        about=about, REFERENCES=tuple(references) or FLOQUET_REFERENCES,
+        own=parameters, **_described(name, text, title, about, references or FLOQUET_REFERENCES, given),
     )  # fmt: skip
 
 
@@ -608,13 +601,26 @@ def _orbit(
     about = inspect.cleandoc(
         about or f"Periodic orbits of x' = f(t, x, p), p = ({', '.join(p.name for p in parameters)})."
     )
-    bits = text.encode() if name.endswith(".py") else _bits((f, period, parameters, names, start, jacobian, continued))
+    known = (f, period, parameters, names, start, jacobian, continued)
     return OrbitScene(
         f=f, period=period, start=start, jacobian=jacobian, states=names, continued=continued, own=parameters,
-        NAME=name, TEXT=text,
-        HASH=hashlib.sha256(bits).hexdigest(), TITLE=title or about.splitlines()[0].rstrip("."), about=about,
-        REFERENCES=tuple(references) or ORBIT_REFERENCES,
+        **_described(name, text, title, about, references or ORBIT_REFERENCES, known),
     )  # fmt: skip
+
+
+def _described(
+    name: str, text: str, title: str | None, about: str, references: Iterable[str], known: Any
+) -> dict[str, Any]:
+    """The fields that say what a scene is; `known` is what its hash is of, if there is no file."""
+    bits = text.encode() if name.endswith(".py") else _bits(known)
+    return {
+        "NAME": name,
+        "TEXT": text,
+        "HASH": hashlib.sha256(bits).hexdigest(),
+        "TITLE": title or about.splitlines()[0].rstrip("."),
+        "about": about,
+        "REFERENCES": tuple(references),
+    }
 
 
 def _continued(

@@ -47,6 +47,10 @@ CONTRACT = {
     ),
     "DIMENSIONS": Value("{name: coordinates} of the extra dimensions that its outputs name in `dims`", dict),
     "EVEN": Value("is the coefficient of its Hill equation even about the half period? True if not given", bool),
+    "states": Value(
+        "names of the states of its linear periodic system; coordinates, then momenta if symplectic", tuple
+    ),
+    "structure": Value("of that system, as in `survey.floquet`: none, symplectic or reversible", str),
     "cost": Function(
         "rough seconds per point with the default method; `sizes` is {parameter: number of values}, 1 if it is fixed",
         ("options", "sizes"),

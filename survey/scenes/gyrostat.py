@@ -44,7 +44,7 @@ that phi lies within `phi_turning_error` of `phi_turning`.
 
 `auto` takes trajectories and Abel solutions in closed form where one applies and keeps its digits (method `closed`),
 else by Taylor series, and in double-double arithmetic (some 1e-3 s each) where these miss `rtol`; fates next to
-separatrices are followed in it, too. `workflows/gyrostat_methods.py` maps where each method fails.
+separatrices are followed in it, too. `survey failures gyrostat` maps where each method fails.
 
 `turnings` counts the zeros of w between 0 and t, its ends not among them; it is unknown where a zero lies so near to t
 that the error bar of w leaves it open on which side.
@@ -245,7 +245,7 @@ def solve(point, request):
         return _fates_on_separatrices(point, request, method)
     if question in ("fate", "portrait"):
         answers = blocks.fates if question == "fate" else blocks.portraits
-        return answers(point, _SYSTEM, np.asarray, method, request.rtol)
+        return answers(point, _SYSTEM, np.asarray, method, request)
     if "separatrix" in request.options:
         return _separatrix(point, request, question)
     measure, start = auto if request.method == "auto" else solution, (*_SYSTEM, "phi0", "w0")

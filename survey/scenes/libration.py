@@ -25,6 +25,11 @@ is proved for the very number given, and not for all real mu beside it.
 The closed forms of order 6 were found by exact rational reconstruction and hold at 110 rational points and against
 Lie series to 90 digits; they are not derived symbolically. Formal stability is not Lyapunov stability.
 
+The discriminant of (3.11) is positive and Arnold's bordered determinant not 0 for every mu < mu_R: by KAM theory most
+motions near L4 stay on tori, on every level of energy. In three degrees of freedom tori do not separate the others, so
+that this is no proof of Lyapunov stability. With the option `order` = 8 or 10 the coefficients go further (Lie
+series), and `effective_radius` says within which distance motions stay for `periods` periods of the primaries.
+
 Verdict 3 means that the half-ulp interval of mu contains mu1 or mu2, 4 that it contains mu_R.
 
 Source: A. P. Markeev, Libration Points in Celestial Mechanics and Cosmodynamics (1978), chapter 8, section 3, checked
@@ -36,14 +41,17 @@ Deprit-Bartholome, Astronomical Journal 72 (1967) 173; K. R. Meyer, D. S. Schmid
 
 import numpy as np
 
+from survey import status
 from survey.kernels.libration.coefficients import LABELS
-from survey.measures.libration import motion, normal_form
-from survey.scene import Output, Parameter, Trajectory, named
+from survey.measures.libration import higher, motion, normal_form
+from survey.scene import Option, Output, Parameter, Trajectory, named
 
 TITLE = "Formal stability of the triangular libration points"
 FAMILY = "normal_form"
 AUDIT = ("rational_double", "lie")
-OPTIONS = ()
+OPTIONS = (
+    Option("order", ("6", "8", "10"), "order of the normal form; beyond 6 by Lie series, with effective stability"),
+)
 STATUS = {
     "overflow": "the method lost every digit, so near a resonance or an end of the interval: try rational_double",
 }
@@ -52,8 +60,14 @@ REFERENCES = (
     "A. Deprit, A. Deprit-Bartholome, Astronomical Journal 72 (1967) 173",
     "K. R. Meyer, D. S. Schmidt, Journal of Differential Equations 62 (1986) 222",
 )
-PARAMETERS = (Parameter("mu", "mass of the smaller primary over that of both", r"\mu", minimum=1e-100, maximum=0.5),)
-DIMENSIONS = {"monomial": np.array(LABELS)}
+_HIGHER = {"order": ("8", "10")}
+PARAMETERS = (
+    Parameter("mu", "mass of the smaller primary over that of both", r"\mu", minimum=1e-100, maximum=0.5),
+    Parameter("periods", "time for which motions are to stay, in periods of the primaries", r"T/2\pi", default=1e9,
+              minimum=1.0, maximum=1e100, when=_HIGHER),
+)  # fmt: skip
+DIMENSIONS = {"monomial": np.array(LABELS), "ray": np.array([1, 2]), "component": np.array(["k1", "k2", "k3"]),
+              "monomial8": np.array(higher.labels(8)), "monomial10": np.array(higher.labels(10))}  # fmt: skip
 _VERDICTS = {
     "undecided": normal_form.UNDECIDED,
     "linearly_unstable": normal_form.UNSTABLE,
@@ -63,6 +77,9 @@ _VERDICTS = {
     "boundary": normal_form.BOUNDARY,
 }
 _BELOW = "at mu < mu_R = 0.0385208965..."
+_SERIES = (
+    _BELOW + ", where the series keep digits: not at mu -> 0, within 4e-15 of mu_R, or within 1e-12 of a resonance"
+)
 OUTPUTS = (
     Output("omega1", "greater frequency in the plane", r"\omega_1", applies=_BELOW),
     Output("omega2", "smaller frequency in the plane (of negative energy)", r"\omega_2", applies=_BELOW),
@@ -79,6 +96,27 @@ OUTPUTS = (
            integer=True, applies=_BELOW),
     Output("resonance_distance", "distance |k1 omega1 - k2 omega2 + k3| of that resonance", r"|k \cdot \omega|",
            applies=_BELOW + "; (2, 0, -2) and (1, 1, 0), met at mu = 0 and mu_R, count too"),
+    Output("resonance", "k of that resonance, k1 omega1 - k2 omega2 + k3", "k", integer=True, fill=normal_form.FILL,
+           dims=("component",), applies=_BELOW),
+    Output("discriminant", "a11^2 - 4 a20 a02 of (3.11): positive, so that N = 0 has two rays on L = 0",
+           r"a_{11}^2 - 4 a_{20} a_{02}", applies=_BELOW),
+    Output("alpha", "r1 / r2 on the rays of L = N = 0 (3.11)", r"\alpha_j", dims=("ray",),
+           applies=_BELOW + "; on ray 1 not where a20 may be 0 (mu** = 0.0027834757...)"),
+    Output("beta", "r3 / r2 on these rays", r"\beta_j", dims=("ray",), applies=_BELOW + ", as alpha"),
+    Output("det_N", "determinant of N'', the second derivatives by the actions", r"\det N''",
+           applies=_BELOW + "; not 0 but at mu = 0.0215391147..."),
+    Output("det_bordered", "determinant of N'' bordered by the frequencies (Arnold)",
+           r"\det\left(\begin{smallmatrix}N'' & \omega\\ \omega^T & 0\end{smallmatrix}\right)",
+           applies=_BELOW + "; never 0: by KAM theory most motions near L4 stay on tori on every level of energy, "
+           "which for three degrees of freedom do not keep the others in: this is not Lyapunov stability"),
+    Output("c8", "coefficient of r1^i r2^j r3^k, monomial ijk of four actions", "c_{ijk}", dims=("monomial8",),
+           when=_HIGHER, applies=_SERIES),
+    Output("c10", "coefficient of r1^i r2^j r3^k, monomial ijk of five actions", "c_{ijk}", dims=("monomial10",),
+           when={"order": ("10",)}, applies=_SERIES),
+    Output("effective_radius", "radius of effective stability: motions with |z_j| <= it stay within sqrt 2 times it "
+           "for `periods`; an estimate by truncated series, not a proof", r"\rho", when=_HIGHER, applies=_SERIES),
+    Output("effective_order", "degree to which the Hamiltonian was normalised for it", "r", integer=True,
+           when=_HIGHER, applies=_SERIES),
     Output("verdict", "formal stability", flags=_VERDICTS,
            applies="by order 6 is proved unless omega1 and omega2 are both rational (rank-2 resonances: countable, "
            "dense, but no float64 mu is one), where M != 0 settles nothing; formal is not Lyapunov stability"),
@@ -87,14 +125,22 @@ OUTPUTS = (
 
 def cost(options, sizes):
     """Seconds per point, roughly."""
-    return 4e-6
+    return {"6": 6e-6, "8": 2e-3, "10": 1e-2}[options["order"]]
 
 
 def solve(point, request):
     """All outputs of a block (see `survey.scenes`)."""
-    shape = np.shape(point["mu"])
-    mu = np.array(point["mu"], dtype=float).ravel()
+    shape = np.broadcast_shapes(*(np.shape(values) for values in point.values()))
+    mu = np.broadcast_to(point["mu"], shape).astype(float).ravel()
     answer = normal_form.solve(mu, request.method, request.rtol)
+    order = int(request.options["order"])
+    if order in higher.ORDERS:
+        periods = np.broadcast_to(point["periods"], shape).ravel()
+        more = higher.solve(mu, np.where(periods >= 1.0, periods, 1.0), order)
+        good = (answer["status"] == status.OK) & np.isfinite(periods)
+        for name, values in more.items():
+            none = -1 if values.dtype.kind == "i" else np.nan
+            answer[name] = np.where(good.reshape(-1, *[1] * (values.ndim - 1)), values, none).astype(values.dtype)
     return {name: values.reshape(shape + values.shape[1:]) for name, values in answer.items()}
 
 

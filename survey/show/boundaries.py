@@ -79,12 +79,17 @@ def curves_of(ds):
     return {name: found[name] for name in CURVES if name in found}
 
 
-def draw_boundaries(axes, ds, x, y):
-    """Draw the boundaries over the map, points above lines; returns their legend handles."""
+def draw_boundaries(axes, ds, x, y, gaps=None):
+    """Draw the boundaries over the map, points above lines; returns their legend handles.
+
+    `gaps`: the colour between the dashes of edges of tongues, which are lines themselves where they are narrow.
+    """
     handles = {}
     for name, parts in curves_of(ds).items():
         label, properties = CURVES[name]
         zorder = 3 if "marker" in properties else 2
+        if label is _EDGES and properties["ls"] != "-":
+            properties = properties | {"gapcolor": gaps}
         for part in parts:
             points = (ds[f"curve_{axis.name}"].values[part] for axis in (x, y))
             axes.plot(*points, clip_on=zorder < 3, zorder=zorder, **properties)

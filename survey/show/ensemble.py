@@ -4,8 +4,9 @@ import numpy as np
 from matplotlib.patches import Patch
 
 from survey import status
+from survey.file.labels import fill_of, masked, words_of
 from survey.show.layout import add_legend
-from survey.show.maps import colours_of_numbers
+from survey.show.maps import IN_WORDS, colours_of_numbers
 from survey.show.palette import kinds_of
 from survey.show.text import WIDE, label_of, spaced
 
@@ -25,7 +26,7 @@ def _parameters(ds):
 def draw_ensemble(axes, ds, name, paper, asked):
     """Scatter a variable over two parameters: a colour for each verdict, or a colour bar; `asked` as in `draw_map`."""
     x, y = _parameters(ds)[:2]
-    variable, state = ds[name].load(), ds.status.load()
+    variable, state = masked(ds[name].load()), ds.status.load()
     if "flag_values" in variable.attrs:
         shown, table, palette = kinds_of(ds, variable, state)
         handles = []
@@ -37,15 +38,20 @@ def draw_ensemble(axes, ds, name, paper, asked):
                 handles.append(Patch(facecolor=palette[kind], edgecolor="black", lw=0.5, label=label))
     else:
         lost = np.isin(state.values, list(status.UNANSWERED))
-        shown = np.ma.masked_invalid(np.where(lost, np.nan, variable.values.astype(float)))
-        colours = colours_of_numbers(shown, variable, asked, variable.dtype.kind == "i")
+        words, values = words_of(variable), variable.values.astype(float)
+        shown = np.ma.masked_invalid(np.where(lost | np.isin(values, list(words)), np.nan, values))
+        colours = colours_of_numbers(shown, variable, asked, fill_of(variable) is not None)
         drawn = axes.scatter(x.values, y.values, SIZE, shown, **colours)
-        axes.figure.colorbar(drawn, ax=axes, label=label_of(variable))
+        axes.figure.colorbar(drawn, ax=axes, label=label_of(variable, WIDE))
         handles = []
+        for code, text in words.items():
+            here = (values == code) & ~lost
+            axes.scatter(x.values[here], y.values[here], SIZE, IN_WORDS, edgecolors="black", linewidths=0.3)
+            handles += [Patch(color=IN_WORDS, label=f"{text} ({int(here.sum()):,})")] if here.any() else []
     bad = np.isin(state.values, list(status.UNANSWERED))
     if bad.any():
         axes.plot(x.values[bad], y.values[bad], "x", color="#999999", ms=4)
         handles.append(Patch(color="#999999", label=f"no answer ({int(bad.sum()):,})"))
-    axes.set(xlabel=label_of(x, WIDE), ylabel=label_of(y))
+    axes.set(xlabel=label_of(x, WIDE), ylabel=label_of(y, WIDE))
     if handles:
         add_legend(axes, handles)

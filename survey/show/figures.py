@@ -11,6 +11,7 @@ from matplotlib.text import Text
 
 from survey import modules
 from survey.errors import BadInput
+from survey.file.labels import masked
 from survey.show import family
 from survey.show.ensemble import draw_ensemble, is_ensemble
 from survey.show.layout import alone, fit
@@ -18,6 +19,7 @@ from survey.show.maps import draw_map
 from survey.show.profiles import draw_profile
 from survey.show.style import figure_size, style_named
 from survey.show.text import literal, title_of
+from survey.wording import shown
 
 MOST_LABELS = 30  # on an axis
 
@@ -42,6 +44,7 @@ def onto(axes, ds, name=None, boundaries=True, style=None, across=(None, None), 
     `across`: the axes that are drawn, or None; `colours`: cmap, vmin, vmax, robust of a variable of numbers, or None.
     """
     paper = style_named(style).paper
+    _check_colours(colours or {})
     drawable = [key for key in ds.data_vars if not key.endswith("_error") and set(ds[key].dims) >= set(ds.status.dims)
                 and ds[key].dtype.kind in "iuf"]  # fmt: skip
     name = name or ("verdict" if "verdict" in ds else drawable[0])
@@ -81,6 +84,23 @@ def onto(axes, ds, name=None, boundaries=True, style=None, across=(None, None), 
     fit(axes)
 
 
+def _check_colours(asked):
+    """Raise BadInput unless the limits are numbers, the lower one first, and the colour map is one of matplotlib's."""
+    limits = {key: asked[key] for key in ("vmin", "vmax") if asked.get(key) is not None}
+    for key, value in limits.items():
+        if np.ndim(value) or np.asarray(value).dtype.kind not in "iuf" or not np.isfinite(value):
+            raise BadInput(f"{key} = {shown(value)}: it must be a finite number")
+    if len(limits) == 2 and not limits["vmin"] < limits["vmax"]:
+        raise BadInput(f"vmin = {limits['vmin']:g} is not below vmax = {limits['vmax']:g}")
+    name = asked.get("cmap")
+    if isinstance(name, str) and name not in matplotlib.colormaps:
+        raise BadInput(f"cmap: {modules.unknown('colour map', name, list(matplotlib.colormaps))}")
+    if not (name is None or isinstance(name, (str, matplotlib.colors.Colormap))):
+        raise BadInput(
+            f"cmap = {shown(name)}: give the name of a colour map, such as 'viridis', or one of matplotlib's"
+        )
+
+
 def _chosen(ds, across):
     """The one or two axes to be drawn, or None; raises BadInput for an unknown one."""
     known = list(ds.status.dims)
@@ -111,7 +131,7 @@ def _flat(ds, name, chosen=None):
     part = ds.isel({dim: at.get(dim, 0) for dim in (*ds.status.dims, *ds[name].dims) if dim not in keep})
     unsorted = [dim for dim in keep if not _is_monotonic(part[dim].values)]
     part = part.sortby(unsorted) if unsorted else part
-    return part, part[name].transpose(*keep), part.status.transpose(*keep)
+    return part, masked(part[name].transpose(*keep)), part.status.transpose(*keep)
 
 
 def _is_monotonic(values):

@@ -10,6 +10,9 @@ SAFE_PART = 0.95  # of the space for a text: fonts are a little wider at other r
 OVERHANG = 1.2  # of the width of axes that have neighbours: texts may reach into the gap
 
 
+LAST = r"(?<=,) \$[^$]*\$( \([^)]*\))?$"  # the symbol and the unit of a label
+
+
 def fit(axes):
     """Wrap the title and the labels that would not fit, as the figure is laid out now."""
     axes.figure.figure.draw_without_rendering()
@@ -28,13 +31,17 @@ def _space(axes, most):
 
 
 def wrap(text, space):
-    """Break the lines of a matplotlib Text that are longer than `space` pixels, but no formula."""
+    """Break the lines of a matplotlib Text that are longer than `space` pixels.
+
+    A formula stays whole, and at the end of a label beside its name and unit.
+    """
     original = text.get_text()
     for length in range(max(map(len, original.split("\n"))), 9, -3):
         box = text.get_window_extent()
         if (box.height if text.get_rotation() else box.width) <= SAFE_PART * space:
             return
-        joined = re.sub(r"\$[^$]*\$", lambda formula: formula[0].replace(" ", "\0"), original)
+        joined = re.sub(LAST, lambda end: end[0].replace(" ", "\0"), original)
+        joined = re.sub(r"\$[^$]*\$", lambda formula: formula[0].replace(" ", "\0"), joined)
         lines = joined.split("\n")
         wrapped = [textwrap.fill(line, length, break_long_words=False, break_on_hyphens=False) for line in lines]
         text.set_text("\n".join(wrapped).replace("\0", " "))

@@ -6,16 +6,15 @@ from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from survey import modules, status
-from survey.errors import BadInput
-from survey.file.labels import flag_codes, scene_statuses
+from survey import status
+from survey.file.labels import fill_of, flag_codes, scene_statuses, words_of
 from survey.file.overview import Overview, Points
 from survey.grid import logarithmic
 from survey.show.boundaries import draw_boundaries, in_plane
 from survey.show.cells import draw_cells
 from survey.show.layout import add_legend
 from survey.show.marks import hatched, marks, marks_without_answer
-from survey.show.palette import UNDECIDED, greys, hatch_of, kinds_of
+from survey.show.palette import UNDECIDED, colours_of, greys, hatch_of, kinds_of
 from survey.show.style import style_named
 from survey.show.text import WIDE, label_of, spaced
 
@@ -24,6 +23,7 @@ MOST_COUNTS = 10  # that have a colour each
 MAX_CELLS = 1000  # along an axis of such a picture: each costs a hundred bytes
 EDGED, EDGES = "discriminant", (-2.0, 2.0)  # whose lines at these values are the edges of stability
 SEQUENTIAL, DIVERGING = "viridis", "RdBu_r"  # of values of one sign, and about 0
+IN_WORDS = "#CC79A7"  # numbers that stand for words, such as infinitely many
 CELLS_PER_PIXEL = 0.8  # of the axes, before legend and labels take their share
 
 
@@ -33,7 +33,8 @@ def draw_map(axes, ds, variable, state, boundaries, paper, asked):
     `asked`: cmap, vmin, vmax, robust of its colours, None where they are not given.
     """
     scales = ["log" if logarithmic(variable[dim].values) else "linear" for dim in variable.dims]
-    ticks = MaxNLocator(integer=True) if variable.dtype.kind == "i" else None
+    words = words_of(variable)
+    ticks = MaxNLocator(integer=True) if fill_of(variable) is not None else None
     variable, state, number = _shown(axes, ds, variable, state, style_named("paper" if paper else None).dpi)
     x, y = (variable[dim] for dim in variable.dims)
     failed = np.isin(state.values, list(status.FAILURES))
@@ -44,27 +45,33 @@ def draw_map(axes, ds, variable, state, boundaries, paper, asked):
         handles = _verdicts(axes, x, y, ds, variable, state, number, paper)
         handles += marks_without_answer(axes, x, y, failed, outside, number, paper)
     else:
-        shown = np.ma.masked_invalid(np.where(failed | outside, np.nan, variable.values.astype(float)))
+        values = variable.values.astype(float)
+        worded = {text: (values == code) & ~(failed | outside) for code, text in words.items()}
+        shown = np.ma.masked_invalid(np.where(failed | outside | np.isin(values, list(words)), np.nan, values))
         colours = colours_of_numbers(shown, variable, asked, ticks is not None)
         drawn = axes.pcolormesh(x, y, shown.T, shading="nearest", rasterized=True, **colours)
         if not shown.mask.all():
             few = isinstance(colours.get("norm"), BoundaryNorm)
             ticks = np.unique(shown.compressed()) if few else ticks
             extend = "neither" if few else clipped(shown, *drawn.get_clim())
-            axes.figure.colorbar(drawn, ax=axes, label=label_of(variable), ticks=ticks, extend=extend)
+            axes.figure.colorbar(drawn, ax=axes, label=label_of(variable, WIDE), ticks=ticks, extend=extend)
         if variable.name == EDGED and min(shown.shape) > 1 and shown.count():
             axes.contour(x, y, shown.T, levels=EDGES, colors="black", linewidths=0.6)
         axes.set_facecolor("#dddddd")
-        missing = shown.mask & ~(failed | outside)
-        handles = _undefined(axes, x, y, ds, state, missing, number, paper)
+        missing = np.isnan(values) & ~(failed | outside)
+        handles = []
+        for text, here in worded.items():
+            handles += _area(axes, x, y, here, IN_WORDS, text, number, paper)
+        handles += _undefined(axes, x, y, ds, state, missing, number, paper)
         handles += marks_without_answer(axes, x, y, failed, outside, number, paper)
         missing &= ~np.isin(state.values, list(scene_statuses(ds).values()))
         handles += [Patch(color="#dddddd", label="does not apply")] if missing.any() else []
     if boundaries and "curve_count" in ds:
-        handles += draw_boundaries(axes, in_plane(ds, variable), x, y)
+        gaps = colours_of(flag_codes(variable.attrs)).get("unstable") if "flag_values" in variable.attrs else None
+        handles += draw_boundaries(axes, in_plane(ds, variable), x, y, gaps)
     if handles:
         add_legend(axes, handles)
-    axes.set(xlabel=label_of(x, WIDE), ylabel=label_of(y))
+    axes.set(xlabel=label_of(x, WIDE), ylabel=label_of(y, WIDE))
     for setting, scale in zip((axes.set_xscale, axes.set_yscale), scales, strict=True):
         if scale == "log":
             setting(scale)
@@ -122,12 +129,17 @@ def _undefined(axes, x, y, ds, state, missing, number, paper):
     handles = []
     codes = scene_statuses(ds)
     for name, grey in greys(ds).items():
-        here = missing & (state.values == codes[name])
-        if here.any():
-            cells = np.ma.masked_array(here, ~here)
-            axes.pcolormesh(x, y, cells.T, cmap=ListedColormap([grey]), shading="nearest", rasterized=True)
-            handles += marks(axes, x, y, here, spaced(name), number, paper, grey)
+        handles += _area(axes, x, y, missing & (state.values == codes[name]), grey, spaced(name), number, paper)
     return handles
+
+
+def _area(axes, x, y, here, colour, label, number, paper):
+    """Draw the cells `here` in a colour; returns their legend handles, none where there is no such cell."""
+    if not here.any():
+        return []
+    cells = np.ma.masked_array(here, ~here)
+    axes.pcolormesh(x, y, cells.T, cmap=ListedColormap([colour]), shading="nearest", rasterized=True)
+    return marks(axes, x, y, here, label, number, paper, colour)
 
 
 def counts(shown):
@@ -147,7 +159,7 @@ def colours_of_numbers(shown, variable, asked, whole):
     if str(variable.name).endswith("_error") and not any(asked.get(key) is not None for key in ("vmin", "vmax")):
         low, high = _positive(shown)
         if high > 100.0 * low > 0.0:
-            return {"cmap": _colour_map(asked.get("cmap"), SEQUENTIAL), "norm": LogNorm(low, high)}
+            return {"cmap": asked.get("cmap") or SEQUENTIAL, "norm": LogNorm(low, high)}
     given = {key: asked[key] for key in ("vmin", "vmax") if asked.get(key) is not None}
     if whole and not given and asked.get("cmap") is None:
         few = counts(shown)
@@ -159,14 +171,7 @@ def colours_of_numbers(shown, variable, asked, whole):
     if signed and not given:
         most = max(-low, high)
         limits = {"vmin": -most, "vmax": most}
-    return {"cmap": _colour_map(asked.get("cmap"), DIVERGING if signed else SEQUENTIAL)} | limits
-
-
-def _colour_map(name, default):
-    """The colour map; raises BadInput for an unknown one."""
-    if name is not None and isinstance(name, str) and name not in colormaps:
-        raise BadInput(f"cmap: {modules.unknown('colour map', name, list(colormaps))}")
-    return default if name is None else name
+    return {"cmap": asked.get("cmap") or (DIVERGING if signed else SEQUENTIAL)} | limits
 
 
 def clipped(shown, low, high):

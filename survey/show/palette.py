@@ -8,7 +8,10 @@ from survey.file.labels import flag_codes, scene_statuses
 # after Okabe and Ito, safe for the colour-blind, the first two far apart in grey print too;
 # black is kept for undecided, white with hatching for failed
 COLOURS = ("#D55E00", "#A6D8F5", "#E69F00", "#F0E442", "#009E73", "#CC79A7", "#0072B2", "#999999", "#B8E0D2", "#5D3A9B",
-           "#8C564B")  # fmt: skip
+           "#8C564B", "#D9B38C", "#BCBD22", "#C49CDE")  # fmt: skip
+UNSTABLE, STABLE = (COLOURS[0], COLOURS[10]), (COLOURS[1], COLOURS[6])  # there may be two of each
+MARGINAL = COLOURS[2]
+OTHERS = tuple(COLOURS[i] for i in (11, 4, 5, 3, 9, 8, 10, 12, 6, 13, 7))
 UNDECIDED = "#000000"
 NOTHING = "#EDEDED"  # the flag "none"
 # where the outputs are undefined, by the scene's own statuses: in print between unstable, stable and black
@@ -31,11 +34,15 @@ def kinds_of(ds, variable, state):
 
 
 def colours_of(table):
-    """A colour per meaning; "ok" takes that of stable, "none" stays pale."""
-    meant = [name for name in table if name not in ("undecided", "ok", "none")]
-    kept = set() if any("unstable" in name for name in meant) else {COLOURS[0]}  # orange means unstable alone
-    first = [c for c in COLOURS if c not in kept | ({COLOURS[1]} if "ok" in table else set())]
-    return {"undecided": UNDECIDED, "ok": COLOURS[1], "none": NOTHING} | dict(zip(meant, first, strict=False))
+    """A colour per meaning: orange is unstable and nothing else, light blue stable or "ok"; "none" stays pale."""
+    found = {"undecided": UNDECIDED, "ok": COLOURS[1], "none": NOTHING, "marginal": MARGINAL}
+    meant = [name for name in table if name not in found]
+    unstable = [name for name in meant if "unstable" in name]
+    stable = [name for name in meant if "stab" in name and name not in unstable]
+    for names, colours in ((unstable, UNSTABLE), (stable, STABLE)):
+        found |= dict(zip(names, colours, strict=False))
+    rest = [name for name in meant if name not in found]
+    return found | dict(zip(rest, (c for c in OTHERS if c not in found.values()), strict=False))
 
 
 def greys_of(ds, table):

@@ -5,9 +5,10 @@ import textwrap
 import numpy as np
 
 from survey import status
-from survey.file.labels import flag_codes
+from survey.file.labels import flag_codes, words_of
 from survey.grid import logarithmic
 from survey.show.layout import add_legend
+from survey.show.maps import IN_WORDS
 from survey.show.palette import kinds_of
 from survey.show.text import WIDE, formula, label_of, literal, spaced
 
@@ -26,7 +27,12 @@ def draw_profile(axes, ds, variable, state, paper):
     else:
         label = textwrap.fill(literal(variable.attrs.get("long_name", variable.name)), 60)
         label = formula(variable.attrs.get("symbol") or variable.name, variable.name) if paper else label
-        axes.plot(x, variable, lw=1.2, color="#0072B2", label=label)
+        words = words_of(variable)
+        axes.plot(x, variable.where(~variable.isin(list(words))), lw=1.2, color="#0072B2", label=label)
+        for code, text in words.items():
+            here = x.values[variable.values == code]
+            if here.size:
+                axes.plot(here, np.full(here.size, axes.get_ylim()[1]), "^", color=IN_WORDS, ms=4, label=text)
         if variable.name == "discriminant":
             for edge in (-2.0, 2.0):
                 axes.axhline(edge, color="black", lw=0.6, ls=(0, (5, 2)))

@@ -10,6 +10,7 @@ from survey.wording import plain
 
 MAX_TEXT, MAX_FORMULA = 300, 120  # characters of a text and of a formula in a file
 WIDE = 80  # characters of a line below axes, where `layout.fit` breaks what is wider
+OF_QUESTION = ("question", "branch")  # options that say nothing of the system
 MAX_DEPTH = 6  # of nested braces in a formula
 WITH_LENGTHS = ("\\hspace", "\\genfrac")  # TeX that takes lengths, which may be miles
 
@@ -50,7 +51,9 @@ def label_of(variable, width=40):
     shown = _is_formula(symbol) and "flag_values" not in variable.attrs
     shown = shown and not (symbol == variable.name and "_" in symbol)  # a name, not a formula with a subscript
     # TeX is longer than what it shows: inserted last; a name that only spells its symbol would repeat it
-    text = "$$" if shown and text in (symbol, symbol.lstrip("\\")) else f"{text}, $$" if shown else text
+    text = (
+        "$$" if shown and text in (symbol, symbol.lstrip("\\")) else f"{text},\N{NO-BREAK SPACE}$$" if shown else text
+    )
     text += "" if units in ("1", "") else f"\N{NO-BREAK SPACE}({literal(units)})"
     wrapped = textwrap.fill(text, width, break_long_words=False).replace("\N{NO-BREAK SPACE}", " ")
     return wrapped.replace("$$", f"${symbol}$") if shown else wrapped
@@ -73,9 +76,9 @@ def title_of(ds, variable):
 
 
 def _options(ds):
-    """The options that say something in words, such as `prolate`; which question is asked, what is drawn says."""
+    """The options that say something in words, such as `prolate`; what is drawn says which question is asked."""
     pairs = [part.partition("=")[::2] for part in str(ds.attrs.get("options", "")).split(", ")]
-    return ", ".join(spaced(value) for key, value in pairs if key != "question" and value[:1].isalpha())
+    return ", ".join(spaced(value) for key, value in pairs if key not in OF_QUESTION and value[:1].isalpha())
 
 
 def _place(axis, coordinate):

@@ -24,9 +24,14 @@ def console():
     return Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
 
 
+def always_compiled(scene):
+    """Is it compiled in each process again: the code of a user's own Hill equation?"""
+    return hasattr(scene, "HASH") and scene.FAMILY == "hill"
+
+
 def sentence(name, scene):
     """`compiling gyrostat, once on this machine, about 40 s`."""
-    when = "in each process that solves it" if hasattr(scene, "HASH") else "on this machine"
+    when = "in each process that solves it" if always_compiled(scene) else "on this machine"
     return f"compiling {name}, once {when}, about {SECONDS.get(scene.FAMILY, USUAL)} s"
 
 

@@ -99,7 +99,10 @@ def _closed(workflow, measure):
     square, third = _square(workflow, *names[:2]), names[2:]
     planes = _planes(workflow, third)
     if hasattr(measure, "searched"):
-        found = [measure.searched(workflow.scene, square, names[:2], fixed | plane) for plane in planes]
+        found = [
+            measure.searched(workflow.scene, square, names[:2], fixed | plane, workflow.request.options)
+            for plane in planes
+        ]
     else:
         found = [measure.closed(square, names[:2], fixed | plane, workflow.request.options) for plane in planes]
     count, kind, flat, error = (

@@ -16,12 +16,12 @@ from survey.file import disk
 from survey.file.blocks import Blocks
 from survey.file.labels import counts_in, layout
 from survey.kernels.jit import compile_seconds
-from survey.sweep import cluster, dispatch, edges_and_cells
+from survey.sweep import cluster, dispatch, edges_and_cells, measured
 from survey.sweep.assembly import Assembly
 from survey.sweep.compile_ahead import compiling_ahead
 from survey.sweep.cost import regions_of
 from survey.sweep.fingerprint import code_version, compilers, fingerprint, refuse_other_code
-from survey.sweep.plan import refuse_too_large
+from survey.sweep.plan import estimates, refuse_too_large
 from survey.sweep.reuse import solve_block
 from survey.sweep.time_left import TimeLeft
 
@@ -168,6 +168,8 @@ def run(
         kept.remove()
     writing = time.perf_counter() - computed - finding - compiling_further
     computing = max(0.0, computed - began - (compiling - compiling_further))
+    if not (reused or earlier or workers or scheduler or workflow.proves):
+        measured.note(workflow, estimates(workflow)[0], {"kernels": computing, "further": finding}, compiling)
     return Finished(written, assembly.tally.counts, compiling, computing, finding if further else 0.0, writing)
 
 

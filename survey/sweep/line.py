@@ -43,7 +43,7 @@ def on_line(scene, options, along, ends, fixed):
     if second:
         curves = measure.closed(square, [along, second], others, options)
     else:
-        curves = measure.searched(scene, square, [along, second], others)
+        curves = measure.searched(scene, square, [along, second], others, options)
     value = fixed.get(second, 0.0)
     here = np.flatnonzero(curves.parameters[:, 1] == value)
     position, kind = curves.parameters[here, 0], np.repeat(curves.kind, curves.count)[here]
@@ -86,4 +86,9 @@ class _Flat:
         return getattr(self._scene, name)
 
     def solve(self, point, request):
-        return self._scene.solve({name: values for name, values in point.items() if name}, request)
+        """As the scene does; points that differ by the second parameter alone are solved once."""
+        columns = np.broadcast_arrays(*(np.atleast_1d(values) for values in point.values()))
+        own = {name: values for name, values in zip(point, columns, strict=True) if name}
+        rows, where = np.unique(np.stack([*own.values()], axis=-1), axis=0, return_inverse=True)
+        out = self._scene.solve(dict(zip(own, rows.T, strict=True)), request)
+        return {name: values[where.reshape(-1)] for name, values in out.items()}

@@ -7,41 +7,72 @@ from rich import filesize
 from survey.errors import BadInput
 from survey.file import unfinished
 from survey.file.labels import layout
-from survey.kernels import jit
-from survey.sweep import edges_and_cells
+from survey.sweep import announce, edges_and_cells, measured
 from survey.sweep.cost import blocks_of, bytes_per_point, lone_cost, seconds_per_point
 from survey.sweep.dispatch import cpus
 from survey.wording import counted
 
-# what remains to be compiled
-ALL = "all kernels, once: none has been compiled on this machine yet (up to a minute)"
-FURTHER = "kernels that no run on this machine has needed yet, once"
+START, PICTURE = 1.0, 0.8  # seconds of a process's start, and of drawing a picture
+WRITTEN = 5e7  # bytes a second
+
+
+def estimates(workflow):
+    """({"kernels", "further": seconds on all threads of a usual machine}, what is known of edges and cells)."""
+    scene, request, grid = workflow.scene, workflow.request, workflow.grid
+    seconds, parts = {"kernels": grid.points * seconds_per_point(scene, request, grid), "further": 0.0}, {}
+    for name, module in edges_and_cells.requested(workflow).items():
+        parts[name], more = module.plan(workflow, lone_cost(scene, request, grid))
+        seconds["further"] += more
+    return {name: value / cpus() for name, value in seconds.items()}, parts
 
 
 def plan(workflow):
-    """What a run would do: points, blocks, bytes, method, estimated seconds, as plain data; no kernel is called."""
+    """What a run would do: points, blocks, bytes, method, estimated seconds, as plain data; no kernel is called.
+
+    Estimates are corrected by what earlier runs on this machine have taken.
+    """
     scene, request, grid = workflow.scene, workflow.request, workflow.grid
-    seconds = grid.points * seconds_per_point(scene, request, grid)
-    parts = {}
-    for name, module in edges_and_cells.requested(workflow).items():
-        parts[name], more = module.plan(workflow, lone_cost(scene, request, grid))
-        seconds += more
+    seconds, parts = estimates(workflow)
+    size = grid.points * bytes_per_point(scene, request)
+    total = sum(value * measured.factor(workflow, name, value) for name, value in seconds.items())
+    total += START + PICTURE * len(workflow.figures) + size / WRITTEN
     return {
         "scene": workflow.name,
         "options": ", ".join(f"{key}={value}" for key, value in request.options.items()),
         "axes": {name: counted(size, "value") for name, size in grid.sizes.items()},
         "points": grid.points,
         "blocks": len(blocks_of(workflow)),
-        "bytes": grid.points * bytes_per_point(scene, request),
+        "bytes": size,
+        "size": filesize.decimal(size),
         "method": request.method,
         "rtol": request.rtol,
         "variables": ", ".join(name for name in layout(scene, request)),
         **parts,
         "output": str(workflow.path),
         "threads": cpus(),
-        "estimated_seconds": float(f"{seconds / cpus():.2g}"),
-        "not_estimated": f"writing the file; compiling {ALL if jit.is_new() else FURTHER}",
+        "estimated_seconds": float(f"{total:.2g}"),
+        "time": lasting(total),
+        "compiling": _compiling(workflow),
     }
+
+
+def _compiling(workflow):
+    """What the estimated time leaves out: compiling, in words."""
+    spent, done = measured.compiling(workflow)
+    if done:
+        return "done already"
+    about = lasting(announce.SECONDS.get(workflow.scene.FAMILY, announce.USUAL) if spent is None else spent)
+    own = announce.always_compiled(workflow.scene)
+    when = "at each run, as the equation is your own" if own else "once on this machine"
+    return f"{about} besides, {when}"
+
+
+def lasting(seconds):
+    """`about 40 s`, `about 3 min`, `about 5.2 h`."""
+    for unit, length in (("h", 5400.0), ("min", 90.0)):
+        if seconds >= length:
+            return f"about {seconds / (3600.0 if unit == 'h' else 60.0):.2g} {unit}"
+    return f"about {max(seconds, 1.0):.2g} s"
 
 
 def refuse_too_large(workflow):

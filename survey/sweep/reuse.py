@@ -8,7 +8,7 @@ from math import prod
 import numpy as np
 
 from survey.file import reading
-from survey.file.labels import layout
+from survey.file.labels import as_stored, layout
 from survey.sweep import solve
 
 
@@ -36,7 +36,7 @@ class Earlier:
         """A variable at the held points of a block: its dimensions are those of the grid, then its own."""
         at = {dim: place[cut][place[cut] >= 0] for (dim, place), cut in zip(self.where.items(), cuts, strict=True)}
         held = _dataset(self.path, self.version)[name].isel(self.fixed).isel({dim: at[dim] for dim in self.dims})
-        held = held.transpose(*self.dims, ...).values
+        held = as_stored(held.transpose(*self.dims, ...))
         missing = [i for i, dim in enumerate(at) if dim not in self.dims]
         return np.expand_dims(held, tuple(missing))
 

@@ -7,7 +7,19 @@ import numpy as np
 from bokeh import events
 from bokeh.core.property.descriptors import UnsetValueError
 from bokeh.layouts import column, row
-from bokeh.models import Button, Checkbox, ColorBar, CustomJS, Div, Label, LinearColorMapper, Range1d, Select, Slider
+from bokeh.models import (
+    Button,
+    Checkbox,
+    ColorBar,
+    CustomJS,
+    Div,
+    InlineStyleSheet,
+    Label,
+    LinearColorMapper,
+    Range1d,
+    Select,
+    Slider,
+)
 from bokeh.palettes import Viridis256
 from bokeh.plotting import figure
 from matplotlib.figure import Figure
@@ -15,9 +27,15 @@ from matplotlib.figure import Figure
 from survey.errors import BadInput, SurveyError, Untrusted
 from survey.request import trust
 from survey.show import boundaries
-from survey.viewer import raster, widgets
+from survey.viewer import finer, raster, widgets
+from survey.viewer.shown import Map
 
 SIDE, WIDTH = 510, 470  # width in pixels of the column beside the map, and of its parts
+# beside the map, or below it where the browser's window is narrow
+STACK = "@media (max-width: 950px) {:host {flex-direction: column !important; overflow-y: auto}}"
+STACKED = "@media (max-width: 950px) {:host {flex: none !important; height: 70vh !important; width: 100% !important}}"
+QUIET = 300  # ms after the last move before a window is solved afresh
+COPY = "Copy Python for this point"
 SOON = 30  # ms: changes that follow each other faster are handled together
 MOMENT = 0.4  # seconds of reading a large map between two pictures of it
 GROWTH = 1.5  # factor by which more must have been read for a new picture, as drawing takes time too
@@ -36,11 +54,14 @@ class Page:
     def __init__(self, shown, document):
         self.map, self.document, self.waiting, self.pointer = shown, document, set(), None
         self.share = 0.0  # of the map that had been read when it was last drawn
+        self.finer = self.finer_of = self.timer = None  # the Map of the window solved afresh, of which view, and when
+        self.not_finer = ""  # why it is not
         self.caption = _text(styles={"color": "#555555"})
         self.view = self._from_link(document.session_context.request.arguments)
         self._plot()
         self._side()
-        document.add_root(row(self.plot, self.side, sizing_mode="stretch_both"))
+        sheet = InlineStyleSheet(css=STACK)
+        document.add_root(row(self.plot, self.side, sizing_mode="stretch_both", stylesheets=[sheet]))
         document.title = shown.title
         self._fill()
         self.changed()
@@ -67,12 +88,13 @@ class Page:
             x_range=ranges[0], y_range=ranges[1], x_axis_type=scales[0], y_axis_type=scales[1],
             tools="pan,wheel_zoom,box_zoom,reset,save", active_scroll="wheel_zoom",
             background_fill_color=raster.BACKGROUND, sizing_mode="stretch_both", min_width=300, min_height=300,
-            stylesheets=[":host(:focus) {outline: none}"],
+            stylesheets=[":host(:focus) {outline: none}", STACKED],
         )  # fmt: skip
         plot.xaxis.axis_label, plot.yaxis.axis_label = (widgets.label(self.map.ds[dim]) for dim in self.map.dims)
         plot.grid.visible, plot.toolbar.logo = False, None
         empty = {"x": [], "y": []}
         self.image = plot.image_rgba(source=empty | {"image": [], "dw": [], "dh": []}, **widgets.IMAGE).data_source
+        self.over = plot.image_rgba(source=empty | {"image": [], "dw": [], "dh": []}, **widgets.IMAGE).data_source
         found = boundaries.curves_of(self.map.ds) if "curve_count" in self.map.ds else ()
         self.curves = {name: widgets.curve(plot, name) for name in found}
         style = {"size": 9, "line_color": RED, "line_width": 2, "fill_color": "colour"}
@@ -143,7 +165,11 @@ class Page:
         )
         self.read.on_event(events.ButtonClick, lambda _: self.show_source())
         self.run.on_event(events.ButtonClick, lambda _: self.trust())
-        texts = [self.legend, self.caption, self.motion, self.read, self.source, self.run, self.known]
+        self.copy = Button(label=COPY, visible=False)
+        self.copy.js_on_event(events.ButtonClick, CustomJS(args={"copy": self.copy}, code=widgets.COPYING))
+        self.python = _text()
+        texts = [self.legend, self.caption, self.motion, self.read, self.source, self.run]
+        texts += [self.copy, self.python, self.known]
         parts = [_text(text=title), self.variable, *self.sliders.values(), self.edges, *texts]
         style = {"overflow-x": "hidden", "overflow-y": "auto", "padding-left": "10px"}
         self.side = column(*parts, width=SIDE, sizing_mode="stretch_height", styles=style)
@@ -171,6 +197,33 @@ class Page:
         for curve in self.curves.values():
             curve.visible = view.boundaries
         plot.name = self.map.link(view)
+        if self.finer_of != self._key():
+            self.finer, self.finer_of, self.not_finer = None, None, ""
+        self.soon(self.draw)
+        self.soon(self.describe)
+
+    def _key(self):
+        """What a window that is solved afresh depends on."""
+        view = self.view
+        return view.name, tuple(view.window), tuple(view.others.items())
+
+    def later(self):
+        """Solve the window afresh once it has not been moved for a moment."""
+        if self.timer is not None:
+            self.document.remove_timeout_callback(self.timer)
+        self.timer = self.document.add_timeout_callback(self.solve_window, QUIET)
+
+    def solve_window(self):
+        """Solve the visible window afresh, and draw it over the map."""
+        self.timer = None
+        try:
+            found = finer.of_window(self.map, self.view)
+            self.finer = Map("the window", found)
+        except Untrusted:
+            self.not_finer = "not solved afresh: its scene has not been allowed to run"
+        except SurveyError as error:
+            self.not_finer = f"not solved afresh: {error}"
+        self.finer_of = self._key()
         self.soon(self.draw)
         self.soon(self.describe)
 
@@ -191,12 +244,20 @@ class Page:
         image, kinds = raster.paint(mask, value, layer)
         (left, right), (low, high) = xs.ends, ys.ends
         self.image.data = {"x": [left], "y": [low], "dw": [right - left], "dh": [high - low], "image": [image]}
-        self._ring(mask, layer, kinds, xs, ys)
+        kinds = self._over(layer, sizes) or self._ring(mask, layer, kinds, xs, ys) or kinds
         self._legend(layer, kinds, value is not None and (np.isnan(value) & (mask == 0)).any())
         caption = self.complaint
         if max(xs.points, ys.points) > 1:
             shows = "its rarest kind" if layer.flagged else "the value largest in magnitude"
             caption += f"a pixel represents up to {xs.points} × {ys.points} points and shows {shows}"
+        if self.finer:
+            number = " × ".join(str(axis.values.size) for axis in self.finer.axes)
+            caption = f"{self.complaint}this window is solved afresh, {number} points; the link shows the same"
+        elif self.not_finer:
+            caption += f"{'; ' * bool(caption)}{self.not_finer}"
+        elif finer.wanted(self.map, self.view):
+            caption = f"{self.complaint}narrower than the map's grid: solving this window afresh ..."
+            self.later()
         if layer.waits(xs, ys):
             self.share = layer.overview.share
             caption = f"an overview, {self.share:.0%} of {layer.variable.size:,} points read; {caption} ..."
@@ -209,6 +270,21 @@ class Page:
         while overview.read() and time.monotonic() < end:
             pass
         self.soon(self.draw if overview.share >= min(1.0, GROWTH * self.share) else self.refine)
+
+    def _over(self, base, sizes):
+        """Draw the window that is solved afresh in the colours of the map's layer; {kind: pixels}, or None without."""
+        self.over.data = {"x": [], "y": [], "dw": [], "dh": [], "image": []}
+        if not self.finer:
+            return None
+        axes = self.finer.axes
+        xs, ys = (axis.pixels(*w, size) for axis, w, size in zip(axes, self.view.window, sizes, strict=True))
+        layer = self.finer.layer(self.finer.like(self.view))
+        mask, value = layer.pixels(xs, ys)
+        image, kinds = raster.paint(mask, value, layer, None if layer.flagged else base.limits)
+        (left, right), (low, high) = xs.ends, ys.ends
+        self.over.data = {"x": [left], "y": [low], "dw": [right - left], "dh": [high - low], "image": [image]}
+        self._ring(mask, layer, kinds, xs, ys)
+        return kinds
 
     def _ring(self, mask, layer, kinds, xs, ys):
         """Ring the pixels with undecided or failed points, where these are few."""
@@ -242,11 +318,11 @@ class Page:
 
     def describe(self):
         """Show what is known about the point under the pointer, on the side where there is space."""
-        point = self._nearest(*self.pointer) if self.pointer else None
+        shown, point = self._nearest(*self.pointer) if self.pointer else (None, None)
         if point is None:
             self.near.visible = False
             return
-        (x, y), text = self.pointer, "\n".join(map(widgets.literal, self.map.under(self.view, point)))
+        (x, y), text = self.pointer, "\n".join(map(widgets.literal, shown.under(self.view, point)))
         left, low = (
             np.mean(axis.scaled(np.array(window))) < axis.scaled(at)
             for axis, window, at in zip(self.map.axes, self.view.window, (x, y), strict=True)
@@ -257,30 +333,35 @@ class Page:
         )  # fmt: skip
 
     def _nearest(self, x, y):
-        """Indices of the point in whose cell the position lies, or None."""
-        point = tuple(axis.nearest(at) for axis, at in zip(self.map.axes, (x, y), strict=True))
-        return None if None in point else point
+        """(the Map, and indices of the point of it in whose cell the position lies), the window's before the map's."""
+        for shown in (self.finer, self.map):
+            point = [axis.nearest(at) for axis, at in zip(shown.axes, (x, y), strict=True)] if shown else [None]
+            if None not in point:
+                return shown, tuple(point)
+        return None, None
 
     def _tapped(self, event):
-        self.choose(self._nearest(event.x, event.y))
+        shown, point = self._nearest(event.x, event.y)
+        self.choose(shown.position(point) if shown else None)
 
-    def choose(self, point):
-        """Choose a point (None: ignored) and solve it in time."""
-        if point is None:
+    def choose(self, position):
+        """Choose a point by its position (None: ignored) and solve it in time."""
+        if position is None:
             return
-        self.view.point = point
-        x, y = self.map.position(point)
+        self.view.point = x, y = position
         self.chosen.data = {"x": [x], "y": [y]}
         self.plot.name = self.map.link(self.view)
         self.motion.text, self.known.text = "solving this point in time ...", ""
+        self.copy.visible, self.python.text = False, ""
         self._ask(None)
         self.soon(self.solve)
 
     def solve(self):
         """Show the motion at the chosen point, and everything known about it."""
-        coords = self.map.coords(self.view)
-        survey = self.map.ds.survey
+        coords, survey = self.map.coords(self.view), self.map.ds.survey
         try:
+            if coords is None:
+                coords, survey = {}, finer.of_point(self.map, self.view).survey
             drawn = Figure(figsize=(6.8, 3.6), layout="constrained")
             survey.trajectory(figure=drawn, **coords)
             self.motion.text = widgets.picture(drawn)
@@ -289,7 +370,14 @@ class Page:
             self.motion.text = UNTRUSTED
         except SurveyError as error:
             self.motion.text = f"no motion: {html.escape(str(error))}"
-        self.known.text = survey.point(**coords)._repr_html_()
+        if coords is None:  # what the file holds nearest to it
+            x, y = self.view.point
+            self.view.point = self.map.position(tuple(a.nearest(v) for a, v in zip(self.map.axes, (x, y), strict=True)))
+            coords = self.map.coords(self.view)
+        point = survey.point(**coords)
+        self.known.text = point._repr_html_()
+        self.copy.update(label=COPY, tags=[point.python], visible=True)
+        self.python.text = widgets.code(point.python)
 
     def _ask(self, untrusted):
         """Offer to read the file of an untrusted scene (an Untrusted), or nothing (None)."""

@@ -56,6 +56,10 @@ class MapAxis:
         """Its range as text."""
         return f"{self.values[0]:g} to {self.values[-1]:g}"
 
+    def inner(self, low, high):
+        """The part of the window [low, high] between the outermost points, beyond which a domain may end."""
+        return max(low, float(self.values[0])), min(high, float(self.values[-1]))
+
     def nearest(self, value):
         """Index of the point in whose cell `value` lies; None outside the map."""
         if self.log and value <= 0:
@@ -211,11 +215,14 @@ def _covered(low, high, edges):
     return tuple(np.clip(end, 0, edges.size - 1).astype(int) for end in (first, stop))
 
 
-def paint(mask, value, layer):
-    """(colours, {kind: number of pixels with it}): uint32 RGBA (rows, columns) of each pixel's kind or value."""
+def paint(mask, value, layer, limits=None):
+    """(colours, {kind: number of pixels with it}): uint32 RGBA (rows, columns) of each pixel's kind or value.
+
+    `limits` of the colours: by default the layer's own.
+    """
     image = np.zeros((*mask.shape, 4), np.uint8)  # transparent where nothing is known
     if value is not None:
-        low, high = layer.limits
+        low, high = layer.limits if limits is None else limits
         image[...] = viridis((value - low) / (high - low), bytes=True)
         image[np.isnan(value)] = _rgba(NOT_APPLY)
     kind, number = layer.shown(mask)

@@ -2,7 +2,7 @@
 
 import re
 import textwrap
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from math import isfinite
 from urllib.parse import parse_qsl, urlencode
@@ -24,7 +24,7 @@ LINES = 6  # outputs shown for the point under the pointer
 
 @dataclass
 class View:
-    """A variable, the window [(x low, high), (y low, high)], indices along other dimensions, the chosen point."""
+    """A variable, the window [(x low, high), (y low, high)], indices along other dimensions, the chosen position."""
 
     name: str
     boundaries: bool = True
@@ -34,10 +34,13 @@ class View:
 
 
 class Map:
-    """A survey's file, lazy if it is large, and its two axes; raises BadInput or Damaged for a file without a map."""
+    """A survey's file, lazy if it is large, and its two axes; raises BadInput or Damaged for a file without a map.
 
-    def __init__(self, path):
-        ds = load(path, chunks=None)
+    Or a survey `ds` in memory.
+    """
+
+    def __init__(self, path, ds=None):
+        ds = load(path, chunks=None) if ds is None else ds
         _check(path, ds)
         if len(ds.status.dims) < 2:
             raise BadInput(
@@ -57,6 +60,10 @@ class Map:
     def layer(self, view):
         """The view's variable, ready to be drawn; the last few are cached."""
         return self._layers(view.name, tuple((dim, view.others[dim]) for dim in self.further_dims(view.name)))
+
+    def like(self, view):
+        """The View of this map that shows what the view of another does."""
+        return replace(view, others={dim: at for dim, at in view.others.items() if dim in self.others})
 
     def further_dims(self, name):
         """The dimensions of a variable other than the map's two."""
@@ -83,8 +90,8 @@ class Map:
                 raise BadInput(f"{at} = {given[at]}: give low,high of a range that overlaps the map's, {axis.range}")
         if "point" in given:
             numbers = _numbers("point", given["point"], 2)
-            view.point = tuple(axis.nearest(value) for axis, value in zip(self.axes, numbers, strict=True))
-            if None in view.point:
+            view.point = numbers
+            if None in [axis.nearest(value) for axis, value in zip(self.axes, numbers, strict=True)]:
                 raise BadInput(
                     f"point = {given['point']}: it lies outside the map, {' by '.join(a.range for a in self.axes)}"
                 )
@@ -102,7 +109,7 @@ class Map:
         query |= {} if view.boundaries else {"boundaries": 0}
         query |= {f"at_{dim}": at for dim, at in view.others.items() if at}
         if view.point is not None:
-            query["point"] = ",".join(repr(value) for value in self.position(view.point))
+            query["point"] = ",".join(repr(value) for value in view.point)
         return urlencode(query, safe=",")
 
     def shares(self, name):
@@ -123,8 +130,11 @@ class Map:
         return tuple(float(axis.values[at]) for axis, at in zip(self.axes, point, strict=True))
 
     def coords(self, view):
-        """{axis: value} of the chosen point, for the survey's accessor."""
-        indices = dict(zip(self.dims, view.point, strict=True)) | view.others
+        """{axis: value} of the map's point at the chosen position, for the survey's accessor; None if there is none."""
+        point = [axis.nearest(at) for axis, at in zip(self.axes, view.point, strict=True)]
+        if None in point or self.position(point) != tuple(view.point):
+            return None
+        indices = dict(zip(self.dims, point, strict=True)) | view.others
         return {dim: float(self.ds[dim].values[indices[dim]]) for dim in self.ds.status.dims}
 
     def under(self, view, point):
@@ -136,7 +146,8 @@ class Map:
         names = dict.fromkeys([view.name, *(["verdict"] if "verdict" in ds else []), *self.names])
         names = [name for name in names if name != "status"][:LINES]
         bars = [f"{name}_error" for name in names if f"{name}_error" in ds]
-        here = ds[[*names, *bars, "status"]].isel(dict(zip(self.dims, point, strict=True)) | view.others).load()
+        others = {dim: at for dim, at in view.others.items() if dim in ds.dims}  # a window solved afresh has fewer
+        here = ds[[*names, *bars, "status"]].isel(dict(zip(self.dims, point, strict=True)) | others).load()
         yield ", ".join(f"{dim} = {short(here[dim].values)}" for dim in ds.status.dims)
         if view.name == "verdict" and "cell_verdict" in ds:
             yield from self._cell(*self.position(point))

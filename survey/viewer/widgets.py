@@ -21,6 +21,10 @@ LABEL = {
     "x": 0, "y": 0, "text": "", "visible": False, "text_font_size": "12px", "text_line_height": 1.35, "padding": 6,
     "background_fill_color": "white", "background_fill_alpha": 0.92, "border_line_color": "#888888",
 }  # fmt: skip
+COPYING = """
+navigator.clipboard.writeText(copy.tags[0]).then(() => { copy.label = "Copied" },
+                                                 () => { copy.label = "Select it below and copy it" })
+"""
 MARKERS = {"D": "diamond", "o": "circle"}
 
 
@@ -73,6 +77,12 @@ def text_of(path, digest, text):
     style = "max-height:360px;overflow:auto;background:#f4f4f4;border:1px solid #888;padding:6px;white-space:pre-wrap"
     content = html.escape(plain(text, len(text), lines=True))
     return f"<b>{html.escape(plain(path))}</b><br>sha256 {digest}<pre style='{style}'>{content}</pre>"
+
+
+def code(text):
+    """HTML of a few lines of Python, to be selected."""
+    style = "background:#f4f4f4;padding:6px;white-space:pre-wrap;user-select:all"
+    return f"<pre style='{style}'>{html.escape(plain(text, len(text), lines=True))}</pre>"
 
 
 def label(variable, tex=True):

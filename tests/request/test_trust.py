@@ -10,12 +10,13 @@ import sys
 import time
 
 import hostile
+import netCDF4
 import numpy as np
 import pytest
 
 import survey
 from survey.errors import BadInput, Untrusted
-from survey.request import trust, user_scene
+from survey.request import earlier, trust, user_scene, workflow
 
 AT = {"a": 1.0, "q": 0.5}
 
@@ -59,6 +60,25 @@ def test_nothing_of_a_strange_survey_runs(strange):
     assert not strange.ran
 
 
+def test_a_strange_survey_whose_points_are_taken_over_runs_nothing(strange, monkeypatch):
+    """Its workflow names the file too, and ours another scene, or its text with a change."""
+    monkeypatch.chdir(strange.path.parent)
+    with netCDF4.Dataset(strange.path, "a") as file:
+        file.workflow = file.workflow.replace('"mathieu"', '"evil.py"')
+        assert "evil.py" in file.workflow
+    hostile.digest(strange.path)
+    axes = {"a": {"start": 0.5, "stop": 9.5, "num": 4}, "q": {"start": 0.0, "stop": 5.0, "num": 3}}
+    ours = workflow.check({"scene": "mathieu", "axes": axes}, output="new.nc")
+    held, told = earlier.find(ours, strange.path)
+    assert held is None and "another scene ('evil.py', not 'mathieu')" in told and not strange.ran
+    text = strange.file.read_text()
+    strange.file.write_text(text.replace("\nopen(", "\n# open("))
+    own = workflow.check({"scene": "evil.py", "axes": axes}, output="new.nc")
+    strange.file.write_text(text)
+    held, told = earlier.find(own, strange.path)
+    assert held is None and "another text of your own scene" in told and not strange.ran
+
+
 def test_verify_checks_what_needs_no_scene_and_says_how_to_go_on(strange):
     done = verify(strange)
     assert done.returncode == 2 and done.stdout.endswith("base.nc: sound; no points were solved again\n"), done.stderr
@@ -73,7 +93,8 @@ def test_a_survey_that_is_opened_in_trust_is_solved(strange):
     ds = survey.open(strange.path, trust_scene=True)
     assert not strange.ran
     assert ds.survey.trajectory(figure=False, **AT).sizes["u"] > 10 and strange.ran
-    assert ds.survey.zoom(a=(0.0, 1.0), q=(0.1, 0.5), num=2).verdict.shape == (2, 2)
+    with pytest.warns(UserWarning, match="beyond the map's"):
+        assert ds.survey.zoom(a=(0.0, 1.0), q=(0.1, 0.5), num=2).verdict.shape == (2, 2)
     assert not strange.state.exists(), "what was allowed once is not kept"
 
 

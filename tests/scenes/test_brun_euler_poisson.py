@@ -7,10 +7,10 @@ w = I^-1 M: no angle, no polynomial and no elliptic function.
 import numpy as np
 import pytest
 import xarray as xr
-from brun_truth import NAMES, draw, draw_scaled
 
 import survey
 from survey.kernels.math.dop853 import STAGES, A, B
+from survey.truth.brun_digits import NAMES, draw, draw_scaled
 
 STEPS = 300
 

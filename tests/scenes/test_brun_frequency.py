@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from brun_truth import NAMES, draw, truth
 from mpmath import mp
 
 import survey
+from survey.truth.brun_digits import NAMES, draw, truth
 
 DERIVED = {
     "nutation_frequency": lambda T, psi, phi: 2 * mp.pi / T,

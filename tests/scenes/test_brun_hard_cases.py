@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 import xarray as xr
-from brun_truth import HALF_ULP, NAMES, OUTPUTS, draw, draw_scaled, scaled, truth, wells
 from mpmath import mp, mpf
 
 import survey
+from survey.truth.brun_digits import HALF_ULP, NAMES, OUTPUTS, draw, draw_scaled, scaled, truth, wells
 
 WIDEST = 1e4  # bars over floors: 5e3 at 1e-24 from separatrices
 

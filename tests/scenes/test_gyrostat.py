@@ -45,7 +45,7 @@ def test_turning_points_beyond_what_an_int32_holds_are_not_told():
     ds = survey.evaluate(
         "gyrostat", question="trajectory", s3=1.0, phi0=1.0, w0=0.0, t=[1e3, 1e8, 1e10], method="closed"
     )
-    assert ds.status.values.tolist() == [OK] * 3 and ds.turnings.values.tolist()[2] == -2
+    assert ds.status.values.tolist() == [OK] * 3 and np.isnan(ds.turnings[2])
     assert (ds.turnings[:2] > 0).all()
 
 

@@ -22,7 +22,7 @@ def test_a_symbol_stands_once_and_the_unit_on_its_line():
     assert label_of(named) == r"$\delta$"
     long = xr.DataArray(0.0, name="x", attrs={"long_name": "a long name of a quantity", "symbol": "x", "units": "rad"})
     for width in range(10, 40):
-        assert "$x$ (rad)" in label_of(long, width)
+        assert "quantity, $x$ (rad)" in label_of(long, width)
 
 
 def test_titles_have_no_internals_and_repeat_nothing(ds):
@@ -40,6 +40,20 @@ def test_orange_means_unstable_alone():
             colours = palette.colours_of(output.flags)
             meant = [colours[name] for name in output.flags if name != "undecided"]
             assert palette.COLOURS[0] not in meant and len(set(meant)) == len(meant)
+
+
+@pytest.mark.parametrize("scene", survey.scenes())
+def test_one_colour_has_one_meaning(scene):
+    """Orange: unstable; light blue: stable; no two meanings of a variable share a colour."""
+    for output in survey.scenes.load(scene).OUTPUTS:
+        if output.flags is None:
+            continue
+        colours = palette.colours_of(output.flags)
+        meant = {name: colours[name] for name in output.flags if name not in ("undecided", "ok", "none")}
+        assert len(set(meant.values())) == len(meant)
+        for name, colour in meant.items():
+            assert colour != palette.COLOURS[0] or "unstable" in name, name
+            assert colour != palette.COLOURS[1] or ("stab" in name and "unstable" not in name), name
 
 
 def test_the_discriminant_has_lines_at_2_and_a_diverging_map(ds):

@@ -90,6 +90,21 @@ def test_a_map_whose_series_take_the_whole_axis_is_solved_anew(tmp_path, monkeyp
     assert "on a map, its values depend on all of the axis rho" in told or "has other bits on this map" in told
 
 
+def test_points_of_your_own_equation_are_taken_over_until_its_text_changes(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = "PARAMETERS, PERIOD, EVEN = ('a', 'q'), 3.141592653589793, False\n"
+    text += "from math import cos, sin\ndef z(u, p):\n    return p[0] - p[1] * (cos(2 * u) + sin(4 * u))\n"
+    (tmp_path / "own.py").write_text(text)
+    given = {"scene": "own.py", "axes": {"a": {"values": [0.5, 1.5]}, "q": {"values": [0.1, 0.4]}}}
+    survey.run(given, output="old.nc")
+    given["axes"]["a"] = {"values": [0.5, 1.0, 1.5]}
+    held, told = earlier.find(workflow.check(given, output="new.nc"), "old.nc")
+    assert held.points == 4, told
+    (tmp_path / "own.py").write_text(text.replace("sin(4", "sin(6"))
+    held, told = earlier.find(workflow.check(given, output="new.nc"), "old.nc")
+    assert held is None and "another text of your own scene" in told
+
+
 def test_a_trajectory_needs_the_same_times(ran, small, monkeypatch):
     monkeypatch.chdir(ran.parent)
     more = workflow.read(small, ["axes.w0.num=11"], "new.nc")

@@ -22,7 +22,7 @@ import survey
 from survey import status
 from survey.analysis.point import reading
 from survey.errors import BadInput
-from survey.viewer import raster
+from survey.viewer import finer, raster
 from survey.viewer.shown import Map
 
 ROOT = Path(__file__).parents[2]
@@ -197,10 +197,10 @@ def test_a_link_tells_its_view():
     shown = Map(MAP)
     view = shown.read("")
     assert view.name == "verdict" and view.point is None and view.boundaries
-    view.name, view.boundaries, view.point = "exponent", False, (3, 5)
+    view.name, view.boundaries, view.point = "exponent", False, shown.position((3, 5))
     view.window = [(0.1, 0.30000000000000004), (1.0, 2.0 / 3.0 + 1)]
     assert shown.read(shown.link(view)) == view
-    lines = list(shown.under(view, view.point))
+    lines = list(shown.under(view, (3, 5)))
     ds = xr.open_dataset(MAP).isel(k=3, rho=5)
     assert lines[0] == f"k = {float(ds.k):.8g}, rho = {float(ds.rho):.8g}"
     assert lines[1] == f"exponent = {reading(ds, 'exponent', True)}".replace("+-", "±") and "±" in lines[1]
@@ -386,10 +386,81 @@ def test_in_a_browser_a_point_is_told_and_clicked_and_its_link_shows_the_same(tm
         picture.wait(driver, motion)
         picture.wait(driver, lambda: driver.execute_script(PIXELS) == seen)
         assert driver.current_url == link
+        driver.execute_script(
+            ZOOM.replace("0.5, end: 0.95", "0.8, end: 0.81").replace("0.6, end: 1.7", "0.7, end: 0.72")
+        )
+        afresh = "this window is solved afresh, 240 × 160 points"
+        picture.wait(driver, lambda: any(afresh in text for text in driver.execute_script(TEXTS)))
+        assert "x=0.8,0.81&y=0.7,0.72" in driver.current_url
+        before = driver.current_url
+        picture.act(driver, 0.803, 0.711, click=True)
+        picture.wait(driver, lambda: driver.current_url != before)
+        picture.wait(driver, lambda: any("survey.evaluate(&#x27;satellite&#x27;, k=0.803" in text
+                                         for text in driver.execute_script(TEXTS)))  # fmt: skip
+        (copy,) = [b for b in driver.execute_script(BUTTONS, "BUTTON") if b.text == "Copy Python for this point"]
+        copy.click()
+        seen, link = driver.execute_script(PIXELS), driver.current_url
+        driver.get("about:blank")
+        driver.get(link)
+        picture.wait(driver, lambda: any(afresh in text for text in driver.execute_script(TEXTS)))
+        assert driver.current_url == link
+        plot, side = driver.execute_script(STACKED)
+        assert side[0] >= plot[0] + plot[2] - 1  # beside the map
+        driver.set_window_size(600, 900)
+        picture.wait(driver, lambda: driver.execute_script(STACKED)[1][1] > 100)
+        plot, side = driver.execute_script(STACKED)
+        assert side[1] >= plot[1] + plot[3] - 1 and plot[3] > 300 and plot[2] > 400  # below it
+        driver.save_screenshot(tmp_path / "narrow.png")
         grave = [
             line for line in driver.get_log("browser") if line["level"] == "SEVERE" and "favicon" not in line["message"]
         ]
         assert not grave
+
+
+FINE = "x=0.8,0.81&y=0.7,0.72"  # less than a cell of the map
+STACKED = """
+const views = Bokeh.index.roots[0].child_views
+return views.map(view => { const r = view.el.getBoundingClientRect(); return [r.left, r.top, r.width, r.height] })
+"""
+
+
+def test_a_window_narrower_than_the_grid_is_solved_afresh_and_is_what_evaluate_gives():
+    shown = Map(MAP)
+    view = shown.read("var=discriminant&" + FINE)
+    assert finer.wanted(shown, view) and not finer.wanted(shown, shown.read(""))
+    fresh = finer.of_window(shown, view)
+    assert fresh.status.shape == finer.FINE and set(fresh.data_vars) >= {"discriminant", "verdict", "status"}
+    same = survey.evaluate("satellite", k=fresh.k.values, rho=fresh.rho.values, variables=["discriminant"])
+    bars = fresh.discriminant_error + same.discriminant_error
+    assert (abs(fresh.discriminant - same.discriminant) <= bars).all() and fresh.discriminant_error.max() < 1e-9
+    (low, high), axis = view.window[0], Map("window", fresh).axes[0]
+    assert axis.ends == pytest.approx((low, high), abs=1e-15)  # the cells tile the window
+    assert finer.of_window(shown, shown.read(shown.link(view))).equals(fresh)  # a link shows the same
+
+
+def test_beyond_the_map_nothing_is_solved():
+    shown = Map(MAP)
+    ends = Map("window", finer.of_window(shown, shown.read("x=-1,0.05&y=0.5,0.62"))).axes
+    assert ends[0].values[0] > 0.0 and ends[1].values[0] > 0.6
+
+
+def test_a_window_that_takes_too_long_is_refused(monkeypatch):
+    shown = Map(ROOT / "results/gyrostat_fate_small.nc")
+    view = shown.read("x=0.1,0.2&y=0.1,0.2")
+    monkeypatch.setattr(finer, "SECONDS", 1e-3)
+    with pytest.raises(BadInput, match="too few to show more than the map does"):
+        finer.of_window(shown, view)
+
+
+def test_any_point_of_a_window_is_solved_and_told_in_python():
+    shown = Map(MAP)
+    view = shown.read("var=exponent&" + FINE + "&point=0.8031,0.711")
+    assert shown.coords(view) is None  # the map has no such point
+    point = finer.of_point(shown, view).survey.point()
+    assert point.parameters == {"k": 0.8031, "rho": 0.711} and "exponent_per_orbit" in point.dataset
+    scope = {}
+    exec(point.python, scope)
+    assert scope["point"].dataset.equals(point.dataset)
 
 
 BUTTONS = """
@@ -413,7 +484,8 @@ def test_in_a_browser_a_strange_scene_runs_only_once_its_text_was_shown_and_allo
     with picture.served(tmp_path / "files/base.nc") as (address, _), picture.browser() as driver:
 
         def seen(tag="BUTTON"):
-            return [element.text for element in driver.execute_script(BUTTONS, tag)]
+            texts = [element.text for element in driver.execute_script(BUTTONS, tag)]
+            return [text for text in texts if not re.search("Copy Python|survey.evaluate", text)]
 
         def press(label):
             (button,) = (button for button in driver.execute_script(BUTTONS, "BUTTON") if button.text == label)

@@ -4,11 +4,12 @@ import json
 
 import numpy as np
 import pytest
-from attack import brun, brun_truth, command, compare, danby, floquet, gyrostat_truth, hill
-from brun_truth import truth as brun_in_full
+from attack import command, compare, floquet
 from mpmath import mp, mpf
 
 import survey
+from survey.truth import brun, brun_sums, danby, gyrostat_flow, hill, own
+from survey.truth.brun_digits import truth as brun_in_full
 
 FAULTS = compare.FAULTS
 
@@ -43,7 +44,7 @@ def test_there_are_no_faults_at_length(family):
 def batch(**more):
     """A few points of a satellite, unstable and stable, far from every edge."""
     given = {"k": np.array([0.95, 0.5, 0.3, 0.9]), "rho": np.array([0.6, 1.3, 2.0, 0.8])}
-    true = hill._true_satellite("k", False, 1, False)
+    true = hill.satellite("k", False, 1, False)
     return compare.Batch("satellite", "control", given, true, None, {"body": "prolate"}, "auto", 1e-8, **more)
 
 
@@ -153,7 +154,7 @@ def test_truth_of_danbys_map():
     root = mp.sqrt(1 - 27 * mpf(mu) * (1 - mpf(mu)))
     true = 2 * mp.cos(2 * mp.pi * mp.sqrt((1 + root) / 2)) + 2 * mp.cos(2 * mp.pi * mp.sqrt((1 - root) / 2))
     assert abs(danby.solved(mu, 0.0)[0, 0] - true) < 1e-15
-    assert danby.solved(*danby.TIP)[0, [0, 2]] == pytest.approx([-4, 6], abs=1e-13)
+    assert danby.solved(*(0.04699080701821065, 0.31450715975493514))[0, [0, 2]] == pytest.approx([-4, 6], abs=1e-13)
 
 
 def test_truth_of_a_gyrostat():
@@ -168,21 +169,21 @@ def test_truth_of_a_gyrostat():
 
         y = mp.odefun(slope, 0, [mpf(p[6]), mpf(p[7])], tol=mpf(10) ** -30)(4)
         out = np.empty((1, 6))
-        gyrostat_truth.flow(np.array([p]), gyrostat_truth.TINY, out)
+        gyrostat_flow.flow(np.array([p]), gyrostat_flow.TINY, out)
         assert all(abs(in_full(out[0], i) - y[i]) < 1e-27 for i in range(2))
         # along phi to where it was: the same w, at that time
         there = np.array([[*p[:8], 1.9]])
         along, back = np.empty((1, 6)), np.empty((1, 6))
-        gyrostat_truth.along(there, gyrostat_truth.TINY, along)
-        gyrostat_truth.flow(np.array([[*p[:8], along[0, 2]]]), gyrostat_truth.TINY, back)
+        gyrostat_flow.along(there, gyrostat_flow.TINY, along)
+        gyrostat_flow.flow(np.array([[*p[:8], along[0, 2]]]), gyrostat_flow.TINY, back)
         assert abs(back[0, 0] - 1.9) < 1e-15 and abs(back[0, 2] - along[0, 0]) < 1e-15
 
 
 def test_truth_of_bruns_problem():
     """Against elliptic integrals at 60 digits."""
     state = np.array([2.0, 1.0, 0.6, 1.1, 0.5, 1.3, 0.9])
-    out = np.empty((1, brun_truth.COLUMNS))
-    brun_truth.states(state[None], 1024, out)
+    out = np.empty((1, brun_sums.COLUMNS))
+    brun_sums.states(state[None], 1024, out)
     with mp.workdps(60):
         true, _floor = brun_in_full(state)
         for i, value in enumerate(true):
@@ -198,7 +199,7 @@ SADDLE_PERIOD = "836.306482278309586125838774447"
 def test_truth_of_a_motion_that_turns_just_before_a_pole():
     """P(1) = 0 exactly, P < 0 next to it: it turns at 1 - u = 3.5e-17, and takes as long as our scene says."""
     point = [2.0, 4.0, 0.5, np.pi / 2, -1.0, -1.0, -1.0]
-    brun_truth.states(np.array([point]), brun.NODES, out := np.empty((1, brun_truth.COLUMNS)))
+    brun_sums.states(np.array([point]), brun.NODES, out := np.empty((1, brun_sums.COLUMNS)))
     with mp.workdps(60):
         cosine = mp.cos(mpf(point[3]))
         energy = 1 + (1 - cosine) / (1 + cosine)
@@ -210,8 +211,8 @@ def test_truth_of_a_motion_that_turns_just_before_a_pole():
 
 
 def test_truth_beside_a_saddle_of_bruns_problem():
-    out = np.empty((1, brun_truth.COLUMNS))
-    brun_truth.states(np.array([SADDLE]), brun.NODES, out)
+    out = np.empty((1, brun_sums.COLUMNS))
+    brun_sums.states(np.array([SADDLE]), brun.NODES, out)
     value, low, doubt = (x[0] for x in brun._rows(out, None)["period"])
     off = abs(mpf(value) + mpf(low) - mpf(SADDLE_PERIOD))
     assert 1e-7 < off < doubt < 1
@@ -219,7 +220,7 @@ def test_truth_beside_a_saddle_of_bruns_problem():
     with mp.workdps(40):
         assert abs(in_full(full, 2) - mpf(SADDLE_PERIOD)) < 1e-24
     given = dict(zip(brun.NAMES, np.array([SADDLE]).T, strict=True))
-    one = compare.Batch("brun states", "saddle", given, brun._of_states, "brun")
+    one = compare.Batch("brun states", "saddle", given, brun.states, "brun")
     counts, worst, faults = compare.compare(one)
     assert not faults and counts["unchecked"] == 0 and worst < 1
 
@@ -246,7 +247,7 @@ def test_truth_of_own_equations(name):
 
         def z(u, piece):
             if name.startswith("harmonics"):
-                x = mpf(hill.TWO_PI) * u / exact[9]
+                x = mpf(own.TWO_PI) * u / exact[9]
                 waves = (exact[n] * mp.cos(n * x) + exact[4 + n] * mp.sin(n * x) for n in range(1, 5))
                 return exact[0] + sum(waves)
             if name == "spike":
@@ -260,7 +261,7 @@ def test_truth_of_own_equations(name):
             if start < stop:
                 x = mp.odefun(lambda u, x, n=piece: [x[1], -z(u, n) * x[0], x[3], -z(u, n) * x[2]], mpf(start), x,
                               tol=mpf(10) ** -13)(mpf(stop))  # fmt: skip
-        out = hill._own_truth(name, p[None])[0]
+        out = own.solved(name, p[None])[0]
         for i, true in zip((0, 2, 1, 3), x, strict=True):
             assert abs(in_full(out, i) - true) < 1e-11 * (1 + abs(true))
 
@@ -281,7 +282,7 @@ def test_the_command(tmp_path, capsys):
 def test_truth_of_a_spike():
     """A weak spike changes y1(T) by its first-order term (Picard), which mpmath integrates."""
     weak, at, wide, rate = 1e-9, 0.3, 1e-3, 5.0
-    out, rest = (hill._own_truth("spike", np.array([[rate, b, at, wide]]))[0] for b in (weak, 0.0))
+    out, rest = (own.solved("spike", np.array([[rate, b, at, wide]]))[0] for b in (weak, 0.0))
     root = mp.sqrt(mpf(rate))
 
     def term(u):

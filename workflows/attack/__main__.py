@@ -10,10 +10,9 @@ import argparse
 import sys
 from pathlib import Path
 
-sys.path.pop(0)  # this folder, in which `brun_truth` is not that of the tests
-sys.path.insert(0, str(Path(__file__).parent.parent))
+sys.path[0] = str(Path(__file__).parent.parent)
 
-from attack import command
+from attack import command  # noqa: E402
 
 
 def main(arguments=None):

@@ -16,6 +16,7 @@ import numpy as np
 from rich.console import Console
 
 from attack.compare import FAULTS
+from survey import truth
 
 # share of the points, points of a chunk
 FAMILIES = {
@@ -32,7 +33,7 @@ FAMILIES = {
 WHERE = {"satellite": ("hill", "satellites"), "mathieu": ("hill", "mathieu"), "own": ("hill", "own"),
          "libration_elliptic": ("danby", "chunk"), "gyrostat_fate": ("fate", "chunk")}  # fmt: skip
 SEEDS = (*sorted(FAMILIES.keys() - {"floquet"}), "floquet")  # later families last: those before keep their points
-FOLDER = Path(__file__).parent
+FOLDER, TRUTHS = Path(__file__).parent, Path(truth.__file__).parent
 LISTED = 60  # faults in the page
 
 
@@ -81,7 +82,7 @@ def sources():
     from survey.kernels.jit import SOURCE_HASH
 
     digest = hashlib.sha256(SOURCE_HASH.encode())
-    for path in sorted(FOLDER.glob("*.py")):
+    for path in sorted([*FOLDER.glob("*.py"), *TRUTHS.glob("*.py")]):
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 

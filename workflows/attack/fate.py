@@ -6,10 +6,11 @@ import numpy as np
 import xarray as xr
 
 import survey
-from attack import gyrostat_truth
 from attack.compare import Batch
-from attack.gyrostat import SYSTEM, _separatrix, force, potential, system
-from attack.hill import LONG, ULP
+from attack.gyrostat import _separatrix, force, potential, system
+from survey.truth import gyrostat_flow
+from survey.truth.gyrostat import SYSTEM
+from survey.truth.hill import LONG, ULP
 
 SPAN = 150.0
 MIRROR = {2: 3, 3: 2, 5: 6, 6: 5}
@@ -93,7 +94,7 @@ def _fate(given, answer):
     section, sinks = _section(p), _sinks(p)
     out = np.full((n, 8), np.nan)
     ok = answer["status"] == 0
-    gyrostat_truth.settle(points[ok], np.full(ok.sum(), section), SPAN, 1e-20, part := out[ok])
+    gyrostat_flow.settle(points[ok], np.full(ok.sum(), section), SPAN, 1e-20, part := out[ok])
     out[ok] = part
     said = answer["verdict"]
     wrong, checked = np.zeros(n, bool), np.zeros(n, bool)
@@ -208,7 +209,7 @@ def _cycles(p, answer, i, cycles, slack):
         goal = section + np.copysign(2 * np.pi, w)
         rows = np.array([[*p.values(), section, w + s * step, goal] for s in (-1, 0, 1)])
         out = np.full((3, 6), np.nan)
-        gyrostat_truth.along(rows, 1e-28, out)
+        gyrostat_flow.along(rows, 1e-28, out)
         if not (out[:, 4] == 0).all():
             continue
         slope = (out[2, 0] - out[0, 0]) / (2 * step)

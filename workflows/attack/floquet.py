@@ -14,10 +14,11 @@ from mpmath import mp, mpc, mpf
 from scipy.optimize import linear_sum_assignment
 
 import survey
-from attack import hill_truth
 from attack.compare import Batch
-from attack.hill import TOLERANCE, accuracy
-from attack.hill_truth import HARMONICS, TWO_PI
+from attack.hill import accuracy
+from survey.truth import hill_flow
+from survey.truth.hill import TOLERANCE
+from survey.truth.hill_flow import HARMONICS, TWO_PI
 
 DIGITS = 45
 DOUBT = 1e-20  # multipliers that nearly meet follow from a trace of 30 digits
@@ -168,7 +169,7 @@ def _solutions(a, q, s, period):
     p = np.zeros((len(a), 10))
     p[:, 0], p[:, 1], p[:, 2], p[:, 9] = a, q, s, period
     out, ends = np.empty((len(a), 12)), np.full(len(a), np.inf)
-    hill_truth.own_points(HARMONICS, p, ends, np.column_stack([p[:, 9], 0 * a]), TOLERANCE, out)
+    hill_flow.own_points(HARMONICS, p, ends, np.column_stack([p[:, 9], 0 * a]), TOLERANCE, out)
     pairs = [[mpf(row[2 * i]) + mpf(row[2 * i + 1]) for i in range(4)] for row in out]
     return [(y1, y2, d1, d2) for y1, y2, d1, d2 in pairs], out[:, 10]
 

@@ -2,17 +2,15 @@
 
 import numpy as np
 
-from attack import gyrostat_truth
 from attack.compare import Batch
 from attack.hill import accuracy
+from survey.truth.gyrostat import SYSTEM, along, flow
 
-SYSTEM = ("b12", "b31", "d", "c23", "s2", "s3")
 METHODS = {
     "trajectory": ("auto",) * 7 + ("taylor", "taylor", "dop853", "dop853", "closed", "closed", "full", "full", "rk4"),
     "abel": ("auto",) * 7 + ("taylor", "taylor", "dop853", "dop853", "closed", "closed", "rk4"),
 }
 NUMBERS = {"dop853": 16, "full": 8, "rk4": 2}
-SURE = 1e-26  # of the truth, relative, where nothing grows
 
 
 def system(random, number):
@@ -142,75 +140,6 @@ def chunk(random, size):
                 )
             }
         given = p | {"phi0": phi0, "w0": w0} | more
-        yield Batch("gyrostat " + question, region, given, {"trajectory": _flow, "abel": _along}[question], "gyrostat",
+        yield Batch("gyrostat " + question, region, given, {"trajectory": flow, "abel": along}[question], "gyrostat",
                     {"question": question}, method, rtol)  # fmt: skip
         used += number
-
-
-def _points(given, last, ok):
-    return np.ascontiguousarray(np.column_stack([given[name] for name in (*SYSTEM, "phi0", "w0", last)])[ok])
-
-
-def _twice(kernel, points, said, bars, columns):
-    """The truth, and where a bar seems to miss it, what another tolerance makes of it: (out, doubt per column)."""
-    out = np.full((len(points), 6), np.nan)
-    kernel(points, gyrostat_truth.TINY, out)
-    doubt = np.full((len(points), len(columns)), 0.0)
-    for j, c in enumerate(columns):
-        doubt[:, j] = SURE * (1 + np.abs(out[:, c]))
-    with np.errstate(invalid="ignore"):
-        suspicious = np.zeros(len(points), bool)
-        for j, c in enumerate(columns):
-            suspicious |= np.abs((said[j] - out[:, c]) - out[:, c + 1]) > 0.5 * bars[j]
-    if suspicious.any():
-        again = np.full((suspicious.sum(), 6), np.nan)
-        kernel(points[suspicious], 1e-30, again)
-        for j, c in enumerate(columns):
-            off = np.abs((again[:, c] - out[suspicious, c]) + (again[:, c + 1] - out[suspicious, c + 1]))
-            doubt[suspicious, j] += 100 * off
-    return out, doubt
-
-
-def _spread(ok, values):
-    wide = np.full(len(ok), np.nan)
-    wide[ok] = values
-    return wide
-
-
-def _flow(given, answer):
-    ok = answer["status"] == 0
-    points = _points(given, "t", ok)
-    said, bars = ([answer[f"{name}{end}"][ok] for name in ("phi", "w")] for end in ("", "_error"))
-    out, doubt = _twice(gyrostat_truth.flow, points, said, bars, (0, 2))
-    turns = answer["turnings"][ok]
-    with np.errstate(invalid="ignore"):
-        clear = (out[:, 4] >= 0) & (np.abs(out[:, 2]) > 2 * np.maximum(bars[1], 1e-25)) & (points[:, 7] != 0)
-        wrong = np.zeros(len(ok), bool)
-        wrong[ok] = clear & (turns >= 0) & (turns != out[:, 4])
-    spread = lambda x: _spread(ok, x)  # noqa: E731
-    return {"phi": (spread(out[:, 0]), spread(out[:, 1]), spread(doubt[:, 0])),
-            "w": (spread(out[:, 2]), spread(out[:, 3]), spread(doubt[:, 1])), "wrong": {"turnings": wrong}}  # fmt: skip
-
-
-def _along(given, answer):
-    status = answer["status"]
-    turned = np.isfinite(answer["phi_turning"])
-    ok = (status == 0) | turned
-    points = _points(given, "phi", ok)
-    pick = [np.where(turned, answer[a], answer[b])[ok] for a, b in (("phi_turning", "w"), ("t_turning", "t"))]
-    bars = [
-        np.where(turned, answer[a + "_error"], answer[b + "_error"])[ok]
-        for a, b in (("phi_turning", "w"), ("t_turning", "t"))
-    ]
-    out, doubt = _twice(gyrostat_truth.along, points, pick, bars, (0, 2))
-    true = _spread(ok, out[:, 4])
-    with np.errstate(invalid="ignore"):
-        apart = np.abs(given["phi"] - answer["phi_turning"]) > answer["phi_turning_error"]
-        wrong = ((status == 0) & (true == 1)) | (turned & (true == 0) & apart)
-    found = {"wrong": {"turning": wrong}}
-    for names, here in ((("w", "t"), true == 0), (("phi_turning", "t_turning"), true == 1)):
-        for name, c, j in zip(names, (0, 2), (0, 1), strict=True):
-            value, low, d = _spread(ok, out[:, c]), _spread(ok, out[:, c + 1]), _spread(ok, doubt[:, j])
-            said = np.isfinite(answer[name])
-            found[name] = np.where(here & said, value, np.nan), low, d
-    return found

@@ -1,24 +1,22 @@
 """Points of Hill's equation: the satellite in all ways of naming it, Mathieu's equation, and equations of one's own."""
 
 from functools import lru_cache
-from math import cos, pi, sin
+from math import pi
 
 import numpy as np
-from mpmath import mp, mpf
 
 import survey
-from attack import hill_truth
 from attack.compare import Batch
-from attack.hill_truth import AMPLITUDE, BENT, COSINE, HARMONICS, INERTIA, LORENTZ, ONE_MINUS_K, RHO, TWO_PI, K
+from survey.truth import own as own_truth
+from survey.truth.hill import WAYS, mathieu_solved, satellite, solved
+from survey.truth.hill import mathieu as true_mathieu
+from survey.truth.hill_flow import INERTIA, RHO
+from survey.truth.own import OWN
 
-LONG = np.longdouble
-ULP = float(np.finfo(LONG).eps)
-WAYS = {"k": K, "one_minus_k": ONE_MINUS_K, "amplitude": AMPLITUDE}
 METHODS = ("auto", "auto", "auto", "taylor16", "magnus6", "rk4", "dop853")
 SPECIAL_K = (0.0, 5e-324, 1e-300, 1e-16, 0.5, np.sqrt(0.5), np.nextafter(1, 0), np.nextafter(1, 2), 2.0, 3.0, 1e3)
 SPECIAL_RHO = (0.0, 5e-324, 1e-300, 1e-8, 0.5, 1.0, 1.5, 2.0, np.sqrt(1.25), np.sqrt(3.0), 1 / np.sqrt(3.0), 10.0, -1.0)
 SPECIAL_ALPHA = (0.0, 2.0, 0.5, 1.5, 11 / 15, 8 / 9, 59 / 63, 4 / 3, 31 / 27, 13 / 12, 1.25, 1e-300)
-TOLERANCE = 1e-33
 
 
 def accuracy(random):
@@ -34,14 +32,6 @@ def beside(random, x, size):
 
 
 # Satellites
-
-
-def solved(way, given, rates, rho, direction=1.0, oblate=False, tolerance=TOLERANCE):
-    """Truth (N, 12): see `hill_truth.satellites`."""
-    given, rho = np.broadcast_arrays(np.asarray(given, float), np.asarray(rho, float))
-    out = np.empty((given.size, 12))
-    hill_truth.satellites(way, given.ravel().copy(), rates, rho.ravel().copy(), direction, oblate, tolerance, out)
-    return out
 
 
 def _edge(random, f, low, high, points=14):
@@ -151,12 +141,12 @@ def satellites(random, size):
             names = {way: np.unique(given[:4]), "rho": np.unique(random.uniform(0, 4, 150))}
             chosen = random.choice(names[way].size * 150, 60, replace=False)
             method = "auto" if method in ("rk4", "dop853") else str(method)
-            true = _true_satellite(way, False, 1, oblate)
+            true = satellite(way, False, 1, oblate)
             yield Batch("satellite", f"{kind}, map", names, true, None, options, method, rtol, "", (way, "rho"), chosen)
             used += 60
             continue
         region = f"{kind}{', ' + sub if sub else ''}{', inertia ratio' if inertia else ''}"
-        yield Batch("satellite", region, names, _true_satellite(way, inertia, direction, oblate), None, options,
+        yield Batch("satellite", region, names, satellite(way, inertia, direction, oblate), None, options,
                     str(method), rtol)  # fmt: skip
         used += number
 
@@ -188,137 +178,6 @@ def _beside_edge(random, way, given, inertia, oblate, size):
     return np.full(size, given), beside(random, x, size)
 
 
-def _true_satellite(way, inertia, direction, oblate):
-    name = "inertia_ratio" if inertia else "rho"
-
-    def truth(given, answer):
-        rates = INERTIA if inertia else RHO
-        ok = _tractable(given, way, name) & (answer["status"] == 0)
-        values, other = (np.broadcast_to(given[x], ok.shape) for x in (way, name))
-        out = np.full((ok.size, 12), np.nan)
-        out[ok] = solved(WAYS[way], values[ok], rates, other[ok], float(direction), oblate)
-        k = {"k": values, "one_minus_k": 1 - values, "amplitude": np.sin(values)}[way]
-        rho = direction / np.sqrt(3 * np.abs(1 - other)) if inertia else other
-        body = other > 1 if inertia else np.full(ok.shape, oblate)
-        short = {
-            "k": 1 - values,
-            "one_minus_k": values,
-            "amplitude": 2 * np.sin((pi / 2 - values + 6.123233995736766e-17) / 2) ** 2,
-        }[way]
-        found = hill_outputs(out, answer, True)
-        found["period"] = 2 * out[:, 8], 2 * out[:, 9], 1e-29 * out[:, 8]
-        grows, _low, doubt = found["exponent"]
-        with np.errstate(all="ignore"):
-            turns = _long(out, 8) * 2 / (2 * LONG_PI) * _rho_long(rho, other, inertia)
-            found["exponent_per_orbit"] = grows / turns, 0.0, doubt / turns + 8 * ULP * np.abs(grows / turns)
-        wrong = found["wrong"]
-        wrong["lyapunov certifies what is not stable"] = (answer["lyapunov"] == 1) & found.pop("unstable")
-        with np.errstate(invalid="ignore"):
-            # its Runge-Kutta steps add up to an error of about 1e-4, which D feels times the squares of the factors
-            known = ok & (np.abs(out[:, :8:2]).max(axis=1) ** 2 < LOUD)
-            off = np.abs(np.abs(answer["rotation_number"]) - rough_rotation(k, short, rho, body, known))
-            wrong["rotation number"] = known & (off > 0.08 + answer["rotation_number_error"])
-        return found
-
-    return truth
-
-
-LOUD = 1e3  # squares of factors from which on a rough D says nothing
-LONG_PI = LONG(3.141592653589793) + LONG(1.2246467991473532e-16)
-
-
-def _rho_long(rho, alpha, inertia):
-    if not inertia:
-        return np.abs(rho).astype(LONG)
-    return 1 / np.sqrt(3 * np.abs(1 - alpha.astype(LONG)))
-
-
-def _tractable(given, way, name):
-    """Points that are cheap enough to hold against the truth."""
-    values, other = np.broadcast_arrays(np.asarray(given[way], float), np.asarray(given[name], float))
-    k = {"k": values, "one_minus_k": 1 - values, "amplitude": np.sin(values)}[way]
-    with np.errstate(all="ignore"):
-        rho = other if name == "rho" else 1 / np.sqrt(3 * np.abs(1 - other))
-    return (
-        np.isfinite(rho)
-        & (np.abs(rho) / np.maximum(k, 1) < 3e3)
-        & (values != {"k": 1.0, "one_minus_k": 0.0, "amplitude": 9.0}[way])
-    )
-
-
-def _long(out, i):
-    return out[:, i].astype(LONG) + out[:, i + 1]
-
-
-def hill_outputs(out, answer, half):
-    """What follows from the factors of `half` a period or of the whole, and which verdicts are wrong."""
-    doubt = out[:, 10]
-    y1, y2, d1, d2 = (_long(out, i) for i in (0, 2, 4, 6))
-    found = {name: (out[:, 2 * i], out[:, 2 * i + 1], doubt) for i, name in enumerate(("y1", "y2", "dy1", "dy2"))}
-    with np.errstate(all="ignore"):
-        if half:
-            minus, plus = d1 * y2, y1 * d2  # (D - 2) / 4 and (D + 2) / 4
-            dminus = doubt * (np.abs(d1) + np.abs(y2)) + 4 * ULP * np.abs(minus)
-            dplus = doubt * (np.abs(y1) + np.abs(d2)) + 4 * ULP * np.abs(plus)
-            trace = np.where(np.abs(minus) < np.abs(plus), 2 + 4 * minus, 4 * plus - 2)
-            dtrace = 4 * np.minimum(dminus, dplus) + 4 * ULP * np.abs(trace)
-        else:
-            # the trace, and its distance from 2 and -2, in double-double
-            high, low = _two(out[:, 0], out[:, 6])
-            low = low + out[:, 1] + out[:, 7]
-            trace = high.astype(LONG) + low
-            minus, plus = ((high - 2).astype(LONG) + low) / 4, ((high + 2).astype(LONG) + low) / 4
-            dminus = dplus = doubt
-            dtrace = 2 * doubt + 2 * ULP * np.abs(trace)
-        unstable = (minus > dminus) | (plus < -dplus)
-        stable = (minus < -dminus) & (plus > dplus)
-        growth = np.where(minus > 0, minus, np.where(plus < 0, -plus, 0))
-        slack = np.where(minus > 0, dminus, np.where(plus < 0, dplus, np.minimum(dminus, dplus)))
-        exponent = 2 * np.arcsinh(np.sqrt(growth))
-        about = 2 * np.arcsinh(np.sqrt(growth + slack)) - 2 * np.arcsinh(np.sqrt(np.maximum(growth - slack, 0)))
-        found["exponent"] = exponent, 0.0, about.astype(float) + 8 * ULP * exponent.astype(float)
-        found["discriminant"] = trace, 0.0, dtrace.astype(float)
-        theta = np.where(minus > 0, 0, np.where(plus < 0, LONG_PI / 2, np.arctan2(np.sqrt(-minus), np.sqrt(plus))))
-        dtheta = _angle_doubt(minus, plus, dminus, dplus)
-        fraction = theta / LONG_PI  # of theta / 2 pi, theta in [0, pi]
-        said = answer["rotation_number"]
-        whole = np.rint(np.asarray(said, LONG) - fraction), np.rint(np.asarray(said, LONG) + fraction)
-        near, other = whole[0] + fraction, whole[1] - fraction
-        true = np.where(np.abs(near - said) < np.abs(other - said), near, other)
-        found["rotation_number"] = true, 0.0, dtheta + 8 * ULP * (1 + np.abs(true).astype(float))
-    verdict = answer["verdict"]
-    found["wrong"] = {
-        "verdict": ((verdict == 1) & unstable) | ((verdict == 0) & stable),
-        "marginal": (verdict == 2) & ((minus < -dminus) | (minus > dminus)) & ((plus < -dplus) | (plus > dplus)),
-    }
-    found["unstable"] = unstable
-    return found
-
-
-def _two(a, b):
-    s = a + b
-    t = s - a
-    return s, (a - (s - t)) + (b - t)
-
-
-def _angle_doubt(minus, plus, dminus, dplus):
-    """What the doubts make of theta / 2 pi."""
-    with np.errstate(all="ignore"):
-        ends = [
-            np.arctan2(np.sqrt(np.maximum(-minus + s * dminus, 0)), np.sqrt(np.maximum(plus - s * dplus, 0)))
-            for s in (-1, 1)
-        ]
-        return (np.abs(ends[1] - ends[0]) / LONG_PI).astype(float)
-
-
-def rough_rotation(k, short, rho, oblate, use):
-    """The rotation number to about 0.05, by counting zeros of a solution in 20 periods."""
-    out = np.empty(len(k))
-    hill_truth.rough(*(np.ascontiguousarray(x, float) for x in (k, short, rho)), np.ascontiguousarray(oblate, bool),
-           np.ascontiguousarray(use & (np.abs(short) > 1e-200) & (k < 1e6), bool), out)  # fmt: skip
-    return out
-
-
 # Mathieu's equation
 
 
@@ -343,70 +202,17 @@ def mathieu(random, size):
         elif kind == "beside an edge":
             scale = 10 ** random.uniform(-3, 1.5)
             fixed = scale * random.choice([-1, 1])
-            x = _edge(random, lambda x, fixed=fixed: _factors(_mathieu_truth(x, fixed)), -2 * scale - 1, 20.0, 24)
+            x = _edge(random, lambda x, fixed=fixed: _factors(mathieu_solved(x, fixed)), -2 * scale - 1, 20.0, 24)
             if x is None:
                 continue
             a, q = beside(random, x, number), np.full(number, fixed)
-        yield Batch("mathieu", kind, {"a": a, "q": q}, _true_mathieu, None, {}, method, rtol)
+        yield Batch("mathieu", kind, {"a": a, "q": q}, true_mathieu, None, {}, method, rtol)
         used += number
-
-
-def _mathieu_truth(a, q):
-    a, q = np.broadcast_arrays(np.asarray(a, float), np.asarray(q, float))
-    points = np.column_stack([a, -2 * q, 0 * q, 0 * q])
-    out = np.empty((len(points), 12))
-    quarter = np.tile([pi / 2, 6.123233995736766e-17], (len(points), 1))
-    hill_truth.own_points(COSINE, points, np.full(len(points), np.inf), quarter, TOLERANCE, out)
-    return out
-
-
-def _true_mathieu(given, answer):
-    out = _mathieu_truth(given["a"], given["q"])
-    found = hill_outputs(out, answer, True)
-    found.pop("unstable")
-    return found
 
 
 # Equations of one's own
 
 
-def harmonics(u, p):
-    x = TWO_PI * u / p[9]
-    even = p[1] * cos(x) + p[2] * cos(2 * x) + p[3] * cos(3 * x) + p[4] * cos(4 * x)
-    return p[0] + even + p[5] * sin(x) + p[6] * sin(2 * x) + p[7] * sin(3 * x) + p[8] * sin(4 * x)
-
-
-def meissner(u, p):
-    return p[0] if u < p[2] else p[1]
-
-
-def meissner_even(u, p):
-    return p[0] if u < p[2] or 1 - u < p[2] else p[1]
-
-
-def bent(u, p):
-    return p[0] + p[1] * u if u < p[4] else p[2] + p[3] * cos(6 * u)
-
-
-def lorentz(u, p):
-    x = (u - p[2]) / p[3]
-    return p[0] + p[1] / (1 + x * x)
-
-
-SHORT = ("a", "b", "c", "d")
-LONG_NAMES = ("a", "c1", "c2", "c3", "c4", "s1", "s2", "s3", "s4", "T")
-# z, parameters, kind of its truth, and the rest that survey.hill is given; z is not that of a smooth period but for
-# the harmonics, so 0 is a break
-OWN = {
-    "harmonics": (harmonics, LONG_NAMES, HARMONICS, dict(period=lambda p: p[9])),
-    "harmonics even": (harmonics, LONG_NAMES, HARMONICS, dict(period=lambda p: p[9], even=True)),
-    "meissner": (meissner, SHORT[:3], None, dict(period=1.0, breaks=lambda p: [0.0, p[2]])),
-    "meissner even": (meissner_even, SHORT[:3], None, dict(period=1.0, breaks=lambda p: p[2], even=True)),
-    "bent": (bent, (*SHORT, "place"), BENT, dict(period=1.0, breaks=lambda p: [0.0, p[4]])),
-    "spike": (lorentz, SHORT, LORENTZ, dict(period=1.0, breaks=0.0)),
-    "spike named": (lorentz, SHORT, LORENTZ, dict(
-        period=1.0, breaks=lambda p: [0.0, p[2] - 4 * p[3], p[2], p[2] + 4 * p[3]])),
-}  # fmt: skip
 OWN_SHARES = (0.28, 0.24, 0.12, 0.1, 0.1, 0.1, 0.06)
 NARROW = 0.2  # of the spikes that are not named
 
@@ -434,7 +240,7 @@ def own(random, size):
                 region, p[:] = "beside an edge", row
                 p[:, 0] = beside(random, x, number)
         given = dict(zip(OWN[name][1], p.T, strict=True))
-        yield Batch(f"own {name}", region, given, _true_own(name), own_scene(name), {}, method, rtol,
+        yield Batch(f"own {name}", region, given, own_truth.true(name), own_scene(name), {}, method, rtol,
                     f"own_scene({name!r})")  # fmt: skip
         used += number
 
@@ -489,62 +295,11 @@ def _draw_spikes(random, name, size):
     return "narrow spike" if narrow else "spike", p, -5.0, 60.0
 
 
-def _own_truth(name, p):
-    p = np.ascontiguousarray(p)
-    _, _, kind, more = OWN[name]
-    if kind is None:
-        return np.array([_steps_truth(row, more.get("even", False)) for row in p]).reshape(-1, 12)
-    ends = p[:, 4].copy() if kind == BENT else np.full(len(p), np.inf)
-    length = p[:, 9] if kind == HARMONICS else np.ones(len(p))
-    if more.get("even"):
-        length = length / 2
-    out = np.empty((len(p), 12))
-    hill_truth.own_points(kind, p, ends, np.column_stack([length, 0 * length]), TOLERANCE, out)
-    return out
-
-
-def _steps_truth(row, even):
-    """As `hill_truth.own_points` for z = a before the break and b behind it: the closed form, 50 digits."""
-    with mp.workdps(50):
-        a, b, place = (mpf(float(x)) for x in row)
-        end = mpf(0.5 if even else 1)
-        flow = mp.eye(2)
-        for z, length in ((a, min(place, end)), (b, end - min(place, end))):
-            root = mp.sqrt(abs(z))
-            x = root * length
-            if z > 0:
-                c, s = mp.cos_sin(x)
-            else:
-                c, s = mp.cosh(x), mp.sinh(x)
-            # sin(x) / root loses nothing but where z is 0
-            step = mp.matrix([[c, s / root if root else length], [-s * root if z > 0 else s * root, c]])
-            flow = step * flow
-        out = []
-        for value in (flow[0, 0], flow[0, 1], flow[1, 0], flow[1, 1]):
-            high = float(value)
-            out += [high, float(value - high)]
-        biggest = max(1.0, *(abs(x) for x in out))
-    return [*out, float(end), 0.0, 1e-31 * biggest, 2.0]
-
-
 def _own_margin(name, x, row):
     p = np.tile(row, (len(x), 1))
     p[:, 0] = x
-    out = _own_truth(name, p)
+    out = own_truth.solved(name, p)
     if OWN[name][3].get("even"):
         return _factors(out)
     trace = out[:, 0] + out[:, 6]
     return np.column_stack([trace - 2, trace + 2])
-
-
-def _true_own(name):
-    def truth(given, answer):
-        p = np.column_stack([given[x] for x in OWN[name][1]])
-        out = np.full((len(p), 12), np.nan)
-        ok = answer["status"] == 0
-        out[ok] = _own_truth(name, p[ok])
-        found = hill_outputs(out, answer, OWN[name][3].get("even", False))
-        found.pop("unstable")
-        return found
-
-    return truth

@@ -46,8 +46,8 @@ def maker(figure):
 def _fit(command, figure):
     """How many letters of the figure's name the command, its workflow or its script says; 0: it does not make it."""
     words = shlex.split(command)
-    if words[:2] == ["survey", "precision"]:
-        names = [f"precision_{words[2]}.png"]
+    if words[:2] in (["survey", "precision"], ["survey", "failures"]):
+        names = [f"{words[1]}_{words[2]}.png"]
     elif words[:2] == ["survey", "run"]:
         names = [] if "output.figures=[]" in words else _of_workflow(ROOT / words[2])
     elif words[:2] == ["survey", "prove"]:

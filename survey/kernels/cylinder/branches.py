@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from survey.kernels.cylinder.equilibria import ANGLE, BAR, KIND, SADDLE
+from survey.kernels.cylinder.equilibria import ANGLE, BAR, KIND, SADDLE, F
 from survey.kernels.cylinder.flow import B12, B31, BOUND_DDG, BOUND_DG, BOUND_F, C23, S2, S3, D, values
 from survey.kernels.cylinder.program import COLUMNS, in_angle
 from survey.kernels.cylinder.records import START_PHI, START_PHI_BAR, START_W, START_W_BAR
@@ -40,15 +40,16 @@ def forces(p, phi, f, g):
 
 
 @kernel
-def unstable(p, eqs, count, starts, furthest=FURTHEST):
+def unstable(p, eqs, count, starts, furthest=FURTHEST, kind=SADDLE):
     """Fill `starts` (START_PHI to START_W_BAR) with a point of each unstable branch, two per saddle; their number.
 
-    They are at most `furthest` (rad) from the saddle.
+    They are at most `furthest` (rad) from the saddle. Of repelling nodes (`kind`) they are the branches that leave
+    fastest.
     """
     f, g, a = np.zeros(ORDER + 1), np.zeros(ORDER + 1), np.zeros(ORDER + 1)
     size = 0
     for i in range(count):
-        if eqs[i, KIND] != SADDLE:
+        if eqs[i, KIND] != kind or (kind != SADDLE and eqs[i, F] <= 0.0):
             continue
         phi, slip = eqs[i, ANGLE], eqs[i, BAR]
         forces(p, phi, f, g)

@@ -368,6 +368,14 @@ def set_identity(A):
 
 
 @kernel
+def add_times(weight, A, out):
+    """Add weight times the matrix A to out."""
+    for j in range(len(A)):
+        for c in range(A.shape[1]):
+            out[j, c] += weight * A[j, c]
+
+
+@kernel
 def copy(A, out):
     """Fill the matrix out; out[:] = A compiles the words of an error for 2 s."""
     for j in range(len(out)):

@@ -62,6 +62,12 @@ def lebesgue(degree):
     return 2 / np.pi * np.log(degree + 1) + 1
 
 
+def lagrange(x, n):
+    """Magnitudes (R, n) of the Lagrange polynomials of the n nodes at x (R), rounded up."""
+    cosines = np.cos(np.arange(n) * np.arccos(np.clip(x, -1.0, 1.0))[:, None])
+    return abs(cosines @ by_columns(n).T) + 8 * n * EPS
+
+
 def expand(values, matrix, ulps):
     """The series of each row of `values` (R, n) at nodes, by `matrix` (n, n; [from, to]), and its `_doubt` (R)."""
     series = np.zeros_like(values)

@@ -1,6 +1,6 @@
 """Method "auto" for flows on the cylinder: closed forms where they apply and keep their digits, point by point.
 
-The rule is read off the true errors that `workflows/gyrostat_methods.py` maps (rtol = 1e-10). Of all initial states of
+The rule is read off the true errors that `survey failures gyrostat` maps (rtol = 1e-10). Of all initial states of
 a system with b = 0 a closed form serves every one on that plane, with a median error of 4e-16 against 9e-15 of the
 Taylor series and at a cost free of t. Next to double and triple roots (separatrices, folds) it serves 38 % of the
 plane, the series 84 %; on (61), from conservative to stiff, 87 % and 100 %. The error bounds show where: so `method`,

@@ -4,7 +4,7 @@ import numpy as np
 
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.steps import TURNING
-from survey.measures.cylinder import fate, portrait
+from survey.measures.cylinder import basins, fate, portrait
 from survey.status import INVALID_PARAMETERS, OK
 
 MOST_TURNINGS = 2**31 - 1  # are kept as int32
@@ -83,8 +83,9 @@ def _systems(point, names, flows):
     return flows(given.reshape(-1, len(names))), given.shape[:-1]
 
 
-def fates(point, names, flows, method, rtol):
+def fates(point, names, flows, method, request):
     """The fates of phi0, w0: one skeleton for each set of the parameters `names`, then its initial states."""
+    whole = basins.asked(request, names)
     starts = [np.asarray(point[key], dtype=float) for key in ("phi0", "w0")]
     systems, own = _systems(point, names, flows)
     shape = np.broadcast_shapes(own, *(array.shape for array in starts))
@@ -97,15 +98,17 @@ def fates(point, names, flows, method, rtol):
         system = systems[group[members[0]]]
         good = members[np.isfinite(starts[members]).all(axis=1)]
         if np.isfinite(system).all() and len(good):
-            fate.solve(method, system, starts[good], rtol, result, good)
+            s = fate.remembered(method, system)
+            out = basins.followed(method, system, s, starts[good], request.rtol, whole)
+            fate.write(s, out, starts[good], result, good)
     return {name: values.reshape(shape) for name, values in result.items()}
 
 
-def portraits(point, names, flows, method, rtol):
+def portraits(point, names, flows, method, request):
     """One portrait for each set of the parameters `names`."""
     systems, shape = _systems(point, names, flows)
     good = np.isfinite(systems).all(axis=1)
     result = portrait.empty(len(systems), INVALID_PARAMETERS, systems.shape[1])
-    for name, values in portrait.solve(method, systems[good], rtol).items():
+    for name, values in portrait.solve(method, systems[good], request.rtol).items():
         result[name][good] = values
     return {name: values.reshape(shape + values.shape[1:]) for name, values in result.items()}

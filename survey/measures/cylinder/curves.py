@@ -58,7 +58,7 @@ def _refusal_of_own(axes, scene):
     return f"curves are known on two axes of {', '.join(own)}, or three, not on {', '.join(axes) or 'none'}"
 
 
-def searched(scene, square, axes, fixed):
+def searched(scene, square, axes, fixed, options):
     """The Curves on the map of `axes`, the unit square `square`; `fixed` holds the other parameters."""
     if scene.FAMILY == "cylinder":
         return closed(square, axes, fixed, {})

@@ -31,19 +31,20 @@ MORE = 10  # times the budget for those that use it up
 MOST = 2_000_000  # steps in all
 BATCH = 50  # fates per kernel call, so that a call stays below a second
 HANDED_OVER = np.geomspace(0.5, 2000.0, 28)  # times, in those of the system, at which float64 takes over again
+SELDOM = 3  # every third time, where what is told at all of them was not enough
 MIRROR = np.array([1.0, -1.0, 1.0, -1.0, -1.0, 1.0])  # S2, see `solution`
 MOST_OF_PROGRAM = 16  # equilibria
 UNKNOWN, NO_ENDS = 21, 22  # as in the STATUS of scenes/gyrostat.py and of request/abel_scene.py
 COARSEST = 1e-9  # rtol: with wider bars more fates stay open, and to decide these costs more than smaller steps
 LEAST = 1e-6  # slowest rotation of the lattice, in velocities of the system
 COLUMNS_OF = {"verdict": rc.VERDICT, "turnings": rc.TURNINGS, "net_turns": rc.NET_TURNS, "status": rc.STATUS}
+LIMITS = [name + end for name in ("limit_phi", "limit_w", "multiplier") for end in ("", "_error")]
 FINE = 1e-16  # truncation per step for cycles, or the finest of the method
 
 
 def empty(size, status):
     """The outputs of `solve` for `size` states, filled with what does not apply."""
-    floats = ("limit_phi", "limit_w", "multiplier")
-    result = {name + end: np.full(size, np.nan) for name in floats for end in ("", "_error")}
+    result = {name: np.full(size, np.nan) for name in LIMITS}
     for name, fill in (("verdict", -1), ("turnings", kf.UNDETERMINED), ("net_turns", NO_TURNS), ("status", status)):
         result[name] = np.full(size, fill, dtype=np.int64)
     return result
@@ -52,12 +53,29 @@ def empty(size, status):
 def solve(method, six, starts, rtol, result, where):
     """Fates at one parameter point, written into `result` (see `empty`) at the indices `where`."""
     s = remembered(method, six)
-    out = followed(method, s, starts, rtol)
+    write(s, followed(method, s, starts, rtol), starts, result, where)
+
+
+def write(s, out, starts, result, where):
+    """Write the fates `out` (VERDICT to STATUS of `records`) of the skeleton's starts into `result`."""
     for name, column in COLUMNS_OF.items():
         result[name][where] = out[:, column]
-    for i, row in zip(where, out, strict=True):
-        limits(s, row, result, i)
+    for first, alike in _alike(out):
+        limits(s, out[first], result, where[first])
+        for name in LIMITS:
+            result[name][where[alike]] = result[name][where[first]]
     wind(s, out, starts[:, 0], result, where)
+
+
+def _alike(out):
+    """(the first, where) of the fates with one verdict and one limit."""
+    if out.shape[1] != rc.FATE:  # g = 0: each motion ends at an angle of its own
+        yield from ((i, slice(i, i + 1)) for i in range(len(out)))
+        return
+    kinds = (64.0 * out[:, rc.VERDICT] + out[:, rc.LIMIT]).astype(np.int64)
+    for kind in np.unique(kinds):
+        alike = np.flatnonzero(kinds == kind)
+        yield alike[0], alike
 
 
 def wind(s, out, angles, result, where):
@@ -68,8 +86,11 @@ def wind(s, out, angles, result, where):
     result["net_turns"][where[known]] = turns[known]
 
 
-def followed(method, s, starts, rtol):
-    """`fates` of the skeleton s, solved again with a greater budget or finer steps where they are not decided."""
+def followed(method, s, starts, rtol, told=None):
+    """`fates` of the skeleton s, solved again with a greater budget or finer steps where they are not decided.
+
+    `told` (see `basins`) gives the fate of a later state of the same motion, or None.
+    """
     first, second = tolerances(method, min(rtol, COARSEST))
     out = fates(method, s, starts, first)
     for code, tolerance in ((STEP_LIMIT, first), (SEPARATRIX, second)):
@@ -80,35 +101,40 @@ def followed(method, s, starts, rtol):
         s.stratum not in (I0, I1) and starts.shape[1] == 2 and len(s.p) == COLUMNS
     ):  # no better than the bars of a start can its fate be
         for i in np.flatnonzero(out[:, rc.STATUS] == SEPARATRIX):
-            _handed_over(method, s, starts[i], first, out[i])
+            _handed_over(method, s, starts[i], first, out[i], told)
     return out
 
 
-def _handed_over(method, s, start, tolerance, out):
+def _handed_over(method, s, start, tolerance, out, told=None):
     """Follow one start in double-double past what float64 cannot decide, until its fate from there on is decided."""
     times = HANDED_OVER / (s.p[BOUND_F] + math.sqrt(s.p[BOUND_DG]) + abs(start[1]))
     row, done = np.concatenate([s.p[:6], start])[None], 0
-    for last in (10, 19, len(times)):  # most are decided early, and what comes later costs most
-        floats, turnings, status = trajectories(taylor_double, row, times[None, :last], 0.0)
-        for state, turned, code in list(zip(floats[0], turnings[0], status[0], strict=True))[done:]:
-            later = fates(method, s, state[None], tolerance)[0] if code == OK else [kf.UNDECIDED]
-            if later[rc.VERDICT] != kf.UNDECIDED:
-                out[:] = later
-                if later[rc.TURNINGS] >= 0:
-                    out[rc.TURNINGS] = later[rc.TURNINGS] + turned if turned >= 0 else kf.UNDETERMINED
-                return
-        done = last
+    ways = ([told] if told else []) + [lambda state: fates(method, s, state[None], tolerance)[0]]
+    for later_of in ways:  # what is told costs nothing, so it is asked at all times first
+        for last in (10, 19, len(times)):  # most are decided early, and what comes later costs most
+            floats, turnings, status = trajectories(taylor_double, row, times[None, :last], 0.0)
+            states = list(zip(floats[0], turnings[0], status[0], strict=True))[done:]
+            for state, turned, code in states[SELDOM - 1 :: SELDOM] if told and later_of is not told else states:
+                later = later_of(state) if code == OK else None
+                if later is not None and later[rc.VERDICT] != kf.UNDECIDED:
+                    out[:] = later
+                    if later[rc.TURNINGS] >= 0:
+                        out[rc.TURNINGS] = later[rc.TURNINGS] + turned if turned >= 0 else kf.UNDETERMINED
+                    return
+            done = last
+        done = 0
 
 
 def _middles(s, out):
     """Angle that counts for net_turns: the equilibrium, or the middle of a libration cycle."""
     angles = np.full(len(out), np.nan)
-    for i, row in enumerate(out):
+    for first, alike in _alike(out):
+        row = out[first]
         if row[rc.VERDICT] in (kf.EQUILIBRIUM, kf.EQUILIBRIUM_START) and row[rc.LIMIT] >= 0:
-            angles[i] = s.equilibria[int(row[rc.LIMIT]), eq.ANGLE]
+            angles[alike] = s.equilibria[int(row[rc.LIMIT]), eq.ANGLE]
         elif row[rc.VERDICT] == kf.LIBRATION:
             cycle = s.librations[int(row[rc.LIMIT])]
-            angles[i] = 0.5 * (cycle[rt.CYCLE_X] + cycle[rt.CYCLE_LEFT])
+            angles[alike] = 0.5 * (cycle[rt.CYCLE_X] + cycle[rt.CYCLE_LEFT])
     return angles
 
 

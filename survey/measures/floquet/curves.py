@@ -42,13 +42,13 @@ def refusal(axes, scene):
     return None if len(axes) in (2, 3) else f"curves are drawn on two axes, or three, not on {len(axes)}"
 
 
-def searched(scene, square, axes, fixed):
+def searched(scene, square, axes, fixed, options):
     """The Curves on the map of `axes`, the unit square `square`; `fixed` holds the other parameters."""
 
     def matrices(x, rtol=RTOL):
         values = square.parameters(x)
         point = fixed | {name: values[:, k] for k, name in enumerate(axes)}
-        request = Request({}, "auto", rtol, frozenset(["monodromy"]))
+        request = Request(options, "auto", rtol, frozenset(["monodromy"]))
         with np.errstate(all="ignore"):
             out = scene.solve(point, request)
         return scene.judged(values, axes, fixed, out["monodromy"], out["monodromy_error"])

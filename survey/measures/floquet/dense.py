@@ -301,17 +301,24 @@ def _degrees(key, middle, radius, budget):
 def _coefficients(key, middle, radius, x):
     """Coefficients (N, K) of the polynomial at x (N, sides) on a panel, and their bounds; None if there are none."""
     points = key.points(*(m + r * x[:, k] for k, (m, r) in enumerate(zip(middle, radius, strict=True))))
-    if not key.system.smooth(points[0]):
+    return at_points(key.system, key.structure, points)
+
+
+def at_points(system, structure, points):
+    """Coefficients (N, K) of the polynomial at the points (N, parameters), and their bounds; None where no series
+    serves.
+    """
+    if not system.smooth(points[0]):
         return None
     with np.errstate(all="ignore"):
-        own = monodromy.Points(key.system, points)
+        own = monodromy.Points(system, points)
         if not own.valid.all() or len(own.groups) != 1 or not all(p.analytic for p in own.groups[0][1]):
             return None
-        every, n = np.arange(len(points)), key.system.n
-        out = np.empty((2, len(points), n // 2 * (2 if key.structure == "symplectic" else 1) if key.paired else n))
+        every, n, paired = np.arange(len(points)), system.n, structure != "none"
+        out = np.empty((2, len(points), n // 2 * (2 if structure == "symplectic" else 1) if paired else n))
 
         def finish(some, matrices, scale, *steps_of):
-            out[:, some] = coefficients(matrices.M, matrices.E, scale, key.structure, steps_of)
+            out[:, some] = coefficients(matrices.M, matrices.E, scale, structure, steps_of)
 
         monodromy.solve(own, monodromy.method_of("auto"), BEST, np.ones(len(points)), every, finish)
     return out if np.isfinite(out).all() else None

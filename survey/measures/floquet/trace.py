@@ -541,9 +541,13 @@ class Program:
         return place == TIME or (operation == "combination" and all(b in (ONE, TIME) for b, _c in operands[0]))
 
     def _order(self):
-        """Places of the basis functions that the entries need, each after those that it is made of."""
+        """Places of the basis functions that the entries need, each after those that it is made of.
+
+        States need lower orders alone, and so do functions of their derivatives, which come last: a derivative may be
+        made of what is being visited, as that of y = sqrt x is of 1 / y.
+        """
         flow = self.graph.flow
-        found, begun = list(flow), set(flow)  # states need lower orders alone
+        found, begun, later = list(flow), set(flow), []
 
         def visit(place):
             if place in begun:
@@ -556,11 +560,13 @@ class Program:
                 if not (function and k == 1):
                     visit(b)
             found.append(place)
-            if function:  # its derivative is asked for at lower orders alone
-                visit(before[1])
+            if function:
+                later.append(before[1])
 
         for place in (*self.used, *(basis for symbol in flow.values() for basis in symbol.terms)):
             visit(int(place))
+        while later:
+            visit(later.pop())
         return np.array(found, dtype=np.int64)
 
     def numbers(self, points):

@@ -119,7 +119,7 @@ def scattered(box, method, asked, answers, position, p):
     sought, axis, open_points = _sought(asked, factors_only=True), _axis(box.line, box.even), np.ones(p.size, np.bool_)
     with _ONE_AT_A_TIME:
         served = [panel for part in _parts(box.row_axis) for panel in panels(part, method, asked.rtol, axis, sought)]
-    for low, high, series, bars, turns in served:
+    for low, high, series, bars, turns, _ in served:
         inside = np.flatnonzero(open_points & (position >= low) & (position <= high))
         padded, number, bars = _shortened(series, bars)
         for some in np.split(inside, range(CALL_POINTS, inside.size, CALL_POINTS)):
@@ -275,7 +275,7 @@ def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
     with _ONE_AT_A_TIME:
         served = panels(problem.row_axis, method, asked.rtol, axis, _sought(asked))
     position, left = problem.positions[chosen], np.ones(chosen.size, np.bool_)
-    for low, high, series, bars, turns in served:
+    for low, high, series, bars, turns, of_nodes in served:
         inside = left & (position >= low) & (position <= high)
         rows, own = chosen[inside], np.empty((len(series), np.count_nonzero(inside), series.shape[2]))
         if rows.size:
@@ -283,6 +283,9 @@ def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
             for of, out in zip(series, own, strict=True):
                 chebyshev.restrict(of, x, np.empty((2, series.shape[2])), out)
             bar, odd = np.repeat(bars[:, None], rows.size, axis=1), _odd(problem.row_axis, axis, position[inside])
+            if (bars > asked.rtol).any():  # points may miss it: bounds of the rows themselves, which cost more
+                tails, bars_there = of_nodes
+                bar = np.minimum(bar, tails[:, None] + bars_there @ chebyshev.lagrange(x, bars_there.shape[1]).T)
             if len(own) > 1:
                 own[3], bar[3] = own[3] * odd[:, None], bar[3] * odd
             _answer(problem, asked, answers, rows, own, bar, _across(turns, x), axis, open_points)
@@ -307,8 +310,8 @@ def _across(turns, x):
 
 @lru_cache(maxsize=64)
 def panels(row_axis, method, rtol, axis, sought):
-    """[(low, high, series (F, n, m), bounds (F), `turns` at the nodes)] of the panels of rows on which what is sought
-    converges, the same for all blocks.
+    """[(low, high, series (F, n, m), bounds (F), `turns` at the nodes, (tails (F), bounds at the nodes (F, n)))] of the
+    panels of rows on which what is sought converges, the same for all blocks.
 
     The axis of rows is halved until it has converged to `rtol`, as long as all that is solved for it pays.
     """
@@ -329,8 +332,8 @@ def panels(row_axis, method, rtol, axis, sought):
 
 
 def _surface(row_axis, method, rtol, middle, radius, axis, budget, sought):
-    """((coefficients (F) of T_j in s by T_k in p, bounds (F), `turns` at the nodes), or None where `rtol` is
-    not met; rows solved, in `budget`).
+    """((coefficients (F) of T_j in s by T_k in p, bounds (F), `turns` at the nodes, tails and bounds there), or None
+    where `rtol` is not met; rows solved, in `budget`).
     """
     ends = row_axis.at(middle + radius * np.array([-1.0, 1.0]))
     size = np.sqrt((ends.bound * np.abs([1.0, axis.radius, axis.radius**2])).sum(axis=1))
@@ -350,7 +353,7 @@ def _surface(row_axis, method, rtol, middle, radius, axis, budget, sought):
         tails = np.array(tails)
         doubts = tails + chebyshev.lebesgue(n) * bars.max(axis=1)
         if _served(values, doubts[:, None, None], rtol).mean(axis=(1, 2)).min() >= MOST:
-            return (np.array(surfaces), doubts, turns), spent
+            return (np.array(surfaces), doubts, turns, (tails, bars)), spent
         worst = doubts.argmax()
         doubt, tail = doubts[worst], tails[worst]
         if not doubt < 0.5 * before:

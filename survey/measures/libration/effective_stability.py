@@ -31,8 +31,8 @@ RESOLUTION = 1e-12  # relative: what the halvings, the rule and the roundings he
 def radius(remainders, time):
     """(radius, bound, r) at each mu: the radius for `time`, how much less rounding may make it, and the order r.
 
-    `remainders`: {(r, d): (values, bounds) (2, 3, N)}, as a method's function of that name gives them. NaN and r = -1
-    where no order is known.
+    `remainders`: {(r, d): (values, bounds) (2, 3, N)}, as a method's function of that name gives them; `time` is a
+    number, or one for each mu. NaN and r = -1 where no order is known.
     """
     top = max(d for _r, d in remainders)
     orders = np.arange(2, top - 1)
@@ -42,7 +42,7 @@ def radius(remainders, time):
     best = np.where(known, orders[np.argmax(np.where(np.isfinite(safe), safe, -1.0), axis=0)], -1)
     radius, least = np.full(known.shape, np.nan), safe.max(axis=0, initial=-1.0, where=np.isfinite(safe))
     for r in np.unique(best[known]):
-        radius[best == r] = _solve(r, norms[r][0].max(axis=0)[best == r], time)
+        radius[best == r] = _solve(r, norms[r][0].max(axis=0)[best == r], np.broadcast_to(time, best.shape)[best == r])
     return radius, np.maximum(radius - least, 0.0) + RESOLUTION * radius, best
 
 

@@ -18,6 +18,7 @@ from survey import measures
 from survey.kernels.libration.closed_forms import MARGIN, MU_1, MU_2, MU_R, linear
 from survey.kernels.libration.coefficients import LABELS
 from survey.kernels.math.roundoff import ROUNDOFF
+from survey.measures.libration import rays
 from survey.methods import rational, rational_double
 from survey.status import INVALID_PARAMETERS, OK, OVERFLOW
 
@@ -27,6 +28,7 @@ COMBINED = ("a20", "a11", "a02", "D4", "D6")
 FLOATS = ("omega1", "omega2", *COMBINED, "M_ray", "resonance_distance")
 HIGHEST = 8  # the greatest order of the resonances considered
 ROUNDINGS = 16  # in a sum of products here
+FILL = -99  # of a resonance where there is none
 
 
 def vectors(highest):
@@ -74,13 +76,17 @@ def answers(mu, method):
     for name, value, bar in zip(FLOATS, values, bars, strict=True):
         out[name], out[f"{name}_error"] = value, bar
     out["c"], out["c_error"] = (np.where(lost, np.nan, part).T.copy() for part in c)
+    for name, value in rays.answers(c, combined, omega).items():
+        out[name] = np.where(lost[:, None] if value.ndim == 2 else lost, np.nan, value)
+    out["resonance"] = np.where((stable & ~lost)[:, None], VECTORS[nearest], FILL).astype(np.int32)
     return out
 
 
 def missed(answer, rtol):
     """Points where an error bound exceeds rtol (1 + |value|)."""
-    wide = [answer[f"{name}_error"] > rtol * (1 + abs(answer[name])) for name in FLOATS]
-    return np.any(wide, axis=0) | (answer["c_error"] > rtol * (1 + abs(answer["c"]))).any(axis=1)
+    wide = [answer[f"{name}_error"] > rtol * (1 + abs(answer[name])) for name in (*FLOATS, *rays.FLOATS)]
+    several = [(answer[f"{name}_error"] > rtol * (1 + abs(answer[name]))).any(axis=1) for name in ("c", *rays.RAYS)]
+    return np.any([*wide, *several], axis=0)
 
 
 def forms(method, mu, omega):

@@ -6,11 +6,11 @@ from importlib.resources import files
 import numpy as np
 import pytest
 import xarray as xr
-from brun_truth import NAMES, truth
 from mpmath import mp, mpf
 
 import survey
 from survey.kernels.nutation import action
+from survey.truth.brun_digits import NAMES, truth
 
 ROWS = json.loads((files("survey.reference") / "brun_distances.json").read_text())
 ROWS = [row for family in ("separatrix", "pole", "precession") for row in ROWS[family][1::3]]

@@ -371,3 +371,21 @@ def test_a_conserved_quantity_is_not_judged():
         survey.evaluate(chained((0, 0, 1, 1, 0)), **axes)
     with pytest.raises(survey.BadInput, match="there are 5 states"):
         chained((1, 1))
+
+
+@pytest.mark.parametrize("power", [-0.5, -1.5])
+def test_a_root_in_a_denominator_has_its_series(power):
+    """The derivative of y = sqrt x is made of 1 / y, which needs y: y'' + a x^power y = 0."""
+
+    def A(t, p, out):
+        x = 1.2 + math.cos(t) ** 2
+        out[0, 1] = 1.0
+        out[1, 0] = -p[0] / (math.sqrt(x) if power == -0.5 else math.sqrt(x) * x)
+
+    own = survey.floquet(A, period=math.pi, parameters=("a",), states=("x", "v"), structure="symplectic")
+    a = np.linspace(0.5, 3.0, 5)
+    one, other = (
+        survey.evaluate(own, a=a, method=method, variables=["monodromy"]) for method in ("taylor16", "dop853")
+    )
+    bars = one.monodromy_error + other.monodromy_error
+    assert (abs(one.monodromy - other.monodromy) <= bars).all() and bars.max() < 1e-8

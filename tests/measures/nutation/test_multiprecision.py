@@ -5,12 +5,12 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import xarray as xr
-from brun_truth import NAMES, OUTPUTS, draw, integrals, outputs, turning_points
 from mpmath import mp, mpf
 
 import survey
 from survey.measures.nutation import multiprecision
 from survey.status import NO_CONVERGENCE, OK, OVERFLOW
+from survey.truth.brun_digits import NAMES, OUTPUTS, draw, integrals, outputs, turning_points
 
 NO_MOTION = 16
 # Found by attack: beside saddles, cusps, upright rotations and regular precessions; advances that cancel.

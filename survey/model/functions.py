@@ -1,0 +1,102 @@
+"""What a model holds series of: the analytic functions of the parameters from which a family's verdict follows.
+
+Each family gives a Source: names of the functions, the rule by which `survey.model.reader` decides, and the values with
+their error bounds at points. Functions rather than D or multipliers, so that verdicts keep their digits at edges.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from survey import api
+from survey.errors import BadInput
+from survey.request.function_scene import FunctionScene
+
+BEST = 1e-15  # what is asked at the nodes: as well as can be
+HALF = ("y1", "dy1", "y2", "dy2")
+INVARIANTS = {"A": "det P", "B": "det T", "C": "det Q", "D": "det S", "t": "trace of T'P"}
+
+
+@dataclass(frozen=True)
+class Source:
+    """`at(x, y)`: values and bounds (F, N1, N2) on the grid of x (N1) and y (N2); NaN where there is no answer."""
+
+    rule: str
+    names: tuple[str, ...]
+    long_names: tuple[str, ...]
+    at: Callable
+
+
+def of(workflow, names, fixed):
+    """The Source of a checked workflow with axes `names` (two) and `fixed` parameters; raises BadInput."""
+    maker = {"hill": _hill, "danby": _danby, "floquet": _floquet}.get(workflow.scene.FAMILY)
+    if maker is None or getattr(workflow.scene, "DAMPED", False):
+        raise BadInput(
+            f"model: the scene {workflow.name} is not answered by series; choose satellite, mathieu, "
+            "libration_elliptic, or a Hill equation without damping or a linear periodic system of your own"
+        )
+    return maker(workflow, names, fixed)
+
+
+def _hill(workflow, names, fixed):
+    """The factors at T/2; or, where z is not even, D alone."""
+    scene, even = workflow.scene, getattr(workflow.scene, "EVEN", True)
+    wanted = HALF if even else ("discriminant",)
+    outputs = {o.name: o for o in scene.OUTPUTS}
+    given = dict(workflow.request.options) | fixed
+    asked = scene if isinstance(scene, FunctionScene) else workflow.name
+
+    def at(x, y):
+        # increasing, as evaluate may answer grids by rows
+        order = [np.argsort(values) for values in (x, y)]
+        grid = {name: values[o] for name, values, o in zip(names, (x, y), order, strict=True)}
+        ds = api.evaluate(asked, method="auto", rtol=BEST, variables=list(wanted), **given, **grid).transpose(*names)
+        back = np.ix_(*(np.argsort(o) for o in order))
+        found = [np.stack([ds[f"{name}{end}"].values[back] for name in wanted]) for end in ("", "_error")]
+        return found[0], found[1].astype(float)
+
+    return Source("hill" if even else "trace", wanted, tuple(outputs[name].long_name for name in wanted), at)
+
+
+def _danby(workflow, names, fixed):
+    """The invariants of `survey.kernels.libration.traces`."""
+    from survey.measures.libration import danby
+
+    def at(x, y):
+        points = {names[0]: np.repeat(x, y.size), names[1]: np.tile(y, x.size)} | fixed
+        mu, e = (np.broadcast_to(points[name], x.size * y.size).astype(float) for name in ("mu", "e"))
+        values, bars = danby.factors(np.ascontiguousarray(e), np.ascontiguousarray(mu), BEST)
+        return values.T.reshape(-1, x.size, y.size), bars.T.reshape(-1, x.size, y.size)
+
+    return Source("danby", tuple(INVARIANTS), tuple(INVARIANTS.values()), at)
+
+
+def _floquet(workflow, names, fixed):
+    """The coefficients of the characteristic polynomial, or of the one in s = l + 1 / l."""
+    from survey.measures.floquet import dense
+
+    scene = workflow.scene
+    n, paired = len(scene.states), scene.structure != "none"
+    number = n // 2 if paired else n
+    if n > dense.LARGEST or (paired and (n % 2 or number > 2)):
+        raise BadInput(
+            f"model: {n} states of the structure {scene.structure!r} are not decided from series; at most "
+            f"{4 if paired else dense.LARGEST} are"
+        )
+    columns = [p.name for p in scene.PARAMETERS]
+    system, others = scene._system, tuple(float(fixed.get(name, 0.0)) for name in columns)
+
+    def at(x, y):
+        points = np.tile(np.array(others), (x.size * y.size, 1))
+        points[:, columns.index(names[0])] = np.repeat(x, y.size)
+        points[:, columns.index(names[1])] = np.tile(y, x.size)
+        known = scene._called(dense.at_points, system, scene.structure, points)
+        if known is None:
+            return np.full((2, number, x.size, y.size), np.nan)
+        return tuple(part[:, :number].T.reshape(number, x.size, y.size) for part in known)
+
+    power = "s = l + 1 / l" if paired else "l"
+    words = tuple(f"coefficient of {power} to the power {number - k}" for k in range(1, number + 1))
+    rule = "reciprocal" if paired else "schur"
+    return Source(rule, tuple(f"c{k}" for k in range(1, number + 1)), words, at)

@@ -1,0 +1,98 @@
+"""What runs on this machine have taken: by it `survey plan` corrects its estimates.
+
+It is a list of records, the latest last, in the user's cache. A file that cannot be read or written is as good as none.
+"""
+
+import contextlib
+import json
+import os
+import tempfile
+from math import inf, log
+from pathlib import Path
+from statistics import median
+
+import numba
+import platformdirs
+
+from survey.kernels import jit
+from survey.sweep.announce import always_compiled
+
+MOST = 400  # records that are kept
+SHORT = 0.1  # seconds: shorter runs tell nothing of longer ones
+PARTS = ("kernels", "further")  # [seconds estimated, measured] of the points; of edges, curves and cells
+
+
+def note(workflow, estimated, measured, compiling):
+    """Keep what a complete run has taken: `estimated` and `measured` are {part: seconds of wall time}."""
+    if numba.config.DISABLE_JIT:
+        return
+    record = _about(workflow) | {"hash": jit.KERNEL_HASH, "compiling": round(compiling, 2)}
+    for part in PARTS:
+        if estimated.get(part, 0.0) > 0.0 and measured.get(part, 0.0) > SHORT:
+            record[part] = [float(f"{seconds:.3g}") for seconds in (estimated[part], measured[part])]
+    path = _path()
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=path.parent) as folder:
+            whole = Path(folder) / path.name
+            whole.write_text(json.dumps([*_records(), record][-MOST:]), encoding="utf-8")
+            os.replace(whole, path)
+
+
+def factor(workflow, part, estimated):
+    """By what the estimated seconds of a part are multiplied on this machine; 1 if nothing is known.
+
+    The runs most like this one decide: of the same question on the same axes, else of the question, of the scene; of
+    those the three of nearest length.
+    """
+    about = _about(workflow)
+    for keys in (("scene", "options", "method", "axes"), ("scene", "options", "method"), ("scene",)):
+        like = [one[part] for one in _records() if part in one and all(one.get(key) == about[key] for key in keys)]
+        if like and estimated > 0.0:
+            like.sort(key=lambda pair: abs(log(pair[0] / estimated)))
+            return median(taken / expected for expected, taken in like[:3])
+    return 1.0
+
+
+def compiling(workflow):
+    """(seconds of compiling at the last run like this one that had to, or None; is what this run needs compiled?)"""
+    about = _about(workflow)
+    keys = ("scene", "options", "method", "tables")
+    like = [one for one in _records() if all(one.get(key) == about[key] for key in keys)]
+    known = any(one["hash"] == jit.KERNEL_HASH for one in like) and not always_compiled(workflow.scene)
+    spent = [one["compiling"] for one in like if one["compiling"] > 1.0]
+    return (spent[-1] if spent else None), known
+
+
+def _about(workflow):
+    """What tells runs apart whose times differ for other reasons than the number of points."""
+    request = workflow.request
+    return {
+        "scene": getattr(workflow.scene, "HASH", workflow.name),
+        "options": ",".join(f"{key}={value}" for key, value in request.options.items()),
+        "method": request.method,
+        "axes": ",".join(workflow.grid.sizes),
+        "tables": ",".join(name for name in ("boundaries", "refine") if getattr(workflow, name)),
+    }
+
+
+def _path():
+    return Path(platformdirs.user_cache_dir("survey")) / "times.json"
+
+
+def _records():
+    try:
+        found = json.loads(_path().read_text(encoding="utf-8"))
+        return [one for one in found if _is_record(one)]
+    except (OSError, ValueError, TypeError, RecursionError):
+        return []
+
+
+def _is_record(one):
+    """Is it one of ours, and not what another program has left there?"""
+    try:
+        pairs = [one[part] for part in PARTS if part in one]
+        numbers = [number for pair in pairs for number in pair]
+        return one["compiling"] >= 0 and len(numbers) == 2 * len(pairs) and all(0 < number < inf for number in numbers)
+    except (KeyError, TypeError):
+        return False

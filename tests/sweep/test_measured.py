@@ -1,0 +1,88 @@
+"""What `survey plan` learns from runs on this machine."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from survey.kernels import jit
+from survey.request import workflow
+from survey.sweep import announce, engine, measured, plan
+
+TABLE = {
+    "scene": "satellite",
+    "axes": {"k": {"start": 0.0, "stop": 0.9, "num": 200}, "rho": {"start": 0.6, "stop": 4.0, "num": 300}},
+}
+
+
+@pytest.fixture
+def mapped(tmp_path, monkeypatch):
+    """A workflow, on a machine on which nothing has run yet."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return workflow.check(TABLE, output=tmp_path / "map.nc")
+
+
+def with_axes(mapped, **numbers):
+    axes = {name: axis | {"num": numbers.get(name, axis["num"])} for name, axis in TABLE["axes"].items()}
+    return workflow.check(TABLE | {"axes": axes}, output=mapped.path)
+
+
+@pytest.mark.parametrize("slower", [0.2, 7.0])
+def test_the_next_plan_is_what_the_last_run_took(mapped, slower):
+    """Within a factor of 2, for a map four times as large, too: on a machine 5 times as fast or 7 times as slow."""
+    usual, _ = plan.estimates(mapped)
+    mapped_larger = with_axes(mapped, k=20000, rho=12000)
+    larger, _ = plan.estimates(mapped_larger)
+    before = plan.plan(mapped_larger)["estimated_seconds"]
+    took = max(usual["kernels"] * slower, 0.2)
+    measured.note(mapped, usual, {"kernels": took}, 3.0)
+    expected = larger["kernels"] * took / usual["kernels"]
+    found = plan.plan(mapped_larger)["estimated_seconds"]
+    assert found - before == pytest.approx(expected - larger["kernels"], rel=0.06)
+
+
+def test_compiling_is_told_apart(mapped):
+    assert plan.plan(mapped)["compiling"] == f"about {announce.SECONDS['hill']} s besides, once on this machine"
+    measured.note(mapped, {"kernels": 1.0}, {"kernels": 2.0}, 13.0)
+    assert plan.plan(mapped)["compiling"] == "done already"
+    path = measured._path()
+    path.write_text(path.read_text().replace(jit.KERNEL_HASH, "other kernels"))
+    assert plan.plan(mapped)["compiling"] == "about 13 s besides, once on this machine"
+
+
+def test_the_runs_most_alike_decide(mapped):
+    other = workflow.check({**TABLE, "options": {"body": "oblate"}}, output=mapped.path)
+    measured.note(other, {"kernels": 1.0}, {"kernels": 8.0}, 0.0)
+    assert measured.factor(mapped, "kernels", 1.0) == 8.0  # the same scene
+    for seconds, taken in ((0.5, 1.0), (1.0, 2.0), (4.0, 8.0), (500.0, 500.0)):
+        measured.note(mapped, {"kernels": seconds}, {"kernels": taken}, 0.0)
+    assert measured.factor(mapped, "kernels", 1.0) == 2.0 and measured.factor(mapped, "further", 1.0) == 1.0
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[", "{}", "[1, null]", '[{"hash": 3, "kernels": [0, "a"], "compiling": 0}]', "[" * 9**5]
+)
+def test_a_file_that_is_none_of_ours_is_as_good_as_none(mapped, text):
+    path = measured._path()
+    path.parent.mkdir(parents=True)
+    path.write_text(text)
+    assert measured.factor(mapped, "kernels", 1.0) == 1.0 and plan.plan(mapped)["estimated_seconds"] > 0
+    measured.note(mapped, {"kernels": 1.0}, {"kernels": 2.0}, 0.0)
+    assert [one["kernels"] for one in json.loads(path.read_text())] == [[1.0, 2.0]]
+
+
+def test_a_run_is_noted_and_a_resumed_one_is_not(mapped, monkeypatch):
+    monkeypatch.setattr(measured, "SHORT", 0.0)
+    small = with_axes(mapped, k=4, rho=5)
+    engine.run(small, fresh=True)
+    (noted,) = measured._records()
+    assert noted["scene"] == "satellite" and noted["axes"] == "k,rho" and len(noted["kernels"]) == 2
+    engine.run(small)  # complete already
+    assert measured._records() == [noted]
+
+
+def test_a_cache_that_cannot_be_written_is_no_error(mapped, monkeypatch, tmp_path):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    measured.note(mapped, {"kernels": 1.0}, {"kernels": 2.0}, 0.0)
+    assert measured._records() == [] and replace(mapped) == mapped
