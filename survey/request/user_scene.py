@@ -439,7 +439,7 @@ def _from_text(name: str, text: str) -> FunctionScene:
         return _abel(module.f, module.g, period, module.PARAMETERS, name, text, title, about, references)
     if is_floquet:
         about = module.__doc__ or inspect.getdoc(matrices.get("A", matrices.get("K")))
-        more = (getattr(module, *one) for one in (("STRUCTURE", "none"), ("BREAKS", ()), ("CONSERVED", None)))
+        more = getattr(module, "STRUCTURE", "none"), getattr(module, "BREAKS", ()), getattr(module, "CONSERVED", None)
         given = module.PERIOD, module.PARAMETERS, module.STATES, *more
         return _floquet(matrices, *given, name, text, title, about, references)
     if is_orbit:
