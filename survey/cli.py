@@ -213,7 +213,23 @@ def plan(workflow, overrides, output, as_json):
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the random points.")
 @click.option("--trust-scene", is_flag=True, help=TRUST)
 def verify(path, points, seed, trust_scene):
-    """Check digest, completeness and counts; solve N random points again by another method."""
+    """Check digest, completeness and counts; solve N random points again by another method. Bundles too."""
+    from survey.share import bundle
+
+    if not bundle.is_bundle(path):
+        return _verify(path, points, seed, trust_scene)
+    with bundle.unpacked(path) as folder:
+        complaints, data = bundle.complaints(folder)
+        for complaint in complaints:
+            complain(f"{path}: {complaint}", 3)
+        if complaints:
+            return 3
+        out.print(plain(f"{path}: all files are those that the bundle lists"), markup=False)
+        return _verify(str(data), points, seed, trust_scene)
+
+
+def _verify(path, points, seed, trust_scene):
+    """Verify one netCDF file; the exit code."""
     from survey.file import reading
     from survey.request import trust
 
@@ -321,6 +337,40 @@ def plot(path, output, var, style, width, at):
             f"{target}: the picture cannot be written ({reason_of(error)}); name a .png, .pdf or .svg file with -o"
         ) from None
     out.print(plain(str(target)), markup=False)
+
+
+@program.command()
+@click.argument("path", metavar="OUT.nc")
+@click.option("-o", "--output", metavar="OUT.html", help="The page; by default beside the file.")
+@click.option("--at", metavar="NAME=VALUE", multiple=True, help="Show this plane of a map of more axes.")
+@click.option("--trust-scene", is_flag=True, help=TRUST)
+def share(path, output, at, trust_scene):
+    """Write the map as one HTML file that opens anywhere, offline: zoom without end, values with error bars."""
+    from survey import api
+    from survey.share import page
+
+    ds = api.open(path, trust_scene=trust_scene)
+    target = output or f"{path.removesuffix('.nc')}.html"
+    told = page.write(ds, target, dict(part.partition("=")[::2] for part in at))
+    how = "drawn from series, sharp at every scale" if told["series"] else f"of points: {told['why']}"
+    err.print(plain(f"{target}: {told['bytes']:,} bytes, {how}"), markup=False)
+    out.print(plain(target), markup=False)
+
+
+@program.command()
+@click.argument("path", metavar="OUT.nc")
+@click.option("-o", "--output", metavar="OUT.zip", help="The .zip file or folder; by default OUT.zip beside the file.")
+@click.option("--author", default="", metavar="NAME", help="Who computed it, for the description.")
+@click.option("--license", "license_url", default="", metavar="URL", help="The licence of the data.")
+def bundle(path, output, author, license_url):
+    """Write a folder or zip for an archive: data, workflow, scene, pictures, versions, RO-Crate; `verify` checks it."""
+    from survey.share import bundle as bundles
+
+    target = output or f"{path.removesuffix('.nc')}.zip"
+    files = bundles.write(path, target, author, license_url)
+    err.print(plain(f"{target}: {counted(len(files), 'file')}; check it with: survey verify {shlex.quote(target)}"),
+              markup=False)  # fmt: skip
+    out.print(plain(target), markup=False)
 
 
 @program.command()

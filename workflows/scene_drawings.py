@@ -54,6 +54,38 @@ def satellite():
     return figure
 
 
+def satellite_triaxial():
+    figure, (orbit, side) = _panels(2, "in the plane of the orbit", "the tilts out of it")
+    _ball(orbit, (0, 0), 0.28, "centre")
+    orbit.add_patch(Arc((0, 0), 4, 4, theta1=-25, theta2=105, color=PALE, linestyle="--"))
+    at = 2 * _unit(40)
+    _line(orbit, 0.35 * _unit(40), 1.75 * at, PALE, "--")
+    orbit.text(*(1.78 * at), "local vertical", color=PALE, va="top", ha="left")
+    first, second = _unit(62), _unit(152)
+    corners = [at + 0.75 * i * first + 0.3 * j * second for i, j in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
+    orbit.add_patch(Polygon(corners, facecolor=BODY, edgecolor=INK))
+    _arrow(orbit, at, at + 1.3 * first, INK)
+    orbit.text(*(at + 1.38 * first), "A", ha="center", va="bottom")
+    _arrow(orbit, at, at + 1.1 * second, INK)
+    orbit.text(*(at + 1.2 * second), "B", ha="right", va="center")
+    _angle(orbit, at, 1.9, 40, 62, "$x$", MARK)
+    _arrow(orbit, 2 * _unit(2), 2 * _unit(16), PALE, bend=0.06)
+    orbit.text(2.1, 0.2, r"$\omega_0$", color=PALE)
+    _limits(orbit, (-0.5, 3.9), (-0.9, 3.5))
+    _arrow(side, (0, 0), (0, 1.7), PALE)
+    side.text(0.06, 1.7, "normal of the orbit", color=PALE)
+    _line(side, (-1.5, 0), (1.9, 0), PALE, "--")
+    side.text(1.9, -0.06, "plane of the orbit", color=PALE, ha="right", va="top")
+    axis, across = _unit(70), _unit(-20)
+    corners = [0.9 * i * across + 0.3 * j * axis for i, j in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
+    side.add_patch(Polygon(corners, facecolor=BODY, edgecolor=INK))
+    _arrow(side, (0, 0), 1.5 * axis, INK)
+    side.text(*(1.55 * axis), "C", va="bottom", ha="center")
+    _angle(side, (0, 0), 2.2, 70, 90, r"$\varepsilon$", MARK)
+    _limits(side, (-1.6, 2.1), (-1.2, 2.1))
+    return figure
+
+
 def mathieu():
     figure, (pendulum, trap) = _panels(2, "a pendulum on a vibrating pivot", "an ion in a quadrupole (Paul) trap")
     _arrow(pendulum, (0, -0.35), (0, 0.35), MARK, "<->")
@@ -205,8 +237,11 @@ def _triangle(axes):
 
 
 DRAWINGS = {
-    draw.__name__: draw for draw in (satellite, mathieu, gyrostat, gyrostat_body, brun, libration, libration_elliptic)
-}
+    draw.__name__: draw
+    for draw in (
+        satellite, satellite_triaxial, mathieu, gyrostat, gyrostat_body, brun, libration, libration_elliptic,
+    )
+}  # fmt: skip
 
 
 def _panels(count, *titles):

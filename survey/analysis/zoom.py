@@ -66,7 +66,8 @@ def _workflow(ds, ranges, num):
 
 def workflow_of(ds, ranges=None, num=None):
     """The workflow of the points alone, as a mapping, from the attributes: the same points, or with new axes."""
-    data = {"title": f"{ds.attrs.get('title', '')}, a part".lstrip(", "), "scene": user_scene.of_dataset(ds)}
+    title = str(ds.attrs.get("title", ""))
+    data = {"title": f"{title}, a part".lstrip(", ") if ranges else title, "scene": user_scene.of_dataset(ds)}
     scene = user_scene.find(data["scene"])[1]
     data |= {"options": options_at(ds, scene), "axes": _axes(ds, ranges or {}, num)}
     solver = {"method": ds.attrs.get("method"), "rtol": ds.attrs.get("rtol")}

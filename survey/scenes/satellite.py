@@ -33,13 +33,14 @@ from survey.kernels.hill.satellite import potential, sample, tabulate
 from survey.kernels.jit import kernel
 from survey.kernels.math.elliptic import MEANS
 from survey.kernels.math.roundoff import EPS
+from survey.measures import linear_motion
 from survey.measures.hill import dense, monodromy
 from survey.measures.hill import motion as hill_motion
 from survey.measures.hill import why as hill_why
-from survey.measures.hill.satellite import Motion, moduli, rates
+from survey.measures.hill.satellite import Motion, moduli, planar_angle, rates
 from survey.measures.rows import Rows
 from survey.methods import dop853
-from survey.scene import Option, Output, Parameter
+from survey.scene import Option, Output, Parameter, Trajectory
 
 TITLE = "Out-of-plane stability of a satellite's planar librations and rotations"
 FAMILY = "hill"
@@ -67,13 +68,21 @@ OPTIONS = (
     Option("direction", ("1", "-1"), "sense of a rotation: 1 as the orbit, -1 against it", only_with="inertia_ratio"),
 )
 why = hill_why.why
+_CRITERION = {"silent": 0, "certifies_stability": 1}
 OUTPUTS = (
     *monodromy.OUTPUTS,
     Output("exponent_per_orbit", "growth of the logarithm of the amplitude per orbital revolution", r"\mu",
            applies="where rho is not 0"),
     Output("lyapunov", "Lyapunov's criterion: z >= 0 and T times the integral of z over T <= 4",
-           flags={"silent": 0, "certifies_stability": 1}),
+           flags=_CRITERION),
+    Output("lyapunov_integral", "T times the integral of z over T, which Lyapunov's criterion compares with 4",
+           r"T\int_0^T z\,du", on_request=True),
+    Output("least_z", "least z along the motion", r"\min z", on_request=True),
+    Output("zhukovskii", "Zhukovskii's criterion: n^2 pi^2 / T^2 <= z <= (n + 1)^2 pi^2 / T^2 for one n = 0, 1, ...",
+           flags=_CRITERION, on_request=True),
 )  # fmt: skip
+
+_OF_PERIOD = {"period", "exponent_per_orbit", "lyapunov", "lyapunov_integral", "zhukovskii"}
 
 # K by the arithmetic-geometric mean, as it is where a machine has no longer floats than float64, and k' from k.
 _PERIOD_ULPS = 6
@@ -161,7 +170,12 @@ def trajectory(point, answer, options, time=None):
         rho, _ = rates(point["inertia_ratio"], options["direction"])
         oblate = point["inertia_ratio"] > 1
     shared = moduli({name: np.array([value]) for name, value in point.items()})
-    return hill_motion.solve(_problem(Motion(*shared, bool(oblate)), np.array([[rho]])), answer, time, "u")
+    found = hill_motion.solve(_problem(Motion(*shared, bool(oblate)), np.array([[rho]])), answer, time, "u")
+    (k,), (kc,) = shared[:2]
+    x, off = planar_angle(found.data["u"][1], float(k), float(kc))
+    words = "angle of the planar motion in radians"
+    data = found.data | linear_motion.value("u", "x", "x", words, x, off)
+    return Trajectory(data, (("lines", "u", "x"), *found.panels))
 
 
 def _solve(shared, rho, oblate, request, low=None, line=None, ends=None):
@@ -191,7 +205,22 @@ def _derived(out, row, rho, block, request, period):
         _per_orbit(out, abs(rho) * (period[:, None] / (2 * pi)))
     if "lyapunov" in wanted:
         out["lyapunov"] = (row.lyapunov(rho, period) & ok).astype(np.int8)
+    _criteria(out, row, rho, period, wanted, ok)
     return {name: block.back(values) for name, values in out.items()}
+
+
+def _criteria(out, row, rho, period, wanted, ok):
+    """Add what the criteria of Lyapunov and Zhukovskii compare."""
+    found = {}
+    if "lyapunov_integral" in wanted:
+        found["lyapunov_integral"] = row.lyapunov_integral(rho, period)
+    if "least_z" in wanted:
+        least, _, bar = row.range_of_z(rho)
+        found["least_z"] = least, bar
+    for name, (values, bars) in found.items():
+        out[name], out[f"{name}_error"] = np.where(ok, values, np.nan), np.where(ok, bars, np.nan)
+    if "zhukovskii" in wanted:
+        out["zhukovskii"] = (row.zhukovskii(rho, period) & ok).astype(np.int8)
 
 
 def _solve_scattered(box, shared, rho, oblate, request):
@@ -207,7 +236,7 @@ def _solve_scattered(box, shared, rho, oblate, request):
 
     out = monodromy.solve_scattered(box, position, rho, problem_of, request.rtol, _wanted(request))
     period = None
-    if not _wanted(request).isdisjoint({"period", "exponent_per_orbit", "lyapunov"}):
+    if not _wanted(request).isdisjoint(_OF_PERIOD):
         integral = row.integrals[0]
         period = np.where(row.rotates, 2 * integral / np.maximum(row.k, 1), 4 * integral)
     return _derived(out, row, rho[:, None], block, request, period)

@@ -16,10 +16,10 @@ motion in it; not for large tilts, eccentric orbits, flexible or damped satellit
 
 Parameters, in order: A, B, C, of any one unit, A < B, none larger than the sum of the others; instead of A roll_ratio =
 (C - A)/B, instead of B yaw_ratio = (C - B)/A, both from -1 to 1. k >= 0, k != 1; or one_minus_k = 1 - k where that is
-small (negative: rotations); or amplitude = asin k (rad), a libration's. The option `direction` is the rotations' sense.
+small (negative: rotations); or amplitude = asin k (rad), a libration's. Option `direction`: their sense.
 
 Known: at k = 0 s^4 + (1 + 3 r + r y) s^2 + 4 r y = 0 with r, y = roll_ratio, yaw_ratio, s in orbital rates; B = C and
-A = C are bodies with an axis of symmetry: two multipliers 1 and those of the scene `satellite` (`marginal`, if these
+A = C are bodies with an axis of symmetry: two multipliers 1 and those of the scene `satellite` (`marginal` if these
 are on the circle). At A = B nothing turns the satellite back, and k = 1 takes for ever: neither has a verdict.
 
 Source: derived, and checked against the body in three dimensions, in `satellite_triaxial.md` beside this file.

@@ -5,9 +5,6 @@ import time
 from datetime import timedelta
 from types import SimpleNamespace
 
-from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
-from rich.progress import Progress as Bar
-
 from survey.sweep import announce
 from survey.wording import counted
 
@@ -31,6 +28,9 @@ class Progress:
         if getattr(self.workflow, "scene", None) is not None:
             self.naming.__enter__()
         if self.console.is_terminal or self.console.is_jupyter:
+            from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
+            from rich.progress import Progress as Bar
+
             columns = (
                 TextColumn("{task.description}"),
                 BarColumn(),

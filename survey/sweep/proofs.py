@@ -21,7 +21,7 @@ from survey.sweep import dispatch
 CODES = {"undecided": -1, "unstable": 0, "stable": 1}
 LABELS = ("unstable", "stable")
 DEEPEST = 20  # halvings of the rectangle
-START = 3  # of them, to make the parts that are proved one by one
+START = 2  # of them, to make the parts that are proved one by one
 FRACTION = 1e-3  # of the width of a cell: what the polynomials may leave out, in units of the factors
 
 
@@ -127,7 +127,8 @@ def solved(prover, once, progress=None):
         return number, (search.PANEL, [search.open_panel()])
 
     if todo:
-        dispatch.on_processes(prover, todo, finished, died, min(dispatch.cpus(), len(todo)))
+        workers, patience = min(dispatch.cpus(), len(todo)), dispatch.Patience(math.inf)  # a part may take minutes
+        dispatch.on_processes(prover, todo, finished, died, workers, patience)
     layouts, lists = zip(*(parts[number] for number in prover.numbers), strict=True)
     return "".join(layouts), [panel for some in lists for panel in some]
 

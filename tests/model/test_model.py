@@ -219,6 +219,22 @@ print(survey.Model({str(satellite)!r})(k=0.5, rho=[1.2]).verdict.values, "numba"
     assert outputs == ["1\n", "[1] False\n"]
 
 
+def test_the_documented_reader_of_60_lines_gives_the_same(satellite):
+    text = (ROOT / "workflows/docs/model.md").read_text()
+    code = re.search(r"```python\n# file: read_model.py\n(.*?)```", text, re.DOTALL)[1]
+    assert len(code.splitlines()) <= 60
+    scope = {}
+    exec(code, scope)
+    about, model = scope["read_model"](satellite), survey.Model(satellite)
+    for k, rho in np.random.default_rng(9).uniform((0.0, 0.6), (0.99, 4.0), (40, 2)):
+        found, own = scope["functions"](about, k, rho), model.at(k, rho, model.outputs)
+        for name, (value, bar) in found.items():
+            assert value == pytest.approx(float(own[name]), rel=1e-13, abs=1e-13) and bar == float(own[f"{name}_error"])
+        verdict, d = scope["hill"](found)
+        assert verdict == own["verdict"] and d == pytest.approx(float(own["discriminant"]), abs=1e-11)
+    assert scope["functions"](about, 0.995, 1.0) is None
+
+
 def test_damaged_files_are_refused(satellite, tmp_path):
     with zipfile.ZipFile(satellite) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}

@@ -15,7 +15,6 @@ from operator import mul
 from types import CellType, CodeType, FunctionType, ModuleType
 
 import numpy as np
-from mpmath.libmp import to_fixed
 
 from survey.kernels.jit import fresh
 
@@ -204,6 +203,8 @@ def series(z, edges, start, nodes):
 
 def _polynomial(values):
     """The power series of the polynomial through the values, and the sizes; in integers, so exactly."""
+    from mpmath.libmp import to_fixed
+
     mp, nodes = context(), len(values)
     power, last = _transforms(nodes)
     size = max(abs(value) for value in values)
@@ -239,6 +240,8 @@ def _transforms(number):
 
     T_j(2 x - 1) has integer coefficients (of x^n, below 6^j): the digits that they cost are among BITS.
     """
+    from mpmath.libmp import to_fixed
+
     mp = type(context())()
     mp.prec = BITS + 64
     cosines = [

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import pi
+from math import pi, sqrt
 
 import numpy as np
 
@@ -10,6 +10,8 @@ from survey.kernels.hill import satellite as motion
 from survey.kernels.hill.satellite import complete_integrals, half_periods
 from survey.kernels.math.double import split_error
 from survey.kernels.math.roundoff import EPS
+
+CLOSE = 1e-17  # of means: what is left of their difference
 
 
 def moduli(point):
@@ -33,6 +35,26 @@ def moduli(point):
         period = (k < np.inf) & (complement > 0)  # there is none where k = 1
         k, complement = np.where(period, k, np.nan), np.where(period, complement, np.nan)
     return k, complement, given, np.full_like(given, which)
+
+
+def planar_angle(u, k, kc):
+    """The angle x (m) of a planar motion at u (m), sin x = k sn(u, k) or x = am(k u, 1/k), and bounds of its error.
+
+    kc is the complement, of 1/k for rotations. DLMF 22.20(ii): am by descending means of 1 and kc.
+    """
+    small, scale = min(k, 1.0 / k) if k > 0 else 0.0, max(k, 1.0)
+    pairs, a, b, c = [], 1.0, kc, small
+    while c > CLOSE * a:
+        a, b = 0.5 * (a + b), sqrt(a * b)
+        c = c * c / (4.0 * a)
+        pairs.append(c / a)
+    am = 2.0 ** len(pairs) * a * scale * u
+    for ratio in reversed(pairs):
+        am = 0.5 * (am + np.arcsin(np.clip(ratio * np.sin(am), -1.0, 1.0)))
+    if k > 1:
+        return am, 16 * EPS * (1.0 + scale * abs(u))
+    side = np.hypot(np.cos(am), kc * np.sin(am))
+    return np.arctan2(k * np.sin(am), side), 16 * EPS * (1.0 + abs(u))
 
 
 def rates(inertia_ratio, direction):
@@ -89,14 +111,38 @@ class Motion:
 
     def lyapunov(self, rho, period):
         """Does Lyapunov's criterion (corrected: T int z <= 4, and z >= 0) certify stability, rounding aside?"""
+        total, bar = self.lyapunov_integral(rho, period)
+        return (total <= 4 - bar) & (self._nonnegative(rho) if self.oblate else True)
+
+    def lyapunov_integral(self, rho, period):
+        """T times the integral of z over T, and a bound of its rounding."""
         k, period, rotates = self.k[:, None], period[:, None], self.rotates[:, None]
         first, second = (values[:, None] for values in self.integrals)
-        squares = np.where(rotates, 2 * k * second, 8 * (second - self.kc[:, None] ** 2 * first))
+        squares = np.where(rotates, 2 * k * second, 4 * (second - self.kc[:, None] ** 2 * first))
         drift = np.where(rotates, pi * rho, 0.0)  # integral of w over T, times rho: am advances by pi
         c = -k * k if self.oblate else (1 - k) * (1 + k)
         size = period * (2 * squares + 2 * abs(drift) + (rho * rho + k * k + 1) * period)
-        total = period * (2 * squares + 2 * drift + (rho * rho + c) * period)
-        return (total <= 4 - 100 * EPS * size) & (self._nonnegative(rho) if self.oblate else True)
+        return period * (2 * squares + 2 * drift + (rho * rho + c) * period), 100 * EPS * size
+
+    def range_of_z(self, rho):
+        """The least and the greatest z along the motion, and a bound of their rounding."""
+        k = self.k[:, None]
+        low = np.where(self.rotates[:, None], k * self.kc[:, None], -k)
+        c = -k * k if self.oblate else (1 - k) * (1 + k)
+
+        def z(w):
+            return 2 * w * w + 2 * rho * w + rho * rho + c
+
+        bar = 32 * EPS * (rho * rho + k * k + 1)
+        return z(np.clip(-rho / 2, low, k)), np.maximum(z(low), z(k)), bar
+
+    def zhukovskii(self, rho, period):
+        """Does n^2 pi^2 / T^2 <= z <= (n + 1)^2 pi^2 / T^2, for one n = 0, 1, ..., certify stability?"""
+        least, greatest, bar = self.range_of_z(rho)
+        unit = (period[:, None] / pi) ** 2
+        off = unit * (bar + 32 * EPS * abs(greatest))
+        n = np.floor(np.sqrt(np.maximum(unit * least - off, 0.0)))
+        return (least > bar) & (unit * greatest + off < (n + 1) ** 2)
 
     def _nonnegative(self, rho):
         """z > 0 all along an oblate body's motion: the least of 2 w^2 + 2 rho w + rho^2 - k^2 over the range of w."""

@@ -5,6 +5,7 @@ import math
 import mpmath
 import numpy as np
 import pytest
+import xarray as xr
 from floquet_truth import multipliers, rotating
 
 import survey
@@ -152,3 +153,42 @@ def test_branches_on_parameters_are_solved_point_by_point(solved):
     scene = survey.floquet(K=K, period=math.pi, parameters=("a", "b"), states="x", structure="symplectic")
     survey.evaluate(scene, a=np.linspace(-1.0, 1.0, 41), b=np.linspace(0.0, 0.5, 40))
     assert solved[0] >= 41 * 40
+
+
+@pytest.mark.parametrize("name", ["symplectic", "damped", "mathieu"])
+def test_scattered_points_agree_with_points_on_their_own(name, solved, monkeypatch):
+    scene, ends = MAPS[name]
+    rng = np.random.default_rng(5)
+    values = {key: xr.DataArray(rng.uniform(*pair, 12_000), dims="point") for key, pair in ends.items()}
+    together = survey.evaluate(scene, **values)
+    assert solved[0] < 0.5 * 12_000
+    assert together.attrs["accuracy_missed"] == 0
+    some = slice(None, None, 23)
+    monkeypatch.setattr(dense, "serves_scattered", lambda *given: False)
+    alone = survey.evaluate(scene, **{key: value[some] for key, value in values.items()})
+    together = together.isel(point=some)
+    assert (together.verdict >= 0).mean() > 0.98
+    for output in ("verdict", "crossing"):
+        known = (together[output] >= 0) & (alone[output] >= 0)
+        assert (together[output] == alone[output]).where(known, True).all()
+    found, other = (ds.multiplier_re.values + 1j * ds.multiplier_im.values for ds in (together, alone))
+    bars = together.multiplier_re_error.values + alone.multiplier_re_error.values
+    apart = abs(found[..., :, None] - other[..., None, :]) <= bars[..., :, None] * (1 + 1e-12)
+    assert apart.any(axis=-1).all() and apart.any(axis=-2).all()
+    # they are not the same numbers: two ways led to them
+    assert (found != other).any()
+
+
+def test_bits_of_scattered_points_do_not_depend_on_the_block():
+    scene, ends = MAPS["damped"]
+    rng = np.random.default_rng(6)
+    points = np.stack([rng.uniform(*ends[name], 5_000) for name in ("W", "e")], axis=1)
+    ranges = {k: (5_000, points[:, k].min(), points[:, k].max()) for k in range(2)}
+    wanted = {"multiplier_re", "spectral_radius", "verdict", "crossing"}
+    whole, part, one = (
+        stability.solve(scene._system, "none", points[rows], "auto", 1e-10, wanted, {}, ranges)
+        for rows in (slice(None), slice(1_234, 3_000), slice(77, 78))
+    )
+    for name, values in whole.items():
+        assert part[name].tobytes() == values[1_234:3_000].tobytes()
+        assert one[name].tobytes() == values[77:78].tobytes()

@@ -1,0 +1,309 @@
+"""The page of a map, in headless Chromium from file://, and by Node: values, verdicts, link, zoom, and no request."""
+
+import json
+import re
+import shutil
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import viewer as picture
+import xarray as xr
+
+import survey
+from survey.errors import BadInput
+from survey.model import build
+from survey.request.workflow import check
+from survey.share import page
+
+ROOT = Path(__file__).parents[2]
+MAP, FATES = ROOT / "results/satellite_prolate_small.nc", ROOT / "results/gyrostat_fate_small.nc"
+SCRIPTS = ROOT / "survey/share"
+browsed = pytest.mark.skipif(bool(picture.missing()), reason=f"no browser: missing {picture.missing()}")
+noded = pytest.mark.skipif(not shutil.which("node"), reason="node is missing (Debian: apt-get install nodejs)")
+HOSTILE = "</script><script>window.owned = 1</script><img src=x onerror='window.owned = 1'>{{data}}"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("pages")
+    page.write(survey.open(MAP), path / "map.html")
+    page.write(survey.open(FATES), path / "fates.html")
+    return path
+
+
+@pytest.fixture(scope="module")
+def driver():
+    with picture.browser() as found:
+        found.set_script_timeout(120)
+        yield found
+
+
+def shown(driver, path, link=""):
+    """The page, opened and drawn."""
+    driver.get("about:blank")
+    driver.get(f"file://{path}{link}")
+    drawn(driver)
+
+
+def drawn(driver, seconds=120):
+    end = time.monotonic() + seconds
+    while not driver.execute_script("return typeof idle == 'function' && idle() && performance.now() > 500"):
+        assert time.monotonic() < end, driver.execute_script("return document.body.innerText")
+        time.sleep(0.1)
+
+
+def pixel(driver, x, y):
+    """The colour that the canvas shows at a point of the map."""
+    return driver.execute_script(
+        "const [px, py] = toPlot(arguments), {box, ratio} = plot;"
+        "const at = [box.left + px * ratio, box.top + py * ratio].map(Math.round);"
+        "return [...context.getImageData(...at, 1, 1).data].slice(0, 3)",
+        x, y,
+    )  # fmt: skip
+
+
+def test_pages_are_small_and_name_no_address(folder):
+    for name in ("map.html", "fates.html"):
+        text = (folder / name).read_text()
+        assert len(text) < 2_000_000
+        outside = re.findall(r"(?:src|href|url|import|fetch)\s*[=(:]\s*[\"']?(https?:|//)[^\"' ]*", text)
+        assert not outside and "default-src 'none'" in text and "eval(" not in text.replace("'unsafe-eval'", "")
+
+
+@browsed
+def test_hover_values_agree_with_evaluate_at_1000_places(folder, driver):
+    shown(driver, folder / "map.html")
+    rng = np.random.default_rng(5)
+    k, rho = rng.uniform(0, 0.99, 1000), rng.uniform(0.6, 4.0, 1000)
+    known_at = "return arguments[0].map(([x, y]) => known(x, y))"
+    found = driver.execute_script(known_at, np.column_stack([k, rho]).tolist())
+    ds = survey.evaluate("satellite", k=xr.DataArray(k, dims="p"), rho=xr.DataArray(rho, dims="p"), body="prolate")
+    codes = {"undecided": -1, "unstable": 0, "stable": 1}
+    for i, own in enumerate(found):
+        for name in ("discriminant", "exponent", "y1", "dy1", "y2", "dy2"):
+            value, bar = own["values"][name]
+            assert abs(value - float(ds[name][i])) <= bar + float(ds[f"{name}_error"][i]), (name, k[i], rho[i])
+        verdict = codes[own["verdict"]]
+        assert verdict == int(ds.verdict[i]) or -1 in (verdict, int(ds.verdict[i]))
+
+
+@browsed
+def test_the_pointer_is_told_what_is_there_with_its_bar(folder, driver):
+    from selenium.webdriver.common.actions.action_builder import ActionBuilder
+
+    shown(driver, folder / "map.html")
+    left, top = driver.execute_script(
+        "const [px, py] = toPlot([0.85, 0.7]), b = canvas.getBoundingClientRect();"
+        "return [b.left + plot.left + px, b.top + plot.top + py]"
+    )
+    moves = ActionBuilder(driver)
+    moves.pointer_action.move_to_location(round(left), round(top))
+    moves.perform()
+    time.sleep(1)
+    told = driver.execute_script("return document.getElementById('readout').textContent")
+    assert re.search(r"k = 0\.8\d+, rho = 0\.[67]\d+\nunstable\ndiscriminant = -?[\d.]+ ± \d\.\de-1\d", told)
+
+
+@browsed
+def test_zoom_is_sharp_at_every_scale(folder, driver):
+    """At the edge of a tongue, in windows down to 1e-9: the pixels have the colours of the verdicts there."""
+    shown(driver, folder / "map.html")
+    rho = float(survey.edge("satellite", along="rho", near=0.75, k=0.9, body="prolate").edge.values.reshape(-1)[0])
+    colours = driver.execute_script("return TEXT.shown[0].colours")
+    driver.execute_script("state.lines = false")
+    for width in (1e-2, 1e-5, 1e-9):
+        driver.execute_script(
+            "const [y, d] = arguments; setView([0.9 - d, 0.9 + d], [y - d, y + d])",
+            rho,
+            width,
+        )
+        time.sleep(0.2)
+        drawn(driver)
+        seen = set()
+        for u, v in np.random.default_rng(6).uniform(-0.9, 0.9, (12, 2)):
+            x, y = 0.9 + u * width, rho + v * width
+            verdict = driver.execute_script("return model.at(...arguments).verdict", x, y)
+            step = 3 * width / 400
+            if {driver.execute_script("return model.at(...arguments).verdict", x, y + s * step) for s in (-1, 1)} == {
+                verdict
+            }:
+                assert pixel(driver, x, y) == colours[str(verdict)], (x, y, width)
+                seen.add(verdict)
+        assert seen == {0, 1}
+
+
+@browsed
+def test_a_link_shows_the_same_view(folder, driver):
+    shown(driver, folder / "map.html")
+    driver.execute_script(
+        "const list = document.getElementById('show'); list.value = 'discriminant'; list.onchange();"
+        "setView([0.5, 0.7], [1, 1.5])"
+    )
+    time.sleep(0.3)
+    drawn(driver)
+    link, before = driver.current_url, driver.execute_script("return canvas.toDataURL()")
+    assert "#x=0.5,0.7&y=1,1.5&show=discriminant" in link
+    driver.get("about:blank")
+    driver.get(link)
+    drawn(driver)
+    assert driver.execute_script("return canvas.toDataURL()") == before and driver.current_url == link
+
+
+@browsed
+def test_no_request_leaves_and_nothing_is_complained_of(folder, driver):
+    for name in ("map.html", "fates.html"):
+        shown(driver, folder / name)
+        assert (
+            driver.execute_script(
+                "return performance.getEntriesByType('resource').filter(r => !r.name.startsWith('blob:')).length"
+            )
+            == 0
+        )
+        assert not [line for line in driver.get_log("browser") if line["level"] == "SEVERE"]
+    refused = driver.execute_async_script(
+        "const done = arguments[0]; fetch('http://127.0.0.1:9/').then(() => done('sent'), e => done(String(e)))"
+    )
+    assert "Failed to fetch" in refused
+    assert any("Content Security Policy" in line["message"] for line in driver.get_log("browser"))
+
+
+@browsed
+def test_hostile_text_is_shown_as_text(tmp_path, driver):
+    ds = survey.open(FATES)
+    dim = ds.status.dims[0]
+    hostile = ds.assign_attrs(
+        title=HOSTILE, references=HOSTILE, options="question=fate", workflow=HOSTILE, history=HOSTILE
+    )
+    hostile[dim].attrs |= {"long_name": HOSTILE, "symbol": HOSTILE}
+    hostile.verdict.attrs["long_name"] = HOSTILE
+    page.write(hostile, tmp_path / "hostile.html")
+    shown(driver, tmp_path / "hostile.html")
+    assert driver.execute_script("return window.owned ?? null") is None
+    assert driver.execute_script("return document.images.length + document.scripts.length") == 3
+    assert driver.execute_script("return document.querySelector('h1').textContent") == HOSTILE
+
+
+@browsed
+def test_points_without_series_are_shown_as_they_are(folder, driver):
+    """Each pixel is that of the nearest point, and its values are the file's."""
+    ds = survey.open(FATES)
+    shown(driver, folder / "fates.html")
+    driver.execute_script("state.lines = false; front = coarse = null; changed()")
+    time.sleep(0.3)
+    drawn(driver)
+    axes, colours = ds.verdict.dims, driver.execute_script("return TEXT.shown[0].colours")
+    for i, j in np.random.default_rng(7).integers(0, [ds.sizes[dim] for dim in axes], (20, 2)):
+        x, y = (float(ds[dim][n]) for dim, n in zip(axes, (i, j), strict=True))
+        own = driver.execute_script("return known(...arguments)", x, y)
+        code = int(ds.verdict[i, j])
+        names = dict(
+            zip(ds.verdict.attrs["flag_values"].tolist(), ds.verdict.attrs["flag_meanings"].split(), strict=True)
+        )
+        assert own["verdict"] == names[code] and (own["x"], own["y"]) == (x, y)
+        assert pixel(driver, x, y) == colours[str(code)]
+
+
+@browsed
+def test_the_keyboard_moves_and_zooms_and_pictures_are_saved(folder, driver):
+    from selenium.webdriver.common.by import By
+    from selenium.webdriver.common.keys import Keys
+
+    shown(driver, folder / "map.html")
+    figure = driver.find_element(By.ID, "figure")
+    figure.send_keys("+", "+", Keys.ARROW_RIGHT)
+    time.sleep(0.5)
+    x = driver.execute_script("return state.view.x")
+    assert x[1] - x[0] == pytest.approx(0.99 / 1.5**2) and x[0] > 0.28
+    assert (
+        "verdict" not in driver.execute_script("return document.getElementById('readout').textContent").split("\n")[0]
+    )
+    drawn(driver)
+    text = driver.execute_script("return svg()")
+    assert text.startswith("<svg") and "data:image/png;base64" in text and "<polyline" in text and "script" not in text
+    figure.send_keys("0")
+    assert driver.execute_script("return state.view.x") == [0, 0.99]
+    driver.execute_script("window.saved = []; save = (name, blob) => saved.push([name, blob.size])")
+    driver.find_element(By.ID, "png").click()
+    driver.find_element(By.ID, "svg").click()
+    time.sleep(1)
+    assert sorted(name for name, size in driver.execute_script("return saved") if size > 5000) == ["png", "svg"]
+
+
+@noded
+@pytest.mark.parametrize("scene", ["mathieu", "libration_elliptic"])
+def test_the_javascript_reader_gives_what_the_python_reader_gives(scene, tmp_path):
+    axes = {
+        "mathieu": {"a": (0.0, 5.0), "q": (0.0, 2.0)},
+        "libration_elliptic": {"mu": (0.005, 0.04), "e": (0.05, 0.5)},
+    }
+    given = {"scene": scene, "axes": {name: {"start": a, "stop": b, "num": 9} for name, (a, b) in axes[scene].items()}}
+    (tmp_path / "map.model").write_bytes(build.packed(check(given | {"output": {"path": "x.nc"}})))
+    model = survey.Model(tmp_path / "map.model")
+    rng = np.random.default_rng(8)
+    points = np.column_stack([rng.uniform(low, high, 50) for low, high in zip(model.low, model.high, strict=True)])
+    (tmp_path / "run.mjs").write_text(
+        "import fs from 'fs'\n"
+        f"const text = fs.readFileSync({str(SCRIPTS / 'model.js')!r}, 'utf8')\n"
+        "const readModel = new Function(text + '; return readModel')()\n"
+        f"const model = await readModel(new Uint8Array(fs.readFileSync({str(tmp_path / 'map.model')!r})))\n"
+        f"console.log(JSON.stringify({json.dumps(points.tolist())}.map(p => model.at(...p))))\n"
+    )
+    out = subprocess.run(["node", str(tmp_path / "run.mjs")], capture_output=True, text=True, check=True).stdout
+    found = model.at(*points.T, model.outputs)
+    for i, own in enumerate(json.loads(out)):
+        assert own["verdict"] == found["verdict"][i]
+        for name in model.outputs:
+            assert own[name][0] == pytest.approx(found[name][i], rel=1e-12, abs=1e-12)
+            assert own[name][1] == pytest.approx(found[f"{name}_error"][i], rel=1e-2)
+
+
+@noded
+@pytest.mark.parametrize("rule", ["hill", "reciprocal"])
+def test_every_pixel_has_the_colour_of_the_verdict_at_its_place(rule, tmp_path):
+    """Also where two multipliers touch without harm, which shortened series alone would colour unstable."""
+    if rule == "hill":
+        given = {
+            "scene": "mathieu",
+            "axes": {"a": {"start": 0.0, "stop": 9.0, "num": 9}, "q": {"start": 0.0, "stop": 4.0, "num": 9}},
+        }
+    else:
+        own = str(ROOT / "workflows/coupled_mathieu.py")
+        given = {
+            "scene": own,
+            "axes": {"Omega": {"start": 0.9, "stop": 1.3, "num": 9}, "epsilon": {"start": 0.0, "stop": 0.3, "num": 9}},
+        }
+    (tmp_path / "map.model").write_bytes(build.packed(check(given | {"output": {"path": "x.nc"}})))
+    model = survey.Model(tmp_path / "map.model")
+    assert model.rule == rule
+    width, height = 230, 170
+    steps = [(b - a) / n for a, b, n in zip(model.low, model.high, (width, height), strict=True)]
+    x, y = model.low[0] + (np.arange(width) + 0.5) * steps[0], model.high[1] - (np.arange(height) + 0.5) * steps[1]
+    job = {"x": [x[0], steps[0]], "y": [y[0], -steps[1]], "width": width, "height": height, "show": "verdict"}
+    job |= {"colours": {code: [code + 1] * 3 for code in (-1, 0, 1)}, "lines": False, "thick": 1, "phase": [0, 0]}
+    (tmp_path / "run.mjs").write_text(
+        "import fs from 'fs'\n"
+        f"const read = name => fs.readFileSync({str(SCRIPTS)!r} + '/' + name, 'utf8')\n"
+        "const engine = new Function(read('model.js') + read('engine.js') + '; return {readModel, draw}')()\n"
+        f"const model = await engine.readModel(new Uint8Array(fs.readFileSync({str(tmp_path / 'map.model')!r})))\n"
+        "Object.assign(model, {rule: model.about.rule, functions: model.about.functions.map(f => f.name)})\n"
+        f"const pixels = engine.draw(model, {json.dumps(job)})\n"
+        "console.log(JSON.stringify([...pixels.filter((_, i) => i % 4 === 0)]))\n"
+    )
+    out = subprocess.run(["node", str(tmp_path / "run.mjs")], capture_output=True, text=True, check=True).stdout
+    drawn_verdicts = np.array(json.loads(out)).reshape(height, width) - 1
+    verdicts = model.grid(x, y)["verdict"].T
+    unlike = drawn_verdicts != verdicts
+    assert (
+        {0, 1} <= set(np.unique(verdicts))
+        and unlike.mean() < 1e-3
+        and not (unlike & (drawn_verdicts >= 0) & (verdicts >= 0)).any()
+    )
+
+
+def test_what_cannot_be_shown_is_refused_in_a_line():
+    ds = survey.evaluate("mathieu", a=np.linspace(0.0, 1.0, 5), q=0.5)
+    with pytest.raises(BadInput, match="two numeric axes"):
+        page.made(ds)
