@@ -34,9 +34,10 @@ import numpy as np
 
 from survey import methods
 from survey.errors import BadInput
+from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.nutation import brun, brun_lanes
 from survey.kernels.nutation import wells as nu
-from survey.measures.nutation import derived, multiprecision, unsettled
+from survey.measures.nutation import derived, multiprecision, separatrix, unsettled
 from survey.measures.nutation import wells as nutation
 from survey.measures.rows import Rows
 from survey.modules import load
@@ -114,6 +115,8 @@ OUTPUTS = (
     *_outputs(_SCALED, ("well",)),
     Output("separatrix_distance", "L less its value on the separatrix at the same p_psi, p_phi, over |k|", r"\Delta l",
            applies="where these momenta have a separatrix (nearer than 1e38): negative in a well, positive outside"),
+    Output("saddle_growth", "growth rate of the unstable regular precession with the same p_psi, p_phi", r"\Lambda",
+           applies="where there is one that float64 tells from a stable one beside it", on_request=True),
     Output("wells", "number of wells of motion at these integrals", integer=True, applies="off separatrices"),
     Output("verdict", "what the motion is", flags=_VERDICTS, when=_STATE),
     Output("verdict", "what the motion is, the last of these that a well holds", flags=_VERDICTS, when=_SCALED),
@@ -148,7 +151,24 @@ def solve(point, request):
     if "t" not in point:
         unsettled.settle(out, _ordered(given), solver, valid, request)
     out |= derived.solve(out, request.variables)
+    if "saddle_growth" in request.variables:
+        out |= _saddle_growth(given, out["status"], request)
     return {name: _back(block, values) for name, values in out.items()}
+
+
+def _saddle_growth(given, code, request):
+    """The output of that name, where the status `code` is ok."""
+    with np.errstate(all="ignore"):
+        if "l" in given:
+            value, bar = separatrix.growth(given["alpha"], given["beta"], np.float64(request.options["sign"]))
+        else:
+            k = given["epsilon"] * given["A"] * (given["A"] - given["C"])
+            size = np.sqrt(abs(k))
+            value, bar = separatrix.growth(given["p_phi"] / size, given["p_psi"] / size, np.sign(k))
+            unit = size / given["A"]
+            value, bar = value * unit, (bar + 8 * ROUNDOFF * value) * unit
+    value, bar = (np.where(code == OK, x if x.ndim == code.ndim else x[:, None], np.nan) for x in (value, bar))
+    return {"saddle_growth": value, "saddle_growth_error": bar}
 
 
 def _ordered(given):
@@ -219,8 +239,15 @@ def _state(given, valid, method, request, times):
     out = _finished(out, status, valid, count, heights)
     if times is not None:
         unsettled.settle(out, points.T, multiprecision.of_state, valid, request, known=True)
-    return _with_motion(out, valid, kinds, times, lambda at: nutation.motions(
-        method, rows, kinds, starts, periods, at, a, drift)) if times is not None else out  # fmt: skip
+    if times is None:
+        return out
+    upright = (kinds == nu.SEPARATRIX) & (points[:, 3] == 0.0) & (points[:, 4] == 0.0)
+
+    def motions(at):
+        found = nutation.motions(method, rows, kinds, starts, periods, at, a, drift)
+        return separatrix.upright(found, upright, at, points[:, 5] / (2.0 * a), drift)
+
+    return _with_motion(out, valid, kinds, times, motions)
 
 
 def _too_large(points):
@@ -280,6 +307,8 @@ def trajectory(point, answer, options, time=None):
     """
     well = int(np.argmax(np.isfinite(np.ravel(answer["period"]))))
     period = float(np.ravel(answer["period"])[well])
+    if not np.isfinite(period) and "l" in point and answer["verdict"] == "separatrix":
+        return _homoclinic(point, int(options["sign"]), time)
     if not np.isfinite(period):
         raise BadInput("this motion has no period (a separatrix, or no motion at all): take a point beside it")
     state = {p.name: point[p.name] for p in PARAMETERS[:7] if p.name in point}
@@ -288,13 +317,30 @@ def trajectory(point, answer, options, time=None):
     t = np.linspace(0.0, _MOTION_PERIODS * period if time is None else time, _MOTION_POINTS)
     asked = {name: np.full((1, 1), value) for name, value in state.items()} | {"t": t[None]}
     out = {name: values[0] for name, values in solve(asked, Request({"motion": "at_t"}, rtol=1e-9)).items()}
-    words = "time, over A / sqrt|k|" if "l" in point else "time"
+    return _drawn(t, out, "l" in point, _sides(out["u"], state))
+
+
+def _homoclinic(point, sign, time):
+    """The Trajectory of the motion that leaves an unstable precession and returns, furthest from it at t = 0."""
+    u, bar = separatrix.saddles(np.array([point["alpha"]]), np.array([point["beta"]]))
+    if sign < 0 or np.isnan(u[0]) or abs(point["alpha"]) == abs(point["beta"]):
+        raise BadInput("this separatrix is next to a cusp, or passes a pole: take a point beside it")
+    drift = point["alpha"] * (1.0 - point["ratio"]) / point["ratio"]
+    loop = separatrix.Loop(u[0], bar[0], point["alpha"], point["beta"], drift)
+    end = 12.0 / loop.rate if time is None else time
+    t = np.linspace(0.0 if time is not None else -end, end, _MOTION_POINTS)
+    return _drawn(t, loop.motion(t), True, 1.0)
+
+
+def _drawn(t, out, scaled, sides):
+    """The Trajectory of u, psi and phi at times t."""
+    words = "time, over A / sqrt|k|" if scaled else "time"
     data = {"t": ("t", t, {"long_name": words, "symbol": "t", "units": "1"})}
     for o in OUTPUTS[:3]:
         meaning = {"long_name": o.long_name, "symbol": o.symbol, "units": o.units}
         data[o.name] = ("t", out[o.name], meaning)
         data[f"{o.name}_error"] = ("t", out[f"{o.name}_error"], meaning | {"long_name": f"error bound of {o.name}"})
-    side = np.sqrt((1.0 - out["u"]) * (1.0 + out["u"])) * _sides(out["u"], state)
+    side = np.sqrt((1.0 - out["u"]) * (1.0 + out["u"])) * sides
     for name, values in {"x": side * np.cos(out["psi"]), "y": side * np.sin(out["psi"]), "z": out["u"]}.items():
         data[f"axis_{name}"] = ("t", values, {"long_name": f"component {name} of the body's axis", "units": "1"})
     return Trajectory(
