@@ -4,6 +4,7 @@ import re
 import shlex
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -47,6 +48,14 @@ def test_the_main_command_is_the_documented_job():
     assert main.startswith("python3 -m venv .venv && .venv/bin/pip install -e . && ") and main.count("&&") == 2
     assert test.endswith("&& .venv/bin/python -m pytest\n")
     assert "README.md" in (ROOT / ".ci/run").read_text()
+
+
+def test_the_first_picture_shows_whole_tongues():
+    """That of the main command, with the edges of tongues that are narrower than its grid."""
+    (first, *_) = re.findall(r"!\[[^]]*\]\((results/\S+)\)", (ROOT / "README.md").read_text())
+    asked = tomllib.loads((ROOT / "workflows" / f"{Path(first).stem}.toml").read_text())
+    assert "axis" in asked["boundaries"] and asked["output"]["figures"][0] == "verdict"
+    assert f"workflows/{Path(first).stem}.toml" in fenced("sh")[0]
 
 
 def test_the_main_command_runs(folder):

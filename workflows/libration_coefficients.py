@@ -43,6 +43,11 @@ def column(ds, name):
     return values
 
 
+def _letter(name):
+    """TeX of a critical mass ratio."""
+    return f"$\\mu_{name.removeprefix('mu').removeprefix('_')}$"
+
+
 def draw_coefficients(ds, path):
     """A panel for each of the figures; the scale is linear around 0 and logarithmic beyond."""
     figure, panels = plt.subplots(len(PANELS), 1, figsize=(8.0, 12.5), sharex=True, layout="constrained")
@@ -51,14 +56,18 @@ def draw_coefficients(ds, path):
         for name, colour in zip(names, LINES, strict=False):
             axes.plot(ds.mu, column(ds, name), lw=1.3, color=colour, label=symbol(name))
         axes.set_yscale("symlog", linthresh=width)
-        axes.set_title(title, fontsize=10)
         axes.axhline(0.0, color="black", lw=0.5)
         for name in ("mu2", "mu1", "mu_R"):
             axes.axvline(marks[name], color="grey", lw=0.8, ls="--")
         axes.axvspan(marks["mu_c"], marks["mu_d"], color=COLOURS[2], alpha=0.15, lw=0)
         axes.legend(fontsize=9, frameon=False, ncols=1, loc="center left", bbox_to_anchor=(1.0, 0.5))
         axes.grid(alpha=0.25)
-    panels[-1].set(xlabel=r"$\mu$", xlim=(0.0, 0.0395))
+        axes.set_xlim(0.0, 0.0395)
+        critical = axes.secondary_xaxis("top")
+        critical.set_xticks([marks[name] for name in MARKED], [_letter(name) for name in MARKED], fontsize=8)
+        critical.tick_params(length=3, pad=1)
+        axes.set_title(title, fontsize=10, pad=16)
+    panels[-1].set(xlabel=r"$\mu$")
     figure.suptitle(
         "Normal form at $L_4$: dashed $\\mu_2$, $\\mu_1$, $\\mu_R$; shaded where order 6 decides", fontsize=11
     )

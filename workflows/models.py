@@ -91,7 +91,7 @@ def gyrostat(number, rng):
 
 def brun(number, rng):
     """Euler and Poisson: M' = M x w + eps g x I g, g' = g x w, x' = x x w with a fixed horizontal axis x."""
-    number = max(number // 4, 50)
+    number = max(number // 10, 50)
     a, c = rng.uniform(1, 3, number), rng.uniform(0.3, 1.7, number)
     state = {
         "A": a, "C": c, "epsilon": rng.uniform(-1, 1, number), "theta0": rng.uniform(0.5, 2.5, number),
@@ -126,7 +126,7 @@ def brun(number, rng):
 
 def libration_elliptic(number, rng):
     """The elliptic problem in pulsating axes: x'' - 2 y' = r Om_x, y'' + 2 x' = r Om_y, z'' + z = r Om_z, about L4."""
-    number = max(number // 4, 50)
+    number = max(number // 10, 50)
     mu, e = rng.uniform(1e-3, 0.05, number), rng.uniform(0.0, 0.8, number)
     ds, reduced = timed("libration_elliptic", mu=along(mu), e=along(e), variables=["a", "b"])
     point = np.array([0.5 - mu, np.full(number, np.sqrt(0.75)), 0 * mu])
@@ -193,7 +193,7 @@ def gyrostat_body(number, rng):
 
 def gyrostat_integrable(number, rng):
     """The flow on the cylinder where b = 0: A11 phi'' = (C33 - C22) sin 2 phi / 2 - C23 cos 2 phi + S2 cos - S3 sin."""
-    number = max(number // 4, 50)
+    number = max(number // 10, 50)
     a11 = rng.uniform(0.5, 2.0, number)
     c22, c33, c23, s2, s3 = rng.uniform(-1.0, 1.0, (5, number))
     phi0, w0 = rng.uniform(0.0, 6.0, number), rng.uniform(3.0, 5.0, number)  # it turns for ever
@@ -217,7 +217,7 @@ def gyrostat_integrable(number, rng):
 
 def mathieu(number, rng):
     """A pendulum whose support moves up and down: x'' + (a - 2 q cos 2t) sin x = 0, about its rest."""
-    number = max(number // 4, 50)
+    number = max(number // 10, 50)
     a, q = rng.uniform(0.0, 20.0, number), rng.uniform(0.0, 8.0, number)
     ds, reduced = timed("mathieu", a=along(a), q=along(q), variables=["discriminant"])
 
@@ -237,7 +237,7 @@ def mathieu(number, rng):
 
 def libration(number, rng):
     """The spatial circular problem about L4: the frequencies of what is small, from the flow over a unit of time."""
-    number = max(number // 4, 50)
+    number = max(number // 10, 50)
     mu = rng.uniform(1e-3, 0.038, number)
     ds, reduced = timed("libration", mu=along(mu))
     point = np.array([0.5 - mu, np.full(number, np.sqrt(0.75)), 0 * mu])

@@ -18,12 +18,11 @@ import numpy as np
 from survey import modules
 from survey.errors import BadInput
 from survey.failures import planes as folder
+from survey.failures.plane import RTOL
 from survey.failures.planes import own_file
 from survey.file.labels import provenance
 from survey.request import ranges
 from survey.truth import kept
-
-RTOL = 1e-10
 
 
 @dataclass(frozen=True)

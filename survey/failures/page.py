@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from survey.failures import RTOL
-from survey.failures.plane import MAP
+from survey.failures.plane import MAP, RTOL
 
 PAGE = """# Where methods fail: {scene}
 

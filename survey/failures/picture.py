@@ -5,7 +5,7 @@ import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import Patch
 
-from survey.failures import RTOL
+from survey.failures.plane import RTOL
 
 GREY = "#c8c8c8"
 WIDE, HIGH = 1.75, 1.95  # inches of a panel

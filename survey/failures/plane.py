@@ -10,6 +10,7 @@ from survey.request import user_scene
 from survey.request.checks import check_options, methods_of
 
 MAP = "auto, as a map"
+RTOL = 1e-10
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,7 @@ MOST = 0.9  # the share of the nodes answered to the asked accuracy from which o
 DROPPED = 0.1  # of a panel's bound: what the terms that are left out may add to it
 UNEVEN = 4.0  # a panel whose bounds at the nodes differ by more may gain from being halved
 EVEN_OUT = 7  # halvings that are spent on that
+FLOOR = 4.0
 TRIED = np.array([-0.934, -0.551, 0.137, 0.862])  # points that are no nodes
 
 
@@ -102,9 +103,9 @@ def _panel(source, sides, rtol, depth):
     noise = chebyshev.lebesgue(NODES) ** 2 * bars.max(axis=(1, 2))
     total = tails.sum(axis=0) + noise + rest
     served = (total[:, None, None] <= rtol * (1 + abs(values))).mean(axis=(1, 2))
-    sharp = tails.sum(axis=0) <= noise + rest
-    uneven = (noise + rest)[:, None, None] > UNEVEN * chebyshev.lebesgue(NODES) ** 2 * bars
-    gains = uneven.mean(axis=(1, 2)) > 1 - MOST
+    sharp = tails.sum(axis=0) <= FLOOR * (noise + rest)  # nothing but rounding is left in the last coefficients
+    uneven = bars.max(axis=(1, 2), keepdims=True) > UNEVEN * bars
+    gains = (uneven.mean(axis=(1, 2)) > 1 - MOST) & (noise > rest)
     if ((served < MOST) & (~sharp | (gains & (sum(depth) < EVEN_OUT)))).any():
         worst = int(np.argmax(tails.sum(axis=0) / (noise + rest)))
         return None, int(tails[1, worst] > tails[0, worst]) if (~sharp).any() else _growth(values, longer)

@@ -61,12 +61,12 @@ def _hill(workflow, names, fixed):
 
 def _danby(workflow, names, fixed):
     """The invariants of `survey.kernels.libration.traces`."""
-    from survey.measures.libration import danby
+    from survey.measures.libration import danby_double
 
     def at(x, y):
         points = {names[0]: np.repeat(x, y.size), names[1]: np.tile(y, x.size)} | fixed
         mu, e = (np.broadcast_to(points[name], x.size * y.size).astype(float) for name in ("mu", "e"))
-        values, bars = danby.factors(np.ascontiguousarray(e), np.ascontiguousarray(mu), BEST)
+        values, bars = danby_double.factors(np.ascontiguousarray(e), np.ascontiguousarray(mu))
         return values.T.reshape(-1, x.size, y.size), bars.T.reshape(-1, x.size, y.size)
 
     return Source("danby", tuple(INVARIANTS), tuple(INVARIANTS.values()), at)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from survey import methods
-from survey.measures.cylinder import blocks, equation, orbit, solution
+from survey.measures.cylinder import basins, blocks, equation, orbit, solution
 from survey.measures.cylinder.fate import MOST_OF_PROGRAM
 from survey.measures.hill.multiprecision import Unsupported
 from survey.modules import load
@@ -81,7 +81,7 @@ class AbelScene(FunctionScene):
         if options["question"] == "portrait":
             return 1.5e-2
         if options["question"] == "fate":
-            return 3e-4 + 2e-2 / (sizes["phi0"] * sizes["w0"])
+            return basins.cost(sizes["phi0"] * sizes["w0"], 3e-4, 2e-2)
         return 6e-5 / sizes.get("t", sizes.get("phi", 1)) + 4e-7
 
     def solve(self, point, request):

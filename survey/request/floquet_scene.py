@@ -30,6 +30,7 @@ class FloquetScene(TracedScene):
     breaks: tuple[float, ...] | Callable
     states: tuple[str, ...]
     structure: str
+    conserved: tuple[float, ...] | Callable | None
     NAME: str
     TEXT: str
     HASH: str
@@ -44,7 +45,7 @@ class FloquetScene(TracedScene):
     @cached_property
     def _system(self):
         return System(
-            self.matrices, len(self.states), self.period, self.breaks, symplectic=self.structure == "symplectic"
+            self.matrices, len(self.states), self.period, self.breaks, self.structure == "symplectic", self.conserved
         )
 
     @property
@@ -56,7 +57,7 @@ class FloquetScene(TracedScene):
     def DIMENSIONS(self):
         """Coordinates: numbers of multipliers, and the names of the states for rows and columns."""
         number = np.arange(1, len(self.states) + 1)
-        return {"multiplier": number, "row": number, "column": number}
+        return {"multiplier": number[: self._system.judged], "row": number, "column": number}
 
     @property
     def NOTES(self):
@@ -88,6 +89,15 @@ class FloquetScene(TracedScene):
         free = {k for k, p in enumerate(self.PARAMETERS) if p.name not in request.fixed}
         given = (points, request.method, request.rtol, wanted, lines, ranges if set(ranges) == free else {})
         return self._called(stability.solve, self._system, self.structure, *given)
+
+    def judged(self, values, axes, fixed, M, E):
+        """M and E (N, n, n) without the multiplier of what is conserved, at `values` (N, len(axes)) of the axes."""
+        if self.conserved is None:
+            return M, E
+        given = fixed | {name: values[:, k] for k, name in enumerate(axes)}
+        points = np.stack([np.broadcast_to(given[p.name], len(M)) for p in self.PARAMETERS], axis=1)
+        found = stability.judged(self._system, points, monodromy.Matrices.plain(M, E))
+        return found.M, found.E
 
     def why(self, answer):
         """Why a point has its verdict (see `survey.scenes`)."""
@@ -141,6 +151,8 @@ class FloquetScene(TracedScene):
         for own, programs in groups:
             for i in known[own]:
                 self._compare(programs, given[i], period[i], edges[i])
+        if self.conserved is not None:
+            self._check_conserved(given[known])
         spikes = self._called(lambda: probing.spikes(monodromy.Points(system, given)))
         for i in np.flatnonzero(np.isfinite(spikes)):
             self._refuse(
@@ -171,6 +183,23 @@ class FloquetScene(TracedScene):
             self._check_reversible(programs, point, edges, size)
         if len(programs) == 1:
             self._check_period(point, period, size)
+
+    def _check_conserved(self, given):
+        """Refuse CONSERVED where w x is not the same a period later."""
+        system, some = self._system, np.arange(len(given))
+        w = self._called(system.weights, given)
+        points = self._called(monodromy.Points, system, given)
+        if not (np.isfinite(w).all() and (w != 0.0).any(axis=1).all()):
+            self._refuse("CONSERVED must be numbers, not all 0", "name the coefficients of the states")
+        found = monodromy.solve(points, monodromy.method_of("auto"), 1e-10, np.ones(len(given)), some, sharp=False)
+        for i in np.flatnonzero(points.valid):
+            off, bar = abs(w[i] @ found.M[i] - w[i]), abs(w[i]) @ found.E[i]
+            if not (off <= bar + SAME * abs(w[i]).max() * (1.0 + abs(found.M[i]).max())).all():
+                self._refuse(
+                    f"CONSERVED: this combination of the states changes by {off.max():.2g} in a period at "
+                    f"{self._where(given[i])}",
+                    "correct its coefficients at t = 0, or leave it out",
+                )
 
     def _check_structure(self, A, size, point):
         n = len(self.states)

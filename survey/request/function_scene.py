@@ -11,7 +11,7 @@ from survey.errors import BadInput
 from survey.scene import Parameter
 from survey.wording import plain
 
-_KEYS = re.compile(r"\b(PARAMETERS|PERIOD|EVEN|BREAKS|STATES|STRUCTURE|START|CONTINUATION|DAMPING)\b")
+_KEYS = re.compile(r"\b(PARAMETERS|PERIOD|EVEN|BREAKS|STATES|STRUCTURE|CONSERVED|START|CONTINUATION|DAMPING)\b")
 _known = {}  # by hash: a worker process compiles a scene once, for all of its blocks
 
 

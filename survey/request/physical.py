@@ -1,8 +1,8 @@
 """Physical input: degrees, moments of inertia, masses or named bodies in place of a scene's own parameters.
 
-GM: R. S. Park et al., Astronomical Journal 161 (2021) 105 (DE440), table 2; planets with their moons, Earth-Moon alone.
-Eccentricities: E. M. Standish, Keplerian elements for approximate positions of the major planets, JPL (J2000); of the
-Moon's orbit, the mean.
+GM: R. S. Park et al., Astronomical Journal 161 (2021) 105 (DE440), table 2; of Mars and beyond with their moons, of the
+Earth without. Eccentricities: E. M. Standish, Keplerian elements for approximate positions of the major planets, JPL
+(J2000), for the Sun and the Earth that of the barycentre with the Moon; of the Moon's orbit, the mean.
 """
 
 import numpy as np

@@ -25,6 +25,8 @@ that of a linear periodic system x' = A(t, p) x, or M q'' + C q' + K q = 0,
     STRUCTURE       "none" by default; "symplectic": J A is symmetric, J = (0 1; -1 0), the states being coordinates,
                     then momenta (with K: M q' + C q / 2); "reversible": R A(-t) R = -A(t) with signs R. It is checked
     BREAKS          times in [0, T] at which A jumps or has a kink: number(s), or a function of p; none by default
+    CONSERVED       optional: n numbers w, or a function of p: w x, x the states at t = 0, is the same a period later
+                    (checked); its multiplier, 1, is neither given nor judged
 
 that of the periodic orbits of x' = f(t, x, p)
 
@@ -215,6 +217,7 @@ def floquet(
     states: str | Iterable[str],
     structure: str = "none",
     breaks: npt.ArrayLike | Callable[[Any], npt.ArrayLike] = (),
+    conserved: npt.ArrayLike | Callable[[Any], npt.ArrayLike] | None = None,
     M: Callable[[Any, Any, Any], Any] | None = None,
     C: Callable[[Any, Any, Any], Any] | None = None,
     K: Callable[[Any, Any, Any], Any] | None = None,
@@ -232,6 +235,8 @@ def floquet(
     structure : "none"; "symplectic" if J A is symmetric, the states being coordinates, then momenta; "reversible" if
         R A(-t) R = -A(t) with a diagonal matrix R of signs. It is checked, and allows verdicts on the unit circle.
     breaks : where A or a derivative jumps, in [0, T]: number(s), or a function of p.
+    conserved : n numbers w, or a function of p: w x, x the states at t = 0, is the same a period later. It is checked;
+        its multiplier, 1, is not among those that are given and judged. For structure "none".
     M, C, K : instead of A, functions that fill the matrices of mass (default: the identity), damping with gyroscopic
         terms (default: 0) and stiffness; the states are then q and q', or, if symplectic, q and M q' + C q / 2.
 
@@ -256,7 +261,7 @@ def floquet(
     except (OSError, TypeError):
         text = ""
     about = inspect.getdoc(first) if first is not None else None
-    scene = _floquet(given, period, parameters, states, structure, breaks, name, text, title, about, ())
+    scene = _floquet(given, period, parameters, states, structure, breaks, conserved, name, text, title, about, ())
     _made[scene.HASH] = scene
     return scene
 
@@ -434,7 +439,7 @@ def _from_text(name: str, text: str) -> FunctionScene:
         return _abel(module.f, module.g, period, module.PARAMETERS, name, text, title, about, references)
     if is_floquet:
         about = module.__doc__ or inspect.getdoc(matrices.get("A", matrices.get("K")))
-        more = getattr(module, "STRUCTURE", "none"), getattr(module, "BREAKS", ())
+        more = getattr(module, "STRUCTURE", "none"), getattr(module, "BREAKS", ()), getattr(module, "CONSERVED", None)
         given = module.PERIOD, module.PARAMETERS, module.STATES, *more
         return _floquet(matrices, *given, name, text, title, about, references)
     if is_orbit:
@@ -514,7 +519,7 @@ def _abel(
 
 def _floquet(
     matrices: dict[str, Any], period: Any, parameters: Any, states: Any, structure: Any, breaks: Any,
-    name: str, text: str, title: str | None, about: str | None, references: Iterable[str],
+    conserved: Any, name: str, text: str, title: str | None, about: str | None, references: Iterable[str],
 ) -> FloquetScene:  # fmt: skip
     """The checked scene; raises BadInput."""
     from survey.measures.floquet import stability
@@ -541,12 +546,19 @@ def _floquet(
     if not callable(period) and not (is_number(period) and 0 < period < np.inf):
         refuse(f"PERIOD = {period!r}: it must be a positive number, or a function of p that returns one")
     breaks = _checked_breaks(breaks, period, refuse)
+    if conserved is not None and not callable(conserved):
+        conserved = tuple(np.asarray(conserved, dtype=float).ravel().tolist())
+        if len(conserved) != len(names):
+            refuse(f"CONSERVED names {len(conserved)} numbers; there are {len(names)} states")
+    if conserved is not None and (structure != "none" or len(names) < 2):
+        refuse("CONSERVED is for STRUCTURE = 'none', and two states at least")
     equation = "x' = A(t, p) x" if "A" in matrices else "M q'' + C q' + K q = 0"
     about = inspect.cleandoc(about or f"{equation}, p = ({', '.join(p.name for p in parameters)}).")
     given = (*matrices.items(), period, breaks, parameters, names, structure)
+    given += () if conserved is None else (conserved,)
     return FloquetScene(
-        matrices=matrices, period=period, breaks=breaks, states=names, structure=structure, own=parameters,
-        **_described(name, text, title, about, references or FLOQUET_REFERENCES, given),
+        matrices=matrices, period=period, breaks=breaks, states=names, structure=structure, conserved=conserved,
+        own=parameters, **_described(name, text, title, about, references or FLOQUET_REFERENCES, given),
     )  # fmt: skip
 
 

@@ -40,7 +40,7 @@ function restriction(n, low, high) {
   return out
 }
 
-function restricted({n, m, c}, across, along) {
+function restricted({n, m, c, off = 0}, across, along) {
   // The series on the part of its square between `across` in x and `along` in y, each given by its matrix for (n, m).
   const left = across(n), right = along(m)
   const half = new Float64Array(n * m), out = new Float64Array(n * m)
@@ -53,7 +53,7 @@ function restricted({n, m, c}, across, along) {
     for (let k = q; k < m; k++) sum += right[q * m + k] * half[p * m + k]
     out[p * m + q] = sum
   }
-  return {n, m, c: out}
+  return {n, m, c: out, off}
 }
 
 function partOf(low, high) {
@@ -66,7 +66,7 @@ function partOf(low, high) {
 }
 
 function shortened(s, most) {
-  // Without the highest degrees, as long as they add up to less than `most`.
+  // Without the highest degrees, as long as they add up to less than `most`; `off`: what has been left out in all.
   let {n, m, c} = s, left = most
   const layer = (axis, last) => {
     let sum = 0
@@ -83,7 +83,7 @@ function shortened(s, most) {
   }
   const out = new Float64Array(n * m)
   for (let p = 0; p < n; p++) for (let q = 0; q < m; q++) out[p * m + q] = c[p * s.m + q]
-  return {n, m, c: out}
+  return {n, m, c: out, off: (s.off ?? 0) + most - left}
 }
 
 function bounds({c}) {
@@ -139,7 +139,7 @@ function edgesOf(rule, v) {
   return [Math.min(...out)]
 }
 
-const styleOf = (rule, f) => rule === "hill" ? FACTORS[f] : rule === "trace" ? [[0, 0], [1, 0]][f] : [f === 1, f === 2]
+const styleOf = (rule, f) => rule === "hill" ? FACTORS[f] : [f === 1, f === 2]
 
 // ---- a rectangle of pixels
 
@@ -197,21 +197,29 @@ function decided(model, panel, job, own, left, top, width, height, out) {
   // Where all factors have one sign, the pixels have one colour.
   if (job.show !== "verdict" || model.rule !== "hill") return false
   const limits = own.map(bounds)
-  if (!limits.every(([c, rest], f) => Math.abs(c) > rest + panel.bars[f])) return false
+  if (!limits.every(([c, rest], f) => Math.abs(c) > rest + panel.bars[f] + own[f].off)) return false
   const [a, b, c, d] = limits
   fill(out, job.width, left, top, width, height, job.colours[judgedByFactors(a[0], b[0], c[0], d[0], panel.bars)])
   return true
 }
 
+function exactly(model, panel, x, y) {
+  // The verdict from the panel's whole series: where the shortened ones leave it open.
+  const X = place(x, panel.low[0], panel.high[0]), Y = place(y, panel.low[1], panel.high[1])
+  return answer(model.rule, panel.series.map(rows => clenshaw(rows.map(row => clenshaw(row, Y)), X)), panel.bars).verdict
+}
+
 function drawBlock(model, panel, job, series, left, top, width, height, out) {
   if (decided(model, panel, job, series, left, top, width, height, out)) return
   const {bars} = panel, verdicts = job.show === "verdict", wide = width + 2, tall = height + 2, F = series.length
-  const values = series.map((s, f) => onPixels(shortened(s, Math.max(0.05 * bars[f], 1e-4 * bounds(s)[1] / BLOCK)), wide, tall))
+  const short = series.map((s, f) => shortened(s, Math.max(0.05 * bars[f], 1e-4 * bounds(s)[1] / BLOCK)))
+  const values = short.map(s => onPixels(s, wide, tall)), wider = bars.map((bar, f) => bar + 1.01 * short[f].off + 1e-15)
   const v = new Array(F), lines = job.lines ? edgeAlphas(model.rule, values, wide, tall, job.thick) : null
   for (let j = 0; j < height; j++) for (let i = 0; i < width; i++) {
     const from = (j + 1) * wide + i + 1, to = 4 * ((top + j) * job.width + left + i)
     for (let f = 0; f < F; f++) v[f] = values[f][from]
-    const verdict = verdicts ? verdictOf(model.rule, v, bars) : 1
+    let verdict = verdicts ? verdictOf(model.rule, v, wider) : 1
+    if (verdict === -1) verdict = exactly(model, panel, job.x[0] + (left + i) * job.x[1], job.y[0] + (top + j) * job.y[1])
     const colour = verdicts ? job.colours[verdict] : coloured(valueOf(model, job.show, v), job)
     let r = colour[0], g = colour[1], b = colour[2]
     if (lines && verdict >= 0) for (let f = 0; f < lines.length; f++) {
@@ -256,10 +264,16 @@ function edgeAlphas(rule, values, wide, tall, thick) {
     for (let j = 1; j < tall - 1; j++) for (let i = 1; i < wide - 1; i++) {
       const at = j * wide + i, slope = 0.5 * Math.hypot(own[at + 1] - own[at - 1], own[at + wide] - own[at - wide])
       const distance = Math.abs(own[at]) / slope
-      if (distance < 0.5 * thick + 0.5) out[at] = Math.min(1, 0.5 * thick + 0.5 - distance)
+      if (distance < 0.5 * thick + 0.5 && (rule === "hill" || changes(own, at, i, j, wide, tall))) out[at] = Math.min(1, 0.5 * thick + 0.5 - distance)
     }
     return out
   })
+}
+
+function changes(own, at, i, j, wide, tall) {
+  // Does it change its sign nearby? Where it only touches 0 nothing is lost.
+  const reach = 3, a = at - Math.min(i, reach), b = at + Math.min(wide - 1 - i, reach), c = at - wide * Math.min(j, reach), d = at + wide * Math.min(tall - 1 - j, reach)
+  return own[a] < 0 !== own[b] < 0 || own[c] < 0 !== own[d] < 0
 }
 
 function coloured(value, {table, range, scale}) {

@@ -45,13 +45,14 @@ EDGES = (
     ("even, periodic (y1' = 0)", "#000000", False), ("odd, periodic (y2 = 0)", "#707070", False),
     ("even, antiperiodic (y1 = 0)", "#000000", True), ("odd, antiperiodic (y2' = 0)", "#707070", True),
 )  # fmt: skip
-OTHER_EDGES = {
-    "trace": (("D = 2", "#000000", False), ("D = -2", "#000000", True)),
-    "danby": (("A B = 0 or K = 0", "#000000", False), ("C D = 0", "#000000", True)),
-    "reciprocal": (("a multiplier passes 1, or two pairs meet", "#000000", False),
-                   ("a multiplier passes -1", "#000000", True)),
-    "schur": (("a multiplier passes the unit circle", "#000000", False),),
-}  # fmt: skip
+OTHER_EDGES = {  # by rule, in the order of `edgesOf` in engine.js
+    "trace": ("D = 2", "D = -2"),
+    "danby": ("two multipliers meet at -1 (A B = 0)", "two multipliers meet at 1 (C D = 0)", "two pairs meet (K = 0)"),
+    "reciprocal 1": ("two multipliers meet at -1", "two multipliers meet at 1"),
+    "reciprocal": ("two pairs meet", "two multipliers meet at 1", "two multipliers meet at -1"),
+    "schur": ("a multiplier passes the unit circle",),
+}
+STYLES = (("#000000", False), ("#000000", True), ("#707070", False))
 HINT = (
     "Point at the map for its values. Wheel, pinch or double click: zoom; drag: move. Keyboard: arrows, + and -, 0; "
     "the cross is read."
@@ -132,7 +133,8 @@ def _of_model(ds, packed):
     rule, given = model.rule, {}
     if rule != "hill" and "curve_count" in ds:
         given = _curves(ds, model.names)
-    drawn = EDGES if rule == "hill" else OTHER_EDGES[rule]
+    others = OTHER_EDGES.get(f"{rule} {len(model.functions)}") or OTHER_EDGES.get(rule, ())
+    drawn = EDGES if rule == "hill" else [(text, *style) for text, style in zip(others, STYLES, strict=False)]
     edges = [{"text": text, "colour": colour, "dash": dash} for text, colour, dash in drawn]
     described = _common(ds, list(model.names))["axes"]
     sides = zip(described, model.low, model.high, strict=True)

@@ -55,8 +55,7 @@ def alone(axes):
 def add_legend(axes, handles):
     """Put the legend below the figure if the axes fill it, else below the axes, in as many columns as fit."""
     fills = alone(axes) and axes.figure.get_constrained_layout()
-    # the frame of the figure's legend is invisible and may reach beyond the figure
-    space = 1.02 * axes.figure.bbox.width if fills else OVERHANG * axes.get_window_extent().width
+    space = 0.98 * axes.figure.bbox.width if fills else OVERHANG * axes.get_window_extent().width
     settings = {"handles": handles, "frameon": False, "fontsize": 8}
     below = axes.transAxes + ScaledTranslation(0, -0.5, axes.figure.dpi_scale_trans)  # inches: ticks and label
     for columns in range(min(4, len(handles)), 0, -1):

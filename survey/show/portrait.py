@@ -68,10 +68,10 @@ def _multipliers(axes, ds):
     axes.set(xlabel=r"$\mathrm{Re}\,\lambda$", ylabel=r"$\mathrm{Im}\,\lambda$")
     axes.set_aspect("equal", adjustable="datalim")
     far = np.abs([x, y]).max()
-    axes.set_title(f"multipliers, error bars up to {bar.max():.1g}", fontsize=9)
+    axes.set_title(f"multipliers,\nerror bars up to {bar.max():.1g}", fontsize=9)
     if far > 30:  # one multiplier is so large that the circle would not be seen
         axes.set(xlim=(-2, 2), ylim=(-2, 2))
-        axes.set_title(f"multipliers (one at {x[np.abs(x).argmax()]:.4g}, not shown)", fontsize=9)
+        axes.set_title(f"multipliers\n(one at {x[np.abs(x).argmax()]:.4g}, not shown)", fontsize=9)
 
 
 def _cylinder(axes, ds, x, y):

@@ -12,6 +12,11 @@ from survey.show.maps import IN_WORDS
 from survey.show.palette import kinds_of
 from survey.show.text import WIDE, formula, label_of, literal, spaced
 
+RING = "#D40000"
+MOST_RINGS, RARE = 12, 50  # isolated points that are ringed; points from which on one among them is hard to see
+STEEP = 30.0  # times the median: where a quantity that changes sign has a pole, not a zero
+WIDE_RANGE = 1e3  # of a quantity with poles from which on its axis is linear about 0 and logarithmic beyond
+
 
 def draw_profile(axes, ds, variable, state, paper):
     """Draw a variable along its one axis, `state` being the status."""
@@ -21,14 +26,29 @@ def draw_profile(axes, ds, variable, state, paper):
         # all flags, but only those statuses that occur
         names = [name for name, code in table.items() if name in flag_codes(variable.attrs) or (shown == code).any()]
         for height, name in enumerate(names):
-            here = x.values[(shown == table[name]).filled(False)]
+            where = (shown == table[name]).filled(False)
+            here = x.values[where]
             axes.plot(here, np.full(here.size, height), "s", markersize=4, color=palette[name])
+            alone = x.values[_isolated(where)]  # as at a resonance that is one value: nobody would see it
+            if 0 < alone.size <= MOST_RINGS and shown.size > RARE:
+                ring = {"marker": "o", "ms": 9, "mfc": "none", "mec": RING, "mew": 1.4, "ls": "none"}
+                axes.plot(alone, np.full(alone.size, height), **ring)
+                for value in alone:
+                    axes.annotate(f"{value:.9g}", (value, height), xytext=(0, 8), textcoords="offset points",
+                                  ha="center", fontsize=7, color=RING)  # fmt: skip
         axes.set_yticks(range(len(names)), [spaced(name) for name in names], fontsize=8)
     else:
         label = textwrap.fill(literal(variable.attrs.get("long_name", variable.name)), 60)
         label = formula(variable.attrs.get("symbol") or variable.name, variable.name) if paper else label
         words = words_of(variable)
-        axes.plot(x, variable.where(~variable.isin(list(words))), lw=1.2, color="#0072B2", label=label)
+        drawn, poles, linear = _without_poles(variable.where(~variable.isin(list(words))))
+        axes.plot(x, drawn, lw=1.2, color="#0072B2", label=label)
+        if linear:
+            axes.set_yscale("symlog", linthresh=linear)
+        for i in poles:
+            axes.axvline(
+                0.5 * float(x[i] + x[i + 1]), color="grey", lw=0.8, ls="--", label="pole" if i == poles[0] else None
+            )
         for code, text in words.items():
             here = x.values[variable.values == code]
             if here.size:
@@ -50,3 +70,29 @@ def draw_profile(axes, ds, variable, state, paper):
         axes.legend(fontsize=8)
     if logarithmic(x.values):
         axes.set_xscale("log")
+
+
+def _isolated(where):
+    """Points whose neighbours are of another kind."""
+    padded = np.pad(where, 1)
+    return where & ~padded[:-2] & ~padded[2:]
+
+
+def _without_poles(variable):
+    """(the values with gaps at poles, the places i of poles between i and i + 1, where its axis is linear, or None).
+
+    A pole is a change of sign between neighbours that are both large, and larger than theirs.
+    """
+    values = np.asarray(variable.values, dtype=float)
+    size = np.abs(values)
+    some = size[np.isfinite(size) & (size > 0.0)]
+    if values.size < 8 or not some.size:
+        return variable, [], None
+    middle = float(np.median(some))
+    big = size > STEEP * middle
+    poles = np.flatnonzero((values[1:] * values[:-1] < 0.0) & big[1:] & big[:-1])
+    if not len(poles) or some.max() < WIDE_RANGE * middle:
+        return variable, [], None
+    gapped = variable.astype(float).copy()
+    gapped[poles] = np.nan
+    return gapped, poles, 0.1 * middle

@@ -49,7 +49,7 @@ def label_of(variable, width=40):
     symbol, units = variable.attrs.get("symbol", ""), variable.attrs.get("units", "1")
     text = literal(variable.attrs.get("long_name", variable.name))
     shown = _is_formula(symbol) and "flag_values" not in variable.attrs
-    shown = shown and not (symbol == variable.name and "_" in symbol)  # a name, not a formula with a subscript
+    shown = shown and not (symbol == variable.name and len(symbol) > 2)  # a name, not a formula
     # TeX is longer than what it shows: inserted last; a name that only spells its symbol would repeat it
     text = (
         "$$" if shown and text in (symbol, symbol.lstrip("\\")) else f"{text},\N{NO-BREAK SPACE}$$" if shown else text

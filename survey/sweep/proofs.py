@@ -127,7 +127,8 @@ def solved(prover, once, progress=None):
         return number, (search.PANEL, [search.open_panel()])
 
     if todo:
-        dispatch.on_processes(prover, todo, finished, died, min(dispatch.cpus(), len(todo)))
+        workers, patience = min(dispatch.cpus(), len(todo)), dispatch.Patience(math.inf)  # a part may take minutes
+        dispatch.on_processes(prover, todo, finished, died, workers, patience)
     layouts, lists = zip(*(parts[number] for number in prover.numbers), strict=True)
     return "".join(layouts), [panel for some in lists for panel in some]
 

@@ -158,6 +158,30 @@ def test_a_piecewise_constant_z_that_is_not_even():
     assert ((abs(trace) < 2) == verdicts).all()
 
 
+RESULTS = Path(__file__).parents[2] / "results"
+
+
+@pytest.mark.parametrize("name", ["mathieu_proved", "satellite_theorem_proved"])
+def test_some_panels_of_the_published_certificates(name):
+    certificate = checker.Certificate((RESULTS / f"{name}.cert").read_text())
+    shares = [checker.shares_of(panel["cells"]) for panel in certificate.panels]
+    assert checker.weighed(certificate.places, shares) == certificate.shares
+    for number in np.random.default_rng(5).choice(len(certificate.panels), 2, replace=False).tolist():
+        certificate.panel(number).check()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", sorted(RESULTS.glob("*.cert")), ids=lambda path: path.stem)
+def test_the_published_certificates(path):
+    checker.check(path.read_text(), processes=2)
+
+
+def test_the_theorem_that_the_documentation_prints():
+    certificate = checker.Certificate((RESULTS / "satellite_theorem_proved.cert").read_text())
+    assert certificate.shares["s"] == 1 and certificate.names == ["inertia_ratio", "amplitude"]
+    assert certificate.sides == [(0, Fraction(1, 2)), (0, Fraction(4, 5))]
+
+
 def test_the_checker_needs_nothing_but_flint(tmp_path):
     """Copied elsewhere and run in isolation, it proves the same."""
     source = Path(checker.__file__).read_text()

@@ -5,6 +5,7 @@ import pytest
 
 import survey
 from survey.errors import BadInput
+from survey.request import physical
 
 
 def test_degrees():
@@ -63,3 +64,21 @@ def test_a_scene_says_what_it_takes():
     assert "in degrees" in told["amplitude_deg"] and "any unit" in told["A, B, C"]
     assert "Sun-Jupiter" in survey.describe("libration_elliptic")["parameters"]["body"]
     assert "any consistent units" in survey.describe("brun")["parameters"]["A"]
+
+
+# NAIF's kernel of constants gm_de440.tpc, in full: BODY10 the Sun, BODY1 to BODY8 the planets' systems, 399 and 301
+KERNEL = {
+    "Sun": 1.3271244004127942e11, "Mercury": 2.2031868551400003e04, "Venus": 3.2485859200000000e05,
+    "Earth": 3.9860043550702266e05, "Moon": 4.9028001184575496e03, "Mars": 4.2828375815756102e04,
+    "Jupiter": 1.2671276409999998e08, "Saturn": 3.7940584841799997e07, "Uranus": 5.7945563999999985e06,
+    "Neptune": 6.8365271005803989e06,
+}  # fmt: skip
+
+
+def test_masses_are_those_of_the_ephemeris():
+    """The paper's table has fewer digits than the kernel."""
+    assert physical.GM.keys() == KERNEL.keys()
+    for body, value in physical.GM.items():
+        assert value == pytest.approx(KERNEL[body], rel=2e-9), body
+    with_moon = 4.0350323562548019e05  # BODY3, the Earth and the Moon
+    assert physical.GM["Earth"] + physical.GM["Moon"] == pytest.approx(with_moon, rel=1e-9)

@@ -80,3 +80,19 @@ def test_ensembles_are_scattered_over_their_parameters():
     offsets = np.concatenate([c.get_offsets() for c in axes.collections])
     assert sorted(map(tuple, offsets)) == sorted(zip(made.a.values, made.q.values, strict=True))
     assert made.survey.map("discriminant").collections[0].get_offsets().shape == (40, 2)
+
+
+def test_narrow_tongues_are_lines_in_the_colour_of_instability(tmp_path):
+    """Edges of tongues narrower than the grid coincide: between their dashes the tongue itself is seen, undotted."""
+    axes = {"a": {"start": 0.5, "stop": 10.0, "num": 12}, "q": {"start": 0.1, "stop": 1.0, "num": 4}}
+    made = survey.run({"scene": "mathieu", "axes": axes, "boundaries": {"axis": "a"}}, output=tmp_path / "tongues.nc")
+    for name, colour in (("verdict", palette.COLOURS[0]), ("exponent", None)):
+        dashed = [line for line in made.survey.map(name).lines if line.is_dashed()]
+        assert dashed and {line.get_gapcolor() for line in dashed} == {colour}
+
+
+def test_limits_and_colour_maps_are_checked_for_verdicts_too(ds):
+    for wrong in ({"vmin": "a"}, {"vmin": 2, "vmax": 1}, {"vmax": np.inf}, {"cmap": "virids"}, {"cmap": 3}):
+        for name in ("verdict", "exponent"):
+            with pytest.raises(survey.BadInput):
+                ds.survey.map(name, **wrong)

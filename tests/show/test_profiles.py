@@ -37,3 +37,39 @@ def test_the_band_is_one_bar_wide_on_either_side(drawn):
 def test_points_without_an_answer_are_marked(drawn):
     (marks,) = (line for line in drawn.lines if line.get_label() == "no answer")
     assert marks.get_xdata().tolist() == [X[2]]
+
+
+def profile(x, **variables):
+    """The axes of a profile of the first of the variables."""
+    words = {"long_name": "quantity", "units": "1"}
+    data = {name: ("x", values, words | more) for name, (values, more) in variables.items()}
+    ds = xr.Dataset(data | {"status": ("x", np.zeros(x.size, np.int8))}, {"x": ("x", x, words)})
+    figure, axes = plt.subplots()
+    draw_profile(axes, ds, ds[next(iter(variables))], ds.status, paper=False)
+    plt.close(figure)
+    return axes
+
+
+def test_a_verdict_of_a_single_point_is_ringed_and_named():
+    x = np.linspace(0.0, 1.0, 101)
+    verdict = np.where(x < 0.6, 1, 0).astype(np.int8)
+    verdict[37] = 2
+    flags = {"flag_values": np.array([0, 1, 2], np.int8), "flag_meanings": "unstable stable resonant"}
+    axes = profile(x, verdict=(verdict, flags))
+    rings = [line for line in axes.lines if line.get_marker() == "o"]
+    assert [line.get_xdata().tolist() for line in rings] == [[x[37]]]
+    assert [text.get_text() for text in axes.texts] == ["0.37"]
+    whole = profile(x, verdict=(np.where(x < 0.6, 1, 0).astype(np.int8), flags))
+    assert not whole.texts and not [line for line in whole.lines if line.get_marker() == "o"]
+
+
+def test_poles_are_gaps_with_marks_on_a_symmetric_logarithmic_axis():
+    x = np.linspace(0.0, 1.0, 2001)
+    axes = profile(x, y=(1.0 / (x - 0.30007), {}))
+    assert axes.get_yscale() == "symlog"
+    (pole,) = (line for line in axes.lines if line.get_label() == "pole")
+    assert abs(pole.get_xdata()[0] - 0.30007) < 1e-3
+    (curve,) = (line for line in axes.lines if line.get_label() == "quantity")
+    assert np.isnan(np.asarray(curve.get_ydata(), float)).sum() == 1
+    assert profile(x, y=(np.sin(20 * x), {})).get_yscale() == "linear"  # zeros are no poles
+    assert profile(x, y=(1e4 * np.sin(20 * x), {})).get_yscale() == "linear"

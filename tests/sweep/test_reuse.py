@@ -97,7 +97,7 @@ def test_points_of_your_own_equation_are_taken_over_until_its_text_changes(tmp_p
     (tmp_path / "own.py").write_text(text)
     given = {"scene": "own.py", "axes": {"a": {"values": [0.5, 1.5]}, "q": {"values": [0.1, 0.4]}}}
     survey.run(given, output="old.nc")
-    given["axes"]["a"] = {"values": [0.5, 1.0, 1.5]}
+    given["output"] = {"variables": ["verdict"]}
     held, told = earlier.find(workflow.check(given, output="new.nc"), "old.nc")
     assert held.points == 4, told
     (tmp_path / "own.py").write_text(text.replace("sin(4", "sin(6"))

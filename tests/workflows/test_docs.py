@@ -21,6 +21,7 @@ from snippets import ROOT, fenced
 import survey.methods
 import survey.scenes
 from survey import cli, measures, modules, status
+from survey.accessor import Survey
 from survey.methods import agm, carlson
 from survey.request import schema, workflow
 
@@ -239,6 +240,18 @@ def test_every_picture_of_a_page_lies_in_the_results(page):
         assert (ROOT / "results" / name).is_file() and "/" not in name, target
 
 
+def test_maps_of_the_documentation_are_pages_that_zoom(tool, tmp_path, monkeypatch):
+    live = tool("live_maps")
+    one = "mathieu_proved.png"
+    monkeypatch.setattr(live, "MAPS", {one: live.MAPS[one]})
+    found = live.pages(tmp_path / "maps")
+    assert sorted(path.name for path in (tmp_path / "maps").iterdir()) == ["mathieu_proved.html", one]
+    assert (tmp_path / "maps/mathieu_proved.html").stat().st_size < 500_000
+    text = live.replaced(f"before ![a map](../results/{one}) after", "scenes/mathieu.md", found)
+    assert 'src="../_static/maps/mathieu_proved.html" title="a map"' in text and "results/" not in text
+    assert f'<noscript><img src="../_static/maps/{one}" alt="a map"></noscript>' in text
+
+
 def test_the_comparison_is_what_was_measured(tool):
     comparisons = tool("comparisons")
     records = json.loads((ROOT / "results/precision_satellite.json").read_text())["records"]
@@ -292,6 +305,20 @@ def test_what_people_search_for_is_a_title(words, page):
     """Titles come first in the search of the site."""
     assert words in (DOCS / f"{page}.md").read_text().splitlines()[0]
     assert "Paul trap" in (DOCS / "choose.md").read_text()
+
+
+def test_formulas_of_docstrings_are_typeset(tool):
+    """All of them, and none that no docstring holds any more."""
+    formulas = tool("formulas")
+    public = [getattr(survey, name) for name in dir(survey) if inspect.isfunction(getattr(survey, name))]
+    public += [member for _, member in inspect.getmembers(Survey, inspect.isfunction)]
+    text = "\n".join(inspect.getdoc(one) or "" for one in public)
+    assert [formula for formula in formulas.TYPESET if formula not in text] == []
+    for line in text.splitlines():
+        if not line.startswith((">>>", "...")):
+            left = re.sub(r":math:`[^`]*`|`[^`]*`", "", formulas.typeset(line))
+            assert not re.search(r"(?<!\w)[xyzqw]'(?!s)|<=|\bphi\(|\^", left), line
+    assert formulas.typeset("`x'` is x'") == "`x'` is :math:`x'`"
 
 
 def test_every_page_is_in_the_table_of_contents():

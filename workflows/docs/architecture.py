@@ -34,7 +34,7 @@ and methods are found by their file names, so [adding one](extend.md) means addi
 list has to be edited.
 """
 WIDTH, HEIGHT, GAP = 2.2, 0.78, 0.36  # of a box, and between layers, in inches
-COLUMNS, MARGIN = 4, 0.25
+COLUMNS, MARGIN = 5, 0.25
 LETTERS = 32  # in a line of a box
 
 

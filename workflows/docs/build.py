@@ -15,6 +15,7 @@ from pathlib import Path
 import architecture
 import comparisons
 import figures
+import live_maps
 import scene_pages
 
 HERE = Path(__file__).resolve().parent
@@ -39,9 +40,11 @@ def assemble(source):
     made["changelog.md"] = (ROOT / ".github/CHANGELOG.md").read_text()
     made["contributing.md"] = (ROOT / ".github/CONTRIBUTING.md").read_text()
     made["notebooks/index.md"] = _notebooks(source / "notebooks")
+    made["index.md"] = (source / "index.md").read_text()
+    live = live_maps.pages(source / "static/maps")
     for name, text in made.items():
         (source / name).parent.mkdir(exist_ok=True)
-        (source / name).write_text(text)
+        (source / name).write_text(live_maps.replaced(text, name, live))
 
 
 def _notebooks(folder):

@@ -1,10 +1,15 @@
 """Sphinx's configuration; `build.py` beside this file assembles the pages and calls it. No network is needed."""
 
 import re
+import sys
+from pathlib import Path
 
 import numpy.typing as npt
 from docutils import nodes
 from sphinx.util.typing import stringify_annotation
+
+sys.path.insert(0, str(Path(__file__).parent))
+import formulas
 
 import survey.api  # so that the API pages show what users call  # noqa: F401
 
@@ -47,13 +52,13 @@ def _as_written(app, doctree):
 
 
 def _plain(app, what, name, thing, options, lines):
-    """Docstrings are plain text: bars in them are no markup; those of modules stand as they are."""
+    """Docstrings are plain text: formulas are typeset, bars are no markup; those of modules stand as they are."""
     if what == "module":
         lines[:] = ["::", "", *(f"   {line}" for line in lines), ""]
         return
     out, section = [], ""
     for line in lines:
-        line = re.sub(r"(`[^`]+`)(?=\w)", r"\1\\ ", line.replace("|", r"\|"))
+        line = formulas.typeset(re.sub(r"(`[^`]+`)(?=\w)", r"\1\\ ", line)).replace("|", r"\|")
         entry = re.match(r"(\*{0,2}\w+(?:, \w+)*) : (.*)", line)
         if re.fullmatch("-{3,}", line):
             section = out.pop()

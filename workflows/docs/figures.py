@@ -29,7 +29,7 @@ def shown():
 def caption(figure):
     """What a figure shows."""
     for pattern, words in sorted(shown().items(), key=lambda row: -len(row[0])):
-        if re.fullmatch(re.escape(pattern).replace(r"\*", ".*"), figure):
+        if re.fullmatch(re.escape(pattern).replace(r"\*", ".*").replace("SCENE", ".+"), figure):
             return words
     raise ValueError(f"{figure}: results/README.md does not say what it shows")
 

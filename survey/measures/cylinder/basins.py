@@ -28,7 +28,7 @@ from survey.status import OK
 COARSE, FINE = 96, 384  # cells of a turn, about
 FEW = 20_000  # pieces: as few are found again in fine cells
 TOLERANCE = 1e-16  # truncation of one step
-PIECES = 8_000, 96_000  # of one curve: the least and the greatest number at which it is cut off
+PIECES = 16_000, 96_000  # of one curve: the least and the greatest number at which it is cut off
 LOOSE = 1e-3  # bar of a cycle, in the same units, beyond which only starts far from it are told
 NARROWEST = 1e-9  # gaps, relative, in which fates are told
 BACK = np.array([-1.0, -1.0, 1.0, 1.0, 1.0, 1.0])  # S1, see `solution`
@@ -91,6 +91,11 @@ def asked(request, names):
     return Map(size, max(abs(last[1]), abs(last[2]))) if last and size >= FEWEST else None
 
 
+def cost(starts, each, system):
+    """Seconds per start, of so many of one system: `each` where it is followed, `system` for the cycles."""
+    return (each if starts < FEWEST else 3e-6 + 0.2 / starts) + system / starts
+
+
 def followed(method, six, s, starts, rtol, whole=None):
     """`fate.followed`, of as few starts as can be where the Map `whole` says that there are many."""
     basins = None
@@ -124,7 +129,7 @@ def found(method, s, rtol, whole):
     limits = _limits(s, scale)
     if limits is None:
         return None
-    top, most = min(max(whole.fastest, scale), 0.5 * limits.min()), min(max(whole.starts // 2, PIECES[0]), PIECES[1])
+    top, most = min(max(whole.fastest, scale), 0.5 * limits.min()), min(max(2 * whole.starts, PIECES[0]), PIECES[1])
     for cells in (COARSE, FINE):
         breaks, numbers, edges = _lattice(s, cells)
         falls = (_forces(s.p, 0.5 * (edges[1:] + edges[:-1])) < 0.0).astype(np.int64)

@@ -53,15 +53,22 @@ def _refusal_of_own(axes, scene):
     own = [p.name for p in scene.own]
     if scene.period is None:
         return "no curves are known: they are where f and g have the period 2 pi (PERIOD)"
-    if len(axes) in (2, 3) and set(axes) <= set(own):
+    if len(axes) in (2, 3) and (set(axes) <= set(own) or (set(axes[:2]) == set(STATE) and set(axes[2:]) <= set(own))):
         return None
-    return f"curves are known on two axes of {', '.join(own)}, or three, not on {', '.join(axes) or 'none'}"
+    return (
+        f"curves are known on two axes of {', '.join(own)}, or three, or on {', '.join(STATE)} with at most one more "
+        f"after them, not on {', '.join(axes) or 'none'}"
+    )
 
 
 def searched(scene, square, axes, fixed, options):
     """The Curves on the map of `axes`, the unit square `square`; `fixed` holds the other parameters."""
     if scene.FAMILY == "cylinder":
         return closed(square, axes, fixed, {})
+    if set(axes) == set(STATE):
+        (flow,) = scene.flows(np.array([[fixed[p.name] for p in scene.own]]))
+        found = [(CLASSES[kind], *rest) for kind, *rest in separatrices.found(square, axes, flow)]
+        return joined(found, [output.name for output in ALONG])
     plane = own_bifurcations.Plane(square, tuple(axes), fixed, scene)
     with np.errstate(all="ignore"):
         rows = [bifurcations.counted(plane, *row) for row in own_bifurcations.found(plane)]
@@ -70,8 +77,11 @@ def searched(scene, square, axes, fixed, options):
 
 def closed(square, axes, fixed, options):
     """The Curves on the map of `axes`, the unit square `square`; `fixed` holds the other parameters."""
-    measure = separatrices if set(axes) == set(STATE) else bifurcations
-    found = [(CLASSES[kind], *rest) for kind, *rest in measure.found(square, axes, fixed)]
+    if set(axes) == set(STATE):
+        rows = separatrices.found(square, axes, [fixed[name] for name in SYSTEM])
+    else:
+        rows = bifurcations.found(square, axes, fixed)
+    found = [(CLASSES[kind], *rest) for kind, *rest in rows]
     return joined(found, [output.name for output in ALONG])
 
 

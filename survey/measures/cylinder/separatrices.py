@@ -15,9 +15,10 @@ from survey.kernels.cylinder import lines
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder import returns as rt
 from survey.kernels.cylinder.branches import unstable
-from survey.kernels.cylinder.flow import BOUND_G, coefficients
+from survey.kernels.cylinder.flow import BOUND_G
+from survey.kernels.cylinder.program import COLUMNS
 from survey.kernels.math.roundoff import ROUNDOFF
-from survey.measures.cylinder.fate import I0, I1, outline, remembered
+from survey.measures.cylinder.fate import I0, I1, G, flow_of, outline, remembered, signed
 from survey.measures.sampled import runs
 from survey.methods import taylor
 
@@ -28,16 +29,20 @@ TINY = 1e-300
 TWO_PI = 2.0 * math.pi
 
 
-def found(square, axes, fixed):
-    """[(class, parameters (m, 2), errors (m), {name: (value, error)})] of the curves and the equilibria on the map."""
-    six = [fixed[name] for name in SYSTEM]
+def found(square, axes, flow):
+    """[(class, parameters (m, 2), errors (m), {name: (value, error)})] of the curves and the equilibria on the map.
+
+    `flow`: the six parameters of SYSTEM, or a program (see `equation`), of which no closed form is known.
+    """
     window = Window(square, axes.index("phi0"))
-    s = outline(six)
+    s = outline(flow)
+    if len(flow) > COLUMNS and (s.stratum != G or s.unknown):
+        return []
     if s.stratum == I0:
-        return list(_free(window, six))
+        return list(_free(window, flow))
     curves = list(_levels(window, s) if s.stratum == I1 else _branches(window, s))
     if s.stratum != I1 and not s.folded:
-        curves += _cycles(window, remembered(taylor, six))
+        curves += _cycles(window, remembered(taylor, flow))
     return curves + list(_equilibria(window, s))
 
 
@@ -75,12 +80,12 @@ class Window:
 
 def _flipped(p):
     """S1."""
-    return np.ascontiguousarray(coefficients(-p[0], -p[1], *p[2:6]))
+    return flow_of(signed(p, (-1.0, -1.0, 1.0, 1.0, 1.0, 1.0)))
 
 
 def _branches(window, s):
     """Both stable branches of every saddle."""
-    p, starts = _flipped(s.p), np.zeros((2 * eq.MOST, 4))
+    p, starts = _flipped(s.p), np.zeros((2 * max(len(s.equilibria), 1), 4))
     saddles = s.equilibria[s.equilibria[:, eq.KIND] == eq.SADDLE]
     if not len(saddles):
         return

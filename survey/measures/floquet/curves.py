@@ -51,10 +51,10 @@ def searched(scene, square, axes, fixed, options):
         request = Request(options, "auto", rtol, frozenset(["monodromy"]))
         with np.errstate(all="ignore"):
             out = scene.solve(point, request)
-        return out["monodromy"], out["monodromy_error"]
+        return scene.judged(values, axes, fixed, out["monodromy"], out["monodromy_error"])
 
     found, on_lattice = [], matrices(contours.lattice(LINES), ROUGH)
-    for kind, function in bifurcations.functions(len(scene.states), scene.structure).items():
+    for kind, function in bifurcations.functions(on_lattice[0].shape[1], scene.structure).items():
         values, bars = function(*on_lattice)
         # where no sign is certain all around, as where the function is 0 throughout, there is only noise
         open_ = ~(abs(values) > bars).reshape(LINES, LINES)

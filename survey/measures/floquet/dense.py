@@ -112,7 +112,7 @@ def serves_scattered(system, structure, wanted, ranges):
 
 def _of_series(system, structure, wanted):
     paired_odd = structure != "none" and system.n % 2
-    return wanted <= SERVED and system.n <= LARGEST and not paired_odd
+    return wanted <= SERVED and system.n <= LARGEST and not paired_odd and system.conserved is None
 
 
 def solve(system, structure, points, rtol, wanted, lines, answer):

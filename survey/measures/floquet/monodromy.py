@@ -28,7 +28,11 @@ MOST_STEPS = 100_000  # of a point
 
 
 class Points:
-    """Points of a System as a method's steps need them: sizes, noise, and the units that balance A."""
+    """Points of a System as a method's steps need them: sizes, noise, and the units that balance A.
+
+    `growth` (2, N): the integral of A's trace over the period, the logarithm of det M, and its error bound; infinite
+    where the trace depends on t.
+    """
 
     def __init__(self, system, points):
         self.system, self.n, self.points = system, system.n, points
@@ -39,6 +43,7 @@ class Points:
         pieces = edges.shape[1] - 1
         self.size, self.noise, self.rate = np.zeros((3, len(points), pieces))
         self.scale = np.ones((len(points), self.n))
+        self.growth = np.zeros((2, len(points)))
         self.groups = []
         where = np.flatnonzero(valid)
         for inside, programs in system.traced(points[where], edges[where]):
@@ -54,6 +59,7 @@ class Points:
             edges = self.edges[own[:1]] if self.system.same_ranges else self.edges[own]
             t = edges[:, k, None] + (edges[:, k + 1] - edges[:, k])[:, None] * TIMES
             numbers, A, E = program.numbers(points), np.empty((N, TIMES.size, n, n)), np.empty((N, n, n))
+            self._add_trace(own, program.trace(numbers), self.edges[own, k + 1] - self.edges[own, k])
             sizes.samples(*program.sampled(numbers, t), *numbers, A, E, largest)
             sampled.append((numbers, A, E))
         sizes.balance(largest, scale)
@@ -68,6 +74,13 @@ class Points:
             self.noise[own, k] = noise
         self.scale[own] = scale
         self.groups.append((own, programs, [numbers[0] for numbers, _A, _E in sampled]))
+
+    def _add_trace(self, own, trace, length):
+        value, bar = (0.0, np.inf) if trace is None else trace
+        with np.errstate(all="ignore"):
+            part = value * length
+            self.growth[0, own] += part
+            self.growth[1, own] += bar * length + 4 * ROUNDOFF_UP * (abs(part) + abs(self.growth[0, own]))
 
     def steps(self, reach, factor, those):
         """Numbers of steps (K, P) of some points, `factor` (K) times what norm and rate ask for."""

@@ -31,7 +31,7 @@ def solve(system, states, point, answer, time):
     re, im, bar = (np.asarray(answer[name]) for name in ("multiplier_re", "multiplier_im", "multiplier_re_error"))
     data = {
         "t": ("t", t, {"long_name": "time", "symbol": "t", "units": "1"}),
-        "multiplier": ("multiplier", np.arange(1, n + 1), {"long_name": "number of the multiplier"}),
+        "multiplier": ("multiplier", np.arange(1, re.size + 1), {"long_name": "number of the multiplier"}),
         **linear_motion.described(re + 1j * im, bar),
     }
     names = [name if name not in data else f"{name}_state" for name in states]

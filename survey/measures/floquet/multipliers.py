@@ -303,6 +303,28 @@ def crossing(own, verdict, paired, signs=None):
     return out
 
 
+def by_determinant(own, centre, bars, growth):
+    """Centres and bars of multipliers where the smallest, if it is real, follows from the others by Liouville: the
+    product of all is exp(growth[0]), `growth` (2, N) with its error bound.
+
+    Beside huge multipliers this tells far more of a small one than M does, whose errors are those of its largest entry.
+    """
+    centre, bars, rows = centre.copy(), bars.copy(), np.arange(len(centre))
+    with np.errstate(all="ignore"):
+        least = abs(centre).argmin(axis=1)
+        others = np.where(np.arange(centre.shape[1]) == least[:, None], 1.0, centre)
+        share = np.where(np.arange(centre.shape[1]) == least[:, None], 0.0, bars / abs(others))
+        # |1 / prod (1 + d_j) - 1| <= x / (1 - x) with x = prod (1 + |d_j|) - 1
+        x = np.expm1(np.log1p(share).sum(axis=1))
+        value = np.exp(growth[0]) / np.prod(others, axis=1).real
+        rounding = 8 * (centre.shape[1] + 1) * EPS
+        bar = abs(value) * (x / (1.0 - x) + np.expm1(growth[1]) + rounding) * (1.0 + x) + 1e-300
+        good = own.isolated.all(axis=1) & (centre[rows, least].imag == 0) & (x < 0.5) & (growth[1] < 0.5)
+        good &= (bar < bars[rows, least]) & (abs(value - centre[rows, least]) <= bar + bars[rows, least])
+    centre[rows[good], least[good]], bars[rows[good], least[good]] = value[good], bar[good]
+    return centre, bars
+
+
 def symmetric(own):
     """Centres and bars of paired multipliers: those outside the circle, and their mirror images in it, exactly."""
     centre, bars = own.centre.copy(), own.bars.copy()

@@ -14,6 +14,7 @@ from survey.kernels.math.roundoff import EPS
 from survey.measures import answers
 from survey.measures.floquet import dense, monodromy, multipliers
 from survey.measures.floquet.answers import Answers
+from survey.measures.floquet.existence import deflated
 from survey.measures.floquet.multipliers import (
     COLLISION,
     MARGINAL,
@@ -54,10 +55,10 @@ LADDER = answers.Ladder(1.5 ** np.arange(16), np.arange(16) + 1, None, most=16)
 CHUNK = 65536  # points n^2 that are solved together: bounds the memory
 
 
-def assess(matrices, structure, rtol, asked, period=None):
+def assess(matrices, structure, rtol, asked, period=None, growth=None):
     """The Answers of points from their Matrices; `asked` holds the names of the outputs that are wanted.
 
-    `period` (N) is needed for the accuracy of the exponent.
+    `period` (N) is needed for the accuracy of the exponent; `growth` (2, N), if given, is that of `monodromy.Points`.
     """
     M, E = matrices.M, matrices.E
     N, n = M.shape[:2]
@@ -73,6 +74,8 @@ def assess(matrices, structure, rtol, asked, period=None):
     if signs is not None:
         found.signs[:] = signs.T
     centre, bars = multipliers.symmetric(discs) if paired else (discs.centre, discs.bars)
+    if not paired and growth is not None:
+        centre, bars = multipliers.by_determinant(discs, centre, bars, growth)
     value, bar = multipliers.radius(discs)
     if paired:  # all multipliers are on the circle, exactly
         strong = found.verdict == STABLE
@@ -122,7 +125,7 @@ def solve(system, structure, points, method, rtol, wanted, lines=None, ranges=No
     """
     n, shape = system.n, points.shape[:-1]
     flat = points.reshape(-1, points.shape[-1])
-    answer, left = Answers(len(flat), n), np.arange(len(flat))
+    answer, left = Answers(len(flat), system.judged), np.arange(len(flat))
     results = monodromy.Matrices.empty(len(flat) if "monodromy" in wanted else 0, n)
     period = system.periods(flat) if wanted & {"period", "exponent"} else None
     if method == "auto" and dense.serves(system, structure, wanted, lines or {}):
@@ -143,6 +146,16 @@ def solve(system, structure, points, method, rtol, wanted, lines=None, ranges=No
     return {name: values.reshape(*shape, *values.shape[1:]) for name, values in out.items()}
 
 
+def judged(system, points, matrices):
+    """The Matrices of the multipliers that are judged: all, or those without the 1 of what is conserved."""
+    if system.conserved is None:
+        return matrices
+    w = system.weights(points)
+    # w is an eigenvector of the transposed matrix
+    M, E = deflated(np.swapaxes(matrices.M, 1, 2), np.swapaxes(matrices.E, 1, 2), w, np.zeros_like(w))
+    return monodromy.Matrices.plain(*(np.ascontiguousarray(np.swapaxes(X, 1, 2)) for X in (M, E)))
+
+
 def _solve_some(system, structure, given, method, rtol, wanted, places, answer, results):
     """Answer points (N, parameters), each from its own monodromy matrix, at their `places`."""
     points = monodromy.Points(system, given)
@@ -156,7 +169,9 @@ def _solve_some(system, structure, given, method, rtol, wanted, places, answer, 
         return monodromy.solve(points, method, rtol, LADDER.rungs[rung], where[those], sharp)
 
     def assessed(those, found):
-        return assess(found, structure, rtol, asked, points.period[where[those]])
+        own = where[those]
+        found = judged(system, given[own], found)
+        return assess(found, structure, rtol, asked, points.period[own], points.growth[:, own])
 
     if where.size:
         rung = np.zeros(where.size, dtype=np.int64)

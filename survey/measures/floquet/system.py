@@ -33,7 +33,8 @@ class Raised(Exception):
 class System:
     """n states; `matrices` {"A"} or {"M", "C", "K"} (M, C optional): functions of t, p and out, the matrix to fill.
 
-    `period` and `breaks` are values, or functions of p.
+    `period` and `breaks` are values, or functions of p; so is `conserved`, if given: w (n), where w x is the same a
+    period later. Its multiplier, 1, is not judged.
     """
 
     matrices: dict
@@ -41,11 +42,25 @@ class System:
     period: float | Callable
     breaks: tuple | Callable
     symplectic: bool
+    conserved: tuple | Callable | None = None
     _traces: list = field(default_factory=list, repr=False)
 
     @cached_property
     def _lifted(self):
         return {name: trace.lifted(function) for name, function in self.matrices.items()}
+
+    @property
+    def judged(self):
+        """The number of multipliers that are judged."""
+        return self.n - (self.conserved is not None)
+
+    def weights(self, points):
+        """What is `conserved` at the points: w (N, n)."""
+        rows = [self._value("CONSERVED", self.conserved, p) for p in points]
+        try:
+            return np.array(rows, dtype=float).reshape(len(points), self.n)
+        except (TypeError, ValueError) as error:
+            raise Raised("CONSERVED(p)") from error
 
     @property
     def same_ranges(self):

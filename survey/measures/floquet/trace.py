@@ -689,6 +689,16 @@ class Program:
                     E[:, :, i, j] += len(self.terms) * ROUNDOFF_UP * abs(x * y)
         return A, E
 
+    def trace(self, numbers):
+        """The sum of the diagonal entries (N) and its error bound; None where it depends on t."""
+        diagonal = self.terms[self.terms[:, pg.ROW] == self.terms[:, pg.COLUMN]]
+        if (diagonal[:, pg.BASIS] != ONE).any():
+            return None
+        values, errors = numbers
+        own = values[:, diagonal[:, pg.NUMBER]]
+        rounding = len(diagonal) * ROUNDOFF_UP * abs(own).sum(axis=1)
+        return own.sum(axis=1), errors[:, diagonal[:, pg.NUMBER]].sum(axis=1) + rounding
+
     def sampled(self, numbers, t):
         """(terms, values, error bounds): the terms with their basis functions numbered from 0, and these functions
         (B, N, m) at times t (N, m); where they depend on t alone t may be (1, m), and N is 1.

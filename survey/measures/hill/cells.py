@@ -83,13 +83,20 @@ class Cells:
     points: int
 
 
-def find(solve, x, y, each=in_turn, report=None):
+def _factors(out):
+    """The factors and their bounds (B, 4, n, n)."""
+    values = np.stack([out[name] for name in FACTORS], axis=1)
+    return values, np.stack([out[f"{name}_error"] for name in FACTORS], axis=1)
+
+
+def find(solve, x, y, each=in_turn, report=None, values=_factors, descend=descend):
     """The Cells of the rectangle of the Sides x and y.
 
     `solve(x, y)` gives the four factors with their error bounds at broadcast arrays of both parameters,
     NaN where there are none; `each`: see `measures.tasks`. `report(part, points)` is called with the part of
-    the rectangle that is settled, and the number of points solved for it. Raises OverflowError if there are more
-    than MOST cells.
+    the rectangle that is settled, and the number of points solved for it. `values(out)` makes functions and their
+    bounds of what is solved, and `descend` decides cells by them. Raises OverflowError if there are more than MOST
+    cells.
     """
     depth = np.array([x.depth, y.depth])
     halves = np.full((2, max(depth.max(), 1), 2, NODES, NODES), np.nan)
@@ -97,7 +104,7 @@ def find(solve, x, y, each=in_turn, report=None):
     todo, kept, points = _first(depth), [], 0
 
     def task(blocks):
-        leaves, count = descend(*_series(solve, x, y, blocks), blocks, depth, halves)
+        leaves, count = descend(*_series(solve, x, y, blocks, values), blocks, depth, halves)
         return leaves[:count]
 
     while len(todo):
@@ -126,15 +133,15 @@ def _first(depth):
     return np.column_stack([np.full(i.size, level[0]), i, np.full(i.size, level[1]), j])
 
 
-def _series(solve, x, y, blocks):
-    """The factors' series (B, 4, n, n) on blocks, and what each leaves open: tails in x, in y, the rest (B, 4, 3)."""
+def _series(solve, x, y, blocks, of):
+    """The functions' series (B, 4, n, n) on blocks, and what each leaves open: tails in x, in y, the rest (B, 4, 3)."""
     (middle_x, radius_x), (middle_y, radius_y) = _spans(x, blocks[:, :2]), _spans(y, blocks[:, 2:])
     out = solve(
         (middle_x[:, None] + radius_x[:, None] * POINTS)[:, :, None],
         (middle_y[:, None] + radius_y[:, None] * POINTS)[:, None, :],
     )
-    values = np.stack([out[name] for name in FACTORS], axis=1)
-    bars = np.stack([out[f"{name}_error"] for name in FACTORS], axis=1).max(axis=(2, 3))
+    values, bars = of(out)
+    bars = bars.max(axis=(2, 3))
     series = TRANSFORM @ values[..., :NODES, :NODES] @ TRANSFORM.T
     size = abs(series)
     by_x, by_y = size.sum(axis=3), size.sum(axis=2)

@@ -37,6 +37,13 @@ def _take(answers, points, own):
     answers.replace(points[better], own, better)
 
 
+def factors(e, mu):
+    """A, B, C, D, t (N, 5) of points, rounded once, and their error bounds (N, 5)."""
+    results = np.concatenate([_results(e[i : i + POINTS], mu[i : i + POINTS]) for i in range(0, e.size, POINTS)])
+    values, low, bars = np.split(results, 3, axis=1)
+    return values, bars + abs(low)
+
+
 def _results(e, mu):
     """Results (N, RESULTS) of points; those with as many steps, by e, go together."""
     order = np.argsort(e, kind="stable")

@@ -76,11 +76,17 @@ def _slope(state, parameters, _sin, _cos):
     W, e = parameters[0], parameters[1]
     wave = e * c
     k1, k2, k3 = 1.69 + wave, 0.49 + 0.5 * wave, 0.7 * wave
-    slopes = [-1.0 * (W * s), W * c]
-    for first in (2, 6, 10, 14):
-        x, y, u, v = state[first], state[first + 1], state[first + 2], state[first + 3]
-        slopes += [u, v, -1.0 * (k1 * x + k3 * y) - 0.02 * u, -1.0 * (k3 * x + k2 * y) - 0.05 * v]
-    return tuple(slopes)
+    x0, y0, u0, v0, x1, y1, u1, v1 = state[2], state[3], state[4], state[5], state[6], state[7], state[8], state[9]
+    x2, y2, u2, v2, x3, y3, u3, v3 = (
+        state[10], state[11], state[12], state[13], state[14], state[15], state[16], state[17],
+    )  # fmt: skip
+    return (
+        -1.0 * (W * s), W * c,
+        u0, v0, -1.0 * (k1 * x0 + k3 * y0) - 0.02 * u0, -1.0 * (k3 * x0 + k2 * y0) - 0.05 * v0,
+        u1, v1, -1.0 * (k1 * x1 + k3 * y1) - 0.02 * u1, -1.0 * (k3 * x1 + k2 * y1) - 0.05 * v1,
+        u2, v2, -1.0 * (k1 * x2 + k3 * y2) - 0.02 * u2, -1.0 * (k3 * x2 + k2 * y2) - 0.05 * v2,
+        u3, v3, -1.0 * (k1 * x3 + k3 * y3) - 0.02 * u3, -1.0 * (k3 * x3 + k2 * y3) - 0.05 * v3,
+    )  # fmt: skip
 
 
 def outcome(ends):

@@ -6,7 +6,8 @@ import pytest
 import survey
 from survey.kernels.cylinder import fate as kf
 from survey.kernels.cylinder import records as rc
-from survey.measures.cylinder import basins, equation, fate
+from survey.measures.cylinder import basins, curves, equation, fate
+from survey.measures.square import Square
 from survey.methods import taylor
 from survey.scene import Request
 
@@ -98,3 +99,23 @@ def test_own_flows_are_told_alike(point):
     random = np.random.default_rng(7)
     share, wrong = compared(row, np.stack([random.uniform(-7.0, 7.0, 60), random.normal(size=60) * 2.0], axis=1))
     assert wrong == 0 and share > 0.8
+
+
+def test_curves_of_an_own_flow_on_a_map_of_states():
+    """The junction's stable manifolds, over (phi0, w0), part the fates: at I = 0.5, a = 0.3 rest from rotation."""
+    f, g = (lambda phi, p: -p[0]), (lambda phi, p: p[1] - np.sin(phi))
+    junction = survey.abel(f, g, parameters=("a", "I"), period=2 * np.pi)
+    square = Square(np.array([-3.0, -3.0]), np.array([3.0, 3.0]), np.array([False, False]))
+    found = curves.searched(junction, square, ["phi0", "w0"], {"a": 0.3, "I": 0.5}, {})
+    saddle = np.pi - np.arcsin(0.5)
+    branches = np.repeat(found.kind, found.count) == curves.CLASSES["stable_manifold"]
+    points = found.parameters[branches]
+    assert len(points)
+    away = np.abs(points - [saddle, 0.0]).sum(axis=1)
+    assert away.min() < 1e-12
+    i = int(np.argmin(np.abs(points[:, 0] - 1.0) + np.abs(points[:, 1] - 1.0)))
+    verdicts = [
+        int(survey.evaluate(junction, a=0.3, I=0.5, phi0=points[i, 0], w0=points[i, 1] + off, question="fate").verdict)
+        for off in (-1e-6, 1e-6)
+    ]
+    assert verdicts[0] != verdicts[1]

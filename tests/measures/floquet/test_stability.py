@@ -315,6 +315,64 @@ def test_the_reason_of_a_cluster_is_told():
     assert "Krein signs are the same" in str(ds.survey.point(a=2.0, q=0.1))
 
 
+def test_small_multipliers_beside_huge_ones():
+    """Where Mathieu's solutions grow by 1e4 and more, M tells nothing of what decays; the determinant does."""
+    a, q, c = np.linspace(-30.0, -4.0, 25), np.linspace(0.1, 8.0, 19), 0.3
+    ours = survey.evaluate(mathieu("none"), a=a, q=q, c=c)
+    known = survey.evaluate("mathieu", a=a - c * c, q=q)
+    mu, doubt = known.exponent.values, known.exponent_error.values
+    exact = np.exp(-c * math.pi - mu) * np.sign(known.discriminant.values)
+    off = abs(ours.multiplier_re.values[..., 1] - exact)
+    bar = ours.multiplier_re_error.values[..., 1]
+    assert (off <= bar + abs(exact) * np.expm1(doubt + 1e-14)).all()
+    assert (bar <= 1e-10 * abs(exact)).mean() > 0.95
+    assert np.median(mu) > 6 and ours.attrs["accuracy_missed"] == 0
+
+
+def chained(known):
+    """Three masses on a line, damped by their relative motion alone: the momentum of all is conserved."""
+
+    def A(t, p, out):
+        k = [p[0] + p[1] * math.cos(t), 0.7 * p[0]]
+        for i in (0, 1):  # strains, then velocities
+            out[i, 2 + i], out[i, 3 + i] = -1.0, 1.0
+            for j, sign in ((2 + i, 1.0), (3 + i, -1.0)):
+                out[j, i] += sign * k[i]
+                out[j, 2 + i] -= sign * p[2]
+                out[j, 3 + i] += sign * p[2]
+
+    names = {"parameters": ("k", "e", "c"), "states": ("s", "r", "u", "v", "w")}
+    return survey.floquet(A, period=2 * math.pi, **names, conserved=known)
+
+
+def test_a_conserved_quantity_is_not_judged():
+    axes = {"k": np.linspace(0.4, 2.5, 9), "e": np.linspace(0.0, 1.0, 7), "c": 0.02}
+    plain = survey.evaluate(chained(None), **axes)
+    ours = survey.evaluate(chained((0, 0, 1, 1, 1)), **axes, variables=["multiplier_re", "verdict", "spectral_radius"])
+    assert not (plain.verdict == 1).any()  # the momentum's multiplier is 1
+    assert set(np.unique(ours.verdict)) == {0, 1}
+    assert (ours.verdict == 0).where(plain.verdict == 0, True).all()
+    assert ours.sizes["multiplier"] == 4 and plain.sizes["multiplier"] == 5
+    # the same masses seen from the middle one: relative velocities alone, nothing is conserved
+
+    def relative(t, p, out):
+        k = [p[0] + p[1] * math.cos(t), 0.7 * p[0]]
+        out[0, 2] = out[1, 3] = 1.0
+        for i, j in ((0, 1), (1, 0)):
+            out[2 + i, i], out[2 + i, j] = -2.0 * k[i], k[j]
+            out[2 + i, 2 + i], out[2 + i, 2 + j] = -2.0 * p[2], p[2]
+
+    names = {"parameters": ("k", "e", "c"), "states": ("s", "r", "ds", "dr")}
+    other = survey.evaluate(survey.floquet(relative, period=2 * math.pi, **names), **axes)
+    assert (ours.verdict == other.verdict).all()
+    off = abs(ours.spectral_radius - other.spectral_radius)
+    assert (off <= ours.spectral_radius_error + other.spectral_radius_error).all()
+    with pytest.raises(survey.BadInput, match="changes by"):
+        survey.evaluate(chained((0, 0, 1, 1, 0)), **axes)
+    with pytest.raises(survey.BadInput, match="there are 5 states"):
+        chained((1, 1))
+
+
 @pytest.mark.parametrize("power", [-0.5, -1.5])
 def test_a_root_in_a_denominator_has_its_series(power):
     """The derivative of y = sqrt x is made of 1 / y, which needs y: y'' + a x^power y = 0."""
