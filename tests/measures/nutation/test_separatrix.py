@@ -46,10 +46,11 @@ def test_growth_rates():
     ds = survey.evaluate("brun", l=2.0, **points, variables=["saddle_growth", "separatrix_distance"])
     assert (ds.saddle_growth.notnull() == ds.separatrix_distance.notnull()).all()
     assert 20 < int(ds.saddle_growth.notnull().sum()) < 180
+    near = separatrix.saddles(alpha, beta)[0].tolist()
     for i in np.flatnonzero(ds.saddle_growth.notnull())[:40]:
         with mp.workdps(30):
             a, b = mpf(alpha[i]), mpf(beta[i])
-            u = mp.findroot(lambda u, a=a, b=b: (a - b * u) * (b - a * u) + u * (1 - u * u) ** 2, -a * b)
+            u = mp.findroot(lambda u, a=a, b=b: (a - b * u) * (b - a * u) + u * (1 - u * u) ** 2, near[i])
             level = (a * a + b * b - 2 * a * b * u) / (1 - u * u) - u * u
             rate = mp.sqrt(1 - 6 * u * u - level)
             assert abs(mpf(float(ds.saddle_growth[i])) - rate) <= float(ds.saddle_growth_error[i])
