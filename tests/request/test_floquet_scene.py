@@ -266,3 +266,21 @@ def test_reversible_systems_of_one_coordinate_are_stable_on_the_circle():
     )  # fmt: skip
     known = survey.evaluate("mathieu", a=[0.5, 1.0], q=-0.2)
     assert ds.verdict.values.tolist() == known.verdict.values.tolist() == [1, 0]
+
+
+def test_a_file_may_name_what_is_conserved(tmp_path):
+    """Two free masses, damped by their relative motion: s' = w - u, and u + w stays the same."""
+    path = tmp_path / "free.py"
+    path.write_text(
+        "from math import cos, pi\n"
+        "PARAMETERS, STATES, PERIOD, CONSERVED = ('k', 'c'), ('s', 'u', 'w'), 2 * pi, (0, 1, 1)\n"
+        "def A(t, p, out):\n"
+        "    out[0, 1], out[0, 2] = -1.0, 1.0\n"
+        "    for row, sign in ((1, 1.0), (2, -1.0)):\n"
+        "        out[row, 0] = sign * p[0] * (1 + 0.1 * cos(t))\n"
+        "        out[row, 1], out[row, 2] = -sign * p[1], sign * p[1]\n"
+    )
+    ds = survey.evaluate(str(path), k=1.3, c=0.2)
+    assert int(ds.verdict) == 1 and ds.sizes["multiplier"] == 2
+    path.write_text(path.read_text().replace(", CONSERVED", "").replace(", (0, 1, 1)", ""))
+    assert int(survey.evaluate(str(path), k=1.3, c=0.2).verdict) == -1

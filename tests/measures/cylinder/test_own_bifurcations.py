@@ -139,7 +139,8 @@ def test_the_junctions_homoclinic_curve(monkeypatch):
 def test_on_a_line_there_are_none():
     scene = survey.abel(lambda phi, p: -p[0], lambda phi, p: p[1] - phi, parameters=["a", "b"])
     assert "period" in curves.refusal(["a", "b"], scene)
-    assert "s2" in curves.refusal(["phi0", "w0"], gyrostat())
+    assert "s2" in curves.refusal(["phi0", "d"], gyrostat())
+    assert curves.refusal(["phi0", "w0"], gyrostat()) is None
     assert curves.refusal(["d", "s2"], gyrostat()) is None
 
 
