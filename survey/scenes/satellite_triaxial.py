@@ -12,7 +12,7 @@ Small tilts e1, e2 about the axes of A and B, with their momenta P1, P2, obey, a
 a canonical system of period T = 4 K(k), or 2 K(1/k) / k for rotations.
 
 Model: a rigid body, gravity to the order of the torque, a circular orbit. Linear motion across the plane of an exact
-motion in it; not for large tilts, eccentric orbits, flexible or damped satellites.
+motion in it. Not for large tilts, eccentric orbits, flexible or damped satellites.
 
 Parameters, in order: A, B, C, of any one unit, A < B, none larger than the sum of the others; instead of A roll_ratio =
 (C - A)/B, instead of B yaw_ratio = (C - B)/A, both from -1 to 1. k >= 0, k != 1; or one_minus_k = 1 - k where that is
