@@ -96,3 +96,11 @@ def ran(small, surveyed):
     for name in ("small.nc", "small.nc.sha256"):
         shutil.copy(surveyed.with_name(name), small.parent)
     return small.with_suffix(".nc")
+
+
+@pytest.fixture(autouse=True)
+def closed_figures():
+    """Close the figures that a test has left open, as the end of a notebook's cell does."""
+    yield
+    if "matplotlib.pyplot" in sys.modules:
+        sys.modules["matplotlib.pyplot"].close("all")

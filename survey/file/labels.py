@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from survey import __version__, status
+from survey.errors import Damaged
 from survey.file import schema
 from survey.scene import exists
 
@@ -183,10 +184,17 @@ def _counts(table):
 
 
 def counts_in(attributes):
-    """{"status", "verdict": {kind: points}} from a file's attributes, as `Tally.attributes` wrote them."""
-    texts = {name: attributes[f"{name}_counts"] for name in ("status", "verdict") if f"{name}_counts" in attributes}
-    pairs = {name: [part.rpartition(": ") for part in text.split(", ")] for name, text in texts.items()}
-    return {name: {kind: int(number) for kind, _, number in parts} for name, parts in pairs.items()}
+    """{"status", "verdict": {kind: points}} from a file's attributes, as `Tally.attributes` wrote them.
+
+    Raises Damaged where they say anything else."""
+    found = {}
+    for name in ("status", "verdict"):
+        if (text := attributes.get(f"{name}_counts")) is not None:
+            parts = [part.rpartition(": ") for part in str(text).split(", ") if part]
+            if not all(number.isdecimal() for _, _, number in parts):
+                raise Damaged(f"the attribute {name}_counts holds no counts")
+            found[name] = {kind: int(number) for kind, _, number in parts}
+    return found
 
 
 def _exceeds(value, bar, rtol):

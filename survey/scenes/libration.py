@@ -106,7 +106,7 @@ OUTPUTS = (
     Output("det_N", "determinant of N'', the second derivatives by the actions", r"\det N''",
            applies=_BELOW + "; not 0 but at mu = 0.0215391147..."),
     Output("det_bordered", "determinant of N'' bordered by the frequencies (Arnold)",
-           r"\det\left(\begin{smallmatrix}N'' & \omega\\ \omega^T & 0\end{smallmatrix}\right)",
+           r"\det N''_\omega",
            applies=_BELOW + "; never 0: by KAM theory most motions near L4 stay on tori on every level of energy, "
            "which for three degrees of freedom do not keep the others in: this is not Lyapunov stability"),
     Output("c8", "coefficient of r1^i r2^j r3^k, monomial ijk of four actions", "c_{ijk}", dims=("monomial8",),

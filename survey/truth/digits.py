@@ -60,7 +60,7 @@ def _factors(scene, z, p):
 def _piece(z, mp, flow, u, end):
     """The flow y1, y2, y1', y2' at the end of a smooth piece, the local errors' sum, steps, the largest entry."""
     h, doubt, steps, largest = end - u, 0.0, 0, 1.0
-    inside = (end - u) * mp.mpf(2) ** -60  # a jump at an end of the piece belongs to the other side
+    inside = (end - u) * mp.mpf(2) ** -110  # a jump at an end of the piece belongs to the other side
     low, high = u + inside, end - inside
     while u < end:
         h = min(h, end - u)

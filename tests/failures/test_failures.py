@@ -27,7 +27,7 @@ def test_no_method_lies(scene):
     for plane, results in zip(of, failures.measure(of), strict=True):
         records = [failures.record(plane, method, found) for method, found in results]
         assert not any(r.lies for r in records), records
-        assert all(r.largest_error_where_met <= failures.RTOL for r in records), plane.name
+        assert not any(r.largest_error_where_met > failures.RTOL for r in records), plane.name  # NaN: none answered
         found = dict(results)
         auto = found["auto"]
         assert auto is not None and (auto.answered | plane_refused(found)).all(), plane.name

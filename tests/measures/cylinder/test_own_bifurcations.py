@@ -37,7 +37,7 @@ def junction():
 def points(scene, square):
     """{class: (parameters (m, 2), errors (m))} of the curves."""
     axes = [p.name for p in scene.own]
-    found = curves.searched(scene, square, axes, {})
+    found = curves.searched(scene, square, axes, {}, {})
     kinds = np.repeat(found.kind, found.count)
     return {NAMES[kind]: (found.parameters[kinds == kind], found.error[kinds == kind]) for kind in set(kinds)}
 
@@ -159,7 +159,7 @@ def test_hopf_points_are_told_apart_by_the_cycle_beside_them(f1, kind, monkeypat
 
     scene = survey.abel(f, g, parameters=["a", "k"], period=2 * pi)
     square = Square(np.array([-0.2, 0.5]), np.array([0.3, 2.0]), EVEN)
-    found = curves.searched(scene, square, ["a", "k"], {})
+    found = curves.searched(scene, square, ["a", "k"], {}, {})
     kinds = [NAMES[k] for k in found.kind]
     assert kind in kinds
     side = survey.evaluate(scene, question="portrait", a=-0.01 * f1, k=1.0)
