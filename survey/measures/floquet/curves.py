@@ -51,7 +51,9 @@ def searched(scene, square, axes, fixed, options):
         request = Request(options, "auto", rtol, frozenset(["monodromy"]))
         with np.errstate(all="ignore"):
             out = scene.solve(point, request)
-        return scene.judged(values, axes, fixed, out["monodromy"], out["monodromy_error"])
+        found = out["monodromy"], out["monodromy_error"]
+        # a system of one's own may have a conserved quantity
+        return scene.judged(values, axes, fixed, *found) if hasattr(scene, "judged") else found
 
     found, on_lattice = [], matrices(contours.lattice(LINES), ROUGH)
     for kind, function in bifurcations.functions(on_lattice[0].shape[1], scene.structure).items():
