@@ -48,12 +48,6 @@ class AbelScene(FunctionScene):
     f: Callable
     g: Callable
     period: float | None
-    NAME: str
-    TEXT: str
-    HASH: str
-    TITLE: str
-    about: str
-    REFERENCES: tuple[str, ...]
     FAMILY = "abel"
     AUDIT = ("dop853",)
     STATUS = STATUS

@@ -36,12 +36,6 @@ class DampedScene(FunctionScene):
     period: float | Callable
     breaks: tuple[float, ...] | Callable
     even: bool
-    NAME: str
-    TEXT: str
-    HASH: str
-    TITLE: str
-    about: str
-    REFERENCES: tuple[str, ...]
     FAMILY = "hill"
     AUDIT = ("dop853",)
     OPTIONS = ()

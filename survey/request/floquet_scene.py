@@ -31,12 +31,6 @@ class FloquetScene(TracedScene):
     states: tuple[str, ...]
     structure: str
     conserved: tuple[float, ...] | Callable | None
-    NAME: str
-    TEXT: str
-    HASH: str
-    TITLE: str
-    about: str
-    REFERENCES: tuple[str, ...]
     FAMILY = "floquet"
     AUDIT = ("dop853",)
     OPTIONS = ()

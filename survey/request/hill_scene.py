@@ -43,12 +43,6 @@ class HillScene(FunctionScene):
     period: float | Callable
     breaks: tuple[float, ...] | Callable
     EVEN: bool
-    NAME: str
-    TEXT: str
-    HASH: str
-    TITLE: str
-    about: str
-    REFERENCES: tuple[str, ...]
     FAMILY = "hill"
     AUDIT = ("dop853",)
     OPTIONS = ()

@@ -36,12 +36,6 @@ class OrbitScene(TracedScene):
     jacobian: Callable | None
     states: tuple[str, ...]
     continued: Range | None
-    NAME: str
-    TEXT: str
-    HASH: str
-    TITLE: str
-    about: str
-    REFERENCES: tuple[str, ...]
     FAMILY = "orbit"
     AUDIT = ("dop853",)
     OPTIONS = ()
