@@ -12,6 +12,7 @@ from survey.errors import BadInput
 from survey.failures.plane import MAP
 from survey.request import user_scene
 from survey.scene import exists
+from survey.truth import distance
 
 
 @dataclass(frozen=True)
@@ -90,9 +91,7 @@ def judged(plane, answer, rtol):
     for name, (value, low, doubt) in truth.items():
         said, bar = answer[name], answer[f"{name}_error"].astype(float)
         with np.errstate(all="ignore"):
-            off = np.abs((said - value) - low).astype(float)
-            known = np.isfinite(off) & np.isfinite(np.broadcast_to(np.asarray(doubt, float), off.shape))
-            over = np.where(known, np.maximum(off - doubt, 0.0), 0.0)
+            off, known, over = distance(said, value, low, doubt)
             sharp = known & ((doubt <= bar) | (off == 0) | (off > doubt))
             relative = np.where(sharp, off / (1.0 + np.abs(np.asarray(value, float))), np.nan)
             checked |= _any(sharp)

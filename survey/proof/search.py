@@ -84,10 +84,10 @@ def _sampled(equation, sides, name, r):
         for k in range(SAMPLES):
             u = start + (end - start) * (arb(2 * k + 1) / (2 * SAMPLES))
             lengths.append(float((end - start) / SAMPLES))
-            rows.append([complex(acb(z(u=u, **{key: x.mid() for key, x in place.items()}))) for place in arcs])
             if k % CHECKED == 0 and not all(acb(z(u=u, **place)).is_finite() for place in boxes):
-                rows[-1] = [math.nan] * len(arcs)
+                rows.append([math.nan] * len(arcs))
                 return np.array(lengths), np.array(rows)
+            rows.append([complex(acb(z(u=u, **{key: x.mid() for key, x in place.items()}))) for place in arcs])
     return np.array(lengths), np.array(rows)
 
 

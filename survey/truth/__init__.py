@@ -32,6 +32,13 @@ def kept():
         _KEPT.pop()
 
 
+def distance(said, value, low, doubt):
+    """(how far an answer lies from a truth, whether that is known, what of it exceeds the truth's doubt)."""
+    off = np.abs((said - value) - low).astype(float)
+    known = np.isfinite(off) & np.isfinite(np.broadcast_to(np.asarray(doubt, float), off.shape))
+    return off, known, np.where(known, np.maximum(off - doubt, 0.0), 0.0)
+
+
 def remembered(name, kernel, points, columns):
     """The rows (N, columns) that kernel(points, out) fills for points (N, n); `name` tells kernels apart."""
     points = np.ascontiguousarray(points, float)

@@ -17,6 +17,7 @@ import survey
 from survey import status
 from survey.request import user_scene
 from survey.scene import exists
+from survey.truth import distance
 
 COUNTS = ("points", "undecided", "missed", "refused", "unchecked", "lies", "wrong", "silent", "tracebacks", "slow")
 FAULTS = ("lies", "wrong", "silent", "tracebacks")
@@ -199,9 +200,7 @@ def _truth(batch, answer, counts, faults):
     for name, (value, low, doubt) in truth.items():
         said, bar = answer[name], answer[f"{name}_error"].astype(float)
         with np.errstate(all="ignore"):
-            off = np.abs((said - value) - low).astype(float)
-            known = np.isfinite(off) & np.isfinite(np.broadcast_to(np.asarray(doubt, float), off.shape))
-            over = np.where(known, np.maximum(off - doubt, 0.0), 0.0)
+            off, known, over = distance(said, value, low, doubt)
             lie = known & (over > bar)
             ratio = np.where(over > 0, over / bar, 0.0)
         checked |= _any(known & ((doubt <= bar) | (off == 0)))  # a vaguer truth checks little
