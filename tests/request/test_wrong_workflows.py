@@ -22,7 +22,7 @@ from survey.sweep import plan, solve
 
 FOLDER = Path(__file__).parents[2] / "workflows"
 LONGEST = 500  # characters of a message
-SECONDS = 20  # for one file: on a busy machine, and with kernels of an own equation to compile
+SECONDS = 60  # for one file: on a busy machine, and with kernels of an own equation to compile
 DEEP = []
 for _ in range(200):
     DEEP = [DEEP]
