@@ -188,6 +188,26 @@ def brun():
     return figure
 
 
+def brun_triaxial():
+    figure, space = _panels(1, "the body, and the way to the attracting centre")
+    _arrow(space, (0, 0), (0, 2.1), PALE)
+    space.text(0.08, 2.1, r"$\nu$, to the attracting centre", ha="left", va="top", color=PALE)
+    first, second, third = 1.5 * _unit(62), 1.25 * _unit(-14), 0.9 * _unit(215)
+    corners = [0.62 * first * i + 0.5 * second * j for i, j in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
+    back = [corner - 0.35 * third for corner in corners]
+    space.add_patch(Polygon(back, facecolor="white", edgecolor=PALE))
+    for one, other in zip(corners, back, strict=True):
+        _line(space, one, other, PALE)
+    space.add_patch(Polygon(corners, facecolor=BODY, edgecolor=INK, alpha=0.9))
+    for axis, name in ((first, "C"), (second, "B"), (third, "A")):
+        _arrow(space, (0, 0), axis, INK)
+        space.text(*(1.12 * axis), name, ha="center", va="center")
+    _arrow(space, (-0.35, 1.75), (0.38, 1.75), MARK, bend=0.35)
+    space.text(-0.4, 1.7, r"$\Omega$", color=MARK, ha="right")
+    _limits(space, (-1.9, 2.3), (-1.2, 2.3))
+    return figure
+
+
 def libration():
     figure, axes = _panels(1, "seen from above, in axes that turn with the primaries")
     _triangle(axes)
@@ -239,7 +259,8 @@ def _triangle(axes):
 DRAWINGS = {
     draw.__name__: draw
     for draw in (
-        satellite, satellite_triaxial, mathieu, gyrostat, gyrostat_body, brun, libration, libration_elliptic,
+        satellite, satellite_triaxial, mathieu, gyrostat, gyrostat_body, brun, brun_triaxial, libration,
+        libration_elliptic,
     )
 }  # fmt: skip
 
