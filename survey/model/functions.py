@@ -11,10 +11,10 @@ import numpy as np
 
 from survey import api
 from survey.errors import BadInput
+from survey.model.reader import HALF
 from survey.request.function_scene import FunctionScene
 
 BEST = 1e-15  # what is asked at the nodes: as well as can be
-HALF = ("y1", "dy1", "y2", "dy2")
 INVARIANTS = {"A": "det P", "B": "det T", "C": "det Q", "D": "det S", "t": "trace of T'P"}
 
 

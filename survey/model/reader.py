@@ -12,7 +12,9 @@ Sources: J. C. Mason, D. C. Handscomb, Chebyshev Polynomials (2003); I. Schur, J
 
 import hashlib
 import json
+import math
 import zipfile
+import zlib
 from functools import cached_property
 from itertools import pairwise
 
@@ -24,7 +26,10 @@ EPS = 2.0**-52
 CHUNK, PART = 16384, 1024  # points whose temporaries stay in the processor's cache, of a grid and of a cell
 CELLS, PIECES, FEW = 16, 4, 100_000  # terms of a cell's series, cells of a panel; points from which on cells pay
 LOT = 2**19  # points that are sorted together
+MOST_CELLS = 2**16  # what their numbers (uint16) tell apart
 FINE = 2**14  # places along a side, each in one cell
+BYTES, TERMS, DENSE = 2**28, 2**10, 2**27  # at most: of a member, of a series along a side, of all series
+HALF, INVARIANTS = ("y1", "dy1", "y2", "dy2"), ("A", "B", "C", "D", "t")
 DERIVED = {"hill": ("discriminant", "exponent"), "trace": ("exponent",), "danby": ("a", "b")}
 
 
@@ -39,15 +44,15 @@ class Model:
     """
 
     def __init__(self, path):
-        try:
-            with zipfile.ZipFile(path) as archive:
-                self.about, series = json.loads(archive.read(TABLE)), archive.read(SERIES)
-        except (zipfile.BadZipFile, KeyError, ValueError) as error:
-            raise ValueError(f"{path}: this is not a model of survey ({error}); make one with survey model") from None
+        self.about, series = _read(path)
         if self.about.get("format") != FORMAT:
             raise ValueError(f"{path}: the format is {self.about.get('format')!r}, not {FORMAT!r}")
-        if hashlib.sha256(series).hexdigest() != self.about["sha256"]:
+        if hashlib.sha256(series).hexdigest() != self.about.get("sha256"):
             raise ValueError(f"{path}: its bits have changed (sha256); copy or make it again")
+        try:
+            _check(self.about, len(series) // 8)
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            raise ValueError(f"{path}: {TABLE} is not that of a model ({error!r}); make it again") from None
         self.names = tuple(p["name"] for p in self.about["parameters"])
         self.low, self.high = (tuple(p[end] for p in self.about["parameters"]) for end in ("low", "high"))
         self.functions = tuple(f["name"] for f in self.about["functions"])
@@ -58,7 +63,7 @@ class Model:
 
     def __repr__(self):
         ends = zip(self.names, self.low, self.high, strict=True)
-        return f"<Model of {self.about['title']}: {', '.join(f'{a:g} <= {n} <= {b:g}' for n, a, b in ends)}>"
+        return f"<Model of {self.about['title']!r}: {', '.join(f'{a:g} <= {n} <= {b:g}' for n, a, b in ends)}>"
 
     def __call__(self, variables=None, gradient=True, **parameters):
         """Values, bars `X_error`, gradients `X_by_NAME` and `verdict` as an xarray Dataset.
@@ -186,8 +191,11 @@ class Model:
 
     @cached_property
     def _cells(self):
-        """Series of D on cells of the panels; None where the rule knows no D."""
-        return _Cells(self) if self.rule in ("hill", "trace") else None
+        """Series of D on cells of the panels; None where the rule knows no D, or there are too many to be numbered."""
+        if self.rule not in ("hill", "trace"):
+            return None
+        lattice = [_lattice(self, side, PIECES) for side in range(2)]
+        return _Cells(self, lattice) if math.prod(edges.size - 1 for edges in lattice) <= MOST_CELLS else None
 
     def _by_cells(self, x, y, out):
         left = [self._cells.solve(x, y, out, slice(first, min(first + LOT, x.size))) for first in range(0, x.size, LOT)]
@@ -200,12 +208,64 @@ class Model:
                 out[name][left] = values
 
 
+def _read(path):
+    """(the table, the bytes of the series) of a model; raises ValueError where the file holds none."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            for member in (TABLE, SERIES):
+                if archive.getinfo(member).file_size > BYTES:
+                    raise ValueError(f"{member} would unpack to more than {BYTES:,} bytes")
+            table, series = json.loads(archive.read(TABLE)), archive.read(SERIES)
+        if not isinstance(table, dict):
+            raise ValueError(f"{TABLE} holds no object")
+    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, KeyError, ValueError, RuntimeError) as error:
+        if getattr(error, "filename", None) is not None:  # there is no such file, or it may not be read
+            raise
+        raise ValueError(f"{path}: this is not a model of survey ({error}); make one with survey model") from None
+    return table, series
+
+
+def _check(about, size):
+    """Raise an error unless the table is what the format says of a file of `size` coefficients."""
+
+    def need(right, what):
+        if not right:
+            raise ValueError(what)
+
+    def numbers(values, count):
+        return len(values) == count and all(type(v) in (int, float) and math.isfinite(v) for v in values)
+
+    need(all(isinstance(about[key], str) for key in ("title", "scene", "options")), "title, scene, options")
+    need(not about.get("proof") or isinstance(about["proof"]["statement"], str), "proof")
+    own, rule = about["parameters"], about["rule"]
+    need(len(own) == 2 and all(p["name"].isidentifier() for p in own), "parameters")
+    need(all(numbers([p["low"], p["high"]], 2) and p["low"] < p["high"] for p in own), "ends of the parameters")
+    names = [f["name"] for f in about["functions"]]
+    known = {"hill": HALF, "trace": ("discriminant",), "danby": INVARIANTS}
+    labels = known.get(rule, [f"c{k + 1}" for k in range(len(names))])
+    need(rule in RULES and names and names == list(labels), "rule and functions")
+    need(rule != "reciprocal" or len(names) <= 2, "rule and functions")
+    need(all(isinstance(f["long_name"], str) for f in about["functions"]), "functions")
+    dense = 0
+    for panel in about["panels"]:
+        low, high, first, terms = (panel[key] for key in ("low", "high", "first", "terms"))
+        need(numbers(low, 2) and numbers(high, 2) and low[0] < high[0] and low[1] < high[1], "ends of a panel")
+        need(numbers(panel["bars"], len(names)) and min(panel["bars"]) >= 0, "bars of a panel")
+        counts = [count for own in terms for count in own]
+        need(len(terms) == len(names) and all(type(n) is int and 0 <= n <= TERMS for n in counts), "terms")
+        need(type(first) is int and 0 <= first <= size - sum(counts), "first of a panel")
+        longest = max(map(len, terms))
+        need(longest <= TERMS, "terms")
+        dense += len(names) * longest * max(counts, default=1)
+    need(about["panels"] and dense <= DENSE, "panels")
+
+
 class _Panel:
     """One panel: `series` (F, n, m) of T_j in x by T_k in y, and `bars` (F)."""
 
     def __init__(self, table, numbers):
         self.low, self.high, self.bars = table["low"], table["high"], np.array(table["bars"])
-        n = max(len(terms) for terms in table["terms"])
+        n = max(1, max(map(len, table["terms"])))
         m = max(max(terms, default=1) for terms in table["terms"])
         self.series, at = np.zeros((len(table["terms"]), n, m)), table["first"]
         for own, terms in zip(self.series, table["terms"], strict=True):
@@ -253,10 +313,9 @@ def _run(inside):
 class _Cells:
     """D as short series on the cells of a lattice that refines the panels, with its derivatives, and its bars."""
 
-    def __init__(self, model):
+    def __init__(self, model, lattice):
         self.low, sizes = model.low, np.subtract(model.high, model.low)
         self.scale = FINE / sizes
-        lattice = [_lattice(model, side, PIECES) for side in range(2)]
         self._solve(model, lattice)
         at = [np.searchsorted(edges, low + (np.arange(FINE) + 0.5) / scale, side="right") - 1
               for edges, low, scale in zip(lattice, model.low, self.scale, strict=True)]  # fmt: skip
@@ -399,7 +458,7 @@ def _hill(values, bars, slopes, wanted, names):
     known = [abs(value) > bar for value, bar in zip(values, bars, strict=True)]
     both, others = known[0] & known[3], known[1] & known[2]
     up, down = (y1 > 0) == (dy2 > 0), (dy1 > 0) != (y2 > 0)
-    out = _functions(values, bars, slopes, wanted, names, ("y1", "dy1", "y2", "dy2"))
+    out = _functions(values, bars, slopes, wanted, names, HALF)
     verdict = np.full(y1.shape, UNDECIDED, np.int8)
     verdict[both & others & up & down] = STABLE
     verdict[(both & ~up) | (others & ~down)] = UNSTABLE
@@ -464,7 +523,7 @@ def _danby(values, bars, slopes, wanted, names):
     verdict = np.full(t.shape, UNDECIDED, np.int8)
     verdict[(ab > ab_bar) & (cd > cd_bar) & (k > k_bar) & (t > bar) & (t - 2.0 < -bar)] = STABLE
     verdict[(ab < -ab_bar) | (cd < -cd_bar) | (k < -k_bar) | (t < -bar) | (t - 2.0 > bar)] = UNSTABLE
-    out = _functions(values, bars, slopes, wanted, names, ("A", "B", "C", "D", "t")) | {"verdict": verdict}
+    out = _functions(values, bars, slopes, wanted, names, INVARIANTS) | {"verdict": verdict}
     if "a" in wanted:
         out["a"], out["a_error"] = 4.0 * t - 4.0, 4.0 * bar + EPS * (4.0 * abs(t) + 4.0)
         for name, slope in zip(names, slopes if slopes is not None else (), strict=False):

@@ -1,5 +1,6 @@
 """Models of maps: true errors within the bars, verdicts that never contradict, and files that other programs read."""
 
+import hashlib
 import json
 import re
 import shutil
@@ -250,6 +251,77 @@ def test_damaged_files_are_refused(satellite, tmp_path):
     (tmp_path / "text").write_text("no zip")
     with pytest.raises(ValueError, match="not a model"):
         survey.Model(tmp_path / "text")
+
+
+def written(path, table, series):
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("model.json", table if isinstance(table, bytes) else json.dumps(table))
+        archive.writestr("series.f64", series)
+    return path
+
+
+def test_damage_at_any_byte_is_refused_in_a_line(satellite, tmp_path):
+    """Bits in the packed series, in the headers of the zip, and an end that is missing."""
+    whole, rng = satellite.read_bytes(), np.random.default_rng(5)
+    model = survey.Model(satellite)
+    places = [*range(60), *rng.integers(len(whole), size=60), *range(len(whole) - 140, len(whole))]
+    copies = [bytes([*whole[:at], whole[at] ^ int(rng.integers(1, 256)), *whole[at + 1 :]]) for at in places]
+    for damaged in copies + [whole[:end] for end in rng.integers(len(whole), size=10)]:
+        (tmp_path / "damaged").write_bytes(damaged)
+        try:
+            found = survey.Model(tmp_path / "damaged")
+        except ValueError as refused:
+            assert "damaged: " in str(refused) and "\n" not in str(refused)
+        else:  # a date, a comment
+            assert found.about == model.about
+    with pytest.raises(FileNotFoundError):
+        survey.Model(tmp_path / "none")
+
+
+def test_a_table_of_another_form_is_refused_in_a_line(satellite, tmp_path):
+    with zipfile.ZipFile(satellite) as archive:
+        table, series = json.loads(archive.read("model.json")), archive.read("series.f64")
+    assert survey.Model(written(tmp_path / "m", table, series)).at(0.5, 1.2)["verdict"] == 1
+    panel = table["panels"][0]
+    wrong = [{key: value for key, value in table.items() if key != left} for left in ("panels", "rule", "title")]
+    wrong += [table | change for change in (
+        {"rule": "danby"}, {"rule": []}, {"panels": []}, {"proof": {"areas": {}}}, {"functions": table["functions"][:3]},
+        {"parameters": [table["parameters"][0] | {"name": "\x1b[2J"}, table["parameters"][1]]},
+    )]  # fmt: skip
+    wrong += [table | {"panels": [panel | change]} for change in (
+        {"first": -8}, {"first": len(series) // 8}, {"terms": [[10**9]] * 4}, {"terms": [[0] * 10**5] * 4},
+        {"terms": panel["terms"][:3]}, {"bars": [1e-12] * 3}, {"bars": [-1.0] * 4}, {"bars": ["x"] * 4},
+        {"bars": [float("nan")] * 4}, {"low": [0.0]}, {"low": panel["high"]},
+    )]  # fmt: skip
+    wrong += [b"[]", b"null", b"[" * 100_000, table | {"panels": [panel | {"terms": [[1024] + [0] * 1023] * 4}] * 100}]
+    for one in wrong:
+        with pytest.raises(ValueError, match="not a model|not that of a model|its bits have changed") as refused:
+            survey.Model(written(tmp_path / "m", one, series))
+        assert "\n" not in str(refused.value) and refused.value.__cause__ is None
+    with pytest.raises(ValueError, match="would unpack to more than"):
+        survey.Model(written(tmp_path / "m", b" " * (reader.BYTES + 1), series))
+
+
+def test_a_map_of_more_cells_than_can_be_numbered_is_answered_from_its_panels(tmp_path):
+    """D = x + 3 y in strips: 67 x 66 edges make 70,752 cells."""
+    places, numbers, n = [], [], 66
+    for i in range(n):
+        places += [((0.5 * i / n, 0.0), (0.5 * (i + 1) / n, 1.0)), ((0.5, i / n), (1.0, (i + 1) / n))]
+    for (x0, y0), (x1, y1) in places:
+        numbers += [0.5 * (x0 + x1) + 1.5 * (y0 + y1), 1.5 * (y1 - y0), 0.5 * (x1 - x0)]
+    series = np.array(numbers).tobytes()
+    table = {
+        "format": reader.FORMAT, "title": "strips", "scene": "own", "options": "", "rule": "trace",
+        "parameters": [{"name": name, "low": 0.0, "high": 1.0} for name in "xy"],
+        "functions": [{"name": "discriminant", "long_name": "D"}], "sha256": hashlib.sha256(series).hexdigest(),
+        "panels": [{"low": low, "high": high, "bars": [1e-14], "first": 3 * i, "terms": [[2, 1]]}
+                   for i, (low, high) in enumerate(places)],
+    }  # fmt: skip
+    model = survey.Model(written(tmp_path / "m", table, series))
+    x, y = np.random.default_rng(3).uniform(size=(2, reader.FEW))
+    found = model.at(x, y, "discriminant")
+    assert (abs(found["discriminant"] - (x + 3 * y)) <= found["discriminant_error"]).all()
+    assert ((found["verdict"] == 1) == (x + 3 * y < 2)).mean() > 0.9999
 
 
 def test_the_same_map_has_the_same_bytes(folder):
