@@ -248,9 +248,11 @@ def _curves(method, s, edges, falls, scale, top, most):
                 yield followed(start, kb.BRANCH, cell)
     for side, table in ((1.0, s.plus), (-1.0, s.minus), (0.0, s.librations)):
         for row in table:
-            if row[rt.MULTIPLIER] < 1.0 or row[rt.CYCLE_BAR] > LOOSE * scale:
+            if row[rt.BELOW] > 0.0:  # it attracts
                 continue
             if side:
+                if row[rt.CYCLE_BAR] > LOOSE * scale:  # beyond the limits
+                    continue
                 edge = int(np.argmin(np.abs(edges[:-1] - s.section % (2.0 * math.pi))))
                 start = np.array([edges[edge], -side * row[rt.CYCLE_X], 0.0, row[rt.CYCLE_BAR], 0.0, 0.0, 0.0])
                 yield followed(start, kb.ROTATION, edge)

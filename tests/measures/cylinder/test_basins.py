@@ -6,6 +6,7 @@ import pytest
 import survey
 from survey.kernels.cylinder import fate as kf
 from survey.kernels.cylinder import records as rc
+from survey.kernels.cylinder import returns as rt
 from survey.measures.cylinder import basins, curves, equation, fate
 from survey.measures.square import Square
 from survey.methods import taylor
@@ -52,6 +53,18 @@ def test_no_start_is_told_otherwise_than_it_ends(systems, starts, seed):
         assert wrong == 0
         shares.append(share)
     assert np.mean(np.array(shares) > 0.9) > 0.7
+
+
+def test_an_unstable_libration_is_a_curve_between_basins_however_slow_the_system():
+    """By S5, with velocities of 1e-6; its bar is an angle, and does not become less with them."""
+    unit = 1e-6
+    six = np.array([0.25, -0.341, -0.782, 0.152, -0.435, 0.731]) * [unit, unit, *[unit**2] * 4]
+    s = fate.remembered(taylor, six)
+    assert (s.librations[:, rt.BELOW] < 0.0).any()
+    random = np.random.default_rng(3)
+    states = np.stack([random.uniform(-3.1, 3.1, 100), random.normal(size=100) * 2.0 * unit], axis=1)
+    share, wrong = compared(six, states)
+    assert wrong == 0 and share > 0.98
 
 
 def test_starts_beside_a_stable_branch_are_followed_or_right():
