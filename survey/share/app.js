@@ -25,7 +25,8 @@ async function loadedModel() {
     const own = await readModel(Uint8Array.from(atob(TEXT.model), c => c.charCodeAt(0)))
     return Object.assign(own, {rule: own.about.rule, functions: own.about.functions.map(f => f.name)})
   }
-  const grid = {...TEXT.grid, axes: await Promise.all(TEXT.grid.axes.map(arrayOf)), status: await arrayOf(TEXT.grid.status), variables: {}}
+  const axes = await Promise.all(TEXT.grid.axes.map(arrayOf)), places = axes.map((values, i) => TEXT.axes[i].log ? values.map(Math.log) : values)
+  const grid = {...TEXT.grid, axes, places, status: await arrayOf(TEXT.grid.status), variables: {}}
   for (const [name, own] of Object.entries(TEXT.grid.variables)) {
     grid.variables[name] = {flags: own.flags, values: await arrayOf(own.values), bars: own.bars ? await arrayOf(own.bars) : null}
   }
@@ -335,7 +336,8 @@ const bound = value => Number.isFinite(value) ? value.toExponential(1) : "?"
 function known(x, y) {
   // {x, y, verdict, status, values: {name: [value, bar]}} at a point of the map, or at the nearest point of its grid.
   if (model.grid) {
-    const {axes, log, variables, status, statuses} = model.grid, i = nearest(axes[0], x), j = nearest(axes[1], y)
+    const {axes, places, variables, status, statuses} = model.grid
+    const [i, j] = [x, y].map((value, axis) => nearest(places[axis], TEXT.axes[axis].log ? Math.log(value) : value))
     if (i < 0 || j < 0) return null
     const at = i * axes[1].length + j, values = {}
     let verdict = null

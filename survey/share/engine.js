@@ -276,10 +276,9 @@ function changes(own, at, i, j, wide, tall) {
   return own[a] < 0 !== own[b] < 0 || own[c] < 0 !== own[d] < 0
 }
 
-function coloured(value, {table, range, scale}) {
+function coloured(value, {table, range: [low, high]}) {
   if (!(value === value)) return [255, 255, 255]
-  const of = scale === "log" ? Math.log : v => v, [low, high] = range.map(of)
-  const i = 3 * Math.max(0, Math.min(255, Math.floor(256 * (of(value) - low) / (high - low))))
+  const i = 3 * Math.max(0, Math.min(255, Math.floor(256 * (value - low) / (high - low))))
   return [table[i], table[i + 1], table[i + 2]]
 }
 
@@ -292,7 +291,7 @@ function fill(out, wide, left, top, width, height, [r, g, b]) {
 // ---- a map of points: every pixel shows the nearest one
 
 function nearest(values, x) {
-  // The number of the ascending value nearest to x (in its logarithm, where the axis is one); -1 beyond the ends.
+  // The number of the ascending value nearest to x; -1 beyond the ends. Along a logarithmic axis: of logarithms.
   let low = 0, high = values.length - 1
   if (high === 0) return 0
   const half = [values[1] - values[0], values[high] - values[high - 1]]
@@ -306,12 +305,9 @@ function nearest(values, x) {
 }
 
 function drawGrid(model, job) {
-  const {width, height} = job, out = new Uint8ClampedArray(4 * width * height), {axes, variables, status} = model.grid
-  const indices = (axis, size, values) => Int32Array.from({length: size}, (_, i) => {
-    const at = job[axis][0] + i * job[axis][1]
-    return nearest(values, model.grid.log[axis === "x" ? 0 : 1] ? Math.exp(at) : at)
-  })
-  const columns = indices("x", width, axes[0]), rows = indices("y", height, axes[1]), {values, flags} = variables[job.show]
+  const {width, height} = job, out = new Uint8ClampedArray(4 * width * height), {axes, places, variables, status} = model.grid
+  const indices = ([first, step], size, values) => Int32Array.from({length: size}, (_, i) => nearest(values, first + i * step))
+  const columns = indices(job.x, width, places[0]), rows = indices(job.y, height, places[1]), {values, flags} = variables[job.show]
   for (let j = 0; j < height; j++) for (let i = 0; i < width; i++) {
     const to = 4 * (j * width + i)
     let colour = [238, 238, 238]

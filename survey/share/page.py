@@ -178,7 +178,7 @@ def _of_points(ds, axes):
         raise BadInput("share: the file holds no variable over both axes")
     codes = flag_codes(ds.status.attrs)
     grid = {
-        "axes": [_packed(ds[dim].values, "f8") for dim in axes], "log": [logarithmic(ds[dim].values) for dim in axes],
+        "axes": [_packed(ds[dim].values, "f8") for dim in axes],
         "status": _packed(state.values, "i1"), "statuses": {code: plain(name) for name, code in codes.items()},
         "unanswered": sorted(status.UNANSWERED), "failed": sorted(status.FAILURES), "variables": variables,
         "greys": {scene_statuses(ds)[name]: _rgb(grey) for name, grey in palette.greys(ds).items()},

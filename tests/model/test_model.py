@@ -285,7 +285,8 @@ def test_a_table_of_another_form_is_refused_in_a_line(satellite, tmp_path):
     panel = table["panels"][0]
     wrong = [{key: value for key, value in table.items() if key != left} for left in ("panels", "rule", "title")]
     wrong += [table | change for change in (
-        {"rule": "danby"}, {"rule": []}, {"panels": []}, {"proof": {"areas": {}}}, {"functions": table["functions"][:3]},
+        {"rule": "danby"}, {"rule": []}, {"panels": []}, {"proof": {"areas": {}}},
+        {"functions": table["functions"][:3]},
         {"parameters": [table["parameters"][0] | {"name": "\x1b[2J"}, table["parameters"][1]]},
     )]  # fmt: skip
     wrong += [table | {"panels": [panel | change]} for change in (
@@ -295,7 +296,7 @@ def test_a_table_of_another_form_is_refused_in_a_line(satellite, tmp_path):
     )]  # fmt: skip
     wrong += [b"[]", b"null", b"[" * 100_000, table | {"panels": [panel | {"terms": [[1024] + [0] * 1023] * 4}] * 100}]
     for one in wrong:
-        with pytest.raises(ValueError, match="not a model|not that of a model|its bits have changed") as refused:
+        with pytest.raises(ValueError, match=r"not a model|not that of a model|its bits have changed") as refused:
             survey.Model(written(tmp_path / "m", one, series))
         assert "\n" not in str(refused.value) and refused.value.__cause__ is None
     with pytest.raises(ValueError, match="would unpack to more than"):

@@ -207,6 +207,32 @@ def test_points_without_series_are_shown_as_they_are(folder, driver):
 
 
 @browsed
+def test_along_a_logarithmic_axis_the_nearest_point_is_that_of_the_least_ratio(tmp_path, driver):
+    """Up to the ends of the map, half a step beyond the last points; three a decade."""
+    ds = survey.evaluate("brun", l=np.linspace(0.5, 6.5, 7), alpha=np.geomspace(0.02, 2.0, 6), beta=0.3, sign=1)
+    page.write(ds, tmp_path / "log.html")
+    shown(driver, tmp_path / "log.html")
+    ends, colours = driver.execute_script("return [TEXT.axes.map(a => a.ends), TEXT.shown[0].colours]")
+    assert driver.execute_script("return TEXT.axes.map(a => a.log)") == [False, True]
+    driver.execute_script("state.lines = false; front = coarse = null; changed()")
+    time.sleep(0.3)
+    drawn(driver)
+    level, alpha = ds.l.values, np.log(ds.alpha.values)
+    random, checked = np.random.default_rng(4), 0
+    for u, v in random.uniform(0.002, 0.998, (60, 2)):
+        x, y = (a + t * (b - a) for (a, b), t in zip(ends, (u, v), strict=True))
+        if min(abs((y - alpha[0]) / (alpha[1] - alpha[0]) % 1 - 0.5), abs((x - level[0]) % 1 - 0.5)) < 0.02:
+            continue  # half way between two points
+        i, j = int(abs(level - x).argmin()), int(abs(alpha - y).argmin())
+        found = driver.execute_script("return known(real(arguments[0], 0), real(arguments[1], 1))", x, y)
+        assert (found["x"], found["y"]) == (level[i], ds.alpha.values[j])
+        if int(ds.status[i, j]) == 0:
+            assert pixel(driver, x, y) == colours[str(int(ds.verdict[i, j]))]
+            checked += 1
+    assert checked > 20
+
+
+@browsed
 def test_the_keyboard_moves_and_zooms_and_pictures_are_saved(folder, driver):
     from selenium.webdriver.common.by import By
     from selenium.webdriver.common.keys import Keys
