@@ -56,11 +56,16 @@ def write(scene, directory, share=1.0, say=lambda line: None):
     results = measure(planes, say)
     records = [record(plane, method, found) for plane, of in zip(planes, results, strict=True) for method, found in of]
     paths = [directory / f"failures_{name}.{kind}" for kind in ("json", "md", "png")]
-    written = {"rtol": RTOL, "planes": [asdict(r) for r in records], "machine": provenance()}
-    paths[0].write_text(json.dumps(written, indent=1) + "\n")
+    written = {"rtol": RTOL, "planes": [_finite(asdict(r)) for r in records], "machine": provenance()}
+    paths[0].write_text(json.dumps(written, indent=1, allow_nan=False) + "\n")
     paths[1].write_text(page.text(scene, name, about, planes, results, records, share))
     picture.draw(planes, results, paths[2])
     return paths
+
+
+def _finite(row):
+    """The row with None for what is not known or not finite, as JSON has no NaN."""
+    return {key: None if isinstance(value, float) and not np.isfinite(value) else value for key, value in row.items()}
 
 
 def _planes(scene, share):

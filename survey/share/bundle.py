@@ -73,6 +73,10 @@ def _fill(folder, path, ds):
         certificate = path.parent / Path(str(ds.attrs["proof_certificate"])).name
         if not certificate.is_file():
             raise BadInput(f"bundle: {certificate.name}, the proof's certificate, is not beside {path}; copy it there")
+        with open(certificate, "rb") as file:
+            if hashlib.file_digest(file, "sha256").hexdigest() != str(ds.attrs.get("proof_sha256")):
+                raise BadInput(f"bundle: {short(certificate.name)} beside {path} is not the certificate of its proof "
+                               "(sha256); copy that one there")  # fmt: skip
         shutil.copyfile(certificate, folder / certificate.name)
     (folder / "requirements.txt").write_text(_requirements(ds.attrs), encoding="utf-8")
     pictures = _pictures(folder, path, ds)

@@ -252,7 +252,7 @@ def _html(ds, table, proof, why):
         "policy": f"default-src 'none'; script-src {scripts}; style-src 'unsafe-inline'; img-src data: blob:; "
                   "worker-src blob:; base-uri 'none'; form-action 'none'",
         "version": survey.__version__, "title": html.escape(title), "style": parts["page.css"],
-        "subtitle": html.escape(f"{ds.attrs['scene']}{', ' + options if options else ''}: {kind}"),
+        "subtitle": html.escape(f"{plain(str(ds.attrs['scene']), 300)}{', ' + options if options else ''}: {kind}"),
         "alt": html.escape(f"{title}: a map; arrows move it, plus and minus zoom"), "about": _about(ds, proof, why),
         # no "<" in it: nothing in the data can end the element
         "data": json.dumps(table, allow_nan=False).replace("<", "\\u003c"), "engine": engine, "app": parts["app.js"],
@@ -272,11 +272,12 @@ def _about(ds, proof, why):
     """Proof, provenance, and how to cite, as HTML."""
     attrs, out = ds.attrs, []
     if proof:
-        areas = "; ".join(f"{name}: area {a:.9g} to {b:.9g}" for name, (a, b) in proof["areas"].items())
-        out.append(f'<div class="proof"><strong>Proved</strong> ({html.escape(areas)}), with the certificate '
-                   f'{html.escape(plain(proof["certificate"]))}, sha256 {html.escape(proof["sha256"])}'
-                   f'<details><summary>the theorem</summary><pre>{html.escape(plain(proof["statement"], 10_000, True))}'
-                   "</pre></details></div>")  # fmt: skip
+        areas = "; ".join(f"{plain(name)}: area {a:.9g} to {b:.9g}" for name, (a, b) in proof["areas"].items())
+        certificate = html.escape(plain(proof["certificate"]))
+        digest, theorem = html.escape(plain(proof["sha256"])), html.escape(plain(proof["statement"], 10_000, True))
+        out.append(f'<div class="proof"><strong>Proved</strong> ({html.escape(areas)}) by the certificate '
+                   f"{certificate}, sha256 {digest}: survey-check {certificate} verifies it"
+                   f"<details><summary>the theorem</summary><pre>{theorem}</pre></details></div>")  # fmt: skip
     if why:
         out.append(f"<p>Points, not series: {html.escape(plain(why))}.</p>")
     sources = plain(str(attrs.get("references", "")), 2000)

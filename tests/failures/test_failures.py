@@ -109,6 +109,17 @@ def test_the_command(tmp_path):
     assert (tmp_path / "failures_whittaker_hill.png").stat().st_size > 20_000
 
 
+def test_what_is_not_known_is_null(tmp_path, plane, monkeypatch):
+    """JSON has no NaN: of a method that refuses all points no error is known."""
+    monkeypatch.setattr(failures, "_planes", lambda scene, share: ("mathieu", "about", [plane]))
+    auto = compare.compared(plane, "auto", failures.RTOL)
+    monkeypatch.setattr(failures, "measure", lambda planes, say: [[("none", None), ("auto", auto)]])
+    failures.write("mathieu", tmp_path)
+    strict = {"parse_constant": lambda word: pytest.fail(f"{word} is not JSON")}
+    rows = json.loads((tmp_path / "failures_mathieu.json").read_text(), **strict)["planes"]
+    assert rows[0]["largest_error"] is None and rows[0]["refused"] == plane.size and rows[1]["largest_error"] < 1e-9
+
+
 def test_what_has_no_planes_is_refused(tmp_path):
     with pytest.raises(survey.BadInput, match="unknown scene with planes of failures 'satelite'; did you mean"):
         failures.write("satelite", tmp_path)

@@ -16,7 +16,7 @@ import tomli_w
 import xarray as xr
 
 import survey
-from survey.errors import BadInput
+from survey.errors import BadInput, Damaged
 from survey.model import build, proved, reader
 from survey.request.workflow import check, read
 
@@ -359,3 +359,15 @@ def test_a_proof_is_carried_and_another_maps_is_refused(tmp_path):
     assert 0 < low < high < 4
     with pytest.raises(BadInput, match="another map"):
         proved.matching(survey.open(tmp_path / "p.nc"), check(workflow("mathieu", {"a": (0.0, 5.0), "q": (0.0, 1.0)})))
+    ds = survey.open(tmp_path / "p.nc")
+    wide = ds.cell_a_low.copy(data=ds.cell_a_high.values)
+    for damaged in (
+        *(ds.drop_attrs(deep=False).assign_attrs({k: v for k, v in ds.attrs.items() if k != left})
+          for left in ("refine", "proof_certificate", "proof_sha256")),
+        ds.assign_attrs(refine="a"), ds.assign_attrs(refine="a, x"), ds.drop_vars("area_low"),
+        ds.assign(area_low=ds.area_low * np.nan), ds.assign(cell_a_low=wide),
+        ds.assign(cell_verdict=ds.cell_verdict + np.int8(7)),
+    ):  # fmt: skip
+        with pytest.raises(Damaged, match="what the file says of its proof is incomplete") as refused:
+            proved.of(damaged)
+        assert "\n" not in str(refused.value)

@@ -1,5 +1,6 @@
 """Bundles: what is in them, `survey verify` of the whole, and the same bits from their workflow."""
 
+import hashlib
 import json
 import shutil
 import subprocess
@@ -12,6 +13,7 @@ import xarray as xr
 
 import survey
 from survey.errors import BadInput
+from survey.file.disk import digest_of
 from survey.share import bundle
 
 SCENE = '''"""Mathieu's equation as one's own."""
@@ -130,3 +132,21 @@ def test_what_exists_is_not_overwritten(folder):
     with pytest.raises(BadInput, match="it exists"):
         bundle.write(folder / "map.nc", folder / "map.zip")
     assert not list(folder.glob(".bundle-*"))
+
+
+def test_only_the_certificate_of_the_proof_is_bundled(folder, tmp_path):
+    """A file from a stranger may name any file beside it: what is not the certificate is not packed."""
+    text = b"a certificate"
+    ds = xr.load_dataset(folder / "map.nc", decode_timedelta=False)
+    ds.attrs |= {"proof_certificate": "../map.cert", "proof_sha256": hashlib.sha256(text).hexdigest()}
+    ds.to_netcdf(tmp_path / "map.nc")
+    digest_of(tmp_path / "map.nc").write_text(
+        f"{hashlib.sha256((tmp_path / 'map.nc').read_bytes()).hexdigest()}  map.nc\n"
+    )
+    with pytest.raises(BadInput, match=r"map\.cert, the proof's certificate, is not beside"):
+        bundle.write(tmp_path / "map.nc", tmp_path / "kept")
+    (tmp_path / "map.cert").write_text("a secret")
+    with pytest.raises(BadInput, match=r"map\.cert beside .* is not the certificate of its proof"):
+        bundle.write(tmp_path / "map.nc", tmp_path / "kept")
+    (tmp_path / "map.cert").write_bytes(text)
+    assert "map.cert" in bundle.write(tmp_path / "map.nc", tmp_path / "kept")
