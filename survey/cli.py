@@ -181,11 +181,17 @@ def prove(workflow, output, overrides, fresh, quiet):
 @click.option("--proof", metavar="PROVED.nc", help="The proof of this map (survey prove): the model carries it.")
 def model(workflow, output, overrides, proof):
     """Write the map's series, which answer anywhere with error bars: survey.Model reads them, with numpy alone."""
+    from pathlib import Path
+
     from survey import api
+    from survey.file.disk import check_folder
     from survey.model import build, proved
     from survey.request.workflow import read
 
-    checked = read(workflow, overrides)
+    if output is not None:
+        check_folder(output)
+    # with -o nothing is written where the workflow's output would be
+    checked = read(workflow, overrides, None if output is None else Path(output).with_suffix(".nc"))
     path = output or str(checked.path.with_suffix(".model"))
     size = build.model(checked, path, proved.matching(api.open(proof), checked) if proof else None)
     err.print(plain(f"wrote {path} ({size:,} bytes); in Python: survey.Model({path!r})"), markup=False)

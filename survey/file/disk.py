@@ -7,7 +7,8 @@ from pathlib import Path
 
 from rich import filesize
 
-from survey.errors import Stopped, SurveyError
+from survey.errors import BadInput, Stopped, SurveyError
+from survey.wording import shown
 
 
 @contextlib.contextmanager
@@ -24,6 +25,14 @@ def refused(path, what="writing"):
         with contextlib.suppress(OSError):
             reason = f"{reason}; {filesize.decimal(shutil.disk_usage(Path(path).parent).free)} free"
         raise Stopped(f"{path}: {what} failed ({reason}); fix this and run the command again") from None
+
+
+def check_folder(path):
+    """Raise BadInput, before anything is computed, where the folder of the output `path` does not exist."""
+    folder = Path(path).parent
+    if not folder.is_dir():
+        raise BadInput(f"{shown(str(path), 120)}: there is no folder {shown(str(folder), 120)}; create it first, "
+                       "or name another with -o")  # fmt: skip
 
 
 def write_atomically(path, content, folder=None):

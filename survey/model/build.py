@@ -16,7 +16,7 @@ import numpy as np
 
 import survey
 from survey.errors import BadInput
-from survey.file.disk import write_atomically
+from survey.file.disk import check_folder, write_atomically
 from survey.kernels.math import chebyshev
 from survey.model import functions
 from survey.model.reader import FORMAT, SERIES, TABLE
@@ -44,6 +44,7 @@ class Panel:
 
 def model(workflow, path, proof=None):
     """Write the model of a checked workflow to `path`; returns the number of bytes. Raises BadInput."""
+    check_folder(path)
     content = packed(workflow, proof)
     write_atomically(Path(path), content)
     return len(content)

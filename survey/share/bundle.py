@@ -18,7 +18,7 @@ from pathlib import Path
 import survey
 from survey.errors import BadInput, Damaged
 from survey.file import reading
-from survey.file.disk import digest_of, refused, write_atomically
+from survey.file.disk import check_folder, digest_of, refused, write_atomically
 from survey.wording import plain, short
 
 CRATE = "ro-crate-metadata.json"
@@ -41,8 +41,7 @@ def write(path, output, author="", license_url=""):
     path, output = Path(path), Path(output)
     if output.exists():
         raise BadInput(f"{output}: it exists; name another folder or .zip file with -o")
-    if not output.parent.is_dir():
-        raise BadInput(f"{output}: the folder {output.parent} does not exist; create it first")
+    check_folder(output)
     ds = reading.load(path)
     with refused(output), tempfile.TemporaryDirectory(prefix=".bundle-", dir=output.parent) as made:
         folder = Path(made) / output.stem

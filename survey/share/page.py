@@ -22,7 +22,7 @@ import survey
 from survey import status
 from survey.analysis import point, zoom
 from survey.errors import BadInput, Untrusted
-from survey.file.disk import write_atomically
+from survey.file.disk import check_folder, write_atomically
 from survey.file.labels import flag_codes, scene_statuses
 from survey.grid import logarithmic
 from survey.model import build, proved
@@ -61,6 +61,7 @@ HINT = (
 
 def write(ds, path, at=None):
     """Write the page of a survey to `path`; returns {"bytes", "series": does it hold series?, "why": else why not}."""
+    check_folder(path)
     ds = point.plane(ds, at or {})
     content, why = made(ds)
     write_atomically(Path(path), content.encode())

@@ -344,6 +344,16 @@ def test_what_has_no_series_is_refused_in_a_line(scene, axes, numbers, line):
         build.packed(check(given))
 
 
+def test_the_command_needs_no_folder_but_that_of_its_own_output(tmp_path):
+    table = workflow("mathieu", {"a": (0.0, 4.0), "q": (0.0, 1.0)}, output={"path": "results/m.nc"})
+    (tmp_path / "m.toml").write_text(tomli_w.dumps(table))
+    program = [sys.executable, "-m", "survey", "model", "m.toml", "-o"]
+    done = subprocess.run([*program, "m.model"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0 and survey.Model(tmp_path / "m.model").at(1.0, 0.5)["verdict"] == 0, done.stderr
+    done = subprocess.run([*program, "none/m.model"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 2 and "'none/m.model': there is no folder 'none'; create it first" in done.stderr
+
+
 def test_a_proof_is_carried_and_another_maps_is_refused(tmp_path):
     pytest.importorskip("flint")
     table = workflow("mathieu", {"a": (0.0, 4.0), "q": (0.0, 1.0)}, refine={"width": {"a": 0.1, "q": 0.1}})

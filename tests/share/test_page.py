@@ -333,3 +333,8 @@ def test_what_cannot_be_shown_is_refused_in_a_line():
     ds = survey.evaluate("mathieu", a=np.linspace(0.0, 1.0, 5), q=0.5)
     with pytest.raises(BadInput, match="two numeric axes"):
         page.made(ds)
+
+
+def test_a_folder_that_does_not_exist_is_named_before_anything_is_computed(tmp_path):
+    with pytest.raises(BadInput, match=r"there is no folder .* create it first"):
+        page.write(survey.open(MAP), tmp_path / "none/map.html")
