@@ -5,7 +5,7 @@ Everything specific to a scene is in the file of its name in `planes/`:
     ABOUT            the scene's planes and what `auto` does on them, in a few sentences of Markdown
     planes(share)    [Plane, ...]; a share below 1 makes them coarser
 
-A file of one's own needs none: its plane is that of its first two parameters, or of a workflow's axes
+A user's own file needs none: its plane is spanned by its first two parameters, or by a workflow's axes
 (`planes/own_file.py`).
 """
 
@@ -69,7 +69,7 @@ def _finite(row):
 
 
 def _planes(scene, share):
-    """(the name in file names, about, planes) of a built-in scene, or of a file of one's own."""
+    """(the name in file names, about, planes) of a built-in scene, or of a user's own file."""
     if not 0.0 < share <= 1.0:
         raise BadInput(f"--share {share:g}: give a number above 0 and up to 1")
     if ranges.is_file(scene):

@@ -1,4 +1,4 @@
-"""The plane that a chart or a map of failures goes over: of a file of one's own, or of a workflow's first two axes."""
+"""The plane that a chart or a map of failures covers: of a user's own file, or of a workflow's first two axes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -27,12 +27,12 @@ class Ranges:
 
 
 def is_file(scene):
-    """Does `scene` name a file of one's own, or a workflow?"""
+    """Does `scene` name a user's own file, or a workflow?"""
     return str(scene).endswith((".py", ".toml"))
 
 
 def of(path):
-    """The Ranges of a file of one's own (its parameters' domains, or what `survey init` writes), or of a workflow."""
+    """The Ranges of a user's own file (its parameters' domains, or what `survey init` writes), or of a workflow."""
     if str(path).endswith(".toml"):
         checked = workflow.read(path)
         given = checked.grid.parameters

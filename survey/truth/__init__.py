@@ -12,7 +12,7 @@ parameters {name: array (N)} and of the answer {output: array (N, ...)}:
     gyrostat        the same, in time, with exact scaling
     brun            trapezoidal sums in double-double; elliptic integrals to 120 digits beside separatrices
     libration       closed forms to 60 digits (their integers are the package's)
-    digits          a file of one's own: its z with mpmath's numbers, by extrapolation
+    digits          a user's own file: its z with mpmath's numbers, by extrapolation
 """
 
 from contextlib import contextmanager

@@ -1,4 +1,4 @@
-"""Brun's problem in the attack's double-double arithmetic: periods by trapezoidal sums, not by elliptic integrals.
+"""Brun's problem in the double-double arithmetic of this folder: periods by sums, not by elliptic integrals.
 
 The polynomial P of (S2) is expanded about the start (or u = 0); its roots are bisected between its stationary points
 and polished, those near a pole as roots in 1 -+ u. With u between its turning points as a cosine of x,

@@ -16,7 +16,7 @@ def _folder(function):
     for path in (function.__code__.co_filename, Path(__file__).with_name("double.py"), __file__):
         digest.update(Path(path).read_bytes())
     base = Path(os.environ.get("NUMBA_CACHE_DIR") or platformdirs.user_cache_dir("survey"))
-    return base / f"attack-{digest.hexdigest()[:16]}"
+    return base / f"truth-{digest.hexdigest()[:16]}"
 
 
 def kernel(function):

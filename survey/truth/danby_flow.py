@@ -1,4 +1,4 @@
-"""Danby's linear equations in the attack's double-double arithmetic, in the eccentric anomaly E.
+"""Danby's linear equations in the double-double arithmetic of this folder, in the eccentric anomaly E.
 
 With s = sqrt(1 - e^2), g = s / (1 - e cos E): (x, q, p, m)_E of equations (3) of the scene's notes times df/dE = g,
 and r df/dE = 1/s. Four solutions over half a period, from which the monodromy M = R Phi^-1 R Phi is multiplied out; its

@@ -1,4 +1,4 @@
-"""Hill equations of anyone's own: z with mpmath's numbers, the flow by extrapolated leapfrog steps of order 20.
+"""Hill equations that users define: z with mpmath's numbers, the flow by extrapolated leapfrog steps of order 20.
 
 z is the user's own Python, run with mpmath's functions (as for the package's double-double); all else is done here.
 """
@@ -7,7 +7,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from survey.errors import BadInput
 from survey.measures.hill import multiprecision
+from survey.request import ranges
+from survey.request.hill_scene import HillScene
 from survey.truth import remembered
 from survey.truth.hill import hill_outputs
 
@@ -15,8 +18,19 @@ COLUMNS, ORDER = 12, 10
 SMALL, DIGITS = 1e-26, 1e-36  # of a step, over the size of the flow; of the arithmetic
 
 
+def of_file(path):
+    """(the Ranges, the truth) of a Hill equation in a file, or in a workflow; raises BadInput where none is known."""
+    found = ranges.of(path)
+    if not isinstance(found.scene, HillScene):
+        raise BadInput(f"{path}: true values are known only of Hill equations y'' + z(u, p) y = 0; name a file with z")
+    try:
+        return found, own(found.scene)
+    except multiprecision.Unsupported as error:
+        raise BadInput(f"{path}: z cannot be run with more digits ({error}), so no true values are known") from None
+
+
 def own(scene):
-    """The truth of a Hill equation of one's own, an object that `survey.hill` or a file makes.
+    """The truth of a user's Hill equation, an object that `survey.hill` or a file makes.
 
     Raises `multiprecision.Unsupported` where z cannot be run with more digits.
     """

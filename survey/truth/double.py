@@ -1,4 +1,4 @@
-"""Double-double arithmetic of the attack's own, not the package's: pairs (high, low) with a fused multiply-add.
+"""Double-double arithmetic of this folder's own, not the kernels': pairs (high, low) with a fused multiply-add.
 
 Sums and products are those of M. Joldes, J.-M. Muller, V. Popescu, ACM Trans. Math. Softw. 44 (2017) 15res
 (algorithms 6, 12, 17), good to about 2^-102 relative. A series is an array (2, terms).
@@ -146,13 +146,6 @@ def mean(a, b):
             break
         a, b = times(add(a, b), 0.5), root(mul(a, b))
     return times(add(a, b), 0.5)
-
-
-@inline
-def last_terms(series):
-    """Size of the last two terms, and of the first ones."""
-    n = series.shape[1]
-    return max(abs(series[0, n - 1]), 1e-300), max(abs(series[0, n - 2]), 1e-300)
 
 
 @inline

@@ -1,4 +1,4 @@
-"""phi' = w, w' = f w + g in the attack's double-double arithmetic: Taylor series of order 26 in time.
+"""phi' = w, w' = f w + g in the double-double arithmetic of this folder: Taylor series in time, of order 26.
 
 `flow` goes to a time and counts the turning points on its way; `along` goes to an angle, or to the turning point before
 it. Parameters are scaled by powers of two, exactly (symmetry S5), so that no series overflows.

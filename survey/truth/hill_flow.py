@@ -1,4 +1,4 @@
-"""Hill's equation in the attack's double-double arithmetic, in another form than the package's.
+"""Hill's equation in the double-double arithmetic of this folder, in another form than the package's.
 
 Satellites: w = k cn u (or k dn k u) solves Duffing's equation w'' = (2 k^2 - 1) w - 2 w^3. It is solved from the
 place where w is least, so that its relative error does not grow however near k is to 1, and both solutions with it; the
@@ -160,7 +160,7 @@ def satellites(which, given, rhowhich, rhogiven, direction, oblate, tolerance, o
 
 
 COSINE, HARMONICS, BENT, LORENTZ = 0, 1, 2, 3
-TWO_PI = 6.283185307179586  # as it stands in the z of one's own
+TWO_PI = 6.283185307179586  # as it stands in a user's z
 
 
 @inline

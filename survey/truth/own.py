@@ -1,4 +1,4 @@
-"""Equations y'' + z y = 0 of one's own whose truth is known: series in double-double, or pieces in closed form."""
+"""User-defined equations y'' + z y = 0 whose truth is known: series in double-double, or pieces in closed form."""
 
 from math import cos, sin
 

@@ -130,7 +130,7 @@ def test_what_has_no_planes_is_refused(tmp_path):
     (tmp_path / "linear.py").write_text(
         'PARAMETERS = ("a",)\nPERIOD = 1.0\nSTATES = ("x",)\ndef A(t, p, out):\n    out[0, 0] = p[0]\n'
     )
-    with pytest.raises(survey.BadInput, match="a truth is known of Hill equations"):
+    with pytest.raises(survey.BadInput, match="true values are known only of Hill equations"):
         failures.write(tmp_path / "linear.py", tmp_path)
 
 

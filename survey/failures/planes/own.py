@@ -1,4 +1,4 @@
-"""Equations of one's own: spikes of all widths, breaks beside the ends, stiff z, narrow gaps."""
+"""Users' own equations: spikes of all widths, breaks beside the ends, stiff z, narrow gaps."""
 
 import numpy as np
 

@@ -1,10 +1,6 @@
-"""A file of one's own: its first two parameters over their domains, or over the axes of a workflow."""
+"""A user's own file: its first two parameters over their domains, or over the axes of a workflow."""
 
-from survey.errors import BadInput
 from survey.failures.plane import Plane, few, plain
-from survey.measures.hill.multiprecision import Unsupported
-from survey.request import ranges
-from survey.request.hill_scene import HillScene
 from survey.truth import digits
 
 ABOUT = """`auto` takes 16th-order Taylor steps, and double-double (z run once more with mpmath's functions) where
@@ -14,13 +10,7 @@ SOURCE = "Truth: z with mpmath's numbers of 38 digits, by extrapolated leapfrog 
 
 def planes(path, share):
     """One plane; raises BadInput for a scene whose truth is not known."""
-    found = ranges.of(path)
-    if not isinstance(found.scene, HillScene):
-        raise BadInput(f"{path}: a truth is known of Hill equations y'' + z(u, p) y = 0 of one's own alone")
-    try:
-        truth = digits.own(found.scene)
-    except Unsupported as error:
-        raise BadInput(f"{path}: z cannot be run with more digits ({error}), so that no truth is known") from None
+    found, truth = digits.of_file(path)
     values = [found.values(name, few(share, 16)) for name in found.axes]
     names = list(found.axes)
     given = dict(found.fixed) | {names[0]: values[0][:, None] if len(names) > 1 else values[0][None]}

@@ -16,7 +16,7 @@ import numpy as np
 
 from survey.kernels.cylinder.equilibria import ANGLE, DG, KIND, NODE, F, captured, offset, settled
 from survey.kernels.cylinder.flow import BOUND_G, TWO_PI, TWO_PI_LOW, table, values
-from survey.kernels.cylinder.steps import bar, carried, expand, time_of_turning, to_target
+from survey.kernels.cylinder.steps import bar, carried, expand, to_target, until_turning
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.newton import bracketed
 
@@ -157,13 +157,9 @@ def pieces(setting, begin, at, p, start, edges, falls, eqs, count, kind, cell, t
     while n < LIMIT and size + 2 < most:
         h = expand(begin, p, phi, w, how, T)
         n += 1
-        x1, w1, _e, _y = at(p, T, h)
+        h, x1, w1, turned = until_turning(at, p, T, h, sign)
         if not (h > 0.0 and math.isfinite(w1) and math.isfinite(x1)):
             break
-        turned = w1 * sign <= 0.0
-        if turned:
-            h = time_of_turning(at, p, T, h)
-            x1, w1, _e, _y = at(p, T, h)
         dt, shift, done = 0.0, 0.0, False
         while True:
             target = (edges[cell + 1] if sign > 0 else edges[cell]) + shift

@@ -13,7 +13,7 @@ import math
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.equilibria import ANGLE, KIND, SADDLE, offset
 from survey.kernels.cylinder.flow import TWO_PI, table, values
-from survey.kernels.cylinder.steps import bar, carried, expand, passage, start_sign, time_of_turning, wrapped
+from survey.kernels.cylinder.steps import bar, carried, expand, passage, start_sign, until_turning, wrapped
 from survey.kernels.jit import inline, kernel
 
 PHI_LOW, PHI_HIGH, W_LOW, W_HIGH, PHI_SIZE, W_SIZE, PHI_LOG, W_LOG = range(8)  # a window; sizes of logarithms if LOG
@@ -116,14 +116,10 @@ def line(setting, begin, at, p, start, window, eqs, count, section, kind, tolera
     while n < LIMIT and not done:
         h = expand(begin, p, phi, w, how, T)
         n += 1
-        x1, w1, _e, _y = at(p, T, h)
+        h, x1, w1, turned = until_turning(at, p, T, h, sign)
         if not (h > 0.0 and math.isfinite(w1) and math.isfinite(x1)):
             break
-        turned = w1 * sign <= 0.0
-        if turned:
-            h = time_of_turning(at, p, T, h)
-            x1, w1, _e, _y = at(p, T, h)
-            done = kind == LIBRATION and sign > 0
+        done = turned and kind == LIBRATION and sign > 0
         if kind == ROTATION and (x1 - target) * sign >= 0.0:
             h = passage(at, p, T, target, sign > 0, h)
             x1, w1, _e, _y = at(p, T, h)

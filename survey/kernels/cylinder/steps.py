@@ -238,6 +238,17 @@ def time_of_turning(at, p, T, h):
 
 
 @inline
+def until_turning(at, p, T, h, sign):
+    """(time, phi, w, is it a turning point?) at the end of a step h with w of this sign, or where w becomes 0."""
+    x, w, _e, _y = at(p, T, h)
+    turned = w * sign <= 0.0
+    if turned:
+        h = time_of_turning(at, p, T, h)
+        x, w, _e, _y = at(p, T, h)
+    return h, x, w, turned
+
+
+@inline
 def to_rest(at, given, dt):
     """The residual of `time_of_turning`."""
     p, T, first = given

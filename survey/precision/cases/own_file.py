@@ -1,14 +1,10 @@
-"""The chart of a file of one's own: a row, a map and scattered points of its first two parameters."""
+"""The chart of a user's own file: a row, a map and scattered points of its first two parameters."""
 
 from types import SimpleNamespace
 
 import numpy as np
 
-from survey.errors import BadInput
-from survey.measures.hill.multiprecision import Unsupported
 from survey.precision.known import references as known
-from survey.request import ranges
-from survey.request.hill_scene import HillScene
 from survey.truth import digits
 
 ERROR = "discriminant"
@@ -16,14 +12,8 @@ ROW, MAP, SCATTERED, POINTS = 2_000, (60, 80), 2_000, 24
 
 
 def case(path):
-    """What a file in `cases` offers, for a Hill equation of one's own in a file, or in a workflow with its ranges."""
-    found = ranges.of(path)
-    if not isinstance(found.scene, HillScene):
-        raise BadInput(f"{path}: charts are drawn of Hill equations y'' + z(u, p) y = 0 of one's own alone")
-    try:
-        truth = digits.own(found.scene)
-    except Unsupported as error:
-        raise BadInput(f"{path}: z cannot be run with more digits ({error}), so that no error is known") from None
+    """What a file in `cases` offers, for a user's Hill equation in a file, or in a workflow with its ranges."""
+    found, truth = digits.of_file(path)
     names, fixed = list(found.axes), dict(found.fixed)
 
     def scattered(number, seed):
