@@ -81,7 +81,7 @@ def _common(workflow, ds, path):
             fixed[name] = int(place[0])
     where, shared = {dim: where[dim] for dim in new.sizes}, tuple(dim for dim in new.sizes if dim in old.sizes)
     found = Earlier(str(path.absolute()), path.stat().st_mtime_ns, where, shared, fixed)
-    why = reuse.obstacle(workflow.scene, workflow.request, new, found, old.lines)
+    why = reuse.obstacle(workflow.scene, workflow.request, new, found, old)
     return (None, why) if why else (found, "")
 
 

@@ -53,7 +53,7 @@ def solve_block(scene, request, grid, block, earlier=None):
     if not held or not all(some.any() for some in held):
         return solve.solve_block(scene, request, grid, block)
     shape, point = tuple(some.size for some in held), grid.point(block)
-    request = replace(request, lines=grid.lines)
+    request = replace(request, lines=grid.lines, fixed=grid.fixed, ranges=grid.ranges)
     out = {name: np.empty(shape + extra, kind) for name, (kind, _, extra) in layout(scene, request).items()}
     for name, values in out.items():
         values[np.ix_(*held)] = earlier.values(name, block)
@@ -81,14 +81,14 @@ def _at(values, rectangle):
     return values
 
 
-def obstacle(scene, request, grid, earlier, lines, points=3):
+def obstacle(scene, request, grid, earlier, old, points=3):
     """Why the values in the file are not those that this grid would get, or "".
 
     Some of them are solved again: the bits must be the same, and so must each axis that the scene looks at as a whole.
-    `lines`: those of the file's own grid.
+    `old`: the file's own grid.
     """
-    seen = _Seen(grid.lines)
-    request = replace(request, lines=seen)
+    seen = [(_Seen(grid.lines), old.lines), (_Seen(grid.ranges), old.ranges)]
+    request = replace(request, lines=seen[0][0], fixed=grid.fixed, ranges=seen[1][0])
     places = [np.flatnonzero(place >= 0) for place in earlier.where.values()]
     for k in range(points):
         here = [place[k * (place.size - 1) // (points - 1)] for place in places]
@@ -100,16 +100,20 @@ def obstacle(scene, request, grid, earlier, lines, points=3):
         for name, values in solve.solve_point(scene, request, grid.point(cuts), shape).items():
             if not np.array_equal(values, earlier.values(name, cuts), equal_nan=values.dtype.kind == "f"):
                 return f"{name} has other bits on this map"
-    other = [name for name in sorted(seen.names) if grid.lines.get(name) != lines.get(name)]
+    other = sorted(name for now, then in seen for name in now.names if dict.get(now, name) != then.get(name))
     return f"on a map, its values depend on all of the axis {other[0]}, which differs" if other else ""
 
 
 class _Seen(dict):
-    """The lines of a grid, and the names of those that a scene has looked at."""
+    """The lines or ranges of a grid, and the names of those that a scene has looked at."""
 
     def __init__(self, lines):
         super().__init__(lines)
         self.names = set()
+
+    def __contains__(self, name):
+        self.names.add(name)
+        return super().__contains__(name)
 
     def get(self, name, default=None):
         self.names.add(name)

@@ -90,6 +90,19 @@ def test_a_map_whose_series_take_the_whole_axis_is_solved_anew(tmp_path, monkeyp
     assert "on a map, its values depend on all of the axis rho" in told or "has other bits on this map" in told
 
 
+def test_fates_of_few_systems_are_not_taken_for_a_map_of_many(tmp_path, monkeypatch):
+    """Maps of 1,000 starts find the curves between basins for as many as 8 systems: 9 have other bits."""
+    monkeypatch.chdir(tmp_path)
+    axes = {name: {"start": -3.0, "stop": 3.0, "num": number} for name, number in (("phi0", 40), ("w0", 25))}
+    axes |= {"b12": {"start": 0.3, "stop": 0.7, "num": 2}, "b31": -0.4, "d": 1.1, "c23": 0.3, "s2": 0.5, "s3": -0.2}
+    table = {"scene": "gyrostat", "options": {"question": "fate"}, "axes": axes, "output": {"path": "old.nc"}}
+    survey.run(table)
+    wider = table | {"axes": axes | {"b12": {"start": 0.3, "stop": 0.7, "num": 9}}}
+    held, told = earlier.find(workflow.check(wider, output="new.nc"), "old.nc")
+    assert held is None and "depend on all of the axis b12, which differs" in told
+    assert earlier.find(workflow.check(table, output="new.nc"), "old.nc")[0].points == 2000
+
+
 def test_points_of_your_own_equation_are_taken_over_until_its_text_changes(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     text = "PARAMETERS, PERIOD, EVEN = ('a', 'q'), 3.141592653589793, False\n"

@@ -82,13 +82,15 @@ def asked(request, names):
     """The Map of a request for fates of systems with the parameters `names`; None if they are few, or not known."""
     own = [request.lines.get(name) for name in ("phi0", "w0")]
     shared = [request.ranges.get(name) for name in ("phi0", "w0")]
+    size = math.prod(line[0] for line in own if line) * max((line[0] for line in shared if line), default=1)
+    last = own[1] or shared[1]
+    if not last or size < FEWEST:
+        return None
     if any(shared) and not set(names) <= request.fixed:
         return None  # how many belong to one system depends on values
     if math.prod(request.lines[name][0] for name in names if name in request.lines) > SYSTEMS:
         return None
-    size = math.prod(line[0] for line in own if line) * max((line[0] for line in shared if line), default=1)
-    last = own[1] or shared[1]
-    return Map(size, max(abs(last[1]), abs(last[2]))) if last and size >= FEWEST else None
+    return Map(size, max(abs(last[1]), abs(last[2])))
 
 
 def cost(starts, each, system):
