@@ -157,7 +157,7 @@ def run(workflow, output, overrides, workers, scheduler, block_timeout, fresh, r
 @click.option("--fresh", is_flag=True, help="Delete what an earlier, interrupted run has proved.")
 @click.option("--quiet", is_flag=True, help="No progress and no closing lines.")
 def prove(workflow, output, overrides, fresh, quiet):
-    """Prove a stability map: OUT.nc with its cells, and OUT.cert, which `survey-check` verifies by itself."""
+    """Prove the cells of a map, or the edges along one axis; OUT.cert is what `survey-check` verifies by itself."""
     from dataclasses import replace
 
     from survey.request.workflow import read

@@ -1,11 +1,13 @@
 """What a certificate states: panels on which few nodes suffice, and cells whose verdicts the checker will prove.
 
-The nodes and the bounds are the checker's own (`survey.proof.checker`), in balls. The cells are searched in binary64,
-many at a time, with a bound of all rounding: nothing is stated that does not hold with a margin.
+The nodes and the bounds are the checker's own (`survey.proof.checker`), in balls. The cells of a map are searched in
+binary64, many at a time, with a bound of all rounding: nothing is stated that does not hold with a margin. Those of a
+row, which are far smaller about its edges, are the checker's own, too.
 """
 
 import math
 from fractions import Fraction
+from itertools import product
 
 import numpy as np
 from flint import acb, arb
@@ -14,13 +16,14 @@ from survey.proof import checker
 
 BITS = 96  # of the balls
 ORDERS = range(12, 80, 4)  # of the Taylor series
-NODES = (6, 8, 10, 12, 14, 16, 18, 20, 24, 28, 32)
+NODES = (6, 8, 10, 12, 14, 16, 18, 20, 24, 28, 32, 36, 40)
 ELLIPSES = (1.6, 1.9, 2.3, 2.8, 3.5, 4.5, 6, 8, 12, 20)
 RATES = np.geomspace(0.03, 1.3, 10)  # least w relative to the square root of the largest |z|, which are tried
 SAMPLES, CHECKED = 96, 12  # positions in a piece at which z is sampled; every so many of them it must be analytic
 UNIT = 2.0**-53
 PANEL = "."  # in a layout
-SMALLEST = 2  # halvings of a panel: for fewer cells it is not worth its nodes
+SMALLEST = 2  # halvings of a map's panel: for fewer cells it is not worth its nodes
+PANELS = 10  # halvings of a row, at most, to find panels
 
 
 def plan(equation, sides, tolerance):
@@ -53,11 +56,11 @@ def _ellipse(equation, sides, name, tolerance):
     for n, _, r, w in _best_of_each(tried):
         least = _rational(w, 1000)
         try:
-            grown = [checker.growth(arc, checker.exact(least)) for arc in equation.on_ellipse(sides, name, r)]
+            grown = equation.sizes(sides, name, r, checker.exact(least))
         except checker.Failed as failed:
             why = failed
             continue
-        bound = 4 * float(max(x.upper() for sizes in grown for x in sizes) / (r - 1))
+        bound = 4 * float(max(x.upper() for x in grown) / (r - 1))
         for more in NODES[NODES.index(n) :]:
             if bound * float(r) ** (1 - more) < 0.2 * tolerance:
                 return more, _rational(float(r), 10), least
@@ -100,43 +103,63 @@ def _growth(length, z, w):
 
 
 def _order(equation, sides, tolerance):
-    """The order at which the series of all steps leave out little enough."""
+    """The order at which the factors in the middle are known well enough."""
     real = {name: centre + half * arb(0, 1) for name, (centre, half) in zip(equation.names, sides, strict=True)}
+    middle = {name: centre for name, (centre, _) in zip(equation.names, sides, strict=True)}
     for order in ORDERS:
-        missed = (y + dy for step in equation.steps(real, order) for y, dy in step[3])
-        if float(sum(missed)) < 1e-3 * tolerance:
+        found = equation.factors(equation.steps(real, order), order, middle)
+        if max(float(f.rad()) for f in found) < 1e-3 * tolerance:
             return order
     raise checker.Failed("the series of the steps leave out too much")
 
 
-def panels(equation, sides, depth, tolerance):
+def panels(equation, sides, depth, tolerance, smallest=None):
     """(layout, panels of the certificate) of a part of the rectangle, whose cells are halved at most `depth` times.
 
-    Where few nodes do not suffice, its quarters are proved instead.
+    Where few nodes do not suffice, its quarters are proved instead, down to panels of `smallest` halvings.
     """
+    row = len(sides) == 1
+    if smallest is None:
+        smallest = max(depth - PANELS, 0) if row else SMALLEST
     try:
         found = plan(equation, sides, tolerance)
         panel = checker.Panel(equation, sides, found)
-        return PANEL, [found | {"cells": cells(panel, depth)}]
+        return PANEL, [found | {"cells": row_cells(panel, depth) if row else cells(panel, depth)}]
     except checker.Failed:
-        if depth <= SMALLEST:
-            return PANEL, [open_panel()]
-    quarters = [checker.within(sides, place) for place in reversed(checker.quarters(((Fraction(0), Fraction(1)),) * 2))]
-    layouts, lists = zip(*(panels(equation, quarter, depth - 1, tolerance) for quarter in quarters), strict=True)
+        if depth <= smallest:
+            return PANEL, [open_panel(len(sides))]
+    parts = [panels(equation, part, depth - 1, tolerance, smallest) for part in reversed(checker.halved(sides))]
+    layouts, lists = zip(*parts, strict=True)
     found = [panel for some in lists for panel in some]
     if all(panel["cells"] == checker.OPEN for panel in found):
-        return PANEL, [open_panel()]
+        return PANEL, [open_panel(len(sides))]
     return checker.SPLIT + "".join(layouts), found
 
 
-def open_panel():
-    """A panel of which nothing is stated."""
-    return {"nodes": [2, 2], "ellipses": ["2", "2"], "rates": ["1", "1"], "order": 2, "cells": checker.OPEN}
+def row_cells(panel, depth):
+    """The certificate's cells of a checker's Panel of a row, with edges halved `depth` times."""
+
+    def found(cell, left):
+        letter = checker.verdict(cell[1])
+        if letter == checker.OPEN:
+            if not left:
+                return panel.edge(*cell) or letter
+            return checker.SPLIT + "".join(found(panel.cell(cell, (half,)), left - 1) for half in (0, 1))
+        return letter
+
+    return found(panel.cell(), depth)
+
+
+def open_panel(sides):
+    """A panel with one side or two of which nothing is stated."""
+    return {
+        "nodes": [2] * sides, "ellipses": ["2"] * sides, "rates": ["1"] * sides, "order": 2, "cells": checker.OPEN,
+    }  # fmt: skip
 
 
 def cells(panel, depth):
     """The certificate's cells of a checker's Panel, halved at most `depth` times."""
-    tables, bounds = panel.polynomials()
+    tables, bounds, _ = zip(*panel.factors, strict=True)
     margins = [float(bound) for bound in bounds]
     floats = [np.array([[float(x.mid()) for x in row] for row in table.tolist()]) for table in tables]
     rounding = [
@@ -175,7 +198,7 @@ class Search:
             margin = (self.margins[factor] + self.rounding[factor]) * (1 + 1e-9)
             low, high = table.min((1, 2)), table.max((1, 2))
             self.signs[index, factor] = np.where(low > margin, 1, np.where(high < -margin, -1, 0))
-        letters = np.array([self.panel.verdict(signs) for signs in self.signs.tolist()])
+        letters = np.array([checker.verdict(dict(enumerate(signs))) for signs in self.signs.tolist()])
         return letters if last else np.where(letters == checker.OPEN, checker.SPLIT, letters)
 
     def _split(self, going):
@@ -186,7 +209,7 @@ class Search:
             some = going[index] & (self.signs[4 * number[index], factor] == 0)
             index, table = number[index[some]], table[some]
             quarters = np.empty((len(index), 4, *table.shape[1:]))
-            for at, (upper, right) in enumerate(reversed(checker.QUARTERS)):
+            for at, (upper, right) in enumerate(product((0, 1), repeat=2)):
                 quarters[:, at] = self.halves[0][right] @ table @ self.halves[1][upper].T
             self.tables[factor] = (4 * index[:, None] + np.arange(4)).ravel(), quarters.reshape(-1, *table.shape[1:])
             self.rounding[factor] += 2 * (sum(table.shape[1:]) + 2) * UNIT * self.largest[factor]

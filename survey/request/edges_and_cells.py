@@ -11,7 +11,7 @@ from survey.wording import short
 MIN_FRACTION = 1e-6  # width of a cell as a fraction of its axis
 
 
-def check_boundaries(scene, name, table, given):
+def check_boundaries(scene, name, table, given, proves=False):
     """The axis along which edges are searched, the last one by default; None where no boundaries are requested."""
     if table is None:
         return None
@@ -21,7 +21,8 @@ def check_boundaries(scene, name, table, given):
         raise BadInput(f"boundaries: no boundary curves are known for the scene {name}; leave the table out")
     if hasattr(measure, "refusal"):
         return _check_closed(measure, scene, name, table, {key: given[key] for key in axes}, given)
-    check_even(scene, name, "boundaries")
+    if not proves:  # proofs need no factors at T/2
+        check_even(scene, name, "boundaries")
     if not axes:
         raise BadInput("boundaries: they are drawn along an axis, and there is none; add one")
     if table.axis is not None and table.axis not in axes:
@@ -74,7 +75,7 @@ def check_refine(scene, name, file, given, proves=False):
     axes = {key: values for key, values in given.items() if np.ndim(values)}
     if measures.question(scene.FAMILY, "cells") is None:
         raise BadInput(f"refine: [refine] is not supported for the scene {name}; leave the table out")
-    if not proves:  # proofs need no factors at T/2
+    if not proves:
         check_even(scene, name, "refine")
     if len(axes) != 2 or min(values.size for values in axes.values()) < 2:
         raise BadInput("refine: cells need exactly two axes of two values or more; fix the other parameters")

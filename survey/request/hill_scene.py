@@ -198,7 +198,7 @@ class HillScene(FunctionScene):
 
     def equation(self, names, ends, options):
         """The equation in formulas (see `survey.scenes`); raises BadInput where z has none."""
-        values = [ends[p.name][0] if p.name in ends else float(names[p.name]) for p in self.PARAMETERS]
+        values = [ends[p.name][0] for p in self.PARAMETERS]
         if callable(self.period) or callable(self.breaks):
             raise BadInput(f"prove: {self.NAME}: PERIOD and BREAKS must be numbers, not functions of p")
         _, edges, _ = self._ranges(np.array([values]))

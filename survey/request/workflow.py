@@ -44,7 +44,7 @@ class Workflow:
     boundaries: str | None = None
     refine: Mapping[str, tuple[float, bool]] | None = None
     style: str = "screen"
-    proves: bool = False  # the cells of `refine` are theorems
+    proves: bool = False  # the cells of `refine`, or the edges of a row, are theorems
 
 
 def read(path, overrides=(), output=None, proves=False):
@@ -129,7 +129,7 @@ def check(data, text="", output=None, default_path="survey.nc", near=None, prove
         path=check_path(next(path for path in (output, file.output.path, default_path) if path is not None)),
         figures=tuple(file.output.figures),
         text=text or _as_toml(data),
-        boundaries=check_boundaries(scene, name, file.boundaries, given),
+        boundaries=check_boundaries(scene, name, file.boundaries, given, proves),
         refine=check_refine(scene, name, file, given, proves),
         proves=proves,
         style=file.output.style,

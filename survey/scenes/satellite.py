@@ -141,7 +141,7 @@ def _body(names, ends, options):
     if "rho" in names:
         return names["rho"], options["body"] == "oblate"
     alpha = names["inertia_ratio"]
-    low, high = ends.get("inertia_ratio") or (float(alpha), float(alpha))
+    low, high = ends["inertia_ratio"]
     if low <= 1 <= high:
         raise BadInput("prove: the axis inertia_ratio contains 1, where rho is infinite; end it before, or begin after")
     rho = f"sqrt(3*({alpha} - 1))" if low > 1 else f"sqrt(3*(1 - {alpha}))"
@@ -152,7 +152,7 @@ def _rotates(names, ends):
     """Are the motions rotations? Raises BadInput if the map contains the separatrix."""
     name = next(name for name in ("k", "one_minus_k", "amplitude") if name in names)
     edge = {"k": 1.0, "one_minus_k": 0.0, "amplitude": pi / 2}[name]
-    low, high = ends.get(name) or (float(names[name]),) * 2
+    low, high = ends[name]
     if low <= edge <= high:
         raise BadInput(f"prove: the axis {name} contains {edge:g}, the separatrix; end it before, or begin after")
     return low < edge if name == "one_minus_k" else low > edge

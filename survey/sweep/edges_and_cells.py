@@ -6,7 +6,7 @@ from survey.sweep import boundaries, dispatch, proofs, refine
 def find(workflow, once, progress=None):
     """The datasets that [boundaries] and [refine] add to the file, their attributes included; `once` as in `Blocks`."""
     found, parts = [], requested(workflow)
-    if "edges" in parts:
+    if "edges" in parts and not (workflow.proves and workflow.refine is None):
         found.append(parts["edges"].find(workflow, _on_threads(progress), once))
     if workflow.proves:
         found.append(proofs.find(workflow, once, progress))

@@ -1,7 +1,8 @@
-"""The cells of a map, each verdict a theorem: found in ball arithmetic, with the certificate for `survey-check`.
+"""The cells of a map, or the edges of a row, each a theorem in ball arithmetic, with a certificate for `survey-check`.
 
-What `survey prove` puts into the file of a map instead of the cells of `survey.sweep.refine`, under the same names. The
-rectangle is proved in parts, side by side in processes, as the arithmetic holds Python's lock; finished parts are kept.
+What `survey prove` puts into the file instead of the cells of `survey.sweep.refine` and the edges of
+`survey.sweep.boundaries`, under the same names. The rectangle or interval is proved in parts, side by side in
+processes, as the arithmetic holds Python's lock; finished parts are kept.
 """
 
 import contextlib
@@ -20,9 +21,15 @@ from survey.sweep import dispatch
 
 CODES = {"undecided": -1, "unstable": 0, "stable": 1}
 LABELS = ("unstable", "stable")
+# of the solution on an edge, by the factor that is zero there: y1, y1', y2, y2', or 2 - D, 2 + D
+EVEN_CLASSES = (("even_antiperiodic", 0), ("even_periodic", 2), ("odd_periodic", 3), ("odd_antiperiodic", 1))
+CLASSES = (("periodic", 0), ("antiperiodic", 1))
 DEEPEST = 20  # halvings of the rectangle
 START = 2  # of them, to make the parts that are proved one by one
 FRACTION = 1e-3  # of the width of a cell: what the polynomials may leave out, in units of the factors
+ROW_PARTS = 8
+EDGE_WIDTH, EDGE_ULPS = 1e-13, 4  # of the intervals that enclose edges; the latter at the larger end
+ROW_BITS = 192
 
 
 def equation_of(workflow):
@@ -34,19 +41,31 @@ def equation_of(workflow):
     scene = workflow.scene
     if not hasattr(scene, "equation"):
         raise BadInput(f"prove: the scene {workflow.name} has no formulas to prove; choose mathieu or satellite")
-    if workflow.refine is None:
-        raise BadInput("prove: the workflow does not say how small cells may become; add [refine] with a width")
-    names, ends, rectangle = {}, {}, []
+    names, ends = {}, {}
     for key, (_, values) in workflow.grid.parameters.items():
-        names[key] = key
-        if key in workflow.refine:
-            ends[key] = float(values.min()), float(values.max())
-        else:
-            names[key] = f"({_decimal(float(values))})"
-    for key in workflow.refine:
-        rectangle.append([_decimal(end) for end in ends[key]])
+        ends[key] = float(np.min(values)), float(np.max(values))
+        names[key] = key if np.ndim(values) else f"({_decimal(float(values))})"
+    axes = _axes(workflow)
     kind, pieces = scene.equation(names, ends, dict(workflow.request.options))
-    return kind, [list(piece) for piece in pieces], list(workflow.refine), rectangle
+    return kind, [list(piece) for piece in pieces], axes, [[_decimal(end) for end in ends[key]] for key in axes]
+
+
+def _axes(workflow):
+    """The parameters of the map, or of the row, that is to be proved; raises BadInput."""
+    if workflow.refine is not None:
+        return list(workflow.refine)
+    axes = list(workflow.grid.sizes)
+    if workflow.boundaries is None:
+        raise BadInput(
+            "prove: nothing is requested: to prove the cells of a map, add [refine] with a width; to prove the edges "
+            "along one axis, add [boundaries]"
+        )
+    if len(axes) != 1:
+        raise BadInput(
+            f"prove: [boundaries] are proved along one axis, and there are {', '.join(axes)}; give all but one as "
+            "bare numbers, or add [refine] with a width to prove the cells of a map"
+        )
+    return axes
 
 
 def _decimal(value):
@@ -55,19 +74,33 @@ def _decimal(value):
 
 
 def find(workflow, once, progress=None):
-    """The dataset of the proved cells and areas; writes the certificate beside the output.
+    """The dataset of the proved cells and areas, or edges; writes the certificate beside the output.
 
     `once` as in `survey.file.blocks.Blocks`; `progress` is called as parts are finished.
     """
-    kind, pieces, names, rectangle = equation_of(workflow)
-    depths = [min(DEEPEST, max(0, math.ceil(math.log2(1 / width) - 1e-9))) for width, _ in workflow.refine.values()]
-    depth = max(0, min(depths) - START)
-    across, tolerance = [2 ** (halvings - depth) for halvings in depths], FRACTION * 0.5 ** max(depths)
-    prover = Prover({"kind": kind, "pieces": pieces}, names, rectangle, across, depth, tolerance)
-    text = _certificate(workflow.title, prover, *solved(prover, once, progress))
+    prover = prover_of(workflow)
+    text = certificate(workflow.title, prover, *solved(prover, once, progress))
     path = workflow.path.with_suffix(".cert")
     write_atomically(path, text.encode())
-    return _describe(workflow, path, text)
+    return (_describe_row if len(prover.names) == 1 else _describe)(workflow, path, text)
+
+
+def prover_of(workflow):
+    """The Prover of the workflow's map or row; raises BadInput."""
+    kind, pieces, names, rectangle = equation_of(workflow)
+    from survey.proof import search
+
+    if len(names) == 1:
+        low, high = (Fraction(end) for end in rectangle[0])
+        width = max(EDGE_WIDTH, EDGE_ULPS * math.ulp(max(abs(low), abs(high))))
+        across, depth = [ROW_PARTS], max(0, math.ceil(math.log2((high - low) / (ROW_PARTS * Fraction(width)))))
+        bits, tolerance = ROW_BITS, FRACTION * width
+    else:
+        depths = [min(DEEPEST, max(0, math.ceil(math.log2(1 / x) - 1e-9))) for x, _ in workflow.refine.values()]
+        depth = max(0, min(depths) - START)
+        across, tolerance = [2 ** (halvings - depth) for halvings in depths], FRACTION * 0.5 ** max(depths)
+        bits = search.BITS
+    return Prover({"kind": kind, "pieces": pieces}, names, rectangle, across, depth, tolerance, bits)
 
 
 class Prover:
@@ -76,22 +109,22 @@ class Prover:
     The rectangle has `across` parts along its sides, whose cells are halved at most `depth` times.
     """
 
-    def __init__(self, equation, names, rectangle, across, depth, tolerance):
+    def __init__(self, equation, names, rectangle, across, depth, tolerance, bits):
         self.equation, self.names, self.rectangle = equation, names, rectangle
-        self.across, self.depth, self.tolerance = across, depth, tolerance
+        self.across, self.depth, self.tolerance, self.bits = across, depth, tolerance, bits
 
     @property
     def numbers(self):
         """Of the parts."""
-        return range(self.across[0] * self.across[1])
+        return range(math.prod(self.across))
 
     def __call__(self, number):
         from survey.proof import checker, search
 
-        checker.ctx.prec = search.BITS
+        checker.ctx.prec = self.bits
         equation = checker.Equation(self.equation["kind"], self.equation["pieces"], self.names)
         sides = [[Fraction(end) for end in side] for side in self.rectangle]
-        part = checker.within(sides, checker.places(self.across, search.PANEL * len(self.numbers))[number])
+        part = checker.places(sides, {"across": self.across, "layout": search.PANEL * len(self.numbers)})[number]
         return number, search.panels(equation, part, self.depth, self.tolerance)
 
 
@@ -106,7 +139,7 @@ def solved(prover, once, progress=None):
     parts = {}
 
     def name(number):
-        return f"proof-{prover.depth}-{prover.across[0]}-{prover.across[1]}-{number}"
+        return "-".join(map(str, ("proof", prover.depth, *prover.across, number)))
 
     def missing():
         raise _Missing
@@ -124,7 +157,7 @@ def solved(prover, once, progress=None):
             progress(reused + done, len(prover.numbers), reused, "parts proved")
 
     def died(number):
-        return number, (search.PANEL, [search.open_panel()])
+        return number, (search.PANEL, [search.open_panel(len(prover.names))])
 
     if todo:
         workers, patience = min(dispatch.cpus(), len(todo)), dispatch.Patience(math.inf)  # a part may take minutes
@@ -141,17 +174,21 @@ def _unpacked(arrays):
     return json.loads(arrays["part"].tobytes())
 
 
-def _certificate(title, prover, layout, panels):
+def certificate(title, prover, layout, panels):
     """The text of the certificate."""
-    from survey.proof import checker, search
+    from survey.proof import checker
 
-    found = [checker.shares_of(panel["cells"]) for panel in panels]
-    shares = checker.weighed(checker.places(prover.across, layout), found)
+    sides = [tuple(Fraction(end) for end in side) for side in prover.rectangle]
+    places = checker.places(sides, {"across": prover.across, "layout": layout})
+    shares = dict.fromkeys(checker.VERDICTS, Fraction(0))
+    for place, panel in zip(places, panels, strict=True):
+        for letter, part in checker.walk(panel["cells"], [place], checker.halved):
+            shares[letter if letter in shares else checker.OPEN] += checker.size(part) / checker.size(sides)
     table = {
-        "format": checker.FORMAT, "title": title, "bits": search.BITS, "equation": prover.equation,
+        "format": checker.FORMAT, "title": title, "bits": prover.bits, "equation": prover.equation,
         "parameters": prover.names, "rectangle": prover.rectangle,
         "panels": {"across": prover.across, "layout": layout, "list": panels},
-        "shares": {letter: str(part) for letter, part in shares.items()},
+        "shares": {letter: str(share) for letter, share in shares.items()},
     }  # fmt: skip
     return json.dumps(table | {"sha256": checker.digest(table)}, indent=1) + "\n"
 
@@ -162,9 +199,8 @@ def _describe(workflow, path, text):
 
     certificate, names = checker.Certificate(text), list(workflow.refine)
     parameters = [next(p for p in workflow.scene.PARAMETERS if p.name == name) for name in names]
-    pairs = zip(certificate.places, certificate.panels, strict=True)
-    found = [boxes(checker.within(certificate.sides, place), panel) for place, panel in pairs]
-    box, letters = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    box = np.array([[float(end) for side in place for end in side] for _, place in certificate.cells])
+    letters = certificate.letters
     variables = {}
     for at, p in enumerate(parameters):
         for side, end in enumerate(("low", "high")):
@@ -184,16 +220,50 @@ def _describe(workflow, path, text):
         "long_name": "verdict of the area", "units": "1", "flag_values": flags,
         "flag_meanings": " ".join(LABELS)})}  # fmt: skip
     words = (
-        f"{label}: {checker.decimal(100 * part, 4, False)} % to {checker.decimal(100 * (part + left), 4, True)} %"
+        f"{label}: {checker.between(100 * part, 100 * (part + left), 4).replace(' to ', ' % to ')} %"
         for label, part in zip(LABELS, least, strict=True)
     )
-    about = {
-        "refine": ", ".join(names), "areas": ", ".join(words),
-        "proof": "each decided cell is proved in ball arithmetic", "proof_certificate": path.name,
-        "proof_sha256": hashlib.sha256(text.encode()).hexdigest(),
-        "proof_statement": certificate.statement(certificate.shares),
+    about = {"refine": ", ".join(names), "areas": ", ".join(words)}
+    return xr.Dataset(variables, coords, about | _about(certificate, path, text, "each decided cell"))
+
+
+def _about(certificate, path, text, what):
+    """The attributes of a proof."""
+    return {
+        "proof": f"{what} is proved in ball arithmetic", "proof_certificate": path.name,
+        "proof_sha256": hashlib.sha256(text.encode()).hexdigest(), "proof_statement": certificate.statement(),
     }  # fmt: skip
-    return xr.Dataset(variables, coords, about)
+
+
+def _describe_row(workflow, path, text):
+    """Variables and attributes of the edges of a row."""
+    from survey.proof import checker
+
+    certificate, axis = checker.Certificate(text), workflow.boundaries
+    cells = [(letter, *place[0]) for letter, place in certificate.cells if letter in checker.EDGES]
+    position = np.array([float((low + high) / 2) for _, low, high in cells])
+    reach = [max(high - Fraction(x), Fraction(x) - low) for x, (_, low, high) in zip(position, cells, strict=True)]
+    error = round_up(np.array([float(x) for x in reach]) * (1 + 2**-50))
+    classes = EVEN_CLASSES if certificate.equation.even else CLASSES
+    kind = np.array([classes[checker.EDGES.index(letter)][1] for letter, *_ in cells], np.int8)
+    parameter = next(p for p in workflow.scene.PARAMETERS if p.name == axis)
+    named = {"units": parameter.units, "symbol": parameter.symbol}
+    complete = checker.OPEN not in certificate.letters
+    variables = {
+        "edge_count": ((), np.int32(len(cells)), {
+            "long_name": "number of proved edges of tongues", "units": "1", "sample_dimension": "edge"}),
+        "edge_complete": ((), np.int8(complete), {
+            "long_name": "is it proved that these are all edges", "units": "1",
+            **flag_attributes({"no": 0, "yes": 1})}),
+        "edge_position": ("edge", position, named | {
+            "long_name": f"{parameter.long_name} at the edge of a tongue",
+            "ancillary_variables": "edge_position_error"}),
+        "edge_position_error": ("edge", error, named | {"long_name": "proved error bound of edge_position"}),
+        "edge_class": ("edge", kind, {
+            "long_name": "kind of the solution on the edge", "units": "1", **flag_attributes(dict(classes))}),
+    }  # fmt: skip
+    about = {"boundaries": axis} | _about(certificate, path, text, "each edge, and that it is the only one there,")
+    return xr.Dataset(variables, attrs=about)
 
 
 def _areas(sides, least, left, units):
@@ -219,20 +289,3 @@ def _rounded(number, towards):
     """A rational number as a float on this side of it."""
     value = float(number)
     return value if Fraction(value) == number else math.nextafter(value, towards)
-
-
-def boxes(sides, panel):
-    """The cells of a panel: (their ends along both axes (M, 4), their letters (M))."""
-    from survey.proof import checker
-
-    found, letters, waiting = [], [], [((0.0, 1.0), (0.0, 1.0))]
-    for letter in panel["cells"]:
-        place = waiting.pop()
-        if letter == checker.SPLIT:
-            waiting += checker.quarters(place)
-        else:
-            found.append([*place[0], *place[1]])
-            letters.append(letter)
-    low = np.array([float(side[0]) for side in sides])
-    length = np.array([float(side[1] - side[0]) for side in sides])
-    return low.repeat(2) + length.repeat(2) * np.array(found), np.array(letters)
