@@ -56,7 +56,7 @@ STABLE, UNSTABLE, OPEN, SPLIT = "s", "u", "o", "+"  # cells; "+" is followed by 
 EDGES = "1234"  # cells of a row: the factor of this number has exactly one zero in it, and no other factor has one
 VERDICTS = {STABLE: "stable", UNSTABLE: "unstable", OPEN: "open"}
 RATIO, FAR = arb(1) / 4, 8  # h / R of a step; a step is halved unless w R < FAR
-SHORTEST, SMALLEST = Fraction(1, 2**20), Fraction(1, 2**11)  # step, and part that bounds growth, as parts of a piece
+SHORTEST, SMALLEST = Fraction(1, 2**20), Fraction(1, 2**16)  # step, and part that bounds growth, as parts of a piece
 ARCS, BOXES, COVER = 24, 32, 4  # parts of half an ellipse, of a piece of [0, S] (at least), of a box's side
 WIDE = arb(1) / 8  # a part of [0, S] is halved while the ball of z times its length exceeds this, relative to sqrt |z|
 LARGEST = 2**23  # characters of a certificate
@@ -95,8 +95,9 @@ def parts(n):
 
 def power(x, n):
     """x^n by multiplication."""
-    found = x if n % 2 else arb(1)
-    return found if n < 2 else found * power(x * x, n // 2)
+    if n < 2:
+        return x if n else arb(1)
+    return x * power(x * x, n // 2) if n % 2 else power(x * x, n // 2)
 
 
 FUNCTIONS = {  # log and sqrt are not a number for complex balls that meet their branch cut, where they are not analytic
@@ -257,12 +258,12 @@ class Panel:
     @cached_property
     def factors(self):
         """[(Bernstein coefficients on the panel, how far it and, on a row, its slope are from them)] of each factor."""
-        nodes = [[(arb.pi() * (2 * i + 1) / (2 * n)).cos() for i in range(n)] for n in self.counts]
+        with ctx.workprec(3 * ctx.prec):  # inverses lose digits
+            nodes = [[(arb.pi() * (2 * i + 1) / (2 * n)).cos() for i in range(n)] for n in self.counts]
+            matrices = [bernstein(at).inv() for at in nodes]
         steps = self.equation.steps(self.place([arb(0, 1)] * len(nodes)), self.order)
         values = [self.equation.factors(steps, self.order, self.place(at)) for at in product(*nodes)]
-        ellipses = zip(self.equation.names, self.ellipses, self.rates, strict=True)
-        sizes = [self.equation.sizes(self.sides, *ellipse) for ellipse in ellipses]
-        matrices = [bernstein(at).inv() for at in nodes]
+        sizes = list(map(partial(self.equation.sizes, self.sides), self.equation.names, self.ellipses, self.rates))
         return [self._factor(matrices, *own) for own in zip(zip(*values, strict=True), *sizes, strict=True)]
 
     def place(self, x):

@@ -124,7 +124,9 @@ def panels(equation, sides, depth, tolerance, smallest=None):
     try:
         found = plan(equation, sides, tolerance)
         panel = checker.Panel(equation, sides, found)
-        return PANEL, [found | {"cells": row_cells(panel, depth) if row else cells(panel, depth)}]
+        found["cells"] = row_cells(panel, depth) if row else cells(panel, depth)
+        if depth <= smallest or {checker.STABLE, checker.UNSTABLE} & set(found["cells"]):
+            return PANEL, [found]
     except checker.Failed:
         if depth <= smallest:
             return PANEL, [open_panel(len(sides))]

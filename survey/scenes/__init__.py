@@ -64,7 +64,7 @@ CONTRACT = {
     ),
     "equation": Function(
         "for `survey prove`: (kind, [(end, z), ...]), Hill's equation in formulas for `survey/proof/checker.py`; "
-        "`names`: for each parameter its name, or its value as a text; `ends`: {axis: (least, largest value)}",
+        "`names`: for each parameter its name, or its value as a text; `ends`: {parameter: (least, largest value)}",
         ("names", "ends", "options"),
     ),
     "compile_ahead": Function(

@@ -161,7 +161,7 @@ def solved(prover, once, progress=None):
 
     if todo:
         workers, patience = min(dispatch.cpus(), len(todo)), dispatch.Patience(math.inf)  # a part may take minutes
-        dispatch.on_processes(prover, todo, finished, died, workers, patience)
+        dispatch.on_processes(prover, todo[::-1], finished, died, workers, patience)  # large parameters take longest
     layouts, lists = zip(*(parts[number] for number in prover.numbers), strict=True)
     return "".join(layouts), [panel for some in lists for panel in some]
 
@@ -254,7 +254,7 @@ def _describe_row(workflow, path, text):
             "long_name": "number of proved edges of tongues", "units": "1", "sample_dimension": "edge"}),
         "edge_complete": ((), np.int8(complete), {
             "long_name": "is it proved that these are all edges", "units": "1",
-            **flag_attributes({"no": 0, "yes": 1})}),
+            **flag_attributes({"not_shown": 0, "complete": 1})}),
         "edge_position": ("edge", position, named | {
             "long_name": f"{parameter.long_name} at the edge of a tongue",
             "ancillary_variables": "edge_position_error"}),
@@ -262,7 +262,9 @@ def _describe_row(workflow, path, text):
         "edge_class": ("edge", kind, {
             "long_name": "kind of the solution on the edge", "units": "1", **flag_attributes(dict(classes))}),
     }  # fmt: skip
-    about = {"boundaries": axis} | _about(certificate, path, text, "each edge, and that it is the only one there,")
+    about = {"boundaries": axis, "edge_incomplete_rows": int(not complete)} | _about(
+        certificate, path, text, "each edge, and that it is the only one there,"
+    )
     return xr.Dataset(variables, attrs=about)
 
 

@@ -1,10 +1,13 @@
 """What `survey-check` proves, against mpmath, closed forms and other methods; and what it must refuse."""
 
+import csv
 import json
 import subprocess
 import sys
+from decimal import Decimal
 from fractions import Fraction
 from functools import cache
+from math import floor
 from pathlib import Path
 
 import mpmath
@@ -202,6 +205,33 @@ def test_the_theorem_that_the_documentation_prints():
     assert certificate.sides == [(0, Fraction(1, 2)), (0, Fraction(4, 5))]
 
 
+@pytest.mark.parametrize("body, number, end", [("rod", 6, Fraction("1.56")), ("disc", 1, Fraction("1.5"))])
+def test_the_critical_amplitudes_that_the_documentation_prints(body, number, end):
+    """Every digit, in radians and degrees, follows from the certificate; and the table made by other methods agrees."""
+    certificate = checker.Certificate((RESULTS / f"satellite_{body}_proved.cert").read_text())
+    found = [(letter, *place[0]) for letter, place in certificate.cells if letter in checker.EDGES]
+    assert len(found) == number and checker.OPEN not in certificate.letters
+    assert certificate.sides == [(0, end)] and certificate.letters[0] == "s"
+    page = (RESULTS.parent / "workflows" / "docs" / "proofs.md").read_text()
+    ctx.prec = 128
+    listed = csv.DictReader((RESULTS / "satellite_critical_amplitudes.csv").read_text().splitlines())
+    listed = [row for row in listed if row["body"].endswith(body) and row["motion"] == "librations"]
+    for (letter, low, high), row in zip(found, listed, strict=False):
+        ball = checker.exact(low).union(checker.exact(high))
+        radians, degrees = (nearest(x, digits) for x, digits in ((ball, 12), (ball * 180 / arb.pi(), 10)))
+        assert (f" {radians} | {degrees} | " if body == "rod" else f"{radians} rad $= {degrees}^") in page
+        error = Fraction(row["amplitude_error_rad"])
+        assert low - error <= Fraction(row["amplitude_rad"]) <= high + error
+        assert row["class"] == dict(zip(checker.EDGES, (name for name, _ in proofs.EVEN_CLASSES), strict=True))[letter]
+
+
+def nearest(ball, digits):
+    """The decimals to which every number of the ball is rounded."""
+    ends = {floor(Fraction(str(end.fmpq())) * 10**digits + Fraction(1, 2)) for end in (ball.lower(), ball.upper())}
+    assert len(ends) == 1
+    return f"{Decimal(ends.pop()).scaleb(-digits):.{digits}f}"
+
+
 def test_the_checker_needs_nothing_but_flint(tmp_path):
     """Copied elsewhere and run in isolation, it proves the same."""
     source = Path(checker.__file__).read_text()
@@ -301,7 +331,7 @@ ROW_MUTATIONS = {
     "too few nodes": panels(nodes=[4]),
     "nodes of a map": panels(nodes=[8, 8]),
     "Taylor series of few terms": panels(order=8),
-    "too few bits": at("bits", value=64),
+    "bits that are a text": at("bits", value="192"),
     "another excitation": formula("a - 9*cos(2*u)"),
     "another interval": at("rectangle", value=[["1", "4"]]),
     "two parameters": at("parameters", value=["a", "q"]),

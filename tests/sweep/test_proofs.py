@@ -2,6 +2,7 @@
 
 from fractions import Fraction
 from itertools import pairwise
+from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -267,3 +268,14 @@ def test_parts_that_are_kept_are_not_proved_again(monkeypatch):
     monkeypatch.setattr(dispatch, "on_processes", on_processes)
     assert proofs.solved(made, once) == proofs.solved(made, once)
     assert calls == [[0]]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["mathieu_proved", "satellite_proved"])
+def test_the_areas_of_refine_lie_within_the_published_bounds(name, tmp_path):
+    root = Path(__file__).parents[2]
+    shares = checker.Certificate((root / "results" / f"{name}.cert").read_text()).shares
+    ds = survey.run(root / "workflows" / f"{name}.toml", output=tmp_path / "map.nc")
+    for code, letter in enumerate("us"):
+        share, error = (float(x.values[code]) for x in (ds.area_fraction, ds.area_fraction_error))
+        assert shares[letter] <= share + error and share - error <= shares[letter] + shares["o"]
