@@ -34,7 +34,7 @@ from survey.kernels.jit import kernel
 from survey.kernels.math.elliptic import MEANS
 from survey.kernels.math.roundoff import EPS
 from survey.measures import linear_motion
-from survey.measures.hill import dense, monodromy
+from survey.measures.hill import dense, monodromy, scattering
 from survey.measures.hill import motion as hill_motion
 from survey.measures.hill import why as hill_why
 from survey.measures.hill.satellite import Motion, moduli, planar_angle, rates
@@ -80,6 +80,8 @@ OUTPUTS = (
     Output("least_z", "least z along the motion", r"\min z", on_request=True),
     Output("zhukovskii", "Zhukovskii's criterion: n^2 pi^2 / T^2 <= z <= (n + 1)^2 pi^2 / T^2 for one n = 0, 1, ...",
            flags=_CRITERION, on_request=True),
+    *(Output(name, words, symbol, applies=where, on_request=True)
+      for name, (words, symbol, where) in scattering.NAMES.items()),
 )  # fmt: skip
 
 _OF_PERIOD = {"period", "exponent_per_orbit", "lyapunov", "lyapunov_integral", "zhukovskii"}
@@ -217,6 +219,9 @@ def _criteria(out, row, rho, period, wanted, ok):
     if "least_z" in wanted:
         least, _, bar = row.range_of_z(rho)
         found["least_z"] = least, bar
+    for name, (values, bars) in found.items():
+        out[name], out[f"{name}_error"] = np.where(ok, values, np.nan), np.where(ok, bars, np.nan)
+    found = scattering.solve(np.broadcast_to(rho, ok.shape), row.rotates[:, None], row.oblate, wanted)
     for name, (values, bars) in found.items():
         out[name], out[f"{name}_error"] = np.where(ok, values, np.nan), np.where(ok, bars, np.nan)
     if "zhukovskii" in wanted:
