@@ -18,12 +18,12 @@ LARGEST = 1e3  # of |rho| and k: motions are followed, step by step
 FLAGS = {"undecided": -1, "unstable": 0, "orbitally_stable": 1, "resonance": 2}
 _APPLIES = "where the verdict is stable, k > 0, and |rho| and k are at most 1000"
 OUTPUTS = (
-    Output("twist", "twist: derivative of the angle per period by the action across the plane, at constant energy",
-           r"\vartheta_J", applies=_APPLIES, on_request=True),
-    Output("twist_resonant", "resonant term of order 4, of any effect only next to D = 0, to compare with the twist",
-           r"\vartheta_4", applies=_APPLIES, on_request=True),
-    Output("verdict_nonlinear", "orbital stability by the normal form of order 4; resonance: D = 0 within its error "
-           "bar, with a resonant term that may outweigh the twist", flags=FLAGS, on_request=True),
+    Output("twist", "twist at constant energy: angle per period by action", r"\tau", on_request=True,
+           applies=f"{_APPLIES}: the action is that across the plane, over I omega_p"),
+    Output("twist_resonant", "resonant term of order 4, to compare with the twist", r"\sigma", on_request=True,
+           applies=f"{_APPLIES}; it has an effect only next to D = 0"),
+    Output("verdict_nonlinear", "orbital stability by the normal form of order 4", flags=FLAGS, on_request=True,
+           applies="resonance: D = 0 within its error bar, with a resonant term that may outweigh the twist"),
 )  # fmt: skip
 NAMES = {output.name for output in OUTPUTS}
 
