@@ -26,6 +26,8 @@ def solve(given, valid, times, out, request):
             found |= _of_integrals(given, valid, int(request.options["sign"]), wanted)
         else:
             found |= _of_states(given, valid, times, out, wanted)
+        if not found:
+            return {}
         good = out["status"] == OK
         return {
             key: np.where(_shaped(good, part), _shaped(part, good), np.nan)
