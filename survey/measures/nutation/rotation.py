@@ -24,9 +24,9 @@ PHASES = {
 }
 AT_T = {
     "p_theta": ("momentum conjugate to theta at t", r"p_\theta"),
-    "p": ("angular velocity about the first axis of the body at t", "p"),
-    "q": ("angular velocity about the second axis of the body at t", "q"),
-    "r": ("angular velocity about the axis of symmetry", "r"),
+    "omega1": ("angular velocity about the first axis of the body at t", "p"),
+    "omega2": ("angular velocity about the second axis of the body at t", "q"),
+    "omega3": ("angular velocity about the axis of symmetry", "r"),
     "gamma1": ("first component in the body of the direction of the centre at t", r"\gamma"),
     "gamma2": ("second component in the body of the direction of the centre at t", r"\gamma'"),
     "gamma3": ("third component in the body of the direction of the centre at t, u", r"\gamma''"),
@@ -90,9 +90,9 @@ def at_times(rows, kinds, starts, periods, times, sizes, motion):
     tilted = off * np.abs(sine)
     return {
         "p_theta": (p_theta, bars[1]),
-        "p": (first / size_a, bar / size_a + 4.0 * ROUNDOFF * np.abs(first / size_a)),
-        "q": (second / size_a, other / size_a + 4.0 * ROUNDOFF * np.abs(second / size_a)),
-        "r": (spin, ROUNDOFF * np.abs(spin)),
+        "omega1": (first / size_a, bar / size_a + 4.0 * ROUNDOFF * np.abs(first / size_a)),
+        "omega2": (second / size_a, other / size_a + 4.0 * ROUNDOFF * np.abs(second / size_a)),
+        "omega3": (spin, ROUNDOFF * np.abs(spin)),
         "gamma1": (sine * s, bars[0] * np.abs(s) + tilted + 2.0 * ROUNDOFF * np.abs(sine * s)),
         "gamma2": (sine * c, bars[0] * np.abs(c) + tilted + 2.0 * ROUNDOFF * np.abs(sine * c)),
         "gamma3": (motion["u"], motion["u_error"]),

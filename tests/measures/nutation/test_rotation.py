@@ -54,11 +54,11 @@ def test_the_rotation_at_t(point):
     t = np.linspace(0.0, 12.0, 61)
     ds = survey.evaluate("brun", **dict(zip(PARAMETERS, point, strict=True)), t=t, variables=[*AT_T, "psi", "phi"])
     known = integrated(point, t)
-    for name, values in zip(("p", "q", "r", "gamma1", "gamma2", "gamma3"), known, strict=True):
+    for name, values in zip(("omega1", "omega2", "omega3", "gamma1", "gamma2", "gamma3"), known, strict=True):
         bar = ds[f"{name}_error"].values
         assert (abs(ds[name].values - values) <= bar + 2e-11).all(), (name, abs(ds[name].values - values).max())
         assert bar.max() < 1e-9, name
-    across = point[0] * (ds.p * np.cos(ds.phi) - ds.q * np.sin(ds.phi))
+    across = point[0] * (ds.omega1 * np.cos(ds.phi) - ds.omega2 * np.sin(ds.phi))
     assert float(abs(ds.p_theta - across).max()) < 1e-12
 
 
