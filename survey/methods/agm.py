@@ -9,13 +9,12 @@ from math import copysign, log, pi, sqrt
 
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math import double as dd
-from survey.kernels.math.elliptic import jacobi
 from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.math.third_kind import mean, third, third_double
 from survey.kernels.nutation import records as rc
 from survey.kernels.nutation import wells as nu
 from survey.kernels.nutation.action import ROUGH, action
-from survey.kernels.nutation.motion import motion
+from survey.kernels.nutation.motion import cosine_by_means, motion
 
 ORDER = 0  # no steps
 SERVES = ("nutation",)
@@ -170,19 +169,9 @@ def nutation_periods(rows, kinds, tolerance, out):
             _periods_of(rows[i], out[i])
 
 
-@inline
-def _cosine(z, kc, quarter, pairs, last):
-    """(1 + c)/2, (1 - c)/2 and c = cn z, for z in [0, 2 K]."""
-    over = z > quarter
-    sn, cn, _dn = jacobi(2.0 * quarter - z if over else z, pairs, last)
-    cn = abs(cn)
-    near, far = 0.5 * (1.0 + cn), 0.5 * sn * sn / (1.0 + cn)
-    return (far, near, -cn) if over else (near, far, cn)
-
-
 @kernel
 def nutation_motions(rows, kinds, starts, periods, times, out):
     """Fill `out` (n, m, MOTION) at `times` (n, m) in units of A."""
     for i in range(len(rows)):
         if kinds[i] >= nu.NUTATION:
-            motion(_cosine, rows[i], starts[i], periods[i], times[i], out[i])
+            motion(cosine_by_means, rows[i], starts[i], periods[i], times[i], out[i])

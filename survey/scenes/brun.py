@@ -34,10 +34,9 @@ import numpy as np
 
 from survey import methods
 from survey.errors import BadInput
-from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.nutation import brun, brun_lanes
 from survey.kernels.nutation import wells as nu
-from survey.measures.nutation import derived, multiprecision, separatrix, unsettled
+from survey.measures.nutation import derived, multiprecision, on_request, rotation, separatrix, twist, unsettled
 from survey.measures.nutation import wells as nutation
 from survey.measures.rows import Rows
 from survey.modules import load
@@ -88,6 +87,7 @@ OPTIONS = (
 )
 
 _TURNS = derived.FINITE
+_SETTLED = f"{_TURNS}, and where double-double tells the turning points apart"
 
 
 def _outputs(when, dims):
@@ -102,16 +102,26 @@ def _outputs(when, dims):
         Output("action", "action of the nutation, 1 / 2 pi times the integral of p_theta d theta over a period", "J_u",
                **turns),
         *(Output(d.name, d.long_name, d.symbol, d.units, applies=d.applies, **given) for d in derived.DERIVED),
+        *(Output(name, words, symbol, applies=_SETTLED, on_request=True, **given)
+          for name, (words, symbol, _column) in twist.NAMES.items()),
     )  # fmt: skip
 
 
+def _extra(name, long_name, symbol, when, applies):
+    return Output(name, long_name, symbol, when=when, applies=applies, on_request=True)
+
+
+_PHASED = dict.fromkeys(("beta1", "beta2"), "p_phi is not 0 and A is not C") | {"beta3": "without jumps at poles"}
 _VERDICTS = {"undecided": -1, "separatrix": 0, "regular_nutation": 1, "regular_precession": 2, "pole_passage": 3}
 _ANGLE = {"units": "rad", "when": _MOTION, "applies": f"{_TURNS}; without the jumps of pi in passing a pole"}
 OUTPUTS = (
     Output("u", "u = cos theta at t", "u", when=_MOTION, applies=_TURNS),
     Output("psi", "angle of precession at t, 0 at first, unwrapped", r"\psi", **_ANGLE),
     Output("phi", "angle of spin at t, 0 at first, unwrapped", r"\varphi", **_ANGLE),
+    *(_extra(name, *words, _MOTION, _SETTLED) for name, words in rotation.AT_T.items()),
     *_outputs(_STATE, ()),
+    *(_extra(name, *words, _STATE, _SETTLED) for name, words in rotation.ENERGIES.items()),
+    *(_extra(name, *words, _STATE, f"{_SETTLED}; {_PHASED[name]}") for name, words in rotation.PHASES.items()),
     *_outputs(_SCALED, ("well",)),
     Output("separatrix_distance", "L less its value on the separatrix at the same p_psi, p_phi, over |k|", r"\Delta l",
            applies="where these momenta have a separatrix (nearer than 1e38): negative in a well, positive outside"),
@@ -137,13 +147,13 @@ def solve(point, request):
     columns = block.columns(shared.values())
     given, valid = dict(zip(shared, columns, strict=True)), np.isfinite(columns).all(axis=0)
     wanted = request.variables or {"action", "separatrix_distance"}
+    times = block.per_point(point["t"]) if "t" in point else None
     if "l" in given:
         sign = int(request.options["sign"])
         solver = partial(multiprecision.of_integrals, sign=sign)
         slowly = partial(_scaled, sign=sign, method=method, rtol=request.rtol)
         out = _scaled_in_lanes(given, valid, sign, slowly, wanted) if auto else slowly(given, valid)
     else:
-        times = block.per_point(point["t"]) if "t" in point else None
         valid &= (given["C"] <= 2.0 * given["A"]) & ((given["theta0"] > 0.0) | (given["p_psi"] == given["p_phi"]))
         solver = multiprecision.of_state
         slowly = partial(_state, method=method, request=request, times=times)
@@ -151,24 +161,8 @@ def solve(point, request):
     if "t" not in point:
         unsettled.settle(out, _ordered(given), solver, valid, request)
     out |= derived.solve(out, request.variables)
-    if "saddle_growth" in request.variables:
-        out |= _saddle_growth(given, out["status"], request)
+    out |= on_request.solve(given, valid, times, out, request)
     return {name: _back(block, values) for name, values in out.items()}
-
-
-def _saddle_growth(given, code, request):
-    """The output of that name, where the status `code` is ok."""
-    with np.errstate(all="ignore"):
-        if "l" in given:
-            value, bar = separatrix.growth(given["alpha"], given["beta"], np.float64(request.options["sign"]))
-        else:
-            k = given["epsilon"] * given["A"] * (given["A"] - given["C"])
-            size = np.sqrt(abs(k))
-            value, bar = separatrix.growth(given["p_phi"] / size, given["p_psi"] / size, np.sign(k))
-            unit = size / given["A"]
-            value, bar = value * unit, (bar + 8 * ROUNDOFF * value) * unit
-    value, bar = (np.where(code == OK, x if x.ndim == code.ndim else x[:, None], np.nan) for x in (value, bar))
-    return {"saddle_growth": value, "saddle_growth_error": bar}
 
 
 def _ordered(given):

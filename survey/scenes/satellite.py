@@ -34,7 +34,7 @@ from survey.kernels.jit import kernel
 from survey.kernels.math.elliptic import MEANS
 from survey.kernels.math.roundoff import EPS
 from survey.measures import linear_motion
-from survey.measures.hill import dense, monodromy
+from survey.measures.hill import dense, monodromy, nonlinear, scattering
 from survey.measures.hill import motion as hill_motion
 from survey.measures.hill import why as hill_why
 from survey.measures.hill.satellite import Motion, moduli, planar_angle, rates
@@ -80,6 +80,9 @@ OUTPUTS = (
     Output("least_z", "least z along the motion", r"\min z", on_request=True),
     Output("zhukovskii", "Zhukovskii's criterion: n^2 pi^2 / T^2 <= z <= (n + 1)^2 pi^2 / T^2 for one n = 0, 1, ...",
            flags=_CRITERION, on_request=True),
+    *(Output(name, words, symbol, applies=where, on_request=True)
+      for name, (words, symbol, where) in scattering.NAMES.items()),
+    *nonlinear.OUTPUTS,
 )  # fmt: skip
 
 _OF_PERIOD = {"period", "exponent_per_orbit", "lyapunov", "lyapunov_integral", "zhukovskii"}
@@ -191,7 +194,10 @@ def _solve(shared, rho, oblate, request, low=None, line=None, ends=None):
 
 
 def _wanted(request):
-    return set(request.variables) | ({"exponent"} if "exponent_per_orbit" in request.variables else set())
+    wanted = set(request.variables)
+    if not wanted.isdisjoint(nonlinear.NAMES):
+        wanted |= {"verdict", "discriminant"}
+    return wanted | ({"exponent"} if "exponent_per_orbit" in wanted else set())
 
 
 def _derived(out, row, rho, block, request, period):
@@ -219,6 +225,11 @@ def _criteria(out, row, rho, period, wanted, ok):
         found["least_z"] = least, bar
     for name, (values, bars) in found.items():
         out[name], out[f"{name}_error"] = np.where(ok, values, np.nan), np.where(ok, bars, np.nan)
+    found = scattering.solve(np.broadcast_to(rho, ok.shape), row.rotates[:, None], row.oblate, wanted)
+    for name, (values, bars) in found.items():
+        out[name], out[f"{name}_error"] = np.where(ok, values, np.nan), np.where(ok, bars, np.nan)
+    if not wanted.isdisjoint(nonlinear.NAMES):
+        out |= nonlinear.solve(row, np.broadcast_to(rho, ok.shape), out)
     if "zhukovskii" in wanted:
         out["zhukovskii"] = (row.zhukovskii(rho, period) & ok).astype(np.int8)
 

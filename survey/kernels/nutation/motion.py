@@ -10,7 +10,7 @@ import numpy as np
 
 from survey.kernels.jit import inline
 from survey.kernels.math.carlson import rf, rj_spread
-from survey.kernels.math.elliptic import MEANS, means
+from survey.kernels.math.elliptic import MEANS, jacobi, means
 from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.nutation import records as rc
 from survey.kernels.nutation import wells as nu
@@ -77,6 +77,16 @@ def rates(row, at):
     """(b - a)/(2(1 - u)) and (b + a)/(2(1 + u))."""
     up = 0.5 * row[nu.MINUS] / at[1] if row[nu.MINUS] != 0.0 else 0.0
     return up, (0.5 * row[nu.PLUS] / at[2] if row[nu.PLUS] != 0.0 else 0.0)
+
+
+@inline
+def cosine_by_means(z, kc, quarter, pairs, last):
+    """(1 + c)/2, (1 - c)/2 and c = cn z, for z in [0, 2 K]."""
+    over = z > quarter
+    sn, cn, _dn = jacobi(2.0 * quarter - z if over else z, pairs, last)
+    cn = abs(cn)
+    near, far = 0.5 * (1.0 + cn), 0.5 * sn * sn / (1.0 + cn)
+    return (far, near, -cn) if over else (near, far, cn)
 
 
 @inline
