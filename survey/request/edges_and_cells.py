@@ -41,7 +41,7 @@ def _check_closed(measure, scene, name, table, axes, given):
             key: float(value) for key, value in given.items() if not np.ndim(value)
         }
         second_axis(measure, scene, names[0], fixed)
-    elif len(names) != 1:
+    else:
         stacks = [[*names[:2], third] for third in names[2:]] or [names]  # further axes make a stack of maps
         refusal = next(filter(None, (measure.refusal(stack, scene) for stack in stacks)), None)
     if refusal:
