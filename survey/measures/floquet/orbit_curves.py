@@ -19,7 +19,7 @@ import numpy as np
 from survey.kernels.math.roundoff import EPS
 from survey.measures import contours
 from survey.measures.floquet import bifurcations, existence, monodromy
-from survey.measures.floquet.continuation import Curves, Range, rough_flow, slopes
+from survey.measures.floquet.continuation import Curves, Range, floored, rough_flow, slopes
 from survey.measures.floquet.critical import Critical
 from survey.measures.floquet.critical_points import RTOL, Points
 from survey.measures.floquet.critical_walk import NEAREST, Walk
@@ -244,7 +244,7 @@ class _Map:
             T = points.critical.period_at
             alike = abs(own[:, T] - seed[T]) <= ALIKE * seed[T]
         else:
-            alike = (abs(own[:, :n] - seed[:n]) <= ALIKE * abs(y[:, :n]).max(axis=0)).all(axis=1)
+            alike = (abs(own[:, :n] - seed[:n]) <= ALIKE * floored(abs(y[:, :n]).max(axis=0)[None])).all(axis=1)
         return bool(((off < SAME) & alike).any())
 
     def shown(self, points, y, border):

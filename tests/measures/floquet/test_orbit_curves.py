@@ -187,6 +187,17 @@ def test_the_cusp_and_the_number_of_orbits():
         assert number.orbits.values.tolist() == [3 if yes else 1 for _w, yes in sorted(zip(tried, inside, strict=True))]
 
 
+def test_without_damping():
+    """A conservative oscillator: one curve of folds, though v = 0 on it; det M = 1 everywhere is no complex pair."""
+
+    def f(t, x, p, out):
+        out[0], out[1] = x[1], -x[0] - x[0] ** 3 + p[0] * math.cos(p[1] * t)
+
+    given = {"period": lambda p: 2 * math.pi / p[1], "start": (0.0, 0.0)}
+    ds = found(survey.orbit(f, states=("x", "v"), parameters=("F", "w"), **given), F=(0.1, 0.5), w=(1.2, 2.0))
+    assert ds.curve_class.values.tolist() == [CLASSES["plus_one"]]
+
+
 def sorted_pair(x, y):
     order = np.argsort(x)
     return x[order], y[order]
