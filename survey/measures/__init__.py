@@ -59,6 +59,11 @@ QUESTIONS = {
             ("solve", "x", "y", "each", "report"),
             needed=True,
         ),
+        "refusal": Function(
+            "why there are no cells on maps of the scene about a point {parameter: value}, in words; None if there are",
+            ("scene", "point"),
+        ),
+        "keywords": Function("what `find` is told besides of this scene, {name: value}", ("scene",)),
         "Side": Value("low, high, depth, log: a side of a rectangle and how often it may be halved", type, needed=True),
         "accuracy": Function(
             "the rtol that `find` needs of OUTPUTS where sides are halved `depth` times", ("depth",), needed=True

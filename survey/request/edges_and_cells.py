@@ -42,7 +42,7 @@ def _check_closed(measure, scene, name, table, axes, given):
             key: float(value) for key, value in given.items() if not np.ndim(value)
         }
         second_axis(measure, scene, names[0], fixed)
-    elif len(names) != 1:
+    else:
         stacks = [[*names[:2], third] for third in names[2:]] or [names]  # further axes make a stack of maps
         refusal = next(filter(None, (measure.refusal(stack, scene) for stack in stacks)), None)
     if refusal:
@@ -73,14 +73,26 @@ def check_refine(scene, name, file, given, proves=False):
     if file.refine is None:
         return None
     axes = {key: values for key, values in given.items() if np.ndim(values)}
-    if measures.question(scene.FAMILY, "cells") is None:
+    measure = measures.question(scene.FAMILY, "cells")
+    if measure is None:
         raise BadInput(f"refine: [refine] is not supported for the scene {name}; leave the table out")
     if not proves:
         check_even(scene, name, "refine")
     if len(axes) != 2 or min(values.size for values in axes.values()) < 2:
         raise BadInput("refine: cells need exactly two axes of two values or more; fix the other parameters")
+    _check_cells(measure, scene, name, given)
     widths = _check_width_table(file.refine.width, axes)
     return {key: _fraction(widths, key, values, file.axes.get(key)) for key, values in axes.items()}
+
+
+def _check_cells(measure, scene, name, given):
+    """Raise BadInput where the measure knows no cells on maps of the scene."""
+    if not hasattr(measure, "refusal"):
+        return
+    point = {p.name: p.default for p in scene.PARAMETERS} | {key: np.median(values) for key, values in given.items()}
+    refusal = measure.refusal(scene, point)
+    if refusal:
+        raise BadInput(f"refine: of {name} {refusal}; leave the table out")
 
 
 def _check_width_table(widths, axes):

@@ -84,6 +84,11 @@ class FloquetScene(TracedScene):
         given = (points, request.method, request.rtol, wanted, lines, ranges if set(ranges) == free else {})
         return self._called(stability.solve, self._system, self.structure, *given)
 
+    def is_analytic(self, point):
+        """Does no branch of the code depend on the parameters about the point, {parameter: value}?"""
+        given = np.array([[float(point[p.name]) for p in self.PARAMETERS]])
+        return self._called(dense.is_analytic, self._system, given)
+
     def judged(self, values, axes, fixed, M, E):
         """M and E (N, n, n) without the multiplier of what is conserved, at `values` (N, len(axes)) of the axes."""
         if self.conserved is None:

@@ -6,7 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
-from survey.measures.floquet import orbit, orbit_motion
+from survey.errors import BadInput
+from survey.measures.floquet import curves, orbit, orbit_curves, orbit_motion
 from survey.measures.floquet.continuation import Range
 from survey.measures.floquet.equation import Equation
 from survey.request.floquet_scene import SAME, TRIED
@@ -55,7 +56,7 @@ class OrbitScene(TracedScene):
         return orbit.OUTPUTS if self.continued is None else (*orbit.OUTPUTS, orbit.NUMBER)
 
     @cached_property
-    def _equation(self):
+    def equation(self):
         return Equation(self.f, len(self.states), self.period, self.start)
 
     @property
@@ -86,12 +87,19 @@ class OrbitScene(TracedScene):
         points, shape = self._points(point)
         wanted = set(request.variables) or {o.name for o in self.OUTPUTS}
         if self.continued is None:
-            out = self._called(orbit.solve, self._equation, points, request.method, request.rtol, wanted)
+            out = self._called(orbit.solve, self.equation, points, request.method, request.rtol, wanted)
         else:
             branch = np.broadcast_to(point["branch"], shape).reshape(-1)
             given = points, branch, self.continued, request.method, request.rtol, wanted
-            out = self._called(orbit.solve_branches, self._equation, *given)
+            out = self._called(orbit.solve_branches, self.equation, *given)
         return {name: values.reshape(*shape, *values.shape[1:]) for name, values in out.items()}
+
+    def curves(self, square, axes, fixed):
+        """What `measures.floquet.orbit_curves` finds on the map of `axes`, or on a line; raises BadInput."""
+        refusal = curves.refusal(axes, self)
+        if refusal:
+            raise BadInput(f"boundaries: {refusal}")
+        return self._called(orbit_curves.searched, self, square, axes, fixed)
 
     def why(self, answer):
         """Why a point has its verdict (see `survey.scenes`)."""
@@ -106,11 +114,11 @@ class OrbitScene(TracedScene):
         if not np.isfinite(answer["x0"]).all():
             self._refuse(f"no orbit is shown to exist at {self._where([point[p.name] for p in self.own])}", ELSEWHERE)
         points = np.array([[point[p.name] for p in self.own]])
-        return self._called(orbit_motion.solve, self._equation, self.states, points, answer, time)
+        return self._called(orbit_motion.solve, self.equation, self.states, points, answer, time)
 
     def check(self, points):
         """Raise BadInput if f cannot be used, or contradicts the scene's other entries at these points (N, n)."""
-        equation = self._equation
+        equation = self.equation
         given = points if len(points) else np.ones((1, len(self.own)))
         x0, period = self._called(equation.begin, given)
         known = np.isfinite(x0).all(axis=1) & (period > 0) & np.isfinite(period)

@@ -30,6 +30,7 @@ def find(workflow, each=in_turn, once=lambda name, make: make(), report=None):
     """
     measure, panels = _measure(workflow), _panels(workflow)
     points, found, total = 0, [], _area(panels)
+    more = measure.keywords(workflow.scene) if hasattr(measure, "keywords") else {}
     for x, y in panels:
         share, done = _area([(x, y)]) / total, _area(panels[: len(found)]) / total
         known = [done, points]
@@ -40,7 +41,7 @@ def find(workflow, each=in_turn, once=lambda name, make: make(), report=None):
         name = f"cells-{len(found)}-{x.depth}-{y.depth}"
         parts = _in_parts(name, each, once, lambda left, known=known: report and report(*known, left))
         try:
-            cells = measure.find(_solver(workflow, x, y), x, y, parts, settled)
+            cells = measure.find(_solver(workflow, x, y), x, y, parts, settled, **more)
         except OverflowError as error:
             raise BadInput(f"refine.width: the map has {error}; use a larger width, or a smaller map") from None
         found.append(cells)

@@ -32,14 +32,14 @@ def functions(n, structure):
     return found | ({COLLISION: collision} if n > 3 else {})
 
 
-def plus_one(M, E):
-    """det(M - 1), of M (N, n, n) known to within E."""
-    return determinant(*_shifted(M, E, -1.0))
+def plus_one(M, E, relative=True):
+    """det(M - 1), of M (N, n, n) known to within E; `relative`: see `determinant`."""
+    return determinant(*_shifted(M, E, -1.0), relative)
 
 
-def minus_one(M, E):
+def minus_one(M, E, relative=True):
     """det(M + 1)."""
-    return determinant(*_shifted(M, E, 1.0))
+    return determinant(*_shifted(M, E, 1.0), relative)
 
 
 def neimark_sacker(M, E):
@@ -84,8 +84,8 @@ def _shifted(A, E, by):
         return A + by * one, E + EPS * (abs(A) + 1.0) * one
 
 
-def determinant(A, E):
-    """det A over the square root of det(1 + A^T A), and its bound, of A (N, n, n) known to within E.
+def determinant(A, E, relative=True):
+    """det A, over the square root of det(1 + A^T A) if `relative`, and its bound, of A (N, n, n) known to within E.
 
     With A = U S V^T within R, entries of U^T (E + R) V are moduli B at most, and the determinant of S + G, |G| <= B,
     differs from the product of the s_i by at most prod(s_i + sum_j B_ij) - prod s_i, as a permanent.
@@ -94,7 +94,8 @@ def determinant(A, E):
     n = A.shape[1]
     with np.errstate(all="ignore"):
         # a smooth one: that of the balanced A would jump
-        size = np.exp(np.linalg.slogdet(np.eye(n) + np.swapaxes(A, 1, 2) @ A)[1] / (2 * n))
+        whole = np.linalg.slogdet(np.eye(n) + np.swapaxes(A, 1, 2) @ A)[1] if relative else np.zeros(len(A))
+        size = np.exp(whole / (2 * n))
         scale = monodromy.balanced(abs(A))
         A, E = (X * scale[:, None, :] / scale[:, :, None] for X in (A, E))
         good = np.isfinite(A).all(axis=(1, 2)) & np.isfinite(E).all(axis=(1, 2))

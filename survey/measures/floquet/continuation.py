@@ -44,14 +44,24 @@ class Curve:
     tangent: np.ndarray
     size: np.ndarray
 
-    def crossings(self, values):
-        """Where l, on cubic pieces, takes the values (V): their numbers, and y (C, m)."""
+    def finer(self, times):
+        """Points of the cubic pieces, so many for each of its own."""
+        c = self._pieces()
+        inner = [_cubic(c, k / times) for k in range(times)]
+        return np.concatenate([np.stack(inner, axis=1).reshape(-1, self.y.shape[1]), self.y[-1:]])
+
+    def _pieces(self):
+        """Coefficients (4, K - 1, m) of the cubic pieces, powers of u in [0, 1]."""
         step, size = np.diff(self.y, axis=0), self.size[:-1]
         length = np.linalg.norm(step / size, axis=1)[:, None]
         one, two = (
             length * t / np.linalg.norm(t / size, axis=1)[:, None] for t in (self.tangent[:-1], self.tangent[1:])
         )
-        c = np.stack([self.y[:-1], one, 3 * step - 2 * one - two, one + two - 2 * step])  # powers of u in [0, 1]
+        return np.stack([self.y[:-1], one, 3 * step - 2 * one - two, one + two - 2 * step])
+
+    def crossings(self, values):
+        """Where l, on cubic pieces, takes the values (V): their numbers, and y (C, m)."""
+        c = self._pieces()
         ends = _monotonic(c[:, :, -1])
         at = _cubic(c[:, :, -1, None], ends)
         below, above = np.minimum(at[:, :-1], at[:, 1:]), np.maximum(at[:, :-1], at[:, 1:])
@@ -157,11 +167,11 @@ class _Walk:
         K, m = y.shape
         self.step, self.kept = np.full(K, FIRST_STEP), [([], [], []) for _ in range(K)]
         self.size, self.tangent, self.plane = np.ones((K, m)), np.zeros((K, m)), np.full((2, K, self.n), np.nan)
-        self.size[:, : self.n] = _floored(moduli)
+        self.size[:, : self.n] = floored(moduli)
         self.tangent[:, -1] = sign
         everyone = np.arange(K)
         if self.free:
-            self.plane[:] = self._slopes(curves.points(rows, y[:, -1]), y[:, : self.n]), y[:, : self.n]
+            self.plane[:] = slopes(self.equation, curves.points(rows, y[:, -1]), y[:, : self.n]), y[:, : self.n]
         self.live = everyone[self._moved(everyone, y, np.pi)]
 
     def run(self):
@@ -221,7 +231,7 @@ class _Walk:
         self.y[took], self.tangent[took], self.size[took] = y[done], tangent[done], size[done]
         if self.free and took.size:
             x = self.y[took, : self.n]
-            self.plane[:, took] = self._slopes(self.curves.points(self.rows[took], self.y[took, -1]), x), x
+            self.plane[:, took] = slopes(self.equation, self.curves.points(self.rows[took], self.y[took, -1]), x), x
         for k in took:
             for kept, one in zip(self.kept[k], (self.y[k], self.tangent[k], self.size[k]), strict=True):
                 kept.append(one.copy())
@@ -231,46 +241,51 @@ class _Walk:
         """The equations' left sides at y (K, m), their derivatives (K, m - 1, m), and what lengths are relative to."""
         n = self.n
         points, x, T = self._real(those, y)
-        X, M, moduli = self._flow(points, x, T)
+        X, M, moduli = rough_flow(self.equation, points, x, T)
         inward = np.where(y[:, -1] < 0.99, DIFFERENCE, -DIFFERENCE)
         shifted = y.copy()
         shifted[:, -1] += inward
-        by_l = (self._flow(*self._real(those, shifted), derived=False)[0] - X) / inward[:, None]
+        by_l = (rough_flow(self.equation, *self._real(those, shifted), derived=False)[0] - X) / inward[:, None]
         value, slope, size = X - x, M - np.eye(n), np.ones_like(y)
-        size[:, :n] = _floored(moduli)
+        size[:, :n] = floored(moduli)
         if self.free:
             c, at = self.plane[:, those]
             value = np.concatenate([value, (c * (x - at)).sum(axis=1)[:, None]], axis=1)
-            slope = bordered(slope, self._slopes(points, X), c)
+            slope = bordered(slope, slopes(self.equation, points, X), c)
             by_l = np.concatenate([by_l, np.zeros((len(y), 1))], axis=1)
             size[:, n] = T
-            across = (c * self._slopes(points, x)).sum(axis=1)
+            across = (c * slopes(self.equation, points, x)).sum(axis=1)
             slope[~(across >= ACROSS * (c * c).sum(axis=1))] = np.nan
         return value, np.concatenate([slope, by_l[:, :, None]], axis=2), size
 
-    def _flow(self, points, x, T, derived=True):
-        N, n = x.shape
-        X, M, size = np.full((N, n), np.nan), np.full((N * derived, n, n), np.nan), np.full((N, n), np.nan)
-        usable = np.flatnonzero(np.isfinite(points).all(axis=1) & np.isfinite(x).all(axis=1) & (T > 0))
-        for inside, programs in self.equation.traced(points[usable], x[usable]):
-            own = usable[inside]
-            X[own], found, size[own], _steps = programs.flow(
-                programs.numbers(points[own]), x[own], T[own], ROUGH_REACH, derived, tolerance=ROUGH
-            )
-            if derived:
-                M[own] = found
-        return X, M, size
 
-    def _slopes(self, points, x):
-        f = np.full(x.shape, np.nan)
-        for inside, programs in self.equation.traced(points, x):
-            f[inside] = programs.slopes(programs.numbers(points[inside]), np.zeros(inside.size), x[inside])[0]
-        return f
+def rough_flow(equation, points, x, T, derived=True):
+    """x(T) from x (N, n), its derivatives, and the largest moduli of the states, not quite to rounding; or NaN."""
+    N, n = x.shape
+    X, M, size = np.full((N, n), np.nan), np.full((N * derived, n, n), np.nan), np.full((N, n), np.nan)
+    usable = np.flatnonzero(np.isfinite(points).all(axis=1) & np.isfinite(x).all(axis=1) & (T > 0))
+    for inside, programs in equation.traced(points[usable], x[usable]):
+        own = usable[inside]
+        X[own], found, size[own], _steps = programs.flow(
+            programs.numbers(points[own]), x[own], T[own], ROUGH_REACH, derived, tolerance=ROUGH
+        )
+        if derived:
+            M[own] = found
+    return X, M, size
 
 
-def _floored(moduli):
+def slopes(equation, points, x):
+    """f (N, n) at t = 0."""
+    f = np.full(x.shape, np.nan)
+    for inside, programs in equation.traced(points, x):
+        f[inside] = programs.slopes(programs.numbers(points[inside]), np.zeros(inside.size), x[inside])[0]
+    return f
+
+
+def floored(moduli):
     """Sizes of states, from their largest moduli (K, n): one that is 0 all the time has one too."""
-    return np.maximum(moduli, LEAST * moduli.max(axis=1, keepdims=True))
+    largest = moduli.max(axis=1, keepdims=True)
+    return np.maximum(moduli, np.where(largest == 0.0, 1.0, LEAST * largest))
 
 
 def _turn(a, b):

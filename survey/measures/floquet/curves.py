@@ -1,10 +1,11 @@
 """The curves that [boundaries] draws on a map of two parameters: where multipliers reach the unit circle or leave it.
 
-They are zeros of the functions of `bifurcations`. These are known on LINES lines of the map each way, and their
-splines, on lines FINER times as dense, show where to look (marching squares). Every point is then bracketed along an
-axis by signs of the function itself that are certain within the error bounds of M. A tongue narrower than the distance
-of two of the dense lines may be missed there, and one that the splines do not show. Curves are drawn wherever a
-multiplier passes, also where another one is outside the circle already: `outside` counts those.
+Those of periodic orbits are found by `orbit_curves`; what follows is about linear systems. There the curves are zeros
+of the functions of `bifurcations`. These are known on LINES lines of the map each way, and their splines, on lines
+FINER times as dense, show where to look (marching squares). Every point is then bracketed along an axis by signs of the
+function itself that are certain within the error bounds of M. A tongue narrower than the distance of two of the dense
+lines may be missed there, and one that the splines do not show. Curves are drawn wherever a multiplier passes, also
+where another one is outside the circle already: `outside` counts those.
 """
 
 from functools import partial
@@ -37,13 +38,19 @@ RTOL, ROUGH = 1e-13, 1e-9  # of M for points of curves, and to see where these a
 
 def refusal(axes, scene):
     """Why there are no curves on a map of these axes, in words; None if there are."""
-    if scene is not None and scene.FAMILY == "orbit":
-        return "curves are drawn for linear systems, not for periodic orbits, which end at folds"
-    return None if len(axes) in (2, 3) else f"curves are drawn on two axes, or three, not on {len(axes)}"
+    if scene is not None and scene.FAMILY == "orbit" and scene.continued is not None:
+        along = scene.own[scene.continued.index].name
+        if "branch" in axes:
+            return "curves are those of all orbits, whatever their number: let `branch` be a number, not an axis"
+        if along not in axes[:2]:
+            return f"curves are drawn along {along}, the parameter of CONTINUATION, or on maps of it and another one"
+    return None if len(axes) in (1, 2, 3) else f"curves are drawn on two axes, or three, not on {len(axes)}"
 
 
 def searched(scene, square, axes, fixed, options):
     """The Curves on the map of `axes`, the unit square `square`; `fixed` holds the other parameters."""
+    if scene.FAMILY == "orbit":
+        return joined(scene.curves(square, axes, fixed), [output.name for output in ALONG])
 
     def matrices(x, rtol=RTOL):
         values = square.parameters(x)

@@ -312,7 +312,7 @@ def at_points(system, structure, points):
         return None
     with np.errstate(all="ignore"):
         own = monodromy.Points(system, points)
-        if not own.valid.all() or len(own.groups) != 1 or not all(p.analytic for p in own.groups[0][1]):
+        if not _is_analytic(own):
             return None
         every, n, paired = np.arange(len(points)), system.n, structure != "none"
         out = np.empty((2, len(points), n // 2 * (2 if structure == "symplectic" else 1) if paired else n))
@@ -324,12 +324,24 @@ def at_points(system, structure, points):
     return out if np.isfinite(out).all() else None
 
 
-def coefficients(M, E, scale, structure, steps_of):
+def is_analytic(system, points):
+    """Is M analytic in the parameters about the points, as far as the code tells?"""
+    if not system.smooth(points[0]):
+        return False
+    with np.errstate(all="ignore"):
+        return _is_analytic(monodromy.Points(system, points))
+
+
+def _is_analytic(own):
+    return own.valid.all() and len(own.groups) == 1 and all(p.analytic for p in own.groups[0][1])
+
+
+def coefficients(M, E, scale, structure, steps_of=None):
     """Those of the polynomial but its first, 1, from the highest power on (N, K), and their bounds.
 
-    M (N, n, n) are known within E, in the units `scale` (N, n) of the states; `steps_of`: see `monodromy.solve`. For
-    p(l) = l^n + c_1 l^(n-1) + ... dc_k = -tr(B_(k-1) dM). c_k comes from B_(k-1), or, where rounding asks for it, from
-    the computed eigenvalues, which are those of a matrix within 8 n EPS |M| of M.
+    M (N, n, n) are known within E, in the units `scale` (N, n) of the states; `steps_of`: see `monodromy.solve`, or
+    None, where only E is known. For p(l) = l^n + c_1 l^(n-1) + ... dc_k = -tr(B_(k-1) dM). c_k comes from B_(k-1), or,
+    where rounding asks for it, from the computed eigenvalues, which are those of a matrix within 8 n EPS |M| of M.
     """
     N, n = M.shape[:2]
     m, one = n // 2, np.eye(n)
@@ -366,7 +378,10 @@ def coefficients(M, E, scale, structure, steps_of):
             form[0, :, k] = (B * np.swapaxes(J, 1, 2)).sum(axis=(1, 2))
             form[1, :, k] = (wide * abs(np.swapaxes(J, 1, 2))).sum(axis=(1, 2))
     more = np.empty((N, kept))
-    steps.gradients(*steps_of, np.ascontiguousarray(found), more)
+    if steps_of is None:
+        more[:] = (abs(found) * np.swapaxes(E, 1, 2)[:, None]).sum(axis=(2, 3))
+    else:
+        steps.gradients(*steps_of, np.ascontiguousarray(found), more)
     c, bars = c[:, : kept + 1], bars[:, : kept + 1]
     bars[:, 1:] += 1.001 * more
     if structure == "none":

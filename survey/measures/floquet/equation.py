@@ -27,6 +27,7 @@ class Equation:
     period: float | Callable | None
     start: tuple | Callable
     _traces: list = field(default_factory=list, repr=False)
+    BRANCHES = "t or on a state"
 
     @property
     def free(self):
@@ -59,10 +60,9 @@ class Equation:
         left, found = np.arange(len(points)), []
         with LOCK:
             known = list(self._traces)
-        zero = np.zeros(len(points))
         while left.size:
             for programs in known:
-                inside = programs.A.holds(points[left], zero[left], zero[left] + 1.0) == 1
+                inside = programs.holds(points[left])
                 if inside.any():
                     found.append((left[inside], programs))
                     left = left[~inside]
@@ -72,19 +72,33 @@ class Equation:
             with LOCK:
                 self._traces.extend(known)
                 del self._traces[:-KEPT]
-            if known[0].A.holds(points[left[:1]], zero[:1], zero[:1] + 1.0)[0] != 1:  # on the very edge of a branch
+            if not known[0].holds(points[left[:1]])[0]:  # on the very edge of a branch
                 found.append((left[:1], known[0]))
                 left = left[1:]
         return found
 
     def _trace(self, point, x0):
-        graph, n = Graph([float(x) for x in point], 0.25), self.n
-        x, out = np.empty(n, dtype=object), np.zeros(n, dtype=object)
-        for k in range(n):
-            x[k] = graph.state(graph.number("parameter", len(point) + k), float(x0[k]))
-        states = [graph.single(x[k]) for k in range(n)]
+        graph = Graph([float(x) for x in point], 0.25)
+        x = self._symbols(graph, len(point), x0)
+        rows = self._called(graph, graph.time, x.copy(), graph.parameters)
+        programs = compiled(graph, x, rows)
+        if self.free and trace.TIME in programs.A.order:
+            raise Unsupported("f(t, x, p, out) depends on t, so that PERIOD must be given")
+        return programs
+
+    @staticmethod
+    def _symbols(graph, parameters, x0):
+        """The states as symbols; where their series begin are the numbers after those of the parameters."""
+        x = np.empty(len(x0), dtype=object)
+        for k in range(len(x0)):
+            x[k] = graph.state(graph.number("parameter", parameters + k), float(x0[k]))
+        return x
+
+    def _called(self, graph, time, x, p):
+        """f as symbols (n), called with symbols."""
+        n, out = self.n, np.zeros(self.n, dtype=object)
         try:
-            value = trace.lifted(self.f)(graph.time, x, graph.parameters, out)
+            value = trace.lifted(self.f)(time, x, p, out)
             out = out if value is None else np.array(value, dtype=object)
         except Unsupported as error:
             raise Unsupported(f"f(t, x, p, out): {error}") from None
@@ -95,16 +109,19 @@ class Equation:
         if out.shape != (n,):
             raise Unsupported(f"f(t, x, p, out) returns an array of shape {out.shape}, not {(n,)}")
         if not all(symbol.is_number for symbol, _yes in (*graph.guards, *graph.equalities)):
-            raise Unsupported("f(t, x, p, out): a branch depends on t or on a state (abs and maximum are branches)")
-        rows = [graph.lift(out[i]) for i in range(n)]
-        graph.flow.update(zip(states, rows, strict=True))
-        slopes = {(i, j): graph.slope(rows[i], state) for i in range(n) for j, state in enumerate(states)}
-        places = [graph.series[state][1] for state in states]
-        A = graph.compiled({at: symbol for at, symbol in slopes.items() if symbol is not None})
-        if self.free and trace.TIME in A.order:
-            raise Unsupported("f(t, x, p, out) depends on t, so that PERIOD must be given")
-        f = graph.compiled({(i, 0): row for i, row in enumerate(rows)})
-        return Programs(A, f, np.array(places))
+            raise Unsupported(f"f(t, x, p, out): a branch depends on {self.BRANCHES} (abs and maximum are branches)")
+        return [graph.lift(out[i]) for i in range(n)]
+
+
+def compiled(graph, x, rows):
+    """The Programs of x' = rows, both symbols."""
+    states = [graph.single(one) for one in x]
+    graph.flow.update(zip(states, rows, strict=True))
+    slopes = {(i, j): graph.slope(row, state) for i, row in enumerate(rows) for j, state in enumerate(states)}
+    places = [graph.series[state][1] for state in states]
+    A = graph.compiled({at: symbol for at, symbol in slopes.items() if symbol is not None})
+    f = graph.compiled({(i, 0): row for i, row in enumerate(rows)})
+    return Programs(A, f, np.array(places))
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,9 +132,17 @@ class Programs:
     f: trace.Program
     places: np.ndarray
 
+    def _with_states(self, points):
+        return np.concatenate([points, np.zeros((len(points), len(self.places)))], axis=1)
+
+    def holds(self, points):
+        """Do the branches of the code go at the points (N, parameters) as they did where it was recorded?"""
+        zero = np.zeros(len(points))
+        return self.A.holds(self._with_states(points), zero, zero + 1.0) == 1
+
     def numbers(self, points):
         """Values and error bounds of the numbers at the points; those of the states are 0."""
-        values, errors = self.A.numbers(np.concatenate([points, np.zeros((len(points), len(self.places)))], axis=1))
+        values, errors = self.A.numbers(self._with_states(points))
         errors[:, self.places] = 0.0
         return values, errors
 

@@ -91,29 +91,30 @@ class Path:
         self.X, self.noise_X = _sum(series), ROUNDOFF_UP * _sum(moduli * (2 * k + 2))
         dX = _sum((series * k)[:, :, 1:]) / self.h[:, None, None]
         noise = ROUNDOFF_UP * _sum((moduli * k * (2 * k + 2))[:, :, 1:]) / self.h[:, None, None]
-        f, df = (one[..., 0].swapaxes(1, 2) for one in self._along(programs.f, self.noise_X))
+        f, df = (one[..., 0].swapaxes(1, 2) for one in self.along(programs.f, self.noise_X))
         self.defect = SAMPLED * self.h[:, None] * (abs(dX - f) + df + noise).max(axis=2)
         # a series begins where the one before it ends, as it is summed
         end, begins = self.X[:-1, :, -1], series[1:, :, 0]
         self.defect[:-1] += np.where((self.point[1:] == self.point[:-1])[:, None], abs(end - begins), 0.0)
         self.defect += self.noise_X[:, :, -1]
         self.f_end = f[self.last, :, -1]
-        A, dA = self._along(programs.A, self.noise_X)
+        A, dA = self.along(programs.A, self.noise_X)
         largest = np.maximum.reduceat(abs(A).max(axis=1), self.first[:-1], axis=0)
         self.scale = monodromy.balanced(largest)
         self.ratio = (self.scale[:, None, :] / self.scale[:, :, None])[self.point]
         self.norm = SAMPLED * (abs(A).max(axis=1) * self.ratio).sum(axis=2).max(axis=1)
-        self.noise = SAMPLED * self._rows(dA)
+        self.noise = SAMPLED * self.rows_of(dA)
         size = (abs(self.X).max(axis=2) / self.scale[self.point]).max(axis=1)
         self.extent = np.maximum.reduceat(size, self.first[:-1])
         self.end = X
         squares = (self.X * self.X).sum(axis=1) @ MEAN
         self.square = np.add.reduceat(squares * self.h, self.first[:-1]) / T
 
-    def _along(self, program, width):
+    def along(self, program, width):
+        """A program's values at the nodes, and bounds, if the states are known to within `width`."""
         return self.programs.along(program, self.numbers, self.t, self.X, width)
 
-    def _rows(self, errors):
+    def rows_of(self, errors):
         """The maximum norm of errors of A (tasks, m, n, n), the largest at NODES, in balanced units."""
         return (errors * self.ratio[:, None]).sum(axis=3).max(axis=(1, 2))
 
@@ -128,7 +129,8 @@ class Path:
             np.arange(tasks), self.begin + 0.5 * self.h, 0.5 * self.h, self.F, self.error, self.doubt,
         )  # fmt: skip
 
-    def _spread(self, delta):
+    def spread_of(self, delta):
+        """See `kernels.floquet.flow.spread`: what local errors delta (tasks, n) become."""
         wide, off = np.empty((2, len(self.point), self.n))
         spread(self.F, np.ascontiguousarray(delta), self.first, wide, off)
         return wide, off
@@ -142,14 +144,14 @@ class Path:
     def bars(self, dx):
         """Error bounds of the series X (tasks, n, NODES), if x(0) is known to within dx (N, n)."""
         radius, delta = (dx / self.scale).max(axis=1), self.defect / self.scale[self.point]
-        tube = self.tube(radius, delta, *self._spread(delta))[1]
+        tube = self.tube(radius, delta, *self.spread_of(delta))[1]
         return self.noise_X + (tube[:, None] * self.scale[self.point])[:, :, None]
 
     def certify(self, x, T, plane, factor):
         """Shown of the orbits near x (N, n), T (N), within `factor` |B G|."""
         n, N, point, last, s = self.n, len(x), self.point, self.last, self.scale
         delta = self.defect / s[point]
-        wide, off = self._spread(delta)
+        wide, off = self.spread_of(delta)
         M, E = np.empty((2, N, n, n))
         products(self.F, self.error, self.doubt, self.first, n, M, E, np.empty_like(E))
         f_end, a_end = self.f_end / s, self.norm[last]
@@ -172,10 +174,10 @@ class Path:
         # the tube, in the maximum norm of balanced units
         begins, tube = self.tube(radius, delta, wide, off)
         width = self.noise_X + (tube[:, None] * s[point])[:, :, None]
-        noise = WIDER * SAMPLED * self._rows(self._along(self.programs.A, width)[1])
+        noise = WIDER * SAMPLED * self.rows_of(self.along(self.programs.A, width)[1])
         error = self.error + self.h * noise * np.exp(self.h * (self.norm + noise))
         doubt = self.doubt * (error / self.error)
-        second = self._spread(np.repeat((n * error * WIDER * begins)[:, None], n, axis=1))[1].max(axis=1)
+        second = self.spread_of(np.repeat((n * error * WIDER * begins)[:, None], n, axis=1))[1].max(axis=1)
         first_order = (wide * radius[point, None] + off).max(axis=1)
         stays = (second <= (WIDER - 1.0) * first_order) & (tube <= self.enough[point])
         stays = np.logical_and.reduceat(stays, self.first[:-1])
@@ -188,8 +190,8 @@ class Path:
             moved = a_end * (WIDER * first_order[last] + shift * fastest) + 4 * EPS * fastest
             bounds = bordered(E, np.repeat((WIDER * unit * moved)[:, None], n, axis=1), 4 * EPS * abs(row))
         m = n if plane is None else n + 1
-        residual = abs(_product(B, slope) - np.eye(m)) + (m + 4) * EPS * _product(size, abs(slope))
-        q = (residual + _product(size, bounds)).sum(axis=2).max(axis=1)
+        residual = abs(product(B, slope) - np.eye(m)) + (m + 4) * EPS * product(size, abs(slope))
+        q = (residual + product(size, bounds)).sum(axis=2).max(axis=1)
         off_G[:, :n] += second[last, None]
         near = (size * off_G[:, None, :]).sum(axis=2).max(axis=1)
         shown = stays & (q < 1) & (near <= (1 - q) * radius) & np.isfinite(E).all(axis=(1, 2))
@@ -223,7 +225,7 @@ class Path:
         inverses[which] = monodromy.inverse(vectors[which])
         extra = np.full((N, n, n), np.nan)
         carried(self.F, error, doubt, self.first, which, n, vectors, inverses, extra)
-        tall = _product(abs(M) + E, abs(vectors))
+        tall = product(abs(M) + E, abs(vectors))
         extra += late[:, None, None] * abs(inverses).sum(axis=2)[:, :, None] * tall.max(axis=1, keepdims=True)
         if f is None:
             found.R, found.extra, found.V, found.W, found.centre = R, extra, vectors, inverses, values
@@ -249,7 +251,7 @@ def _sum(series):
     return total
 
 
-def _product(A, B):
+def product(A, B):
     """Products of matrices (N, n, n), with sums in the same order in any block."""
     return (A[:, :, :, None] * B[:, None, :, :]).sum(axis=2)
 

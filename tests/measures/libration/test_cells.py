@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 
 import survey
+from survey.measures import sign_cells
 from survey.measures.libration import cells
 from survey.truth import danby
 
@@ -57,8 +58,8 @@ def test_where_the_functions_are_not_sure_nothing_is_decided():
     """A series whose slack reaches across 0 decides nothing; where one function is negative, the cell is unstable."""
     series = np.zeros((2, 5, 4, 4))
     series[:, :, 0, 0], series[1, 2, 0, 0] = 1.0, -1.0
-    assert cells._decided(series, np.full((2, 5), 0.5)).tolist() == [cells.STABLE, cells.UNSTABLE]
-    assert cells._decided(series, np.full((2, 5), 1.5)).tolist() == [cells.UNDECIDED] * 2
+    assert sign_cells.decided(series, np.full((2, 5), 0.5)).tolist() == [sign_cells.STABLE, sign_cells.UNSTABLE]
+    assert sign_cells.decided(series, np.full((2, 5), 1.5)).tolist() == [cells.UNDECIDED] * 2
 
 
 def test_the_functions_are_those_of_the_digest():

@@ -1,0 +1,83 @@
+"""Cells decided by the signs of a few functions: stable where all are positive, unstable where one is negative.
+
+On a block each function is its tensor Chebyshev series to within a bound, as in `survey.measures.hill.cells`, whose
+series and cells these are; the cells of a block are halved on the series alone, all of one size together.
+"""
+
+import numpy as np
+
+from survey.kernels.hill.answers import STABLE, UNDECIDED, UNSTABLE
+from survey.kernels.hill.cells import ENOUGH, UNSOLVED
+from survey.kernels.math.roundoff import EPS
+from survey.measures.hill import cells
+
+
+def find(solve, x, y, each, report, values):
+    """The `hill.cells.Cells` of the rectangle of the Sides x and y.
+
+    `values(out)` makes the functions and their bounds (B, F, n, n) of what `solve` gives; other arguments as there.
+    """
+    return cells.find(solve, x, y, each, report, values, _descend)
+
+
+def _descend(series, doubts, blocks, depth, halves):
+    """As `kernels.hill.cells.descend`: leaves (M, 7) of blocks, cells of one size halved together."""
+    leaves, slack = [], doubts.sum(axis=2)
+    own, where, of = series, blocks.astype(np.int64), np.arange(len(blocks))
+    while len(where):
+        verdict = decided(own, slack[of])
+        # a block whose own series is too loose is solved again, if it can be halved
+        loose = (verdict == UNDECIDED) & (doubts[of][:, :, :2].sum(axis=2) > ENOUGH * _sizes(own)).any(axis=1)
+        whole = (where == blocks[of]).all(axis=1) & loose & (where[:, [0, 2]] < depth).any(axis=1)
+        left = np.maximum(depth[0] - where[:, 0], depth[1] - where[:, 2])
+        done = ~whole & ((verdict != UNDECIDED) | (left == 0))
+        leaves += [_leaves(where[done], verdict[done]), _split(where[whole], depth)]
+        go = ~done & ~whole
+        own, where, of = own[go], where[go], of[go]
+        along = np.where(depth[0] - where[:, 0] == left[go], 0, 1)
+        own, where, of = _halved(own, where, of, along, halves)
+    return np.concatenate(leaves), sum(map(len, leaves))
+
+
+def _sizes(series):
+    """How large each function is on its cell, at least its mean (M, F)."""
+    return abs(series).sum(axis=(2, 3))
+
+
+def decided(series, slack):
+    """The verdicts of cells (M), from the mean of each function and the sum of its other coefficients."""
+    middle = series[:, :, 0, 0]
+    swing = (_sizes(series) - abs(middle) + slack) * (1.0 + 256.0 * EPS)
+    unstable, stable = (middle < -swing).any(axis=1), (middle > swing).all(axis=1)
+    return np.where(unstable, UNSTABLE, np.where(stable, STABLE, UNDECIDED))
+
+
+def _leaves(where, verdict):
+    """Rows of `descend`: the block, its verdict, and its parts that are stable and unstable at least."""
+    return np.column_stack([where, verdict, verdict == STABLE, verdict == UNSTABLE]).astype(float)
+
+
+def _split(where, depth):
+    """The halves, unsolved, of blocks along the side that can be halved more often."""
+    rows = []
+    for block in where:
+        at = 0 if depth[0] - block[0] >= depth[1] - block[2] else 2
+        for side in (0, 1):
+            child = block.copy()
+            child[at], child[at + 1] = block[at] + 1, 2 * block[at + 1] + side
+            rows.append([*child, UNSOLVED, 0, 0])
+    return np.array(rows, dtype=float).reshape(-1, 7)
+
+
+def _halved(own, where, of, along, halves):
+    """Both halves of every cell: their series, blocks and the numbers of their first blocks."""
+    parts = []
+    for axis in (0, 1):
+        here = along == axis
+        for side in (0, 1):
+            level, place = where[here, 2 * axis], where[here].copy()
+            place[:, 2 * axis], place[:, 2 * axis + 1] = level + 1, 2 * place[:, 2 * axis + 1] + side
+            step = halves[axis, level, side][:, None]
+            new = step @ own[here] if axis == 0 else own[here] @ step.swapaxes(2, 3)
+            parts.append((new, place, of[here]))
+    return tuple(np.concatenate(column) for column in zip(*parts, strict=True))
