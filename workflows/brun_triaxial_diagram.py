@@ -1,13 +1,11 @@
 """The bifurcation diagram of Clebsch's case: energy H against F2 at one value of F3, with random motions.
 
-python workflows/brun_triaxial_diagram.py -o results/brun_triaxial_diagram.png
+python workflows/brun_triaxial_diagram.py -o results
 """
-
-import argparse
-from pathlib import Path
 
 import matplotlib
 import numpy as np
+from script import parser
 
 import survey
 
@@ -75,9 +73,8 @@ def draw():
 
 
 def main(arguments=None):
-    words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    words.add_argument("-o", "--output", type=Path, default=Path("results/brun_triaxial_diagram.png"), metavar="FILE")
-    draw().savefig(words.parse_args(arguments).output, dpi=110)
+    folder = parser(__doc__, "the picture").parse_args(arguments).output
+    draw().savefig(folder / "brun_triaxial_diagram.png", dpi=110)
 
 
 if __name__ == "__main__":

@@ -6,8 +6,8 @@
 w is the angular velocity and nu the vertical, the direction of the attracting centre, in the body's principal axes.
 H, F2 and F3 are conserved.
 
-Model: gravity to the order of the torque, a centre that does not move. The equations are exact for any A, B, C; with
-A = B they are those of the scene `brun`, which has closed forms of all motions.
+Model: Euler's and Poisson's equations, exact for any A, B, C (with A = B: scene `brun`, which has all motions in closed
+form). Not for a centre that moves; the potential is that of the gravity gradient, with errors of order 1/R.
 
 Parameters, in order: A, B, C > 0, principal moments of inertia, none larger than the sum of the others; epsilon =
 3 mu / R^3, any sign. For the question `trajectory` an initial state, omega1, omega2, omega3 (w) and gamma1, gamma2,
@@ -42,7 +42,7 @@ from survey.modules import load
 from survey.scene import Option, Output, Parameter, Request, Trajectory, named
 from survey.status import INVALID_PARAMETERS, NO_CONVERGENCE, OK, OVERFLOW
 
-TITLE = "Rotation of a body with three unequal moments in a Newtonian field (Clebsch's case)"
+TITLE = "Rotation of a body with three unequal moments of inertia in a Newtonian field (Clebsch's case)"
 FAMILY = "body"
 AUDIT = ("dop853",)
 REFERENCES = (
