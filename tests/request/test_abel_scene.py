@@ -49,6 +49,7 @@ def scene(f=f, g=g, **given):
     return survey.abel(f, g, **({"parameters": "mu"} | given))
 
 
+@pytest.mark.slow
 def test_every_command_takes_it(program, tmp_path, monkeypatch):
     (tmp_path / "mine.py").write_text(SCENE)
     (tmp_path / "mine.toml").write_text(WORKFLOW)

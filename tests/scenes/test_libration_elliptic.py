@@ -200,6 +200,7 @@ print(*(v.hex() for v in danby.solve(np.array([0.3]), np.linspace(0, 0.5, 75)[No
 """
 
 
+@pytest.mark.slow
 def test_plain_python_gives_the_same_bits():
     printed = [
         subprocess.run(

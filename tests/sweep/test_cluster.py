@@ -148,6 +148,7 @@ def certificate(folder, name, days=2):
     return {f"DASK_DISTRIBUTED__COMM__TLS__{what}": str(file) for what, file in {"CA_FILE": cert, **files}.items()}
 
 
+@pytest.mark.slow
 def test_a_cluster_with_tls(small, tmp_path, surveyed):
     if not shutil.which("openssl"):
         pytest.skip("needs openssl")

@@ -36,7 +36,7 @@ READ, COMPILED, UNUSED = "1 0", "0 1", "0 0"
     [
         ("satellite", "k", "rho", ["exponent", "rotation_number", "verdict"], (UNUSED, UNUSED, READ)),
         ("satellite", "k", "rho", ["exponent_per_orbit", "period", "verdict"], (READ, READ, UNUSED)),
-        ("mathieu", "q", "a", ["discriminant", "verdict"], (READ, UNUSED, UNUSED)),
+        pytest.param("mathieu", "q", "a", ["discriminant", "verdict"], (READ, UNUSED, UNUSED), marks=pytest.mark.slow),
     ],
 )
 def test_the_map_reads_what_the_process_beside_it_compiles(tmp_path, scene, row, lane, variables, kernels):

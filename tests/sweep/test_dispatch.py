@@ -195,6 +195,7 @@ def test_a_cluster_replaces_a_worker_that_is_frozen(cluster, in_time, monkeypatc
     assert heard.dead == [] and sorted(heard.results) == [n * n for n in NUMBERS]
 
 
+@pytest.mark.slow
 def test_a_cluster_stops_for_a_task_without_end(cluster, in_time, monkeypatch, caplog):
     monkeypatch.setattr(dispatch, "COMPILE_SECONDS", 3.0)
 

@@ -36,7 +36,7 @@ def test_the_polynomials_are_those_of_the_full_motion(mu, e):
         start = size * direction
         value = found @ np.array([np.prod(start**p) for p in command.POWERS])
         off.append(abs(value - images(mu, e, start[None])[0, 0]).max())
-    assert 12.0 < off[0] / off[1] < 20.0 and off[1] < 1e-8  # of order 4
+    assert 12.0 < off[0] / off[1] < 20.0 and off[1] < 1e-7  # of order 4
 
 
 def test_on_circles_the_normal_form_is_that_of_deprit_and_deprit_bartholome():
@@ -77,6 +77,7 @@ def test_the_resonances_of_the_circular_problem_are_where_and_what_is_known():
     assert {what for (k, mu), what in found.items() if k == (2, 2)} == {command.STABLE}
 
 
+@pytest.mark.slow
 def test_at_a_resonance_of_order_3_motions_leave_and_beside_it_they_stay():
     ((_, mu, _),) = [place for place in command.places(0.2) if place[0] == (1, 2)]
     away = []

@@ -138,6 +138,7 @@ def van_der_pol(omega, F, mu):
     return f, jacobian
 
 
+@pytest.mark.slow
 def test_entrainment_against_scipy():
     """Folds, complex pairs, and the angle of these, where SciPy's integrator puts them."""
     ds = found(str(WORKFLOWS / "entrainment.py"), omega=(0.8, 1.1), F=(0.5, 1.3), mu=0.5, branch=-1)
