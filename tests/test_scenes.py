@@ -79,7 +79,7 @@ def agree(one, other):
 
 
 each = pytest.mark.parametrize(("scene", "options"), list(questions()))
-seeds = pytest.mark.parametrize("seed", [1, 2, 3])
+seeds = pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))])
 
 
 @each

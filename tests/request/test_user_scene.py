@@ -46,6 +46,7 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_every_command_takes_it(program, folder):
     run = program("run", "below/mine.toml", "-o", "mine.nc", "--workers", "1")
     assert run.returncode == 0, run.stderr

@@ -21,9 +21,10 @@ def found(family, seed, size, index=0):
     return sum((compare.Counter(row[3]) for row in part["rows"]), compare.Counter()), faults
 
 
-@pytest.mark.parametrize(("family", "size"), [("satellite", 200), ("mathieu", 150), ("libration_elliptic", 150),
-                                              ("gyrostat", 150), ("brun", 150), ("libration", 60),
-                                              ("own", 40), ("floquet", 60)])  # fmt: skip
+@pytest.mark.parametrize(("family", "size"), [
+    ("satellite", 200), ("mathieu", 150), ("libration_elliptic", 150), ("libration", 60), ("own", 40), ("floquet", 60),
+    *(pytest.param(*one, marks=pytest.mark.slow) for one in (("gyrostat", 150), ("brun", 150))),  # compile for long
+])  # fmt: skip
 def test_there_are_no_faults(family, size):
     counts, faults = found(family, 3, size)
     assert counts["points"] >= size
