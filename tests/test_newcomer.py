@@ -52,7 +52,7 @@ SHELL = [
     ("plot good.toml", "this is not a netCDF file of survey"),
     ("plot map.nc -o map.docx", "name a .png, .pdf or .svg file"),
     ("info nothing.nc", "there is no such file; name a netCDF file"),
-    ("scenes pendulum", "unknown scene 'pendulum' (allowed: brun, gyrostat"),
+    ("scenes pendulum", "unknown scene 'pendulum' (allowed: brun, brun_triaxial, gyrostat"),
     ("init sattelite", "did you mean 'satellite'?"),
     ("merge map.nc map.nc -o both.nc", "they are of the same points"),
     ("prove good.toml", "add [refine] with a width"),

@@ -354,6 +354,7 @@ def test_the_command_needs_no_folder_but_that_of_its_own_output(tmp_path):
     assert done.returncode == 2 and "'none/m.model': there is no folder 'none'; create it first" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_proof_is_carried_and_another_maps_is_refused(tmp_path):
     pytest.importorskip("flint")
     table = workflow("mathieu", {"a": (0.0, 4.0), "q": (0.0, 1.0)}, refine={"width": {"a": 0.1, "q": 0.1}})

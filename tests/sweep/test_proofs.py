@@ -116,7 +116,9 @@ def edges_of(text):
     return [(*place[0], letter) for letter, place in certificate.cells if letter in checker.EDGES]
 
 
-@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize(
+    "body", [pytest.param(body, marks=[pytest.mark.slow] * (not body.endswith("librations"))) for body in BODIES]
+)
 def test_satellites_agree_with_the_map(body):
     """The elementary form of the equation gives the verdicts of the elliptic one, in decided cells."""
     scene, axes, options = BODIES[body]
