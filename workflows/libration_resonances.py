@@ -38,6 +38,7 @@ HARMLESS, STABLE, UNSTABLE, OPEN = "harmless", "stable to order 4", "unstable", 
 
 POWERS = [p for p in product(range(DEGREE + 1), repeat=4) if sum(p) <= DEGREE]
 PLACE = {p: i for i, p in enumerate(POWERS)}
+LINEAR = [PLACE[tuple(row)] for row in np.eye(4, dtype=int)]  # the places of the variables themselves
 PAIRS = np.array([(i, j, PLACE[tuple(np.add(p, q))]) for i, p in enumerate(POWERS) for j, q in enumerate(POWERS)
                   if sum(p) + sum(q) <= DEGREE]).T  # fmt: skip
 
@@ -98,8 +99,7 @@ def revolution(mu, e):
         return np.concatenate([p + v, q - u, q - u + force[0], -p - v + force[1]])
 
     start = np.zeros((4, len(POWERS)))
-    for i in range(4):
-        start[i, PLACE[tuple(np.eye(4, dtype=int)[i])]] = 1.0
+    start[range(4), LINEAR] = 1.0
     end = solve_ivp(slope, (0.0, 2.0 * np.pi), start.ravel(), method="DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
     return end.reshape(4, -1)
 
@@ -118,8 +118,7 @@ def of_coordinates(images, V):
     """The map of (q1, q2, conj q1, conj q2): its coefficients (4, monomials)."""
     powers = {(0, 0, 0, 0): np.eye(1, len(POWERS), PLACE[0, 0, 0, 0])[0].astype(complex)}
     linear = np.zeros((4, len(POWERS)), complex)
-    for j in range(4):
-        linear[:, PLACE[tuple(np.eye(4, dtype=int)[j])]] = V[:, j]
+    linear[:, LINEAR] = V
     for p in sorted(POWERS, key=sum)[1:]:
         i = next(k for k in range(4) if p[k])
         below = tuple(p[k] - (k == i) for k in range(4))
@@ -132,8 +131,7 @@ def of_coordinates(images, V):
 def normal_form(mu, e):
     """(theta1, theta2, quadratic map (4, monomials), cubic map) in coordinates without quadratic terms that can go."""
     images = revolution(mu, e)
-    linear = images[:, [PLACE[tuple(np.eye(4, dtype=int)[j])] for j in range(4)]]
-    own, V = diagonal(linear)
+    own, V = diagonal(images[:, LINEAR])
     if len(own) != 2:
         raise ValueError(f"mu = {mu}, e = {e} is not linearly stable")
     F, both = of_coordinates(images, V), np.concatenate([own, own.conj()])

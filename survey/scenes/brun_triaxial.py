@@ -181,10 +181,10 @@ def _trajectories(point, request):
     floats[status != OK] = np.nan
     columns = {f"{kind}{i}": 3 * k + i - 1 for k, kind in enumerate(("w", "nu")) for i in (1, 2, 3)}
     found = {name: Bounded(floats[..., at], floats[..., 6 + at]) for name, at in columns.items()}
-    inertia, field = [moments[:, i, None] for i in range(3)], bounded.of(epsilon[:, None])
+    inertia, field = [bounded.of(moments[:, i, None]) for i in range(3)], bounded.of(epsilon[:, None])
     first = [Bounded(x[:, i, None], width) for x, width in ((w, 0.0), (nu, 4e-16)) for i in range(3)]
-    kept = clebsch.integrals([bounded.of(A) for A in inertia], field, first[:3], first[3:])
-    later = clebsch.integrals([bounded.of(A) for A in inertia], field, *(
+    kept = clebsch.integrals(inertia, field, first[:3], first[3:])
+    later = clebsch.integrals(inertia, field, *(
         [found[f"{kind}{i}"] for i in (1, 2, 3)] for kind in ("w", "nu")))  # fmt: skip
     for name, number in kept.items():
         found[name], found[f"{name}_drift"] = number, later[name] - number

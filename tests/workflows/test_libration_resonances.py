@@ -54,7 +54,7 @@ def test_on_ellipses_the_angles_grow_as_the_normal_form_says():
     mu, e, turns = 0.01, 0.2, 240
     theta, _F, cubic = command.normal_form(mu, e)
     a = command.twist(theta, cubic)
-    linear = command.revolution(mu, e)[:, [command.PLACE[tuple(np.eye(4, dtype=int)[j])] for j in range(4)]]
+    linear = command.revolution(mu, e)[:, command.LINEAR]
     _, V = command.diagonal(linear)
     sizes = np.array([0.001, -0.001, 0.003, -0.003])  # what is odd in the size cancels
     starts = np.array([(V @ np.array([q, 0.0, q, 0.0])).real for q in sizes])
@@ -82,7 +82,7 @@ def test_at_a_resonance_of_order_3_motions_leave_and_beside_it_they_stay():
     ((_, mu, _),) = [place for place in command.places(0.2) if place[0] == (1, 2)]
     away = []
     for at in (mu, mu - 0.004):
-        linear = command.revolution(at, 0.2)[:, [command.PLACE[tuple(np.eye(4, dtype=int)[j])] for j in range(4)]]
+        linear = command.revolution(at, 0.2)[:, command.LINEAR]
         _, V = command.diagonal(linear)
         phases = np.exp(1j * np.linspace(0.0, 2 * np.pi, 3, endpoint=False))
         q = 0.0015 * np.stack([phases, np.sqrt(2.0) * np.ones(3)], axis=1)
