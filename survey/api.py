@@ -156,7 +156,7 @@ def evaluate(
         variables = _as_list(variables)
     request = check_request(module, options, method, rtol, variables)
     given |= {key: xr.DataArray(float(p.default)) for key, p in used.items() if key not in given}
-    _check_single_values(used, given)
+    _check_single_values(used, given, request)
     _check_dimensions(module, given)
     if any(array.chunks for array in given.values()):
         user_scene.check(module)
@@ -253,9 +253,9 @@ def _check_dimensions(module: Any, given: dict[str, xr.DataArray]) -> None:
             raise BadInput(f"{key}: its dimension {dim!r} clashes with {what}; rename it")
 
 
-def _check_single_values(used: dict[str, Parameter], given: dict[str, xr.DataArray]) -> None:
+def _check_single_values(used: dict[str, Parameter], given: dict[str, xr.DataArray], request: Request) -> None:
     for key, array in given.items():
-        if array.ndim == 0 and not array.chunks and not used[key].holds(array.values):
+        if array.ndim == 0 and not array.chunks and not used[key].holds(array.values, request.variables):
             raise BadInput(f"{key} = {float(array):g} is outside its domain; allowed: {used[key].domain}"
                            f"{physical.hint(used[key], float(array))}")  # fmt: skip
 

@@ -1,6 +1,6 @@
 """What a scene describes itself with: parameters, options, outputs, and what is asked of it."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from math import inf
 from typing import Any
@@ -13,7 +13,8 @@ import numpy.typing as npt
 class Parameter:
     """A real number of the system: an axis of a survey or one fixed value.
 
-    `symbol` is TeX. `default=None` means that it must be given. `excluded` and open ends are not part of the domain.
+    `symbol` is TeX. `default=None` means that it must be given. `excluded` and open ends are not part of the domain;
+    outputs whose names begin with `but_for` exist at the excluded values too.
     `instead_of` names the parameter that this one replaces when it is given. `when` holds the option
     values for which the parameter exists ("": where the option does not). An axis of an `uncut` parameter is never cut
     into blocks. One that is `number_option` may also stand among the options, as one number.
@@ -29,17 +30,22 @@ class Parameter:
     open_minimum: bool = False
     open_maximum: bool = False
     excluded: tuple[float, ...] = ()
+    but_for: str = ""
     instead_of: str | None = None
     when: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     uncut: bool = False
     number_option: bool = False
 
-    def holds(self, values: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-        """True where `values` (any shape) lie in the domain; NaN and infinities do not."""
+    def holds(self, values: npt.ArrayLike, outputs: Collection[str] = ()) -> npt.NDArray[np.bool_]:
+        """True where `values` (any shape) lie in the domain, that of `outputs` alone if these are given.
+
+        NaN and infinities do not.
+        """
         values = np.asarray(values, dtype=float)
         above = values > self.minimum if self.open_minimum else values >= self.minimum
         below = values < self.maximum if self.open_maximum else values <= self.maximum
-        return np.isfinite(values) & above & below & ~np.isin(values, self.excluded)
+        exist = self.but_for and outputs and all(name.startswith(self.but_for) for name in outputs)
+        return np.isfinite(values) & above & below & (~np.isin(values, self.excluded) | bool(exist))
 
     @property
     def domain(self) -> str:
@@ -50,6 +56,8 @@ class Parameter:
         if self.maximum < inf:
             words.append(f"{self.name} {'<' if self.open_maximum else '<='} {self.maximum:g}")
         words += [f"{self.name} != {value:g}" for value in self.excluded]
+        if self.but_for:
+            words[-1] += f" (there request the variables {self.but_for}* alone)"
         return ", ".join(words) or "any finite number"
 
 

@@ -43,13 +43,13 @@ def values_of(key, axis):
     return values
 
 
-def check_domain(parameter, values, others=()):
-    """Raise BadInput if a single value or an end of an axis lies outside the parameter's domain.
+def check_domain(parameter, values, outputs, others=()):
+    """Raise BadInput if a single value or an end of an axis lies outside the parameter's domain for these outputs.
 
     `others`: names of the parameters that may take its place.
     """
     ends = np.atleast_1d(values)[[0, -1]]
-    for value in ends[~parameter.holds(ends)]:
+    for value in ends[~parameter.holds(ends, outputs)]:
         what = "is" if np.ndim(values) == 0 else "has an end"
         instead = f"; instead of {parameter.name} you can give {' or '.join(others)}" if others else ""
         raise BadInput(

@@ -107,12 +107,12 @@ def check(data, text="", output=None, default_path="survey.nc", near=None, prove
     given = _in_own_terms(scene, file)
     options = check_options(scene, file.options, given, "options.")
     parameters = check_parameters(scene, name, options, given, "axes.")
+    solver = file.solver
+    request = check_request(scene, options, solver.method, solver.rtol, file.output.variables, ("solver.", "output."))
     for key, values in given.items():
         group = parameters[key].instead_of or key
         others = [p.name for p in scene.PARAMETERS if group in (p.name, p.instead_of) and p.name != key]
-        check_domain(parameters[key], values, others)
-    solver = file.solver
-    request = check_request(scene, options, solver.method, solver.rtol, file.output.variables, ("solver.", "output."))
+        check_domain(parameters[key], values, request.variables, others)
     for figure in file.output.figures:
         if figure not in request.variables:
             raise BadInput(f"output.figures: {modules.unknown('variable', figure, sorted(request.variables))}")

@@ -11,9 +11,10 @@ obey Hill's equation, in u = omega_p t, omega_p^2 = 3 omega_0^2 |I - Iz| / I, wi
 Model: the body's rotation in three dimensions. Without spin the plane of the orbit is invariant, and linear motion
 across it is this equation, exactly. Not for spin, finite tilts, eccentric orbits, bodies without axis of symmetry.
 
-Parameters, in order: k >= 0, k != 1; or one_minus_k = 1 - k <= 1, != 0, where 1 - k is small (negative: rotations);
-or amplitude = asin k (rad), a libration's. rho, any sign: rho^2 = 1 / (3 |1 - alpha|), so rho >= 1/sqrt(3) is a body;
-rho < 0 is a retrograde rotation. Or, instead of rho and the body, inertia_ratio = alpha: 0 a thin rod, 2 a disc.
+Parameters, in order: k >= 0, where k = 1 has the outputs separatrix_* alone; or one_minus_k = 1 - k <= 1 where that is
+small (negative: rotations); or amplitude = asin k (rad), a libration's. rho, any sign: rho^2 = 1 / (3 |1 - alpha|), so
+rho >= 1/sqrt(3) is a body; rho < 0 is a retrograde rotation. Or, instead of rho and the body, inertia_ratio = alpha: 0 a
+thin rod, 2 a disc.
 
 Known: at k = 0 every gap is closed and D = 2 cos(2 pi sqrt(1 + rho^2)) (prolate), 2 cos(2 pi rho) (oblate); rho = 0 is
 an edge of Lame's equation, |D| = 2; D is even in rho for librations; tongue n opens as k^n; k = 1 is a scattering
@@ -54,9 +55,9 @@ REFERENCES = (
 
 PARAMETERS = (
     Parameter("k", "modulus of the planar motion", "k",
-              minimum=0.0, maximum=1e12, excluded=(1.0,)),
+              minimum=0.0, maximum=1e12, excluded=(1.0,), but_for="separatrix_"),
     Parameter("one_minus_k", "1 - k, where k is close to 1", "1-k",
-              minimum=-1e12, maximum=1.0, excluded=(0.0,), instead_of="k"),
+              minimum=-1e12, maximum=1.0, excluded=(0.0,), but_for="separatrix_", instead_of="k"),
     Parameter("amplitude", "amplitude of the libration, asin k", r"\beta", "rad",
               minimum=0.0, maximum=pi / 2, open_maximum=True, instead_of="k"),
     Parameter("rho", "orbital rate over libration rate", r"\rho", minimum=-1e12, maximum=1e12),
@@ -99,6 +100,8 @@ def cost(options, sizes):
 
 def solve(point, request):
     """All outputs of a block that the request wants (see `survey.scenes`)."""
+    if request.variables <= scattering.NAMES.keys():
+        return _passages(point, request)
     shared = moduli(point)
     if "rho" in point:
         oblate = request.options["body"] == "oblate"
@@ -163,7 +166,8 @@ def _rotates(names, ends):
 
 def compile_ahead(variables):
     """Compile some of the kernels of a map of these variables (see `survey.scenes`)."""
-    dense.compile_ahead(sample, np.empty((0, 6)), variables)
+    if not set(variables) <= scattering.NAMES.keys():
+        dense.compile_ahead(sample, np.empty((0, 6)), variables)
 
 
 def trajectory(point, answer, options, time=None):
@@ -191,6 +195,25 @@ def _solve(shared, rho, oblate, request, low=None, line=None, ends=None):
     problem = _problem(row, block.per_point(rho), None if low is None else block.per_point(low), line, ends)
     out = monodromy.solve(problem, request.method, request.rtol, _wanted(request))
     return _derived(out, row, problem.p, block, request, row.period)
+
+
+def _passages(point, request):
+    """The outputs of a passage along the separatrix alone, which exist at k = 1 too."""
+    if "rho" in point:
+        rho, oblate = point["rho"], np.array(request.options["body"] == "oblate")
+    else:
+        rho, _ = rates(point["inertia_ratio"], request.options["direction"])
+        oblate = point["inertia_ratio"] > 1
+    name = next(name for name in ("k", "one_minus_k", "amplitude") if name in point)
+    rotates = {"k": point[name] > 1, "one_minus_k": point[name] < 0}.get(name, np.array(False))
+    known, rho, oblate, rotates = np.broadcast_arrays(np.isfinite(point[name]) & np.isfinite(rho), rho, oblate, rotates)
+    out = {"status": np.where(known, status.OK, status.INVALID_PARAMETERS)}
+    for which in np.unique(oblate):
+        found = scattering.solve(np.where(known & (oblate == which), rho, np.nan), rotates, which, request.variables)
+        for key, pair in found.items():
+            for output, values in zip((key, f"{key}_error"), pair, strict=True):
+                out[output] = np.where(oblate == which, values, out.get(output, np.nan))
+    return out
 
 
 def _wanted(request):

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 from mpmath import mp, mpc, mpf
 
 import survey
+from survey import status
 from survey.measures.hill import scattering
 
 NAMES = tuple(scattering.NAMES)
@@ -74,6 +76,38 @@ def test_the_values_of_the_mathematics_page():
     assert float(ds.separatrix_transmission[0]) == pytest.approx(0.9941371190, abs=5e-11)
     assert float(ds.separatrix_transmission_back[0]) == pytest.approx(0.6736900155, abs=5e-11)
     np.testing.assert_allclose(2 * np.cosh(2 * ds.separatrix_largest_growth), [3.224854, 2.144280], atol=6e-7)
+
+
+def test_the_separatrix_itself():
+    """k = 1 has these outputs alone, those of the neighbours: librations' means, and each passage's own numbers."""
+    rho = np.linspace(-3.0, 3.0, 40)
+    for body in ("prolate", "oblate"):
+        for name, values in (("k", [0.99, 1.0, 1.01]), ("one_minus_k", [-0.01, 0.0, 0.01])):
+            ds = survey.evaluate("satellite", **{name: values}, rho=rho, body=body, variables=[*NAMES])
+            assert (ds.status == status.OK).all()
+            at, below, above = (ds.sel({name: v}, drop=True) for v in (values[1], *values[:: 2 if name == "k" else -2]))
+            xr.testing.assert_identical(at, below)
+            for output in (*NAMES[:2], *NAMES[5:]):
+                xr.testing.assert_identical(at[output].variable, above[output].variable)
+    bodies = survey.evaluate("satellite", k=1.0, inertia_ratio=[0.3, 1.0, 1.2, 1.9], variables=[*NAMES])
+    assert bodies.status.values.tolist() == [status.OK, status.INVALID_PARAMETERS, status.OK, status.OK]
+    rho = 1 / np.sqrt(3 * np.array([0.7, 0.2, 0.9]))
+    for i, (body, place) in enumerate((("prolate", 0), ("oblate", 2), ("oblate", 3))):
+        own = survey.evaluate("satellite", k=1.0, rho=rho[i], body=body, variables=[*NAMES])
+        for output in NAMES:
+            np.testing.assert_allclose(bodies[output][place], own[output], atol=1e-12)
+
+
+def test_no_verdict_on_the_separatrix():
+    for variables in (None, ["verdict", "separatrix_growth"]):
+        with pytest.raises(survey.BadInput, match=r"k = 1 .* \(there request the variables separatrix_\*"):
+            survey.evaluate("satellite", k=1.0, rho=0.7, variables=variables)
+    ds = survey.evaluate("satellite", k=[0.9, 1.0], rho=0.7, variables=["verdict", "separatrix_growth"])
+    assert ds.status.values.tolist() == [status.OK, status.INVALID_PARAMETERS]
+    assert np.isnan(ds.separatrix_growth[1])
+    lone = survey.evaluate("satellite", k=1.0, rho=0.7, variables=["separatrix_growth"])
+    with pytest.raises(survey.BadInput, match=r"k = 1 is outside"):
+        lone.survey.trajectory()
 
 
 @pytest.mark.parametrize(("body", "rho", "side"), [("prolate", 0.6, 1), ("prolate", -0.6, -1), ("oblate", 1.2, 1)])
