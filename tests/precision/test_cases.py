@@ -12,7 +12,8 @@ from survey.precision import chart
 from survey.precision.known import references as known
 from survey.truth.hill import mathieu
 
-QUICK = ("mathieu", "libration", "libration_orders", "libration_elliptic_near_1", "satellite_families", "brun_motion")
+QUICK = ("mathieu", "libration", "libration_orders", "libration_elliptic_near_1")
+SLOW = (pytest.param(name, marks=pytest.mark.slow) for name in ("satellite_families", "brun_motion"))
 SETTING = 1e-8
 
 
@@ -28,7 +29,7 @@ def quick(monkeypatch):
     monkeypatch.setattr(precision, "_cold", lambda *_: 0.0)
 
 
-@pytest.mark.parametrize("name", QUICK)
+@pytest.mark.parametrize("name", [*QUICK, *SLOW])
 def test_the_errors_of_a_chart_are_what_was_asked(name, quick, monkeypatch, tmp_path):
     case = modules.load(folder, name, "chart")
     works = {work: (few(point), options) for work, (point, options) in case.works().items()}

@@ -53,6 +53,7 @@ def test_records_hold_what_was_measured_and_the_asked_accuracy_is_reached(quick,
     assert any("measured" in line for line in said)
 
 
+@pytest.mark.slow
 def test_a_first_call_compiles_in_a_process_of_its_own():
     assert precision._cold("satellite", "rk4") > 0
 

@@ -95,6 +95,7 @@ def test_a_lost_scheduler_is_told_and_the_run_can_go_on(cluster, small):
     assert len(list(blocks.glob("*.block"))) > 5
 
 
+@pytest.mark.slow
 def test_workers_with_too_little_memory_end_the_run_which_can_go_on(scheduler, small, surveyed):
     """The limit kills every worker as it imports or compiles; a nanny that is late, on a busy machine, gives up."""
     file, processes = scheduler
@@ -221,6 +222,7 @@ def test_blocks_travel_where_no_folder_is_shared(small, tmp_path):
         assert kept.intact() == {0}
 
 
+@pytest.mark.slow
 def test_workers_that_see_another_disk_send_their_blocks(scheduler, small, surveyed):
     """Their own empty disk hides the folder of the run."""
     file, processes = scheduler
@@ -299,6 +301,7 @@ def test_the_batch_script_takes_the_settings_of_tls(small, tmp_path, surveyed):
     xr.testing.assert_equal(*(xr.load_dataset(path).drop_attrs() for path in (surveyed, small.with_suffix(".nc"))))
 
 
+@pytest.mark.slow
 def test_the_batch_script_stops_before_the_walltime_and_is_queued_again(small):
     many = ("--set", "axes.w0.num=10000", "--set", "solver.method='dop853'")
     running = queue(small.parent, *many)

@@ -35,7 +35,10 @@ READ, COMPILED, UNUSED = "1 0", "0 1", "0 0"
     ("scene", "row", "lane", "variables", "kernels"),
     [
         ("satellite", "k", "rho", ["exponent", "rotation_number", "verdict"], (UNUSED, UNUSED, READ)),
-        ("satellite", "k", "rho", ["exponent_per_orbit", "period", "verdict"], (READ, READ, UNUSED)),
+        pytest.param(
+            "satellite", "k", "rho", ["exponent_per_orbit", "period", "verdict"], (READ, READ, UNUSED),
+            marks=pytest.mark.slow,
+        ),
         pytest.param("mathieu", "q", "a", ["discriminant", "verdict"], (READ, UNUSED, UNUSED), marks=pytest.mark.slow),
     ],
 )

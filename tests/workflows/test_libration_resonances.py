@@ -50,6 +50,7 @@ def test_on_circles_the_normal_form_is_that_of_deprit_and_deprit_bartholome():
         assert np.allclose(np.exp(1j * theta), np.exp(2j * np.pi * np.array([one, -two])), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_on_ellipses_the_angles_grow_as_the_normal_form_says():
     mu, e, turns = 0.01, 0.2, 240
     theta, _F, cubic = command.normal_form(mu, e)

@@ -37,6 +37,7 @@ def test_beside_lames_edge_the_verdict_is_given(body, rho):
     assert int(ds.verdict) == (UNSTABLE if dy1 * y2 > 0 or y1 * dy2 < 0 else STABLE)
 
 
+@pytest.mark.slow
 def test_both_sides_of_the_edge_of_a_tongue_two_ulp_apart():
     """An edge of the prolate tongue n = 4 at k = 0.3, closed in by mpmath to 1e-30: its neighbours are decided."""
     k = 0.3

@@ -105,6 +105,7 @@ def _torque(phi, p):
     return p[1] * np.sin(phi) + 0.6 * np.cos(phi) - 0.8 * np.sin(2.0 * phi)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("point", [(0.5, -0.4), (0.3, 0.5)])
 def test_own_flows_are_told_alike(point):
     """A user's f and g on the cylinder: the same door, the same fates as those followed."""

@@ -153,6 +153,7 @@ def test_portraits_of_the_junction():
     assert int(survey.evaluate(JUNCTION, question="fate", a=0.0, I=0.3, phi0=1.0, w0=1.0).status) == 22
 
 
+@pytest.mark.slow
 def test_fates_of_the_junction_agree_with_long_integration():
     for a, current in ((0.3, 0.6), (0.9, 0.7), (0.4, 1.2)):
         phi0, w0 = RNG.uniform(-3, 3, 5), RNG.uniform(-3, 4, 5)

@@ -42,6 +42,7 @@ def points(scene, square):
     return {NAMES[kind]: (found.parameters[kinds == kind], found.error[kinds == kind]) for kind in set(kinds)}
 
 
+@pytest.mark.slow
 def test_an_equation_written_out_has_the_gyrostats_curves(monkeypatch):
     monkeypatch.setattr(connections, "found", lambda plane: [])
     monkeypatch.setattr(cycle_folds, "found", lambda plane: [])

@@ -48,6 +48,7 @@ def cycles(t, x, p, out):
     out[0], out[1] = grow * x[0] - 1.5 * x[1], 1.5 * x[0] + grow * x[1]
 
 
+@pytest.mark.slow
 def test_a_fold_of_limit_cycles_in_closed_form():
     scene = survey.orbit(
         cycles,
@@ -84,6 +85,7 @@ def test_period_doubling_in_closed_form():
     assert abs(ds.curve_angle.values[curve] - math.pi).max() < 1e-15
 
 
+@pytest.mark.slow
 def test_complex_pairs_in_closed_form():
     """A limit cycle of angular velocity w, and beside it z' = (a - b^2 + i v) z: multipliers exp((a - b^2 + i v) T)."""
     w, v = 2.0, 0.6
