@@ -13,8 +13,8 @@ across it is this equation, exactly. Not for spin, finite tilts, eccentric orbit
 
 Parameters, in order: k >= 0, where k = 1 has the outputs separatrix_* alone; or one_minus_k = 1 - k <= 1 where that is
 small (negative: rotations); or amplitude = asin k (rad), a libration's. rho, any sign: rho^2 = 1 / (3 |1 - alpha|), so
-rho >= 1/sqrt(3) is a body; rho < 0 is a retrograde rotation. Or, instead of rho and the body, inertia_ratio = alpha: 0 a
-thin rod, 2 a disc.
+rho >= 1/sqrt(3) is a body; rho < 0 is a retrograde rotation. Or, instead of rho and the body, inertia_ratio = alpha:
+0 a thin rod, 2 a disc.
 
 Known: at k = 0 every gap is closed and D = 2 cos(2 pi sqrt(1 + rho^2)) (prolate), 2 cos(2 pi rho) (oblate); rho = 0 is
 an edge of Lame's equation, |D| = 2; D is even in rho for librations; tongue n opens as k^n; k = 1 is a scattering
