@@ -36,7 +36,11 @@ READ, COMPILED, UNUSED = "1 0", "0 1", "0 0"
     [
         ("satellite", "k", "rho", ["exponent", "rotation_number", "verdict"], (UNUSED, UNUSED, READ)),
         pytest.param(
-            "satellite", "k", "rho", ["exponent_per_orbit", "period", "verdict"], (READ, READ, UNUSED),
+            "satellite",
+            "k",
+            "rho",
+            ["exponent_per_orbit", "period", "verdict"],
+            (READ, READ, UNUSED),
             marks=pytest.mark.slow,
         ),
         pytest.param("mathieu", "q", "a", ["discriminant", "verdict"], (READ, UNUSED, UNUSED), marks=pytest.mark.slow),
