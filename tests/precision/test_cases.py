@@ -2,6 +2,8 @@
 
 import json
 
+import body_truth
+import mpmath as mp
 import numpy as np
 import pytest
 from snippets import ROOT
@@ -12,7 +14,7 @@ from survey.precision import chart
 from survey.precision.known import references as known
 from survey.truth.hill import mathieu
 
-QUICK = ("mathieu", "libration", "libration_orders", "libration_elliptic_near_1")
+QUICK = ("mathieu", "libration", "libration_orders", "libration_elliptic_near_1", "gyrostat_body")
 SLOW = (pytest.param(name, marks=pytest.mark.slow) for name in ("satellite_families", "brun_motion"))
 SETTING = 1e-8
 
@@ -62,6 +64,17 @@ def test_a_reference_is_the_truth():
     )
     assert point == {"a": 2.0, "q": 0.0} and options == {}
     assert float(exact["discriminant"]) == pytest.approx(2 * np.cos(np.pi * np.sqrt(2.0)), abs=1e-15)
+
+
+@pytest.mark.slow
+def test_the_bodies_of_the_chart_by_another_series():
+    """`body_truth` sums its own Taylor series, not mpmath's."""
+    with mp.workdps(30):
+        for body, _, exact, _ in modules.load(folder, "gyrostat_body", "chart").references():
+            state = [mp.mpf(body[f"{name}{i}"]) for name in ("omega", "gamma") for i in (1, 2, 3)]
+            size = mp.norm(state[3:])
+            end = body_truth.motion(body, [*state[:3], *(x / size for x in state[3:])], body["t"], digits=30)
+            assert abs(end[0] - mp.mpf(exact["w1"])) < 1e-16
 
 
 def test_a_chart_of_ones_own(quick, tmp_path):
