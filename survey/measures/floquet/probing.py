@@ -14,6 +14,7 @@ WIDTH, NUMBER, CHECKED = 1 / 128, 256, 16384
 WAVES = tuple(pg.CODES[name] + pg.OF_LINE for name in ("sin", "cos"))
 SIMPLE = 4  # sines and cosines of lines, multiplied with each other: their series of order 16 show them
 RESOLVED = 1e-12  # relative to the largest Chebyshev coefficient: smaller ones do not count
+AT_ONCE = 64  # points that are sampled together: their arrays stay in the cache
 HARMLESS = 1e-16  # what an entry of A, in balanced units, may change by over a piece
 SEEN = 2.0  # a rate this many times that of fewer samples takes its place
 
@@ -44,8 +45,20 @@ def rates(program, numbers, low, high, scale, number=NUMBER):
     places = suspects(program)
     if not places:
         return np.zeros((0, len(low)))
+    found = np.empty((len(places), len(low)))
+    for first in range(0, len(low), AT_ONCE):
+        some = slice(first, first + AT_ONCE)
+        own = [values[some] for values in numbers]
+        found[:, some] = _rates(program, places, own, low[some], high[some], scale[some], number)
+    return found
+
+
+def _rates(program, places, numbers, low, high, scale, number):
+    """`rates` of some points."""
+    if (low == low[0]).all() and (high == high[0]).all():  # what depends on t alone is sampled once
+        low, high = low[:1], high[:1]
     t = low + (high - low) * (0.5 - 0.5 * np.cos(np.pi * (np.arange(number) + 0.5) / number))
-    found = np.zeros((len(places), len(low)))
+    found = np.zeros((len(places), len(scale)))
     for k, (values, bars) in enumerate(_values(program, numbers, t, places)):
         c = abs(np.fft.rfft(np.concatenate([values, values[:, ::-1]], axis=1), axis=1)[:, :number]) / number
         terms = program.terms[program.terms[:, pg.BASIS] == places[k]]
@@ -82,6 +95,7 @@ def spikes(points):
 
 
 def _values(program, numbers, t, places):
-    """Yield the values (N, m) of these basis functions at the times t (N, m), and their error bounds."""
+    """Yield the values (N, m) of these basis functions at the times t (N or 1, m), and their error bounds."""
+    shape = len(numbers[0]), t.shape[1]
     for values, bars in program.series(numbers, t, places).values():
-        yield np.broadcast_to(values, t.shape), np.broadcast_to(bars, t.shape)
+        yield np.broadcast_to(values, shape), np.broadcast_to(bars, shape)
