@@ -36,7 +36,16 @@ from survey import methods
 from survey.errors import BadInput
 from survey.kernels.nutation import brun, brun_lanes
 from survey.kernels.nutation import wells as nu
-from survey.measures.nutation import derived, multiprecision, on_request, rotation, separatrix, twist, unsettled
+from survey.measures.nutation import (
+    derived,
+    multiprecision,
+    on_request,
+    resting,
+    rotation,
+    separatrix,
+    twist,
+    unsettled,
+)
 from survey.measures.nutation import wells as nutation
 from survey.measures.rows import Rows
 from survey.modules import load
@@ -87,6 +96,8 @@ OPTIONS = (
 )
 
 _TURNS = derived.FINITE
+_RESTS = "and at rest on an unstable precession, until the bar of u has grown too large"
+_MOVES = f"{_TURNS}; {_RESTS}"
 _SETTLED = f"{_TURNS}, and where double-double tells the turning points apart"
 
 
@@ -113,12 +124,12 @@ def _extra(name, long_name, symbol, when, applies):
 
 _PHASED = dict.fromkeys(("beta1", "beta2"), "p_phi is not 0 and A is not C") | {"beta3": "without jumps at poles"}
 _VERDICTS = {"undecided": -1, "separatrix": 0, "regular_nutation": 1, "regular_precession": 2, "pole_passage": 3}
-_ANGLE = {"units": "rad", "when": _MOTION, "applies": f"{_TURNS}; without the jumps of pi in passing a pole"}
+_ANGLE = {"units": "rad", "when": _MOTION, "applies": f"{_MOVES}; without the jumps of pi in passing a pole"}
 OUTPUTS = (
-    Output("u", "u = cos theta at t", "u", when=_MOTION, applies=_TURNS),
+    Output("u", "u = cos theta at t", "u", when=_MOTION, applies=_MOVES),
     Output("psi", "angle of precession at t, 0 at first, unwrapped", r"\psi", **_ANGLE),
     Output("phi", "angle of spin at t, 0 at first, unwrapped", r"\varphi", **_ANGLE),
-    *(_extra(name, *words, _MOTION, _SETTLED) for name, words in rotation.AT_T.items()),
+    *(_extra(name, *words, _MOTION, f"{_SETTLED}; {_RESTS}") for name, words in rotation.AT_T.items()),
     *_outputs(_STATE, ()),
     *(_extra(name, *words, _STATE, _SETTLED) for name, words in rotation.ENERGIES.items()),
     *(_extra(name, *words, _STATE, f"{_SETTLED}; {_PHASED[name]}") for name, words in rotation.PHASES.items()),
@@ -235,11 +246,10 @@ def _state(given, valid, method, request, times):
         unsettled.settle(out, points.T, multiprecision.of_state, valid, request, known=True)
     if times is None:
         return out
-    upright = (kinds == nu.SEPARATRIX) & (points[:, 3] == 0.0) & (points[:, 4] == 0.0)
 
     def motions(at):
         found = nutation.motions(method, rows, kinds, starts, periods, at, a, drift)
-        return separatrix.upright(found, upright, at, points[:, 5] / (2.0 * a), drift)
+        return resting.at_times(found, kinds == nu.SEPARATRIX, points, at, drift)
 
     return _with_motion(out, valid, kinds, times, motions)
 
@@ -316,14 +326,14 @@ def trajectory(point, answer, options, time=None):
 
 def _homoclinic(point, sign, time):
     """The Trajectory of the motion that leaves an unstable precession and returns, furthest from it at t = 0."""
-    u, bar = separatrix.saddles(np.array([point["alpha"]]), np.array([point["beta"]]))
-    if sign < 0 or np.isnan(u[0]) or abs(point["alpha"]) == abs(point["beta"]):
-        raise BadInput("this separatrix is next to a cusp, or passes a pole: take a point beside it")
     drift = point["alpha"] * (1.0 - point["ratio"]) / point["ratio"]
-    loop = separatrix.Loop(u[0], bar[0], point["alpha"], point["beta"], drift)
+    loop = separatrix.loop(point["alpha"], point["beta"], sign, drift)
+    if loop is None:
+        raise BadInput("this separatrix is next to a cusp: take a point beside it")
     end = 12.0 / loop.rate if time is None else time
     t = np.linspace(0.0 if time is not None else -end, end, _MOTION_POINTS)
-    return _drawn(t, loop.motion(t), True, 1.0)
+    found = loop.motion(t)
+    return _drawn(t, found, True, _sides(found["u"], {"p_psi": point["beta"], "p_phi": point["alpha"]}))
 
 
 def _drawn(t, out, scaled, sides):

@@ -78,6 +78,6 @@ def _of_states(given, valid, times, out, wanted):
         constants = rotation.constants(rows, kinds, starts, periods, points)
         found |= {name: constants[name] for name in phased}
     if moving:
-        at_t = rotation.at_times(rows, kinds, starts, periods, times, sizes, out)
+        at_t = rotation.at_times(rows, kinds, starts, periods, times, points, out)
         found |= {name: at_t[name] for name in moving}
     return found

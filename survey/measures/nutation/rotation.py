@@ -11,6 +11,7 @@ import numpy as np
 from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.nutation import rotation as rt
 from survey.kernels.nutation import wells as nu
+from survey.measures.nutation import resting
 
 ENERGIES = {
     "alpha1": ("constant of (8), twice the energy", r"\alpha_1"),
@@ -66,18 +67,20 @@ def _where(share, value, bar, roundings, size=None):
     return np.where(good, value, np.nan), np.where(good, bar + roundings * ROUNDOFF * size, np.nan)
 
 
-def at_times(rows, kinds, starts, periods, times, sizes, motion):
-    """{name: (values, bars)} of AT_T, each (n, m) at `times` (n, m).
+def at_times(rows, kinds, starts, periods, times, points, motion):
+    """{name: (values, bars)} of AT_T, each (n, m) at `times` (n, m), of initial states `points` (n, 7).
 
-    sizes: A, C and p_phi (n); motion: u, psi and phi there, and their bars.
+    motion: u, psi and phi there, and their bars.
     """
     found = np.full((*times.shape, 2, rt.PLACE), np.nan)
     turning = (kinds >= nu.NUTATION) & np.isfinite(periods).all(axis=1)
-    size_a, size_c, a = (values[:, None] for values in sizes)
+    size_a, size_c, a = (points[:, i, None] for i in (0, 1, 6))
     some = np.empty((np.count_nonzero(turning), times.shape[1], 2, rt.PLACE))
     inside = np.ascontiguousarray((times / size_a)[turning])
     rt.places(rows[turning], starts[turning], periods[turning], inside, some)
     found[turning] = some
+    still = kinds == nu.SEPARATRIX
+    found[still] = resting.rotations(points[still], motion["u"][still], motion["u_error"][still]).transpose(2, 3, 0, 1)
     values, bars = np.moveaxis(found, -1, 0)[:, :, :, 0], np.moveaxis(found, -1, 0)[:, :, :, 1]
     sine, p_theta, across = values
     phi, off = motion["phi"], motion["phi_error"] + 4.0 * ROUNDOFF

@@ -1,17 +1,17 @@
-"""Motions on separatrices in closed form: the unstable upright rotation, and the loops that leave a saddle and return.
+"""Motions on separatrices in closed form: the loops that leave an unstable precession and return.
 
 In units A = k = 1, P = -(u - u0)^2 (u^2 + 2 u0 u + c): with x = rate t, kappa = rate^2,
 
     u = u0 + kappa / D,   D = 2 u0 + sigma sqrt(4 u0^2 + kappa) cosh x,   sigma = +-1 for the two loops
 
-and 1 / (e - u) = 1/(e - u0) + kappa / [(e - u0) ((e - u0) D - kappa)], e = +-1, has an elementary integral. A loop is
-at its end, farthest from u0, at t = 0; psi and phi are 0 there.
+(k = -1: from the upright rotation u0 = +-1, kappa = -u0 (4 - alpha^2), D = 2 + |alpha| cosh x), and 1 / (e - u) =
+1/(e - u0) + kappa / [(e - u0) ((e - u0) D - kappa)], e = +-1, has an elementary integral. A loop is at its end,
+farthest from u0, at t = 0; psi and phi are 0 there.
 
 Source: derived in `scenes/brun.md`, from (S2) and (S4).
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -20,18 +20,6 @@ from survey.kernels.math.roundoff import EPS
 
 SAMPLES = 401  # at which saddles are looked for
 BISECTIONS = 60
-
-
-def upright(found, those, times, turning, drift):
-    """`found` with the upright rotation, u = 1, in the rows `those` (n): psi' = turning, phi' = turning + drift (n)."""
-    psi = np.where(those[:, None], turning[:, None] * times, 0.0)
-    phi = np.where(those[:, None], (turning + drift)[:, None] * times, 0.0)
-    size = abs(psi) + abs(drift[:, None] * times)
-    exact = {"u": (1.0 + 0.0 * psi, 0.0 * psi), "psi": (psi, 4.0 * EPS * abs(psi)), "phi": (phi, 16.0 * EPS * size)}
-    for name, values in exact.items():
-        for key, value in zip((name, f"{name}_error"), values, strict=True):
-            found[key] = np.where(those[:, None], value, found[key])
-    return found
 
 
 def saddles(alpha, beta):
@@ -90,60 +78,68 @@ def growth(alpha, beta, sign):
 
 @dataclass(frozen=True)
 class Loop:
-    """The motion from the saddle u0 and back, the loop of the greater excursion; alpha and beta differ in size.
+    """u = u0 + kappa / D, D = level + swing cosh(rate t), which leaves u0, an unstable precession, and returns.
 
-    Where alpha = +-beta it would pass a pole.
+    On a motion that passes a pole, |alpha| = |beta|, psi and phi go without the jumps of pi that they have there.
     """
 
     u0: float
     bar: float
+    kappa: float
+    level: float
+    swing: float
     alpha: float
     beta: float
     drift: float
 
-    @cached_property
-    def kappa(self):
-        """rate^2."""
-        return _square(self.u0, self.alpha, self.beta, 1.0)
-
     @property
     def rate(self):
-        """The rate at which the saddle is left, its growth rate."""
-        return float(np.sqrt(self.kappa))
-
-    @cached_property
-    def _root(self):
-        return np.sqrt(4.0 * self.u0**2 + self.kappa)
-
-    @cached_property
-    def side(self):
-        """sigma of the loop: the one whose end is farther from u0."""
-        return 1.0 if self.u0 <= 0.0 else -1.0
+        """The rate at which u0 is left."""
+        return float(np.sqrt(abs(self.kappa)))
 
     def motion(self, t):
         """{name: values, name_error: bars} of u, psi, phi at times t (m)."""
         x = np.minimum(abs(t) * self.rate, 700.0)
-        D = 2.0 * self.u0 + self.side * self._root * np.cosh(x)
-        u = self.u0 + self.kappa / D
-        minus, plus = (self._integral(end, t) for end in (1.0, -1.0))
+        away = (
+            self.kappa / (self.level + self.swing * np.cosh(x))
+            if self.swing
+            else self.u0 * (np.tanh(0.5 * t * self.rate) - 1.0)
+        )
+        u = self.u0 + away
         # psi' = ((b - a) / (1 - u) + (b + a) / (1 + u)) / 2
-        one, two = 0.5 * (self.beta - self.alpha) * minus, -0.5 * (self.beta + self.alpha) * plus
-        psi, phi = one + two, two - one + self.drift * t
-        loss = (self.bar + 64.0 * EPS) / self.kappa  # of the rate and the place of the saddle
+        half = {1.0: 0.5 * (self.beta - self.alpha), -1.0: 0.5 * (self.beta + self.alpha)}
+        parts = {end: end * c * self._integral(end, t) if c else 0.0 * t for end, c in half.items()}
+        psi, phi = parts[1.0] + parts[-1.0], parts[-1.0] - parts[1.0] + self.drift * t
+        loss = (self.bar + 64.0 * EPS) / abs(self.kappa)  # of the rate and the place of u0
         off = loss * (1.0 + abs(t) * self.rate)
-        turned = abs(one) + abs(two) + abs(self.drift * t)
-        size = off * (abs(self.beta) + abs(self.alpha)) * (1.0 + abs(t)) / (1.0 - abs(u).max()) ** 2
-        out = {"u": (u, off * (1.0 + 0.0 * t)), "psi": (psi, size + 64 * EPS * turned)}
-        out["phi"] = phi, size + 64 * EPS * turned
-        return {
-            key: part for name, pair in out.items() for key, part in zip((name, f"{name}_error"), pair, strict=True)
-        }
+        turned = abs(parts[1.0]) + abs(parts[-1.0]) + abs(self.drift * t)
+        steep = sum(2.0 * abs(c) / abs(end - u).min() ** 2 for end, c in half.items() if c)
+        size = off * steep * (1.0 + abs(t)) + 64 * EPS * turned
+        return {"u": u, "u_error": off, "psi": psi, "psi_error": size, "phi": phi, "phi_error": size}
 
     def _integral(self, end, t):
         """The integral of 1 / (end - u) from 0 to t."""
         away, kappa = end - self.u0, self.kappa
-        p, q = 2.0 * self.u0 * away - kappa, self.side * self._root * away
+        p, q = self.level * away - kappa, self.swing * away
         # integral of dx / (p + q cosh x) from 0 to x, |q| > |p| as the loop does not reach the pole
         y = np.tanh(0.5 * t * self.rate)
         wide = np.sqrt((q - p) * (q + p))
         return t / away + kappa / away * (2.0 / wide) * np.arctan((q - p) / wide * y) / self.rate
+
+
+def loop(alpha, beta, sign, drift):
+    """The Loop of these momenta that goes farther, or None: there is none, or none that is seen (see `saddles`).
+
+    With k < 0 it leaves an upright rotation; alpha = beta = 0 then is a passage from one to the other.
+    """
+    if sign < 0:
+        if abs(alpha) != abs(beta) or abs(alpha) >= 2.0:
+            return None
+        pole = 1.0 if alpha == beta else -1.0
+        return Loop(pole, 0.0, -pole * (2.0 - abs(alpha)) * (2.0 + abs(alpha)), 2.0, abs(alpha), alpha, beta, drift)
+    place, bar = (float(x[0]) for x in saddles(np.array([alpha]), np.array([beta])))
+    kappa = _square(place, alpha, beta, 1.0)
+    if not kappa > 0.0:
+        return None
+    side = 1.0 if place <= 0.0 else -1.0  # of the loop whose end is farther from u0
+    return Loop(place, bar, kappa, 2.0 * place, side * np.sqrt(4.0 * place**2 + kappa), alpha, beta, drift)

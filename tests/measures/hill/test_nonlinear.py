@@ -176,6 +176,32 @@ def test_the_resonance_of_order_4():
     assert (abs(here.twist) > abs(here.twist_resonant)).all() and (here.verdict_nonlinear == 1).all()
 
 
+def resonant_rotation():
+    """A retrograde rotation of a prolate body (alpha = 0.871) with D = 0 where the twist is next to 0."""
+    low, high = -1.62, -1.60
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        here = survey.evaluate("satellite", k=2.92, rho=middle, variables=["discriminant", "period", *NAMES])
+        low, high = (middle, high) if float(here.discriminant) > 0 else (low, middle)
+    return here
+
+
+def test_a_rotation_in_resonance():
+    here = resonant_rotation()
+    assert abs(here.discriminant) <= here.discriminant_error
+    assert abs(here.twist_resonant) > 10 * abs(here.twist) and int(here.verdict_nonlinear) == 2
+    beside = survey.evaluate("satellite", k=2.92, rho=float(here.rho) + 1e-6, variables=NAMES)
+    assert int(beside.verdict_nonlinear) == 1
+
+
+@pytest.mark.slow
+def test_there_tilts_grow_and_beside_it_they_do_not():
+    here = resonant_rotation()
+    for away, least, most in ((0.0, 5.0, 10.0), (0.1, 1.0, 1.5), (-0.1, 1.0, 1.5)):
+        states = Body(2.92, float(here.rho) + away, oblate=False).returns(0.2, 600, float(here.period))
+        assert least < np.hypot(*states.T).max() / 0.2 < most
+
+
 @pytest.mark.parametrize("body", ["prolate", "oblate"])
 def test_small_librations(body):
     """Birkhoff's normal form of the equilibrium, by hand: H = I1 + O I2 + (a I1^2 + 2 b I1 I2 + c I2^2)/2."""
@@ -190,7 +216,7 @@ def test_small_librations(body):
 
 
 def test_verdicts_by_the_rule():
-    """On made-up numbers: no twist, resonance with and without enough of it, instability."""
+    """On made-up numbers: far from resonance and in it, with enough twist; instability, and nothing decided."""
 
     class Row:
         oblate = False
