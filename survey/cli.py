@@ -1,6 +1,7 @@
 """The commands. Only this file prints: data to stdout, messages and progress to stderr."""
 
 import gc
+import io
 import json
 import os
 import shlex
@@ -25,6 +26,9 @@ TRUST = "Allow the survey's own scene, a Python file, to run: only if you have r
 
 def main(arguments=None):
     """Run the program and exit: 0 done, 1 points failed, 2 bad input, 3 damaged, 4 stopped, 130/143 interrupted."""
+    for stream in (sys.stdout, sys.stderr):  # a pipe on Windows knows few characters
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
     gc.set_threshold(100_000)  # measured: otherwise garbage collection takes a tenth of the time of compiling kernels
     try:
         arguments = sys.argv[1:] if arguments is None else arguments

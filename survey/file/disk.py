@@ -61,6 +61,8 @@ def publish(part, path):
 
 def sync(folder):
     """Make durable what was created, renamed or removed in the folder."""
+    if not hasattr(os, "O_DIRECTORY"):  # Windows opens no folders
+        return
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(descriptor)

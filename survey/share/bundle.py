@@ -63,7 +63,7 @@ def _fill(folder, path, ds):
     shutil.copyfile(path, folder / path.name)
     with open(path, "rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
-    digest_of(folder / path.name).write_text(f"{digest}  {path.name}\n")
+    digest_of(folder / path.name).write_text(f"{digest}  {path.name}\n", encoding="utf-8")
     text = str(ds.attrs.get("workflow", ""))
     if ds.attrs.get("scene_text"):
         text = _with_scene(folder, text, ds)
