@@ -34,7 +34,9 @@ def theirs(path):
             packed = {"compression": "zlib", "complevel": 1, "shuffle": True, "fletcher32": True, "chunksizes": tile}
             fill = np.nan if values.dtype.kind == "f" and tile else None
             kind = str if values.dtype.kind == "O" else values.dtype
-            made = file.createVariable(name, kind, dims, fill_value=fill, **(packed if tile and values.size else {}))
+            if kind is str or not (tile and values.size):  # HDF5 packs no strings, and old netCDF does not know that
+                packed = {"chunksizes": tile} if kind is str else {}
+            made = file.createVariable(name, kind, dims, fill_value=fill, **packed)
             made.setncatts(MEANING)
             made[...] = values
         file.setncatts(MEANING)
