@@ -101,10 +101,12 @@ WORKFLOW = _Files(".toml")
 @click.option("-o", "--output", metavar="FILE.toml", help="The workflow file; by default SCENE.toml.")
 def init(scene, output):
     """Write a commented workflow of the scene to start from; it runs as it is."""
+    from survey.file.disk import check_folder
     from survey.request import starter
 
     text = starter.workflow(scene)
     path = output or f"{os.path.basename(scene).removesuffix('.py')}.toml"
+    check_folder(path, ".toml")
     try:
         with open(path, "x", encoding="utf-8") as file:
             file.write(text)
@@ -193,7 +195,7 @@ def model(workflow, output, overrides, proof):
     from survey.request.workflow import read
 
     if output is not None:
-        check_folder(output)
+        check_folder(output, ".model")
     # with -o nothing is written where the workflow's output would be
     checked = read(workflow, overrides, None if output is None else Path(output).with_suffix(".nc"))
     path = output or str(checked.path.with_suffix(".model"))

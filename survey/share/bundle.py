@@ -29,6 +29,7 @@ KINDS = {
     ".cert": "application/json",
 }  # fmt: skip
 PACKAGES = {"survey": "stability-survey", "numba": "numba", "llvmlite": "llvmlite", "numpy": "numpy"}
+OTHERS = {".7z", ".bz2", ".gz", ".html", ".json", ".nc", ".pdf", ".png", ".rar", ".tar", ".tgz", ".toml", ".xz"}
 FILES, RATIO, SPARE = 1000, 1032, 2**20  # of a bundle; the largest compression ratio of deflate
 MOST = 2**26  # characters of the description
 
@@ -42,6 +43,11 @@ def write(path, output, author="", license_url=""):
     if output.exists():
         raise BadInput(f"{output}: it exists; name another folder or .zip file with -o")
     check_folder(output)
+    if output.suffix.lower() in OTHERS:
+        raise BadInput(f"{output}: a bundle is a .zip file or a folder; name one, such as {output.with_suffix('.zip')}")
+    if license_url and "://" not in license_url:
+        raise BadInput(f"--license {license_url!r}: give the address of the licence, such as "
+                       "https://creativecommons.org/licenses/by/4.0/")  # fmt: skip
     ds = reading.load(path)
     with refused(output), tempfile.TemporaryDirectory(prefix=".bundle-", dir=output.parent) as made:
         folder = Path(made) / output.stem
