@@ -69,7 +69,7 @@ class FloquetScene(TracedScene):
         """Seconds per point, roughly: measured on the examples in `workflows`."""
         n = len(self.states)
         further = max(self._known.get("series", 2.0) - 2.0, 0.0)  # besides 1 and a function of time
-        alone = 2e-5 + further * (1.1e-5 + 9e-7 * self._known.get("steps", 6.0)) + 1e-6 * n**2 + 1e-7 * n**3
+        alone = 2e-5 + further * (6e-6 + 9e-7 * self._known.get("steps", 6.0)) + 1e-6 * n**2 + 1e-7 * n**3
         longest = sorted(sizes.values())[-2:]
         if np.prod(longest) < 4 * NODES or n > dense.LARGEST:
             return alone
