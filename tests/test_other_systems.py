@@ -163,7 +163,7 @@ def test_a_second_run_is_told_whose_the_lock_is_and_a_killed_one_frees_it(start,
     said = start("-m", "survey", "run", "map.toml").communicate(timeout=120)[0]
     assert "another run is writing it (host" in said and f"pid {holder.pid})" in said and said.count("\n") == 1
     holder.kill()
-    holder.wait()
+    holder.communicate()
     assert json.loads((tmp_path / "map.nc.lock").read_text())["pid"] == holder.pid
     again = start("-m", "survey", "run", "map.toml", "--workers", "2")
     said = again.communicate(timeout=300)[0]
