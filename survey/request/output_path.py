@@ -40,17 +40,23 @@ def _checked(path):
     longest = os.pathconf(folder, "PC_NAME_MAX") if hasattr(os, "pathconf") else LONGEST_NAME
     if len(os.fsencode(path.name)) > longest - LONGEST_SUFFIX:
         raise BadInput(f"{key}: this name is too long for the files beside it; shorten it")
+    if os.access(folder, os.W_OK | os.X_OK) and not str(folder.resolve()).startswith(("/proc", "/sys")):
+        return path
+    if _is_read_only(folder):
+        raise Stopped(
+            f"{key}: the disk of the folder {where} is read-only; make it writable and "
+            "run the command again, or use -o OUT.nc"
+        )
+    raise BadInput(f"{key}: the folder {where} cannot be written to; use -o OUT.nc")
+
+
+def _is_read_only(folder):
+    """Is it the disk that takes no file, whoever asks?"""
     try:
         tempfile.TemporaryFile(dir=folder).close()
     except OSError as error:
-        if error.errno == errno.EROFS:
-            raise Stopped(
-                f"{key}: the disk of the folder {where} is read-only; make it writable and "
-                "run the command again, or use -o OUT.nc"
-            ) from None
-        if error.errno not in (errno.ENOSPC, errno.EDQUOT):  # what the run frees may be enough
-            raise BadInput(f"{key}: the folder {where} cannot be written to; use -o OUT.nc") from None
-    return path
+        return error.errno == errno.EROFS
+    return False
 
 
 def _is_netcdf(path):
