@@ -1,6 +1,7 @@
 """The commands. Only this file prints: data to stdout, messages and progress to stderr."""
 
 import gc
+import io
 import json
 import os
 import shlex
@@ -25,6 +26,9 @@ TRUST = "Allow the survey's own scene, a Python file, to run: only if you have r
 
 def main(arguments=None):
     """Run the program and exit: 0 done, 1 points failed, 2 bad input, 3 damaged, 4 stopped, 130/143 interrupted."""
+    for stream in (sys.stdout, sys.stderr):  # a pipe on Windows knows few characters
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
     gc.set_threshold(100_000)  # measured: otherwise garbage collection takes a tenth of the time of compiling kernels
     try:
         arguments = sys.argv[1:] if arguments is None else arguments
@@ -97,10 +101,12 @@ WORKFLOW = _Files(".toml")
 @click.option("-o", "--output", metavar="FILE.toml", help="The workflow file; by default SCENE.toml.")
 def init(scene, output):
     """Write a commented workflow of the scene to start from; it runs as it is."""
+    from survey.file.disk import check_folder
     from survey.request import starter
 
     text = starter.workflow(scene)
     path = output or f"{os.path.basename(scene).removesuffix('.py')}.toml"
+    check_folder(path, ".toml")
     try:
         with open(path, "x", encoding="utf-8") as file:
             file.write(text)
@@ -189,7 +195,7 @@ def model(workflow, output, overrides, proof):
     from survey.request.workflow import read
 
     if output is not None:
-        check_folder(output)
+        check_folder(output, ".model")
     # with -o nothing is written where the workflow's output would be
     checked = read(workflow, overrides, None if output is None else Path(output).with_suffix(".nc"))
     path = output or str(checked.path.with_suffix(".model"))

@@ -21,6 +21,7 @@ path = "map.nc"
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("newcomer")
     (folder / "good.toml").write_text(WORKFLOW)
+    (folder / "folder.html").mkdir()
     survey.run(folder / "good.toml", output=folder / "map.nc")
     return folder
 
@@ -57,6 +58,20 @@ SHELL = [
     ("merge map.nc map.nc -o both.nc", "they are of the same points"),
     ("prove good.toml", "add [refine] with a width"),
     ("precision xyz", "xyz"),
+    ("share map.nc -o map.nc", "this file ends in .html or .htm; name one, such as 'map.html'"),
+    ("share map.nc -o map.png", "name one, such as 'map.html'"),
+    ("share map.nc -o folder.html", "is a folder; name a file, with -o"),
+    ("share map.nc --at r=1", "unknown axis 'r'"),
+    ("model good.toml -o map.nc", "this file ends in .model; name one, such as 'map.model'"),
+    ("model good.toml --set axes.k=0.5", "1 of the workflow's parameters vary; a model needs two"),
+    ("model good.toml --proof nothing.nc", "there is no such file"),
+    ("bundle map.nc -o map.tar", "a bundle is a .zip file or a folder; name one, such as map.zip"),
+    ("bundle map.nc -o b.zip --license MIT", "give the address of the licence"),
+    ("bundle map.nc --licence MIT", "Did you mean '--license'?"),
+    ("failures good.toml", "true values are known only of Hill equations"),
+    ("failures mathieu --share 2", "give a number above 0 and up to 1"),
+    ("init mathieu -o nowhere/x.toml", "there is no folder 'nowhere'; create it first"),
+    ("init mathieu -o folder.html", "this file ends in .toml"),
 ]
 
 

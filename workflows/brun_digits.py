@@ -148,7 +148,7 @@ def main(argv=None):
     folder.mkdir(parents=True, exist_ok=True)
     results = {family: errors(family) for family in FAMILIES}
     draw(results, folder / "brun_digits.png")
-    (folder / "brun_digits.md").write_text(table(results))
+    (folder / "brun_digits.md").write_text(table(results), encoding="utf-8")
     print(f"wrote {folder / 'brun_digits.md'} and {folder / 'brun_digits.png'}")
     return 0
 

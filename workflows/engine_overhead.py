@@ -54,14 +54,14 @@ def main():
     with tempfile.TemporaryDirectory(dir=given.output) as folder:
         page = measure(given, Path(folder))
     path = given.output / "engine_overhead.md"
-    path.write_text(page)
+    path.write_text(page, encoding="utf-8")
     print(path)
 
 
 def measure(given, folder):
     """The page, from runs that write to `folder`, without the edges of tongues."""
     points_alone, target = folder / "points.toml", folder / "map.nc"
-    points_alone.write_text(WORKFLOW.read_text().partition("[boundaries]")[0])
+    points_alone.write_text(WORKFLOW.read_text(encoding="utf-8").partition("[boundaries]")[0])
     k, rho = given.points.split("x")
     overrides = [f"axes.k.num={k}", f"axes.rho.num={rho}", f"output.variables={given.variables.split(',')}"]
     overrides.append("output.figures=[]")

@@ -65,5 +65,5 @@ def write(doc, name, page, tables):
     for key in ("right", "gaps"):
         filled[key] = "\n".join(f"| {place} | {what} | {short(residual(test))} |" for place, what, test in tables[key])
     path = folder / f"{name}.md"
-    path.write_text(page.format(digits=DIGITS, trials=TRIALS, **filled))
+    path.write_text(page.format(digits=DIGITS, trials=TRIALS, **filled), encoding="utf-8")
     print(path)

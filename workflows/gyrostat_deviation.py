@@ -155,7 +155,7 @@ def main():
         ),
         free="\n".join(f"| {name} | {distance:.0e} |" for name, distance in moved(first)),
     )
-    (folder / "gyrostat_deviation.md").write_text(page)
+    (folder / "gyrostat_deviation.md").write_text(page, encoding="utf-8")
     draw(kept, {name: off[name, 1e-6] for name in names}, folder / "gyrostat_deviation.png")
     print(folder / "gyrostat_deviation.md", folder / "gyrostat_deviation.png", sep="\n")
 

@@ -50,7 +50,7 @@ def draw(rows, folder):
     """The map of `josephson.toml` with the curve and its expansion."""
     import matplotlib.pyplot as plt
 
-    job = tomllib.loads((HERE / "josephson.toml").read_text()) | {"scene": str(HERE / "josephson.py")}
+    job = tomllib.loads((HERE / "josephson.toml").read_text(encoding="utf-8")) | {"scene": str(HERE / "josephson.py")}
     job["output"] |= {"figures": []}
     with TemporaryDirectory() as own:
         ds = survey.run(job, output=Path(own) / "josephson.nc").load()
@@ -85,7 +85,7 @@ def main():
     for a in DAMPINGS:
         rows.append((a, *homoclinic(a)))
         say(f"a = {a}: I = {0.5 * (rows[-1][1] + rows[-1][2]):.10f}, 4 a / pi = {4 * a / pi:.10f}")
-    (folder / "josephson_curve.md").write_text("\n".join(table(rows)) + "\n")
+    (folder / "josephson_curve.md").write_text("\n".join(table(rows)) + "\n", encoding="utf-8")
     draw(rows, folder)
 
 

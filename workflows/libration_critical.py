@@ -483,7 +483,7 @@ def main():
     folder = parser(__doc__, "the page and its table").parse_args().output
     text, values = page()
     written, listed = folder / "libration_critical_values.md", folder / "libration_critical_values.csv"
-    written.write_text(text)
+    written.write_text(text, encoding="utf-8")
     with listed.open("w", newline="") as file:
         out = csv.writer(file, lineterminator="\n")
         out.writerow(COLUMNS)

@@ -139,7 +139,7 @@ def main():
     roots = np.array([root for root, _k in low])
     say("at the resonances")
     on, beside = radii(roots, ORDERS[-1]), radii(roots * 1.001, ORDERS[-1])
-    (folder / "libration_effective_stability.md").write_text(page(mu, curves, at, low, on, beside))
+    (folder / "libration_effective_stability.md").write_text(page(mu, curves, at, low, on, beside), encoding="utf-8")
     draw(mu, curves, found, folder / "libration_effective_stability.png")
     print(*(folder / f"libration_effective_stability.{end}" for end in ("md", "png")), sep="\n")
 

@@ -172,7 +172,7 @@ def main():
         number=len(points), worst=upward(max(p.error for p in points)), mu=end[0], e=end[1],
         mu_error=upward(end_error[0]), e_error=upward(end_error[1]),
         rows="\n".join(row(e, points) for e in SHOWN if e in ROWS or e in STRIP),
-    ))  # fmt: skip
+    ), encoding="utf-8")  # fmt: skip
     draw(points, end, picture)
     print(page, listed, picture, sep="\n")
 

@@ -28,7 +28,7 @@ def main():
     rows = [check(given.points, rng) for check in CHECKS]
     path = given.output / "models.md"
     table = "\n".join("| " + " | ".join(row) + " |" for row in rows)
-    path.write_text(PAGE.format(points=given.points, rows=table))
+    path.write_text(PAGE.format(points=given.points, rows=table), encoding="utf-8")
     say(path)
 
 

@@ -370,7 +370,7 @@ def main():
         turned=f"{sum(int(ds.certified.sum()) for ds in turns):,}",
         contradicted=sum(int((ds.certified & ds.unstable).sum()) for ds in turns),
     )  # fmt: skip
-    (folder / "satellite_claims.md").write_text(page)
+    (folder / "satellite_claims.md").write_text(page, encoding="utf-8")
     draw(maps, turns, folder / "satellite_claims.png")
     print(folder / "satellite_claims.md", folder / "satellite_claims.png", sep="\n")
 

@@ -225,7 +225,7 @@ def main():
     page.write_text(PAGE.format(
         number=sum(map(len, found.values())), sections="".join(section(case, own) for case, own in found.items()),
         ratio=np.exp(-np.sqrt(3) * np.pi), limit=2 * np.pi * np.sqrt(2), deviation=upward(deviation(found)),
-    ))  # fmt: skip
+    ), encoding="utf-8")  # fmt: skip
     print(page, listed, sep="\n")
 
 

@@ -244,7 +244,7 @@ def mathieu(harness):
 def own(harness):
     """A row, a map and scattered points of one's own equation with two harmonics."""
     path = Path(harness.folder) / "two_harmonics.py"
-    path.write_text(OWN)
+    path.write_text(OWN, encoding="utf-8")
     c, s, y, v, z, u = hy.make_vars("c", "s", "y", "v", "z", "u")
     q = (PAR[0] - PAR[2]) + PAR[1] * c + 2.0 * PAR[2] * (c * c)
     equations = [(c, -2.0 * s), (s, 2.0 * c), (y, v), (v, -q * y), (z, u), (u, -q * z)]
@@ -282,7 +282,7 @@ def own(harness):
 def wave(harness):
     """Meissner's equation as one's own, against its closed form in NumPy."""
     path = Path(harness.folder) / "square_wave.py"
-    path.write_text(WAVE)
+    path.write_text(WAVE, encoding="utf-8")
     a, b = np.linspace(0.05, 8, 300), np.linspace(0, 4, 200)
     bs, as_ = (v.ravel() for v in np.meshgrid(b, a, indexing="ij"))
 

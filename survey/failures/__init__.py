@@ -57,8 +57,8 @@ def write(scene, directory, share=1.0, say=lambda line: None):
     records = [record(plane, method, found) for plane, of in zip(planes, results, strict=True) for method, found in of]
     paths = [directory / f"failures_{name}.{kind}" for kind in ("json", "md", "png")]
     written = {"rtol": RTOL, "planes": [_finite(asdict(r)) for r in records], "machine": provenance()}
-    paths[0].write_text(json.dumps(written, indent=1, allow_nan=False) + "\n")
-    paths[1].write_text(page.text(scene, name, about, planes, results, records, share))
+    paths[0].write_text(json.dumps(written, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    paths[1].write_text(page.text(scene, name, about, planes, results, records, share), encoding="utf-8")
     picture.draw(planes, results, paths[2])
     return paths
 

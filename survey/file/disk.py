@@ -27,9 +27,21 @@ def refused(path, what="writing"):
         raise Stopped(f"{path}: {what} failed ({reason}); fix this and run the command again") from None
 
 
-def check_folder(path):
-    """Raise BadInput, before anything is computed, where the folder of the output `path` does not exist."""
-    folder = Path(path).parent
+def check_folder(path, *endings):
+    """Raise BadInput, before anything is computed, where no file can be made at `path`.
+
+    Its folder must exist, and it may be no folder itself; if `endings` are given, it has one of them, so that the name
+    of a file of another kind, a survey's say, is not taken for that of this one.
+    """
+    path = Path(path)
+    folder = path.parent
+    if endings and path.suffix.lower() not in endings:
+        example = shown(path.stem + endings[0], 120)
+        raise BadInput(
+            f"{shown(str(path), 120)}: this file ends in {' or '.join(endings)}; name one, such as {example}"
+        )
+    if endings and path.is_dir():
+        raise BadInput(f"{shown(str(path), 120)} is a folder; name a file, with -o")
     if not folder.is_dir():
         raise BadInput(f"{shown(str(path), 120)}: there is no folder {shown(str(folder), 120)}; create it first, "
                        "or name another with -o")  # fmt: skip
@@ -61,6 +73,8 @@ def publish(part, path):
 
 def sync(folder):
     """Make durable what was created, renamed or removed in the folder."""
+    if not hasattr(os, "O_DIRECTORY"):  # Windows opens no folders
+        return
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(descriptor)

@@ -291,7 +291,7 @@ def _commit():
 
     def git(*arguments):
         return subprocess.run(
-            ["git", "-C", root, *arguments], capture_output=True, text=True, check=True
+            ["git", "-C", root, *arguments], capture_output=True, encoding="utf-8", check=True
         ).stdout.strip()
 
     try:
@@ -308,7 +308,7 @@ def _commit():
 def _cpu():
     """The processor's name."""
     try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
         return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
     except (OSError, StopIteration):
         return platform.processor() or platform.machine()

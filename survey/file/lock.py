@@ -1,11 +1,11 @@
 """The lock of an output, `OUT.nc.lock`: a file that names the run writing it, removed when the run ends.
 
-flock shows at once whether a process on this host holds it. Not every network file system shares flock between hosts,
-so a run on another host, which the file names, is active as long as the file's modification time advances.
+The system's lock (flock, LockFileEx) shows at once whether a process on this host holds it. Not every network file
+system shares it between hosts, so a run on another host, which the file names, is active as long as the file's
+modification time advances.
 """
 
 import contextlib
-import fcntl
 import json
 import logging
 import os
@@ -16,6 +16,7 @@ import time
 BEAT_SECONDS = 2.0  # interval at which the holder updates the file's modification time
 GONE_SECONDS = 10.0  # a holder on another host that has not updated it for so long has ended
 PEEK_SECONDS = 0.2  # more than `holder` takes, which locks the file briefly
+PEEKS = 5
 
 
 class Held(Exception):
@@ -45,7 +46,8 @@ class Lock:
             if before and not (known and before.get("host") == socket.gethostname()) and self._beats(before):
                 raise Held(before)
             content = json.dumps(self.name).encode()
-            os.pwrite(self.descriptor, content, 0)
+            os.lseek(self.descriptor, 0, os.SEEK_SET)
+            os.write(self.descriptor, content)
             os.ftruncate(self.descriptor, len(content))
         except BaseException as error:
             if isinstance(error, Held) or before:  # not ours to remove
@@ -76,16 +78,21 @@ class Lock:
         try:
             if self._is_file(descriptor):
                 os.unlink(self.path)  # while it is held, so that nobody else can hold a lock of that name
-        finally:
+        except PermissionError:  # Windows removes no file that is open: this one, or once another run has it
             os.close(descriptor)
+            descriptor = None
+            os.unlink(self.path)
+        finally:
+            if descriptor is not None:
+                os.close(descriptor)
 
     def _opened(self):
-        """(the open file, which no other process on this host has locked; is flock supported here?)"""
+        """(the open file, which no other process on this host has locked; are locks supported here?)"""
         deadline = time.monotonic() + PEEK_SECONDS
         while True:
-            descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+            descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
             try:
-                known = _flocked(descriptor, fcntl.LOCK_EX)
+                known = _locked(descriptor)
                 if self._is_file(descriptor):  # and its holder has not removed it meanwhile
                     return descriptor, known
             except BlockingIOError:
@@ -117,34 +124,38 @@ class Lock:
     def _beat(self):
         while not self.ended.wait(BEAT_SECONDS):
             with contextlib.suppress(OSError):
-                os.utime(self.descriptor)
+                os.utime(self.descriptor if os.utime in os.supports_fd else self.path)
 
 
 def holder(path):
     """What the lock at `path` says of the active run; None if there is none. A run can still acquire it."""
     try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+        descriptor = os.open(path, os.O_RDONLY)
     except OSError:
         return None
     try:
-        name = _name_in(descriptor)
-        if _flocked(descriptor, fcntl.LOCK_SH) and name.get("host") == socket.gethostname():
-            return None
-        return name if name and time.time() - os.fstat(descriptor).st_mtime < GONE_SECONDS else None
-    except BlockingIOError:
+        for _ in range(PEEKS):  # another process may be looking, too
+            name = _name_in(descriptor)
+            with contextlib.suppress(BlockingIOError):
+                if _locked(descriptor) and name.get("host") == socket.gethostname():
+                    return None
+                return name if name and time.time() - os.fstat(descriptor).st_mtime < GONE_SECONDS else None
+            time.sleep(PEEK_SECONDS / PEEKS)
         return name
     finally:
         os.close(descriptor)
 
 
-def _flocked(descriptor, how):
+def _locked(descriptor):
     """Lock the file; False where the file system has no locks. Raises BlockingIOError if another process holds it."""
+    import filelock  # Windows too; closing the file, or the end of its process, unlocks it
+
     try:
-        fcntl.flock(descriptor, how | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise
+        free = filelock.lock_descriptor(descriptor, blocking=False)
     except OSError:
         return False
+    if not free:
+        raise BlockingIOError
     return True
 
 
@@ -156,9 +167,10 @@ def _beat_of(path):
 
 
 def _name_in(descriptor):
-    """The mapping in the open file; {} if there is none."""
+    """The mapping in the open file; {} if there is none. Its first byte is what Windows locks, unreadable by others."""
     try:
-        name = json.loads(os.pread(descriptor, 2**16, 0))
+        os.lseek(descriptor, 1, os.SEEK_SET)
+        name = json.loads(b"{" + os.read(descriptor, 2**16))
     except ValueError:
         return {}
     return name if isinstance(name, dict) else {}

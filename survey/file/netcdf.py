@@ -21,7 +21,8 @@ class Sink:
     """A new file for HDF5 that never fails: `error` is the first OSError; later writes stay in memory."""
 
     def __init__(self, path):
-        self.descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o666)
+        flags = os.O_RDWR | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0)  # that one on Windows
+        self.descriptor = os.open(path, flags, 0o666)
         self.at, self.size, self.error, self.unwritten = 0, 0, None, []
 
     def seek(self, offset, whence=os.SEEK_SET):
@@ -82,13 +83,16 @@ class Sink:
 
     def _read(self, buffer):
         done = 0
-        while count := os.preadv(self.descriptor, [buffer[done:]], self.at + done):  # zeros beyond the end
-            done += count
+        os.lseek(self.descriptor, self.at, os.SEEK_SET)
+        while content := os.read(self.descriptor, len(buffer) - done):  # zeros beyond the end
+            buffer[done : done + len(content)] = content
+            done += len(content)
 
     def _write(self, content):
         done = 0
+        os.lseek(self.descriptor, self.at, os.SEEK_SET)
         while done < len(content):
-            done += os.pwrite(self.descriptor, content[done:], self.at + done)
+            done += os.write(self.descriptor, content[done:])
 
 
 class File:

@@ -44,7 +44,7 @@ class Panel:
 
 def model(workflow, path, proof=None):
     """Write the model of a checked workflow to `path`; returns the number of bytes. Raises BadInput."""
-    check_folder(path)
+    check_folder(path, ".model")
     content = packed(workflow, proof)
     write_atomically(Path(path), content)
     return len(content)
@@ -69,7 +69,9 @@ def _axes(workflow):
     values = {name: np.asarray(own) for name, (_, own) in workflow.grid.parameters.items()}
     axes = [used[name] for name, own in values.items() if own.size > 1]
     if len(axes) != 2:
-        raise BadInput(f"model: the workflow has {len(axes)} axes; a model needs two, the others single numbers")
+        raise BadInput(
+            f"model: {len(axes)} of the workflow's parameters vary; a model needs two, the others single numbers"
+        )
     return axes, {name: float(own.reshape(-1)[0]) for name, own in values.items() if own.size == 1}
 
 

@@ -154,7 +154,9 @@ class Model:
         for name, values, low, high in zip(self.names, (x, y), self.low, self.high, strict=True):
             if values.size and not (low <= values.min() and values.max() <= high):
                 wrong = values[~((values >= low) & (values <= high))].flat[0]
-                raise OutOfDomain(f"{name} = {wrong:.17g}: the model is known for {low:.17g} <= {name} <= {high:.17g}")
+                raise OutOfDomain(
+                    f"{name} = {float(wrong)!r}: the model is known for {float(low)!r} <= {name} <= {float(high)!r}"
+                )
 
     def _prepared(self, variables, gradient, shape):
         """(the names that are wanted, empty outputs)."""

@@ -34,6 +34,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+import psutil
 
 from survey import modules, scenes
 from survey.errors import BadInput
@@ -95,9 +96,11 @@ def write(scene, directory, peers=False, say=lambda line: None):
     paths = [directory / f"precision_{name}.{kind}" for kind in ("json", "csv", "png")]
     machine = provenance() | {"system": platform.platform(), "threads": 1} | limit(scene, case)
     machine["missing_peers"] = missing(peers)
-    machine |= {"load": os.getloadavg(), "entry": "scene.solve", "outputs": outputs(case), "works": described(case)}
+    machine |= {"load": psutil.getloadavg(), "entry": "scene.solve", "outputs": outputs(case), "works": described(case)}
     machine["peers"] = {peer: version(peer) for peer in sorted({r.peer for r in records} - {""})}
-    paths[0].write_text(json.dumps({"records": [asdict(r) for r in records], "machine": machine}, indent=1) + "\n")
+    paths[0].write_text(
+        json.dumps({"records": [asdict(r) for r in records], "machine": machine}, indent=1) + "\n", encoding="utf-8"
+    )
     with open(paths[1], "w", newline="") as file:
         table = csv.DictWriter(file, list(asdict(records[0])))
         table.writeheader()

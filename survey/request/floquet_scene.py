@@ -1,7 +1,7 @@
 """The scene of a user's A(t, p), or M, C, K: what a module of `survey.scenes` offers, as an object."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -31,6 +31,7 @@ class FloquetScene(TracedScene):
     states: tuple[str, ...]
     structure: str
     conserved: tuple[float, ...] | Callable | None
+    _known: dict[str, float] = field(default_factory=dict, repr=False)  # by the last check, for the cost
     FAMILY = "floquet"
     AUDIT = ("dop853",)
     OPTIONS = ()
@@ -65,13 +66,16 @@ class FloquetScene(TracedScene):
         }
 
     def cost(self, options, sizes):
-        """Seconds per point, roughly."""
+        """Seconds per point, roughly: measured on the examples in `workflows`."""
         n = len(self.states)
-        alone = 1.5e-5 + 1e-6 * n**2 + 1e-7 * n**3
+        further = max(self._known.get("series", 2.0) - 2.0, 0.0)  # besides 1 and a function of time
+        alone = 2e-5 + further * (6e-6 + 9e-7 * self._known.get("steps", 6.0)) + 1e-6 * n**2 + 1e-7 * n**3
         longest = sorted(sizes.values())[-2:]
         if np.prod(longest) < 4 * NODES or n > dense.LARGEST:
             return alone
-        return 1e-7 * n + (0.05 + NODES / np.prod(longest)) * alone  # by series, one point in twenty on its own
+        # what series do not answer: by more multipliers inside the circle the radius is lost sooner than by pairs on it
+        left = 0.05 if self.structure != "none" else min(0.05 + 0.1 * (n - 1), 1.0)
+        return 1e-7 * n + (left + NODES / np.prod(longest)) * alone
 
     def solve(self, point, request):
         """The requested outputs of a block (see `survey.scenes`)."""
@@ -152,7 +156,9 @@ class FloquetScene(TracedScene):
                 self._compare(programs, given[i], period[i], edges[i])
         if self.conserved is not None:
             self._check_conserved(given[known])
-        spikes = self._called(lambda: probing.spikes(monodromy.Points(system, given)))
+        known = self._called(monodromy.Points, system, given)
+        self._known.update(_effort(known))
+        spikes = self._called(probing.spikes, known)
         for i in np.flatnonzero(np.isfinite(spikes)):
             self._refuse(
                 f"A has a spike near t = {spikes[i]:.6g} at {self._where(given[i])}, too narrow to be seen in a run",
@@ -267,3 +273,14 @@ class FloquetScene(TracedScene):
             m = self._size_of(name)
             sizes = f"PARAMETERS names {len(self.own)} and out is {m} x {m}"
             self._tried(function, f"{name}(t, p, out)", (0.25, point), (m, m), sizes, f"{m} x {m}")
+
+
+def _effort(points):
+    """{"series": functions of time in A, "steps": in a period}: the means over some Points, by which a point's cost
+    goes."""
+    reach, valid = monodromy.method_of("auto").floquet_reach(1e-10), np.flatnonzero(points.valid)
+    if not valid.size:
+        return {}
+    steps = points.steps(reach, np.ones(valid.size), valid).sum(axis=1).mean()
+    series = [len(program.used) for _own, programs, _numbers in points.groups for program in programs]
+    return {"series": float(np.mean(series)), "steps": float(steps)}

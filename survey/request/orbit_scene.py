@@ -75,9 +75,19 @@ class OrbitScene(TracedScene):
             notes["continuation"] = f"{self.own[index].name} from {low:g} to {high:g}"
         return notes
 
+    @property
+    def curves_seconds(self):
+        """Seconds that the curves of a map take, roughly: some thousands of orbits."""
+        return 6e3 * self._one
+
+    @property
+    def _one(self):
+        """Seconds of an orbit."""
+        return 5e-4 + 1e-4 * len(self.states) ** 2
+
     def cost(self, options, sizes):
         """Seconds per point, roughly: one set of curves serves its row, one set of orbits all branches."""
-        one = 5e-4 + 1e-4 * len(self.states) ** 2
+        one = self._one
         if self.continued is None:
             return one
         return (one + 100 * one / sizes[self.own[self.continued.index].name]) / sizes["branch"]

@@ -1,12 +1,15 @@
 """Where a workflow's netCDF file goes: can it be written there?"""
 
+import errno
 import os
+import tempfile
 from pathlib import Path
 
 from survey.errors import BadInput, Stopped
 from survey.wording import reason_of, shown
 
 LONGEST_SUFFIX = 40  # bytes that the names of files beside the output are longer by
+LONGEST_NAME = 255  # where the system does not say
 
 
 def check_path(path):
@@ -34,16 +37,26 @@ def _checked(path):
         raise BadInput(f"{key} is a folder; name a file, such as {shown(str(path / 'map.nc'), 120)}")
     if not folder.is_dir():
         raise BadInput(f"{key}: there is no folder {where}; create it first, or use -o OUT.nc")
-    if os.statvfs(folder).f_flag & os.ST_RDONLY:
+    longest = os.pathconf(folder, "PC_NAME_MAX") if hasattr(os, "pathconf") else LONGEST_NAME
+    if len(os.fsencode(path.name)) > longest - LONGEST_SUFFIX:
+        raise BadInput(f"{key}: this name is too long for the files beside it; shorten it")
+    if os.access(folder, os.W_OK | os.X_OK) and not str(folder.resolve()).startswith(("/proc", "/sys")):
+        return path
+    if _is_read_only(folder):
         raise Stopped(
             f"{key}: the disk of the folder {where} is read-only; make it writable and "
             "run the command again, or use -o OUT.nc"
         )
-    if len(os.fsencode(path.name)) > os.pathconf(folder, "PC_NAME_MAX") - LONGEST_SUFFIX:
-        raise BadInput(f"{key}: this name is too long for the files beside it; shorten it")
-    if not os.access(folder, os.W_OK | os.X_OK) or str(folder.resolve()).startswith(("/proc", "/sys")):
-        raise BadInput(f"{key}: the folder {where} cannot be written to; use -o OUT.nc")
-    return path
+    raise BadInput(f"{key}: the folder {where} cannot be written to; use -o OUT.nc")
+
+
+def _is_read_only(folder):
+    """Is it the disk that takes no file, whoever asks?"""
+    try:
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError as error:
+        return error.errno == errno.EROFS
+    return False
 
 
 def _is_netcdf(path):

@@ -37,7 +37,7 @@ def keep(digest: str) -> None:
     with suppress(OSError):
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         if _is_private(folder, stat.S_ISDIR):
-            os.close(os.open(folder / digest, os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW, 0o600))
+            os.close(os.open(folder / digest, os.O_WRONLY | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600))
 
 
 def _folder() -> Path | None:
@@ -52,9 +52,14 @@ def _is_kept(digest: str) -> bool:
 
 
 def _is_private(path: Path, kind) -> bool:  # type: ignore[no-untyped-def]
-    """Is it of this kind, not a link, owned by this user, and writable by nobody else?"""
+    """Is it of this kind, not a link, owned by this user, and writable by nobody else?
+
+    Windows has no owners and modes to look at: there, only this user can write to the user's own folders.
+    """
     try:
         found = path.lstat()
     except OSError:
         return False
+    if not hasattr(os, "geteuid"):
+        return kind(found.st_mode)  # type: ignore[no-any-return]
     return kind(found.st_mode) and found.st_uid == os.geteuid() and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)

@@ -231,7 +231,7 @@ OUTPUTS = (
 def cost(options, sizes):
     """Seconds per point, rough: one solution serves its dense outputs, one set of cycles all fates of a system."""
     if options["question"] == "portrait":
-        return 2e-2
+        return 9e-3
     if "separatrix" in options and options["question"] == "fate":
         return 5e-3
     if "separatrix" in options:  # in double-double arithmetic, but where b = 0

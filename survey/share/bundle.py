@@ -29,6 +29,7 @@ KINDS = {
     ".cert": "application/json",
 }  # fmt: skip
 PACKAGES = {"survey": "stability-survey", "numba": "numba", "llvmlite": "llvmlite", "numpy": "numpy"}
+OTHERS = {".7z", ".bz2", ".gz", ".html", ".json", ".nc", ".pdf", ".png", ".rar", ".tar", ".tgz", ".toml", ".xz"}
 FILES, RATIO, SPARE = 1000, 1032, 2**20  # of a bundle; the largest compression ratio of deflate
 MOST = 2**26  # characters of the description
 
@@ -42,6 +43,11 @@ def write(path, output, author="", license_url=""):
     if output.exists():
         raise BadInput(f"{output}: it exists; name another folder or .zip file with -o")
     check_folder(output)
+    if output.suffix.lower() in OTHERS:
+        raise BadInput(f"{output}: a bundle is a .zip file or a folder; name one, such as {output.with_suffix('.zip')}")
+    if license_url and "://" not in license_url:
+        raise BadInput(f"--license {license_url!r}: give the address of the licence, such as "
+                       "https://creativecommons.org/licenses/by/4.0/")  # fmt: skip
     ds = reading.load(path)
     with refused(output), tempfile.TemporaryDirectory(prefix=".bundle-", dir=output.parent) as made:
         folder = Path(made) / output.stem
@@ -63,7 +69,7 @@ def _fill(folder, path, ds):
     shutil.copyfile(path, folder / path.name)
     with open(path, "rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
-    digest_of(folder / path.name).write_text(f"{digest}  {path.name}\n")
+    digest_of(folder / path.name).write_text(f"{digest}  {path.name}\n", encoding="utf-8")
     text = str(ds.attrs.get("workflow", ""))
     if ds.attrs.get("scene_text"):
         text = _with_scene(folder, text, ds)

@@ -61,7 +61,7 @@ HINT = (
 
 def write(ds, path, at=None):
     """Write the page of a survey to `path`; returns {"bytes", "series": does it hold series?, "why": else why not}."""
-    check_folder(path)
+    check_folder(path, ".html", ".htm")
     ds = point.plane(ds, at or {})
     content, why = made(ds)
     write_atomically(Path(path), content.encode())

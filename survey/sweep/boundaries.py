@@ -79,7 +79,8 @@ def plan(workflow, cost):
         sizes = workflow.grid.sizes
         seconds = measure.seconds(list(sizes)) if hasattr(measure, "seconds") else 0.1  # measured, per map
         if hasattr(measure, "searched") and not hasattr(measure, "seconds"):
-            seconds = 1e5 * cost  # measured: some ten points solved for each point of a curve, and a lattice
+            # measured: some ten points solved for each point of a curve, and a lattice
+            seconds = getattr(workflow.scene, "curves_seconds", 1e5 * cost)
         size = 8 * (1 + len(sizes) + 2 * len(measure.ALONG))
         return {"bytes_per_curve_point": size}, seconds * prod(list(sizes.values())[2:])
     sizes = [size for dim, size in workflow.grid.sizes.items() if dim != workflow.boundaries and size > 1]

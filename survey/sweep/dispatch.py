@@ -27,6 +27,7 @@ DEATHS = 3
 # and at least this many seconds; during its first block it may compile, which takes up to a minute on an idle machine.
 PATIENCE, PATIENCE_SECONDS, COMPILE_SECONDS = 20, 300.0, 300.0
 LEAVE_SECONDS = 10.0  # that idle worker processes get to end
+MASKS = hasattr(signal, "pthread_sigmask")  # not on Windows, where a worker hears of Ctrl-C until it ignores it
 
 
 def cpus():
@@ -159,7 +160,8 @@ def _kill(starter):
 @contextlib.contextmanager
 def _pool(workers):
     """Worker processes; an error or an interruption kills them, whatever they are doing."""
-    resource_tracker.ensure_running()  # otherwise the first worker's start would, and unblock the signal
+    if MASKS:
+        resource_tracker.ensure_running()  # otherwise the first worker's start would, and unblock the signal
     leave = threading.Timer(LEAVE_SECONDS, _kill, [threading.get_ident()])  # a frozen one does not end by itself
     leave.daemon = True
     try:
@@ -180,6 +182,9 @@ class _Worker(multiprocessing.context.SpawnProcess):
     def start(self):
         self.starter = threading.get_ident()
         with _deferred(signal.SIGINT, signal.SIGTERM):
+            if not MASKS:
+                super().start()
+                return
             before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # the process inherits it
             try:
                 super().start()
@@ -209,7 +214,9 @@ class _Spawning(multiprocessing.context.SpawnContext):
 
 
 def _serve():
-    """End this worker process when its parent has ended."""
+    """Ignore Ctrl-C, and end this worker process when its parent has ended."""
+    if not MASKS:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_follow, args=(multiprocessing.parent_process(),), daemon=True).start()
 
 

@@ -54,6 +54,12 @@ def factor(workflow, part, estimated):
     return 1.0
 
 
+def knows(workflow):
+    """Has the scene run here before?"""
+    about = _about(workflow)
+    return any(one.get("scene") == about["scene"] and any(part in one for part in PARTS) for one in _records())
+
+
 def compiling(workflow):
     """(seconds of compiling at the last run like this one that had to, or None; is what this run needs compiled?)"""
     about = _about(workflow)

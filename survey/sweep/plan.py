@@ -12,8 +12,10 @@ from survey.sweep.cost import blocks_of, bytes_per_point, lone_cost, seconds_per
 from survey.sweep.dispatch import cpus
 from survey.wording import counted
 
-START, PICTURE = 1.0, 0.8  # seconds of a process's start, and of drawing a picture
+START, PICTURE = 1.2, 1.0  # seconds of a process's start, and of drawing a picture
 WRITTEN = 5e7  # bytes a second
+LEARNT = "runs on this machine"
+GUESSED = "a usual machine; the next plan knows what this run took"
 
 
 def estimates(workflow):
@@ -52,6 +54,7 @@ def plan(workflow):
         "threads": cpus(),
         "estimated_seconds": float(f"{total:.2g}"),
         "time": lasting(total),
+        "time_from": LEARNT if measured.knows(workflow) else GUESSED,
         "compiling": _compiling(workflow),
     }
 

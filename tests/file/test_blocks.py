@@ -252,7 +252,7 @@ def test_every_flipped_bit_and_every_cut_of_a_block_is_found():
     [
         (os, "fsync", OSError(28, "No space left on device")),
         (netcdf.File, "write", OSError("HDF5: an error of its own")),
-        (os, "pwrite", OSError(5, "Input/output error")),
+        (os, "write", OSError(5, "Input/output error")),
     ],
 )
 def test_a_disk_that_refuses_leaves_the_old_file(copy, small, monkeypatch, where, name, error):

@@ -6,7 +6,9 @@ import os
 import socket
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
+import filelock
 import pytest
 
 from survey.file import lock
@@ -53,6 +55,30 @@ def test_a_lock_whose_holder_is_gone_says_whose_it_was_and_is_taken(path):
     assert not path.exists()
 
 
+def test_whose_a_lock_is_can_be_read_where_its_first_byte_cannot(path, monkeypatch):
+    """Windows lets nobody else read what is locked: the byte at 0."""
+    held, read = lock.Lock(path, HERE), os.read
+    held.acquire()
+
+    def refused(descriptor, count):
+        if os.lseek(descriptor, 0, os.SEEK_CUR) == 0:
+            raise PermissionError(13, "Permission denied")
+        return read(descriptor, count)
+
+    monkeypatch.setattr(os, "read", refused)
+    assert lock.holder(path) == HERE
+    with pytest.raises(lock.Held, match=f"pid {HERE['pid']}"):
+        lock.Lock(path, HERE | {"run": "other"}).acquire()
+    held.release()
+
+
+def test_many_may_look_at_a_lock_that_is_gone_at_once(path):
+    """Each looks by locking it for a moment: none takes another for a run that is active."""
+    path.write_text(json.dumps(HERE))
+    with ThreadPoolExecutor(8) as pool:
+        assert set(pool.map(lock.holder, [path] * 200)) == {None}
+
+
 @pytest.mark.parametrize("content", [b"", b'{"host": "a', b"[1, 2]", b"\xff\xfe", b"null"])
 def test_a_torn_lock_is_taken(path, content):
     path.write_bytes(content)
@@ -86,10 +112,10 @@ def test_a_run_of_another_host_is_seen_by_its_beats_though_flock_says_nothing(pa
 
 
 def test_without_flock_the_beats_alone_tell(path, quick, monkeypatch):
-    def unknown(*_):
+    def unknown(*_, **__):
         raise OSError(38, "Function not implemented")
 
-    monkeypatch.setattr(lock.fcntl, "flock", unknown)
+    monkeypatch.setattr(filelock, "lock_descriptor", unknown)
     held = lock.Lock(path, HERE)
     held.acquire()
     with pytest.raises(lock.Held):
@@ -114,7 +140,7 @@ def test_a_lock_that_cannot_be_written_leaves_no_file(path, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(os, "pwrite", full)
+    monkeypatch.setattr(os, "write", full)
     with pytest.raises(OSError, match="No space"):
         lock.Lock(path, HERE).acquire()
     assert not path.exists()

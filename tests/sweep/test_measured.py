@@ -1,14 +1,20 @@
 """What `survey plan` learns from runs on this machine."""
 
 import json
+import time
 from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
+import xarray as xr
 
+import survey
 from survey.kernels import jit
 from survey.request import workflow
 from survey.sweep import announce, engine, measured, plan
 
+ROOT = Path(__file__).parents[2]
 TABLE = {
     "scene": "satellite",
     "axes": {"k": {"start": 0.0, "stop": 0.9, "num": 200}, "rho": {"start": 0.6, "stop": 4.0, "num": 300}},
@@ -39,6 +45,12 @@ def test_the_next_plan_is_what_the_last_run_took(mapped, slower):
     expected = larger["kernels"] * took / usual["kernels"]
     found = plan.plan(mapped_larger)["estimated_seconds"]
     assert found - before == pytest.approx(expected - larger["kernels"], rel=0.06)
+
+
+def test_a_plan_says_what_it_knows_the_time_from(mapped):
+    assert plan.plan(mapped)["time_from"] == plan.GUESSED
+    measured.note(mapped, {"kernels": 1.0}, {"kernels": 2.0}, 0.0)
+    assert plan.plan(mapped)["time_from"] == plan.LEARNT
 
 
 def test_compiling_is_told_apart(mapped):
@@ -86,3 +98,26 @@ def test_a_cache_that_cannot_be_written_is_no_error(mapped, monkeypatch, tmp_pat
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     measured.note(mapped, {"kernels": 1.0}, {"kernels": 2.0}, 0.0)
     assert measured._records() == [] and replace(mapped) == mapped
+
+
+@pytest.mark.parametrize(
+    "name", ["coupled_mathieu", "ion_trap", "kapitza", pytest.param("ground_resonance", marks=pytest.mark.slow)]
+)
+def test_what_a_point_of_an_own_system_costs_is_known_before_it_is_solved(name):
+    """Two states or twelve, two functions of time or 135: within a factor of 3 of the processor's time."""
+    checked = workflow.read(ROOT / f"workflows/{name}.toml", output="never.nc")
+    scene, grid = checked.scene, checked.grid
+    random = np.random.default_rng(1)
+    many = 1000 if len(scene.states) < 8 else 40
+    some = {key: random.choice(np.ravel(own), many) for key, (_, own) in grid.parameters.items()}
+
+    def spent(number):
+        points = {key: xr.DataArray(own[:number], dims="sample") for key, own in some.items()}
+        began = time.process_time()
+        survey.evaluate(scene, **points)
+        return time.process_time() - began
+
+    spent(many)  # compiles
+    most, half = (min(spent(number) for _ in range(3)) for number in (many, many // 2))
+    taken, expected = (most - half) / (many / 2), scene.cost({}, dict.fromkeys(some, 1))
+    assert expected / 3 < taken < 3 * expected, (taken, expected)

@@ -96,15 +96,15 @@ def run(points, scenes, seed, output, workers, minutes, fresh):
         shutil.rmtree(kept)
     kept.mkdir(parents=True, exist_ok=True)
     manifest = kept / "attack.json"
-    if manifest.exists() and json.loads(manifest.read_text()) != identity:
+    if manifest.exists() and json.loads(manifest.read_text(encoding="utf-8")) != identity:
         console.print(f"attack: {kept} holds another attack (points, scenes, seed or sources differ); "
                       "give --fresh to start again, or another -o", style="red", soft_wrap=True)  # fmt: skip
         return 2
-    manifest.write_text(json.dumps(identity))
+    manifest.write_text(json.dumps(identity), encoding="utf-8")
     chunks = plan(points, scenes)
     left = [c for c in chunks if not _path(kept, c).exists()]
     _work(left, seed, kept, workers, minutes, console, len(chunks) - len(left), len(chunks))
-    found = [json.loads(_path(kept, c).read_text()) for c in chunks if _path(kept, c).exists()]
+    found = [json.loads(_path(kept, c).read_text(encoding="utf-8")) for c in chunks if _path(kept, c).exists()]
     if not found:
         return 4
     count = write(output, found, identity, len(found) == len(chunks))
@@ -138,7 +138,7 @@ def _work(left, seed, kept, workers, minutes, console, done, number):
             for future in ready:
                 chunk = waiting.pop(future)
                 path = _path(kept, chunk)
-                path.with_suffix(".part").write_text(json.dumps(future.result(), default=str))
+                path.with_suffix(".part").write_text(json.dumps(future.result(), default=str), encoding="utf-8")
                 os.replace(path.with_suffix(".part"), path)
                 done += 1
                 progress(done, number, reused, "chunks")
@@ -192,7 +192,7 @@ def write(output, found, identity, complete):
         shown = [f"  {line}" for line in fault["line"].splitlines()]
         page += [f"- {words} (chunk {fault['chunk']})", "", "  ```text", *shown, "  ```"]
     output.parent.mkdir(parents=True, exist_ok=True)
-    output.write_text("\n".join(page) + "\n")
+    output.write_text("\n".join(page) + "\n", encoding="utf-8")
     return count
 
 

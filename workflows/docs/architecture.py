@@ -40,7 +40,7 @@ LETTERS = 32  # in a line of a box
 
 def rules():
     """What `pyproject.toml` says to import-linter: {name of the rule: rule}."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     return {rule["name"]: rule for rule in project["tool"]["importlinter"]["contracts"]}
 
 
@@ -97,7 +97,7 @@ def check(imports):
 def meaning(package):
     """The first sentence of its docstring, without its name and what is in brackets."""
     path = ROOT / "survey" / package
-    text = (path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text()
+    text = (path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text(encoding="utf-8")
     line = ast.get_docstring(ast.parse(text)).partition("\n")[0]
     line = re.sub(r" \([^)]*\)", "", line.removeprefix(f"The {package}: "))
     words = re.split(r"\.(?: |$)|; ", line)[0]

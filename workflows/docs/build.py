@@ -37,14 +37,14 @@ def assemble(source):
     architecture.draw(imports, source / "imports.svg")
     made = scene_pages.pages() | {"figures.md": figures.page(), "peers.md": comparisons.page()}
     made["architecture.md"] = architecture.page(imports)
-    made["changelog.md"] = (ROOT / ".github/CHANGELOG.md").read_text()
-    made["contributing.md"] = (ROOT / ".github/CONTRIBUTING.md").read_text()
+    made["changelog.md"] = (ROOT / ".github/CHANGELOG.md").read_text(encoding="utf-8")
+    made["contributing.md"] = (ROOT / ".github/CONTRIBUTING.md").read_text(encoding="utf-8")
     made["notebooks/index.md"] = _notebooks(source / "notebooks")
-    made["index.md"] = (source / "index.md").read_text()
+    made["index.md"] = (source / "index.md").read_text(encoding="utf-8")
     live = live_maps.pages(source / "static/maps")
     for name, text in made.items():
         (source / name).parent.mkdir(exist_ok=True)
-        (source / name).write_text(live_maps.replaced(text, name, live))
+        (source / name).write_text(live_maps.replaced(text, name, live), encoding="utf-8")
 
 
 def _notebooks(folder):
@@ -56,7 +56,9 @@ def _notebooks(folder):
 def check(folder):
     """Every executed notebook ends with the figure that answers its question."""
     for path in sorted(folder.glob("*.ipynb")):
-        *_, last = (cell for cell in json.loads(path.read_text())["cells"] if cell["cell_type"] == "code")
+        *_, last = (
+            cell for cell in json.loads(path.read_text(encoding="utf-8"))["cells"] if cell["cell_type"] == "code"
+        )
         if not any("image/png" in output.get("data", {}) for output in last["outputs"]):
             sys.exit(f"{path}: its last cell shows no figure")
 

@@ -24,7 +24,7 @@ def page():
     parts = [INTRODUCTION]
     for path in sorted(RESULTS.glob("precision_*.json")):
         scene = path.stem.removeprefix("precision_")
-        measured = json.loads(path.read_text())
+        measured = json.loads(path.read_text(encoding="utf-8"))
         parts += [
             f"## {scene}",
             _machine(measured["machine"]),

@@ -17,12 +17,12 @@ those of the notebooks are made by the notebooks.
 
 def commands():
     """The commands that made the results, in order."""
-    return re.findall(r"^(?:survey|python) .+$", (RESULTS / "README.md").read_text(), re.MULTILINE)
+    return re.findall(r"^(?:survey|python) .+$", (RESULTS / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
 
 
 def shown():
     """{file: what it shows}, as the table of the results says; a name may stand for several files."""
-    rows = re.findall(r"^\| (`[^|]*`) \| (.*) \|$", (RESULTS / "README.md").read_text(), re.MULTILINE)
+    rows = re.findall(r"^\| (`[^|]*`) \| (.*) \|$", (RESULTS / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
     return {name: words for names, words in rows for name in re.findall(r"`([^`]*)`", names)}
 
 
@@ -56,7 +56,7 @@ def _fit(command, figure):
         names = []
     else:  # {...} in a name may be anything; a script may be a folder
         script = ROOT / words[1]
-        texts = [path.read_text() for path in (script.glob("*.py") if script.is_dir() else [script])]
+        texts = [path.read_text(encoding="utf-8") for path in (script.glob("*.py") if script.is_dir() else [script])]
         names = re.findall(r'"((?:\w|\{\w+\})+\.(?:png|\{\w+\}))"', "\n".join(texts))
     fixed = [re.sub(r"\{\w+\}", "", name) for name in names]
     patterns = [re.sub(r"\\\{\w+\\\}", r"\\w+", re.escape(name)) for name in names]
@@ -65,7 +65,7 @@ def _fit(command, figure):
 
 def _of_workflow(path, ending=""):
     """The figures that a workflow draws beside its output: OUT.png, and OUT_NAME.png from the second on."""
-    output = tomllib.loads(path.read_text())["output"]
+    output = tomllib.loads(path.read_text(encoding="utf-8"))["output"]
     stem = Path(output["path"]).stem + ending
     return [f"{stem}.png" if i == 0 else f"{stem}_{name}.png" for i, name in enumerate(output.get("figures", []))]
 

@@ -42,7 +42,7 @@ def _page(name):
 def _explanation(name):
     """NAME.md, without its title, as it stands beside the scene; "" if there is none."""
     path = ROOT / f"survey/scenes/{name}.md"
-    text = path.read_text().partition("\n")[2].strip() if path.exists() else ""
+    text = path.read_text(encoding="utf-8").partition("\n")[2].strip() if path.exists() else ""
     return text.replace("](../../results/", "](../results/").replace("](../../workflows/docs/", "](../")
 
 
@@ -68,7 +68,7 @@ def _results(name, names):
 
 
 def _title(path):
-    return path.read_text().splitlines()[0].removeprefix("# ")
+    return path.read_text(encoding="utf-8").splitlines()[0].removeprefix("# ")
 
 
 def escaped(text):

@@ -25,7 +25,7 @@ _WORKS = {
 
 def states(family):
     """[(distance, parameters, {output: exact value}, {output: floor})] of a family (error below 1e-35)."""
-    data = json.loads(resources.files("survey.reference").joinpath("brun_distances.json").read_text())
+    data = json.loads(resources.files("survey.reference").joinpath("brun_distances.json").read_text(encoding="utf-8"))
     return [
         (
             row["distance"],
@@ -44,7 +44,7 @@ def references(work):
     if family:
         rows = [row for row in states(family) if least < 1.1 * row[0] < 0.2]
         return [(point, {}, {ERROR: float(exact[ERROR])}, 1) for _, point, exact, _ in rows]
-    data = json.loads(resources.files("survey.reference").joinpath("brun.json").read_text())
+    data = json.loads(resources.files("survey.reference").joinpath("brun.json").read_text(encoding="utf-8"))
     cases = []
     for case in data["cases"]:
         point = {key: float.fromhex(value) for key, value in case["inputs_hex"].items()}

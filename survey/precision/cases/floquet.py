@@ -38,7 +38,7 @@ SCENE = floquet(K=_stiffness, C=_damping, period=_period, parameters=("W", "e"),
 @cache
 def references(_work=None):
     """The reference points, the same for every work (error below 1e-28)."""
-    data = json.loads(resources.files("survey.reference").joinpath("floquet_map.json").read_text())
+    data = json.loads(resources.files("survey.reference").joinpath("floquet_map.json").read_text(encoding="utf-8"))
     return [
         ({"W": row["W"], "e": row["e"]}, {}, {ERROR: float(row["spectral_radius"])}, row["stable"])
         for row in data["points"]

@@ -25,7 +25,9 @@ _CASES = {"trajectory": "trajectories", "b = 0": "still", "g = 0": "free", "(61)
 @cache
 def references(work):
     """The reference cases of the work's kind (error of the JSON's own values below 1e-29)."""
-    data = json.loads(resources.files("survey.reference").joinpath("gyrostat_trajectories.json").read_text())
+    data = json.loads(
+        resources.files("survey.reference").joinpath("gyrostat_trajectories.json").read_text(encoding="utf-8")
+    )
     cases = []
     for row in data[_CASES[work]]:
         numbers = map(float.fromhex, (*row["p_hex"], row["phi0_hex"], row["w0_hex"]))

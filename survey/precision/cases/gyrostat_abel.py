@@ -27,7 +27,7 @@ _CASES = {"one turn": "turn", "121 angles of a turn": "angles", "0.9999 of the w
 @cache
 def references(work):
     """The reference cases of the work's kind (error of the JSON's own values below 1e-29)."""
-    data = json.loads(resources.files("survey.reference").joinpath("gyrostat_abel.json").read_text())
+    data = json.loads(resources.files("survey.reference").joinpath("gyrostat_abel.json").read_text(encoding="utf-8"))
     cases = []
     for row in data[_CASES[work]]:
         numbers = map(float.fromhex, (*row["p_hex"], row["phi0_hex"], row["w0_hex"], row["phi_hex"]))

@@ -27,7 +27,7 @@ _CASES = {"one system, 60x40 states": "random", "scattered": "random", "beside s
 
 @cache
 def _group(name):
-    data = json.loads(resources.files("survey.reference").joinpath("gyrostat_fates.json").read_text())
+    data = json.loads(resources.files("survey.reference").joinpath("gyrostat_fates.json").read_text(encoding="utf-8"))
     cases = []
     for row in data[name]:
         numbers = map(float.fromhex, (*row["p_hex"], row["phi0_hex"], row["w0_hex"]))

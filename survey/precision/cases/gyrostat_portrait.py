@@ -26,7 +26,7 @@ _POINTS = 100
 @cache
 def references(_work=None):
     """Systems whose first cycle is a rotation."""
-    data = json.loads(resources.files("survey.reference").joinpath("gyrostat_cycles.json").read_text())
+    data = json.loads(resources.files("survey.reference").joinpath("gyrostat_cycles.json").read_text(encoding="utf-8"))
     cases = []
     for row in data["cycles"]:
         point = dict(zip(_NAMES, map(float.fromhex, row["p_hex"]), strict=True))

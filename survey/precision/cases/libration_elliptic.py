@@ -22,7 +22,9 @@ MOST = {"dop853": 200, "rk4": 300}
 @cache
 def references(_work=None):
     """The reference points in the range of the works, the same for every work (error below 1e-31)."""
-    data = json.loads(resources.files("survey.reference").joinpath("libration_elliptic.json").read_text())
+    data = json.loads(
+        resources.files("survey.reference").joinpath("libration_elliptic.json").read_text(encoding="utf-8")
+    )
     return [
         ({"mu": row["mu"], "e": row["e"]}, {}, {ERROR: float(row["b"])}, row["stable"])
         for row in data["points"]

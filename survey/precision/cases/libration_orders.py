@@ -18,7 +18,9 @@ _NUMBER = 256
 @cache
 def references(work):
     """Coefficients of 24 digits at a few mu (`survey/reference/libration_order_8.json`)."""
-    data = json.loads(resources.files("survey.reference").joinpath("libration_order_8.json").read_text())
+    data = json.loads(
+        resources.files("survey.reference").joinpath("libration_order_8.json").read_text(encoding="utf-8")
+    )
     return [
         ({"mu": row["mu"]}, {"order": work.split()[1]}, {ERROR: np.array([float(row["c8"][k]) for k in LABELS])}, None)
         for row in data["points"]

@@ -22,7 +22,7 @@ _FAMILIES = {"PL": "prolate", "PR": "prolate", "OL": "oblate", "OR": "oblate"}
 @cache
 def references(_work=None):
     """The reference cases, the same for every work (error of the JSON's own values below 1e-38)."""
-    data = json.loads(resources.files("survey.reference").joinpath("satellite.json").read_text())
+    data = json.loads(resources.files("survey.reference").joinpath("satellite.json").read_text(encoding="utf-8"))
     cases = []
     for row in data["libration"] + data["nasty"] + data["rotation"]:
         point = {"k": float.fromhex(row["k_hex"]), "rho": float.fromhex(row["rho_hex"])}
