@@ -42,7 +42,7 @@ def equation_of(workflow):
     scene = workflow.scene
     if not hasattr(scene, "equation"):
         raise BadInput(
-            f"prove: the scene {workflow.name} has no formulas to prove; choose mathieu, satellite or libration_elliptic"
+            f"prove: {workflow.name} has no formulas to prove; choose mathieu, satellite or libration_elliptic"
         )
     names, ends = {}, {}
     for key, (_, values) in workflow.grid.parameters.items():
