@@ -1,39 +1,32 @@
-#!/usr/bin/env python3
 """survey-check OUT.cert: proves the stability map that a certificate states, or says what fails.
 
-This file needs Python and python-flint (ball arithmetic, https://flintlib.org) alone: copy it, read it, and run
-`python checker.py OUT.cert`. It believes no number of the certificate. What is proved is printed by
-`Certificate.statement`; the lemmas have their proofs in the documentation, on the page "Proved maps".
+It needs Python and python-flint (ball arithmetic, https://flintlib.org) alone: `python checker.py OUT.cert`. It takes
+no number of the certificate on trust. The lemmas have their proofs in the documentation, on the page "Proved maps".
 
-HILL'S EQUATION y'' + z(u, p) y = 0, with one or two real parameters p in an interval (a row) or a rectangle (a map).
-A certificate gives z by formulas on consecutive pieces of [0, S], and a kind:
-    even      z is continued by z(-u) = z(u) and z(S + u) = z(S - u), with the period T = 2 S;
-    periodic  z is continued with the period T = S.
-y1, y2 are the solutions with y1 = 1, y1' = 0 and y2 = 0, y2' = 1 at u = 0, and D = y1(T) + y2'(T).
+THE EQUATION is X' = K(u, p) Y, Y' = L(u, p) X with symmetric K, L of m rows, and one or two real parameters p in an
+interval (a row) or a rectangle (a map). A certificate gives formulas on consecutive pieces of [0, S], and a kind:
+    even, periodic  m = 1, K = 1, L = -z: Hill's equation y'' + z(u, p) y = 0, X = y, Y = y';
+    reversible      m = 2, the entries k11, k12, k22 of K and l11, l12, l22 of L.
+A periodic z is continued with the period T = S, all else by K(-u) = K(u) and K(S + u) = K(S - u), so that T = 2 S.
+The matrices X1, Y1, X2, Y2 are the solutions at S with X = 1, Y = 0 and with X = 0, Y = 1 at u = 0.
 
-1. VERDICTS (`verdict`). If |D| < 2 all solutions are bounded, if |D| > 2 one grows exponentially (Magnus and Winkler,
-   Hill's Equation, 1966, theorem 1.1). If z is even, D - 2 = 4 y1'(S) y2(S) and D + 2 = 4 y1(S) y2'(S): the signs of
-   the four factors y1, y1', y2, y2' at S decide. If not, the factors are 2 - D and 2 + D.
-2. A STEP (`Equation.steps`). Let z be analytic and |z| <= Z on the disc |u - u0| <= R, w^2 >= Z, w > 0, 0 < h < R, and
-   x = h/R. On every ray from u0 the maximum norm of v = (w y, y') satisfies |v|' <= w |v|, so |w y| <= e^(wR) |v(u0)|
-   on the disc, and by Cauchy the Taylor coefficients of y satisfy |a_n| <= M R^-n, M = e^(wR) max(|y|, |y'|/w) at u0.
-   At u0 + h the sums up to degree N are off by at most M x^(N+1) / (1 - x), for y' by (M/R) (N+1) x^N / (1 - x)^2.
-3. GROWTH (`growth`). For complex z and a constant w > 0, the Euclidean norm of (sqrt(w) y, y'/sqrt(w)) grows at most
-   at the rate |w^2 - conj z| / (2 w), the logarithmic norm of [[0, w], [-z/w, 0]]. Where w is changed from v to w it
-   grows at most by max(v/w, w/v)^(1/2). So with constants w on parts of [0, S] it grows at most by the product of all.
-4. PARAMETERS (`Panel`). A panel is a part of the rectangle, mapped to [-1, 1]^2. If a factor f is analytic, |f| <= M,
-   for p1 in the Bernstein ellipse E_r (semi-axes (r +- 1/r)/2) and real p2, its interpolant I1 f at the n Chebyshev
-   points of the first kind satisfies |f - I1 f| <= 4 M sum r^-k, |f' - (I1 f)'| <= 4 M sum k^2 r^-k over k >= n: its
-   coefficients are at most 2 M r^-k, and T_k is interpolated by 0 or some +-T_j, j < n (Trefethen, Approximation Theory
-   and Approximation Practice, theorem 8.1, chapter 4). In two variables |f - I1 I2 f| <= |f - I1 f| + L1 |f - I2 f|,
-   where L = 1 + (2/pi) log n is at least the norm of I (Rivlin, The Chebyshev Polynomials, 1974). Errors of d at most
-   at the nodes change the interpolant by at most L1 d, or L1 L2 d, and its derivative by (n - 1)^2 L1 d (Markov).
-5. CELLS (`Panel.cell`). An interpolant in Bernstein's polynomials of a cell lies there between its least and its
-   largest coefficient. De Casteljau's matrices give the coefficients on halves. A factor is positive on a cell, its
-   border included, if all coefficients (which are balls) exceed the bound of 4; negative likewise.
-6. EDGES (`Panel.edge`). On a row's cell of width d the interpolant's derivative lies between the least and the largest
-   (n - 1)/d times a difference of neighbouring coefficients. If they exceed the bound of 4, and the factor has opposite
-   signs at the ends, where its interpolant is the first and the last coefficient, it has one simple zero there.
+1. VERDICTS (`verdict`) follow from the signs of *factors*. Periodic: 2 - D, 2 + D, D = X1 + Y2. Else multipliers have
+   r + 1/r = 2 + 4 w, w the eigenvalues of W = X2* Y1 = Y2* X1 - 1 (* transposes), and the factors are the determinants
+   of X1, Y1, X2, Y2 and, if m = 2, t = tr W + 2, 2 - t and c = t^2 - 4 det Y2* X1 = (w1 - w2)^2. Stable: -1 < w < 0,
+   det Y2* X1 > 0, (-1)^m det W > 0 and, if m = 2, 0 < t < 2 and c > 0 or, for W is then similar to a symmetric matrix,
+   det X1* Y1 > 0. Unstable: one of the same numbers, but for the last one, is negative.
+2. A STEP (`Equation.steps`). If |K| <= a, |L| <= b for |u - u0| <= R, w > 0, q = max(w a, b/w), x = h/R < 1, then sums
+   of v = (w X, Y) at u0 + h up to degree N are off by at most e^(qR) |v(u0)| x^(N+1)/(1 - x), in the maximum norm.
+3. GROWTH (`growth`). For complex K, L and w > 0 the Euclidean norm of (sqrt(w) X, Y/sqrt(w)) grows at most at the rate
+   |w K + conj(L)/w| / 2, and by max(v/w, w/v)^(1/2) where w is changed from v to w.
+4. PARAMETERS (`Panel`). If f is analytic, |f| <= M, for p1 in the ellipse E_r (semi-axes (r +- 1/r)/2) about a panel,
+   mapped to [-1, 1]^2, and real p2, its interpolant I1 f at n Chebyshev points has |f - I1 f| <= 4 M sum r^-k and
+   |f' - (I1 f)'| <= 4 M sum k^2 r^-k over k >= n; |f - I1 I2 f| <= |f - I1 f| + L1 |f - I2 f|, L = 1 + (2/pi) log n.
+   Errors of d at the nodes change the interpolant by at most L1 d, or L1 L2 d, its derivative by (n - 1)^2 L1 d.
+5. CELLS (`Panel.cell`). A factor is positive on a closed cell if all Bernstein coefficients of its interpolant there,
+   by de Casteljau's matrices, exceed the bound of 4; negative likewise.
+6. EDGES (`Panel.edge`). A factor of opposite signs at the ends of a row's cell, of width d, has one simple zero there
+   if (n - 1)/d times the differences of neighbouring coefficients all exceed the bound of 4 for f', or all with -f.
 """
 
 import ast
@@ -52,14 +45,22 @@ from operator import add, mul, neg, sub, truediv
 from flint import acb, arb, arb_mat, arb_poly, arb_series, ctx
 
 FORMAT = "survey-certificate 1"
+KINDS = {  # of equations: entries, factors, and in words the equation and its continuation beyond S, which is {0}
+    "even": ("z", ["y1", "y1'", "y2", "y2'"], "y'' + z(u) y = 0", "z(-u) = z(u), z({0} + u) = z({0} - u), T = 2 ({0})"),
+    "periodic": ("z", ["2 - D", "2 + D"], "y'' + z(u) y = 0", "z(u + T) = z(u), T = {0}"),
+    "reversible": ("k11 k12 k22 l11 l12 l22", ["det X1", "det Y1", "det X2", "det Y2", "t", "2 - t", "c"],
+                   "X' = K(u) Y, Y' = L(u) X with symmetric K, L of two rows",
+                   "K(-u) = K(u), K({0} + u) = K({0} - u), L likewise, T = 2 ({0})"),
+}  # fmt: skip
 STABLE, UNSTABLE, OPEN, SPLIT = "s", "u", "o", "+"  # cells; "+" is followed by its halves or quarters
-EDGES = "1234"  # cells of a row: the factor of this number has exactly one zero in it, and no other factor has one
+EDGES = "1234567"  # cells of a row: the factor of this number has exactly one zero in it, and no other factor has one
 VERDICTS = {STABLE: "stable", UNSTABLE: "unstable", OPEN: "open"}
+ZERO, UNIT = arb(0), arb(0, 1)  # UNIT: the ball [-1, 1]
 RATIO, FAR = arb(1) / 4, 8  # h / R of a step; a step is halved unless w R < FAR
 SHORTEST, SMALLEST = Fraction(1, 2**20), Fraction(1, 2**16)  # step, and part that bounds growth, as parts of a piece
-ARCS, BOXES, COVER = 24, 32, 4  # parts of half an ellipse, of a piece of [0, S] (at least), of a box's side
+ARCS, SIDE = ([(arb(k) / n).union(arb(k + 1) / n) for k in range(n)] for n in (24, 4))  # of half an ellipse, a box
 WIDE = arb(1) / 8  # a part of [0, S] is halved while the ball of z times its length exceeds this, relative to sqrt |z|
-LARGEST = 2**23  # characters of a certificate
+BOXES, LARGEST = 32, 2**23  # parts of a piece of [0, S], at least; characters of a certificate
 MALFORMED = (KeyError, TypeError, ValueError, IndexError, AttributeError, RecursionError, ArithmeticError)
 
 
@@ -72,13 +73,11 @@ def need(condition, why):
         raise Failed(why)
 
 
-def exact(number):
-    """The ball of a rational number."""
+def exact(number):  # the ball of a rational number
     return arb(number.numerator) / number.denominator
 
 
-def rational(text):
-    """The rational number that a text such as '0.99' or '-7/3' denotes."""
+def rational(text):  # the rational number that a text such as '0.99' or '-7/3' denotes
     need(isinstance(text, str) and len(text) < 80, "a number is not a short text")
     return Fraction(text)
 
@@ -86,18 +85,6 @@ def rational(text):
 def whole(value, least, most, what):
     need(type(value) is int and least <= value <= most, f"{what} is not a whole number from {least} to {most}")
     return value
-
-
-def parts(n):
-    """The balls of [0, 1/n], [1/n, 2/n], ..., [1 - 1/n, 1]."""
-    return [(arb(k) / n).union(arb(k + 1) / n) for k in range(n)]
-
-
-def power(x, n):
-    """x^n by multiplication."""
-    if n < 2:
-        return x if n else arb(1)
-    return x * power(x * x, n // 2) if n % 2 else power(x * x, n // 2)
 
 
 FUNCTIONS = {  # log and sqrt are not a number for complex balls that meet their branch cut, where they are not analytic
@@ -119,12 +106,15 @@ class Formula:
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             raise Failed(f"this is not a formula: {text[:80]!r}") from None
 
-    def __call__(self, **values):
-        """Its value for balls, complex balls, or power series of balls."""
-        values["pi"] = arb.pi()
+    def __call__(self, **values):  # its value for balls, complex balls, or power series of balls
+        return self.known(values)[self.whole]
+
+    def known(self, values):  # these values, and those of all parts that follow from them
+        values = {"pi": arb.pi(), **values}
         for text, (operands, operation) in self.parts.items():
-            values[text] = operation(*(values[operand] for operand in operands))
-        return values[self.whole]
+            if text not in values and values.keys() >= {*operands}:
+                values[text] = operation(*[values[operand] for operand in operands])
+        return values
 
     def _read(self, node):
         """The text of a node; `parts` has its operands, of which those before it have the values, and its operation."""
@@ -137,7 +127,8 @@ class Formula:
             case ast.UnaryOp(op=ast.USub()):
                 operands, operation = [node.operand], neg
             case ast.BinOp(op=ast.Pow(), right=ast.Constant()):
-                operands, operation = [node.left], partial(power, n=whole(node.right.value, 0, 64, "an exponent"))
+                exponent = whole(node.right.value, 0, 64, "an exponent")
+                operands, operation = [node.left], lambda x: prod([x] * exponent, start=arb(1))
             case ast.BinOp() if type(node.op) in OPERATIONS:
                 operands, operation = [node.left, node.right], OPERATIONS[type(node.op)]
             case ast.Call(func=ast.Name(id=name), args=[_], keywords=[]) if name in FUNCTIONS:
@@ -149,39 +140,42 @@ class Formula:
 
 
 class Equation:
-    """y'' + z(u, p) y = 0 on [0, S]; `pieces`: [(end, formula of z)] from 0 to S; `names` of the two parameters."""
+    """X' = K(u, p) Y, Y' = L(u, p) X on [0, S]; `pieces`: [(end, formulas of K and L)] from 0 to S; `names` of p."""
 
     def __init__(self, kind, pieces, names):
-        need(kind in ("even", "periodic"), "z is neither even nor periodic")
-        need(0 < len(pieces) <= 100, "there must be 1 to 100 pieces of [0, S]")
-        self.even, self.names, self.pieces, start = kind == "even", names, [], arb(0)
-        for end, z in pieces:
+        need(kind in KINDS and 0 < len(pieces) <= 100, "an unknown kind of equation, or not 1 to 100 pieces of [0, S]")
+        self.kind, self.names, self.pieces, start = kind, names, [], arb(0)
+        for end, *entries in pieces:
             end = Formula(end, [])
-            need(end() > start, "the ends of the pieces of [0, S] do not increase")
-            self.pieces.append((start, end(), end.text, Formula(z, ["u", *names])))
+            good = end() > start and len(entries) == len(KINDS[kind][0].split())
+            need(good, "the ends of the pieces of [0, S] do not increase, or one has another number of formulas")
+            self.pieces.append((start, end(), end.text, [Formula(entry, ["u", *names]) for entry in entries]))
             start = end()
 
     def steps(self, box, order):
-        """[(u0, h, z, bounds of what is left out of (y1, y1') and of (y2, y2'))]; `box` covers the parameters."""
+        """[({entry: what u gives of it}, h, w, bound of what is left out if |v(u0)| = 1)] for parameters in `box`."""
 
-        def tried(u0, h, z):
+        def tried(u0, h, entries):
             radius = h / RATIO
-            size = acb(z(u=acb(u0 + radius * arb(0, 1), radius * arb(0, 1)), **box)).abs_upper()
-            w = size.sqrt().upper() + exact(SHORTEST)
-            y = (w * radius).exp() * RATIO ** (order + 1) / (1 - RATIO)
-            dy = (w * radius).exp() / radius * (order + 1) * RATIO**order / (1 - RATIO) ** 2
-            return (u0, h, z, ((y, dy), (y / w, dy / w))) if w * radius < FAR else None  # or z is not finite there
+            disc = acb(u0 + radius * UNIT, radius * UNIT)
+            upper, lower = (norm(x) for x in blocks([acb(f(u=disc, **box)) for f in entries]))
+            w = (lower / upper).sqrt().upper() + exact(SHORTEST)
+            rate = (w * upper).max(lower / w)
+            missed = (rate * radius).exp() * RATIO ** (order + 1) / (1 - RATIO)
+            return (u0, entries, h, w, missed) if rate * radius < FAR else None  # or one is not finite there
 
-        return list(self.bisected(1, SHORTEST, tried, "z is too large, or singular too near to the real axis"))
+        found = self.bisected(1, SHORTEST, tried, "K or L is too large, or singular too near to the real axis")
+        ctx.cap = order  # what depends on u alone is evaluated once
+        return [({f: f.known({"u": arb_series([u0, 1])}) for f in entries}, *own) for u0, entries, *own in found]
 
     def bisected(self, count, shortest, tried, why):
-        """What `tried(start, length, z)` finds on parts of the pieces of [0, S], which are halved where it is None."""
-        for start, end, _, z in self.pieces:
+        """What `tried(start, length, entries)` finds on parts of the pieces of [0, S], halved where it is None."""
+        for start, end, _, entries in self.pieces:
             waiting = [(Fraction(k, count), Fraction(1, count)) for k in reversed(range(count))]
             while waiting:
                 low, length = waiting.pop()
                 need(length > shortest, why)
-                value = tried(start + (end - start) * exact(low), (end - start) * exact(length), z)
+                value = tried(start + (end - start) * exact(low), (end - start) * exact(length), entries)
                 if value is None:
                     waiting += [(low + length / 2, length / 2), (low, length / 2)]
                 else:
@@ -189,57 +183,86 @@ class Equation:
 
     def factors(self, steps, order, point):
         """The factors for the parameters `point` (balls)."""
-        ctx.cap = order + 1
-        reached = arb_mat([[1, 0], [0, 1]])  # (y1, y2) and (y1', y2')
-        for u0, h, z, missed in steps:
-            series = arb_series(z(u=arb_series([u0, 1]), **point))
-            reached = step([series[n] for n in range(order - 1)], h, missed) * reached
-        y1, y2, dy1, dy2 = reached.entries()
-        return (y1, dy1, y2, dy2) if self.even else (2 - y1 - dy2, 2 + y1 + dy2)
+        ctx.cap, over = order, []
+        fixed = {f: f.known(point) for *_, entries in self.pieces for f in entries}
+        for known, *own in steps:
+            series = [arb_series(0) + f.known(fixed[f] | values)[f.whole] for f, values in known.items()]
+            over.append(step(blocks(series), order, *own))
+        table = reduce(mul, reversed(over)).tolist()
+        halves = product((slice(len(table) // 2), slice(len(table) // 2, None)), repeat=2)
+        x1, y1, x2, y2 = (arb_mat([row[columns] for row in table[rows]]) for columns, rows in halves)
+        dets, trace = [x.det() for x in (x1, y1, x2, y2)], (y2.transpose() * x1).trace()
+        if self.kind == "periodic":
+            return 2 - dets[0] - dets[3], 2 + dets[0] + dets[3]
+        return dets if self.kind == "even" else (*dets, trace, 2 - trace, trace * trace - 4 * dets[0] * dets[3])
 
     def cover(self, sides, name, r):
         """Parameters that cover the upper half of E_r of one of them: (arcs of its border, boxes of its inside)."""
-        real = {name: centre + half * arb(0, 1) for name, (centre, half) in zip(self.names, sides, strict=True)}
+        real = {name: centre + half * UNIT for name, (centre, half) in zip(self.names, sides, strict=True)}
         centre, half = sides[self.names.index(name)]
         across, up = half * (r + 1 / r) / 2, half * (r - 1 / r) / 2
-        arcs = [acb(centre + across * x.cos_pi(), up * x.sin_pi()) for x in parts(ARCS)]
-        boxes = [acb(centre + across * (2 * x - 1), up * y) for x, y in product(parts(COVER), repeat=2)]
+        arcs = [acb(centre + across * x.cos_pi(), up * x.sin_pi()) for x in ARCS]
+        boxes = [acb(centre + across * (2 * x - 1), up * y) for x, y in product(SIDE, repeat=2)]
         return [[{**real, name: place} for place in places] for places in (arcs, boxes)]
 
     def sizes(self, sides, name, r, least):
-        """Bounds of the factors (without the 2 of 2 - D, which I1 reproduces) for one parameter in E_r, if z is finite,
-        so that it is analytic, on boxes that cover the upper half of E_r. The lower half is its mirror image."""
+        """Bounds of the factors (less constants, which I1 reproduces) for one parameter in E_r, if all is analytic."""
         arcs, boxes = self.cover(sides, name, r)
 
-        def tried(start, length, z):
+        def tried(start, length, entries):
             u = start.union(start + length)
-            values = [acb(z(u=u, **place)) for place in arcs]
-            sharp = all(length * x.rad() < WIDE * (1 + x.abs_upper().sqrt()) for x in values)
-            if sharp and all(acb(z(u=u, **place)).is_finite() for place in boxes):
-                return [(length, value) for value in values]
+            values = [[acb(f(u=u, **place)) for f in entries] for place in arcs]
+            sharp = all(length * x.rad() < WIDE * (1 + x.abs_upper().sqrt()) for own in values for x in own)
+            if sharp and all(acb(f(u=u, **place)).is_finite() for place in boxes for f in entries):
+                return [(length, own) for own in values]
 
-        found = self.bisected(BOXES, SMALLEST, tried, f"z is singular, or changes too fast, for complex {name}")
+        found = self.bisected(BOXES, SMALLEST, tried, f"K or L is singular, or changes too fast, for complex {name}")
         grown = zip(*(growth(steps, least) for steps in zip(*found, strict=True)), strict=True)
-        y1, dy1, y2, dy2 = (reduce(arb.max, bounds) for bounds in grown)
-        return (y1, dy1, y2, dy2) if self.even else (y1 + dy2, y1 + dy2)
+        x1, y1, x2, y2 = norms = [reduce(arb.max, bounds) for bounds in grown]
+        if self.kind == "periodic":
+            return x1 + y2, x1 + y2
+        return norms if self.kind == "even" else (*(x * x for x in norms), *[2 * x1 * y2] * 2, (2 * x2 * y1) ** 2)
+
+
+def blocks(entries):
+    """The symmetric matrices K and L, as lists of rows, from z or from their six entries on and above the diagonals."""
+    if len(entries) == 1:
+        return [[0 * entries[0] + 1]], [[-entries[0]]]
+    a, b, c, d, e, f = entries
+    return [[a, b], [b, c]], [[d, e], [e, f]]
+
+
+def norm(
+    matrix,
+):  # a bound of the norm of a symmetric matrix, as an operator in the maximum norm and in the Euclidean one
+    return reduce(arb.max, (sum((x.abs_upper() for x in row), arb(0)) for row in matrix))
 
 
 def growth(steps, least):
-    """Bounds of |y1|, |y1'|, |y2|, |y2'| at S, from [(length of a part of [0, S], z there)]; w is at least `least`."""
-    steps = [(length, z, least.max(z.mid().abs_upper().sqrt().mid())) for length, z in steps]
-    exponent = sum((length * (w * w - z.conjugate()).abs_upper() / (2 * w) for length, z, w in steps), arb(0))
-    grown = exponent.exp() * prod((v / w).max(w / v).sqrt() for (*_, v), (*_, w) in pairwise(steps))
-    first, last = steps[0][2].sqrt(), steps[-1][2].sqrt()
+    """Bounds of the norms of X1, Y1, X2, Y2, from [(length of a part of [0, S], entries there)]; w >= `least`."""
+    found = []
+    for length, entries in steps:
+        w = least if len(entries) > 1 else least.max(entries[0].mid().abs_upper().sqrt().mid())
+        rows = (zip(*rows, strict=True) for rows in zip(*blocks(entries), strict=True))
+        found.append((length * norm([[w * x + y.conjugate() / w for x, y in row] for row in rows]) / 2, w))
+    grown = sum((exponent for exponent, _ in found), arb(0)).exp()
+    grown *= prod((v / w).max(w / v).sqrt() for (_, v), (_, w) in pairwise(found))
+    first, last = found[0][1].sqrt(), found[-1][1].sqrt()
     return grown * first / last, grown * first * last, grown / (first * last), grown * last / first
 
 
-def step(z_n, h, missed):
-    """The matrix that takes (y, y') over a step, from the Taylor coefficients of z and what the sums leave out."""
-    columns = []
-    for a, (y, dy) in zip(([arb(1), arb(0)], [arb(0), arb(1)]), missed, strict=True):
-        for n in range(len(z_n)):
-            a.append(-sum(map(mul, z_n, a[n::-1]), arb(0)) / ((n + 1) * (n + 2)))
-        columns.append([arb_poly(a)(h) + y * arb(0, 1), arb_poly(a).derivative()(h) + dy * arb(0, 1)])
+def step(matrices, order, h, w, missed):
+    """The matrix that takes (X, Y) over a step, from Taylor series of K and L; see `Equation.steps`."""
+    upper, lower = ([[[x[n] for n in range(len(x))] for x in row] for row in part] for part in matrices)
+    rows = [list(enumerate(row, len(upper))) for row in upper] + [list(enumerate(row)) for row in lower]
+    scales, columns = [w] * len(upper) + [arb(1)] * len(lower), []
+    for column, scale in enumerate(scales):
+        v = [[arb(i == column)] for i in range(len(rows))]  # coefficients, the last one first
+        for n in range(1, order + 1):
+            slopes = [[sum(map(mul, a, v[j]), ZERO) for j, a in row] for row in rows]
+            for x, slope in zip(v, slopes, strict=True):
+                x.insert(0, sum(slope[1:], slope[0]) / n)
+        columns.append([arb_poly(x[::-1])(h) + missed * scale / own * UNIT for x, own in zip(v, scales, strict=True)])
     return arb_mat(columns).transpose()
 
 
@@ -261,26 +284,23 @@ class Panel:
         with ctx.workprec(3 * ctx.prec):  # inverses lose digits
             nodes = [[(arb.pi() * (2 * i + 1) / (2 * n)).cos() for i in range(n)] for n in self.counts]
             matrices = [bernstein(at).inv() for at in nodes]
-        steps = self.equation.steps(self.place([arb(0, 1)] * len(nodes)), self.order)
+        steps = self.equation.steps(self.place([UNIT] * len(nodes)), self.order)
         values = [self.equation.factors(steps, self.order, self.place(at)) for at in product(*nodes)]
         sizes = list(map(partial(self.equation.sizes, self.sides), self.equation.names, self.ellipses, self.rates))
-        return [self._factor(matrices, *own) for own in zip(zip(*values, strict=True), *sizes, strict=True)]
+        norms, found = [1 + 2 / arb.pi() * arb(n).log() for n in self.counts], []
+        for own, *bounds in zip(zip(*values, strict=True), *sizes, strict=True):
+            error, each = reduce(arb.max, (x.rad() for x in own)), zip(self.counts, self.ellipses, bounds, strict=True)
+            first, *second = (4 * m * r ** (1 - n) / (r - 1) for n, r, m in each)
+            bound = first + sum((norms[0] * other for other in second), prod(norms) * error)
+            n, q = self.counts[0], 1 / (self.ellipses[0] - 1)  # the sum of k^2 r^-k over k >= n is that of r^-k, times:
+            slope = first * (n * n + 2 * n * q + q * (1 + 2 * q)) + (n - 1) ** 2 * norms[0] * error
+            table = arb_mat(n, len(own) // n, [x.mid() for x in own])
+            found.append((transformed(table, matrices), bound.upper(), slope.upper()))
+        return found
 
-    def place(self, x):
-        """{name: parameter} at x in [-1, 1]^2."""
+    def place(self, x):  # {name: parameter} at x in [-1, 1]^2
         each = zip(self.equation.names, self.sides, x, strict=True)
         return {name: middle + half * at for name, (middle, half), at in each}
-
-    def _factor(self, matrices, values, *sizes):
-        """The same of one factor, from its values at the nodes and its sizes on the ellipses."""
-        counts, norms = self.counts, [1 + 2 / arb.pi() * arb(n).log() for n in self.counts]
-        error = reduce(arb.max, (x.rad() for x in values))
-        first, *second = (4 * m * r ** (1 - n) / (r - 1) for n, r, m in zip(counts, self.ellipses, sizes, strict=True))
-        bound = first + sum((norms[0] * other for other in second), prod(norms) * error)
-        n, q = counts[0], 1 / (self.ellipses[0] - 1)  # the sum of k^2 r^-k over k >= n is that of r^-k, times:
-        slope = first * (n * n + 2 * n * q + q * (1 + 2 * q)) + (n - 1) ** 2 * norms[0] * error
-        table = arb_mat(n, len(values) // n, [x.mid() for x in values])
-        return transformed(table, matrices), bound.upper(), slope.upper()
 
     def check(self):
         """Raises Failed unless every cell is what it is said to be."""
@@ -289,14 +309,12 @@ class Panel:
             good = not cell or letter == verdict(cell[1]) or letter == self.edge(*cell)
             need(good, f"cell {number} is not proved to be {VERDICTS.get(letter, 'an edge')}")
 
-    def parts(self, part):
-        """What `cell` takes for the halves or quarters of a cell, in the order of `halved`."""
+    def parts(self, part):  # what `cell` takes for the halves or quarters of a cell, in the order of `halved`
         above = self.cell(*part)
         return [(above, half[::-1]) for half in product((1, 0), repeat=len(self.counts))]
 
     def cell(self, above=None, half=()):
-        """({factor: its coefficients, where its sign is unknown}, {factor: 1, -1 or 0, its sign everywhere}, width) of
-        the panel, or of a part of the cell `above`: `half` of each of its sides."""
+        """({factor of unknown sign: coefficients}, {factor: sign or 0}, width) of the panel or a part of `above`."""
         if above is None:
             tables, signs, width = {i: table for i, (table, *_) in enumerate(self.factors)}, {}, arb(2)
         else:
@@ -306,46 +324,42 @@ class Panel:
         signs = signs | {i: sign(table.entries(), self.factors[i][1]) for i, table in tables.items()}
         return {i: table for i, table in tables.items() if not signs[i]}, signs, width
 
-    def edge(self, tables, _, width):
-        """The letter of a row's cell in which exactly one factor has a zero, and exactly one; else None."""
+    def edge(self, tables, signs, width):
+        """The letter of a row's cell in which one factor has a zero, one alone, and stability changes; or None."""
         if len(self.counts) > 1 or len(tables) != 1:
             return None
         [(i, table)] = tables.items()
         (_, bound, slope), values = self.factors[i], table.entries()
         rises = [(len(values) - 1) * (after - before) for before, after in pairwise(values)]
-        return (
-            EDGES[i]
-            if sign(values[:1], bound) * sign(values[-1:], bound) == -1 and sign(rises, slope * width)
-            else None
-        )
+        once = sign(values[:1], bound) * sign(values[-1:], bound) == -1 and sign(rises, slope * width)
+        return EDGES[i] if once and {verdict(signs | {i: side}) for side in (1, -1)} == {STABLE, UNSTABLE} else None
 
 
 def verdict(signs):
     """What the signs {number of a factor: 1, -1, or 0 if it is unknown} prove."""
-    if len(signs) == 4:
-        signs = {0: -signs[1] * signs[2], 1: signs[0] * signs[3]}  # of 2 - D and of 2 + D
-    return UNSTABLE if -1 in signs.values() else STABLE if signs[0] == signs[1] == 1 else OPEN
+    signs = [signs[i] for i in range(len(signs))]
+    if len(signs) > 2:
+        x1, y1, x2, y2, *more = signs
+        signs = [x1 * y2, x2 * y1, *more[:2], more[2] or int(x1 * y1 == 1)] if more else [x1 * y2, -x2 * y1]
+    return UNSTABLE if -1 in signs else STABLE if 0 not in signs else OPEN
 
 
-def sign(values, bound):
-    """1 or -1 if all values, and all that differs from one by at most `bound`, have this sign; else 0."""
+def sign(
+    values, bound
+):  # 1 or -1 if all values, and all that differs from one by at most `bound`, have this sign; else 0
     return int(all(x > bound for x in values)) - int(all(x < -bound for x in values))
 
 
-def transformed(table, matrices):
-    """A table with a matrix applied to each of its one or two sides."""
-    table = matrices[0] * table
-    return table * matrices[1].transpose() if len(matrices) > 1 else table
+def transformed(table, matrices):  # a table with a matrix applied to each of its one or two sides
+    return matrices[0] * table * (matrices[1].transpose() if len(matrices) > 1 else 1)
 
 
-def bernstein(nodes):
-    """The values of Bernstein's polynomials of degree n - 1 on [-1, 1] at n nodes."""
+def bernstein(nodes):  # the values of Bernstein's polynomials of degree n - 1 on [-1, 1] at n nodes
     d, pairs = len(nodes) - 1, [((1 + x) / 2, (1 - x) / 2) for x in nodes]
-    return arb_mat([[comb(d, j) * power(x, j) * power(y, d - j) for j in range(d + 1)] for x, y in pairs])
+    return arb_mat([[prod([x] * j + [y] * (d - j), start=arb(comb(d, j))) for j in range(d + 1)] for x, y in pairs])
 
 
-def halving(n):
-    """Bernstein coefficients on an interval -> on its lower and on its upper half (de Casteljau)."""
+def halving(n):  # bernstein coefficients on an interval -> on its lower and on its upper half (de Casteljau)
     lower = [[arb(comb(i, j)) / 2**i for j in range(n)] for i in range(n)]
     return arb_mat(lower), arb_mat([row[::-1] for row in lower[::-1]])
 
@@ -369,26 +383,18 @@ def halved(place):
     return [part[::-1] for part in product(*halves[::-1])]
 
 
-def size(place):
-    """Its length or area."""
+def size(place):  # its length or area
     return prod(end - start for start, end in place)
 
 
 @lru_cache(maxsize=1)  # each process reads it once
 class Certificate:
-    """What the text of a certificate states; raises Failed if it is not one."""
+    """What the text of a certificate states; raises Failed, or one of MALFORMED, if it is not one."""
 
     def __init__(self, text):
-        need(len(text) < LARGEST, "the certificate is too long")
-        try:
-            data = json.loads(text)
-            need(data["format"] == FORMAT, f"the format is not {FORMAT!r}")
-            need(digest(data) == data["sha256"], "it was changed: its digest is another")
-            self._read(data)
-        except MALFORMED as error:
-            raise Failed(f"the certificate is malformed ({type(error).__name__}: {error})") from None
-
-    def _read(self, data):
+        data = json.loads(text)
+        need(data["format"] == FORMAT, f"the format is not {FORMAT!r}")
+        need(digest(data) == data["sha256"], "it was changed: its digest is another")
         ctx.prec = whole(data["bits"], 53, 4096, "the number of bits")
         self.names = names = [str(name) for name in data["parameters"]]
         good = all(name.isidentifier() and name not in {"u", "pi", *FUNCTIONS} for name in names)
@@ -405,41 +411,37 @@ class Certificate:
         self.shares = dict.fromkeys(VERDICTS, Fraction(0))
         for letter, place in self.cells:
             self.shares[letter if letter in VERDICTS else OPEN] += size(place) / size(self.sides)
-        stated = {letter: rational(data["shares"][letter]) for letter in VERDICTS}
-        need(stated == self.shares, "the shares of the verdicts are not those of its cells")
+        good = self.shares == {letter: rational(data["shares"][letter]) for letter in VERDICTS}
+        need(good, "the shares of the verdicts are not those of its cells")
 
-    def statement(self):
-        """The theorem in words."""
-        row, start, lines = len(self.sides) == 1, "0", ["Consider y'' + z(u) y = 0, where"]
-        for _, _, end, z in self.equation.pieces:
-            lines.append(f"    z(u) = {z.text}    for {start} <= u <= {end},")
+    def statement(self):  # the theorem in words
+        names, factors, equation, beyond = KINDS[self.equation.kind]
+        row, start, lines = len(self.sides) == 1, "0", [f"Consider {equation}, where"]
+        for _, _, end, entries in self.equation.pieces:
+            here = f"    for {start} <= u <= {end},"
+            lines += [f"    {name}(u) = {entry.text}{here}" for name, entry in zip(names.split(), entries, strict=True)]
             start = end
-        even = f"    z(-u) = z(u), z({start} + u) = z({start} - u), and the period T = 2 ({start})."
         ends = ", ".join(f"{low} <= {name} <= {high}" for name, (low, high) in zip(self.names, self.sides, strict=True))
         counts = ", ".join(f"{self.letters.count(letter):,} {word}" for letter, word in VERDICTS.items())
         lines += [
-            even if self.equation.even else f"    z(u + T) = z(u), and the period T = {start}.",
-            "D is the trace of the monodromy matrix over T. Stable: |D| < 2, all solutions are bounded.",
-            "Unstable: |D| > 2, a solution grows exponentially. Open: nothing is stated.",
+            f"    {beyond.format(start)}, which is the period.",
+            "Stable: all solutions are bounded, and no multiplier over T is 1 or -1.",
+            "Unstable: a multiplier over T exceeds 1 in modulus: a solution grows exponentially. Open: no statement.",
             f"{ends} consists of cells, borders included: {counts}{', and edges:' if row else '.'}",
-            *(self._edges(start) if row else ()),
         ]
+        number = sum(letter in EDGES for letter in self.letters)
+        for (letter, place), after in zip(self.cells, self.letters[1:] + OPEN, strict=True):
+            if letter in EDGES:
+                where, factor = between(*place[0], 3 - floor(log10(size(place)))), factors[EDGES.index(letter)]
+                lines.append(f"    {where}: {factor} at {start} is 0 once, {VERDICTS.get(after, 'an edge')} after it;")
+        if row:
+            where = f"{number} point{', in this edge' if number == 1 else 's, one in each of these edges'}."
+            lines.append(f"stability changes at {'at least' if OPEN in self.letters else 'exactly'} {where}")
         for letter in (STABLE, UNSTABLE):
             low, high, area = self.shares[letter], self.shares[letter] + self.shares[OPEN], size(self.sides)
             what = f"{'a length' if row else 'an area'} of {between(low * area, high * area, 12)}"
             lines.append(f"The {VERDICTS[letter]} points have {what}: {between(100 * low, 100 * high, 4)} %.")
         return "\n".join(lines)
-
-    def _edges(self, end):
-        """What is stated of the edges of a row."""
-        factors = [f"{f}({end})" for f in ("y1", "y1'", "y2", "y2'")] if self.equation.even else ["2 - D", "2 + D"]
-        lines = []
-        for (letter, place), after in zip(self.cells, self.letters[1:] + OPEN, strict=True):
-            if letter in EDGES:
-                where, f = between(*place[0], 3 - floor(log10(size(place)))), factors[EDGES.index(letter)]
-                lines.append(f"    {where}: {f} = 0 at one point, {VERDICTS.get(after, 'an edge')} after it;")
-        most = "at least" if OPEN in self.letters else "exactly"
-        return [*lines, f"so that stability changes at {most} {len(lines)} points, one in each of these edges."]
 
 
 def places(sides, panels):
@@ -450,8 +452,7 @@ def places(sides, panels):
     return [place for _, place in walk(panels["layout"], list(product(*map(pairwise, ends))), halved)]
 
 
-def digest(data):
-    """The SHA-256 of all but itself."""
+def digest(data):  # the SHA-256 of all but itself
     others = json.dumps({key: value for key, value in data.items() if key != "sha256"}, sort_keys=True)
     return hashlib.sha256(others.encode()).hexdigest()
 
@@ -462,8 +463,7 @@ def between(low, high, digits):
     return " to ".join(f"{'-' * (n < 0)}{abs(n) // 10**digits}.{abs(n) % 10**digits:0{digits}d}" for n in ends)
 
 
-def proved(text, number):
-    """Why a panel is not proved, if it is not; perhaps in a process of its own."""
+def proved(text, number):  # why a panel is not proved, if it is not; perhaps in a process of its own
     try:
         Certificate(text).panels[number].check()
     except (Failed, *MALFORMED) as error:
@@ -471,7 +471,7 @@ def proved(text, number):
 
 
 def check(text, processes=1):
-    """The statement that the text of a certificate proves; raises Failed if it proves none."""
+    """The statement that the text of a certificate proves; raises Failed, or one of MALFORMED, if it proves none."""
     certificate = Certificate(text)
     with get_context("spawn").Pool(processes) if processes > 1 else nullcontext() as pool:
         for why in (pool.imap if pool else map)(partial(proved, text), range(len(certificate.panels))):
@@ -488,8 +488,8 @@ def main(arguments=None):
     try:
         with open(given.certificate, encoding="utf-8") as file:
             statement = check(file.read(LARGEST), given.processes)
-    except (Failed, OSError, UnicodeDecodeError) as failed:
-        print(f"NOT PROVED: {given.certificate}: {failed}")
+    except (Failed, OSError, *MALFORMED) as failed:
+        print(f"NOT PROVED: {given.certificate}: {type(failed).__name__}: {failed}")
         return 1
     print(f"PROVED\n{statement}")
     return 0

@@ -19,7 +19,8 @@ ORDERS = range(12, 80, 4)  # of the Taylor series
 NODES = (6, 8, 10, 12, 14, 16, 18, 20, 24, 28, 32, 36, 40)
 ELLIPSES = (1.6, 1.9, 2.3, 2.8, 3.5, 4.5, 6, 8, 12, 20)
 RATES = np.geomspace(0.03, 1.3, 10)  # least w relative to the square root of the largest |z|, which are tried
-SAMPLES, CHECKED = 96, 12  # positions in a piece at which z is sampled; every so many of them it must be analytic
+CONSTANT_RATES = (0.7, 0.85, 1.0, 1.2, 1.4)  # w, where it does not follow z
+SAMPLES, CHECKED = 96, 12  # positions in a piece that are sampled; every so many of them K and L must be analytic
 UNIT = 2.0**-53
 PANEL = "."  # in a layout
 SMALLEST = 2  # halvings of a map's panel: for fewer cells it is not worth its nodes
@@ -44,12 +45,11 @@ def _ellipse(equation, sides, name, tolerance):
     """(number of nodes, r, least w) for one parameter: the fewest nodes."""
     tried, why = [], checker.Failed("no ellipse has a small enough bound: smaller panels are needed")
     for r in map(arb, ELLIPSES):
-        length, z = _sampled(equation, sides, name, r)
-        if not np.isfinite(z).all():  # z is singular in this ellipse, and in larger ones
+        length, entries = _sampled(equation, sides, name, r)
+        if not np.isfinite(entries).all():  # they are singular in this ellipse, and in larger ones
             break
-        local = np.sqrt(np.abs(z))
-        for w in (local.max() * RATES).tolist():
-            bound = 4 * _growth(length, z, np.maximum(local, w)) / (float(r) - 1)
+        for w in _rates(entries):
+            bound = 4 * _growth(length, entries, w) / (float(r) - 1)
             n = next((n for n in NODES if bound * float(r) ** (1 - n) < 0.1 * tolerance), None)
             if n:
                 tried.append((n, bound * float(r) ** (1 - n), r, w))
@@ -80,26 +80,38 @@ def _best_of_each(tried):
 
 
 def _sampled(equation, sides, name, r):
-    """(the length of each sample of u, z at them on the border of the ellipse), no bounds; NaN where z is singular."""
+    """(the length of each sample of u, the entries of K and L at them on the border of the ellipse, each an array with
+    samples along its first axis), no bounds; NaN where they are singular."""
     arcs, boxes = equation.cover(sides, name, r)
+    arcs = [{key: x.mid() for key, x in place.items()} for place in arcs]
     lengths, rows = [], []
-    for start, end, _, z in equation.pieces:
+    for start, end, _, entries in equation.pieces:
         for k in range(SAMPLES):
             u = start + (end - start) * (arb(2 * k + 1) / (2 * SAMPLES))
             lengths.append(float((end - start) / SAMPLES))
-            if k % CHECKED == 0 and not all(acb(z(u=u, **place)).is_finite() for place in boxes):
-                rows.append([math.nan] * len(arcs))
-                return np.array(lengths), np.array(rows)
-            rows.append([complex(acb(z(u=u, **{key: x.mid() for key, x in place.items()}))) for place in arcs])
-    return np.array(lengths), np.array(rows)
+            if k % CHECKED == 0 and not all(acb(f(u=u, **place)).is_finite() for place in boxes for f in entries):
+                return np.array(lengths), np.full((1, 1, 1), math.nan)
+            rows.append([[complex(acb(f(u=u, **place))) for place in arcs] for f in entries])
+    return np.array(lengths), np.array(rows).swapaxes(0, 1)
 
 
-def _growth(length, z, w):
-    """About the largest bound of the factors that `checker.growth` finds; samples of u along the first axis."""
-    exponent = (length[:, None] * abs(w**2 - z.conj()) / (2 * w)).sum(0) + 0.5 * abs(np.diff(np.log(w), axis=0)).sum(0)
+def _rates(entries):
+    """Least w that are tried."""
+    if len(entries) > 1:
+        return CONSTANT_RATES
+    return (np.sqrt(abs(entries)).max() * RATES).tolist()
+
+
+def _growth(length, entries, least):
+    """About the largest bound of the factors that `checker.Equation.sizes` finds."""
+    hill = len(entries) == 1
+    w = np.maximum(np.sqrt(abs(entries[0])), least) if hill else np.full(entries.shape[1:], least)
+    pairs = [zip(*rows, strict=True) for rows in zip(*checker.blocks(list(entries)), strict=True)]
+    rate = np.max([sum(abs(w * x + y.conj() / w) for x, y in pair) for pair in pairs], 0) / 2
+    exponent = (length[:, None] * rate).sum(0) + 0.5 * abs(np.diff(np.log(w), axis=0)).sum(0)
     first, last = np.log(w[0]), np.log(w[-1])
     exponent += 0.5 * np.maximum(abs(first - last), abs(first + last))
-    return math.exp(min(exponent.max(), 700.0))
+    return math.exp(min((1 if hill else 4) * exponent.max(), 700.0))
 
 
 def _order(equation, sides, tolerance):

@@ -63,7 +63,7 @@ CONTRACT = {
         ("point", "answer", "options", "time"),
     ),
     "equation": Function(
-        "for `survey prove`: (kind, [(end, z), ...]), Hill's equation in formulas for `survey/proof/checker.py`; "
+        "for `survey prove`: (kind, [(end, formulas ...), ...]), the equation for `survey/proof/checker.py`; "
         "`names`: for each parameter its name, or its value as a text; `ends`: {parameter: (least, largest value)}",
         ("names", "ends", "options"),
     ),

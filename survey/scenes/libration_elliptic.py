@@ -73,6 +73,13 @@ def solve(point, request):
     return {name: block.back(values) for name, values in out.items()}
 
 
+def equation(names, ends, options):
+    """The equation (3) of `libration_elliptic.md` in formulas (see `survey.scenes`)."""
+    mu, e = names["mu"], names["e"]
+    s, r = f"sqrt(1 - 3*{mu}*(1 - {mu}))", f"(1/(1 + {e}*cos(u)))"
+    return "reversible", [("pi", "1", "-1", f"1 - 3*(1 - {s})/2*{r}", f"3*(1 + {s})/2*{r} - 1", "1", "-1")]
+
+
 def trajectory(point, answer, options, time=None):
     """A planar orbit of the linear equations, from rest beside L4, and the multipliers (see `survey.scenes`)."""
     found, bars = motion.multipliers(*(float(answer[name]) for name in ("a", "a_error", "b", "b_error")))

@@ -21,11 +21,12 @@ from survey.sweep import dispatch
 
 CODES = {"undecided": -1, "unstable": 0, "stable": 1}
 LABELS = ("unstable", "stable")
-# of the solution on an edge, by the factor that is zero there: y1, y1', y2, y2', or 2 - D, 2 + D
+# of the solution on an edge, or of the curve through it, by the factor of `checker.KINDS` that is zero there
 EVEN_CLASSES = (("even_antiperiodic", 0), ("even_periodic", 2), ("odd_periodic", 3), ("odd_antiperiodic", 1))
-CLASSES = (("periodic", 0), ("antiperiodic", 1))
+REVERSIBLE_CLASSES = (("A", 0), ("C", 3), ("D", 4), ("B", 1), ("t", 5), ("two_minus_t", 6), ("KC", 2))
+CLASSES = {"even": EVEN_CLASSES, "periodic": (("periodic", 0), ("antiperiodic", 1)), "reversible": REVERSIBLE_CLASSES}
 DEEPEST = 20  # halvings of the rectangle
-START = 2  # of them, to make the parts that are proved one by one
+START = {"even": 2, "periodic": 2, "reversible": 0}  # of them, at least, to make the parts that are proved in turn
 FRACTION = 1e-3  # of the width of a cell: what the polynomials may leave out, in units of the factors
 ROW_PARTS = 8
 EDGE_WIDTH, EDGE_ULPS = 1e-13, 4  # of the intervals that enclose edges; the latter at the larger end
@@ -40,7 +41,9 @@ def equation_of(workflow):
         raise BadInput("prove: python-flint is missing; install it with pip install python-flint") from None
     scene = workflow.scene
     if not hasattr(scene, "equation"):
-        raise BadInput(f"prove: the scene {workflow.name} has no formulas to prove; choose mathieu or satellite")
+        raise BadInput(
+            f"prove: {workflow.name} has no formulas to prove; choose mathieu, satellite or libration_elliptic"
+        )
     names, ends = {}, {}
     for key, (_, values) in workflow.grid.parameters.items():
         ends[key] = float(np.min(values)), float(np.max(values))
@@ -97,7 +100,7 @@ def prover_of(workflow):
         bits, tolerance = ROW_BITS, FRACTION * width
     else:
         depths = [min(DEEPEST, max(0, math.ceil(math.log2(1 / x) - 1e-9))) for x, _ in workflow.refine.values()]
-        depth = max(0, min(depths) - START)
+        depth = max(0, min(depths) - START[kind])
         across, tolerance = [2 ** (halvings - depth) for halvings in depths], FRACTION * 0.5 ** max(depths)
         bits = search.BITS
     return Prover({"kind": kind, "pieces": pieces}, names, rectangle, across, depth, tolerance, bits)
@@ -244,7 +247,7 @@ def _describe_row(workflow, path, text):
     position = np.array([float((low + high) / 2) for _, low, high in cells])
     reach = [max(high - Fraction(x), Fraction(x) - low) for x, (_, low, high) in zip(position, cells, strict=True)]
     error = round_up(np.array([float(x) for x in reach]) * (1 + 2**-50))
-    classes = EVEN_CLASSES if certificate.equation.even else CLASSES
+    classes = CLASSES[certificate.equation.kind]
     kind = np.array([classes[checker.EDGES.index(letter)][1] for letter, *_ in cells], np.int8)
     parameter = next(p for p in workflow.scene.PARAMETERS if p.name == axis)
     named = {"units": parameter.units, "symbol": parameter.symbol}

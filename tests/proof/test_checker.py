@@ -17,15 +17,20 @@ import xarray as xr
 
 pytest.importorskip("flint")
 
+import danby_exact
 from flint import arb, ctx
 
 import survey
 from survey.proof import checker, search
+from survey.scenes import libration_elliptic
 from survey.sweep import proofs
 
 MATHIEU = ("even", [["pi/2", "a - 2*q*cos(2*u)"]], ["a", "q"])
 MEISSNER = ("periodic", [["1", "a + b"], ["5/2", "a - b"]], ["a", "b"])
+DANBY = (*(lambda kind, pieces: (kind, [list(piece) for piece in pieces]))(
+    *libration_elliptic.equation({"mu": "mu", "e": "e"}, {}, {})), ["mu", "e"])  # fmt: skip
 RECTANGLE = [["1", "4"], ["0.5", "3"]]
+STRIP = [["0.033", "0.041"], ["0.1", "0.104"]]  # of mu and e: A and KC cross it
 SIDES = [tuple(map(Fraction, side)) for side in RECTANGLE]
 DEPTH = 5
 
@@ -42,8 +47,8 @@ def proof(system="mathieu"):
         kind, pieces, names, rectangle = "even", [["pi/2", "a - 10*cos(2*u)"]], ["a"], [["1", "3"]]
         depth, tolerance = 40, 1e-15
     else:
-        kind, pieces, names = MATHIEU if system == "mathieu" else MEISSNER
-        rectangle, depth, tolerance = RECTANGLE, DEPTH, 1e-6
+        kind, pieces, names = {"mathieu": MATHIEU, "meissner": MEISSNER, "danby": DANBY}[system]
+        rectangle, depth, tolerance = STRIP if system == "danby" else RECTANGLE, DEPTH, 1e-6
     across, bits = [1] * len(names), 192 if system == "row" else search.BITS
     prover = proofs.Prover({"kind": kind, "pieces": pieces}, names, rectangle, across, depth, tolerance, bits)
     return proofs.certificate("a test", prover, *prover(0)[1])
@@ -81,6 +86,19 @@ def test_node_values_enclose_the_solutions():
             assert all(ball.rad() < sharp for ball in found)
 
 
+@pytest.mark.parametrize("mu, e", [("0.03", "0.4"), ("0.01", "0.9")])
+def test_node_values_enclose_danbys_factors(mu, e):
+    """Against Taylor series in mpmath that share nothing with the checker."""
+    equation, point = checker.Equation(*DANBY), {"mu": arb(mu), "e": arb(e)}
+    with mpmath.workdps(30):
+        truth = danby_exact.factors(mpmath.mpf(mu), mpmath.mpf(e), 16, 50)
+        t = truth["t"]
+        truth = [+truth[name] for name in "ACDBt"] + [2 - t, truth["KC"]]
+    found = equation.factors(equation.steps(point, 32), 32, point)
+    assert all(inside(ball, value) for ball, value in zip(found, truth, strict=True))
+    assert max(float(ball.rad()) for ball in found) < 1e-8
+
+
 def test_steps_of_few_terms_say_so():
     """With few terms the sums leave out much: the balls must be wide, and still contain the truth."""
     equation, point = checker.Equation(*MATHIEU), {"a": arb(2), "q": arb(1)}
@@ -89,11 +107,11 @@ def test_steps_of_few_terms_say_so():
     assert max(float(ball.rad()) for ball in found) > 1e-4
 
 
-def errors(number, system=MATHIEU, nodes=8):
-    """(true interpolation error, bound) of the four factors at random points of a panel."""
-    equation = checker.Equation(*system)
-    plan = search.plan(equation, SIDES, 1e-6) | {"nodes": [nodes, nodes], "order": 32}
-    panel = checker.Panel(equation, SIDES, plan)
+def errors(number, system=MATHIEU, rectangle=RECTANGLE, nodes=8):
+    """(true interpolation error, bound) of the factors at random points of a panel."""
+    equation, sides = checker.Equation(*system), [tuple(map(Fraction, side)) for side in rectangle]
+    plan = search.plan(equation, sides, 1e-6) | {"nodes": [nodes, nodes], "order": 32}
+    panel = checker.Panel(equation, sides, plan)
     tables, bounds, _ = zip(*panel.factors, strict=True)
     rng, order = np.random.default_rng(1), 40
     box = {name: centre + half * arb(0, 1) for name, (centre, half) in zip(equation.names, panel.sides, strict=True)}
@@ -107,16 +125,23 @@ def errors(number, system=MATHIEU, nodes=8):
 
 
 @pytest.mark.parametrize("number", [40, pytest.param(1000, marks=pytest.mark.slow)])
-def test_the_truncation_bound_exceeds_the_true_error(number):
-    ratios = [float(error / bound) for error, bound in errors(number)]
+@pytest.mark.parametrize(
+    "system, rectangle, nodes, least",
+    [(MATHIEU, RECTANGLE, 8, 1e-6), (DANBY, STRIP, 6, 1e-8)],
+    ids=["mathieu", "danby"],
+)
+def test_the_truncation_bound_exceeds_the_true_error(number, system, rectangle, nodes, least):
+    ratios = [float(error / bound) for error, bound in errors(number, system, rectangle, nodes)]
     assert max(ratios) < 1
-    assert max(ratios) > 1e-6  # a bound too small by 10^6 would fail above
+    assert max(ratios) > least  # a bound too small by so much would fail above
 
 
-def test_a_wrong_growth_is_found(monkeypatch):
+@pytest.mark.parametrize("arguments, wrong", [((40,), 10**6), ((10, DANBY, STRIP, 6), 10**5)], ids=["mathieu", "danby"])
+def test_a_wrong_growth_is_found(arguments, wrong, monkeypatch):
+    """Danby's factors are bounded by its second and fourth powers."""
     right = checker.growth
-    monkeypatch.setattr(checker, "growth", lambda arc, w: [bound / 10**6 for bound in right(arc, w)])
-    assert any(error > bound for error, bound in errors(40))
+    monkeypatch.setattr(checker, "growth", lambda arc, w: [bound / wrong for bound in right(arc, w)])
+    assert any(error > bound for error, bound in errors(*arguments))
 
 
 def slopes(nodes=8):
@@ -151,6 +176,17 @@ def test_a_certificate_is_proved():
     statement = checker.check(proof())
     assert "0 <= u <= pi/2" in statement and "1 <= a <= 4" in statement
     assert checker.Certificate(proof()).shares["o"] < 0.2
+
+
+def test_danbys_strip_is_proved():
+    """Against the package's own kernels; the strip between A and KC, which is thinner than the cells, is seen."""
+    statement = checker.check(proof("danby"))
+    assert (
+        "k22(u) = 1 - 3*(1 - sqrt(1 - 3*mu*(1 - mu)))/2*(1/(1 + e*cos(u)))" in statement and "L likewise" in statement
+    )
+    verdicts, mu, e = decided(proof("danby"), np.random.default_rng(4))
+    ds = survey.evaluate("libration_elliptic", mu=xr.DataArray(mu, dims="point"), e=xr.DataArray(e, dims="point"))
+    assert (ds.verdict == verdicts).all()
 
 
 def decided(text, rng):
@@ -222,7 +258,7 @@ def test_the_critical_amplitudes_that_the_documentation_prints(body, number, end
         assert (f" {radians} | {degrees} | " if body == "rod" else f"{radians} rad $= {degrees}^") in page
         error = Fraction(row["amplitude_error_rad"])
         assert low - error <= Fraction(row["amplitude_rad"]) <= high + error
-        assert row["class"] == dict(zip(checker.EDGES, (name for name, _ in proofs.EVEN_CLASSES), strict=True))[letter]
+        assert row["class"] == proofs.EVEN_CLASSES[checker.EDGES.index(letter)][0]
 
 
 def nearest(ball, digits):
@@ -317,6 +353,20 @@ MUTATIONS = {
     "another format": at("format", value="survey-certificate 9"),
     "no panels": at("panels", value={}),
 }
+STRIP_MUTATIONS = {
+    "a stable cell is called unstable": flipped("s", "u"),
+    "an unstable cell is called stable": flipped("u", "s"),
+    "an open cell is called stable": flipped("o", "s"),
+    "an open cell is called unstable": flipped("o", "u", -1),
+    "too few nodes": panels(nodes=[3, 3]),
+    "ellipses beyond e = 1": panels(ellipses=["2", "100"]),
+    "a rate that is far off": panels(rates=["1000", "1000"]),
+    "another entry": at("equation", "pieces", 0, 2, value="1"),
+    "an entry is missing": lambda data: data["equation"]["pieces"][0].pop(),
+    "a singular entry": at("equation", "pieces", 0, 3, value="1/(1 - cos(u))"),
+    "Hill's equation": at("equation", "kind", value="even"),
+    "another half period": at("equation", "pieces", 0, 0, value="3"),
+}
 ROW_MUTATIONS = {
     "an edge is called stable": flipped("1", "s"),
     "an edge is called unstable": flipped("1", "u"),
@@ -339,11 +389,22 @@ ROW_MUTATIONS = {
 }
 
 
-@pytest.mark.parametrize("system, what", [("mathieu", x) for x in MUTATIONS] + [("row", x) for x in ROW_MUTATIONS])
+ALL_MUTATIONS = {"mathieu": MUTATIONS, "danby": STRIP_MUTATIONS, "row": ROW_MUTATIONS}
+QUICK = {"a stable cell is called unstable", "an entry is missing", "a singular entry", "Hill's equation"}  # of danby
+
+
+@pytest.mark.parametrize(
+    "system, what",
+    [
+        pytest.param(system, what, marks=[pytest.mark.slow] * (system == "danby" and what not in QUICK))
+        for system, own in ALL_MUTATIONS.items()
+        for what in own
+    ],
+)
 def test_a_mutated_certificate_is_refused(system, what, tmp_path, capsys):
     """Each mutation is signed again, so that it is refused for what it states."""
     data = json.loads(proof(system))
-    (ROW_MUTATIONS if system == "row" else MUTATIONS)[what](data)
+    ALL_MUTATIONS[system][what](data)
     path = tmp_path / "mutated.cert"
     path.write_text(json.dumps(signed(data)))
     assert checker.main([str(path)]) == 1

@@ -1,5 +1,6 @@
 """`survey prove`: the file, the certificate, and what is refused."""
 
+import csv
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
@@ -15,6 +16,7 @@ import survey
 from survey import cli
 from survey.proof import checker
 from survey.request.workflow import check
+from survey.scenes import libration_elliptic
 from survey.sweep import dispatch, proofs
 
 MATHIEU = """
@@ -204,6 +206,20 @@ def test_the_edges_of_a_row_of_satellites():
         assert low - Fraction(float(error)) <= Fraction(float(edge)) <= high + Fraction(float(error))
 
 
+def test_the_edges_of_a_row_of_danbys_map():
+    """B, A and KC at e = 0.2, against the table made by another method."""
+    table = Path(__file__).parents[2] / "results" / "libration_elliptic_boundaries.csv"
+    listed = [row for row in csv.DictReader(table.read_text().splitlines()) if row["e"] == "0.2"]
+    text = row("libration_elliptic", "mu", [0.015, 0.0425], {"e": 0.2})
+    proved, statement = edges_of(text), checker.check(text)
+    assert "exactly 3 points" in statement and "det Y2 at pi is 0 once, unstable after it" in statement
+    assert [proofs.REVERSIBLE_CLASSES[checker.EDGES.index(letter)][0] for *_, letter in proved] == ["B", "A", "KC"]
+    for (low, high, _), name in zip(proved, ("B", "A", "KC"), strict=True):
+        [own] = [row for row in listed if row["curve"] == name]
+        mu, error = Fraction(own["mu"]), Fraction(own["mu_error"])
+        assert low - error <= mu <= high + error and high - low <= 1e-13
+
+
 def test_the_edges_of_a_row_by_command(here, capfd):
     (here / "row.toml").write_text(
         'scene = "mathieu"\n[axes]\na = { start = 1.0, stop = 4.5, num = 8 }\nq = 1.5\n[boundaries]\n'
@@ -235,7 +251,6 @@ def test_what_a_row_does_not_prove_is_open():
 @pytest.mark.parametrize("change, words", [
     ({"refine": None}, "add [refine]"),
     ({"refine": None, "boundaries": {}}, "give all but one as bare numbers"),
-    ({"scene": "libration_elliptic", "axes": {"mu": [0.01, 0.02], "e": [0.0, 0.1]}}, "no formulas to prove"),
     ({"scene": "satellite", "axes": {"k": [0.5, 1.5], "rho": [1.0, 2.0]}}, "separatrix"),
     ({"scene": "satellite", "axes": {"amplitude": [0.5, 1.5], "inertia_ratio": [0.5, 1.5]}}, "contains 1"),
 ])  # fmt: skip
@@ -245,6 +260,12 @@ def test_what_cannot_be_proved_is_refused_in_one_line(change, words):
     with pytest.raises(survey.BadInput) as error:
         proofs.equation_of(check({key: value for key, value in table.items() if value is not None}, proves=True))
     assert words in str(error.value) and "\n" not in str(error.value)
+
+
+def test_a_scene_without_formulas_is_refused_in_one_line(monkeypatch):
+    monkeypatch.delattr(libration_elliptic, "equation")
+    with pytest.raises(survey.BadInput, match="no formulas to prove; choose mathieu"):
+        prover("libration_elliptic", {"mu": [0.01, 0.02], "e": [0.0, 0.1]}, {})
 
 
 def test_without_flint_one_line_says_what_to_install(monkeypatch):
@@ -273,7 +294,7 @@ def test_parts_that_are_kept_are_not_proved_again(monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["mathieu_proved", "satellite_proved"])
+@pytest.mark.parametrize("name", ["mathieu_proved", "satellite_proved", "libration_elliptic_proved"])
 def test_the_areas_of_refine_lie_within_the_published_bounds(name, tmp_path):
     root = Path(__file__).parents[2]
     shares = checker.Certificate((root / "results" / f"{name}.cert").read_text()).shares
