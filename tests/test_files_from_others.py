@@ -65,6 +65,10 @@ def test_mutations_are_drawn_or_refused(folder):
     checked(folder, range(1000, 1004))
 
 
+def test_ticks_near_the_largest_number_warn_of_nothing(folder):
+    checked(folder, (30039,), "mathieu")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("part", range(20))
 def test_ten_thousand_mutations(folder, part):

@@ -26,7 +26,7 @@ MOST_LABELS = 30  # on an axis
 
 def save(ds, path, name=None, style=None, width="single"):
     """Draw variable `name` (the verdict, or the first output) of `ds` to `path` (PNG, PDF or SVG)."""
-    with matplotlib.rc_context(style_named(style).rc):
+    with matplotlib.rc_context(style_named(style).rc), np.errstate(over="ignore"):  # of ticks, near the largest number
         draw(ds, name, style, width).savefig(path, dpi=style_named(style).dpi)
 
 
