@@ -205,8 +205,8 @@ def why(answer):
         return f"the rate is compared with {named(answer, 'critical_rate')}"
     return {
         "stable": f"the moment is the {answer['place']} one: a combination of H and F3 has a strict extremum",
-        "unstable": f"the moment is the middle one: {named(answer, 'growth')}",
-        "undecided": "two moments are equal, or nothing turns the body back",
+        "unstable": f"{'the moment is the middle one: ' * (answer['place'] == 'middle')}{named(answer, 'growth')}",
+        "undecided": "two moments are equal, or nothing turns the body back, and deviations need not grow",
     }[str(answer["verdict"])]
 
 

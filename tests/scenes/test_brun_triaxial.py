@@ -108,6 +108,14 @@ def test_equal_moments_and_rest_without_field_are_left_open():
     assert int(ask("rotation", (1.0, 1.2, 1.5), epsilon=1.0, Omega=1.0, axis="B").verdict) == -1
 
 
+def test_equal_moments_are_unstable_where_deviations_grow_exponentially():
+    """Omega = 0, A = B = 3/2, C = 1, axis A: tilts about the axis of B obey B x'' = epsilon (A - C) x."""
+    ds = ask("rotation", (1.5, 1.5, 1.0), epsilon=[1.0, -1.0], Omega=0.0, axis="A")
+    assert ds.verdict.values.tolist() == [0, -1]
+    assert abs(float(ds.growth[0]) - np.sqrt(0.5 / 1.5)) <= float(ds.growth_error[0])
+    assert str(ds.isel(epsilon=0).survey.point()).splitlines()[2].startswith("why: growth = 0.57735")
+
+
 def test_no_body_has_such_moments():
     ds = ask("rotation", (1.0, 1.0, [2.0, 2.1]), epsilon=1.0, Omega=1.0)
     assert ds.status.values.tolist() == [0, 1] and ds.verdict.values[1] == -1

@@ -45,6 +45,7 @@ def rotation(inertia, epsilon, rate):
     verdict = np.where((place != 0.0) & ~needs & ~free_top, STABLE, verdict)
     verdict = np.where((place != 0.0) & needs, np.select([beyond > 0.0, beyond < 0.0], [STABLE, UNSTABLE], -1), verdict)
     growth, slow, fast = _modes(A2 * A3, b, two * three, _discriminant(A1, A2, A3, e, square, free), verdict)
+    verdict = np.where((verdict == UNDECIDED) & (growth.value > growth.bar), UNSTABLE, verdict)  # two equal moments
     zero, one = np.zeros_like(A1.value), np.ones_like(A1.value)
     known = integrals((A1, A2, A3), e, [bounded.of(x) for x in (np.asarray(rate, float) + zero, zero, zero)],
                       [bounded.of(x) for x in (one, zero, zero)])  # fmt: skip
