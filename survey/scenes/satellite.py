@@ -100,7 +100,7 @@ def cost(options, sizes):
 
 def solve(point, request):
     """All outputs of a block that the request wants (see `survey.scenes`)."""
-    if request.variables <= scattering.NAMES.keys():
+    if request.variables and request.variables <= scattering.NAMES.keys():
         return _passages(point, request)
     shared = moduli(point)
     if "rho" in point:
