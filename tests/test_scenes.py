@@ -79,6 +79,14 @@ def agree(one, other):
 
 
 each = pytest.mark.parametrize(("scene", "options"), list(questions()))
+
+
+def each_but(*slow):
+    """As `each`; these questions, whose kernels or points take long, are slow."""
+    marked = [pytest.param(*q.values, id=q.id, marks=pytest.mark.slow) if q.id in slow else q for q in questions()]
+    return pytest.mark.parametrize(("scene", "options"), marked)
+
+
 seeds = pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))])
 
 
@@ -111,7 +119,7 @@ def extremes(scene, options, seed, points=60):
     return point
 
 
-@each
+@each_but("brun", "gyrostat-fate", "gyrostat_integrable-elliptic")
 @seeds
 def test_every_point_has_outputs_bars_and_a_status(scene, options, seed):
     has_outputs_bars_and_a_status(evaluate(scene, options, draw(scene, options, seed)))
@@ -171,7 +179,7 @@ def test_one_bad_point_costs_one_point(scene, options):
         np.testing.assert_array_equal(good[name].values, bad.isel({axis: slice(0, -1)})[name].values)
 
 
-@each
+@each_but("gyrostat-fate", "brun_triaxial-trajectory")
 @seeds
 def test_the_methods_check_one_another(scene, options, seed):
     point = draw(scene, options, seed)

@@ -53,6 +53,7 @@ def scene(**given):
     return survey.floquet(**(usual | given))
 
 
+@pytest.mark.slow
 def test_every_command_takes_it(program, tmp_path, monkeypatch):
     (tmp_path / "mine.py").write_text(SCENE)
     (tmp_path / "mine.toml").write_text(WORKFLOW)

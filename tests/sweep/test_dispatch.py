@@ -273,6 +273,7 @@ def test_tasks_that_all_need_too_much_memory_stop_the_run(short_of_memory, in_ti
     assert heard.dead == [] and set(heard.results) and set(heard.results) <= {n * n for n in range(6)}
 
 
+@pytest.mark.slow
 def test_a_worker_that_pauses_for_lack_of_memory_is_restarted(short_of_memory, in_time, monkeypatch, caplog):
     monkeypatch.setattr(clusters, "PAUSED_SECONDS", 1)
 

@@ -28,6 +28,7 @@ from survey.request import schema, workflow
 DOCS = ROOT / "workflows/docs"
 PAGES = sorted(DOCS.glob("*.md"))
 NOTEBOOKS = sorted((ROOT / "workflows/notebooks").glob("*.ipynb"))
+COMPILING = {"own_equation", "damping"}  # pages whose examples compile for long
 each_page = pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
 
 
@@ -48,7 +49,9 @@ def tool(monkeypatch):
     return lambda name: __import__(name)
 
 
-@each_page
+@pytest.mark.parametrize(
+    "page", [pytest.param(p, id=p.stem, marks=[pytest.mark.slow] * (p.stem in COMPILING)) for p in PAGES]
+)
 def test_the_python_of_a_page_runs(page, folder):
     scope = {"__name__": "__main__"}
     for code in fenced(page.read_text(), "python"):

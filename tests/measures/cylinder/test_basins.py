@@ -115,6 +115,7 @@ def test_own_flows_are_told_alike(point):
     assert wrong == 0 and share > 0.8
 
 
+@pytest.mark.slow
 def test_curves_of_an_own_flow_on_a_map_of_states():
     """The junction's stable manifolds, over (phi0, w0), part the fates: at I = 0.5, a = 0.3 rest from rotation."""
     f, g = (lambda phi, p: -p[0]), (lambda phi, p: p[1] - np.sin(phi))
