@@ -232,9 +232,8 @@ def blocks(entries):
     return [[a, b], [b, c]], [[d, e], [e, f]]
 
 
-def norm(
-    matrix,
-):  # a bound of the norm of a symmetric matrix, as an operator in the maximum norm and in the Euclidean one
+def norm(matrix):
+    """A bound of a symmetric matrix's norm, as an operator in the maximum norm and in the Euclidean one."""
     return reduce(arb.max, (sum((x.abs_upper() for x in row), arb(0)) for row in matrix))
 
 

@@ -98,9 +98,14 @@ def cost(options, sizes):
     return monodromy.cost(rows, max(sizes.get(name, 1) for name in ("rho", "inertia_ratio")))
 
 
+def _separatrix_alone(variables):
+    """Whether only outputs of the motion on the separatrix are requested; none named means all outputs."""
+    return bool(variables) and set(variables) <= scattering.NAMES.keys()
+
+
 def solve(point, request):
     """All outputs of a block that the request wants (see `survey.scenes`)."""
-    if request.variables and request.variables <= scattering.NAMES.keys():
+    if _separatrix_alone(request.variables):
         return _passages(point, request)
     shared = moduli(point)
     if "rho" in point:
@@ -166,7 +171,7 @@ def _rotates(names, ends):
 
 def compile_ahead(variables):
     """Compile some of the kernels of a map of these variables (see `survey.scenes`)."""
-    if not set(variables) <= scattering.NAMES.keys():
+    if not _separatrix_alone(variables):
         dense.compile_ahead(sample, np.empty((0, 6)), variables)
 
 

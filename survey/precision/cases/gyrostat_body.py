@@ -20,16 +20,16 @@ _QUESTION = {"question": "trajectory"}
 _KEYS = tuple(ENTRIES)
 
 
-def _bodies(number, seed):
-    random = np.random.default_rng(seed)
-    shape, tensors = random.normal(size=(number, 3, 3)), random.normal(size=(2, number, len(_KEYS)))
+def _bodies():
+    random = np.random.default_rng(1)
+    shape, tensors = random.normal(size=(NUMBER, 3, 3)), random.normal(size=(2, NUMBER, len(_KEYS)))
     A = np.eye(3) + 0.2 * shape @ shape.swapaxes(1, 2)
     entries = [[A[:, i, j] for i, j in ENTRIES.values()], *(0.3 * part.T for part in tensors)]
     values = {
         f"{name}{key}": v for name, part in zip("ABC", entries, strict=True) for key, v in zip(_KEYS, part, strict=True)
     }
     for name, size in (("lambda", 0.5), ("s", 0.5), ("omega", 1.0), ("gamma", 1.0)):
-        values |= {f"{name}{i}": v for i, v in enumerate(size * random.normal(size=(3, number)), 1)}
+        values |= {f"{name}{i}": v for i, v in enumerate(size * random.normal(size=(3, NUMBER)), 1)}
     return {name: values[name] for name in NAMES}
 
 
@@ -46,7 +46,7 @@ def references(_work=None):
 
 def works():
     """Bodies that share nothing, at the last time; fewer of them at all times."""
-    bodies = _bodies(NUMBER, 1)
+    bodies = _bodies()
     rows = {name: values[:100, None] for name, values in bodies.items()}
     dense = rows | {"t": np.linspace(0.0, LAST, TIMES + 1)[None, 1:]}
     return {"one time": (bodies | {"t": np.full(NUMBER, LAST)}, _QUESTION), f"{TIMES} times": (dense, _QUESTION)}
