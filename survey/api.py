@@ -19,9 +19,8 @@ from survey.file.labels import count, counts, flag_codes, layout, percent
 from survey.file.labels import describe as labelled
 from survey.grid import Grid, fixed, lines
 from survey.request import earlier, physical, trust, user_scene
-from survey.request.checks import check_options, check_parameters, check_request, methods_of
+from survey.request.checks import check_options, check_parameters, check_request, is_number, methods_of
 from survey.request.function_scene import FunctionScene
-from survey.request.hill_scene import is_number
 from survey.request.workflow import check, read
 from survey.scene import Option, Output, Parameter, Request, condition, exists
 from survey.sweep import announce, engine, solve

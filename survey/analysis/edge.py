@@ -11,10 +11,9 @@ from survey.analysis.given import options_at, parameters
 from survey.errors import BadInput
 from survey.file.labels import flag_attributes
 from survey.request import user_scene
-from survey.request.checks import check_options, check_parameters
+from survey.request.checks import check_options, check_parameters, is_number
 from survey.request.edges_and_cells import check_even
 from survey.request.function_scene import FunctionScene
-from survey.request.hill_scene import is_number
 from survey.scene import plus_minus
 from survey.sweep import boundaries
 from survey.wording import shown

@@ -10,8 +10,8 @@ from survey.measures.cylinder import basins, blocks, equation, orbit, solution
 from survey.measures.cylinder.fate import MOST_OF_PROGRAM
 from survey.measures.hill.multiprecision import Unsupported
 from survey.modules import load
-from survey.request.function_scene import FunctionScene
-from survey.request.hill_scene import is_number, reason
+from survey.request.checks import is_number
+from survey.request.function_scene import FunctionScene, reason
 from survey.scene import Option, Output, Request, named
 from survey.scenes import gyrostat
 

@@ -5,6 +5,8 @@
 
 from numbers import Real
 
+import numpy as np
+
 import survey.methods
 from survey import measures, modules
 from survey.errors import BadInput
@@ -124,3 +126,8 @@ def _fits(scene, method, options):
     if options is None:
         return all(name in own or "" in allowed for name, allowed in when.items())
     return all(options.get(name, "") in allowed for name, allowed in when.items())
+
+
+def is_number(value):
+    """Is it a real number, and not a truth value?"""
+    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)

@@ -12,6 +12,8 @@ from survey.scene import Parameter
 from survey.wording import plain
 
 _KEYS = re.compile(r"\b(PARAMETERS|PERIOD|EVEN|BREAKS|STATES|STRUCTURE|CONSERVED|START|CONTINUATION|DAMPING)\b")
+# Beginnings of those lines of numba's messages that do not say what is wrong.
+CHATTER = ("Failed in", "During", "This error", "There are", "- Of which", "Overload", "File ", "Unknown", "^", "[1]")
 _known = {}  # by hash: a worker process compiles a scene once, for all of its blocks
 
 
@@ -86,6 +88,12 @@ class FunctionScene:
 def refusal(name, message):
     """The BadInput of a scene: what its file calls EVEN is `even` to who gave it to `survey.hill`, and so on."""
     return BadInput(f"{name}: {message if name.endswith('.py') else _KEYS.sub(lambda key: key[0].lower(), message)}")
+
+
+def reason(error):
+    """The line of a many-line message that says what is wrong."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    return next((line for line in lines if not line.startswith(CHATTER)), type(error).__name__)
 
 
 def _restored(kind, digest, values):

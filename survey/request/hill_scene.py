@@ -13,7 +13,8 @@ from survey.kernels.math.roundoff import EPS
 from survey.measures.hill import dependence, monodromy, motion, multiprecision, user_equation, user_rows, why
 from survey.measures.rows import Rows
 from survey.proof import formulas
-from survey.request.function_scene import FunctionScene
+from survey.request.checks import is_number
+from survey.request.function_scene import FunctionScene, reason
 
 LONG_NAMES = {
     "y1": "y1(T), where y1(0) = 1, y1'(0) = 0",
@@ -26,8 +27,6 @@ SYMBOLS = {"y1": "y_1(T)", "y2": "y_2(T)", "dy1": "y_1'(T)", "dy2": "y_2'(T)"}
 SAME = 8 * user_equation.SLACK
 # Points of an axis from which on rows pay.
 LANES = 8
-# Beginnings of those lines of numba's messages that do not say what is wrong.
-CHATTER = ("Failed in", "During", "This error", "There are", "- Of which", "Overload", "File ", "Unknown", "^", "[1]")
 # Meaning of two of the common codes here.
 STATUS = {
     "invalid_parameters": "outside the domain, or z or T is not finite there, or z is not even although EVEN = True",
@@ -413,14 +412,3 @@ def _at_full_period(output):
         if output.name in LONG_NAMES
         else output
     )
-
-
-def is_number(value):
-    """Is it a real number, and not a truth value?"""
-    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-
-
-def reason(error):
-    """The line of a many-line message that says what is wrong."""
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    return next((line for line in lines if not line.startswith(CHATTER)), type(error).__name__)

@@ -4,8 +4,7 @@ import numpy as np
 
 from survey.measures.floquet.system import Raised
 from survey.measures.floquet.trace import Unsupported
-from survey.request.function_scene import FunctionScene
-from survey.request.hill_scene import reason
+from survey.request.function_scene import FunctionScene, reason
 
 
 class TracedScene(FunctionScene):

@@ -85,19 +85,19 @@ import numpy as np
 import numpy.typing as npt
 
 from survey.errors import BadInput, Untrusted
-from survey.measures.hill import monodromy
 from survey.request import trust
-from survey.request.function_scene import FunctionScene, refusal
-from survey.request.hill_scene import SAME, HillScene, is_number, reason
+from survey.request.checks import is_number
+from survey.request.function_scene import FunctionScene, reason, refusal
 from survey.scene import Parameter
 from survey.scenes import load
 from survey.wording import reason_of, short, shown
 
-# The other scenes, and the measures behind them, are imported when one is made: most runs need none.
+# These scenes, and the measures behind them, are imported when one is made: most runs need none.
 if TYPE_CHECKING:
     from survey.request.abel_scene import AbelScene
     from survey.request.damped_scene import DampedScene
     from survey.request.floquet_scene import FloquetScene
+    from survey.request.hill_scene import HillScene
     from survey.request.orbit_scene import OrbitScene
 
 EXAMPLES = {
@@ -457,6 +457,8 @@ def _hill(
     name: str, text: str, title: str | None, about: str | None, references: Iterable[str],
 ) -> HillScene | DampedScene:  # fmt: skip
     """The checked scene; raises BadInput."""
+    from survey.measures.hill import monodromy
+    from survey.request.hill_scene import HillScene
 
     def refuse(message: str) -> NoReturn:
         raise refusal(name, message)
@@ -654,6 +656,8 @@ def _state_names(states: Any, refuse: Callable[[str], NoReturn]) -> tuple[str, .
 
 def _checked_breaks(breaks: Any, period: Any, refuse: Callable[[str], NoReturn]) -> Any:
     """Positions in [0, T] as a tuple, or the function that returns them."""
+    from survey.request.hill_scene import SAME
+
     if callable(breaks):
         return breaks
     try:

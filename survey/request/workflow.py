@@ -15,10 +15,9 @@ from survey.errors import BadInput
 from survey.grid import Grid
 from survey.request import physical, user_scene
 from survey.request.axes import as_float, check_domain, check_size, grid_of, values_of
-from survey.request.checks import check_options, check_parameters, check_request, unknown_parameter
+from survey.request.checks import check_options, check_parameters, check_request, is_number, unknown_parameter
 from survey.request.edges_and_cells import check_boundaries, check_refine
 from survey.request.function_scene import FunctionScene
-from survey.request.hill_scene import is_number
 from survey.request.output_path import check_path
 from survey.request.schema import File, complaint
 from survey.scene import Request

@@ -1,6 +1,6 @@
 """What [boundaries] and [refine] add to the file of a map: edges of tongues and curves, and cells."""
 
-from survey.sweep import boundaries, dispatch, proofs, refine
+from survey.sweep import boundaries, dispatch, refine
 
 
 def find(workflow, once, progress=None):
@@ -9,6 +9,8 @@ def find(workflow, once, progress=None):
     if "edges" in parts and not (workflow.proves and workflow.refine is None):
         found.append(parts["edges"].find(workflow, _on_threads(progress), once))
     if workflow.proves:
+        from survey.sweep import proofs  # most runs prove nothing
+
         found.append(proofs.find(workflow, once, progress))
     elif "cells" in parts:
         found.append(parts["cells"].find(workflow, _on_threads(), once, getattr(progress, "refining", None)))
