@@ -383,6 +383,7 @@ def test_a_home_that_cannot_be_written_is_fine(folder):
     assert running.returncode == 0 and "status: ok: 4" in stderr, stderr
 
 
+@pytest.mark.slow
 def test_two_processes_fill_one_empty_kernel_cache(folder):
     environment = os.environ | {"NUMBA_CACHE_DIR": str(folder / "cache")}
     small = ["--set", "axes.w0.num=2", "--set", "axes.phi0.num=2"]

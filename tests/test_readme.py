@@ -90,12 +90,14 @@ def test_the_scene_of_ones_own_runs(tmp_path, monkeypatch):
     assert int(ds.verdict) == 1 and ds.attrs["title"].startswith("Mathieu's equation with a second harmonic")
 
 
+@pytest.mark.slow
 def test_the_abel_equations_of_ones_own_run(capsys):
     scope = {}
     exec(fenced("python")[3], scope)
     assert capsys.readouterr().out == "[0. 1.]\n" and (scope["ds"].status == 0).all()
 
 
+@pytest.mark.slow
 def test_the_example_of_the_josephson_junction_runs(tmp_path):
     small = ["axes.a={values=[0.1, 0.5]}", "axes.I={values=[0.1, 0.3, 0.9]}", "output.figures=[]"]
     checked = workflow.read(ROOT / "workflows/josephson.toml", small, tmp_path / "small.nc")

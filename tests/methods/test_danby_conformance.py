@@ -83,6 +83,7 @@ def wrong_chain(v, h, e, d1, d2, out):
     lanes.chain(wrong_columns, len(rk4.NODES) + 5, v, h, e, d1, d2, out)
 
 
+@pytest.mark.slow
 def test_the_checks_see_a_broken_method():
     """A Runge-Kutta step with an error of h^3 in one entry claims order 4 and bars that do not hold."""
     assert not bars_hold(rk4.NODES, wrong_chain)

@@ -81,6 +81,7 @@ def test_the_hash_tells_of_all_that_the_functions_depend_on():
     assert swapped.HASH != first
 
 
+@pytest.mark.slow
 def test_functions_from_python_run_in_other_processes(tmp_path):
     given = {"scene": scene(), "axes": {"mu": {"values": [0.5, 1.0]}, "phi0": 2.0, "phi": {"values": [0.0, 1.0]}}}
     given["options"] = {"question": "abel"}

@@ -35,7 +35,7 @@ def by_scipy(a, q, c):
 POINTS = [(1.0, 0.3, 0.05), (1.0, 0.3, 0.2), (2.5, 0.4, 0.1), (0.9, 0.5, -0.1), (4.1, 2.0, 0.01), (-0.3, 0.2, 0.3)]
 
 
-@pytest.mark.parametrize("point", POINTS)
+@pytest.mark.parametrize("point", [*POINTS[:2], *(pytest.param(point, marks=pytest.mark.slow) for point in POINTS[2:])])
 def test_trace_exponent_and_verdict_are_those_of_the_damped_equation(point):
     a, q, c = point
     trace, growth = by_scipy(a, q, c)

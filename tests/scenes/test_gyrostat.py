@@ -123,7 +123,7 @@ def test_fates_over_a_parameter():
         assert np.array_equal(np.isfinite(out[name]), np.isfinite(out[f"{name}_error"]))
 
 
-@pytest.mark.parametrize("method", ["rk4", "dop853"])
+@pytest.mark.parametrize("method", [pytest.param("rk4", marks=pytest.mark.slow), "dop853"])
 def test_methods_agree_on_fates(method):
     phi0, w0 = grid(3, 4)
     best, other = solve("fate", phi0=phi0, w0=w0), solve("fate", method, 1e-7, phi0=phi0, w0=w0)
@@ -147,6 +147,7 @@ print(json.dumps({q + k: float(np.ravel(v)[0]) for q, o in all_of for k, v in o.
 """
 
 
+@pytest.mark.slow
 def test_plain_python_gives_the_same_bits():
     texts = []
     for off in ("0", "1"):

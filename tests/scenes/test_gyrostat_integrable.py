@@ -107,6 +107,7 @@ def test_61_solves_57(root):
     assert seen > 10
 
 
+@pytest.mark.slow
 def test_b_0_against_the_quartic():
     """a_i, invariants, roots and period in 40 digits from the paper's formulas, and the motion by Taylor series."""
     random, kinds = np.random.default_rng(3), set()

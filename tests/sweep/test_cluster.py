@@ -239,6 +239,7 @@ def test_workers_that_see_another_disk_send_their_blocks(scheduler, small, surve
     xr.testing.assert_equal(*(xr.load_dataset(path).drop_attrs() for path in (surveyed, away / "small.nc")))
 
 
+@pytest.mark.slow
 def test_a_cluster_with_an_edited_survey_is_refused(scheduler, small):
     file, processes = scheduler
     shutil.copytree(Path(survey.__file__).parent, file.parent / "other" / "survey")
@@ -281,6 +282,7 @@ def test_the_batch_script_says_what_is_missing_instead_of_waiting(small):
     assert running.returncode == 3 and "is not on PATH: activate the environment" in stderr
 
 
+@pytest.mark.slow
 def test_the_batch_script_runs_a_sweep(small, surveyed):
     running = queue(small.parent)
     stderr = running.communicate(timeout=180)[1]

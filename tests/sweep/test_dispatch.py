@@ -256,6 +256,7 @@ def test_a_task_that_needs_too_much_memory_costs_itself_alone(short_of_memory, i
     assert heard.dead == [4] and sorted(heard.results) == sorted(n * n if n != 4 else -4 for n in NUMBERS)
 
 
+@pytest.mark.slow
 def test_tasks_that_all_need_too_much_memory_stop_the_run(short_of_memory, in_time, monkeypatch):
     monkeypatch.setattr(clusters, "WORKERLESS_SECONDS", 5)
 

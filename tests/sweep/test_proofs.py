@@ -196,6 +196,7 @@ def test_the_edges_of_a_row_are_those_of_meissner(here):
         assert low < value < high and high - low <= 1e-13 and letter == expected
 
 
+@pytest.mark.slow
 def test_the_edges_of_a_row_of_satellites():
     """Against the Fourier series of `survey.edge`, which knows nothing of formulas in the angle."""
     proved = edges_of(row("satellite", "amplitude", [0.5, 0.9], {"inertia_ratio": 0.6}))

@@ -90,6 +90,7 @@ def test_a_map_whose_series_take_the_whole_axis_is_solved_anew(tmp_path, monkeyp
     assert "on a map, its values depend on all of the axis rho" in told or "has other bits on this map" in told
 
 
+@pytest.mark.slow
 def test_fates_of_few_systems_are_not_taken_for_a_map_of_many(tmp_path, monkeypatch):
     """Maps of 1,000 starts find the curves between basins for as many as 8 systems: 9 have other bits."""
     monkeypatch.chdir(tmp_path)

@@ -128,6 +128,7 @@ def floquet_rows(kind, number):
     return np.column_stack(list(batch.given.values())), [found[2] for found in seen]
 
 
+@pytest.mark.slow
 def test_truth_of_linear_periodic_systems():
     """exp(G B) by mpmath, and damped Mathieu equations by its Taylor series, 30 digits."""
     with mp.workdps(50):
@@ -158,6 +159,7 @@ def test_truth_of_danbys_map():
     assert danby.solved(*(0.04699080701821065, 0.31450715975493514))[0, [0, 2]] == pytest.approx([-4, 6], abs=1e-13)
 
 
+@pytest.mark.slow
 def test_truth_of_a_gyrostat():
     p = [0.7, -0.4, 1.1, 0.3, 0.5, -0.2, 1.5, 0.8, 4.0]
     with mp.workdps(34):
@@ -180,6 +182,7 @@ def test_truth_of_a_gyrostat():
         assert abs(back[0, 0] - 1.9) < 1e-15 and abs(back[0, 2] - along[0, 0]) < 1e-15
 
 
+@pytest.mark.slow
 def test_truth_of_bruns_problem():
     """Against elliptic integrals at 60 digits."""
     state = np.array([2.0, 1.0, 0.6, 1.1, 0.5, 1.3, 0.9])

@@ -9,6 +9,7 @@ pytest.importorskip("scipy")
 import models
 
 
+@pytest.mark.slow
 def test_full_and_reduced_models_agree(tmp_path, monkeypatch):
     monkeypatch.setattr("sys.argv", ["models", "-o", str(tmp_path), "--points", "40"])
     models.main()

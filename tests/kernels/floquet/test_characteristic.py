@@ -41,7 +41,7 @@ def inside(answer, exact):
     return off[rows, columns].max()
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 4, 7, 12])
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 7, pytest.param(12, marks=pytest.mark.slow)])
 def test_roots_of_all_polynomials_within_the_doubts(n):
     rng, served, worst = np.random.default_rng(n), 0, 0.0
     for _ in range(60):

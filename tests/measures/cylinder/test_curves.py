@@ -74,7 +74,9 @@ def distances(six, near, side, points, time):
     return off
 
 
-@pytest.mark.parametrize("fixed", SYSTEMS)
+@pytest.mark.parametrize(
+    "fixed", [*(pytest.param(system, marks=pytest.mark.slow) for system in SYSTEMS[:-1]), SYSTEMS[-1]]
+)
 def test_stable_manifolds_lie_where_long_integration_has_them(fixed):
     six, checked = [fixed[name] for name in SYSTEM], 0
     with mp.workdps(35):

@@ -44,6 +44,7 @@ def shot(F, w, x):
     return y[:2], y[2:].reshape(2, 2)
 
 
+@pytest.mark.slow
 def test_duffings_three_orbits_against_scipy():
     """Newton's method from a lattice of starts finds no orbit that the curves do not, and the same states."""
     w = np.array([1.2, 1.9, 2.3])

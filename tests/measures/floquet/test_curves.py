@@ -152,6 +152,7 @@ def danby():
     return survey.floquet(A, period=2 * math.pi, parameters=("mu", "e"), states=states, structure="symplectic")
 
 
+@pytest.mark.slow
 def test_danbys_curves():
     axes = {"mu": (0.001, 0.0532), "e": (0.0, 0.5)}
     square = [(name, *ends) for name, ends in axes.items()]
