@@ -10,7 +10,7 @@ Source: A. P. Markeev, Libration Points (1978), ch. 8; algorithm: `kernels/libra
 import numpy as np
 
 from survey.kernels.libration.lie import normal_forms
-from survey.kernels.libration.lie_plan import plan
+from survey.kernels.libration.lie_plan import solved
 from survey.kernels.libration.monomials import monomials
 
 ORDER = 0  # no steps: each order's sum is finite
@@ -19,7 +19,7 @@ SERVES = ("normal_form",)
 
 def coefficients(mu, order):
     """Values and bars (M, N) of the M coefficients named by `labels(order)`, any even order >= 4, at N values of mu."""
-    values, _norms = _solve(mu, order)
+    values, _norms = solved(normal_forms, mu, order)
     return values[0], values[2]
 
 
@@ -39,13 +39,4 @@ def remainders(mu, order):
     The norm for r_j is the sum over monomials of |k_j| |coefficient|, so that these terms change r_j by at most
     norm rho^d per unit of time where all |z_j| <= rho, r_j = |z_j|^2. r = 2: before the first step.
     """
-    _values, norms = _solve(mu, order, True)
-    return dict(zip(plan(order, True).measured, norms, strict=True))
-
-
-def _solve(mu, order, remainders=False):
-    """(values (3, M, N), norms (., 2, 3, N)) as `kernels.libration.lie.normal_forms` gives them."""
-    what, mu = plan(order, remainders), np.ascontiguousarray(mu, dtype=float)
-    values, norms = np.empty((3, len(what.diagonal), mu.size)), np.empty((len(what.measured), 2, 3, mu.size))
-    normal_forms(*what[:6], mu, values, norms)
-    return values, norms
+    return solved(normal_forms, mu, order, True)[1]

@@ -36,7 +36,8 @@ Source: A. P. Markeev, Libration Points in Celestial Mechanics and Cosmodynamics
 and corrected in `libration.md` beside this file, whose equation numbers are used; planar coefficients: A. Deprit, A.
 Deprit-Bartholome, Astronomical Journal 72 (1967) 173; K. R. Meyer, D. S. Schmidt, J. Differential Equations 62 (1986).
 
-`auto` takes closed forms in float64, and in double-double where `rtol` is missed or the verdict is left open.
+`auto` takes closed forms in float64, and in double-double where `rtol` is missed or the verdict is left open; orders 8
+and 10 by Lie series in float64, and in double-double where `rtol` is missed.
 """
 
 import numpy as np
@@ -77,9 +78,7 @@ _VERDICTS = {
     "boundary": normal_form.BOUNDARY,
 }
 _BELOW = "at mu < mu_R = 0.0385208965..."
-_SERIES = (
-    _BELOW + ", where the series keep digits: not at mu -> 0, within 4e-15 of mu_R, or within 1e-12 of a resonance"
-)
+_SERIES = _BELOW + ", where the series keep digits: not at mu -> 0, next to mu_R, or with a divisor below 1e-20"
 OUTPUTS = (
     Output("omega1", "greater frequency in the plane", r"\omega_1", applies=_BELOW),
     Output("omega2", "smaller frequency in the plane (of negative energy)", r"\omega_2", applies=_BELOW),
@@ -136,7 +135,7 @@ def solve(point, request):
     order = int(request.options["order"])
     if order in higher.ORDERS:
         periods = np.broadcast_to(point["periods"], shape).ravel()
-        more = higher.solve(mu, np.where(periods >= 1.0, periods, 1.0), order)
+        more = higher.solve(mu, np.where(periods >= 1.0, periods, 1.0), order, request.method, request.rtol)
         good = (answer["status"] == status.OK) & np.isfinite(periods)
         for name, values in more.items():
             none = -1 if values.dtype.kind == "i" else np.nan

@@ -42,8 +42,8 @@ def test_the_errors_of_a_chart_are_what_was_asked(name, quick, monkeypatch, tmp_
     assert {r.work for r in records if r.method == "auto"} == set(works)
     series = {"lie"} if name == "libration" else set()  # loses digits towards mu = 0 and poles, and says so in its bars
     for r in records:
-        if name == "libration_orders":
-            assert r.error < 1e-6  # what the series' cancellation leaves, in float64
+        if name == "libration_orders" and r.method == "lie":
+            assert SETTING < r.error < 1e-6  # what the series' cancellation leaves, in float64
         elif r.method not in series:
             assert r.error <= SETTING and r.wrong_verdicts == 0, r
     machine = {"least": [], "missing_peers": [], "cpu": "a core", "load": (1.0, 1.0, 1.0), "entry": "scene.solve"}

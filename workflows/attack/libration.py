@@ -6,7 +6,7 @@ from attack.compare import Batch
 from attack.hill import accuracy, beside
 from survey.truth.libration import truth
 
-METHODS = ("auto", "auto", "rational", "rational_double", "lie")
+METHODS = ("auto", "auto", "rational", "rational_double", "lie", "lie_double")
 CRITICAL = (0.0385208965045513970786520697274, 0.0242938971420523216662227326885, 0.0135160160224525267555750091159,
             0.0109136676772006628897436975729, 0.0163767553558164932157833667016, 0.00278347576233486111776847984938,
             0.0285954792089683170661037585968)  # fmt: skip

@@ -120,7 +120,7 @@ def run(code, indices, numbers, divisors, big, norms, lane, count):
                     big[target + indices[0, t]], big[source + indices[1, t]], divisors[indices[2, t]], numbers[0, t]
                 )
         else:
-            _measure(big, source, indices, first, last, norms[target, :, :, lane : lane + count])
+            measure(big, source, indices, first, last, norms[target, :, :, lane : lane + count], RE, IM, BAR)
 
 
 @inline
@@ -166,16 +166,16 @@ def _divide(out, f, divisor, sign):
 
 
 @inline
-def _measure(big, source, weights, first, last, out):
-    """Sums over a degree's monomials, both conjugates, of |k_j| |F|, and their bars."""
+def measure(big, source, weights, first, last, out, real, imaginary, bar):
+    """Sums over a degree's monomials, both conjugates, of |k_j| |F|, and their bars; where a row's parts begin."""
     out[:] = 0.0
     for t in range(first, last):
         row = big[source + np.uint64(t - first)]
         for j in range(3):
             weight = 2.0 * float(weights[j, t])
             for i in range(out.shape[2]):
-                out[0, j, i] += weight * sqrt(row[RE + i] * row[RE + i] + row[IM + i] * row[IM + i])
-                out[1, j, i] += weight * row[BAR + i]
+                out[0, j, i] += weight * sqrt(row[real + i] * row[real + i] + row[imaginary + i] * row[imaginary + i])
+                out[1, j, i] += weight * row[bar + i]
     for j in range(3):
         for i in range(out.shape[2]):
             out[1, j, i] = out[1, j, i] * SLACK + (last - first + 4) * ROUNDOFF * out[0, j, i]

@@ -12,7 +12,7 @@ Sources: A. Deprit, Cel. Mech. 1 (1969) 12; A. J. Dragt, J. M. Finn, J. Math. Ph
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache
-from math import comb, factorial, sqrt
+from math import comb, factorial, isqrt, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +22,7 @@ from survey.kernels.libration.monomials import brackets, monomials, norm, produc
 CLEAR, MULTIPLY, LINEAR, FINISH, DIVIDE, MEASURE = range(6)
 XI, ETA, DELTA, ONE, WORK = 0, 4, 8, 9, 10  # the rows set before the first operation, and the first other one
 NONE = -1
+SQRT_3 = Fraction(isqrt(3 * 10**80), 10**40)  # 40 digits
 
 
 class Plan(NamedTuple):
@@ -29,7 +30,9 @@ class Plan(NamedTuple):
 
     code: np.ndarray  # (n, 6): operation; rows of target, source and factor; first and last of the terms
     indices: np.ndarray  # (3, T) of the terms
-    numbers: np.ndarray  # (2, T)
+    numbers: (
+        np.ndarray
+    )  # (2, T): of a product its factor and the sign of f; of a multiple its factor and what that lacks
     harmonics: np.ndarray  # (m, 3) of the divisors
     diagonal: np.ndarray  # rows of the normal form's coefficients
     rows: int
@@ -76,7 +79,8 @@ class Draft:
         if stop > start and number != 0.0:
             at = np.arange(start, stop)
             zero = np.zeros(len(at))
-            first, last = self.hold((target + at, source + at, zero), (zero + float(number), zero))
+            pair = zero + float(number), zero + float(number - Fraction(float(number)))
+            first, last = self.hold((target + at, source + at, zero), pair)
             self.add(LINEAR, 0, 0, 0, first, last)
 
     def plan(self, diagonal):
@@ -140,6 +144,14 @@ def plan(order, remainders=False):
             transform(out, stage, degree, need[stage][degree], F, chi, parts)
         measure(out, stage, top, F, remainders)
     return out.plan(np.concatenate([F[d] + np.arange(rows(d, 0)) for d in range(4, order + 1, 2)]))
+
+
+def solved(normal_forms, mu, order, remainders=False):
+    """What a kernel like `lie.normal_forms` gives at mu (N): values (3, M, N), {(stage, degree): norms (2, 3, N)}."""
+    what, mu = plan(order, remainders), np.ascontiguousarray(mu, dtype=float)
+    values, norms = np.empty((3, len(what.diagonal), mu.size)), np.empty((len(what.measured), 2, 3, mu.size))
+    normal_forms(*what[:6], mu, values, norms)
+    return values, dict(zip(what.measured, norms, strict=True))
 
 
 def rows(degree, cutoff):
@@ -249,16 +261,20 @@ def _collect(out, n, m, target, count, powers):
     row = planar.row[planar.find(flat)]
     spread = np.array([comb(2 * half, int(p)) for p in full[:, 2]]) / 2.0**half
     for i in range(m + 1):
-        number = potential(n, i, m - i)
-        if number != 0.0 and len(at):
-            zero = np.zeros(len(at))
-            first, last = out.hold((target + at, powers[i] + row, zero), (number * spread, zero))
+        rational, root = potential(n, i, m - i)
+        if rational != 0 and len(at):
+            number = float(rational) * (sqrt(3.0) if root else 1.0) * spread
+            exact = rational * (SQRT_3 if root else 1)
+            low = [float(exact * Fraction(share) - Fraction(high)) for share, high in zip(spread, number, strict=True)]
+            first, last = out.hold((target + at, powers[i] + row, np.zeros(len(at))), (number, low))
             out.add(LINEAR, 0, 0, 0, first, last)
 
 
 @cache
 def potential(n, i, j):
     """Coefficient of xi^i eta^j zeta^(n - i - j) in H_n, n >= 3, without the factor delta = 1 - 2 mu of odd i.
+
+    A rational number, and whether sqrt(3) is to multiply it.
 
     H_n = -(-1)^n [(1 - mu) R_n(s) + mu R_n(s')], s = xi/2 + sqrt(3) eta/2, s' = s with -xi, R_n = |q|^n P_n(s/|q|).
     """
@@ -275,4 +291,4 @@ def potential(n, i, j):
             power = n - 2 * t - (i - 2 * a)  # of eta in s^(n - 2 t); its sqrt 3 come in pairs but for one
             spread = Fraction(factorial(t), factorial(a) * factorial(b) * factorial(c))
             total += legendre * spread * comb(n - 2 * t, power) * Fraction(3 ** (power // 2), 2 ** (n - 2 * t))
-    return -((-1) ** n) * float(total) * (sqrt(3.0) if j % 2 else 1.0)
+    return -((-1) ** n) * total, j % 2 == 1

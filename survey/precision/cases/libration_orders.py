@@ -11,7 +11,7 @@ from survey.measures.libration import higher
 SCENE = "libration"
 ERROR = "c8"
 LABELS = higher.labels(8)
-MOST = {"lie": 64, "rational": 64, "rational_double": 64}
+MOST = dict.fromkeys(("lie", "lie_double", "rational", "rational_double"), 64)
 _NUMBER = 256
 
 
