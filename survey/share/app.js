@@ -2,7 +2,7 @@
 
 const $ = id => document.getElementById(id)
 const TEXT = JSON.parse($("data").textContent)
-const MARGIN = {left: 92, right: 30, top: 10, bottom: 62}, BLOCKS = 256, COARSE = 5, REST = 120, EDGED = ["verdict", "discriminant", "exponent"]
+const MARGIN = {left: 92, right: 30, top: 10, bottom: 62}, BLOCKS = 256, COARSE = 5, REST = 120, SHOWN = 60, AGAIN = 50, EDGED = ["verdict", "discriminant", "exponent"]
 const state = {view: null, show: TEXT.shown[0].name, pointer: null, lines: true}
 // A picture of another view serves a moving one while it is not larger than this.
 const MAGNIFIED = 3
@@ -36,18 +36,32 @@ async function loadedModel() {
 // ---- the view: the ends of both axes, in the parameters, or in their logarithms
 
 const home = () => ({x: [...TEXT.axes[0].ends], y: [...TEXT.axes[1].ends]})
-const canvas = $("map"), plot = {}
-let context = null
+const figure = $("figure"), plot = {}
+// Two pictures of the map, of which one is shown, and a coarse one below. While the view moves, the browser's compositor
+// moves and scales them: no script touches their pixels. The axes are drawn in strips beside them.
+const papers = [$("one"), $("two")].map(canvas => ({canvas, context: canvas.getContext("2d", {alpha: false})}))
+const under = {canvas: $("under"), context: $("under").getContext("2d", {alpha: false})}
+const strips = [$("left"), $("below")].map(canvas => ({canvas, context: canvas.getContext("2d", {alpha: false})}))
+
+function sized(canvas, left, top, width, height) {
+  // In pixels of the screen.
+  const {ratio} = plot
+  canvas.width = width; canvas.height = height
+  Object.assign(canvas.style, {left: left / ratio + "px", top: top / ratio + "px", width: width / ratio + "px", height: height / ratio + "px"})
+}
 
 function resize() {
-  // One opaque canvas for all: a second one above it would cost as much again in every frame. `box`: the plot in pixels.
-  const ratio = window.devicePixelRatio || 1, {width, height} = $("figure").getBoundingClientRect()
-  canvas.width = Math.max(150, Math.round(width * ratio)); canvas.height = Math.max(120, Math.round(height * ratio))
-  Object.assign(canvas.style, {width: canvas.width / ratio + "px", height: canvas.height / ratio + "px"})
-  context = canvas.getContext("2d", {alpha: false})
+  // `box`: the plot in pixels of the screen; left, top, width and height: in those of CSS.
+  const ratio = window.devicePixelRatio || 1, area = figure.getBoundingClientRect()
+  const all = [Math.max(150, Math.round(area.width * ratio)), Math.max(120, Math.round(area.height * ratio))]
   const left = Math.round(MARGIN.left * ratio), top = Math.round(MARGIN.top * ratio)
-  const box = {left, top, width: canvas.width - left - Math.round(MARGIN.right * ratio), height: canvas.height - top - Math.round(MARGIN.bottom * ratio)}
-  Object.assign(plot, {ratio, box, left: left / ratio, top: top / ratio, width: box.width / ratio, height: box.height / ratio})
+  const box = {left, top, width: all[0] - left - Math.round(MARGIN.right * ratio), height: all[1] - top - Math.round(MARGIN.bottom * ratio)}
+  Object.assign(plot, {all, ratio, box, left: left / ratio, top: top / ratio, width: box.width / ratio, height: box.height / ratio})
+  Object.assign($("plot").style, {left: plot.left + "px", top: plot.top + "px", width: plot.width + "px", height: plot.height + "px"})
+  for (const {canvas} of papers) sized(canvas, 0, 0, box.width, box.height)
+  sized(under.canvas, 0, 0, Math.ceil(box.width / COARSE), Math.ceil(box.height / COARSE))
+  sized(strips[0].canvas, 0, 0, left, top + box.height)
+  sized(strips[1].canvas, 0, top + box.height, all[0], all[1] - top - box.height)
   front = coarse = null
   changed()
 }
@@ -92,14 +106,14 @@ function changed() {
 }
 
 function placed(own) {
-  // Where a picture of another view lies in this one, in pixels of the canvas.
-  const {ratio, box} = plot, [left, top] = toPlot([own.view.x[0], own.view.y[1]]), [right, bottom] = toPlot([own.view.x[1], own.view.y[0]])
-  return [box.left + left * ratio, box.top + top * ratio, (right - left) * ratio, (bottom - top) * ratio]
+  // Where a picture of another view lies in this one, in pixels of the plot.
+  const {ratio} = plot, [left, top] = toPlot([own.view.x[0], own.view.y[1]]), [right, bottom] = toPlot([own.view.x[1], own.view.y[0]])
+  return [left * ratio, top * ratio, (right - left) * ratio, (bottom - top) * ratio]
 }
 
 function covers([left, top, width, height]) {
   const {box} = plot
-  return left <= box.left + 0.5 && top <= box.top + 0.5 && left + width >= box.left + box.width - 0.5 && top + height >= box.top + box.height - 0.5
+  return left <= 0.5 && top <= 0.5 && left + width >= box.width - 0.5 && top + height >= box.height - 0.5
 }
 
 const magnified = own => placed(own)[2] / plot.box.width
@@ -121,59 +135,88 @@ function coarsely() {
   const view = {x: [x[0], x[0] + width * COARSE * dx], y: [y[1] - height * COARSE * dy, y[1]]}
   coarse = {...coarse, waiting: true}
   ask({...jobFor(0, 0, width, height, COARSE), lines: false}, pixels => {
-    const picture = new OffscreenCanvas(width, height)
-    picture.getContext("2d").putImageData(new ImageData(pixels, width, height), 0, 0)
-    coarse = {view, picture, waiting: false}
-    if (own !== generation && !enough()) coarsely()
+    under.context.putImageData(new ImageData(pixels, width, height), 0, 0)
+    coarse = {view, canvas: under.canvas, waiting: false}
+    if (own !== generation) setTimeout(() => enough() || coarsely(), AGAIN)
     frame ||= requestAnimationFrame(redraw)
   }, () => { coarse.waiting = false })
 }
 
 function sharply() {
-  const own = generation, blocks = [], {box} = plot, picture = new OffscreenCanvas(box.width, box.height), paper = picture.getContext("2d", {alpha: false})
-  paper.drawImage(canvas, box.left, box.top, box.width, box.height, 0, 0, box.width, box.height)
-  front = {view: state.view, picture, left: 0}
+  // On the paper that is not shown, over what is known of the view; the blocks that have come are shown together.
+  const own = generation, blocks = [], {box} = plot, paper = papers.find(one => one.canvas !== front?.canvas), arrived = []
+  paint(paper.context)
+  front = {view: state.view, canvas: paper.canvas, left: 0}
   for (let top = 0; top < box.height; top += BLOCKS) for (let left = 0; left < box.width; left += BLOCKS) {
     blocks.push([left, top, Math.min(BLOCKS, box.width - left), Math.min(BLOCKS, box.height - top)])
   }
   const far = ([left, top]) => Math.hypot(left + BLOCKS / 2 - box.width / 2, top + BLOCKS / 2 - box.height / 2)
+  const show = () => {
+    if (own !== generation || !arrived.length) return
+    paper.context.save()
+    paper.context.beginPath()
+    for (const {pixels, block: [left, top, width, height]} of arrived) {
+      paper.context.putImageData(new ImageData(pixels, width, height), left, top)
+      paper.context.rect(left, top, width, height)
+    }
+    front.left -= arrived.length
+    arrived.length = 0
+    paper.context.clip()
+    curves(brush(paper.context, [-box.left, -box.top]))
+    paper.context.restore()
+  }
   front.left = blocks.length
-  for (const [left, top, width, height] of blocks.sort((a, b) => far(a) - far(b))) {
-    ask(jobFor(left, top, width, height, 1), pixels => {
+  for (const block of blocks.sort((a, b) => far(a) - far(b))) {
+    ask(jobFor(...block, 1), pixels => {
       if (own !== generation) return
-      paper.putImageData(new ImageData(pixels, width, height), left, top)
-      front.left--
-      frame ||= requestAnimationFrame(redraw)
+      if (!arrived.length) setTimeout(show, SHOWN)
+      arrived.push({pixels, block})
+      if (front.left === arrived.length) show()
     })
   }
+  keepLink()
+  frame ||= requestAnimationFrame(redraw)
 }
 
-const idle = () => Boolean(front && front.left === 0 && !coarse?.waiting && !frame && !queue.length)
+const idle = () => Boolean(front && front.view === state.view && front.left === 0 && !coarse?.waiting && !frame && !queue.length)
+
+function shownOf() {
+  // Which pictures show the view: [the coarse one?, the other one?].
+  const sharp = front && placed(front), rough = coarse?.canvas && placed(coarse), whole = sharp && covers(sharp)
+  if (rough && whole && magnified(front) > COARSE && magnified(coarse) < magnified(front) / COARSE) return [true, false]
+  return [Boolean(rough) && !whole, Boolean(sharp)]
+}
+
+function paint(context) {
+  const {box} = plot, shown = shownOf()
+  context.setTransform(1, 0, 0, 1, 0, 0)
+  context.fillStyle = "#fff"
+  context.fillRect(0, 0, box.width, box.height)
+  context.imageSmoothingEnabled = false
+  for (const [i, own] of [coarse, front].entries()) if (shown[i]) context.drawImage(own.canvas, ...placed(own))
+}
 
 function redraw() {
   frame = 0
-  const {box, ratio} = plot, begun = performance.now()
-  context.setTransform(1, 0, 0, 1, 0, 0)
-  context.imageSmoothingEnabled = false  // measured: several times as fast, and sharp blocks follow
-  const sharp = front && placed(front), rough = coarse?.picture && placed(coarse), whole = sharp && covers(sharp)
-  context.save()
-  context.beginPath(); context.rect(box.left, box.top, box.width, box.height); context.clip()
-  if (!whole) {
-    context.fillStyle = "#fff"
-    if (!rough || !covers(rough)) context.fillRect(box.left, box.top, box.width, box.height)
-    if (rough) context.drawImage(coarse.picture, ...rough)
+  const begun = performance.now(), {ratio} = plot, shown = shownOf()
+  for (const {canvas} of [under, ...papers]) {
+    const own = shown[0] && coarse.canvas === canvas ? coarse : shown[1] && front.canvas === canvas ? front : null
+    canvas.style.visibility = own ? "visible" : "hidden"
+    if (!own) continue
+    const [left, top, width, height] = placed(own), still = Math.abs(width - canvas.width) < 0.01 && Math.abs(height - canvas.height) < 0.01
+    // by whole pixels, without scaling, where it is only moved: a third of the compositor's work
+    canvas.style.transform = still ? `translate(${Math.round(left) / ratio}px,${Math.round(top) / ratio}px)` :
+      `matrix(${width / canvas.width},0,0,${height / canvas.height},${left / ratio},${top / ratio})`
   }
-  if (rough && whole && magnified(front) > COARSE && magnified(coarse) < magnified(front) / COARSE) context.drawImage(coarse.picture, ...rough)
-  else if (sharp) context.drawImage(front.picture, ...sharp)
-  context.restore()
-  context.fillStyle = "#fff"
-  const right = box.left + box.width, bottom = box.top + box.height
-  for (const edge of [[0, 0, canvas.width, box.top], [0, bottom, canvas.width, canvas.height - bottom], [0, 0, box.left, canvas.height], [right, 0, canvas.width - right, canvas.height]]) context.fillRect(...edge)
-  context.setTransform(ratio, 0, 0, ratio, 0, 0)
-  annotate(brush())
+  for (const {canvas, context} of strips) {
+    context.setTransform(1, 0, 0, 1, 0, 0)
+    context.fillStyle = "#fff"
+    context.fillRect(0, 0, canvas.width, canvas.height)
+    annotate(brush(context, canvas.id === "below" ? [0, -plot.box.top - plot.box.height] : [0, 0]))
+  }
+  $("cross").style.visibility = state.pointer?.keyboard ? "visible" : "hidden"
   tell()
   window.drawn = {milliseconds: performance.now() - begun, number: (window.drawn?.number ?? 0) + 1}
-  keepLink()
 }
 
 // ---- workers
@@ -224,7 +267,9 @@ function hire() {
 
 // ---- axes, on the screen and in SVG
 
-function brush() {
+function brush(context, [left, top]) {
+  // Draws in pixels of CSS from the figure's corner on; (left, top): that corner in the context's own pixels.
+  context.setTransform(plot.ratio, 0, 0, plot.ratio, left, top)
   return {
     line(points, colour, width, dash = []) {
       context.strokeStyle = colour; context.lineWidth = width; context.setLineDash(dash)
@@ -244,12 +289,6 @@ function brush() {
       context.fill(new Path2D(path))
       context.restore()
     },
-    clipped(make) {
-      context.save()
-      context.beginPath(); context.rect(plot.left, plot.top, plot.width, plot.height); context.clip()
-      make()
-      context.restore()
-    },
   }
 }
 
@@ -259,7 +298,6 @@ function svgBrush(parts) {
     line: (points, colour, width, dash = []) => parts.push(`<polyline fill="none" stroke="${colour}" stroke-width="${width}" stroke-dasharray="${dash.join(" ")}" points="${points.map(([x, y]) => `${n(x)},${n(y)}`).join(" ")}"/>`),
     text: (x, y, text, anchor, baseline) => parts.push(`<text x="${n(x)}" y="${n(y)}" text-anchor="${anchor}" dominant-baseline="${baseline === "top" ? "hanging" : "central"}">${safe(text)}</text>`),
     label: ({path, width}, x, y, turn) => parts.push(`<path transform="translate(${n(x)} ${n(y)}) rotate(${turn * 180 / Math.PI}) scale(1 -1) translate(${-width / 2} 0)" d="${safe(path)}"/>`),
-    clipped(make) { parts.push(`<g clip-path="url(#plot)">`); make(); parts.push("</g>") },
   }
 }
 
@@ -281,7 +319,6 @@ function ticksOf([low, high], axis, pixels) {
 
 function annotate(b) {
   const {left, top, width, height} = plot, {x, y} = state.view
-  b.clipped(() => curves(b))
   b.line([[left, top], [left + width, top], [left + width, top + height], [left, top + height], [left, top]], "#111", 1)
   const across = ticksOf(x, 0, width), along = ticksOf(y, 1, height * 1.6)
   for (const {at, text} of across.ticks) {
@@ -298,12 +335,6 @@ function annotate(b) {
   if (along.offset) b.text(4, top + height + 36, `+ ${along.offset}`, "start")
   b.label(TEXT.axes[0].label, left + width / 2, top + height + 46, 0)
   b.label(TEXT.axes[1].label, 20, top + height / 2, -Math.PI / 2)
-  const at = state.pointer
-  if (at?.keyboard) {
-    const px = left + width / 2, py = top + height / 2
-    b.line([[px - 9, py], [px + 9, py]], "#000", 1)
-    b.line([[px, py - 9], [px, py + 9]], "#000", 1)
-  }
 }
 
 function curves(b) {
@@ -363,11 +394,15 @@ function provedAt(x, y) {
   return cell ? {s: "stable", u: "unstable"}[cell[4]] ?? null : null
 }
 
+function say(text) {
+  if ($("readout").textContent !== text) $("readout").textContent = text
+}
+
 function tell() {
-  const at = state.pointer, box = $("readout")
-  if (!at) { box.textContent = TEXT.hint; return }
+  const at = state.pointer
+  if (!at) { say(TEXT.hint); return }
   const [x, y] = toMap(at.keyboard ? plot.width / 2 : at.px, at.keyboard ? plot.height / 2 : at.py), found = known(real(x, 0), real(y, 1))
-  if (!found) { box.textContent = "outside the map"; return }
+  if (!found) { say("outside the map"); return }
   const lines = [`${TEXT.axes[0].name} = ${few(found.x)}, ${TEXT.axes[1].name} = ${few(found.y)}`]
   if (found.verdict) lines.push(`${found.verdict.replaceAll("_", " ")}${found.proved === found.verdict ? ", proved" : ""}`)
   if (found.status && found.status !== "ok") lines.push(found.status.replaceAll("_", " "))
@@ -376,7 +411,7 @@ function tell() {
     if (typeof value === "string") lines.push(`${name}: ${value.replaceAll("_", " ")}`)
     else if (Number.isFinite(value)) lines.push(`${name} = ${few(value)}${Number.isFinite(bar) ? ` ± ${bound(bar)}` : ""}`)
   }
-  box.textContent = lines.join("\n")
+  say(lines.join("\n"))
 }
 
 // ---- link
@@ -411,24 +446,34 @@ function save(name, blob) {
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000)
 }
 
-function savePng() {
-  canvas.toBlob(blob => save("png", blob))
+function picture() {
+  // The figure as it is shown, in one canvas.
+  const out = document.createElement("canvas"), context = out.getContext("2d", {alpha: false}), {all, box} = plot
+  out.width = all[0]; out.height = all[1]
+  context.fillStyle = "#fff"
+  context.fillRect(0, 0, ...all)
+  context.drawImage(flat(), box.left, box.top)
+  annotate(brush(context, [0, 0]))
+  return out
 }
 
 function flat() {
-  // The map alone, without what is drawn over it.
-  const out = document.createElement("canvas"), {box} = plot
-  out.width = box.width; out.height = box.height
-  out.getContext("2d").drawImage((front ?? coarse).picture, ...placed(front ?? coarse).map((value, i) => value - [box.left, box.top, 0, 0][i]))
-  return out.toDataURL("image/png")
+  // The map alone.
+  const out = document.createElement("canvas")
+  out.width = plot.box.width; out.height = plot.box.height
+  paint(out.getContext("2d", {alpha: false}))
+  return out
 }
 
 function svg() {
-  const {left, top, width, height, ratio} = plot, parts = []
+  const {left, top, width, height, all, ratio} = plot, parts = []
   annotate(svgBrush(parts))
-  return `<svg xmlns="http://www.w3.org/2000/svg" width="${canvas.width / ratio}" height="${canvas.height / ratio}" font-family="sans-serif" font-size="13">` +
+  parts.push(`<g clip-path="url(#plot)">`)
+  curves(svgBrush(parts))
+  parts.push("</g>")
+  return `<svg xmlns="http://www.w3.org/2000/svg" width="${all[0] / ratio}" height="${all[1] / ratio}" font-family="sans-serif" font-size="13">` +
     `<clipPath id="plot"><rect x="${left}" y="${top}" width="${width}" height="${height}"/></clipPath><rect width="100%" height="100%" fill="#fff"/>` +
-    `<image x="${left}" y="${top}" width="${width}" height="${height}" href="${flat()}"/>${parts.join("")}</svg>`
+    `<image x="${left}" y="${top}" width="${width}" height="${height}" href="${flat().toDataURL("image/png")}"/>${parts.join("")}</svg>`
 }
 
 // ---- legend and controls
@@ -460,16 +505,22 @@ function controls() {
   $("nearer").onclick = () => zoom(2)
   $("farther").onclick = () => zoom(0.5)
   $("lines").onclick = () => { state.lines = !state.lines; front = null; legend(); changed() }
-  $("png").onclick = savePng
+  $("png").onclick = () => picture().toBlob(blob => save("png", blob))
   $("svg").onclick = () => save("svg", new Blob([svg()], {type: "image/svg+xml"}))
   $("copy").onclick = () => navigator.clipboard?.writeText(location.href)
-  const figure = $("figure"), fingers = new Map(), place = event => {
-    const box = canvas.getBoundingClientRect()
+  const fingers = new Map(), place = event => {
+    const box = figure.getBoundingClientRect()
     return [event.clientX - box.left - plot.left, event.clientY - box.top - plot.top]
   }
   figure.addEventListener("wheel", event => { event.preventDefault(); zoom(Math.exp(-event.deltaY * (event.deltaMode ? 0.05 : 0.0015)), ...place(event)) }, {passive: false})
   figure.addEventListener("dblclick", event => zoom(event.shiftKey ? 0.25 : 4, ...place(event)))
-  figure.addEventListener("pointerdown", event => { figure.setPointerCapture(event.pointerId); fingers.set(event.pointerId, place(event)) })
+  figure.addEventListener("pointerdown", event => {
+    const now = place(event)
+    figure.setPointerCapture(event.pointerId)
+    fingers.set(event.pointerId, now)
+    state.pointer = {px: now[0], py: now[1]}
+    frame ||= requestAnimationFrame(redraw)
+  })
   const lift = event => fingers.delete(event.pointerId)
   figure.addEventListener("pointerup", lift)
   figure.addEventListener("pointercancel", lift)

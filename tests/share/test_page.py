@@ -58,9 +58,8 @@ def drawn(driver, seconds=120):
 def pixel(driver, x, y):
     """The colour that the canvas shows at a point of the map."""
     return driver.execute_script(
-        "const [px, py] = toPlot(arguments), {box, ratio} = plot;"
-        "const at = [box.left + px * ratio, box.top + py * ratio].map(Math.round);"
-        "return [...context.getImageData(...at, 1, 1).data].slice(0, 3)",
+        "const [px, py] = toPlot(arguments), own = front.canvas.getContext('2d');"
+        "return [...own.getImageData(Math.round(px * plot.ratio), Math.round(py * plot.ratio), 1, 1).data].slice(0, 3)",
         x, y,
     )  # fmt: skip
 
@@ -90,13 +89,53 @@ def test_hover_values_agree_with_evaluate_at_1000_places(folder, driver):
         assert verdict == int(ds.verdict[i]) or -1 in (verdict, int(ds.verdict[i]))
 
 
+DAMPED = '''"""Hill's equation with damping, its coefficient not even."""
+from math import cos, pi, sin
+PARAMETERS, PERIOD, DAMPING = ("a", "q"), pi, 0.05
+def z(u, p):
+    return p[0] - 2 * p[1] * (cos(2 * u) + 0.3 * sin(4 * u))
+'''
+OTHERS = {  # scene: axes
+    "mathieu": {"a": (0.0, 10.0), "q": (0.0, 5.0)},
+    "libration_elliptic": {"mu": (0.0, 0.055), "e": (0.0, 0.7)},
+    "damped.py": {"a": (0.0, 5.0), "q": (0.0, 2.0)},
+    "coupled_mathieu.py": {"Omega": (1.0, 1.6), "epsilon": (0.0, 0.3)},
+}
+
+
+@browsed
+@pytest.mark.slow
+@pytest.mark.parametrize("name", OTHERS)
+def test_hover_values_of_other_scenes_agree_with_evaluate_at_1000_places(name, tmp_path, driver):
+    (tmp_path / "damped.py").write_text(DAMPED)
+    scene = {"damped.py": str(tmp_path / name), "coupled_mathieu.py": str(ROOT / "workflows" / name)}.get(name, name)
+    axes = {axis: {"start": low, "stop": high, "num": 9} for axis, (low, high) in OTHERS[name].items()}
+    told = page.write(survey.run({"scene": scene, "axes": axes}, output=tmp_path / "m.nc"), tmp_path / "m.html")
+    assert told["series"] and told["bytes"] < 2_000_000
+    shown(driver, tmp_path / "m.html")
+    low, high = np.array(list(OTHERS[name].values())).T
+    places = np.random.default_rng(12).uniform(low, high, (1000, 2))
+    found = driver.execute_script("return arguments[0].map(([x, y]) => known(x, y))", places.tolist())
+    given = {axis: xr.DataArray(values, dims="p") for axis, values in zip(axes, places.T, strict=True)}
+    ds = survey.evaluate(scene, rtol=1e-13, **given)
+    codes, decided = {"undecided": -1, "unstable": 0, "stable": 1}, 0
+    for i, own in enumerate(found):
+        for output, (value, bar) in own["values"].items():
+            if output in ds:
+                assert abs(value - float(ds[output][i])) <= bar + float(ds[f"{output}_error"][i]), (output, *places[i])
+        verdict, true = codes[own["verdict"]], int(ds.verdict[i])
+        assert verdict == true or -1 in (verdict, true) or true == 2
+        decided += verdict >= 0
+    assert decided > 950 and any(output in ds for output in found[0]["values"]) == (name != "coupled_mathieu.py")
+
+
 @browsed
 def test_the_pointer_is_told_what_is_there_with_its_bar(folder, driver):
     from selenium.webdriver.common.actions.action_builder import ActionBuilder
 
     shown(driver, folder / "map.html")
     left, top = driver.execute_script(
-        "const [px, py] = toPlot([0.85, 0.7]), b = canvas.getBoundingClientRect();"
+        "const [px, py] = toPlot([0.85, 0.7]), b = figure.getBoundingClientRect();"
         "return [b.left + plot.left + px, b.top + plot.top + py]"
     )
     moves = ActionBuilder(driver)
@@ -144,12 +183,12 @@ def test_a_link_shows_the_same_view(folder, driver):
     )
     time.sleep(0.3)
     drawn(driver)
-    link, before = driver.current_url, driver.execute_script("return canvas.toDataURL()")
+    link, before = driver.current_url, driver.execute_script("return picture().toDataURL()")
     assert "#x=0.5,0.7&y=1,1.5&show=discriminant" in link
     driver.get("about:blank")
     driver.get(link)
     drawn(driver)
-    assert driver.execute_script("return canvas.toDataURL()") == before and driver.current_url == link
+    assert driver.execute_script("return picture().toDataURL()") == before and driver.current_url == link
 
 
 @browsed
@@ -256,6 +295,94 @@ def test_the_keyboard_moves_and_zooms_and_pictures_are_saved(folder, driver):
     driver.find_element(By.ID, "svg").click()
     time.sleep(1)
     assert sorted(name for name, size in driver.execute_script("return saved") if size > 5000) == ["png", "svg"]
+
+
+def touch(driver, kind, *places):
+    """A touch event of Chromium's own input, with fingers at places of the map (x, y)."""
+    at = driver.execute_script(
+        "const b = figure.getBoundingClientRect();"
+        "return arguments[0].map(p => toPlot(p)).map(([px, py]) => [b.left + plot.left + px, b.top + plot.top + py])",
+        [list(place) for place in places],
+    )
+    points = [{"x": x, "y": y, "id": number} for number, (x, y) in enumerate(at)]
+    driver.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+    return at
+
+
+@browsed
+def test_fingers_read_move_and_zoom_the_map(folder, driver):
+    """A tap tells the value there, a finger moves the map, and two of them zoom it: what is under each stays there."""
+    shown(driver, folder / "map.html")
+    driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": True, "maxTouchPoints": 2})
+    under = (
+        "const b = figure.getBoundingClientRect();"
+        "return toMap(arguments[0] - b.left - plot.left, arguments[1] - b.top - plot.top)"
+    )
+    try:
+        touch(driver, "touchStart", (0.6, 2.0))
+        touch(driver, "touchEnd")
+        time.sleep(0.2)
+        told = driver.execute_script("return document.getElementById('readout').textContent")
+        x, y = (float(text) for text in re.match(r"k = ([\d.]+), rho = ([\d.]+)\n", told).groups())
+        assert (x, y) == pytest.approx((0.6, 2.0), abs=0.01) and "\ndiscriminant = " in told
+
+        driver.execute_script("setView([0.3, 0.8], [1.5, 3])")
+        begun = touch(driver, "touchStart", (0.6, 2.0))[0]
+        driver.execute_cdp_cmd(
+            "Input.dispatchTouchEvent",
+            {"type": "touchMove", "touchPoints": [{"x": begun[0] + 120, "y": begun[1] + 50, "id": 0}]},
+        )
+        touch(driver, "touchEnd")
+        assert driver.execute_script(under, begun[0] + 120, begun[1] + 50) == pytest.approx([0.6, 2.0], abs=1e-9)
+
+        driver.execute_script("setView([0.3, 0.8], [1.5, 3])")
+        one, two = touch(driver, "touchStart", (0.5, 2.0), (0.6, 2.5))
+        to = [[one[0] - (two[0] - one[0]), one[1] - (two[1] - one[1])], two]  # twice as far apart, along one line
+        for t in (0.25, 0.5, 0.75, 1.0):
+            points = [{"x": a[0] + t * (b[0] - a[0]), "y": a[1] + t * (b[1] - a[1]), "id": number}
+                      for number, (a, b) in enumerate(zip((one, two), to, strict=True))]  # fmt: skip
+            driver.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": "touchMove", "touchPoints": points})
+        touch(driver, "touchEnd")
+        for (px, py), place in zip(to, ((0.5, 2.0), (0.6, 2.5)), strict=True):
+            assert driver.execute_script(under, px, py) == pytest.approx(list(place), abs=1e-6)
+        x, y = driver.execute_script("return [state.view.x, state.view.y]")
+        assert (x[1] - x[0], y[1] - y[0]) == pytest.approx((0.25, 0.75))
+    finally:
+        driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})
+
+
+# ten steps of a zoom, one a frame: the calls that draw, and how far the picture's middle is from where it belongs
+MOVING = """
+const done = arguments[0], places = []
+let touched = 0, n = 0
+for (const kind of [CanvasRenderingContext2D, OffscreenCanvasRenderingContext2D]) {
+ for (const name of ["drawImage", "putImageData"]) {
+  const own = kind.prototype[name]
+  kind.prototype[name] = function (...all) { touched++; return own.apply(this, all) }
+ }
+}
+const go = () => {
+  const own = front.canvas.getBoundingClientRect(), area = $("plot").getBoundingClientRect(), [u, v] = toPlot([0.4, 2])
+  if (n > 1) places.push([own.left + own.width / 2 - area.left - u, own.top + own.height / 2 - area.top - v])
+  if (n++ < 10) { zoom(1.08, 10, 20); clearTimeout(resting); requestAnimationFrame(() => setTimeout(go)) }
+  else { resting = setTimeout(sharply); done([touched, places]) }
+}
+go()
+"""
+
+
+@browsed
+def test_a_moving_view_is_moved_by_the_compositor(folder, driver):
+    """No script touches pixels while the picture covers the view; when it rests it is drawn afresh, in its place."""
+    shown(driver, folder / "map.html")
+    driver.execute_script("setView([0.2, 0.6], [1.5, 2.5])")
+    drawn(driver)
+    touched, places = driver.execute_async_script(MOVING)
+    assert touched == 0 and len(places) == 9 and np.abs(places).max() < 1e-3
+    drawn(driver)
+    assert driver.execute_script("return new DOMMatrix(getComputedStyle(front.canvas).transform).isIdentity")
+    hidden = "return papers.filter(one => getComputedStyle(one.canvas).visibility === 'visible').length"
+    assert driver.execute_script(hidden) == 1
 
 
 @noded
