@@ -11,6 +11,7 @@ import numpy as np
 
 from survey import api
 from survey.errors import BadInput
+from survey.kernels.math.roundoff import EPS
 from survey.model.reader import HALF
 from survey.request.function_scene import FunctionScene
 
@@ -31,32 +32,66 @@ class Source:
 def of(workflow, names, fixed):
     """The Source of a checked workflow with axes `names` (two) and `fixed` parameters; raises BadInput."""
     maker = {"hill": _hill, "danby": _danby, "floquet": _floquet}.get(workflow.scene.FAMILY)
-    if maker is None or getattr(workflow.scene, "DAMPED", False):
+    if maker is None:
         raise BadInput(
             f"model: the scene {workflow.name} is not answered by series; choose satellite, mathieu, "
-            "libration_elliptic, or a Hill equation without damping or a linear periodic system of your own"
+            "libration_elliptic, or a Hill equation or a linear periodic system of your own"
         )
-    return maker(workflow, names, fixed)
+    return (_damped if getattr(workflow.scene, "DAMPED", False) else maker)(workflow, names, fixed)
 
 
 def _hill(workflow, names, fixed):
     """The factors at T/2; or, where z is not even, D alone."""
-    scene, even = workflow.scene, getattr(workflow.scene, "EVEN", True)
+    scene = workflow.scene
+    even = getattr(scene, "EVEN", True) and not getattr(scene, "DAMPED", False)
     wanted = HALF if even else ("discriminant",)
     outputs = {o.name: o for o in scene.OUTPUTS}
+    solve = _evaluated(workflow, names, fixed, wanted)
+
+    def at(x, y):
+        found = solve(x, y)
+        return tuple(np.stack([found[f"{name}{end}"] for name in wanted]) for end in ("", "_error"))
+
+    return Source("hill" if even else "trace", wanted, tuple(outputs[name].long_name for name in wanted), at)
+
+
+def _damped(workflow, names, fixed):
+    """l^2 + c1 l + c2 of y'' + 2 c y' + z y = 0: c1 = -D, c2 = e^(-2 c T); where c is 0 throughout, D alone."""
+    scene = workflow.scene
+    columns = [p.name for p in scene.PARAMETERS]
+    if (scene.damping if scene.place is None else fixed.get(columns[scene.place])) == 0.0:
+        return _hill(workflow, names, fixed)
+    solve = _evaluated(workflow, names, fixed, ("discriminant", "period"))
+
+    def at(x, y):
+        found = solve(x, y)
+        points = {names[0]: x[:, None], names[1]: y} | fixed
+        c = scene.damping if scene.place is None else points[columns[scene.place]]
+        turn = np.broadcast_to(2.0 * c, (x.size, y.size)) * found["period"]
+        det = np.exp(-turn)
+        off = det * np.expm1(abs(turn) * (8.0 * EPS + 2.0 * found["period_error"] / found["period"])) + 4.0 * EPS * det
+        return np.stack([-found["discriminant"], det]), np.stack([found["discriminant_error"], off])
+
+    words = "minus the trace of the monodromy matrix", "its determinant, e^(-2 c T)"
+    return Source("schur", ("c1", "c2"), words, at)
+
+
+def _evaluated(workflow, names, fixed, wanted):
+    """What `survey.evaluate` gives on the grid of x and y, in any order: {name: values (N1, N2)}, bars too."""
     given = dict(workflow.request.options) | fixed
-    asked = scene if isinstance(scene, FunctionScene) else workflow.name
+    asked = workflow.scene if isinstance(workflow.scene, FunctionScene) else workflow.name
 
     def at(x, y):
         # increasing, as evaluate may answer grids by rows
         order = [np.argsort(values) for values in (x, y)]
         grid = {name: values[o] for name, values, o in zip(names, (x, y), order, strict=True)}
-        ds = api.evaluate(asked, method="auto", rtol=BEST, variables=list(wanted), **given, **grid).transpose(*names)
+        ds = api.evaluate(asked, method="auto", rtol=BEST, variables=list(wanted), **given, **grid)
         back = np.ix_(*(np.argsort(o) for o in order))
-        found = [np.stack([ds[f"{name}{end}"].values[back] for name in wanted]) for end in ("", "_error")]
-        return found[0], found[1].astype(float)
+        shaped = ds.broadcast_like(ds.status).transpose(*names)
+        both = [f"{name}{end}" for name in wanted for end in ("", "_error")]
+        return {name: shaped[name].values[back].astype(float) for name in both}
 
-    return Source("hill" if even else "trace", wanted, tuple(outputs[name].long_name for name in wanted), at)
+    return at
 
 
 def _danby(workflow, names, fixed):

@@ -23,9 +23,10 @@ import numpy as np
 FORMAT, TABLE, SERIES = "survey-model 1", "model.json", "series.f64"
 UNDECIDED, UNSTABLE, STABLE = -1, 0, 1
 EPS = 2.0**-52
-CHUNK, PART = 16384, 1024  # points whose temporaries stay in the processor's cache, of a grid and of a cell
+CHUNK, PART = 16384, 4096  # points whose temporaries stay in the processor's cache, of a grid and of a cell
 CELLS, PIECES, FEW = 16, 4, 100_000  # terms of a cell's series, cells of a panel; points from which on cells pay
-LOT = 2**19  # points that are sorted together
+SHORTER = 0.1  # of a cell's bound: what the degrees that are left out may add to it
+LOT = 2**20  # points that are sorted together
 MOST_CELLS = 2**16  # what their numbers (uint16) tell apart
 FINE = 2**14  # places along a side, each in one cell
 BYTES, TERMS, DENSE = 2**28, 2**10, 2**27  # at most: of a member, of a series along a side, of all series
@@ -367,7 +368,17 @@ class _Cells:
                 self.series[i, own[1], 1] = derive @ series * (2.0 / np.diff(lattice[0])[i])
                 self.series[i, own[1], 2] = series @ derive.T * (2.0 / np.diff(lattice[1])[own[1], None, None])
                 self.bars[i, own[1]] = bars + tail + rounding
-        self.series, self.bars = self.series.reshape(-1, 3 * q, q), self.bars.reshape(-1)
+        self._shorten(self.series.reshape(-1, 3, q, q), self.bars.reshape(-1))
+
+    def _shorten(self, series, bars):
+        """Leave out of each cell the highest degrees, as long as they add to its bound by a tenth at most."""
+        q = series.shape[-1]
+        degree, size = np.maximum.outer(np.arange(q), np.arange(q)), abs(series[:, 0])
+        layers = np.stack([size[:, degree == k].sum(axis=1) for k in range(q)] + [np.zeros(bars.size)], axis=1)
+        rest = layers[:, ::-1].cumsum(axis=1)[:, ::-1]
+        kept = np.maximum((rest > SHORTER * bars[:, None]).sum(axis=1), 2)
+        self.bars = bars + 1.001 * rest[np.arange(bars.size), kept]
+        self.series = [own[:, :k, :k].reshape(3 * k, k) for own, k in zip(series, kept, strict=True)]
 
     def solve(self, x, y, out, lot):
         """Answer a `lot` (slice) of the points from their cells; returns those that stay undecided."""
@@ -378,32 +389,30 @@ class _Cells:
         order = np.argsort(cell, kind="stable")
         ends = np.searchsorted(cell[order], np.arange(self.bars.size + 1))
         parts = 3 if len(out) > 3 else 1  # D and its derivatives
-        found, bars = [np.empty(x.size) for _ in range(parts)], np.empty(x.size)
-        x, y, q = x[order], y[order], CELLS
-        stable, near = np.empty((2, x.size), bool)
+        found, x, y = np.empty((parts, x.size)), x[order], y[order]
         # memory that is used again: fresh pages cost more than the arithmetic
-        work = [np.empty(rows * PART) for rows in (parts * q, q, q, 1)]
+        tables, products = np.empty(2 * CELLS * PART), np.empty(parts * CELLS * PART)
         for c in np.flatnonzero(np.diff(ends)):
-            bar, series = self.bars[c], self.series[c, : parts * q]
+            q = self.series[c].shape[1]
+            series = self.series[c][: parts * q]
             for first in range(ends[c], ends[c + 1], PART):
                 part = slice(first, min(first + PART, ends[c + 1]))
                 n = part.stop - first
-                sums, across, along, size = (
-                    own[: rows * n].reshape(rows, n) for own, rows in zip(work, (parts * q, q, q, 1), strict=True)
-                )
-                _short_table(x[part], self.middle[0][c], self.inverse[0][c], across)
-                _short_table(y[part], self.middle[1][c], self.inverse[1][c], along)
-                sums = np.matmul(series, along, out=sums).reshape(parts, q, n)
-                for own, values in zip(found, sums, strict=True):
-                    np.einsum("qn,qn->n", values, across, out=own[part])
-                bars[part] = bar
-                size = np.abs(found[0][part], out=size[0])
-                np.less(size, 2.0 - bar, out=stable[part])
-                np.less_equal(size, 2.0 + bar, out=near[part])
-        verdict = stable.view(np.int8) - (near & ~stable).view(np.int8)
-        names = ("discriminant", *(name for name in out if "_by_" in name), "discriminant_error", "verdict")
-        for name, values in zip(names, (*found, bars, verdict), strict=True):
-            out[name][lot][order] = values
+                table, sums = tables[: 2 * q * n].reshape(q, 2, n), products[: parts * q * n].reshape(parts * q, n)
+                for values, side in ((x, 0), (y, 1)):
+                    np.subtract(values[part], self.middle[side][c], out=table[1, side])
+                    table[1, side] *= self.inverse[side][c]
+                _short_tables(table)
+                np.matmul(series, table[:, 1], out=sums)
+                np.einsum("pqn,qn->pn", sums.reshape(parts, q, n), table[:, 0], out=found[:, part])
+        bars, values = self.bars[cell], out["discriminant"][lot]
+        names = ("discriminant", *(name for name in out if "_by_" in name))
+        for name, own in zip(names, found, strict=True):
+            out[name][lot][order] = own
+        out["discriminant_error"][lot] = bars
+        size = np.abs(values)
+        size -= 2.0
+        out["verdict"][lot] = (size < -bars).view(np.int8) - (abs(size) <= bars).view(np.int8)
         open_points = (out["verdict"][lot] == UNDECIDED) | ~np.isfinite(out["discriminant_error"][lot])
         return lot.start + np.flatnonzero(open_points)
 
@@ -415,15 +424,15 @@ def _lattice(model, side, pieces):
     return np.append(np.concatenate(fine), edges[-1])
 
 
-def _short_table(x, middle, inverse, table):
-    """T_0 ... at the place of x (N) between the ends of a cell, into `table` (q, N)."""
-    table[0] = 1.0
-    np.subtract(x, middle, out=table[1])
-    table[1] *= inverse
-    for k in range(2, len(table)):
-        np.multiply(table[1], table[k - 1], out=table[k])
-        table[k] *= 2.0
-        table[k] -= table[k - 2]
+def _short_tables(table):
+    """T_2 ... into `table` (q, 2, N), whose second row holds the places, by T_(m+n) = 2 T_m T_n - T_|m-n|."""
+    table[0], last, q = 1.0, 1, len(table)
+    while last < q - 1:
+        most = min(2 * last, q - 1)
+        end = 2 * last - most - 1
+        np.multiply(2.0 * table[last], table[1 : most - last + 1], out=table[last + 1 : most + 1])
+        table[last + 1 : most + 1] -= table[last - 1 : end if end >= 0 else None : -1]
+        last = most
 
 
 def answer(rule, values, bars, slopes, wanted, names):

@@ -35,6 +35,12 @@ def A(t, p, out):
     out[1, 0] = -p[0] ** 2 * (1.0 + p[1] * cos(t))
     out[1, 1] = -0.02
 '''
+DAMPED = '''"""Mathieu's equation with damping."""
+from math import cos, pi
+PARAMETERS, PERIOD, EVEN, DAMPING = ("a", "q", "c"), pi, True, "c"
+def z(u, p):
+    return p[0] - 2 * p[1] * cos(2 * u)
+'''
 
 
 def workflow(scene, axes, **more):
@@ -100,6 +106,26 @@ def assert_agree(found, ds):
 
 def test_a_model_agrees_with_evaluate_within_both_bars(other):
     assert_agree(*compared(*other, 300, 1))
+
+
+@pytest.mark.parametrize(("axes", "number"), [({"q": (0.0, 2.0), "c": (-0.2, 0.4)}, {"a": 1.0}),
+                                               ({"a": (0.0, 5.0), "q": (0.1, 2.0)}, {"c": 0.0})])  # fmt: skip
+def test_damped_hill_equations_have_models(folder, axes, number):
+    """Both coefficients of l^2 - D l + e^(-2 c T), and verdicts; without damping, D alone."""
+    (folder / "damped.py").write_text(DAMPED)
+    given = workflow(folder / "damped.py", axes)
+    given["axes"] |= number
+    build.model(check(given), folder / "damped.model")
+    found, ds = compared(check(given), folder / "damped.model", 300, 3)
+    assert_agree(found, ds)
+    assert {0, 1} <= set(found["verdict"].tolist())
+    if number == {"a": 1.0}:
+        off = abs(found["c1"] + ds.discriminant.values)
+        assert (off <= found["c1_error"] + ds.discriminant_error.values).all() and found["c1_error"].max() < 1e-9
+        c = ds.c.values
+        for value, bar, own in zip(found["c2"], found["c2_error"], c, strict=True):
+            with mpmath.workdps(30):
+                assert abs(mpmath.mpf(float(value)) - mpmath.exp(-2 * mpmath.mpf(float(own)) * mpmath.pi)) <= bar < 1e-9
 
 
 def test_the_readmes_map_fits_into_300_kb_and_agrees(satellite):
