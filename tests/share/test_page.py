@@ -126,7 +126,17 @@ def test_hover_values_of_other_scenes_agree_with_evaluate_at_1000_places(name, t
         verdict, true = codes[own["verdict"]], int(ds.verdict[i])
         assert verdict == true or -1 in (verdict, true) or true == 2
         decided += verdict >= 0
-    assert decided > 950 and any(output in ds for output in found[0]["values"]) == (name != "coupled_mathieu.py")
+    assert decided > 950
+    if name.endswith(".py"):  # minus the trace: of a damped equation, or the sum of all multipliers
+        trace, off = (
+            ds[f"{'discriminant' if name == 'damped.py' else 'multiplier_re'}{end}"].astype(float)
+            for end in ("", "_error")
+        )
+        trace, off = (own.sum("multiplier") if "multiplier" in own.dims else own for own in (trace, off))
+        c1, bar = np.array([own["values"]["c1"] for own in found]).T
+        assert (abs(c1 + trace.values) <= bar + off.values).all() and bar.max() < 1e-9
+    else:
+        assert sum(output in ds for output in found[0]["values"]) >= 2
 
 
 @browsed
