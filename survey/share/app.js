@@ -409,7 +409,7 @@ function tell() {
   for (const [name, [value, bar]] of Object.entries(found.values)) {
     if (name === "verdict") continue
     if (typeof value === "string") lines.push(`${name}: ${value.replaceAll("_", " ")}`)
-    else if (Number.isFinite(value)) lines.push(`${name} = ${few(value)}${Number.isFinite(bar) ? ` ± ${bound(bar)}` : ""}`)
+    else if (Number.isFinite(value)) lines.push(Number.isFinite(bar) ? `${name} = ${few(value)} ± ${bound(bar)}` : `${name} = ${Number.isInteger(value) ? value : few(value)}`)
   }
   say(lines.join("\n"))
 }
@@ -492,9 +492,11 @@ function legend() {
     const stops = Array.from({length: 17}, (_, i) => rgb(shown.table.slice(3 * Math.min(255, 16 * i), 3 * Math.min(255, 16 * i) + 3)))
     entry({background: `linear-gradient(90deg, ${stops.join(",")})`, width: "160px"}, `${shown.range[0].toPrecision(3)} to ${shown.range[1].toPrecision(3)}`)
   }
+  for (const [code, grey] of Object.entries(TEXT.grid?.greys ?? {})) entry({background: rgb(grey)}, TEXT.grid.statuses[code].replaceAll("_", " "))
   entry({background: "repeating-linear-gradient(45deg,#777 0 1px,#fff 1px 4px)"}, TEXT.hatched)
   for (const {text, colour, dash} of state.lines && (EDGED.includes(shown.name) || TEXT.curves.length) ? TEXT.edges : []) {
-    entry({background: "none", border: "0", borderTop: `2px ${dash ? "dashed" : "solid"} ${colour}`, height: "0", width: "22px", verticalAlign: "4px"}, text)
+    const pale = /^(#fff(fff)?|white|w)$/i.test(colour)
+    entry({background: pale ? "#777" : "none", border: "0", borderTop: `2px ${dash ? "dashed" : "solid"} ${colour}`, height: pale ? "6px" : "0", width: "22px", verticalAlign: "4px"}, text)
   }
 }
 

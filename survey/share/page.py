@@ -8,6 +8,7 @@ import base64
 import hashlib
 import html
 import json
+import tomllib
 import zlib
 from dataclasses import replace
 from importlib import resources
@@ -34,7 +35,7 @@ from survey.wording import plain
 
 RTOL = 1e-12  # of the series, at most
 POINTS = 4_000_000  # of a map without series
-FLOATS = 6  # variables of numbers that such a page holds
+FLOATS = 8  # variables of numbers that such a page holds
 SAMPLES = 150  # along a side, by which colours of numbers are chosen
 KINDS = {"undecided": -1, "unstable": 0, "stable": 1}
 ATTRIBUTES = (
@@ -149,12 +150,15 @@ def _of_points(ds, axes):
     if ds.status.size > POINTS:
         raise BadInput(f"share: the map has {ds.status.size:,} points; a page without series holds at most {POINTS:,}: "
                        "take a part with ds.survey.zoom()")  # fmt: skip
+    ds = _separated(ds, axes)
     names = [name for name, v in ds.data_vars.items() if set(v.dims) == set(axes) and name != "status"]
     flags = [name for name in names if "flag_values" in ds[name].attrs]
     flags.sort(key=lambda name: name != "verdict")
     floats = [
         name for name in names if ds[name].dtype.kind in "fi" and name not in flags and not name.endswith("_error")
     ]
+    figures = _figures(ds)
+    floats.sort(key=lambda name: figures.index(named) if (named := name.split(" ")[0]) in figures else len(figures))
     state, shown, variables = ds.status.transpose(*axes), [], {}
     for name in flags + floats[:FLOATS]:
         variable = ds[name].transpose(*axes)
@@ -177,12 +181,12 @@ def _of_points(ds, axes):
             variables[name] = {"flags": None, "values": _packed(answered, "f8"), "bars": _bars(ds, name, axes)}
     if not shown:
         raise BadInput("share: the file holds no variable over both axes")
-    codes = flag_codes(ds.status.attrs)
+    codes, own = flag_codes(ds.status.attrs), scene_statuses(ds)
     grid = {
         "axes": [_packed(ds[dim].values, "f8") for dim in axes],
         "status": _packed(state.values, "i1"), "statuses": {code: plain(name) for name, code in codes.items()},
         "unanswered": sorted(status.UNANSWERED), "failed": sorted(status.FAILURES), "variables": variables,
-        "greys": {scene_statuses(ds)[name]: _rgb(grey) for name, grey in palette.greys(ds).items()},
+        "greys": {own[name]: _rgb(grey) for name, grey in palette.greys(ds).items() if (state == own[name]).any()},
     }  # fmt: skip
     widened = []
     for own, dim in zip(_common(ds, axes)["axes"], axes, strict=True):  # half a step more at the ends: whole pixels
@@ -191,6 +195,34 @@ def _of_points(ds, axes):
         widened.append({**own, "ends": [float(end) for end in ends]})
     curves = _curves(ds, axes) if "curve_count" in ds else {}
     return {"grid": grid, "shown": shown, "axes": widened, "hatched": "outside the domain; crossed: failed"} | curves
+
+
+def _separated(ds, axes):
+    """With a variable for each place of one more dimension: "period (well 2)"."""
+    more = {}
+    for name, variable in ds.data_vars.items():
+        others = [dim for dim in variable.dims if dim not in axes]
+        plain_floats = variable.dtype.kind == "f" and not name.endswith("_error")
+        if len(others) != 1 or len(variable.dims) != len(axes) + 1 or not plain_floats:
+            continue
+        dim, bar = others[0], f"{name}_error"
+        labels = ds[dim].values if dim in ds.coords else 1 + np.arange(ds.sizes[dim])
+        for i, label in enumerate(labels):
+            place = f"({plain(str(dim), 40)} {plain(str(label), 40)})"
+            words = f"{variable.attrs.get('long_name', name)} {place}"
+            more[f"{name} {place}"] = variable.isel({dim: i}, drop=True).assign_attrs(long_name=words)
+            if bar in ds:
+                more[f"{name} {place}_error"] = ds[bar].isel({dim: i}, drop=True)
+    return ds.assign(more)
+
+
+def _figures(ds):
+    """The names of the variables that the workflow in the file draws."""
+    try:
+        found = tomllib.loads(str(ds.attrs.get("workflow", "")))["output"]["figures"]
+    except (tomllib.TOMLDecodeError, RecursionError, KeyError, TypeError):
+        return []
+    return [name for name in found if isinstance(name, str)] if isinstance(found, list) else []
 
 
 def _bars(ds, name, axes):

@@ -14,6 +14,7 @@ import xarray as xr
 
 import survey
 from survey.errors import BadInput
+from survey.file.labels import scene_statuses
 from survey.model import build
 from survey.request.workflow import check
 from survey.share import page
@@ -277,8 +278,13 @@ def test_along_a_logarithmic_axis_the_nearest_point_is_that_of_the_least_ratio(t
         assert (found["x"], found["y"]) == (level[i], ds.alpha.values[j])
         if int(ds.status[i, j]) == 0:
             assert pixel(driver, x, y) == colours[str(int(ds.verdict[i, j]))]
+            value, bar = found["values"]["u_max (well 1)"]
+            true = ds.u_max.sel(well=1).isel(l=i, alpha=j)
+            assert value == true and bar == ds.u_max_error.sel(well=1).isel(l=i, alpha=j)
             checked += 1
     assert checked > 20
+    told = driver.execute_script("return document.getElementById('legend').textContent")
+    assert ("no motion" in told) == bool((ds.status == scene_statuses(ds)["no_motion"]).any())
 
 
 @browsed
