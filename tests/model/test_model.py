@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+import time
 import zipfile
 from pathlib import Path
 
@@ -13,12 +14,14 @@ import mpmath
 import numpy as np
 import pytest
 import tomli_w
+import viewer as picture
 import xarray as xr
 
 import survey
 from survey.errors import BadInput, Damaged
 from survey.model import build, proved, reader
 from survey.request.workflow import check, read
+from survey.share import page
 
 ROOT = Path(__file__).parents[2]
 HILL = '''"""A Hill equation whose coefficient is not even."""
@@ -380,6 +383,28 @@ def test_the_command_needs_no_folder_but_that_of_its_own_output(tmp_path):
     assert done.returncode == 2 and "'none/m.model': there is no folder 'none'; create it first" in done.stderr
 
 
+PLACES = (2.03, 0.51), (1.03, 0.51), (1.53, 0.51)  # within cells: the last of one that stays open
+
+
+def _page_says_what_is_proved(folder, digest):
+    page.write(survey.open(folder / "p.nc"), folder / "p.html")
+    text = (folder / "p.html").read_text()
+    assert "<strong>Proved</strong>" in text and f"sha256 {digest}: survey-check p.cert verifies it" in text
+    if picture.missing():
+        return
+    with picture.browser() as driver:
+        driver.get(f"file://{folder / 'p.html'}")
+        while not driver.execute_script("return typeof idle == 'function' && idle()"):
+            time.sleep(0.1)
+        told = [driver.execute_script("return known(...arguments)", *at) for at in PLACES]
+    ds = survey.open(folder / "p.nc")
+    for (a, q), own in zip(PLACES, told, strict=True):
+        inside = (ds.cell_a_low <= a) & (a <= ds.cell_a_high) & (ds.cell_q_low <= q) & (q <= ds.cell_q_high)
+        known = {int(code) for code in ds.cell_verdict[inside.values]} - {-1}
+        assert own["proved"] == ({1: "stable", 0: "unstable"}[known.pop()] if known else None)
+    assert [own["proved"] for own in told[:2]] == ["stable", "unstable"]
+
+
 @pytest.mark.slow
 def test_a_proof_is_carried_and_another_maps_is_refused(tmp_path):
     pytest.importorskip("flint")
@@ -394,6 +419,7 @@ def test_a_proof_is_carried_and_another_maps_is_refused(tmp_path):
     assert model(a=1.0, q=0.1).attrs["proof"] == model.about["proof"]["statement"]
     low, high = model.about["proof"]["areas"]["stable"]
     assert 0 < low < high < 4
+    _page_says_what_is_proved(tmp_path, model.about["proof"]["sha256"])
     with pytest.raises(BadInput, match="another map"):
         proved.matching(survey.open(tmp_path / "p.nc"), check(workflow("mathieu", {"a": (0.0, 5.0), "q": (0.0, 1.0)})))
     ds = survey.open(tmp_path / "p.nc")
