@@ -6,7 +6,7 @@ import xarray as xr
 
 from survey.errors import BadInput
 from survey.file import schema
-from survey.wording import plain
+from survey.wording import plain, shown
 
 
 @xr.register_dataset_accessor("survey")
@@ -66,6 +66,8 @@ class Survey:
         from survey.show.style import figure_size
 
         ds = self._ds
+        if ax is not None and not hasattr(ax, "pcolormesh"):
+            raise BadInput(f"ax = {shown(ax)}: give the Axes of a matplotlib figure, or None for a new one")
         if isinstance(var, xr.DataArray):
             ds, var = verdicts.combined(ds, var), "combined"
         colours = {"cmap": cmap, "vmin": vmin, "vmax": vmax, "robust": robust}

@@ -4,6 +4,7 @@ import gc
 import io
 import json
 import os
+import re
 import shlex
 import signal
 import sys
@@ -16,7 +17,7 @@ from rich.text import Text
 
 from survey import __version__
 from survey.errors import BadInput, SurveyError, Untrusted
-from survey.wording import counted, plain, reason_of
+from survey.wording import counted, plain, reason_of, shown
 
 out = Console(highlight=False, soft_wrap=True, emoji=False)
 err = Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
@@ -51,6 +52,10 @@ def main(arguments=None):
 def _usage(error):
     """What is wrong with the command line, and where to find its usage, in one line."""
     message, context = error.format_message().replace("\n", " ").removesuffix("."), getattr(error, "ctx", None)
+    message = re.sub(r"is not a valid (integer|float) range", r"is not a valid \1", message)
+    message = re.sub(r"is not in the range (\S+)<=x<=(\S+)", r"is not from \1 to \2", message)
+    message = re.sub(r"is not in the range x>=(\S+)", r"is below \1", message)
+    message = re.sub(r"is not in the range x>(\S+)", r"is not above \1", message)
     return f"{message}; see {context.command_path} --help" if context else message
 
 
@@ -337,6 +342,8 @@ def plot(path, output, var, style, width, at):
 
     if width != "single" and style != "paper":
         raise BadInput(f"--width {width} applies only to --style paper; give both, or neither")
+    if output and (os.path.isdir(output) or not os.path.splitext(output)[1]):
+        raise BadInput(f"-o {shown(output)}: name a .png, .pdf or .svg file, such as map.png")
     ds = plane(api.open(path), dict(part.partition("=")[::2] for part in at))
     suffix = ".pdf" if style == "paper" else ".png"
     target = Path(output or f"{path.removesuffix('.nc')}{f'_{var}' if var else ''}{suffix}")

@@ -36,7 +36,38 @@ def here(folder, monkeypatch):
 SHELL = [
     ("run nothing.toml", "No such file or directory"),
     ("rum good.toml", "Did you mean 'run'?"),
-    ("run map.nc", "cannot read this workflow file"),
+    ("run map.nc", "survey info, plot and verify read it"),
+    ("run satellite", "this is a scene: survey init satellite writes a workflow of it"),
+    ("run good.toml -o map.csv", "output.path = 'map.csv' must be a netCDF file; name one, such as 'map.nc'"),
+    ("run good.toml -o .", "output.path = '.' is a folder"),
+    ("run good.toml --set axes.k.num=2.5", "axes.k.num = 2.5"),
+    ("run good.toml --set axes.k.spacing=logarithmic", "should be 'linear' or 'log'"),
+    ("run good.toml --set axes.k.step=0.1", "give num, the number of values from start to stop"),
+    ("run good.toml --set axes.k.start=nan", "axes.k.start = nan"),
+    ("run good.toml --set options.body=ball", "unknown value 'ball' (allowed: prolate, oblate)"),
+    ("run good.toml --set solver.rtol=small", "solver.rtol = 'small'"),
+    ("run good.toml --set output.variables=verdict", "it must be a list"),
+    ("run good.toml --workers 0", "'--workers': 0 is below 1; see survey run --help"),
+    ("run good.toml --block-timeout 0", "0.0 is not above 0"),
+    ("run good.toml --scheduler nothing.json", "there is no such scheduler file"),
+    ("plan map.nc", "survey info, plot and verify read it"),
+    ("plan good.toml --set axes=3", "axes = 3"),
+    ("verify map.nc --points many", "'many' is not a valid integer; see survey verify --help"),
+    ("verify .", "is a folder; name a netCDF file"),
+    ("plot map.nc -o .", "-o '.': name a .png, .pdf or .svg file"),
+    ("plot map.nc -o picture", "-o 'picture': name a .png, .pdf or .svg file"),
+    ("plot map.nc --at k", "k = '': give one number"),
+    ("plot map.nc --at k=0.1 --at rho=1", "a figure needs at least one axis"),
+    ("scenes good.toml", "'good.toml' (allowed: brun"),
+    ("init mathieu -o .", "'.' is a folder; name a file that ends in .toml"),
+    ("precision satelite", "unknown precision chart 'satelite'; did you mean 'satellite'?"),
+    ("precision mathieu -o good.toml", "cannot make this folder"),
+    ("failures satelite", "unknown failure chart 'satelite'; did you mean 'satellite'?"),
+    ("merge map.nc", "Missing option '-o'"),
+    ("bundle good.toml", "this is not a netCDF file of survey"),
+    ("prove good.toml --set refine.width=-1", "refine.width = -1"),
+    ("view map.nc --port 70000", "70000 is not from 0 to 65535"),
+    ("view map.nc --link foo", "--link foo: this is not the address of a view"),
     ("run good.toml --set axes.k.number=3", "did you mean 'num'?"),
     ("run good.toml --set axes.k", "write it as KEY=VALUE"),
     ("run good.toml --set axes.k.num=0", "axes.k.num = 0"),
@@ -60,7 +91,7 @@ SHELL = [
     ("precision xyz", "xyz"),
     ("share map.nc -o map.nc", "this file ends in .html or .htm; name one, such as 'map.html'"),
     ("share map.nc -o map.png", "name one, such as 'map.html'"),
-    ("share map.nc -o folder.html", "is a folder; name a file, with -o"),
+    ("share map.nc -o folder.html", "is a folder; name a file that ends in .html or .htm, with -o"),
     ("share map.nc --at r=1", "unknown axis 'r'"),
     ("model good.toml -o map.nc", "this file ends in .model; name one, such as 'map.model'"),
     ("model good.toml --set axes.k=0.5", "1 of the workflow's parameters vary; a model needs two"),
@@ -71,7 +102,7 @@ SHELL = [
     ("failures good.toml", "true values are known only of Hill equations"),
     ("failures mathieu --share 2", "give a number above 0 and up to 1"),
     ("init mathieu -o nowhere/x.toml", "there is no folder 'nowhere'; create it first"),
-    ("init mathieu -o folder.html", "this file ends in .toml"),
+    ("init mathieu -o folder.html", "is a folder; name a file that ends in .toml"),
 ]
 
 
@@ -87,6 +118,10 @@ def test_a_command_answers_in_one_line(line, words, here, capsys):
 
 def z(u, p):
     return p[0] + np.cos(2 * u)
+
+
+def fill(t, p, out):
+    out[0, 1], out[1, 0] = 1.0, -p[0]
 
 
 PYTHON = [
@@ -134,7 +169,51 @@ PYTHON = [
     (lambda ds: survey.edge("satellite", along="amplitud", inertia_ratio=0.2), "did you mean 'amplitude'?"),
     (lambda ds: survey.evaluate("libration", body="Earth-Mon"), "did you mean 'Earth-Moon'?"),
     (lambda ds: survey.evaluate("libration", m1=1.0), "m2 is missing: give all of m1, m2"),
+    (lambda ds: survey.evaluate("satellite", amplitude=0.5, A=-1.0, B=-1.0, C=-0.5), "A = -1.0: a moment of inertia"),
+    (lambda ds: survey.evaluate("satellite", amplitude=0.5, A=0.0, B=0.0, C=1.0), "must be equal and positive"),
+    (lambda ds: survey.evaluate("satellite", amplitude=0.5, A=1.0, B=1.0), "C is missing: give all of A, B, C"),
+    (lambda ds: survey.evaluate("satellite", k=True, rho=1.0), "k = True: it must be a real number"),
+    (
+        lambda ds: survey.evaluate("satellite", k=0.5, rho=1.0, rtol="1e-8"),
+        "rtol = '1e-8': it must lie between 0 and 1",
+    ),
+    (lambda ds: survey.evaluate("gyrostat", question="Abel", phi=1.0, w0=1.0), "did you mean 'abel'?"),
+    (lambda ds: survey.evaluate("libration", body="Earth-Moon", mu=0.01), "mu is given twice"),
+    (lambda ds: survey.run("good.toml", output=3), "output = 3: give the path of a netCDF file"),
+    (lambda ds: survey.run("good.toml", scheduler=3), "scheduler = 3: give an address"),
+    (lambda ds: survey.open("good.toml"), "this is not a netCDF file of survey"),
+    (lambda ds: survey.describe("satelite"), "did you mean 'satellite'?"),
+    (lambda ds: survey.concat([ds]), "give two or more surveys, not 1"),
+    (lambda ds: survey.concat(ds), "give a list of surveys"),
+    (lambda ds: ds.survey.map(ax=3), "ax = 3: give the Axes of a matplotlib figure"),
+    (lambda ds: ds.survey.map(x="k", y="k"), "x and y are both 'k'"),
+    (lambda ds: ds.survey.margin(k=0.1), "rho is missing: a point needs"),
+    (lambda ds: ds.survey.margin(k=5, rho=1.0), "lies outside the map"),
+    (lambda ds: survey.edge("satellite", along="amplitude", amplitude=1.0, inertia_ratio=0.2), "give (low, high)"),
+    (lambda ds: survey.edge("satellite", along="amplitude", inertia_ratio=[0.2, 0.3]), "it must be one number"),
+    (lambda ds: survey.edge("libration", along="mu"), "no boundaries are known along mu"),
+    (lambda ds: survey.hill(z, period=1.0, parameters=("a", "a")), "give at least one name, each once"),
+    (lambda ds: survey.hill(z, period=1.0, parameters="a", even="yes"), "even = 'yes': it must be True or False"),
+    (
+        lambda ds: survey.hill(z, period=1.0, parameters="a", damping=np.nan),
+        "damping = nan: it must be a finite number",
+    ),
+    (lambda ds: survey.hill(z, period=1.0, parameters="a", breaks=(9.0,)), "breaks: 9 lies outside"),
+    (
+        lambda ds: survey.floquet(fill, period=0, parameters="a", states="xy"),
+        "period = 0: it must be a positive number",
+    ),
+    (lambda ds: survey.floquet(fill, period=1, parameters="a", states=()), "give the names of the states"),
+    (lambda ds: survey.floquet(fill, period=1, parameters="a", states="xy", structure="even"), "must be one of 'none'"),
+    (lambda ds: survey.floquet(period=1, parameters="a", states="xy"), "give either A(t, p, out), or K(t, p, out)"),
+    (lambda ds: survey.abel(z, "g", parameters="a"), "g must be a function of two arguments, g(phi, p)"),
 ]
+
+
+def test_a_model_that_is_missing_is_said_in_one_line(here):
+    with pytest.raises(FileNotFoundError) as refused:
+        survey.Model("nothing.model")
+    assert str(refused.value) == "nothing.model: there is no such file; name one that survey model has made"
 
 
 @pytest.mark.parametrize(("mistake", "words"), PYTHON)

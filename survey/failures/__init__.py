@@ -74,7 +74,7 @@ def _planes(scene, share):
         raise BadInput(f"--share {share:g}: give a number above 0 and up to 1")
     if ranges.is_file(scene):
         return Path(scene).stem, own_file.ABOUT, own_file.planes(scene, share)
-    module = modules.load(folder, scene, "scene with planes of failures")
+    module = modules.load(folder, scene, "failure chart")
     if module is own_file:
         raise BadInput("own_file: name your own file, such as my_equation.py, or a workflow that names it")
     return scene, module.ABOUT, module.planes(share)

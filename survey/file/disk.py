@@ -35,13 +35,13 @@ def check_folder(path, *endings):
     """
     path = Path(path)
     folder = path.parent
+    if endings and path.is_dir():
+        raise BadInput(f"{shown(str(path), 120)} is a folder; name a file that ends in {' or '.join(endings)}, with -o")
     if endings and path.suffix.lower() not in endings:
         example = shown(path.stem + endings[0], 120)
         raise BadInput(
             f"{shown(str(path), 120)}: this file ends in {' or '.join(endings)}; name one, such as {example}"
         )
-    if endings and path.is_dir():
-        raise BadInput(f"{shown(str(path), 120)} is a folder; name a file, with -o")
     if not folder.is_dir():
         raise BadInput(f"{shown(str(path), 120)}: there is no folder {shown(str(folder), 120)}; create it first, "
                        "or name another with -o")  # fmt: skip

@@ -222,7 +222,9 @@ def _read(path):
         if not isinstance(table, dict):
             raise ValueError(f"{TABLE} holds no object")
     except (zipfile.BadZipFile, zlib.error, EOFError, OSError, KeyError, ValueError, RuntimeError) as error:
-        if getattr(error, "filename", None) is not None:  # there is no such file, or it may not be read
+        if isinstance(error, FileNotFoundError):
+            raise FileNotFoundError(f"{path}: there is no such file; name one that survey model has made") from None
+        if getattr(error, "filename", None) is not None:  # it may not be read
             raise
         raise ValueError(f"{path}: this is not a model of survey ({error}); make one with survey model") from None
     return table, series

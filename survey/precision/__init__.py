@@ -115,7 +115,7 @@ def _case(scene):
     """The case of a chart: a file in `cases`, or one made for a file of one's own."""
     if ranges.is_file(scene):
         return own_file.case(scene)
-    found = modules.load(cases, scene, "scene with a precision chart")
+    found = modules.load(cases, scene, "precision chart")
     if found is own_file:
         raise BadInput("own_file: name your own file, such as my_equation.py, or a workflow that names it")
     return found

@@ -10,10 +10,15 @@ from survey.wording import reason_of, shown
 
 LONGEST_SUFFIX = 40  # bytes that the names of files beside the output are longer by
 LONGEST_NAME = 255  # where the system does not say
+OTHER_KINDS = set(
+    ".cert .csv .html .ipynb .jpg .json .md .model .pdf .png .py .svg .toml .txt .xlsx .zarr .zip".split()
+)
 
 
 def check_path(path):
     """The output path; raises BadInput unless a file can be created there, Stopped where the disk is read-only."""
+    if not isinstance(path, (str, os.PathLike)):
+        raise BadInput(f"output = {shown(path)}: give the path of a netCDF file, such as 'map.nc'")
     if not str(path):
         raise BadInput("output.path is empty; name a file, such as 'map.nc'")
     try:
@@ -29,7 +34,7 @@ def check_path(path):
 def _checked(path):
     folder = path.parent
     key, where = f"output.path = {shown(str(path), 120)}", shown(str(folder), 120)
-    if path.suffix.lower() in (".png", ".pdf", ".svg", ".toml"):
+    if path.suffix.lower() in OTHER_KINDS:
         raise BadInput(f"{key} must be a netCDF file; name one, such as {shown(path.stem + '.nc')}")
     if path.is_file() and not _is_netcdf(path):
         raise BadInput(f"{key} exists and is not a netCDF file; move it away, or use -o OUT.nc")

@@ -82,10 +82,15 @@ def _ratio(m1, m2):
 
 def _axial(a, b, c):
     """Iz / I of a body with two equal moments of inertia, in any unit."""
+    for name, moment in zip(MOMENTS, (a, b, c), strict=True):
+        if not bool((moment >= 0).all()):
+            raise BadInput(f"{name} = {shown(float(moment.min()))}: a moment of inertia must be positive, or 0")
     for one, other, axial in ((a, b, c), (b, c, a), (a, c, b)):
-        if bool((one == other).all()):
+        if bool(((one == other) & (one > 0)).all()):
             return axial / one
-    raise BadInput("A, B, C: two moments of inertia must be equal, as this scene's body has an axis of symmetry")
+    raise BadInput(
+        "A, B, C: two moments of inertia must be equal and positive, as this scene's body has an axis of symmetry"
+    )
 
 
 def _of_body(body, with_eccentricity):

@@ -10,7 +10,7 @@ import numpy as np
 import tomli_w
 from pydantic import ValidationError
 
-from survey import modules
+from survey import modules, scenes
 from survey.errors import BadInput
 from survey.grid import Grid
 from survey.request import physical, user_scene
@@ -52,7 +52,7 @@ def read(path, overrides=(), output=None, proves=False):
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, ValueError) as error:
-        raise BadInput(f"{short(path, 120)}: cannot read this workflow file ({reason_of(error)})") from None
+        raise BadInput(f"{short(path, 120)}: cannot read this workflow file ({_why(path, error)})") from None
     data = _parsed(text, short(path, 120))
     for override in overrides:
         _apply(data, override)
@@ -81,6 +81,15 @@ def _as_toml(data):
 
 
 @np.errstate(all="ignore")  # overflow on an axis is found by its values
+def _why(path, error):
+    """Why a file is no workflow: what it is instead, where its name tells."""
+    if path.suffix == ".nc":
+        return "a netCDF file holds results: survey info, plot and verify read it"
+    if isinstance(error, FileNotFoundError) and not path.suffix and path.name in modules.names(scenes):
+        return f"this is a scene: survey init {path.name} writes a workflow of it"
+    return reason_of(error)
+
+
 def check(data, text="", output=None, default_path="survey.nc", near=None, proves=False):
     """The checked Workflow of the mapping `data` (a parsed workflow file); `text` is what it was parsed from.
 

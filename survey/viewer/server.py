@@ -16,7 +16,7 @@ from urllib.parse import urlsplit
 from survey.errors import BadInput
 from survey.request import trust
 from survey.viewer.shown import Map
-from survey.wording import counted
+from survey.wording import counted, short
 
 try:
     from bokeh.application import Application
@@ -43,6 +43,8 @@ def serve(path, port, link="", say=print, browser=False, trust_scene=False):
     if trust_scene:
         trust.allow(shown.ds.attrs.get("scene_hash", ""))
     query = urlsplit(link).query if "?" in link else link
+    if query and "=" not in query:
+        raise BadInput(f"--link {short(link)}: this is not the address of a view; copy it from the browser")
     query = f"?{shown.link(shown.read(query))}" if query else ""
 
     async def run():

@@ -122,7 +122,7 @@ def test_what_is_not_known_is_null(tmp_path, plane, monkeypatch):
 
 
 def test_what_has_no_planes_is_refused(tmp_path):
-    with pytest.raises(survey.BadInput, match="unknown scene with planes of failures 'satelite'; did you mean"):
+    with pytest.raises(survey.BadInput, match="unknown failure chart 'satelite'; did you mean"):
         failures.write("satelite", tmp_path)
     with pytest.raises(survey.BadInput, match="--share"):
         failures.write("mathieu", tmp_path, share=0.0)
