@@ -67,15 +67,26 @@ class FloquetScene(TracedScene):
 
     def cost(self, options, sizes):
         """Seconds per point, roughly: measured on the examples in `workflows`."""
-        n = len(self.states)
-        further = max(self._known.get("series", 2.0) - 2.0, 0.0)  # besides 1 and a function of time
-        alone = 2e-5 + further * (6e-6 + 9e-7 * self._known.get("steps", 6.0)) + 1e-6 * n**2 + 1e-7 * n**3
+        n, alone = len(self.states), self._alone
         longest = sorted(sizes.values())[-2:]
         if np.prod(longest) < 4 * NODES or n > dense.LARGEST:
             return alone
         # what series do not answer: by more multipliers inside the circle the radius is lost sooner than by pairs on it
         left = 0.05 if self.structure != "none" else min(0.05 + 0.1 * (n - 1), 1.0)
         return 1e-7 * n + (left + NODES / np.prod(longest)) * alone
+
+    @property
+    def curves_seconds(self):
+        """Seconds that the curves of a map take, roughly: a lattice, and points of curves, most of them in narrow
+        tongues, which damped systems do not have; measured on the examples in `workflows`."""
+        return 1e4 * self._alone + 0.03 * len(self.states) ** 3 * (1.0 if self.structure == "none" else 7.0)
+
+    @property
+    def _alone(self):
+        """Seconds of a point on its own."""
+        n = len(self.states)
+        further = max(self._known.get("series", 2.0) - 2.0, 0.0)  # besides 1 and a function of time
+        return 2e-5 + further * (6e-6 + 9e-7 * self._known.get("steps", 6.0)) + 1e-6 * n**2 + 1e-7 * n**3
 
     def solve(self, point, request):
         """The requested outputs of a block (see `survey.scenes`)."""

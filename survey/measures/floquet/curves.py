@@ -3,12 +3,14 @@
 Those of periodic orbits are found by `orbit_curves`; what follows is about linear systems. There the curves are zeros
 of the functions of `bifurcations`. These are known on LINES lines of the map each way, and their splines, on lines
 FINER times as dense, show where to look (marching squares). Every point is then bracketed along an axis by signs of the
-function itself that are certain within the error bounds of M. A tongue narrower than the distance of two of the dense
-lines may be missed there, and one that the splines do not show. Curves are drawn wherever a multiplier passes, also
+function itself that are certain within the error bounds of M, and followed on from its ends inside the map, into the tips
+of tongues (see `tips`). A tongue that is narrower everywhere than the distance of two of the dense lines may be missed,
+and one that the splines do not show. Curves are drawn wherever a multiplier passes, also
 where another one is outside the circle already: `outside` counts those.
 """
 
 from functools import partial
+from itertools import pairwise
 
 import contourpy
 import numpy as np
@@ -16,7 +18,7 @@ from scipy.interpolate import RectBivariateSpline
 from scipy.ndimage import binary_erosion
 
 from survey.measures import contours
-from survey.measures.floquet import bifurcations
+from survey.measures.floquet import bifurcations, tips
 from survey.measures.floquet.stability import CROSSINGS
 from survey.measures.hill.edges import close_in
 from survey.measures.sampled import FLAT, LONGEST, joined
@@ -91,11 +93,12 @@ def _lines(function, grain, values):
         dense = np.ma.masked_array(dense, hole)
     found = contourpy.contour_generator(fine, fine, dense).lines(0.0)
     parts = [_thinned(np.asarray(line)[:, ::-1]) for line in found]
-    return [curve for x in parts for curve in _closed_in(function, x, spline, grain)]
+    return tips.followed(function, _closed_in(function, parts, spline, grain), grain) if parts else []
 
 
-def _closed_in(function, x, spline, grain):
-    """The curve near the positions x, moved along the axis that crosses it best; cut where one is not certain."""
+def _closed_in(function, parts, spline, grain):
+    """The curves near positions, moved along the axis that crosses them best; cut where one is not certain."""
+    x = np.concatenate(parts)
     slope = abs(np.stack([spline.ev(*x.T, dx=1), spline.ev(*x.T, dy=1)], axis=1))
     border = (x == 0.0) | (x == 1.0)
     along = np.argmax(np.where(border, -1.0, slope), axis=1)
@@ -111,10 +114,12 @@ def _closed_in(function, x, spline, grain):
         left = np.flatnonzero(error == np.inf)
         axis = abs(along[left] - other)
         start, same = x[left, axis], np.ones(left.size)
-        t, width, sure = close_in(partial(at, left, axis), start, times * NEAR * same, grain * same)
+        t, width, sure = close_in(partial(at, left, axis), start, times * NEAR * same, grain * same, 0.5 / (LINES - 1))
         sure &= (width < SURE) & (t >= 0.0) & (t <= 1.0) & (abs(t - start) < 0.5 / (LINES - 1))
         found[left[sure], axis[sure]], error[left[sure]] = t[sure], width[sure] + grain
-    return [(found[part], error[part]) for part in contours.runs(np.isfinite(error))]
+    firsts = np.cumsum([0, *map(len, parts)])
+    own = [first + run for first, last in pairwise(firsts) for run in contours.runs(np.isfinite(error[first:last]))]
+    return [(found[part], error[part]) for part in own]
 
 
 def _thinned(x):

@@ -183,11 +183,11 @@ def tongue(out, kind):
     return near[np.arange(kind.size), np.argmax(near % 2 == (kind < 2)[:, None], axis=1)]
 
 
-def close_in(function, x, width, grain):
+def close_in(function, x, width, grain, widest=np.inf):
     """Sharpen simple zeros near x (n) on lines: (x, half width, certain), with opposite, certain signs at its ends.
 
     `function(who, x)` gives the functions `who` (m indices into the lines) and their error bounds at x (m, 3);
-    `grain` (n) is the rounding of x.
+    `grain` (n) is the rounding of x; zeros that are not certain between signs `widest` away are given up.
     """
     x, width, sure = x.copy(), width.copy(), np.zeros(x.size, np.bool_)
     left = np.arange(x.size)
@@ -207,7 +207,7 @@ def close_in(function, x, width, grain):
         x[left[better]] += step[better]
         width[left] = np.where(better, reach, np.where(certain, wide, 3 * wide))
         sure[left] = certain & ~better
-        left = left[better | ~certain]
+        left = left[(better | ~certain) & (width[left] <= widest)]
     return x, width, sure
 
 

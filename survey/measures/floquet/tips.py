@@ -1,0 +1,162 @@
+"""Curves followed on from where a lattice loses them: into the tips of tongues, or up to the next piece.
+
+Inside a narrow tongue the function is a shallow valley, a parabola across whose zeros are the tongue's two edges. Of
+the parabola through three values the zero with the curve's own slope is taken, so that one edge is not mistaken for the
+other, and it is bracketed by certain signs, as all points are. All ends take their steps together, each of its own
+length.
+"""
+
+import numpy as np
+
+from survey.measures.hill.edges import close_in
+from survey.measures.sampled import FLAT, LONGEST
+
+LEAST = 1e-4  # of the map: a shorter step than this is the end
+FITS = 3  # parabolas, one inside the other
+MOST = 300  # steps
+SURE = 1e-6  # the widest bracket of a point, half of it, that is drawn
+SAME = 1e-8  # how near one place is found again, besides the brackets
+
+
+class _End:
+    """An end of a piece: its outermost points, the one that is nearest to the end last, and the length of a step."""
+
+    def __init__(self, x, error):
+        self.x, self.error, self.own = [*x], [*error], len(x)
+        self.step, self.going, self.side = max(LEAST, min(np.hypot(*(x[-1] - x[-2])), 0.25 * LONGEST)), True, 0.0
+
+    @property
+    def ahead(self):
+        back = next(p for p in self.x[-2::-1] if np.hypot(*(self.x[-1] - p)) > 0.1 * LEAST or p is self.x[0])
+        run = self.x[-1] - back
+        return run / max(np.hypot(*run), 1e-300)
+
+    @property
+    def new(self):
+        return np.array(self.x[self.own :]).reshape(-1, 2), np.array(self.error[self.own :])
+
+
+def followed(function, pieces, grain):
+    """The pieces [(positions (m, 2), errors (m))] of curves function(x) = 0, longer at ends that lie inside the map."""
+    ends = [_End(x[::sense], error[::sense]) for x, error in pieces for sense in (-1, 1)]
+    for end in ends:
+        tip = end.x[-1]
+        end.going = bool(((tip > 0.0) & (tip < 1.0)).all())
+    _sides(function, [end for end in ends if end.going])
+    for _ in range(MOST):
+        going = [end for end in ends if end.going]
+        if not going:
+            break
+        _steps(function, going, ends, grain)
+    longer = []
+    for i, (x, error) in enumerate(pieces):
+        (first, first_error), (last, last_error) = (end.new for end in ends[2 * i : 2 * i + 2])
+        longer.append((np.concatenate([first[::-1], x, last]), np.concatenate([first_error[::-1], error, last_error])))
+    return longer
+
+
+def _sides(function, ends):
+    """Note the sign of the function to the left of each end, on its way out; ends where it is open go nowhere."""
+    if not ends:
+        return
+    width = np.array([max(10.0 * end.error[-1], 1e-9) for end in ends])
+    left = np.array([[-end.ahead[1], end.ahead[0]] for end in ends])
+    tips = np.array([end.x[-1] for end in ends])
+    for _ in range(4):  # as far from the end as its sign needs
+        values, bars = function(np.concatenate([tips + width[:, None] * left, tips - width[:, None] * left]))
+        sign = np.where(abs(values) > bars, np.sign(values), 0.0).reshape(2, -1)
+        for k, end in enumerate(ends):
+            if end.side == 0.0 and sign[0, k] * sign[1, k] < 0.0:
+                end.side = sign[0, k]
+        width = 5.0 * width
+    for end in ends:
+        end.going = end.side != 0.0
+
+
+def _steps(function, going, ends, grain):
+    """One step of all ends that are going; those that cannot take it try a shorter one next, or stop."""
+    goals, met = zip(*(_goal(end, ends) for end in going), strict=True)
+    ahead, goals = np.array([end.ahead for end in going]), np.array(goals)
+    axis, rows = np.argmin(abs(ahead), axis=1), np.arange(len(going))
+    left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
+    slope = np.array([end.side for end in going]) * np.sign(left[rows, axis])
+    length = np.hypot(*(goals - [end.x[-1] for end in going]).T)
+
+    def at(who, t):
+        here = np.repeat(goals[who][:, None], t.shape[1], axis=1)
+        here[np.arange(len(t)), :, axis[who]] = t
+        value, bar = function(here.reshape(-1, 2))
+        return value.reshape(t.shape), bar.reshape(t.shape)
+
+    t, reach = _zeros(at, goals[rows, axis].copy(), 0.2 * length, slope)
+    found = np.isfinite(t)
+    t[~found] = goals[rows, axis][~found]
+    wide = np.where(found, np.maximum(0.1 * reach, 4.0 * grain), 1e-3)
+    error, sure = np.full((2, len(going)), np.inf)
+    some = np.flatnonzero(found)
+    if some.size:
+        t[some], error[some], certain = close_in(
+            lambda who, x: at(some[who], x), t[some], wide[some], np.full(some.size, grain), LONGEST
+        )
+        beyond, bars = at(some, (t[some] + error[some])[:, None])
+        right = (beyond[:, 0] * slope[some] > 0.0) & (abs(beyond[:, 0]) > bars[:, 0])
+        sure[some] = certain & right & (error[some] < SURE)
+    inside = (t >= 0.0) & (t <= 1.0)
+    off = abs(t - goals[rows, axis])
+    for k, end in enumerate(going):
+        place = goals[k].copy()
+        place[axis[k]] = t[k]
+        other = met[k]
+        bend = off[k] if other is None else 0.0  # a goal that is met is where the curve goes
+        if sure[k] != 1.0 or not inside[k] or bend > 8.0 * FLAT + 0.1 * LEAST or off[k] > 0.5 * length[k]:
+            end.step *= 0.5
+            end.going = end.step >= LEAST
+            continue
+        end.x.append(place)
+        end.error.append(error[k] + grain)
+        if other is not None and off[k] <= SAME + error[k] + other.error[-1]:
+            end.going = other.going = False
+        elif ((place <= 0.0) | (place >= 1.0)).any():
+            end.going = False
+        elif bend < 2.0 * FLAT:
+            end.step = min(1.5 * end.step, LONGEST)
+
+
+def _goal(end, ends):
+    """(where the next step leads to, the end of another piece that is met there, or None)."""
+    tip, ahead = end.x[-1], end.ahead
+    for other in ends:
+        if other is not end and len(other.x) == other.own:
+            run = other.x[-1] - tip
+            along = run @ ahead
+            if 0.0 < along <= 1.3 * end.step and np.hypot(*(run - along * ahead)) <= 0.2 * along:
+                if ahead @ other.ahead < 0.0:
+                    return other.x[-1], other
+    goal = tip + end.step * ahead
+    with np.errstate(all="ignore"):
+        room = np.where(ahead > 0.0, (1.0 - tip) / ahead, np.where(ahead < 0.0, -tip / ahead, np.inf))
+    nearest = int(np.argmin(room))
+    if room[nearest] < end.step:
+        goal = tip + room[nearest] * ahead
+        goal[nearest] = float(ahead[nearest] > 0.0)
+    return goal, None
+
+
+def _zeros(at, t, reach, slope):
+    """(zeros near t (n) at which functions have slopes of the signs `slope`, or NaN; within what they are known)."""
+    rows = np.arange(t.size)
+    for _ in range(FITS):
+        f, _bars = at(rows, t[:, None] + reach[:, None] * np.array([-1.0, 0.0, 1.0]))
+        with np.errstate(all="ignore"):
+            b, c = 0.5 * (f[:, 2] - f[:, 0]), 0.5 * (f[:, 2] + f[:, 0]) - f[:, 1]
+            root = slope * np.sqrt(b * b - 4.0 * c * f[:, 1])
+            zero = np.where(b * root > 0.0, -2.0 * f[:, 1] / (b + root), (root - b) / (2.0 * c))
+            apart = abs(root / c)  # from the other zero
+        zero = np.where(abs(zero) < 3.0, zero, np.nan)
+        t = t + reach * zero
+        reach = reach * np.clip(0.3 * np.nan_to_num(apart, nan=1.0, posinf=1.0), 1e-4, 0.3)
+        lost = ~np.isfinite(t)
+        if lost.all():
+            break
+        t, reach = np.where(lost, np.nan, t), np.where(lost, 1e-3, reach)
+    return t, reach
