@@ -1,5 +1,6 @@
 """Text from a file for matplotlib: taken literally, or as a formula that it can draw; labels and titles."""
 
+import re
 import textwrap
 from functools import lru_cache
 
@@ -11,6 +12,7 @@ from survey.wording import plain
 MAX_TEXT, MAX_FORMULA = 300, 120  # characters of a text and of a formula in a file
 WIDE = 80  # characters of a line below axes, where `layout.fit` breaks what is wider
 OF_QUESTION = ("question", "branch")  # options that say nothing of the system
+_RAISED = str.maketrans("-0123456789", "\N{SUPERSCRIPT MINUS}⁰¹²³⁴⁵⁶⁷⁸⁹")
 MAX_DEPTH = 6  # of nested braces in a formula
 WITH_LENGTHS = ("\\hspace", "\\genfrac")  # TeX that takes lengths, which may be miles
 
@@ -54,16 +56,22 @@ def label_of(variable, width=40):
     text = (
         "$$" if shown and text in (symbol, symbol.lstrip("\\")) else f"{text},\N{NO-BREAK SPACE}$$" if shown else text
     )
-    text += "" if units in ("1", "") else f"\N{NO-BREAK SPACE}({literal(units)})"
+    text += "" if units in ("1", "") else f"\N{NO-BREAK SPACE}({_with_powers(units)})"
     wrapped = textwrap.fill(text, width, break_long_words=False).replace("\N{NO-BREAK SPACE}", " ")
     return wrapped.replace("$$", f"${symbol}$") if shown else wrapped
+
+
+def _with_powers(units):
+    """`rad s-1` as it is printed: powers raised, no line broken within."""
+    raised = re.sub(r"(?<=[A-Za-z])(-?\d+)\b", lambda power: power[1].translate(_RAISED), literal(units))
+    return raised.replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def title_of(ds, variable):
     """The survey's title, what is drawn, the options that are words, and the numbers that are fixed and not zero."""
     title, name = literal(ds.attrs.get("title", "")), literal(variable.attrs.get("long_name", variable.name))
     fixed = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "fi"]
-    fixed = [c for c in fixed if c.name in ds.dims or float(c) != 0]
+    fixed = [c for c in fixed if c.name in ds.dims or (float(c) != 0 and not _is_default(c))]
     position = {name: f" ({_place(ds[name], c)} of {ds.sizes[name]})"
                 for name, c in variable.coords.items() if c.ndim == 0 and ds.sizes.get(name, 1) > 1}  # fmt: skip
     numbers = [f"{_equal(c)}{position.get(c.name, '')}" for c in fixed]
@@ -79,6 +87,11 @@ def _options(ds):
     """The options that say something in words, such as `prolate`; what is drawn says which question is asked."""
     pairs = [part.partition("=")[::2] for part in str(ds.attrs.get("options", "")).split(", ")]
     return ", ".join(spaced(value) for key, value in pairs if key not in OF_QUESTION and value[:1].isalpha())
+
+
+def _is_default(fixed):
+    """Is it an orbit's number by which the last is meant, or the only one?"""
+    return fixed.name == "branch" and float(fixed) < 0
 
 
 def _place(axis, coordinate):

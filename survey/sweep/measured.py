@@ -18,7 +18,7 @@ from survey.kernels import jit
 from survey.sweep.announce import always_compiled
 
 MOST = 400  # records that are kept
-SHORT = 0.1  # seconds: shorter runs tell nothing of longer ones
+SHORT = 1.0  # seconds: a shorter run has spent them on beginning, and would tell a longer one a multiple of its time
 PARTS = ("kernels", "further")  # [seconds estimated, measured] of the points; of edges, curves and cells
 
 

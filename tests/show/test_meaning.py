@@ -25,6 +25,20 @@ def test_a_symbol_stands_once_and_the_unit_on_its_line():
         assert "quantity, $x$ (rad)" in label_of(long, width)
 
 
+@pytest.mark.parametrize(("units", "shown"), [("rad s-1", "(rad s⁻¹)"), ("m2 s-2", "(m² s⁻²)"), ("kg", "(kg)")])
+def test_units_have_their_powers_raised(units, shown):
+    rate = xr.DataArray(0.0, name="n", attrs={"long_name": "rate", "symbol": r"\Omega", "units": units})
+    assert label_of(rate).replace("\N{NO-BREAK SPACE}", " ") == rf"rate, $\Omega$ {shown}"
+
+
+def test_the_number_of_an_orbit_stands_in_the_title_where_it_tells_it_from_others(ds):
+    for number, words in ((-1.0, "stability of the linear motion"), (1.0, "stability of the linear motion\ni = 1")):
+        branch = xr.DataArray(number, name="branch", attrs={"symbol": "i"})
+        assert title_of(ds.assign_attrs(title=""), ds.verdict.assign_coords(branch=branch)).strip() == words.replace(
+            "i = 1", "$i = 1$"
+        )
+
+
 def test_titles_have_no_internals_and_repeat_nothing(ds):
     shown = ds.assign_attrs(
         title="A map, stability of the linear motion", options="question=fate, direction=1, body=prolate"

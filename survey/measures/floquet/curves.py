@@ -3,9 +3,9 @@
 Those of periodic orbits are found by `orbit_curves`; what follows is about linear systems. There the curves are zeros
 of the functions of `bifurcations`. These are known on LINES lines of the map each way, and their splines, on lines
 FINER times as dense, show where to look (marching squares). Every point is then bracketed along an axis by signs of the
-function itself that are certain within the error bounds of M, and followed on from its ends inside the map, into the tips
-of tongues (see `tips`). A tongue that is narrower everywhere than the distance of two of the dense lines may be missed,
-and one that the splines do not show. Curves are drawn wherever a multiplier passes, also
+function itself that are certain within the error bounds of M, and curves are followed on from their ends inside the
+map, into the tips of tongues (see `tips`). A tongue that is narrower everywhere than the distance of two of the dense
+lines may be missed, and one that the splines do not show. Curves are drawn wherever a multiplier passes, also
 where another one is outside the circle already: `outside` counts those.
 """
 
