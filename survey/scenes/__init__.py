@@ -56,6 +56,8 @@ CONTRACT = {
         ("options", "sizes"),
         needed=True,
     ),
+    "SECONDS": Value("{output: seconds that a point takes besides where it is named}, of outputs on request", dict),
+    "curves_seconds": Value("seconds that the curves of [boundaries] of a map take, where they are searched", float),
     "solve": Function("{output: array} of a block, see above", ("point", "request"), needed=True),
     "why": Function("a sentence: what decided the verdict, by which margin against which error bar", ("answer",)),
     "trajectory": Function(

@@ -92,6 +92,10 @@ _OF_PERIOD = {"period", "exponent_per_orbit", "lyapunov", "lyapunov_integral", "
 _PERIOD_ULPS = 6
 
 
+# measured: a motion along the separatrix, or a normal form, for each point
+SECONDS = dict.fromkeys(scattering.NAMES, 1.2e-4) | {o.name: 9e-5 for o in nonlinear.OUTPUTS}
+
+
 def cost(options, sizes):
     """Seconds per point, roughly."""
     rows = max(sizes.get(name, 1) for name in ("k", "one_minus_k", "amplitude"))

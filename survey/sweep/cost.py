@@ -27,7 +27,9 @@ def seconds_per_point(scene, request, grid):
 
 def scene_cost(scene, request, grid):
     """The scene's own estimate for this grid, in seconds per point."""
-    return scene.cost(request.options, {name: values.size for name, (_, values) in grid.parameters.items()})
+    dear = getattr(scene, "SECONDS", {})  # such outputs come together
+    seconds = scene.cost(request.options, {name: values.size for name, (_, values) in grid.parameters.items()})
+    return seconds + max((dear[name] for name in request.variables if name in dear), default=0.0)
 
 
 def lone_cost(scene, request, grid):

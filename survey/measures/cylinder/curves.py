@@ -88,4 +88,4 @@ def closed(square, axes, fixed, options):
 def seconds(axes):
     """Estimated seconds on one thread of the curves on one map, measured."""
     own = set(axes[:2])
-    return 0.1 if own == set(STATE) else 10.0 if own <= set(SYSTEM) else 60.0
+    return 0.1 if own == set(STATE) else 10.0 if own <= set(SYSTEM) else 12.0

@@ -13,7 +13,7 @@ from survey.measures.sampled import FLAT, LONGEST
 
 LEAST = 1e-4  # of the map: a shorter step than this is the end
 FITS = 3  # parabolas, one inside the other
-MOST = 300  # steps
+MOST = 60  # steps
 SURE = 1e-6  # the widest bracket of a point, half of it, that is drawn
 SAME = 1e-8  # how near one place is found again, besides the brackets
 
