@@ -14,6 +14,7 @@ from survey.measures.sampled import FLAT, LONGEST
 LEAST = 1e-4  # of the map: a shorter step than this is the end
 FITS = 3  # parabolas, one inside the other
 MOST = 60  # steps
+ENDS = 64  # that are followed, those of the longest pieces: where tongues crowd there are hundreds
 SURE = 1e-6  # the widest bracket of a point, half of it, that is drawn
 SAME = 1e-8  # how near one place is found again, besides the brackets
 
@@ -42,6 +43,8 @@ def followed(function, pieces, grain):
     for end in ends:
         tip = end.x[-1]
         end.going = bool(((tip > 0.0) & (tip < 1.0)).all())
+    for end in sorted((end for end in ends if end.going), key=lambda end: -end.own)[ENDS:]:
+        end.going = False
     _sides(function, [end for end in ends if end.going])
     for _ in range(MOST):
         going = [end for end in ends if end.going]
