@@ -65,6 +65,12 @@ def test_mutations_are_drawn_or_refused(folder):
     checked(folder, range(1000, 1004))
 
 
+def test_mutations_of_cells_and_areas(folder):
+    """A cell that ends at -1e308, of which a picture overflows; areas of a single verdict, joined with another file."""
+    checked(folder, (20506,))
+    checked(folder, (30082,), "mathieu")
+
+
 def test_ticks_near_the_largest_number_warn_of_nothing(folder):
     checked(folder, (30039,), "mathieu")
 

@@ -43,14 +43,14 @@ def concat(datasets: Iterable[xr.Dataset | str | os.PathLike[str]]) -> xr.Datase
     survey.BadInput where the parts do not belong together: another scene, option, method, rtol or set of outputs, more
     than one axis that differs, or different values at a common point.
     """
-    parts = [_part(given) for given in _as_list(datasets)]
+    parts = [of_points(_part(given)) for given in _as_list(datasets)]
     if len(parts) < 2:
         raise BadInput(f"concat: give two or more surveys, not {len(parts)}")
     for part in parts[1:]:
         _check_alike(parts[0], part)
     axis = _axis(parts)
     about = parts[0][axis].attrs
-    parts = [_along(of_points(part), axis) for part in parts]
+    parts = [_along(part, axis) for part in parts]
     joined = reduce(lambda one, other: _joined(one, other, axis), parts)
     return _described(joined.assign_coords({axis: (axis, joined[axis].values, about)}), parts, axis)
 
@@ -94,7 +94,7 @@ def _check_alike(one, other):
             raise BadInput(
                 f"concat: the surveys have another {key}: {shown(one.attrs.get(key))} and {shown(other.attrs.get(key))}"
             )
-    names = [set(of_points(ds).data_vars) for ds in (one, other)]
+    names = [set(ds.data_vars) for ds in (one, other)]
     if names[0] != names[1]:
         only = ", ".join(sorted(names[0] ^ names[1]))
         raise BadInput(f"concat: only one of the surveys has {only}; leave it out of the other (drop_vars)")

@@ -15,6 +15,7 @@ from survey.errors import Damaged
 RATIO, SPARE = 1032, 2**20
 CHUNK = 2**28  # bytes: tiles of survey are a hundred times smaller
 AXIS = 10**8  # values: more than a workflow allows
+ROUNDED = 1e-9  # of an axis: by how much the end of a cell may lie beyond it
 AREA = 1e300  # so that sums and fractions of areas stay within the range of floats
 VARIABLES, FLAGS = 2000, 28
 REQUIRED = ("scene", "options", "method", "rtol")
@@ -185,6 +186,11 @@ def cells(ds):
     if ds.attrs.get("refine") != ", ".join(ds.status.dims) or len(ds.status.dims) != 2:
         raise Damaged("the attribute refine must name the two axes of the map")
     _along(ds, "cell", "cell_verdict", *(f"cell_{dim}_{end}" for dim in ds.status.dims for end in ("low", "high")))
+    for dim in ds.status.dims:
+        first, last = np.sort(ds[dim].values.astype(float)[[0, -1]])
+        ends = np.concatenate([ds[f"cell_{dim}_{end}"].values.astype(float) for end in ("low", "high")])
+        if not ((ends - first >= ROUNDED * (first - last)) & (ends - last <= ROUNDED * (last - first))).all():
+            raise Damaged(f"cell_{dim}_low and cell_{dim}_high must lie on the axis {dim}")
     _coded(ds, "cell_verdict")
     if "undecided" not in flags(ds.cell_verdict.attrs) or not ds.sizes["cell"]:
         raise Damaged("cell_verdict must have a flag undecided, and values")
