@@ -99,11 +99,19 @@ def prover_of(workflow):
         across, depth = [ROW_PARTS], max(0, math.ceil(math.log2((high - low) / (ROW_PARTS * Fraction(width)))))
         bits, tolerance = ROW_BITS, FRACTION * width
     else:
-        depths = [min(DEEPEST, max(0, math.ceil(math.log2(1 / x) - 1e-9))) for x, _ in workflow.refine.values()]
+        ends = [[float(end) for end in side] for side in rectangle]
+        widths = [_linear(*width, *side) for width, side in zip(workflow.refine.values(), ends, strict=True)]
+        depths = [min(DEEPEST, max(0, math.ceil(math.log2(1 / x) - 1e-9))) for x in widths]
         depth = max(0, min(depths) - START[kind])
         across, tolerance = [2 ** (halvings - depth) for halvings in depths], FRACTION * 0.5 ** max(depths)
         bits = search.BITS
     return Prover({"kind": kind, "pieces": pieces}, names, rectangle, across, depth, tolerance, bits)
+
+
+def _linear(width, log, low, high):
+    """A width as a fraction of an axis; on a logarithmic one, whose fraction is of the logarithm, that of the least."""
+    low, high = sorted((abs(low), abs(high)))
+    return math.expm1(width * math.log(high / low)) / (high / low - 1) if log else width
 
 
 class Prover:
