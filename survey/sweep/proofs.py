@@ -196,11 +196,18 @@ def certificate(title, prover, layout, panels):
         for letter, part in checker.walk(panel["cells"], [place], checker.halved):
             shares[letter if letter in shares else checker.OPEN] += checker.size(part) / checker.size(sides)
     table = {
-        "format": checker.FORMAT, "title": title, "bits": prover.bits, "equation": prover.equation,
+        "format": checker.FORMAT, "title": title, "statement": [], "bits": prover.bits, "equation": prover.equation,
         "parameters": prover.names, "rectangle": prover.rectangle,
         "panels": {"across": prover.across, "layout": layout, "list": panels},
         "shares": {letter: str(share) for letter, share in shares.items()},
     }  # fmt: skip
+    table["statement"] = checker.Certificate(_signed(table)).statement().split("\n")
+    return _signed(table)
+
+
+def _signed(table):
+    from survey.proof import checker
+
     return json.dumps(table | {"sha256": checker.digest(table)}, indent=1) + "\n"
 
 

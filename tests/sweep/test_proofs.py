@@ -72,18 +72,41 @@ def test_a_map_is_proved(here, capfd):
         assert f"The {word} points have an area of" in statement
 
 
-def test_refine_agrees(here):
+OWN = (
+    "from math import cos, exp\nPARAMETERS = ('a', 'q')\nPERIOD = 2.0\nEVEN = True\n"
+    "def z(u, p):\n    return p[0] + p[1] * exp(cos(3.141592653589793 * u))\n"
+)
+MAPS = {  # scene: its axes
+    "mathieu": {"a": (1.0, 4.0), "q": (0.5, 3.0)},
+    "own.py": {"a": (1.0, 4.0), "q": (0.5, 3.0)},
+    "satellite": {"inertia_ratio": (0.1, 0.3), "amplitude": (0.9, 1.1)},
+    "libration_elliptic": {"mu": (0.0, 0.05), "e": (0.0, 0.2)},
+}
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [pytest.param(name, marks=[pytest.mark.slow] * (name != "mathieu")) for name in MAPS],
+)
+def test_refine_agrees(scene, here):
     """The cells of `survey run` have no other verdict, and its areas lie within the proved bounds."""
+    axes = "".join(
+        f"{name} = {{ start = {low}, stop = {high}, num = 20 }}\n" for name, (low, high) in MAPS[scene].items()
+    )
+    (here / "map.toml").write_text(f'scene = "{scene}"\n[axes]\n{axes}[refine]\nwidth = 0.05\n')
+    (here / "own.py").write_text(OWN)
     assert run("prove", "map.toml", "-o", "proved.nc", "--quiet") == 0
     assert run("run", "map.toml", "-o", "map.nc", "--quiet") == 0
     proved, ds = xr.open_dataset("proved.nc"), xr.open_dataset("map.nc")
+    assert {0, 1} <= set(proved.cell_verdict.values.tolist())
     slack = ds.area_error.values
     assert (ds.area.values + slack >= proved.area_low.values).all()
     assert (ds.area.values - slack <= proved.area_high.values).all()
-    middle = [0.5 * (proved[f"cell_{name}_low"] + proved[f"cell_{name}_high"]).values for name in "aq"]
-    ends = [ds[f"cell_{name}_{end}"].values for name in "aq" for end in ("low", "high")]
-    for low_a, high_a, low_q, high_q, verdict in zip(*ends, ds.cell_verdict.values, strict=True):
-        inside = (low_a < middle[0]) & (middle[0] < high_a) & (low_q < middle[1]) & (middle[1] < high_q)
+    names = proved.attrs["refine"].split(", ")
+    middle = [0.5 * (proved[f"cell_{name}_low"] + proved[f"cell_{name}_high"]).values for name in names]
+    ends = [ds[f"cell_{name}_{end}"].values for name in names for end in ("low", "high")]
+    for low_x, high_x, low_y, high_y, verdict in zip(*ends, ds.cell_verdict.values, strict=True):
+        inside = (low_x < middle[0]) & (middle[0] < high_x) & (low_y < middle[1]) & (middle[1] < high_y)
         assert not (proved.cell_verdict.values[inside] == 1 - verdict).any() or verdict == -1
 
 
