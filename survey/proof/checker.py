@@ -17,8 +17,8 @@ The matrices X1, Y1, X2, Y2 are the solutions at S with X = 1, Y = 0 and with X 
    det X1* Y1 > 0. Unstable: one of the same numbers, but for the last one, is negative.
 2. A STEP (`Equation.steps`). If |K| <= a, |L| <= b for |u - u0| <= R, w > 0, q = max(w a, b/w), x = h/R < 1, then sums
    of v = (w X, Y) at u0 + h up to degree N are off by at most e^(qR) |v(u0)| x^(N+1)/(1 - x), in the maximum norm.
-3. GROWTH (`growth`). For complex K, L and w > 0 the Euclidean norm of (sqrt(w) X, Y/sqrt(w)) grows at most at the rate
-   |w K + conj(L)/w| / 2, and by max(v/w, w/v)^(1/2) where w is changed from v to w.
+3. GROWTH (`growth`). For complex K, L, w > 0 and the diagonal matrix d of sqrt(w) and, if m = 2, 1/sqrt(w), Euclid's
+   norm of (d X, Y/d) grows at most at the rate |d K d + conj(L/d)/d| / 2, and by max(v/w, w/v)^(1/2) where v becomes w.
 4. PARAMETERS (`Panel`). If f is analytic, |f| <= M, for p1 in the ellipse E_r (semi-axes (r +- 1/r)/2) about a panel,
    mapped to [-1, 1]^2, and real p2, its interpolant I1 f at n Chebyshev points has |f - I1 f| <= 4 M sum r^-k and
    |f' - (I1 f)'| <= 4 M sum k^2 r^-k over k >= n; |f - I1 I2 f| <= |f - I1 f| + L1 |f - I2 f|, L = 1 + (2/pi) log n.
@@ -44,7 +44,7 @@ from operator import add, mul, neg, sub, truediv
 
 from flint import acb, arb, arb_mat, arb_poly, arb_series, ctx
 
-FORMAT = "survey-certificate 1"
+FORMAT = "survey-certificate 2"
 KINDS = {  # of equations: entries, factors, and in words the equation and its continuation beyond S, which is {0}
     "even": ("z", ["y1", "y1'", "y2", "y2'"], "y'' + z(u) y = 0", "z(-u) = z(u), z({0} + u) = z({0} - u), T = 2 ({0})"),
     "periodic": ("z", ["2 - D", "2 + D"], "y'' + z(u) y = 0", "z(u + T) = z(u), T = {0}"),
@@ -156,9 +156,10 @@ class Equation:
         """[({entry: what u gives of it}, h, w, bound of what is left out if |v(u0)| = 1)] for parameters in `box`."""
 
         def tried(u0, h, entries):
-            radius = h / RATIO
-            disc = acb(u0 + radius * UNIT, radius * UNIT)
-            upper, lower = (norm(x) for x in blocks([acb(f(u=disc, **box)) for f in entries]))
+            radius = h / RATIO  # boxes cover the upper half of the disc, and K and L are real on the real axis
+            parts = [acb(u0 + radius * (2 * x - 1), radius * y) for x, y in product(SIDE, repeat=2)]
+            found = [map(norm, blocks([acb(f(u=u, **box)) for f in entries])) for u in parts]
+            upper, lower = (reduce(arb.max, bounds) for bounds in zip(*found, strict=True))
             w = (lower / upper).sqrt().upper() + exact(SHORTEST)
             rate = (w * upper).max(lower / w)
             missed = (rate * radius).exp() * RATIO ** (order + 1) / (1 - RATIO)
@@ -218,10 +219,9 @@ class Equation:
 
         found = self.bisected(BOXES, SMALLEST, tried, f"K or L is singular, or changes too fast, for complex {name}")
         grown = zip(*(growth(steps, least) for steps in zip(*found, strict=True)), strict=True)
-        x1, y1, x2, y2 = norms = [reduce(arb.max, bounds) for bounds in grown]
-        if self.kind == "periodic":
-            return x1 + y2, x1 + y2
-        return norms if self.kind == "even" else (*(x * x for x in norms), *[2 * x1 * y2] * 2, (2 * x2 * y1) ** 2)
+        x1, _, _, y2 = norms = [reduce(arb.max, bounds) for bounds in grown]
+        n = 2 * x1 * y2  # if m = 2, the first and the last d, of determinant 1, cancel in all factors
+        return {"even": norms, "periodic": [x1 + y2] * 2, "reversible": [n / 2] * 4 + [n, n, n * n]}[self.kind]
 
 
 def blocks(entries):
@@ -241,9 +241,11 @@ def growth(steps, least):
     """Bounds of the norms of X1, Y1, X2, Y2, from [(length of a part of [0, S], entries there)]; w >= `least`."""
     found = []
     for length, entries in steps:
-        w = least if len(entries) > 1 else least.max(entries[0].mid().abs_upper().sqrt().mid())
-        rows = (zip(*rows, strict=True) for rows in zip(*blocks(entries), strict=True))
-        found.append((length * norm([[w * x + y.conjugate() / w for x, y in row] for row in rows]) / 2, w))
+        upper, lower = blocks(entries)
+        w = least.max(lower[0][0].mid().abs_upper().sqrt().mid())
+        d, m = (w.sqrt(), 1 / w.sqrt()), range(len(lower))
+        sums = [[d[i] * d[j] * upper[i][j] + lower[i][j].conjugate() / (d[i] * d[j]) for j in m] for i in m]
+        found.append((length * norm(sums) / 2, w))
     grown = sum((exponent for exponent, _ in found), arb(0)).exp()
     grown *= prod((v / w).max(w / v).sqrt() for (_, v), (_, w) in pairwise(found))
     first, last = found[0][1].sqrt(), found[-1][1].sqrt()
@@ -258,7 +260,7 @@ def step(matrices, order, h, w, missed):
     for column, scale in enumerate(scales):
         v = [[arb(i == column)] for i in range(len(rows))]  # coefficients, the last one first
         for n in range(1, order + 1):
-            slopes = [[sum(map(mul, a, v[j]), ZERO) for j, a in row] for row in rows]
+            slopes = [[sum(map(mul, a, v[j]), ZERO) if len(a) != 1 else a[0] * v[j][0] for j, a in row] for row in rows]
             for x, slope in zip(v, slopes, strict=True):
                 x.insert(0, sum(slope[1:], slope[0]) / n)
         columns.append([arb_poly(x[::-1])(h) + missed * scale / own * UNIT for x, own in zip(v, scales, strict=True)])
@@ -343,9 +345,7 @@ def verdict(signs):
     return UNSTABLE if -1 in signs else STABLE if 0 not in signs else OPEN
 
 
-def sign(
-    values, bound
-):  # 1 or -1 if all values, and all that differs from one by at most `bound`, have this sign; else 0
+def sign(values, bound):  # 1 or -1 if all values, and all that differs from one by at most `bound`, have it; else 0
     return int(all(x > bound for x in values)) - int(all(x < -bound for x in values))
 
 
@@ -472,6 +472,7 @@ def proved(text, number):  # why a panel is not proved, if it is not; perhaps in
 def check(text, processes=1):
     """The statement that the text of a certificate proves; raises Failed, or one of MALFORMED, if it proves none."""
     certificate = Certificate(text)
+    need(json.loads(text)["statement"] == certificate.statement().split("\n"), "it states another theorem")
     with get_context("spawn").Pool(processes) if processes > 1 else nullcontext() as pool:
         for why in (pool.imap if pool else map)(partial(proved, text), range(len(certificate.panels))):
             need(why is None, why)

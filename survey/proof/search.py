@@ -7,6 +7,7 @@ row, which are far smaller about its edges, are the checker's own, too.
 
 import math
 from fractions import Fraction
+from functools import reduce
 from itertools import product
 
 import numpy as np
@@ -18,9 +19,9 @@ BITS = 96  # of the balls
 ORDERS = range(12, 80, 4)  # of the Taylor series
 NODES = (6, 8, 10, 12, 14, 16, 18, 20, 24, 28, 32, 36, 40)
 ELLIPSES = (1.6, 1.9, 2.3, 2.8, 3.5, 4.5, 6, 8, 12, 20)
-RATES = np.geomspace(0.03, 1.3, 10)  # least w relative to the square root of the largest |z|, which are tried
-CONSTANT_RATES = (0.7, 0.85, 1.0, 1.2, 1.4)  # w, where it does not follow z
-SAMPLES, CHECKED = 96, 12  # positions in a piece that are sampled; every so many of them K and L must be analytic
+RATES = np.geomspace(0.03, 1.3, 10)  # least w relative to the square root of the largest |L11|, which are tried
+POWERS = {1: 1, 2: 1, 4: 1, 7: np.array([2, 2, 2, 2, 2, 2, 4])}  # of the growth in the factors, by their number
+SAMPLES, CHECKED = 96, 12  # positions in a piece that are sampled; every so many of their ends K and L must be analytic
 UNIT = 2.0**-53
 PANEL = "."  # in a layout
 SMALLEST = 2  # halvings of a map's panel: for fewer cells it is not worth its nodes
@@ -28,29 +29,40 @@ PANELS = 10  # halvings of a row, at most, to find panels
 
 
 def plan(equation, sides, tolerance):
-    """A panel without its cells, on which the polynomials leave out less than `tolerance`, relative to the bound of the
-    factors' growth for real parameters; raises checker.Failed.
+    """A panel without its cells, on which the polynomials leave out less than `tolerance`, or than this part of the
+    largest factor that is found there; raises checker.Failed.
 
     `sides`: the ends of both, rational."""
     sides = [(checker.exact((low + high) / 2), checker.exact((high - low) / 2)) for low, high in sides]
-    chosen = [_ellipse(equation, sides, name, tolerance) for name in equation.names]
+    allowed = tolerance * _scale(equation, sides)
+    chosen = [_ellipse(equation, sides, name, allowed) for name in equation.names]
     nodes, ellipses, rates = zip(*chosen, strict=True)
     return {
         "nodes": list(nodes), "ellipses": [str(r) for r in ellipses], "rates": [str(w) for w in rates],
-        "order": _order(equation, sides, tolerance), "cells": checker.OPEN,
+        "order": _order(equation, sides, allowed), "cells": checker.OPEN,
     }  # fmt: skip
 
 
-def _ellipse(equation, sides, name, tolerance):
+def _scale(equation, sides):
+    """The largest modulus of each factor at the middle and the corners of the sides, at least 1."""
+    found = [np.ones(1)]
+    for at in [(0,) * len(sides), *product((-1, 1), repeat=len(sides))]:
+        point = {n: centre + x * half for n, x, (centre, half) in zip(equation.names, at, sides, strict=True)}
+        factors = equation.factors(equation.steps(point, ORDERS[4]), ORDERS[4], point)
+        found.append(np.array([abs(float(f.mid())) for f in factors]))
+    return reduce(np.maximum, found)
+
+
+def _ellipse(equation, sides, name, allowed):
     """(number of nodes, r, least w) for one parameter: the fewest nodes."""
     tried, why = [], checker.Failed("no ellipse has a small enough bound: smaller panels are needed")
     for r in map(arb, ELLIPSES):
         length, entries = _sampled(equation, sides, name, r)
         if not np.isfinite(entries).all():  # they are singular in this ellipse, and in larger ones
             break
-        for w in _rates(entries):
-            bound = 4 * _growth(length, entries, w) / (float(r) - 1)
-            n = next((n for n in NODES if bound * float(r) ** (1 - n) < 0.1 * tolerance), None)
+        for w in np.sqrt(abs(checker.blocks(entries)[1][0][0])).max() * RATES:
+            bound = 4 * np.max(_growth(length, entries, w) ** POWERS[len(allowed)] / allowed) / (float(r) - 1)
+            n = next((n for n in NODES if bound * float(r) ** (1 - n) < 0.1), None)
             if n:
                 tried.append((n, bound * float(r) ** (1 - n), r, w))
     for n, _, r, w in _best_of_each(tried):
@@ -60,9 +72,9 @@ def _ellipse(equation, sides, name, tolerance):
         except checker.Failed as failed:
             why = failed
             continue
-        bound = 4 * float(max(x.upper() for x in grown) / (r - 1))
+        bound = 4 * max(float(x.upper()) / own for x, own in zip(grown, allowed, strict=True)) / (float(r) - 1)
         for more in NODES[NODES.index(n) :]:
-            if bound * float(r) ** (1 - more) < 0.2 * tolerance:
+            if bound * float(r) ** (1 - more) < 0.2:
                 return more, _rational(float(r), 10), least
     raise why
 
@@ -76,7 +88,7 @@ def _best_of_each(tried):
     seen = {}
     for found in sorted(tried, key=lambda found: found[:2]):
         seen.setdefault(float(found[2]), found)
-    return list(seen.values())[:2]
+    return list(seen.values())[:3]
 
 
 def _sampled(equation, sides, name, r):
@@ -86,41 +98,37 @@ def _sampled(equation, sides, name, r):
     arcs = [{key: x.mid() for key, x in place.items()} for place in arcs]
     lengths, rows = [], []
     for start, end, _, entries in equation.pieces:
+        known = [start + (end - start) * (arb(k) / SAMPLES) for k in range(0, SAMPLES + 1, CHECKED)]
+        if not all(acb(f(u=u, **place)).is_finite() for u in known for place in boxes for f in entries):
+            return np.array([1.0]), np.full((1, 1, 1), math.nan)
         for k in range(SAMPLES):
             u = start + (end - start) * (arb(2 * k + 1) / (2 * SAMPLES))
             lengths.append(float((end - start) / SAMPLES))
-            if k % CHECKED == 0 and not all(acb(f(u=u, **place)).is_finite() for place in boxes for f in entries):
-                return np.array(lengths), np.full((1, 1, 1), math.nan)
             rows.append([[complex(acb(f(u=u, **place))) for place in arcs] for f in entries])
     return np.array(lengths), np.array(rows).swapaxes(0, 1)
 
 
-def _rates(entries):
-    """Least w that are tried."""
-    if len(entries) > 1:
-        return CONSTANT_RATES
-    return (np.sqrt(abs(entries)).max() * RATES).tolist()
-
-
 def _growth(length, entries, least):
-    """About the largest bound of the factors that `checker.Equation.sizes` finds."""
-    hill = len(entries) == 1
-    w = np.maximum(np.sqrt(abs(entries[0])), least) if hill else np.full(entries.shape[1:], least)
-    pairs = [zip(*rows, strict=True) for rows in zip(*checker.blocks(list(entries)), strict=True)]
-    rate = np.max([sum(abs(w * x + y.conj() / w) for x, y in pair) for pair in pairs], 0) / 2
+    """About the largest bound of the norms that `checker.growth` finds."""
+    upper, lower = checker.blocks(list(entries))
+    w = np.maximum(np.sqrt(abs(lower[0][0])), least)
+    d, m = (np.sqrt(w), 1 / np.sqrt(w)), range(len(lower))
+    sums = [[d[i] * d[j] * upper[i][j] + lower[i][j].conj() / (d[i] * d[j]) for j in m] for i in m]
+    rate = np.max([sum(map(abs, row)) for row in sums], 0) / 2
     exponent = (length[:, None] * rate).sum(0) + 0.5 * abs(np.diff(np.log(w), axis=0)).sum(0)
-    first, last = np.log(w[0]), np.log(w[-1])
-    exponent += 0.5 * np.maximum(abs(first - last), abs(first + last))
-    return math.exp(min((1 if hill else 4) * exponent.max(), 700.0))
+    if len(lower) == 1:
+        first, last = np.log(w[0]), np.log(w[-1])
+        exponent += 0.5 * np.maximum(abs(first - last), abs(first + last))
+    return math.exp(min(exponent.max(), 170.0))
 
 
-def _order(equation, sides, tolerance):
+def _order(equation, sides, allowed):
     """The order at which the factors in the middle are known well enough."""
     real = {name: centre + half * arb(0, 1) for name, (centre, half) in zip(equation.names, sides, strict=True)}
     middle = {name: centre for name, (centre, _) in zip(equation.names, sides, strict=True)}
     for order in ORDERS:
         found = equation.factors(equation.steps(real, order), order, middle)
-        if max(float(f.rad()) for f in found) < 1e-3 * tolerance:
+        if all(float(f.rad()) < 1e-3 * own for f, own in zip(found, allowed, strict=True)):
             return order
     raise checker.Failed("the series of the steps leave out too much")
 

@@ -99,11 +99,19 @@ def prover_of(workflow):
         across, depth = [ROW_PARTS], max(0, math.ceil(math.log2((high - low) / (ROW_PARTS * Fraction(width)))))
         bits, tolerance = ROW_BITS, FRACTION * width
     else:
-        depths = [min(DEEPEST, max(0, math.ceil(math.log2(1 / x) - 1e-9))) for x, _ in workflow.refine.values()]
+        ends = [[float(end) for end in side] for side in rectangle]
+        widths = [_linear(*width, *side) for width, side in zip(workflow.refine.values(), ends, strict=True)]
+        depths = [min(DEEPEST, max(0, math.ceil(math.log2(1 / x) - 1e-9))) for x in widths]
         depth = max(0, min(depths) - START[kind])
         across, tolerance = [2 ** (halvings - depth) for halvings in depths], FRACTION * 0.5 ** max(depths)
         bits = search.BITS
     return Prover({"kind": kind, "pieces": pieces}, names, rectangle, across, depth, tolerance, bits)
+
+
+def _linear(width, log, low, high):
+    """A width as a fraction of an axis; on a logarithmic one, whose fraction is of the logarithm, that of the least."""
+    low, high = sorted((abs(low), abs(high)))
+    return math.expm1(width * math.log(high / low)) / (high / low - 1) if log else width
 
 
 class Prover:
@@ -188,11 +196,18 @@ def certificate(title, prover, layout, panels):
         for letter, part in checker.walk(panel["cells"], [place], checker.halved):
             shares[letter if letter in shares else checker.OPEN] += checker.size(part) / checker.size(sides)
     table = {
-        "format": checker.FORMAT, "title": title, "bits": prover.bits, "equation": prover.equation,
+        "format": checker.FORMAT, "title": title, "statement": [], "bits": prover.bits, "equation": prover.equation,
         "parameters": prover.names, "rectangle": prover.rectangle,
         "panels": {"across": prover.across, "layout": layout, "list": panels},
         "shares": {letter: str(share) for letter, share in shares.items()},
     }  # fmt: skip
+    table["statement"] = checker.Certificate(_signed(table)).statement().split("\n")
+    return _signed(table)
+
+
+def _signed(table):
+    from survey.proof import checker
+
     return json.dumps(table | {"sha256": checker.digest(table)}, indent=1) + "\n"
 
 

@@ -22,15 +22,22 @@ from flint import arb, ctx
 
 import survey
 from survey.proof import checker, search
-from survey.scenes import libration_elliptic
+from survey.scenes import libration_elliptic, satellite
 from survey.sweep import proofs
 
 MATHIEU = ("even", [["pi/2", "a - 2*q*cos(2*u)"]], ["a", "q"])
 MEISSNER = ("periodic", [["1", "a + b"], ["5/2", "a - b"]], ["a", "b"])
 DANBY = (*(lambda kind, pieces: (kind, [list(piece) for piece in pieces]))(
     *libration_elliptic.equation({"mu": "mu", "e": "e"}, {}, {})), ["mu", "e"])  # fmt: skip
+BODIES = [["0.1", "0.3"], ["0.9", "1.1"]]  # of the inertia ratio and the amplitude
+SATELLITE = (*(lambda kind, pieces: (kind, [list(piece) for piece in pieces]))(*satellite.equation(
+    {name: name for name in ("inertia_ratio", "amplitude")},
+    {name: tuple(map(float, side)) for name, side in zip(("inertia_ratio", "amplitude"), BODIES, strict=True)},
+    {"direction": 1})), ["inertia_ratio", "amplitude"])  # fmt: skip
+SYSTEMS = {"mathieu": MATHIEU, "meissner": MEISSNER, "satellite": SATELLITE, "danby": DANBY}
 RECTANGLE = [["1", "4"], ["0.5", "3"]]
 STRIP = [["0.033", "0.041"], ["0.1", "0.104"]]  # of mu and e: A and KC cross it
+RECTANGLES = {"mathieu": RECTANGLE, "meissner": RECTANGLE, "satellite": BODIES, "danby": STRIP}
 SIDES = [tuple(map(Fraction, side)) for side in RECTANGLE]
 DEPTH = 5
 
@@ -47,8 +54,8 @@ def proof(system="mathieu"):
         kind, pieces, names, rectangle = "even", [["pi/2", "a - 10*cos(2*u)"]], ["a"], [["1", "3"]]
         depth, tolerance = 40, 1e-15
     else:
-        kind, pieces, names = {"mathieu": MATHIEU, "meissner": MEISSNER, "danby": DANBY}[system]
-        rectangle, depth, tolerance = STRIP if system == "danby" else RECTANGLE, DEPTH, 1e-6
+        kind, pieces, names = SYSTEMS[system]
+        rectangle, depth, tolerance = RECTANGLES[system], DEPTH, 1e-6
     across, bits = [1] * len(names), 192 if system == "row" else search.BITS
     prover = proofs.Prover({"kind": kind, "pieces": pieces}, names, rectangle, across, depth, tolerance, bits)
     return proofs.certificate("a test", prover, *prover(0)[1])
@@ -107,9 +114,9 @@ def test_steps_of_few_terms_say_so():
     assert max(float(ball.rad()) for ball in found) > 1e-4
 
 
-def errors(number, system=MATHIEU, rectangle=RECTANGLE, nodes=8):
+def errors(number, system="mathieu", nodes=8):
     """(true interpolation error, bound) of the factors at random points of a panel."""
-    equation, sides = checker.Equation(*system), [tuple(map(Fraction, side)) for side in rectangle]
+    equation, sides = checker.Equation(*SYSTEMS[system]), [tuple(map(Fraction, side)) for side in RECTANGLES[system]]
     plan = search.plan(equation, sides, 1e-6) | {"nodes": [nodes, nodes], "order": 32}
     panel = checker.Panel(equation, sides, plan)
     tables, bounds, _ = zip(*panel.factors, strict=True)
@@ -124,19 +131,29 @@ def errors(number, system=MATHIEU, rectangle=RECTANGLE, nodes=8):
             yield abs((rows[0] * table * rows[1].transpose())[0, 0] - exact), bound
 
 
-@pytest.mark.parametrize("number", [40, pytest.param(1000, marks=pytest.mark.slow)])
-@pytest.mark.parametrize(
-    "system, rectangle, nodes, least",
-    [(MATHIEU, RECTANGLE, 8, 1e-6), (DANBY, STRIP, 3, 1e-7)],
-    ids=["mathieu", "danby"],
-)
-def test_the_truncation_bound_exceeds_the_true_error(number, system, rectangle, nodes, least):
-    ratios = [float(error / bound) for error, bound in errors(number, system, rectangle, nodes)]
+@pytest.mark.parametrize("number, system, nodes, least", [
+    (40, "mathieu", 8, 1e-6),
+    (40, "meissner", 8, 1e-6),
+    (40, "danby", 3, 1e-7),
+    *(pytest.param(1000, *what, marks=pytest.mark.slow) for what in (
+        ("mathieu", 8, 1e-6), ("meissner", 8, 1e-6), ("satellite", 6, 1e-6), ("danby", 3, 1e-7))),
+])  # fmt: skip
+def test_the_truncation_bound_exceeds_the_true_error(number, system, nodes, least):
+    ratios = [float(error / bound) for error, bound in errors(number, system, nodes)]
     assert max(ratios) < 1
     assert max(ratios) > least  # a bound too small by so much would fail above
 
 
-@pytest.mark.parametrize("arguments, wrong", [((40,), 10**6), ((10, DANBY, STRIP, 6), 10**5)], ids=["mathieu", "danby"])
+@pytest.mark.parametrize(
+    "arguments, wrong",
+    [
+        ((40,), 10**6),
+        ((40, "meissner"), 10**6),
+        pytest.param((10, "satellite", 6), 10**6, marks=pytest.mark.slow),
+        ((10, "danby", 6), 10**5),
+    ],
+    ids=SYSTEMS,
+)
 def test_a_wrong_growth_is_found(arguments, wrong, monkeypatch):
     """Danby's factors are bounded by its second and fourth powers."""
     right = checker.growth
@@ -340,6 +357,8 @@ MUTATIONS = {
     "another rectangle": at("rectangle", value=[["1", "5"], ["1/2", "3"]]),
     "a rectangle without area": at("rectangle", value=[["1", "1"], ["1/2", "3"]]),
     "too few bits": at("bits", value=8),
+    "another statement": at("statement", 0, value="Consider y'' = 0."),
+    "no statement": lambda data: data.pop("statement"),
     "shares that are not those of the cells": at("shares", "s", value="1/2"),
     "an edge in a map": flipped("o", "1"),
     "panels that do not cover the rectangle": at("panels", "across", value=[1, 2]),
@@ -389,14 +408,28 @@ ROW_MUTATIONS = {
 }
 
 
-ALL_MUTATIONS = {"mathieu": MUTATIONS, "danby": STRIP_MUTATIONS, "row": ROW_MUTATIONS}
-QUICK = {"a stable cell is called unstable", "an entry is missing", "a singular entry", "Hill's equation"}  # of danby
+OTHERS = (  # of those of Mathieu's equation, for a z of one's own and for satellites
+    "a stable cell is called unstable", "an unstable cell is called stable", "an open cell is called stable",
+    "an open cell is called unstable", "a decided cell is called open", "a cell is missing", "a cell too many",
+    "too few nodes", "an ellipse that is a segment", "ellipses so large that the factors grow", "a rate of zero",
+    "a rate that is far off", "Taylor series of few terms", "a half period that is negative", "too few bits",
+    "shares that are not those of the cells", "an edge in a map", "panels that do not cover the rectangle",
+    "a rectangle with one side", "a layout that ends early", "another format", "no panels",
+)  # fmt: skip
+ALL_MUTATIONS = {
+    "mathieu": MUTATIONS, "danby": STRIP_MUTATIONS, "row": ROW_MUTATIONS,
+    "meissner": {what: MUTATIONS[what] for what in OTHERS}, "satellite": {what: MUTATIONS[what] for what in OTHERS},
+}  # fmt: skip
+QUICK = {  # of those that take long
+    "danby": {"a stable cell is called unstable", "an entry is missing", "a singular entry", "Hill's equation"},
+    "satellite": set(),
+}
 
 
 @pytest.mark.parametrize(
     "system, what",
     [
-        pytest.param(system, what, marks=[pytest.mark.slow] * (system == "danby" and what not in QUICK))
+        pytest.param(system, what, marks=[pytest.mark.slow] * (what not in QUICK.get(system, own)))
         for system, own in ALL_MUTATIONS.items()
         for what in own
     ],

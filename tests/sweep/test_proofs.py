@@ -72,18 +72,41 @@ def test_a_map_is_proved(here, capfd):
         assert f"The {word} points have an area of" in statement
 
 
-def test_refine_agrees(here):
+OWN = (
+    "from math import cos, exp\nPARAMETERS = ('a', 'q')\nPERIOD = 2.0\nEVEN = True\n"
+    "def z(u, p):\n    return p[0] + p[1] * exp(cos(3.141592653589793 * u))\n"
+)
+MAPS = {  # scene: its axes
+    "mathieu": {"a": (1.0, 4.0), "q": (0.5, 3.0)},
+    "own.py": {"a": (1.0, 4.0), "q": (0.5, 3.0)},
+    "satellite": {"inertia_ratio": (0.1, 0.3), "amplitude": (0.9, 1.1)},
+    "libration_elliptic": {"mu": (0.0, 0.05), "e": (0.0, 0.2)},
+}
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [pytest.param(name, marks=[pytest.mark.slow] * (name != "mathieu")) for name in MAPS],
+)
+def test_refine_agrees(scene, here):
     """The cells of `survey run` have no other verdict, and its areas lie within the proved bounds."""
+    axes = "".join(
+        f"{name} = {{ start = {low}, stop = {high}, num = 20 }}\n" for name, (low, high) in MAPS[scene].items()
+    )
+    (here / "map.toml").write_text(f'scene = "{scene}"\n[axes]\n{axes}[refine]\nwidth = 0.05\n')
+    (here / "own.py").write_text(OWN)
     assert run("prove", "map.toml", "-o", "proved.nc", "--quiet") == 0
     assert run("run", "map.toml", "-o", "map.nc", "--quiet") == 0
     proved, ds = xr.open_dataset("proved.nc"), xr.open_dataset("map.nc")
+    assert {0, 1} <= set(proved.cell_verdict.values.tolist())
     slack = ds.area_error.values
     assert (ds.area.values + slack >= proved.area_low.values).all()
     assert (ds.area.values - slack <= proved.area_high.values).all()
-    middle = [0.5 * (proved[f"cell_{name}_low"] + proved[f"cell_{name}_high"]).values for name in "aq"]
-    ends = [ds[f"cell_{name}_{end}"].values for name in "aq" for end in ("low", "high")]
-    for low_a, high_a, low_q, high_q, verdict in zip(*ends, ds.cell_verdict.values, strict=True):
-        inside = (low_a < middle[0]) & (middle[0] < high_a) & (low_q < middle[1]) & (middle[1] < high_q)
+    names = proved.attrs["refine"].split(", ")
+    middle = [0.5 * (proved[f"cell_{name}_low"] + proved[f"cell_{name}_high"]).values for name in names]
+    ends = [ds[f"cell_{name}_{end}"].values for name in names for end in ("low", "high")]
+    for low_x, high_x, low_y, high_y, verdict in zip(*ends, ds.cell_verdict.values, strict=True):
+        inside = (low_x < middle[0]) & (middle[0] < high_x) & (low_y < middle[1]) & (middle[1] < high_y)
         assert not (proved.cell_verdict.values[inside] == 1 - verdict).any() or verdict == -1
 
 
@@ -196,15 +219,22 @@ def test_the_edges_of_a_row_are_those_of_meissner(here):
         assert low < value < high and high - low <= 1e-13 and letter == expected
 
 
-@pytest.mark.slow
-def test_the_edges_of_a_row_of_satellites():
+@pytest.mark.parametrize("axis, ends, fixed, options, number", [
+    pytest.param("amplitude", [0.5, 0.9], {"inertia_ratio": 0.6}, {}, 2, marks=pytest.mark.slow),
+    pytest.param("k", [1.3, 1.36], {"rho": 1.0}, {}, 2, marks=pytest.mark.slow),
+    pytest.param("k", [1.2, 1.25], {"inertia_ratio": 0.2}, {"direction": "-1"}, 1, marks=pytest.mark.slow),
+    ("rho", [-0.4, 0.45], {"k": 1.3}, {"body": "oblate"}, 3),  # one at rho = 0, where the body is a sphere
+], ids=["libration", "rotation", "backward", "oblate"])  # fmt: skip
+def test_the_edges_of_a_row_of_satellites(axis, ends, fixed, options, number):
     """Against the Fourier series of `survey.edge`, which knows nothing of formulas in the angle."""
-    proved = edges_of(row("satellite", "amplitude", [0.5, 0.9], {"inertia_ratio": 0.6}))
-    ds = survey.edge("satellite", along="amplitude", near=0.7, inertia_ratio=0.6)
-    ds = ds.isel(place=(ds.edge > 0.5) & (ds.edge < 0.9))
-    assert len(proved) == ds.edge.size == 2
-    for (low, high, _), edge, error in zip(proved, ds.edge.values, ds.edge_error.values, strict=True):
-        assert low - Fraction(float(error)) <= Fraction(float(edge)) <= high + Fraction(float(error))
+    proved = edges_of(row("satellite", axis, ends, fixed, options))
+    assert len(proved) == number
+    for low, high, _ in proved:
+        ds = survey.edge("satellite", along=axis, near=float(low + high) / 2, **fixed, **options)
+        found = zip(ds.edge.values.tolist(), ds.edge_error.values.tolist(), strict=True)
+        reach = [(Fraction(edge) - Fraction(error), Fraction(edge) + Fraction(error)) for edge, error in found]
+        assert sum(first <= high and low <= last for first, last in reach) == 1
+        assert all(any(a <= y and x <= b for a, b, _ in proved) for x, y in reach if ends[0] < x and y < ends[1])
 
 
 def test_the_edges_of_a_row_of_danbys_map():
@@ -249,15 +279,24 @@ def test_what_a_row_does_not_prove_is_open():
         edges_of(text)
 
 
+def test_cells_on_a_logarithmic_axis_are_as_narrow_as_requested():
+    """A width of 0.1 is a tenth of the value; at q = 0.5, the least, 0.05."""
+    axes = {"a": {"start": 1.0, "stop": 2.0, "num": 3}, "q": {"start": 0.5, "stop": 8.0, "num": 3, "spacing": "log"}}
+    made = proofs.prover_of(check({"scene": "mathieu", "axes": axes, "refine": {"width": {"a": 0.5, "q": 0.1}}}))
+    assert made.across[1] * 2**made.depth == 256 and made.across[0] * 2**made.depth == 2  # 7.5 / 0.05 = 150
+
+
 @pytest.mark.parametrize("change, words", [
     ({"refine": None}, "add [refine]"),
     ({"refine": None, "boundaries": {}}, "give all but one as bare numbers"),
     ({"scene": "satellite", "axes": {"k": [0.5, 1.5], "rho": [1.0, 2.0]}}, "separatrix"),
     ({"scene": "satellite", "axes": {"amplitude": [0.5, 1.5], "inertia_ratio": [0.5, 1.5]}}, "contains 1"),
+    ({"scene": "satellite_triaxial", "axes": {"yaw_ratio": [-0.5, 0.5], "roll_ratio": [-0.5, 0.5], "amplitude": [0.5]}},
+     "satellite_triaxial has no formulas to prove; choose mathieu"),
 ])  # fmt: skip
 def test_what_cannot_be_proved_is_refused_in_one_line(change, words):
     table = {"scene": "mathieu", "axes": {"a": [0.0, 1.0], "q": [0.0, 1.0]}, "refine": {"width": 0.1}} | change
-    table["axes"] = {name: {"values": ends} for name, ends in table["axes"].items()}
+    table["axes"] = {name: {"values": ends} if ends[1:] else ends[0] for name, ends in table["axes"].items()}
     with pytest.raises(survey.BadInput) as error:
         proofs.equation_of(check({key: value for key, value in table.items() if value is not None}, proves=True))
     assert words in str(error.value) and "\n" not in str(error.value)

@@ -38,6 +38,8 @@ def refusal(scene, point):
     """Why there are no cells on maps of the scene about this point, {parameter: value}, in words; None if there are."""
     if scene.FAMILY == "orbit":
         return "cells are known of linear systems, not of periodic orbits, which end at folds"
+    if not hasattr(scene, "conserved"):
+        return "cells are not known, but only of systems whose matrix A(t, p) is given"
     n = len(scene.states)
     if n > dense.LARGEST:
         return f"cells are known of systems of up to {dense.LARGEST} states, not of {n}"
