@@ -4,7 +4,7 @@ from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise, product
-from math import ceil, prod
+from math import ceil, isinf, prod
 
 import numpy as np
 
@@ -149,6 +149,8 @@ def coordinates(start, stop, num, spacing="linear"):
         raise BadInput(f"num = 1 cannot reach stop = {stop:g}; give num >= 2, or a single number")
     if num > 1 and start == stop:
         raise BadInput(f"start and stop are both {start:g}, with num = {num}; give a single number, or another stop")
+    if isinf(float(stop) - float(start)):
+        raise BadInput(f"start = {start:g}, stop = {stop:g}: they differ by more than the largest number, 1.8e308")
     if spacing == "log":
         if not (start > 0 and stop > 0):
             raise BadInput(f"start = {start:g}, stop = {stop:g} with spacing = 'log': both must be positive")

@@ -53,7 +53,7 @@ def test_worker_processes_give_the_same_file(program, small):
         (["run", "small.toml", "--set", "scene=gyrostats"], "did you mean 'gyrostat'"),
         (["run", "small.toml", "-o", "nowhere/out.nc"], "there is no folder 'nowhere'"),
         (["run", "small.toml", "-o", "."], "is a folder"),
-        (["run", "small.toml", "--workers", "none"], "integer range; see survey run --help"),
+        (["run", "small.toml", "--workers", "none"], "is not a valid integer; see survey run --help"),
         (["run"], "Missing argument 'WORKFLOW'; see survey run --help"),
         (["runn"], "No such command 'runn'"),
         (["runn"], "; see survey --help"),

@@ -91,6 +91,11 @@ def test_one_value_has_no_room_for_two_ends_nor_two_for_one():
     assert coordinates(0.5, 0.5, 1) == [0.5]
 
 
+def test_ends_that_differ_by_more_than_a_float_holds_are_refused():
+    with pytest.raises(BadInput, match="differ by more than the largest number"):
+        coordinates(-1.1e308, 1.7e308, 3)
+
+
 def test_log_coordinates_need_positive_ends():
     with pytest.raises(BadInput, match="positive"):
         coordinates(0.0, 1.0, 5, "log")

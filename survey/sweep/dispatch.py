@@ -167,6 +167,8 @@ def _pool(workers):
     try:
         with ProcessPoolExecutor(workers, _Spawning(), _serve) as pool:
             try:
+                with _deferred(signal.SIGINT, signal.SIGTERM):
+                    pool.submit(int)  # starts the workers and the pool's thread: one half started could not be joined
                 yield pool
             except BaseException:
                 _kill(threading.get_ident())

@@ -100,6 +100,7 @@ def wrong_chain(samples, c2, h, p, order, starts, ends, out):
     chain(rk4.samples_only, wrong_step, rk4.WIDTH, samples, c2, h, p, order, starts, ends, out)
 
 
+@pytest.mark.slow
 def test_the_checks_see_a_broken_method():
     """A Runge-Kutta step with an error of h^3 in one entry claims order 4 and bars that do not hold."""
     broken = SimpleNamespace(NODES=rk4.NODES, ORDER=4, hill_chain=wrong_chain)

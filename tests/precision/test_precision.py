@@ -86,10 +86,11 @@ def test_a_folder_that_cannot_be_or_a_missing_chart_is_refused(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(BadInput, match="cannot make this folder"):
         precision.write("satellite", tmp_path / "file" / "below")
-    with pytest.raises(BadInput, match="unknown scene with a precision chart 'satelite'"):
+    with pytest.raises(BadInput, match="unknown precision chart 'satelite'"):
         precision.write("satelite", tmp_path)
 
 
+@pytest.mark.slow
 def test_what_a_method_does_not_answer_is_not_in_the_chart(monkeypatch):
     case = modules.load(folder, "gyrostat", "scene")
     works = {name: ({key: v[:20] for key, v in point.items()}, o) for name, (point, o) in case.works().items()}

@@ -3,6 +3,7 @@
 import body_truth as truth
 import mpmath as mp
 import numpy as np
+import pytest
 from scipy.integrate import solve_ivp
 
 import survey
@@ -205,6 +206,7 @@ def test_there_is_no_critical_motion_where_the_square_is_negative_or_the_area_to
     assert found == [16, 0, 16]
 
 
+@pytest.mark.slow
 def test_trajectories_lie_within_their_bars_and_keep_the_integrals():
     moments, epsilons, draw = bodies(4, 8)
     for body, epsilon in zip(moments, epsilons, strict=True):

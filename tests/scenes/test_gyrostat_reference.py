@@ -162,6 +162,7 @@ def test_half_angles(group):
             assert abs(mp.tan(mp.mpf(case[key]) / 2) / mp.mpf(case[half]) - 1) < 1e-25
 
 
+@pytest.mark.slow
 def test_the_separatrix():
     """N1: above the threshold the saddle is passed, below it the solution turns; the branch's slope at the saddle."""
     (case,) = (case for case in REFERENCE["abel_time"] if case["form"] == "separatrix")

@@ -41,6 +41,7 @@ def compare(count, seed):
         assert (ds.verdict.values[~clear] != -1).all()
 
 
+@pytest.mark.slow
 def test_the_rotation_of_a_body_in_three_dimensions():
     compare(30, 1)
 

@@ -56,6 +56,7 @@ def folder(tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 def test_a_bundle_holds_everything_and_describes_it(folder):
     with zipfile.ZipFile(folder / "map.zip") as archive:
         names = {name.removeprefix("map/") for name in archive.namelist()}

@@ -118,6 +118,7 @@ def test_a_map_without_tongues_has_empty_curves(tmp_path):
     plt.close("all")
 
 
+@pytest.mark.slow
 def test_rows_through_a_value_where_tongues_accumulate(tmp_path, capsys):
     """Inertia ratio 1 is left out, and named; all other edges are those of the eigenproblem in rho, both bodies'."""
     (tmp_path / "through.toml").write_text(

@@ -84,6 +84,7 @@ def test_a_cluster_gives_the_same_file(cluster, small, surveyed):
     xr.testing.assert_equal(*(xr.load_dataset(path).drop_attrs() for path in (surveyed, small.with_suffix(".nc"))))
 
 
+@pytest.mark.slow
 def test_a_lost_scheduler_is_told_and_the_run_can_go_on(cluster, small):
     many = ("--set", "axes.w0.num=1000", "--set", "solver.method='dop853'")
     running = start(small.parent, cluster[0], *many)

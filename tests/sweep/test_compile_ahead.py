@@ -34,7 +34,14 @@ READ, COMPILED, UNUSED = "1 0", "0 1", "0 0"
 @pytest.mark.parametrize(
     ("scene", "row", "lane", "variables", "kernels"),
     [
-        ("satellite", "k", "rho", ["exponent", "rotation_number", "verdict"], (UNUSED, UNUSED, READ)),
+        pytest.param(
+            "satellite",
+            "k",
+            "rho",
+            ["exponent", "rotation_number", "verdict"],
+            (UNUSED, UNUSED, READ),
+            marks=pytest.mark.slow,
+        ),
         pytest.param(
             "satellite",
             "k",
@@ -43,7 +50,7 @@ READ, COMPILED, UNUSED = "1 0", "0 1", "0 0"
             (READ, READ, UNUSED),
             marks=pytest.mark.slow,
         ),
-        pytest.param("mathieu", "q", "a", ["discriminant", "verdict"], (READ, UNUSED, UNUSED), marks=pytest.mark.slow),
+        ("mathieu", "q", "a", ["discriminant", "verdict"], (READ, UNUSED, UNUSED)),
     ],
 )
 def test_the_map_reads_what_the_process_beside_it_compiles(tmp_path, scene, row, lane, variables, kernels):

@@ -179,6 +179,7 @@ def test_a_cluster_ends_every_number_and_survives_deaths(cluster, in_time, tmp_p
     assert sorted(heard.results) == sorted(n * n if n != 4 else -4 for n in NUMBERS)
 
 
+@pytest.mark.slow
 def test_a_cluster_replaces_a_worker_that_is_frozen(cluster, in_time, monkeypatch, tmp_path):
     monkeypatch.setattr(dispatch, "COMPILE_SECONDS", 5.0)
 

@@ -91,6 +91,7 @@ def test_a_double_root_is_degenerate_and_a_near_one_is_two(gap, kinds):
         assert abs(abs(row[eq.ANGLE] - math.pi) - math.sqrt(gap / 1.5)) < row[eq.BAR] + 1e-9
 
 
+@pytest.mark.slow
 def test_regions_of_attraction_hold():
     """States on the edge of the region V < LEVEL end at the equilibrium."""
     tried, random = 0, np.random.default_rng(5)

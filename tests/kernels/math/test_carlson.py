@@ -1,6 +1,7 @@
 """Carlson's integrals, the mean's sums and the double-double sine against mpmath."""
 
 import numpy as np
+import pytest
 from mpmath import mp, mpf
 
 from survey.kernels.jit import kernel
@@ -18,6 +19,7 @@ def all_of(x, m, g, p, a, b, out):
     out[5], out[6], out[7], out[8] = ratio[0], ratio[1], middle[0], middle[1]
 
 
+@pytest.mark.slow
 def test_integrals():
     """Real and conjugate pairs; p from 1e-16 to 1e8."""
     random, out = np.random.default_rng(0), np.empty(9)

@@ -76,7 +76,8 @@ def coarse(monkeypatch):
     monkeypatch.setattr(bifurcations, "COUNTED", 2)
 
 
-@pytest.mark.parametrize("places", [(2,), pytest.param((2, 4), marks=pytest.mark.slow)], ids=["short", "long"])
+@pytest.mark.parametrize("places", [(2,), (2, 4)], ids=["short", "long"])
+@pytest.mark.slow
 def test_branches_miss_each_other_to_either_side(places):
     kinds = set()
     with mp.workdps(35):

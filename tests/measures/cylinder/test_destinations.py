@@ -77,6 +77,7 @@ def against_long_runs(rows):
     return checked
 
 
+@pytest.mark.slow
 def test_branches_go_where_long_integration_takes_them():
     checked = against_long_runs(systems(3, 4))
     assert sum(checked.values()) > 8 and len(checked) == 5

@@ -161,7 +161,7 @@ def hard_point(i):
 
 
 @pytest.mark.parametrize("points", [8, pytest.param(24, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("method", [taylor, dop853], ids=["taylor", "dop853"])
+@pytest.mark.parametrize("method", [taylor, pytest.param(dop853, marks=pytest.mark.slow)], ids=["taylor", "dop853"])
 def test_trajectories_lie_within_their_bars(method, points):
     wide = answered = 0
     for i in range(points):

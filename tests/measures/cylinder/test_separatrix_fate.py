@@ -32,7 +32,8 @@ def rates(_t, y, b12, b31, d, c23, s2, s3):
     return [w, (b12 * c - b31 * s) * w - d * s * c - c23 * (c * c - s * s) + s2 * c - s3 * s]
 
 
-@pytest.mark.parametrize("system", [SYSTEMS[0], *(pytest.param(s, marks=pytest.mark.slow) for s in SYSTEMS[1:])])
+@pytest.mark.slow
+@pytest.mark.parametrize("system", SYSTEMS)
 def test_an_unstable_branch_ends_where_long_integration_does(system):
     verdicts = set()
     for ds, given in starts(system, **UNSTABLE):

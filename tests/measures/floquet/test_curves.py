@@ -59,6 +59,7 @@ def mathieu(structure):
     return survey.floquet(K=K, period=math.pi, states="x", structure=structure, **more)
 
 
+@pytest.mark.slow
 def test_mathieus_tongues():
     axes = {"a": (-1.5, 7.0), "q": (0.0, 4.0)}
     square = [(name, *ends) for name, ends in axes.items()]
@@ -234,6 +235,7 @@ def test_neimark_sacker():
     assert not curves(ds, "minus_one", *axes) and not curves(ds, "collision", *axes)
 
 
+@pytest.mark.slow
 def test_gyroscopic_stabilisation():
     """x'' - 2 g y' - a x = 0, y'' + 2 g x' - b y = 0: frequencies meet at 2 g = sqrt(a) + sqrt(b); and z."""
     b, period = 0.4, 1.1

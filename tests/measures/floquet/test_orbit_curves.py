@@ -175,6 +175,7 @@ def test_entrainment_against_scipy():
             assert np.hypot(*x[:, own]).min() < 0.02
 
 
+@pytest.mark.slow
 def test_the_cusp_and_the_number_of_orbits():
     """Between the folds of Duffing's oscillator there are three orbits, elsewhere one; the folds meet in a cusp."""
     ds = found(str(WORKFLOWS / "duffing.py"), omega=(0.9, 3.0), F=(0.02, 1.5), branch=2)

@@ -121,6 +121,7 @@ def mathieu(structure, **more):
     )
 
 
+@pytest.mark.slow
 def test_mathieus_map():
     axes = {"a": np.linspace(-0.507, 6.03, 60), "q": np.linspace(0.013, 4.1, 40)}
     ours = survey.evaluate(mathieu("symplectic"), **axes, c=0.0)
