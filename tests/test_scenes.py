@@ -125,9 +125,15 @@ def test_every_point_has_outputs_bars_and_a_status(scene, options, seed):
     has_outputs_bars_and_a_status(evaluate(scene, options, draw(scene, options, seed)))
 
 
-@pytest.mark.parametrize(
-    ("scene", "options"), [q for q in questions() if "gyrostat" not in q.id and q.id != "brun_triaxial-trajectory"]
-)
+def at_the_ends():
+    """The questions whose domains have ends that are solved in seconds; three unequal moments are slow."""
+    for q in questions():
+        if "gyrostat" not in q.id and q.id != "brun_triaxial-trajectory":
+            slow = [pytest.mark.slow] * q.id.startswith("satellite_triaxial")
+            yield pytest.param(*q.values, id=q.id, marks=slow)
+
+
+@pytest.mark.parametrize(("scene", "options"), at_the_ends())
 def test_so_has_each_at_the_ends_of_the_domain(scene, options):
     """Those of the gyrostat and of `brun_triaxial` by time, which take seconds a point there, stand in their files."""
     points = 10 if scene.FAMILY == "floquet" else 60  # a point of these is a system of its own

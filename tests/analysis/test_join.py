@@ -41,6 +41,7 @@ def _parsed(text):
     return tomllib.loads(text)
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_sound_file_and_replaces_none(parts, program):
     whole, high, low = parts
     done = program("merge", low, high, "-o", "joined.nc")

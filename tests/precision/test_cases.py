@@ -78,6 +78,7 @@ def test_the_bodies_of_the_chart_by_another_series():
             assert abs(end[0] - mp.mpf(exact["w1"])) < 1e-16
 
 
+@pytest.mark.slow
 def test_a_chart_of_ones_own(quick, tmp_path):
     paths = precision.write(ROOT / "workflows/whittaker_hill.py", tmp_path)
     written = json.loads(paths[0].read_text())

@@ -64,6 +64,7 @@ def scaled_misses(seed, number):
     return faults
 
 
+@pytest.mark.slow
 def test_hard_cases():
     with mp.workdps(60):
         assert misses(1, 120) == []

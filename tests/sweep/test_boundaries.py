@@ -184,6 +184,7 @@ def test_a_value_that_rounds_to_the_one_left_out(tmp_path):
     assert int(survey.run(asked, output=tmp_path / "near.nc").edge_complete) == 1
 
 
+@pytest.mark.slow
 def test_lost_curves_are_told(tmp_path, capsys):
     """Edges of an oblate body near the separatrix lie closer together than float64 can follow."""
     (tmp_path / "lost.toml").write_text(

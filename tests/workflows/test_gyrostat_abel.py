@@ -53,6 +53,7 @@ def test_the_survey_has_its_three_pictures(family):
     assert all(path.read_bytes()[:4] == b"\x89PNG" for path in paths)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("end", [pytest.param(0, marks=pytest.mark.slow), -1])
 def test_solutions_and_turning_points_are_those_of_the_motion_in_time(family, end):
     ds, _ = family

@@ -100,6 +100,7 @@ def test_cycles_round_their_fold_in_closed_form():
             assert int(at.verdict) == (k == len(squares) - 1)
 
 
+@pytest.mark.slow
 def test_bits_depend_on_no_grid():
     w, F = np.linspace(0.8, 4.0, 9), np.array([0.4, 1.0, 1.3])
     whole = survey.evaluate(scene(), F=F, w=w, branch=[1.0, 2.0, 3.0])
