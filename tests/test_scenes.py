@@ -133,7 +133,7 @@ def at_the_ends():
             yield pytest.param(*q.values, id=q.id, marks=slow)
 
 
-@pytest.mark.parametrize(("scene", "options"), at_the_ends())
+@pytest.mark.parametrize(("scene", "options"), [*at_the_ends()])
 def test_so_has_each_at_the_ends_of_the_domain(scene, options):
     """Those of the gyrostat and of `brun_triaxial` by time, which take seconds a point there, stand in their files."""
     points = 10 if scene.FAMILY == "floquet" else 60  # a point of these is a system of its own
