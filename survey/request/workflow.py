@@ -80,7 +80,6 @@ def _as_toml(data):
         raise BadInput(f"this workflow cannot be written as TOML ({short(error, 150)}); use plain values") from None
 
 
-@np.errstate(all="ignore")  # overflow on an axis is found by its values
 def _why(path, error):
     """Why a file is no workflow: what it is instead, where its name tells."""
     if path.suffix == ".nc":
@@ -90,6 +89,7 @@ def _why(path, error):
     return reason_of(error)
 
 
+@np.errstate(all="ignore")  # overflow on an axis is found by its values
 def check(data, text="", output=None, default_path="survey.nc", near=None, proves=False):
     """The checked Workflow of the mapping `data` (a parsed workflow file); `text` is what it was parsed from.
 

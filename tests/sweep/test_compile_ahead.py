@@ -34,23 +34,14 @@ READ, COMPILED, UNUSED = "1 0", "0 1", "0 0"
 @pytest.mark.parametrize(
     ("scene", "row", "lane", "variables", "kernels"),
     [
-        pytest.param(
-            "satellite",
-            "k",
-            "rho",
-            ["exponent", "rotation_number", "verdict"],
-            (UNUSED, UNUSED, READ),
-            marks=pytest.mark.slow,
-        ),
-        pytest.param(
-            "satellite",
-            "k",
-            "rho",
-            ["exponent_per_orbit", "period", "verdict"],
-            (READ, READ, UNUSED),
-            marks=pytest.mark.slow,
-        ),
         ("mathieu", "q", "a", ["discriminant", "verdict"], (READ, UNUSED, UNUSED)),
+        *(
+            pytest.param("satellite", "k", "rho", variables, kernels, marks=pytest.mark.slow)
+            for variables, kernels in (
+                (["exponent", "rotation_number", "verdict"], (UNUSED, UNUSED, READ)),
+                (["exponent_per_orbit", "period", "verdict"], (READ, READ, UNUSED)),
+            )
+        ),
     ],
 )
 def test_the_map_reads_what_the_process_beside_it_compiles(tmp_path, scene, row, lane, variables, kernels):
