@@ -2,11 +2,12 @@
 
 const $ = id => document.getElementById(id)
 const TEXT = JSON.parse($("data").textContent)
-const MARGIN = {left: 92, right: 30, top: 10, bottom: 62}, BLOCKS = 256, COARSE = 5, REST = 120, SHOWN = 60, AGAIN = 50, EDGED = ["verdict", "discriminant", "exponent"]
+const MARGIN = {left: 92, right: 30, top: 10, bottom: 62}, BLOCKS = 256, COARSE = 5, REST = 120, SHOWN = 60, PAUSE = 3, ANNOTATED = 25, EDGED = ["verdict", "discriminant", "exponent"]
 const state = {view: null, show: TEXT.shown[0].name, pointer: null, lines: true}
 // A picture of another view serves a moving one while it is not larger than this.
 const MAGNIFIED = 3
-let model = null, workers = [], queue = [], generation = 0, coarse = null, front = null, frame = 0, resting = 0
+let model = null, workers = [], generation = 0, coarse = null, front = null, frame = 0, resting = 0, annotated = 0
+const queue = []
 
 // ---- data
 
@@ -98,7 +99,7 @@ const real = (value, axis) => TEXT.axes[axis].log ? Math.exp(value) : value
 function changed() {
   if (!model || !state.view) return
   generation++
-  queue = []
+  for (const {dropped} of queue.splice(0)) dropped?.()
   if (!enough()) coarsely()
   clearTimeout(resting)
   resting = setTimeout(sharply, REST)
@@ -129,15 +130,20 @@ function jobFor(left, top, width, height, step) {
 }
 
 function coarsely() {
-  if (coarse?.waiting) return  // one at a time: it is asked again when it comes
+  // One at a time, and again when it has come, after a pause that leaves the processor to the motion.
+  if (coarse?.waiting) return
   const width = Math.ceil(plot.box.width / COARSE), height = Math.ceil(plot.box.height / COARSE), own = generation
   const {x, y} = state.view, dx = (x[1] - x[0]) / plot.box.width, dy = (y[1] - y[0]) / plot.box.height
   const view = {x: [x[0], x[0] + width * COARSE * dx], y: [y[1] - height * COARSE * dy, y[1]]}
+  const asked = performance.now()
   coarse = {...coarse, waiting: true}
   ask({...jobFor(0, 0, width, height, COARSE), lines: false}, pixels => {
     under.context.putImageData(new ImageData(pixels, width, height), 0, 0)
-    coarse = {view, canvas: under.canvas, waiting: false}
-    if (own !== generation) setTimeout(() => enough() || coarsely(), AGAIN)
+    const shown = coarse = {view, canvas: under.canvas, waiting: own !== generation}
+    if (shown.waiting) setTimeout(() => {
+      shown.waiting = false
+      if (coarse === shown && !enough()) coarsely()
+    }, PAUSE * (performance.now() - asked))
     frame ||= requestAnimationFrame(redraw)
   }, () => { coarse.waiting = false })
 }
@@ -208,11 +214,16 @@ function redraw() {
     canvas.style.transform = still ? `translate(${Math.round(left) / ratio}px,${Math.round(top) / ratio}px)` :
       `matrix(${width / canvas.width},0,0,${height / canvas.height},${left / ratio},${top / ratio})`
   }
-  for (const {canvas, context} of strips) {
-    context.setTransform(1, 0, 0, 1, 0, 0)
-    context.fillStyle = "#fff"
-    context.fillRect(0, 0, canvas.width, canvas.height)
-    annotate(brush(context, canvas.id === "below" ? [0, -plot.box.top - plot.box.height] : [0, 0]))
+  // The axes in every second frame: with them the browser draws the whole page again.
+  if (begun - annotated < ANNOTATED) frame = requestAnimationFrame(redraw)
+  else {
+    annotated = begun
+    for (const {canvas, context} of strips) {
+      context.setTransform(1, 0, 0, 1, 0, 0)
+      context.fillStyle = "#fff"
+      context.fillRect(0, 0, canvas.width, canvas.height)
+      annotate(brush(context, canvas.id === "below" ? [0, -plot.box.top - plot.box.height] : [0, 0]))
+    }
   }
   $("cross").style.visibility = state.pointer?.keyboard ? "visible" : "hidden"
   tell()
