@@ -198,13 +198,16 @@ def model(workflow, output, overrides, proof):
     from survey.file.disk import check_folder
     from survey.model import build, proved
     from survey.request.workflow import read
+    from survey.sweep.progress import Progress
 
     if output is not None:
         check_folder(output, ".model")
     # with -o nothing is written where the workflow's output would be
     checked = read(workflow, overrides, None if output is None else Path(output).with_suffix(".nc"))
     path = output or str(checked.path.with_suffix(".model"))
-    size = build.model(checked, path, proved.matching(api.open(proof), checked) if proof else None)
+    proof = proved.matching(api.open(proof), checked) if proof else None
+    with Progress(err, checked) as progress:
+        size = build.model(checked, path, proof, progress)
     err.print(plain(f"wrote {path} ({size:,} bytes); in Python: survey.Model({path!r})"), markup=False)
     out.print(plain(path), markup=False)
 
@@ -365,12 +368,17 @@ def plot(path, output, var, style, width, at):
 @click.option("--trust-scene", is_flag=True, help=TRUST)
 def share(path, output, at, trust_scene):
     """Write the map as one HTML file that opens anywhere, offline: zoom without end, values with error bars."""
+    from pathlib import Path
+    from types import SimpleNamespace
+
     from survey import api
     from survey.share import page
+    from survey.sweep.progress import Progress
 
     ds = api.open(path, trust_scene=trust_scene)
     target = output or f"{path.removesuffix('.nc')}.html"
-    told = page.write(ds, target, dict(part.partition("=")[::2] for part in at))
+    with Progress(err, SimpleNamespace(name=Path(path).stem, scene=None)) as progress:
+        told = page.write(ds, target, dict(part.partition("=")[::2] for part in at), progress)
     how = "drawn from series, sharp at every scale" if told["series"] else f"of points: {told['why']}"
     err.print(plain(f"{target}: {told['bytes']:,} bytes, {how}"), markup=False)
     out.print(plain(target), markup=False)

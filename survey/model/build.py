@@ -8,6 +8,7 @@ import hashlib
 import json
 import platform
 import zipfile
+from collections import deque
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -29,6 +30,7 @@ DROPPED = 0.1  # of a panel's bound: what the terms that are left out may add to
 UNEVEN = 4.0  # a panel whose bounds at the nodes differ by more may gain from being halved
 EVEN_OUT = 7  # halvings that are spent on that
 FLOOR = 4.0
+PARTS = 1000  # of the map, in which progress is counted
 TRIED = np.array([-0.934, -0.551, 0.137, 0.862])  # points that are no nodes
 
 
@@ -42,22 +44,24 @@ class Panel:
     bars: np.ndarray
 
 
-def model(workflow, path, proof=None):
+def model(workflow, path, proof=None, progress=None):
     """Write the model of a checked workflow to `path`; returns the number of bytes. Raises BadInput."""
     check_folder(path, ".model")
-    content = packed(workflow, proof)
+    content = packed(workflow, proof, BUDGET, progress)
     write_atomically(Path(path), content)
     return len(content)
 
 
-def packed(workflow, proof=None):
-    """The model file of a checked workflow, as bytes; `proof`: what is proved of the map (see `proved`)."""
+def packed(workflow, proof=None, budget=BUDGET, progress=None):
+    """The model file of a checked workflow, as bytes; `proof`: what is proved of the map (see `proved`).
+
+    At most about `budget` points are solved; `progress`: as `solved` calls it."""
     axes, fixed = _axes(workflow)
     names = [p.name for p in axes]
     sides = [tuple(float(end) for end in (own.min(), own.max()))
              for _, own in (workflow.grid.parameters[name] for name in names)]  # fmt: skip
     source = functions.of(workflow, names, fixed)
-    panels = solved(source, sides, workflow.request.rtol)
+    panels = solved(source, sides, workflow.request.rtol, budget, progress)
     if not panels:
         raise BadInput("model: no series converges on this map; choose axes where every point has an answer")
     return _file(workflow, source, axes, sides, fixed, panels, proof)
@@ -75,11 +79,16 @@ def _axes(workflow):
     return axes, {name: float(own.reshape(-1)[0]) for name, own in values.items() if own.size == 1}
 
 
-def solved(source, sides, rtol):
-    """The Panels that serve the rectangle `sides`, each halved where its series is too short."""
-    left, found, spent = [(tuple(sides), (0, 0))], [], 0
-    while left and spent < BUDGET:
-        own, depth = left.pop(0)
+def solved(source, sides, rtol, budget=BUDGET, progress=None):
+    """The Panels that serve the rectangle `sides`, each halved where its series is too short.
+
+    `progress(done, total, 0, what)` is called with the part of the rectangle that is served or given up."""
+    left, found, spent = deque([(tuple(sides), (0, 0))]), [], 0
+    while left and spent < budget:
+        if progress is not None:
+            served = 1 - sum(0.5 ** sum(depth) for _, depth in left)
+            progress(max(int(PARTS * served), min(spent, 1)), PARTS, 0, "parts of the map")
+        own, depth = left.popleft()
         panel, cut = _panel(source, own, rtol, depth)
         spent += NODES * NODES + TRIED.size**2
         if panel is not None:

@@ -32,7 +32,7 @@ class Source:
 def of(workflow, names, fixed):
     """The Source of a checked workflow with axes `names` (two) and `fixed` parameters; raises BadInput."""
     maker = {"hill": _hill, "danby": _danby, "floquet": _floquet}.get(workflow.scene.FAMILY)
-    if maker is None:
+    if maker is None or (maker is _floquet and not isinstance(workflow.scene, FunctionScene)):
         raise BadInput(
             f"model: the scene {workflow.name} is not answered by series; choose satellite, mathieu, "
             "libration_elliptic, or a Hill equation or a linear periodic system of your own"

@@ -399,8 +399,8 @@ let cells = null
 function provedAt(x, y) {
   // "stable" or "unstable" where the cell around the point is proved.
   if (!TEXT.proof) return null
-  cells ??= TEXT.proof.cells.split(";").map(row => row.split(" ")).filter(cell => cell[4] !== "o")
-  const [u, v] = [x, y].map((value, i) => (value - TEXT.axes[i].ends[0]) / (TEXT.axes[i].ends[1] - TEXT.axes[i].ends[0]) * TEXT.proof.parts[i])
+  cells ??= model.about.proof.cells.split(";").map(row => row.split(" ")).filter(cell => cell[4] !== "o")
+  const [u, v] = [x, y].map((value, i) => (value - TEXT.axes[i].ends[0]) / (TEXT.axes[i].ends[1] - TEXT.axes[i].ends[0]) * model.about.proof.parts[i])
   const cell = cells.find(([a, b, c, d]) => u >= a && u <= b && v >= c && v <= d)
   return cell ? {s: "stable", u: "unstable"}[cell[4]] ?? null : null
 }

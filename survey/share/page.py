@@ -34,6 +34,7 @@ from survey.show.text import label_of, literal, spaced
 from survey.wording import plain
 
 RTOL = 1e-12  # of the series, at most
+BUDGET = 300_000  # points that are solved for the series: about 1.5 MB
 POINTS = 4_000_000  # of a map without series
 FLOATS = 8  # variables of numbers that such a page holds
 SAMPLES = 150  # along a side, by which colours of numbers are chosen
@@ -60,36 +61,35 @@ HINT = (
 )
 
 
-def write(ds, path, at=None):
+def write(ds, path, at=None, progress=None):
     """Write the page of a survey to `path`; returns {"bytes", "series": does it hold series?, "why": else why not}."""
     check_folder(path, ".html", ".htm")
     ds = point.plane(ds, at or {})
-    content, why = made(ds)
+    content, why = made(ds, progress)
     write_atomically(Path(path), content.encode())
     return {"bytes": len(content.encode()), "series": not why, "why": why}
 
 
-def made(ds):
+def made(ds, progress=None):
     """(the page as text, why it holds no series: "" where it does)."""
     axes = [dim for dim in ds.status.dims if ds.sizes[dim] > 1]
     if len(axes) != 2 or any(ds[dim].dtype.kind not in "fi" for dim in axes):
         raise BadInput(f"share: a page shows a map of two numeric axes, and this file has {', '.join(axes) or 'none'}")
     ds = ds.squeeze([dim for dim in ds.status.dims if ds.sizes[dim] == 1]).sortby(axes)
-    packed, why = _series(ds)
+    packed, why = _series(ds, progress)
     table = _common(ds, axes)
     proof = proved.of(ds)
     table |= _of_model(ds, packed) if packed else _of_points(ds, axes)
-    if packed and proof and proof["names"] == axes:
-        table["proof"] = proof
+    table["proof"] = bool(packed and proof and proof["names"] == axes)  # the model has it
     return _html(ds, table, proof, why), why
 
 
-def _series(ds):
+def _series(ds, progress):
     """(the model file, ""), or (None, why there is none)."""
     try:
         checked = workflow.check(zoom.workflow_of(ds))
         checked = replace(checked, request=replace(checked.request, rtol=min(checked.request.rtol, RTOL)))
-        return build.packed(checked, proved.of(ds)), ""
+        return build.packed(checked, proved.of(ds), BUDGET, progress), ""
     except Untrusted:
         raise
     except BadInput as refused:
@@ -104,7 +104,7 @@ def _common(ds, axes):
         ends = [float(end) for end in (np.log(values[[0, -1]]) if log else values[[0, -1]])]
         described.append({"name": plain(str(dim), 40), "log": log, "ends": ends, "label": _glyphs(label_of(ds[dim]))})
     file = "".join(c if c.isalnum() else "_" for c in str(ds.attrs.get("title", "map"))[:60])
-    return {"axes": described, "hint": HINT, "file": file, "proof": None, "edges": [], "curves": []}
+    return {"axes": described, "hint": HINT, "file": file, "edges": [], "curves": []}
 
 
 def _glyphs(text):

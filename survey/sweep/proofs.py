@@ -85,7 +85,12 @@ def find(workflow, once, progress=None):
     text = certificate(workflow.title, prover, *solved(prover, once, progress))
     path = workflow.path.with_suffix(".cert")
     write_atomically(path, text.encode())
-    return (_describe_row if len(prover.names) == 1 else _describe)(workflow, path, text)
+    return described(workflow, path, text)
+
+
+def described(workflow, path, text):
+    """The dataset of what the text of a certificate at `path` states of the workflow's map or row; not checked."""
+    return (_describe if workflow.refine else _describe_row)(workflow, path, text)
 
 
 def prover_of(workflow):

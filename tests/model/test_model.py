@@ -354,6 +354,15 @@ def test_a_map_of_more_cells_than_can_be_numbered_is_answered_from_its_panels(tm
     assert ((found["verdict"] == 1) == (x + 3 * y < 2)).mean() > 0.9999
 
 
+def test_progress_tells_how_much_of_the_map_is_served_and_a_budget_ends_the_search():
+    checked = check(workflow("satellite", {"inertia_ratio": (0.0, 2.0), "amplitude": (0.0, 1.57)}))
+    told = []
+    build.packed(checked, None, 60_000, lambda *given: told.append(given))
+    done, totals, reused, _ = zip(*told, strict=True)
+    assert done[0] == 0 and min(done[1:]) >= 1 and list(done) == sorted(done) and 700 < done[-1] < totals[-1] == 1000
+    assert set(reused) == {0} and len(told) <= 60_000 // build.NODES**2 + 1
+
+
 def test_the_same_map_has_the_same_bytes(folder):
     checked = check(workflow("mathieu", {"a": (0.0, 5.0), "q": (0.0, 2.0)}))
     assert build.packed(checked) == build.packed(checked)
@@ -363,8 +372,10 @@ def test_the_same_map_has_the_same_bytes(folder):
     ("scene", "axes", "numbers", "line"),
     [
         ("brun", {"l": (0.0, 1.0), "alpha": (0.0, 1.0)}, {"beta": 0.5}, "is not answered by series"),
+        ("satellite_triaxial", {"roll_ratio": (-0.5, 0.5), "yaw_ratio": (-0.5, 0.5)}, {"amplitude": 0.5},
+         "is not answered by series"),
         ("mathieu", {"a": (0.0, 5.0)}, {"q": 1.0}, "a model needs two"),
-    ],
+    ],  # fmt: skip
 )
 def test_what_has_no_series_is_refused_in_a_line(scene, axes, numbers, line):
     given = workflow(scene, axes)

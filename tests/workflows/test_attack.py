@@ -200,6 +200,7 @@ SADDLE = [2.2392854657601977, 2.129834011504694, 1.9042235387022515, 1.670864519
 SADDLE_PERIOD = "836.306482278309586125838774447"
 
 
+@pytest.mark.slow
 def test_truth_of_a_motion_that_turns_just_before_a_pole():
     """P(1) = 0 exactly, P < 0 next to it: it turns at 1 - u = 3.5e-17, and takes as long as our scene says."""
     point = [2.0, 4.0, 0.5, np.pi / 2, -1.0, -1.0, -1.0]

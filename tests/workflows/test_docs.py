@@ -245,14 +245,17 @@ def test_every_picture_of_a_page_lies_in_the_results(page):
 
 def test_maps_of_the_documentation_are_pages_that_zoom(tool, tmp_path, monkeypatch):
     live = tool("live_maps")
-    one = "mathieu_proved.png"
-    monkeypatch.setattr(live, "MAPS", {one: live.MAPS[one]})
+    monkeypatch.setattr(live, "MAPS", {name: live.MAPS[name] for name in ("mathieu_proved", "brun_states")})
     found = live.pages(tmp_path / "maps")
-    assert sorted(path.name for path in (tmp_path / "maps").iterdir()) == ["mathieu_proved.html", one]
-    assert (tmp_path / "maps/mathieu_proved.html").stat().st_size < 500_000
-    text = live.replaced(f"before ![a map](../results/{one}) after", "scenes/mathieu.md", found)
-    assert 'src="../_static/maps/mathieu_proved.html" title="a map"' in text and "results/" not in text
-    assert f'<noscript><img src="../_static/maps/{one}" alt="a map"></noscript>' in text
+    pictures = ["brun_states.png", "brun_states_precession.png", "mathieu_proved.png"]
+    assert sorted(found) == pictures
+    made = ["brun_states.html", "mathieu_proved.html", *pictures]
+    assert sorted(path.name for path in (tmp_path / "maps").iterdir()) == sorted(made)
+    proved = tmp_path / "maps/mathieu_proved.html"
+    assert proved.stat().st_size < 500_000 and "<strong>Proved</strong>" in proved.read_text()
+    text = live.replaced(f"before ![a map](../results/{pictures[2]}) after", "scenes/mathieu.md", found)
+    assert 'src="../_static/maps/mathieu_proved.html#show=verdict" title="a map"' in text and "results/" not in text
+    assert f'<noscript><img src="../_static/maps/{pictures[2]}" alt="a map"></noscript>' in text
 
 
 def test_the_comparison_is_what_was_measured(tool):

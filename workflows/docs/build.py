@@ -40,7 +40,7 @@ def assemble(source):
     made["changelog.md"] = (ROOT / ".github/CHANGELOG.md").read_text(encoding="utf-8")
     made["contributing.md"] = (ROOT / ".github/CONTRIBUTING.md").read_text(encoding="utf-8")
     made["notebooks/index.md"] = _notebooks(source / "notebooks")
-    made["index.md"] = (source / "index.md").read_text(encoding="utf-8")
+    made = {path.name: path.read_text(encoding="utf-8") for path in source.glob("*.md")} | made
     live = live_maps.pages(source / "static/maps")
     for name, text in made.items():
         (source / name).parent.mkdir(exist_ok=True)

@@ -49,9 +49,9 @@ def _fit(command, figure):
     if words[:2] in (["survey", "precision"], ["survey", "failures"]):
         names = [f"{words[1]}_{words[2]}.png"]
     elif words[:2] == ["survey", "run"]:
-        names = [] if "output.figures=[]" in words else _of_workflow(ROOT / words[2])
+        names = [] if "output.figures=[]" in words else of_workflow(ROOT / words[2])
     elif words[:2] == ["survey", "prove"]:
-        names = _of_workflow(ROOT / words[2], "_proved")
+        names = of_workflow(ROOT / words[2], "_proved")
     elif words[0] == "survey":
         names = []
     else:  # {...} in a name may be anything; a script may be a folder
@@ -63,7 +63,7 @@ def _fit(command, figure):
     return max((len(f) for f, p in zip(fixed, patterns, strict=True) if re.fullmatch(p, figure)), default=0)
 
 
-def _of_workflow(path, ending=""):
+def of_workflow(path, ending=""):
     """The figures that a workflow draws beside its output: OUT.png, and OUT_NAME.png from the second on."""
     output = tomllib.loads(path.read_text(encoding="utf-8"))["output"]
     stem = Path(output["path"]).stem + ending

@@ -1,7 +1,6 @@
 """The documentation's own maps as pages that zoom (`survey share`), in the place of pictures, which stay as a fallback.
 
-A page is drawn from series, so that a few points of the map are enough to make it; a map that has none is that of its
-workflow, point by point.
+A page is drawn from series where the map has them, so that a few of its points are enough to make it; else from points.
 """
 
 import html
@@ -9,50 +8,95 @@ import re
 import shutil
 import tomllib
 from pathlib import Path
+from urllib.parse import quote
 
+import figures
 import survey
+from survey.request import workflow
 from survey.share import page
+from survey.sweep import proofs
 
 ROOT = Path(__file__).resolve().parents[2]
-POINTS = 9  # along each axis
-MAPS = {  # {picture in results/: scene, options, axes; or the workflow of a map without series}
-    "satellite_prolate.png": ("satellite", {"body": "prolate"}, {"k": (0.0, 0.99), "rho": (0.6, 4.0)}),
-    "satellite_rotations.png": ("satellite", {"body": "prolate"}, {"k": (1.02, 2.0), "rho": (-3.0, 2.0)}),
-    "satellite_rotations_oblate.png": ("satellite", {"body": "oblate"}, {"k": (1.02, 2.0), "rho": (-3.0, 2.0)}),
-    "mathieu_proved.png": ("mathieu", {}, {"a": (0.0, 20.0), "q": (0.0, 10.0)}),
-    "libration_elliptic.png": ("libration_elliptic", {}, {"mu": (0.0, 0.055), "e": (0.0, 0.98)}),
-    "gyrostat_fate.png": "gyrostat_fate.toml",
-}
-TITLES = {
-    "satellite_prolate.png": "Out-of-plane stability of a prolate satellite's librations",
-    "satellite_rotations.png": "Tongues of a prolate satellite's rotations",
-    "satellite_rotations_oblate.png": "Tongues of an oblate satellite's rotations",
-    "mathieu_proved.png": "Mathieu's equation",
-    "libration_elliptic.png": "Triangular libration points of the elliptic problem",
+LARGEST = 2_000_000  # bytes of a page
+SERIES = 9  # points along each axis of a map that has series
+MAPS = {  # {workflow: points along each axis, at most}
+    "brun_frequency": 150,
+    "brun_monodromy": 150,
+    "brun_periods": 150,
+    "brun_states": 150,
+    "brun_triaxial": 150,
+    "coupled_mathieu": SERIES,
+    "duffing": 75,
+    "entrainment": 75,
+    "gyrostat_body": 60,
+    "gyrostat_fate": 150,
+    "gyrostat_portrait": 24,
+    "ion_trap": SERIES,
+    "josephson": 20,
+    "kapitza": SERIES,
+    "libration_elliptic": SERIES,
+    "libration_elliptic_proved": SERIES,
+    "libration_elliptic_strip": SERIES,
+    "mathieu_proved": SERIES,
+    "meissner": SERIES,
+    "satellite_areas": SERIES,
+    "satellite_prolate": SERIES,
+    "satellite_proved": SERIES,
+    "satellite_rotations": SERIES,
+    "satellite_rotations_oblate": SERIES,
+    "satellite_tongues": SERIES,
+    "satellite_triaxial": 150,
+    "satellite_triaxial_amplitude": 100,
+    "whittaker_hill": SERIES,
 }
 
 
 def pages(folder):
-    """Write the pages, and the pictures that stand for them, to the folder; {picture: name of its page}."""
+    """Write the pages, and the pictures that stand for them, to the folder; {picture: its page and what it shows}."""
     folder.mkdir(parents=True, exist_ok=True)
-    for picture, known in MAPS.items():
-        path = folder / f"{picture.removesuffix('.png')}.nc"
-        told = page.write(survey.run(_workflow(picture), output=path), path.with_suffix(".html"))
-        if not (told["series"] or isinstance(known, str)):
-            raise RuntimeError(f"{picture}: no series, {told['why']}")
+    found = {}
+    for name, points in MAPS.items():
+        path = folder / f"{name}.nc"
+        told = page.write(_solved(name, points, path), path.with_suffix(".html"))
+        if told["series"] != (points == SERIES):
+            raise RuntimeError(f"{name}: series {told['series']}, {told['why']}")
+        if told["bytes"] > LARGEST:
+            raise RuntimeError(f"{name}: a page of {told['bytes']:,} bytes")
         for left in folder.glob(f"{path.name}*"):
             left.unlink()
-        shutil.copy(ROOT / "results" / picture, folder)
-    return {picture: picture.replace(".png", ".html") for picture in MAPS}
+        given = _given(name)["output"]
+        pictures = figures.of_workflow(_path(name), "_proved" if name.endswith("_proved") else "")
+        content = path.with_suffix(".html").read_text(encoding="utf-8")
+        for picture, variable in zip(pictures, given["figures"], strict=True):
+            # of an output in each well, the first one
+            if shown := re.search(rf'"name": "({variable}(?: \([^"]*)?)"', content):
+                shutil.copy(ROOT / "results" / picture, folder)
+                found[picture] = f"{name}.html#show={quote(shown[1])}"
+    return found
 
 
-def _workflow(picture):
-    if isinstance(MAPS[picture], str):
-        given = tomllib.loads((ROOT / "workflows" / MAPS[picture]).read_text(encoding="utf-8"))
-        return given | {"output": {}}
-    scene, options, axes = MAPS[picture]
-    table = {name: {"start": low, "stop": high, "num": POINTS} for name, (low, high) in axes.items()}
-    return {"title": TITLES[picture], "scene": scene, "options": options, "axes": table}
+def _path(name):
+    return ROOT / "workflows" / f"{name}.toml"
+
+
+def _given(name):
+    return tomllib.loads(_path(name).read_text(encoding="utf-8"))
+
+
+def _solved(name, points, path):
+    """The map of a workflow with fewer points, and what its certificate states of it, if it has one."""
+    given = _given(name)
+    axes = {key: own | {"num": min(own["num"], points)} if isinstance(own, dict) else own
+            for key, own in given["axes"].items()}  # fmt: skip
+    scene = str(_path(name).with_name(given["scene"])) if given["scene"].endswith(".py") else given["scene"]
+    output = {key: own for key, own in given["output"].items() if key != "path"}
+    fewer = {key: own for key, own in given.items() if key not in ("boundaries", "refine")}
+    ds = survey.run(fewer | {"scene": scene, "axes": axes, "output": output}, output=path)
+    certificate = ROOT / "results" / f"{name}.cert"
+    if not certificate.is_file():
+        return ds
+    stated = proofs.described(workflow.read(_path(name), (), str(path)), certificate, certificate.read_text(encoding="utf-8"))
+    return ds.merge(stated).assign_attrs(stated.attrs)
 
 
 def replaced(text, name, live):
