@@ -41,7 +41,6 @@ if sys.platform == "win32":  # what they try is signals, links, pipes, modes, sh
     ]
 
 
-
 def pytest_collection_modifyitems(items):
     """The files that take longest go first, so that no process waits for the last one: those of the whole program."""
     first = ["tests", "workflows", "sweep"]

@@ -372,10 +372,9 @@ def test_the_same_map_has_the_same_bytes(folder):
     ("scene", "axes", "numbers", "line"),
     [
         ("brun", {"l": (0.0, 1.0), "alpha": (0.0, 1.0)}, {"beta": 0.5}, "is not answered by series"),
-        ("satellite_triaxial", {"roll_ratio": (-0.5, 0.5), "yaw_ratio": (-0.5, 0.5)}, {"amplitude": 0.5},
-         "is not answered by series"),
+        ("satellite_triaxial", {"roll_ratio": (0.1, 0.5), "C": (1.0, 2.0)}, {"k": 0.5, "yaw_ratio": 0.1}, "by series"),
         ("mathieu", {"a": (0.0, 5.0)}, {"q": 1.0}, "a model needs two"),
-    ],  # fmt: skip
+    ],
 )
 def test_what_has_no_series_is_refused_in_a_line(scene, axes, numbers, line):
     given = workflow(scene, axes)

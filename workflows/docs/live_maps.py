@@ -11,6 +11,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 import figures
+
 import survey
 from survey.request import workflow
 from survey.share import page
@@ -95,7 +96,8 @@ def _solved(name, points, path):
     certificate = ROOT / "results" / f"{name}.cert"
     if not certificate.is_file():
         return ds
-    stated = proofs.described(workflow.read(_path(name), (), str(path)), certificate, certificate.read_text(encoding="utf-8"))
+    whole, text = workflow.read(_path(name), (), str(path)), certificate.read_text(encoding="utf-8")
+    stated = proofs.described(whole, certificate, text)
     return ds.merge(stated).assign_attrs(stated.attrs)
 
 
