@@ -47,15 +47,17 @@ class Panel:
 def model(workflow, path, proof=None, progress=None):
     """Write the model of a checked workflow to `path`; returns the number of bytes. Raises BadInput."""
     check_folder(path, ".model")
-    content = packed(workflow, proof, BUDGET, progress)
+    content = packed(workflow, proof, progress=progress)
     write_atomically(Path(path), content)
     return len(content)
 
 
-def packed(workflow, proof=None, budget=BUDGET, progress=None):
+def packed(workflow, proof=None, budget=BUDGET, most=None, progress=None):
     """The model file of a checked workflow, as bytes; `proof`: what is proved of the map (see `proved`).
 
-    At most about `budget` points are solved; `progress`: as `solved` calls it."""
+    At most about `budget` points are solved; `progress`: as `solved` calls it. Where there would be more than `most`
+    bytes, the smallest panels are left out.
+    """
     axes, fixed = _axes(workflow)
     names = [p.name for p in axes]
     sides = [tuple(float(end) for end in (own.min(), own.max()))
@@ -64,7 +66,12 @@ def packed(workflow, proof=None, budget=BUDGET, progress=None):
     panels = solved(source, sides, workflow.request.rtol, budget, progress)
     if not panels:
         raise BadInput("model: no series converges on this map; choose axes where every point has an answer")
-    return _file(workflow, source, axes, sides, fixed, panels, proof)
+    content = _file(workflow, source, axes, sides, fixed, panels, proof)
+    while most is not None and len(content) > most:
+        largest = sorted(panels, key=lambda own: -np.prod(np.subtract(own.high, own.low)))
+        panels = sorted(largest[: int(0.95 * len(panels) * most / len(content))], key=lambda own: own.low)
+        content = _file(workflow, source, axes, sides, fixed, panels, proof)
+    return content
 
 
 def _axes(workflow):
@@ -82,7 +89,8 @@ def _axes(workflow):
 def solved(source, sides, rtol, budget=BUDGET, progress=None):
     """The Panels that serve the rectangle `sides`, each halved where its series is too short.
 
-    `progress(done, total, 0, what)` is called with the part of the rectangle that is served or given up."""
+    `progress(done, total, 0, what)` is called with the part of the rectangle that is served or given up.
+    """
     left, found, spent = deque([(tuple(sides), (0, 0))]), [], 0
     while left and spent < budget:
         if progress is not None:

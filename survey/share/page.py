@@ -34,7 +34,8 @@ from survey.show.text import label_of, literal, spaced
 from survey.wording import plain
 
 RTOL = 1e-12  # of the series, at most
-BUDGET = 300_000  # points that are solved for the series: about 1.5 MB
+BUDGET = 1_000_000  # points that are solved for the series
+LARGEST = 1_350_000  # bytes of the model, for a page of less than 2 MB
 POINTS = 4_000_000  # of a map without series
 FLOATS = 8  # variables of numbers that such a page holds
 SAMPLES = 150  # along a side, by which colours of numbers are chosen
@@ -89,7 +90,7 @@ def _series(ds, progress):
     try:
         checked = workflow.check(zoom.workflow_of(ds))
         checked = replace(checked, request=replace(checked.request, rtol=min(checked.request.rtol, RTOL)))
-        return build.packed(checked, proved.of(ds), BUDGET, progress), ""
+        return build.packed(checked, proved.of(ds), BUDGET, LARGEST, progress), ""
     except Untrusted:
         raise
     except BadInput as refused:

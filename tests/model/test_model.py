@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 import zipfile
+from io import BytesIO
 from pathlib import Path
 
 import mpmath
@@ -354,13 +355,19 @@ def test_a_map_of_more_cells_than_can_be_numbered_is_answered_from_its_panels(tm
     assert ((found["verdict"] == 1) == (x + 3 * y < 2)).mean() > 0.9999
 
 
-def test_progress_tells_how_much_of_the_map_is_served_and_a_budget_ends_the_search():
+def test_progress_tells_how_much_of_the_map_is_served_and_budgets_end_the_search():
     checked = check(workflow("satellite", {"inertia_ratio": (0.0, 2.0), "amplitude": (0.0, 1.57)}))
     told = []
-    build.packed(checked, None, 60_000, lambda *given: told.append(given))
+    content = build.packed(checked, None, 60_000, progress=lambda *given: told.append(given))
     done, totals, reused, _ = zip(*told, strict=True)
     assert done[0] == 0 and min(done[1:]) >= 1 and list(done) == sorted(done) and 700 < done[-1] < totals[-1] == 1000
     assert set(reused) == {0} and len(told) <= 60_000 // build.NODES**2 + 1
+    fewer = build.packed(checked, None, 60_000, most=len(content) // 2)
+    tables = [json.loads(zipfile.ZipFile(BytesIO(own)).read(reader.TABLE))["panels"] for own in (content, fewer)]
+    whole, part = ({(*own["low"], *own["high"]) for own in table} for table in tables)
+    area = [np.prod(np.subtract(own[2:], own[:2])) for own in part]
+    assert len(fewer) <= len(content) // 2 and part < whole
+    assert min(area) >= max(np.prod(np.subtract(own[2:], own[:2])) for own in whole - part)
 
 
 def test_the_same_map_has_the_same_bytes(folder):
