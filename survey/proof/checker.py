@@ -254,15 +254,17 @@ def growth(steps, least):
 
 def step(matrices, order, h, w, missed):
     """The matrix that takes (X, Y) over a step, from Taylor series of K and L; see `Equation.steps`."""
-    upper, lower = ([[[x[n] for n in range(len(x))] for x in row] for row in part] for part in matrices)
-    rows = [list(enumerate(row, len(upper))) for row in upper] + [list(enumerate(row)) for row in lower]
-    scales, columns = [w] * len(upper) + [arb(1)] * len(lower), []
+    m, columns, terms = len(matrices[0]), [], []  # v_i' is the sum of a v_j for all (i, j, a) in `terms`
+    for (first, second), part in zip(((0, m), (m, 0)), matrices, strict=True):
+        terms += [(first + i, second + j, list(a)) for i, row in enumerate(part) for j, a in enumerate(row)]
+    scales = [w] * m + [arb(1)] * m
     for column, scale in enumerate(scales):
-        v = [[arb(i == column)] for i in range(len(rows))]  # coefficients, the last one first
+        v = [[arb(i == column)] for i in range(2 * m)]  # coefficients, the last one first
         for n in range(1, order + 1):
-            slopes = [[sum(map(mul, a, v[j]), ZERO) if len(a) != 1 else a[0] * v[j][0] for j, a in row] for row in rows]
-            for x, slope in zip(v, slopes, strict=True):
-                x.insert(0, sum(slope[1:], slope[0]) / n)
+            slopes = [ZERO] * (2 * m)
+            for i, j, a in terms:
+                slopes[i] = sum(map(mul, a, v[j]), slopes[i])
+            v = [[slope / n, *x] for x, slope in zip(v, slopes, strict=True)]
         columns.append([arb_poly(x[::-1])(h) + missed * scale / own * UNIT for x, own in zip(v, scales, strict=True)])
     return arb_mat(columns).transpose()
 
@@ -300,8 +302,7 @@ class Panel:
         return found
 
     def place(self, x):  # {name: parameter} at x in [-1, 1]^2
-        each = zip(self.equation.names, self.sides, x, strict=True)
-        return {name: middle + half * at for name, (middle, half), at in each}
+        return {name: c + half * at for name, (c, half), at in zip(self.equation.names, self.sides, x, strict=True)}
 
     def check(self):
         """Raises Failed unless every cell is what it is said to be."""
@@ -311,8 +312,7 @@ class Panel:
             need(good, f"cell {number} is not proved to be {VERDICTS.get(letter, 'an edge')}")
 
     def parts(self, part):  # what `cell` takes for the halves or quarters of a cell, in the order of `halved`
-        above = self.cell(*part)
-        return [(above, half[::-1]) for half in product((1, 0), repeat=len(self.counts))]
+        return list(product([self.cell(*part)], [half[::-1] for half in product((1, 0), repeat=len(self.counts))]))
 
     def cell(self, above=None, half=()):
         """({factor of unknown sign: coefficients}, {factor: sign or 0}, width) of the panel or a part of `above`."""

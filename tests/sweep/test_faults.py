@@ -165,6 +165,7 @@ def faults(tmp_path_factory):
     yield faults
     faults.server.stdin.close()
     assert faults.server.wait(20) == 0
+    faults.server.stdout.close()
 
 
 def _published(calls):
