@@ -170,7 +170,8 @@ def _solutions(a, q, s, period):
     p[:, 0], p[:, 1], p[:, 2], p[:, 9] = a, q, s, period
     out, ends = np.empty((len(a), 12)), np.full(len(a), np.inf)
     hill_flow.own_points(HARMONICS, p, ends, np.column_stack([p[:, 9], 0 * a]), TOLERANCE, out)
-    pairs = [[mpf(row[2 * i]) + mpf(row[2 * i + 1]) for i in range(4)] for row in out]
+    with mp.workdps(DIGITS):  # the two halves of a double-double
+        pairs = [[mpf(row[2 * i]) + mpf(row[2 * i + 1]) for i in range(4)] for row in out]
     return [(y1, y2, d1, d2) for y1, y2, d1, d2 in pairs], out[:, 10]
 
 
