@@ -80,6 +80,7 @@ def test_bars_that_miss_what_was_asked_and_undecided_verdicts_are_counted(plane)
     assert compare.judged(plane, open_, failures.RTOL).undecided.all()
 
 
+@pytest.mark.slow
 def test_a_turning_point_is_held_against_the_true_one():
     plane = modules.load(planes, "gyrostat", "scene").planes(SHARE)[4]
     answer = answered(plane)

@@ -215,6 +215,7 @@ def test_truth_of_a_motion_that_turns_just_before_a_pole():
     assert abs(float(ds.period) - out[0, 4]) < float(ds.period_error)
 
 
+@pytest.mark.slow
 def test_truth_beside_a_saddle_of_bruns_problem():
     out = np.empty((1, brun_sums.COLUMNS))
     brun_sums.states(np.array([SADDLE]), brun.NODES, out)
