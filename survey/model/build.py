@@ -67,9 +67,9 @@ def packed(workflow, proof=None, budget=BUDGET, most=None, progress=None):
     if not panels:
         raise BadInput("model: no series converges on this map; choose axes where every point has an answer")
     content = _file(workflow, source, axes, sides, fixed, panels, proof)
-    while most is not None and len(content) > most:
+    while most is not None and len(content) > most and len(panels) > 1:
         largest = sorted(panels, key=lambda own: -np.prod(np.subtract(own.high, own.low)))
-        panels = sorted(largest[: int(0.95 * len(panels) * most / len(content))], key=lambda own: own.low)
+        panels = sorted(largest[: max(1, int(0.9 * len(panels) * most / len(content)))], key=lambda own: own.low)
         content = _file(workflow, source, axes, sides, fixed, panels, proof)
     return content
 
