@@ -40,13 +40,6 @@ if sys.platform == "win32":  # what they try is signals, links, pipes, modes, sh
         "sweep/test_faults.py",
     ]
 
-
-def pytest_collection_modifyitems(items):
-    """The files that take longest go first, so that no process waits for the last one: those of the whole program."""
-    first = ["tests", "workflows", "sweep"]
-    items.sort(key=lambda item: first.index(item.path.parent.name) if item.path.parent.name in first else len(first))
-
-
 hypothesis.settings.register_profile("untimed", deadline=None)
 hypothesis.settings.load_profile("untimed")
 gc.set_threshold(100_000)  # as the program does: a tenth of the time in which kernels are compiled

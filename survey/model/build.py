@@ -91,21 +91,22 @@ def solved(source, sides, rtol, budget=BUDGET, progress=None):
 
     `progress(done, total, 0, what)` is called with the part of the rectangle that is served or given up.
     """
-    left, found, spent = deque([(tuple(sides), (0, 0))]), [], 0
+    left, found, spent, settled = deque([(tuple(sides), (0, 0))]), [], 0, 0.0
     while left and spent < budget:
         if progress is not None:
-            served = 1 - sum(0.5 ** sum(depth) for _, depth in left)
-            progress(max(int(PARTS * served), min(spent, 1)), PARTS, 0, "parts of the map")
+            progress(max(int(PARTS * settled), min(spent, 1)), PARTS, 0, "parts of the map")
         own, depth = left.popleft()
         panel, cut = _panel(source, own, rtol, depth)
         spent += NODES * NODES + TRIED.size**2
-        if panel is not None:
-            found.append(panel)
-        elif 0.5 ** depth[cut] > SMALLEST:
+        if panel is None and 0.5 ** depth[cut] > SMALLEST:
             low, high = own[cut]
             deeper = (depth[0] + (cut == 0), depth[1] + (cut == 1))
             for half in ((low, 0.5 * (low + high)), (0.5 * (low + high), high)):
                 left.append(((half, own[1]) if cut == 0 else (own[0], half), deeper))
+            continue
+        settled += 0.5 ** sum(depth)
+        if panel is not None:
+            found.append(panel)
     return sorted(found, key=lambda panel: panel.low)
 
 

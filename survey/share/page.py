@@ -77,20 +77,20 @@ def made(ds, progress=None):
     if len(axes) != 2 or any(ds[dim].dtype.kind not in "fi" for dim in axes):
         raise BadInput(f"share: a page shows a map of two numeric axes, and this file has {', '.join(axes) or 'none'}")
     ds = ds.squeeze([dim for dim in ds.status.dims if ds.sizes[dim] == 1]).sortby(axes)
-    packed, why = _series(ds, progress)
-    table = _common(ds, axes)
     proof = proved.of(ds)
+    packed, why = _series(ds, proof, progress)
+    table = _common(ds, axes)
     table |= _of_model(ds, packed) if packed else _of_points(ds, axes)
     table["proof"] = bool(packed and proof and proof["names"] == axes)  # the model has it
     return _html(ds, table, proof, why), why
 
 
-def _series(ds, progress):
+def _series(ds, proof, progress):
     """(the model file, ""), or (None, why there is none)."""
     try:
         checked = workflow.check(zoom.workflow_of(ds))
         checked = replace(checked, request=replace(checked.request, rtol=min(checked.request.rtol, RTOL)))
-        return build.packed(checked, proved.of(ds), BUDGET, LARGEST, progress), ""
+        return build.packed(checked, proof, BUDGET, LARGEST, progress), ""
     except Untrusted:
         raise
     except BadInput as refused:

@@ -54,7 +54,7 @@ def test_the_survey_has_its_three_pictures(family):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("end", [pytest.param(0, marks=pytest.mark.slow), -1])
+@pytest.mark.parametrize("end", [0, -1])
 def test_solutions_and_turning_points_are_those_of_the_motion_in_time(family, end):
     ds, _ = family
     for i, j in ((2, 0), (7, 1), (10, 0), (15, 1), (18, 0), (21, 2), (24, 1)):
