@@ -6,6 +6,8 @@ const MARGIN = {left: 92, right: 30, top: 10, bottom: 62}, BLOCKS = 256, COARSE 
 const state = {view: null, show: TEXT.shown[0].name, pointer: null, lines: true}
 // A picture of another view serves a moving one while it is not larger than this.
 const MAGNIFIED = 3
+// A picture of more pixels than this is scaled in motion by a copy with every `FEWER`th of them.
+const LARGE = 4_000_000, FEWER = 3
 let model = null, workers = [], generation = 0, coarse = null, front = null, frame = 0, resting = 0, annotated = 0
 const queue = []
 
@@ -42,6 +44,8 @@ const figure = $("figure"), plot = {}
 // moves and scales them: no script touches their pixels. The axes are drawn in strips beside them.
 const papers = [$("one"), $("two")].map(canvas => ({canvas, context: canvas.getContext("2d", {alpha: false})}))
 const under = {canvas: $("under"), context: $("under").getContext("2d", {alpha: false})}
+// And a smaller copy of a large picture, shown while it is scaled: the compositor has no time for all of its pixels.
+const copy = {canvas: $("copied"), context: $("copied").getContext("2d", {alpha: false}), of: null}
 const strips = [$("left"), $("below")].map(canvas => ({canvas, context: canvas.getContext("2d", {alpha: false})}))
 
 function sized(canvas, left, top, width, height) {
@@ -60,6 +64,7 @@ function resize() {
   Object.assign(plot, {all, ratio, box, left: left / ratio, top: top / ratio, width: box.width / ratio, height: box.height / ratio})
   Object.assign($("plot").style, {left: plot.left + "px", top: plot.top + "px", width: plot.width + "px", height: plot.height + "px"})
   for (const {canvas} of papers) sized(canvas, 0, 0, box.width, box.height)
+  sized(copy.canvas, 0, 0, Math.ceil(box.width / FEWER), Math.ceil(box.height / FEWER))
   sized(under.canvas, 0, 0, Math.ceil(box.width / COARSE), Math.ceil(box.height / COARSE))
   sized(strips[0].canvas, 0, 0, left, top + box.height)
   sized(strips[1].canvas, 0, top + box.height, all[0], all[1] - top - box.height)
@@ -202,11 +207,25 @@ function paint(context) {
   for (const [i, own] of [coarse, front].entries()) if (shown[i]) context.drawImage(own.canvas, ...placed(own))
 }
 
+function copied() {
+  // Is the picture scaled, and too large for that? Then its copy stands for it.
+  const [, , width, height] = placed(front), {canvas, context} = copy
+  const still = Math.abs(width - front.canvas.width) < 0.01 && Math.abs(height - front.canvas.height) < 0.01
+  if (still || front.canvas.width * front.canvas.height <= LARGE) copy.of = null
+  else if (copy.of !== front) {
+    context.imageSmoothingQuality = "medium"  // thin lines stay whole
+    context.drawImage(front.canvas, 0, 0, canvas.width, canvas.height)
+    copy.of = front
+  }
+}
+
 function redraw() {
   frame = 0
   const begun = performance.now(), {ratio} = plot, shown = shownOf()
-  for (const {canvas} of [under, ...papers]) {
-    const own = shown[0] && coarse.canvas === canvas ? coarse : shown[1] && front.canvas === canvas ? front : null
+  if (shown[1]) copied()
+  const sharp = shown[1] && copy.of === front ? copy.canvas : front?.canvas
+  for (const {canvas} of [under, copy, ...papers]) {
+    const own = shown[0] && coarse.canvas === canvas ? coarse : shown[1] && sharp === canvas ? front : null
     canvas.style.visibility = own ? "visible" : "hidden"
     if (!own) continue
     const [left, top, width, height] = placed(own), still = Math.abs(width - canvas.width) < 0.01 && Math.abs(height - canvas.height) < 0.01
