@@ -107,8 +107,12 @@ def test_a_point_is_the_nearest_one_with_its_bars_and_reasons(mathieu):
         ("libration", {"mu": 0.05}, "mu > mu_R"),
         ("libration_elliptic", {"mu": 0.05, "e": 0.1}, "is not positive (at 0 two pairs meet)"),
         ("libration_elliptic", {"mu": 0.01, "e": 0.1}, "> 0, and so are"),
-        ("brun", {"theta0": 1.0, "p_psi": 0.6, "p_phi": 0.4, **STATE}, "beyond the error bars"),
-        ("brun", {"theta0": 1.0, "p_psi": 0.5, "p_phi": 0.5, **STATE}, "passes a pole"),
+        pytest.param(
+            "brun", STATE | {"theta0": 1.0, "p_psi": 0.6, "p_phi": 0.4}, "beyond the error bars", marks=pytest.mark.slow
+        ),
+        pytest.param(
+            "brun", STATE | {"theta0": 1.0, "p_psi": 0.5, "p_phi": 0.5}, "passes a pole", marks=pytest.mark.slow
+        ),
         ("brun", {"l": 1.0, "alpha": 0.2, "beta": 0.1}, "separatrix_distance = "),
     ],
 )

@@ -15,25 +15,26 @@ from pathlib import Path
 import numpy as np
 import viewer
 
-# The view circles, then breathes: 4 s each.
+# The view circles, then breathes, 4 s each; it begins at rest, sharp.
 MOVED = """
 const [kind, seconds, done] = arguments, at = [], own = []
-const half = 0.25, {x, y} = home(), begun = performance.now()
-const go = () => {
-  const now = performance.now(), t = (now - begun) / 1000, turn = t * 2 * Math.PI / 4
+const half = 0.25, {x, y} = home()
+const side = ([a, b], middle, size) => [a + (b - a) * (middle - size), a + (b - a) * (middle + size)]
+const show = t => {
+  const turn = t * 2 * Math.PI / 4, far = kind === "pan" ? 1 : 0
+  const size = kind === "zoom" ? half * Math.exp(-Math.sin(turn)) : half
+  setView(side(x, 0.5 + 0.15 * far * Math.sin(turn), size), side(y, 0.5 + 0.1 * far * Math.sin(2 * turn), size))
+}
+const rested = then => idle() ? then() : setTimeout(rested, 5, then)
+const move = begun => {
+  const now = performance.now(), t = (now - begun) / 1000
   at.push(now)
   if (window.drawn) own.push(window.drawn.milliseconds)
-  const size = kind === "zoom" ? half * Math.exp(-Math.sin(turn)) : half
-  const far = kind === "pan" ? 1 : 0, u = 0.5 + 0.15 * far * Math.sin(turn), v = 0.5 + 0.1 * far * Math.sin(2 * turn)
-  const side = ([a, b], middle) => [a + (b - a) * (middle - size), a + (b - a) * (middle + size)]
-  if (t < seconds) { setView(side(x, u), side(y, v)); requestAnimationFrame(go) }
-  else {
-    const still = performance.now(), tell = () => done({at, own, sharp: performance.now() - still})
-    const wait = () => idle() ? tell() : setTimeout(wait, 5)
-    wait()
-  }
+  if (t < seconds) { show(t); requestAnimationFrame(() => move(begun)) }
+  else rested(() => done({at, own, sharp: performance.now() - now}))
 }
-requestAnimationFrame(go)
+show(0)
+setTimeout(rested, 500, () => move(performance.now()))
 """
 
 

@@ -26,7 +26,8 @@ def maps():
     for case in questions():
         scene, options = case.values
         axes = {key: np.sort(np.atleast_1d(v)).tolist() for key, v in draw(scene, options, 5).items()}
-        yield pytest.param(scene.__name__.rpartition(".")[2], options, axes, id=case.id)
+        slow = [pytest.mark.slow] * (case.id == "gyrostat-fate")
+        yield pytest.param(scene.__name__.rpartition(".")[2], options, axes, id=case.id, marks=slow)
     for scene, options, axes in OTHERS:
         yield pytest.param(scene, options, axes, id="-".join([Path(scene).stem, *axes]))
 

@@ -180,6 +180,7 @@ def test_a_kill_at_any_call_from_the_publication_on_leaves_what_the_next_run_rem
         faults.meet(words, at, "kill")
 
 
+@pytest.mark.slow
 def test_an_error_at_a_call_of_each_kind_is_one_line(faults):
     """Of several calls that do the same with files of the same use, one from the middle."""
     words, kinds = ("plain.toml",), {}

@@ -123,7 +123,9 @@ def test_a_lower_saddle_has_a_loop_of_its_own():
         assert (end[row] == ds.EQUILIBRIUM).all() and (limit[row] == row + 1).all()
 
 
-@pytest.mark.parametrize(("current", "to_the_right"), [(0.1, ds.EQUILIBRIUM), (0.2, ds.ROTATION_PLUS)])
+@pytest.mark.parametrize(
+    ("current", "to_the_right"), [pytest.param(0.1, ds.EQUILIBRIUM, marks=pytest.mark.slow), (0.2, ds.ROTATION_PLUS)]
+)
 def test_of_a_junction_the_branch_changes_its_end_at_the_homoclinic_curve(current, to_the_right):
     """Its damping is 0.1: I = 0.4 / pi = 0.127."""
 
