@@ -313,7 +313,8 @@ def _about(ds, proof, why):
                    f"{certificate}, sha256 {digest}: survey-check {certificate} verifies it"
                    f"<details><summary>the theorem</summary><pre>{theorem}</pre></details></div>")  # fmt: skip
     if why:
-        out.append(f"<p>Points, not series: {html.escape(plain(why))}.</p>")
+        reason = html.escape(plain(why.partition("; ")[0]))  # without what to do: the reader has the page alone
+        out.append(f"<p>The page shows the points that were solved, no series: {reason}.</p>")
     sources = plain(str(attrs.get("references", "")), 2000)
     cite = (
         f"{literal(attrs.get('title', 'A stability map')).rstrip('.')}. Computed with survey "
