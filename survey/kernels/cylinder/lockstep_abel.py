@@ -1,6 +1,7 @@
 """Solutions w(phi) of Abel's equation (57) for many systems in lock step: w and t at given angles.
 
-The steps are those of `lockstep`, in time. A step's series serves all the angles that it passes, BLOCK of them at once:
+Far from turning points phi is the variable (`lockstep_phi`); from there on the steps are those of `lockstep`, in time,
+and errors are bounded as there. A step's series serves all the angles that it passes, BLOCK of them at once:
 Newton's method gives the times, then come w, t and their error bars. Turning points, targets in doubt and the
 ends of solutions are treated as in `steps.abel`.
 """
@@ -9,6 +10,7 @@ import math
 
 import numpy as np
 
+from survey.kernels.cylinder import lockstep_phi as far
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.flow import (
     B12,
@@ -236,13 +238,15 @@ def _pass(T, state, before, fixed, q, i, block, targets, j, doubt, started, floa
 
 
 @kernel
-def _refill(P, starts, targets, waiting, state, fixed, axes, row, sizes, floats, status):
+def _refill(P, starts, targets, waiting, state, fixed, axes, row, sizes, goal, started, column, ahead, floats, status):
     """Give free lanes the rows that wait; returns the first that still waits."""
     for i in range(LANES):
         while waiting < len(P) and row[i] < 0:
             p, phi0, w0, size = P[waiting], starts[waiting, 0], starts[waiting, 1], finite(targets[waiting])
             at, rows, codes = targets[waiting, :size], floats[waiting, :size], status[waiting, :size]
-            if size > 0 and not at_rest(p, reduced(phi0)[0], phi0, w0, at, rows, codes):
+            begun = ahead[waiting, far.W] > 0.0
+            first = int(ahead[waiting, far.COLUMN]) if begun else 0
+            if first < size and (begun or not at_rest(p, reduced(phi0)[0], phi0, w0, at, rows, codes)):
                 enter(p, phi0, w0, state, fixed, i)
                 fixed[NEXT, i], row[i], sizes[i] = math.inf, waiting, size
                 # number by number: an assignment to a slice would take a second to compile
@@ -250,8 +254,22 @@ def _refill(P, starts, targets, waiting, state, fixed, axes, row, sizes, floats,
                 axes[i, C23], axes[i, S2], axes[i, S3] = 0.0, fixed[P2, i], fixed[P3, i]
                 axes[i, BOUND_F], axes[i, BOUND_G], axes[i, BOUND_DG] = fixed[PF, i], fixed[PG, i], fixed[PDG, i]
                 axes[i, BOUND_DDG] = p[BOUND_DDG]
+                if begun:
+                    _go_on(ahead[waiting], state, fixed, i)
+                column[i], started[i] = first, state[V, i] > 0.0
+                goal[i] = targets[waiting, first] - fixed[TURN, i]
             waiting += 1
     return waiting
+
+
+@inline
+def _go_on(reached, state, fixed, i):
+    """Set lane i to what `lockstep_phi` has reached: bounds of the errors at an angle become those at a time."""
+    w, late = reached[far.W], reached[far.T_BOUND]
+    state[PSI, i], state[TURNS, i], state[V, i] = reached[far.AT], reached[far.TURNED], w
+    state[TIME, i], state[TIME_LOW, i] = reached[far.TIME], reached[far.TIME_LOW]
+    wide, tall = w * late, reached[far.W_BOUND] + (fixed[PF, i] * w + fixed[PG, i]) * late
+    state[SAA, i], state[SBB, i], state[STEPS, i] = wide * wide, tall * tall, 1.0
 
 
 @inline
@@ -280,17 +298,32 @@ def abels(P, starts, targets, tolerance, limit, floats, status):
     column, doubt = np.zeros(LANES, dtype=np.int64), np.full(LANES, -1)
     goal, started, calm = np.zeros(LANES), np.zeros(LANES, dtype=np.bool_), np.zeros(LANES, dtype=np.bool_)
     waiting, free = 0, True
+    ahead = np.zeros((len(P), far.STATE))
+    far.abels(P, starts, targets, tolerance, limit, floats, status, ahead)
     while True:
         if free:
             for i in range(LANES):
                 if row[i] < 0:
                     column[i], doubt[i] = 0, -1
-            waiting = _refill(P, starts, targets, waiting, state, fixed, axes, row, sizes, floats, status)
+            waiting = _refill(
+                P,
+                starts,
+                targets,
+                waiting,
+                state,
+                fixed,
+                axes,
+                row,
+                sizes,
+                goal,
+                started,
+                column,
+                ahead,
+                floats,
+                status,
+            )
             if not busy(row):
                 return
-            for i in range(LANES):
-                if row[i] >= 0 and state[STEPS, i] == 0.0:
-                    started[i], goal[i] = state[V, i] > 0.0, targets[row[i], 0] - fixed[TURN, i]
         series(T, state, fixed)
         advance(T, state, before, fixed, fate, tolerance)
         _calm(state, fixed, goal, doubt, started, calm)

@@ -132,8 +132,10 @@ def abel(method, rows, targets, rtol, before=False):
     `before`; both branches lie to the side of g, and at targets on the other side it has turned at t = 0.
     """
     back = rows[:, rc.W0] == 0.0 if before else np.zeros(len(rows), bool)
-    floats = np.full((*targets.shape, rc.STATE), np.nan)
-    status, phi0 = np.zeros(targets.shape, dtype=np.int64), rows[:, rc.PHI0, None]
+    phi0, past = rows[:, rc.PHI0, None], back | (rows[:, rc.W0] < 0)
+    if len(rows) and (past == past[0]).all() and (targets >= phi0).all():  # as a rule
+        return _branch(method, rows, targets, rtol, 1.0, past[0])
+    floats, status = np.full((*targets.shape, rc.STATE), np.nan), np.zeros(targets.shape, dtype=np.int64)
     for side in (1.0, -1.0):
         onward = targets >= phi0 if side > 0 else targets < phi0
         for past in (False, True):
@@ -142,7 +144,7 @@ def abel(method, rows, targets, rtol, before=False):
                 continue
             mine = onward[picked]
             same = np.flatnonzero(mine[0])
-            if (mine == mine[0]).all() and same[-1] - same[0] < same.size:  # as a rule; picking costs more than solving
+            if (mine == mine[0]).all() and same[-1] - same[0] < same.size:  # picking costs more than solving
                 at = slice(same[0], same[-1] + 1)
                 some = slice(None) if picked.all() else picked
                 floats[some, at], status[some, at] = _branch(method, rows[some], targets[some, at], rtol, side, past)

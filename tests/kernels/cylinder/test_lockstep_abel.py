@@ -4,7 +4,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from survey.kernels.cylinder import lockstep, lockstep_abel, steps
+from survey.kernels.cylinder import lockstep, lockstep_abel, lockstep_phi, steps
 from survey.kernels.jit import fresh
 from survey.measures.cylinder import solution
 from survey.methods import closed, taylor
@@ -60,6 +60,7 @@ def test_bars_hold_on_random_systems(tolerance):
     [
         (40, 40, 1, 1, 1, 1, 3, 1),  # stiff
         (1, 1, 1, 1, 1, 1, 3, 300),  # fast
+        (1, 1, 1, 1, 1, 1, 3, 6),  # slow and fast in turn
         (0, 0, 9, 9, 9, 9, 3, 3),  # conserves H
         (1, 1, 0, 0, 0, 0, 3, 1),  # g = 0
         (1, 1, 1, 1, 1, 1, 1e6, 1),  # many turns from 0
@@ -71,6 +72,36 @@ def test_bars_hold_on_random_systems(tolerance):
 def test_bars_hold_on_hard_systems(scale):
     theirs, both = agree(drawn(100, 4, scale), [0.0, 1e-9, 0.01, 1.0, 5.0, 30.0])
     assert both > theirs - 0.02
+
+
+def test_phi_is_the_variable_far_from_turning_points():
+    """Three digits more than the bars ask for, by mpmath; and no solution is left to steps in time."""
+    rows = drawn(lockstep.LANES, 9, (0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 3, 0))
+    rows[:, 7] = np.linspace(3.0, 30.0, len(rows))
+    over = np.linspace(0.0, 2 * np.pi, 25)
+    floats, status = solved(rows, over)
+    ahead = np.zeros((len(rows), lockstep_phi.STATE))
+    P, starts = solution.split(rows)
+    again, codes = np.empty_like(floats), np.empty_like(status)
+    lockstep_phi.abels(P, starts, rows[:, 6:7] + over, 1e-13, solution.STEPS, again, codes, ahead)
+    assert (ahead[:, lockstep_phi.COLUMN] == len(over)).all() and (status == steps.OK).all()
+    np.testing.assert_array_equal(again, floats)
+    assert floats[..., 2].max() < 1e-10 and floats[..., 3].max() < 1e-10
+    for i in (0, 7, 31):
+        b12, b31, d, c23, s2, s3 = map(mp.mpf, rows[i, :6])
+
+        def slope(x, y, b12=b12, b31=b31, d=d, c23=c23, s2=s2, s3=s3):
+            c, s = mp.cos(x), mp.sin(x)
+            return [b12 * c - b31 * s + (s2 * c - s3 * s - d * c * s - c23 * (c * c - s * s)) / y[0], 1 / y[0]]
+
+        with mp.workdps(20):
+            true = mp.odefun(slope, mp.mpf(rows[i, 6]), [mp.mpf(rows[i, 7]), mp.mpf(0)])
+            for j in (3, 12, 24):
+                off = [
+                    abs(mp.mpf(a) - b)
+                    for a, b in zip(floats[i, j, :2], true(mp.mpf(rows[i, 6] + over[j])), strict=True)
+                ]
+                assert off[0] < floats[i, j, 2] and off[1] < floats[i, j, 3], (i, j, off)
 
 
 def test_every_angle_beside_a_turning_point():

@@ -1,0 +1,323 @@
+"""Solutions w(phi) of Abel's equation (57) for many systems in lock step, while they are far from turning points.
+
+There phi is the better variable. In units of w = w0 at the start of a step, from which s = psi - psi0 counts,
+
+    w = w0 omega,  omega q = g / w0^2,  omega' = f / w0 + q,  omega r = 1,  t' = r / w0          (57),
+
+with f and g in closed form: two Cauchy products, where the motion in time has three (see `lockstep`, also for the axes
+turned by a). A value at an angle is a polynomial, without Newton's method. The variational equation has one component:
+
+    (dw)' = -(g / w^2) dw,  (dt)' = -dw / w^2,
+
+and bounds of both errors are carried on by sums of positive terms. A solution leaves where w^2 is small or its bound is
+not; `lockstep_abel` goes on with it from there.
+"""
+
+import math
+
+import numpy as np
+
+from survey.kernels.cylinder import records as rc
+from survey.kernels.cylinder.flow import TWO_PI, TWO_PI_LOW
+from survey.kernels.cylinder.lockstep import (
+    COARSEST,
+    FALL,
+    LANES,
+    NEAREST,
+    P2,
+    P3,
+    P12,
+    P31,
+    PD,
+    PF,
+    PG,
+    PSI,
+    SAA,
+    TURN,
+    TURNS,
+    V,
+    busy,
+    enter,
+    polynomial,
+    sine_cosine,
+)
+from survey.kernels.cylinder.lockstep import FIXED as FIXED_ROWS
+from survey.kernels.cylinder.lockstep import STATE as STATE_ROWS
+from survey.kernels.cylinder.steps import OK, STEP_LIMIT, conclude, finite, unturned
+from survey.kernels.jit import inline, kernel
+from survey.kernels.math.roundoff import ROUNDOFF_UP
+from survey.kernels.unroll import unroll
+
+ORDER = 16
+VARIED = 4  # order of the integral of g / w^2
+# Rows of the series: f / w0 and g / w0^2, omega, q, r.
+F_, G_, OMEGA = 0, ORDER, 2 * ORDER
+Q, R = OMEGA + ORDER + 1, OMEGA + 2 * ORDER + 1
+TABLE = R + ORDER + 1
+# Rows of a state: where the solution stands, its error bounds, the next target, and 1 / the last step.
+(AT, TURNED, W, TIME, TIME_LOW, W_BOUND, T_BOUND, COUNT, COLUMN, RATE) = range(10)
+STATE = 10
+# Of a step: its length, the error bound of w at its targets, a lower bound of w, an upper bound of |dw/dphi|.
+H, W_WITHIN, LOWEST, STEEPEST = range(4)
+STEP = 4
+FAR = 2.0  # phi is the variable while w^2 is greater than this times the bound of |g|, ...
+SURE = 1e-3  # and while the error bound of w is smaller than this share of it
+BLOCK = 8
+_SHORT = 1.0 / 8.0  # as in `lockstep`
+
+
+@unroll
+def _functions(T, fixed, i, s, c, inverse):
+    """Series of f / w0 and g / w0^2 from sin and cos of psi and 1 / w0; the first coefficients of the others."""
+    p12, p31, p2, p3, pd = (fixed[row, i] for row in (P12, P31, P2, P3, PD))
+    f = [(p12 * c - p31 * s) * inverse, -(p12 * s + p31 * c) * inverse]
+    square = inverse * inverse
+    one = [(p2 * c - p3 * s) * square, -(p2 * s + p3 * c) * square]
+    two = [-(pd * square) * (s * c), -(pd * square) * ((c - s) * (c + s))]
+    for n in range(2, ORDER):
+        share = 1.0 / (n * (n - 1))
+        f.append(-share * f[n - 2])
+        one.append(-share * one[n - 2])
+        two.append(-4.0 * share * two[n - 2])
+    for n in range(ORDER):
+        T[F_ + n, i], T[G_ + n, i] = f[n], one[n] + two[n]
+    T[OMEGA, i], T[R, i] = 1.0, 1.0
+
+
+def _orders(first, last):
+    """What adds the coefficients `first` to `last` - 1 of q, and those one higher of omega and r, of a lane."""
+
+    @unroll
+    def expand(T, i):
+        omega, r = ([T[row + n, i] for n in range(first + 1)] for row in (OMEGA, R))
+        q = [T[Q + n, i] for n in range(first)]
+        for n in range(first, last):
+            q.append(T[G_ + n, i] - _sum(omega[k] * q[n - k] for k in range(1, n + 1)) if n else T[G_, i])
+            omega.append((T[F_ + n, i] + q[n]) * (1.0 / (n + 1)))
+            r.append(-_sum(omega[k] * r[n + 1 - k] for k in range(1, n + 2)))
+            T[Q + n, i], T[OMEGA + n + 1, i], T[R + n + 1, i] = q[n], omega[n + 1], r[n + 1]
+
+    return expand
+
+
+def _sum(terms):
+    first, *others = terms
+    return sum(others, first)
+
+
+_low_orders, _middle_orders, _high_orders = _orders(0, 7), _orders(7, 12), _orders(12, ORDER)
+
+
+@inline
+def _series(T, state, fixed):
+    """All coefficients of all lanes; whole turns are taken out of psi."""
+    for i in range(LANES):
+        psi = state[AT, i]
+        k = (psi * (1.0 / TWO_PI) + NEAREST) - NEAREST
+        state[AT, i] = (psi - k * TWO_PI) - k * TWO_PI_LOW
+        state[TURNED, i] += k
+        # what that rounds shifts the solution
+        slip = (4.0 * ROUNDOFF_UP) * abs(k)
+        state[W_BOUND, i] += slip * (fixed[PF, i] + fixed[PG, i] / state[W, i])
+        state[T_BOUND, i] += slip / state[W, i]
+    for i in range(LANES):
+        s, c = sine_cosine(state[AT, i])
+        _functions(T, fixed, i, s, c, 1.0 / state[W, i])
+    for i in range(LANES):
+        _low_orders(T, i)
+    for i in range(LANES):
+        _middle_orders(T, i)
+    for i in range(LANES):
+        _high_orders(T, i)
+
+
+def _coefficients(row, size):
+    @unroll
+    def read(T, i):
+        return tuple(T[row + n, i] for n in range(size))
+
+    return read
+
+
+_omega, _r, _low_q = _coefficients(OMEGA, ORDER + 1), _coefficients(R, ORDER + 1), _coefficients(Q, VARIED + 1)
+
+
+@unroll
+def _rise(omega, s):
+    """omega - 1 at s; even and odd powers apart: half as long a chain."""
+    square = s * s
+    return (polynomial(omega[2::2], square) * s + polynomial(omega[1::2], square)) * s
+
+
+@unroll
+def _elapsed(r, s):
+    """w0 (t - t0) at s."""
+    x = [r[n] * (1.0 / (n + 1)) for n in range(ORDER + 1)]
+    square = s * s
+    return (polynomial(x[0::2], square) + polynomial(x[1::2], square) * s) * s
+
+
+@unroll
+def _contracted(q, r, h):
+    """What dw has been multiplied by at h: exp(-integral of g / w^2), to 1 %."""
+    rates = [_sum(q[k] * r[n - k] for k in range(n + 1)) * (1.0 / (n + 1)) for n in range(VARIED + 1)]
+    half = 0.0625 * h * polynomial(rates, h)  # of an eighth of the exponent
+    part = (1.0 - half) / (1.0 + half)
+    part *= part
+    part *= part
+    return part * part
+
+
+@inline
+def _advance(T, state, before, step, fixed, tolerance):
+    """One step of every lane; `before` keeps the state before it."""
+    for k in range(STATE):
+        for i in range(LANES):
+            before[k, i] = state[k, i]
+    for i in range(LANES):
+        w, psi, most_f, most_g = state[W, i], state[AT, i], fixed[PF, i], fixed[PG, i]
+        omega, r = _omega(T, i), _r(T, i)
+        inverse = 1.0 / w
+        # at most half of w is lost within a step this short
+        slope = most_f + 2.0 * most_g * inverse
+        least = 2.0 * slope * inverse
+        last, previous = abs(omega[ORDER]), abs(omega[ORDER - 1])
+        third, fourth = FALL * abs(omega[ORDER - 2]), FALL * abs(omega[ORDER - 3])
+        last_r, previous_r = (1.0 / (2.0 * ORDER)) * abs(r[ORDER]), (1.0 / (2.0 * ORDER)) * abs(r[ORDER - 1])
+        relative, guess = w / (1.0 + w), state[RATE, i]
+        size = max(max(last, third * guess * guess) * relative, last_r)
+        size = max(size, max(max(previous, fourth * guess * guess) * relative, previous_r) * guess)
+        size = size * max(1.0, _SHORT * guess) / tolerance
+        rate = max(math.sqrt(math.sqrt(math.sqrt(math.sqrt(size)))), max(least, 0.25))
+        end = psi + 1.0 / rate
+        h = end - psi
+        v = w + w * _rise(omega, h)
+        spent = _elapsed(r, h) * inverse
+        lowest = 0.5 * (w + v - h * slope)
+        h2 = h * h
+        h4 = h2 * h2
+        h13 = h4 * h4 * h4 * h
+        cut = w * h13 * max(max(last * h2, third) * h, max(previous * h2, fourth))
+        cut_t = inverse * h13 * h * h2 * max(last_r * h, previous_r)
+        local = cut + ROUNDOFF_UP * (1.5 * max(w, v) + 8.0 * h * slope)
+        bound, most = state[W_BOUND, i], 1.0 / (lowest * lowest)
+        grown = h * most_g * most
+        within = bound * (1.0 + grown + grown * grown) + local  # grown < 1
+        now = 1.02 * _contracted(_low_q(T, i), r, h) * bound + local
+        step[H, i], step[W_WITHIN, i], step[LOWEST, i], step[STEEPEST, i] = h, within, lowest, slope
+        high = state[TIME, i] + spent
+        state[TIME_LOW, i] += spent - (high - state[TIME, i])
+        state[T_BOUND, i] += h * within * most + cut_t + ROUNDOFF_UP * (4.0 * h * inverse)
+        state[TIME, i], state[AT, i], state[W, i], state[W_BOUND, i] = high, end, v, now
+        state[COUNT, i] += 1.0
+        state[RATE, i] = rate
+
+
+@kernel
+def _record(T, before, state, step, fixed, i, block, targets, first, floats, status):
+    """Record lane i at its targets, from the `first` on, within the step; returns the next."""
+    omega, r = _omega(T, i), _r(T, i)
+    psi, turns, w, t, t_low = before[AT, i], before[TURNED, i], before[W, i], before[TIME, i], before[TIME_LOW, i]
+    angle, inverse, size, end = fixed[TURN, i], 1.0 / before[W, i], len(targets), state[AT, i]
+    high, slope, late, slowest = step[W_WITHIN, i], step[STEEPEST, i], state[T_BOUND, i], 1.0 / step[LOWEST, i]
+    apart = 5e-16 * (angle != 0.0)
+    while first < size and unturned(targets[first], turns) - angle <= end:
+        count = 0
+        while count < BLOCK and first + count < size:
+            goal = unturned(targets[first + count], turns) - angle
+            if goal > end:
+                break
+            block[count] = max(goal - psi, 0.0)
+            block[BLOCK + count] = 3e-16 * abs(targets[first + count]) + apart
+            count += 1
+        for j in range(count, BLOCK):
+            block[j] = 0.0
+        for j in range(BLOCK):
+            s, slip = block[j], block[BLOCK + j]
+            value, time = w + w * _rise(omega, s), t + (_elapsed(r, s) * inverse + t_low)
+            block[2 * BLOCK + j], block[3 * BLOCK + j] = value, time
+            block[4 * BLOCK + j] = 1.02 * (high + slope * slip)
+            block[5 * BLOCK + j] = 1.02 * (late + slip * slowest) + 4e-16 * time
+        for j in range(count):
+            row = floats[first + j]
+            row[rc.VALUE], row[rc.TIME] = block[2 * BLOCK + j], block[3 * BLOCK + j]
+            row[rc.VALUE_BAR], row[rc.TIME_BAR] = block[4 * BLOCK + j], block[5 * BLOCK + j]
+            status[first + j] = OK
+        first += count
+    return first
+
+
+@inline
+def _far(w, bound, most_g):
+    """Is phi the variable?"""
+    return w * w > FAR * most_g and bound < SURE * w
+
+
+@kernel
+def _refill(P, starts, targets, waiting, state, fixed, whole, row, goal, ahead):
+    """Give free lanes the rows that wait; returns the first that still waits."""
+    for i in range(LANES):
+        while waiting < len(P) and row[i] < 0:
+            p, w0 = P[waiting], starts[waiting, 1]
+            ahead[waiting, W] = 0.0  # it has not begun
+            if math.isfinite(targets[waiting, 0]) and w0 > 0.0:
+                enter(p, starts[waiting, 0], w0, whole, fixed, i)
+                slip = math.sqrt(whole[SAA, i])
+                if _far(w0, slip * (fixed[PF, i] + fixed[PG, i] / w0), fixed[PG, i]):
+                    for k in range(STATE):
+                        state[k, i] = 0.0
+                    state[AT, i], state[TURNED, i], state[W, i] = whole[PSI, i], whole[TURNS, i], whole[V, i]
+                    state[W_BOUND, i] = slip * (fixed[PF, i] + fixed[PG, i] / w0)
+                    state[T_BOUND, i], state[RATE, i] = slip / w0, 2.0
+                    row[i], goal[i] = waiting, targets[waiting, 0] - fixed[TURN, i]
+            waiting += 1
+        if row[i] < 0:
+            state[AT, i], state[W, i] = 0.0, 1.0  # a free lane moves too
+    return waiting
+
+
+@inline
+def abels(P, starts, targets, tolerance, limit, floats, status, ahead):
+    """Follow each row as far as phi is the variable; arguments as in `lockstep_abel.abels`.
+
+    `ahead` (rows, STATE): how far; W is 0 where a row has not begun, and COLUMN is the number of its targets where all
+    are known.
+    """
+    work = np.zeros((TABLE + 2 * STATE + STEP + FIXED_ROWS + STATE_ROWS, LANES))  # LLVM: rows do not overlap
+    second = TABLE + STATE
+    third = second + STATE
+    fourth = third + STEP
+    T, state, before, step = work[:TABLE], work[TABLE:second], work[second:third], work[third:fourth]
+    fixed, whole = work[fourth : fourth + FIXED_ROWS], work[fourth + FIXED_ROWS :]
+    tolerance = min(tolerance, COARSEST)
+    row, goal, block = np.full(LANES, -1), np.zeros(LANES), np.zeros(6 * BLOCK)
+    waiting, free, ended = 0, True, np.zeros(LANES, dtype=np.bool_)
+    while True:
+        if free:
+            waiting = _refill(P, starts, targets, waiting, state, fixed, whole, row, goal, ahead)
+            if not busy(row):
+                return
+        _series(T, state, fixed)
+        _advance(T, state, before, step, fixed, tolerance)
+        for i in range(LANES):
+            x = state[AT, i] + state[TURNED, i] * TWO_PI
+            near = not (x + 1e-9 * (1.0 + abs(x)) < goal[i])
+            ended[i] = near | (not _far(state[W, i], state[W_BOUND, i], fixed[PG, i])) | (state[COUNT, i] >= limit)
+        free = False
+        for i in range(LANES):
+            if row[i] < 0 or not ended[i]:
+                continue
+            k, sound = row[i], math.isfinite(state[W, i]) and state[W_BOUND, i] < SURE * state[W, i]
+            size, j = finite(targets[k]), int(state[COLUMN, i])
+            if sound:
+                j = _record(T, before, state, step, fixed, i, block, targets[k, :size], j, floats[k], status[k])
+            if j < size and sound and state[COUNT, i] < limit and _far(state[W, i], state[W_BOUND, i], fixed[PG, i]):
+                state[COLUMN, i], goal[i] = j, targets[k, j] - fixed[TURN, i]
+                continue
+            for n in range(STATE):
+                ahead[k, n] = state[n, i] if sound else before[n, i]
+            ahead[k, COLUMN] = j
+            if j < size and state[COUNT, i] >= limit:
+                conclude(STEP_LIMIT, -1, j, floats[k, :size], status[k, :size])
+                ahead[k, COLUMN] = size
+            row[i], free = -1, True
