@@ -72,9 +72,15 @@ def at_angles(results, good, back):
     for names, code in ((("w", "t"), OK), (("phi_turning", "t_turning"), TURNING)):
         here = status == code
         for name, value, bar in zip(names, (rc.VALUE, rc.TIME), (rc.VALUE_BAR, rc.TIME_BAR), strict=True):
-            results[name] = back(np.where(here, floats[..., value], np.nan))
-            results[f"{name}_error"] = back(np.where(here, floats[..., bar], np.nan))
+            results[name], results[f"{name}_error"] = (back(_only(here, floats[..., at])) for at in (value, bar))
     return results
+
+
+def _only(here, values):
+    """The values with NaN elsewhere; without a copy where it is all or nothing."""
+    if here.all():
+        return values
+    return np.where(here, values, np.nan) if here.any() else np.broadcast_to(np.nan, here.shape)
 
 
 def _systems(point, names, flows):
