@@ -4,8 +4,8 @@ There phi is the better variable. In units of w = w0 at the start of a step, fro
 
     w = w0 omega,  omega q = g / w0^2,  omega' = f / w0 + q,  omega r = 1,  t' = r / w0          (57),
 
-with f and g in closed form: two Cauchy products, where the motion in time has three (see `lockstep`, also for the axes
-turned by a). A value at an angle is a polynomial, without Newton's method. The variational equation has one component:
+with f and g in closed form: two Cauchy products, where the motion in time has three (see `lockstep`); psi is phi less
+whole turns. A value at an angle is a polynomial, without Newton's method. The variational equation has one component:
 
     (dw)' = -(g / w^2) dw,  (dt)' = -dw / w^2,
 
@@ -18,31 +18,8 @@ import math
 import numpy as np
 
 from survey.kernels.cylinder import records as rc
-from survey.kernels.cylinder.flow import TWO_PI, TWO_PI_LOW
-from survey.kernels.cylinder.lockstep import (
-    COARSEST,
-    FALL,
-    LANES,
-    NEAREST,
-    P2,
-    P3,
-    P12,
-    P31,
-    PD,
-    PF,
-    PG,
-    PSI,
-    SAA,
-    TURN,
-    TURNS,
-    V,
-    busy,
-    enter,
-    polynomial,
-    sine_cosine,
-)
-from survey.kernels.cylinder.lockstep import FIXED as FIXED_ROWS
-from survey.kernels.cylinder.lockstep import STATE as STATE_ROWS
+from survey.kernels.cylinder.flow import B12, B31, BOUND_F, BOUND_G, C23, S2, S3, TWO_PI, TWO_PI_LOW, D, reduced
+from survey.kernels.cylinder.lockstep import COARSEST, FALL, LANES, NEAREST, busy, polynomial, sine_cosine
 from survey.kernels.cylinder.steps import OK, STEP_LIMIT, conclude, finite, unturned
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
@@ -57,6 +34,7 @@ TABLE = R + ORDER + 1
 # Rows of a state: where the solution stands, its error bounds, the next target, and 1 / the last step.
 (AT, TURNED, W, TIME, TIME_LOW, W_BOUND, T_BOUND, COUNT, COLUMN, RATE) = range(10)
 STATE = 10
+FIXED = BOUND_G + 1  # rows of what stays fixed: as the columns of `flow.coefficients`
 # Of a step: its length, the error bound of w at its targets, a lower bound of w, an upper bound of |dw/dphi|.
 H, W_WITHIN, LOWEST, STEEPEST = range(4)
 STEP = 4
@@ -69,11 +47,12 @@ _SHORT = 1.0 / 8.0  # as in `lockstep`
 @unroll
 def _functions(T, fixed, i, s, c, inverse):
     """Series of f / w0 and g / w0^2 from sin and cos of psi and 1 / w0; the first coefficients of the others."""
-    p12, p31, p2, p3, pd = (fixed[row, i] for row in (P12, P31, P2, P3, PD))
-    f = [(p12 * c - p31 * s) * inverse, -(p12 * s + p31 * c) * inverse]
+    b12, b31, d, c23, s2, s3 = (fixed[row, i] for row in (B12, B31, D, C23, S2, S3))
+    f = [(b12 * c - b31 * s) * inverse, -(b12 * s + b31 * c) * inverse]
     square = inverse * inverse
-    one = [(p2 * c - p3 * s) * square, -(p2 * s + p3 * c) * square]
-    two = [-(pd * square) * (s * c), -(pd * square) * ((c - s) * (c + s))]
+    one = [(s2 * c - s3 * s) * square, -(s2 * s + s3 * c) * square]
+    product, double = s * c, (c - s) * (c + s)  # sin 2 psi / 2 and cos 2 psi
+    two = [-(d * product + c23 * double) * square, (4.0 * c23 * product - d * double) * square]
     for n in range(2, ORDER):
         share = 1.0 / (n * (n - 1))
         f.append(-share * f[n - 2])
@@ -118,7 +97,7 @@ def _series(T, state, fixed):
         state[TURNED, i] += k
         # what that rounds shifts the solution
         slip = (4.0 * ROUNDOFF_UP) * abs(k)
-        state[W_BOUND, i] += slip * (fixed[PF, i] + fixed[PG, i] / state[W, i])
+        state[W_BOUND, i] += slip * (fixed[BOUND_F, i] + fixed[BOUND_G, i] / state[W, i])
         state[T_BOUND, i] += slip / state[W, i]
     for i in range(LANES):
         s, c = sine_cosine(state[AT, i])
@@ -175,7 +154,7 @@ def _advance(T, state, before, step, fixed, tolerance):
         for i in range(LANES):
             before[k, i] = state[k, i]
     for i in range(LANES):
-        w, psi, most_f, most_g = state[W, i], state[AT, i], fixed[PF, i], fixed[PG, i]
+        w, psi, most_f, most_g = state[W, i], state[AT, i], fixed[BOUND_F, i], fixed[BOUND_G, i]
         omega, r = _omega(T, i), _r(T, i)
         inverse = 1.0 / w
         # at most half of w is lost within a step this short
@@ -183,7 +162,8 @@ def _advance(T, state, before, step, fixed, tolerance):
         least = 2.0 * slope * inverse
         last, previous = abs(omega[ORDER]), abs(omega[ORDER - 1])
         third, fourth = FALL * abs(omega[ORDER - 2]), FALL * abs(omega[ORDER - 3])
-        last_r, previous_r = (1.0 / (2.0 * ORDER)) * abs(r[ORDER]), (1.0 / (2.0 * ORDER)) * abs(r[ORDER - 1])
+        last_r, previous_r = (1.0 / ORDER) * abs(r[ORDER]), (1.0 / ORDER) * abs(r[ORDER - 1])
+        third_r, fourth_r = (FALL / ORDER) * abs(r[ORDER - 2]), (FALL / ORDER) * abs(r[ORDER - 3])
         relative, guess = w / (1.0 + w), state[RATE, i]
         size = max(max(last, third * guess * guess) * relative, last_r)
         size = max(size, max(max(previous, fourth * guess * guess) * relative, previous_r) * guess)
@@ -198,7 +178,7 @@ def _advance(T, state, before, step, fixed, tolerance):
         h4 = h2 * h2
         h13 = h4 * h4 * h4 * h
         cut = w * h13 * max(max(last * h2, third) * h, max(previous * h2, fourth))
-        cut_t = inverse * h13 * h * h2 * max(last_r * h, previous_r)
+        cut_t = 2.0 * inverse * h13 * h * max(max(last_r * h2, third_r) * h, max(previous_r * h2, fourth_r))
         local = cut + ROUNDOFF_UP * (1.5 * max(w, v) + 8.0 * h * slope)
         bound, most = state[W_BOUND, i], 1.0 / (lowest * lowest)
         grown = h * most_g * most
@@ -214,21 +194,20 @@ def _advance(T, state, before, step, fixed, tolerance):
 
 
 @kernel
-def _record(T, before, state, step, fixed, i, block, targets, first, floats, status):
+def _record(T, before, state, step, i, block, targets, first, floats, status):
     """Record lane i at its targets, from the `first` on, within the step; returns the next."""
     omega, r = _omega(T, i), _r(T, i)
     psi, turns, w, t, t_low = before[AT, i], before[TURNED, i], before[W, i], before[TIME, i], before[TIME_LOW, i]
-    angle, inverse, size, end = fixed[TURN, i], 1.0 / before[W, i], len(targets), state[AT, i]
+    inverse, size, end = 1.0 / before[W, i], len(targets), state[AT, i]
     high, slope, late, slowest = step[W_WITHIN, i], step[STEEPEST, i], state[T_BOUND, i], 1.0 / step[LOWEST, i]
-    apart = 5e-16 * (angle != 0.0)
-    while first < size and unturned(targets[first], turns) - angle <= end:
+    while first < size and unturned(targets[first], turns) <= end:
         count = 0
         while count < BLOCK and first + count < size:
-            goal = unturned(targets[first + count], turns) - angle
+            goal = unturned(targets[first + count], turns)
             if goal > end:
                 break
             block[count] = max(goal - psi, 0.0)
-            block[BLOCK + count] = 3e-16 * abs(targets[first + count]) + apart
+            block[BLOCK + count] = 3e-16 * abs(targets[first + count])
             count += 1
         for j in range(count, BLOCK):
             block[j] = 0.0
@@ -254,22 +233,25 @@ def _far(w, bound, most_g):
 
 
 @kernel
-def _refill(P, starts, targets, waiting, state, fixed, whole, row, goal, ahead):
+def _refill(P, starts, targets, waiting, state, fixed, row, goal, ahead):
     """Give free lanes the rows that wait; returns the first that still waits."""
     for i in range(LANES):
         while waiting < len(P) and row[i] < 0:
             p, w0 = P[waiting], starts[waiting, 1]
             ahead[waiting, W] = 0.0  # it has not begun
             if math.isfinite(targets[waiting, 0]) and w0 > 0.0:
-                enter(p, starts[waiting, 0], w0, whole, fixed, i)
-                slip = math.sqrt(whole[SAA, i])
-                if _far(w0, slip * (fixed[PF, i] + fixed[PG, i] / w0), fixed[PG, i]):
+                psi, turns = reduced(starts[waiting, 0])
+                slip = (4.0 * ROUNDOFF_UP) * (turns != 0.0)
+                bend = p[BOUND_F] + p[BOUND_G] / w0
+                bound = slip * bend
+                if _far(w0, bound, p[BOUND_G]):
+                    for k in range(FIXED):
+                        fixed[k, i] = p[k]
                     for k in range(STATE):
                         state[k, i] = 0.0
-                    state[AT, i], state[TURNED, i], state[W, i] = whole[PSI, i], whole[TURNS, i], whole[V, i]
-                    state[W_BOUND, i] = slip * (fixed[PF, i] + fixed[PG, i] / w0)
-                    state[T_BOUND, i], state[RATE, i] = slip / w0, 2.0
-                    row[i], goal[i] = waiting, targets[waiting, 0] - fixed[TURN, i]
+                    state[AT, i], state[TURNED, i], state[W, i], state[RATE, i] = psi, turns, w0, 2.0 + bend / w0
+                    state[W_BOUND, i], state[T_BOUND, i] = bound, slip / w0
+                    row[i], goal[i] = waiting, targets[waiting, 0]
             waiting += 1
         if row[i] < 0:
             state[AT, i], state[W, i] = 0.0, 1.0  # a free lane moves too
@@ -283,18 +265,23 @@ def abels(P, starts, targets, tolerance, limit, floats, status, ahead):
     `ahead` (rows, STATE): how far; W is 0 where a row has not begun, and COLUMN is the number of its targets where all
     are known.
     """
-    work = np.zeros((TABLE + 2 * STATE + STEP + FIXED_ROWS + STATE_ROWS, LANES))  # LLVM: rows do not overlap
+    work = np.zeros((TABLE + 2 * STATE + STEP + FIXED, LANES))  # LLVM: rows do not overlap
     second = TABLE + STATE
     third = second + STATE
     fourth = third + STEP
-    T, state, before, step = work[:TABLE], work[TABLE:second], work[second:third], work[third:fourth]
-    fixed, whole = work[fourth : fourth + FIXED_ROWS], work[fourth + FIXED_ROWS :]
+    T, state, before, step, fixed = (
+        work[:TABLE],
+        work[TABLE:second],
+        work[second:third],
+        work[third:fourth],
+        work[fourth:],
+    )
     tolerance = min(tolerance, COARSEST)
     row, goal, block = np.full(LANES, -1), np.zeros(LANES), np.zeros(6 * BLOCK)
     waiting, free, ended = 0, True, np.zeros(LANES, dtype=np.bool_)
     while True:
         if free:
-            waiting = _refill(P, starts, targets, waiting, state, fixed, whole, row, goal, ahead)
+            waiting = _refill(P, starts, targets, waiting, state, fixed, row, goal, ahead)
             if not busy(row):
                 return
         _series(T, state, fixed)
@@ -302,7 +289,7 @@ def abels(P, starts, targets, tolerance, limit, floats, status, ahead):
         for i in range(LANES):
             x = state[AT, i] + state[TURNED, i] * TWO_PI
             near = not (x + 1e-9 * (1.0 + abs(x)) < goal[i])
-            ended[i] = near | (not _far(state[W, i], state[W_BOUND, i], fixed[PG, i])) | (state[COUNT, i] >= limit)
+            ended[i] = near | (not _far(state[W, i], state[W_BOUND, i], fixed[BOUND_G, i])) | (state[COUNT, i] >= limit)
         free = False
         for i in range(LANES):
             if row[i] < 0 or not ended[i]:
@@ -310,9 +297,14 @@ def abels(P, starts, targets, tolerance, limit, floats, status, ahead):
             k, sound = row[i], math.isfinite(state[W, i]) and state[W_BOUND, i] < SURE * state[W, i]
             size, j = finite(targets[k]), int(state[COLUMN, i])
             if sound:
-                j = _record(T, before, state, step, fixed, i, block, targets[k, :size], j, floats[k], status[k])
-            if j < size and sound and state[COUNT, i] < limit and _far(state[W, i], state[W_BOUND, i], fixed[PG, i]):
-                state[COLUMN, i], goal[i] = j, targets[k, j] - fixed[TURN, i]
+                j = _record(T, before, state, step, i, block, targets[k, :size], j, floats[k], status[k])
+            if (
+                j < size
+                and sound
+                and state[COUNT, i] < limit
+                and _far(state[W, i], state[W_BOUND, i], fixed[BOUND_G, i])
+            ):
+                state[COLUMN, i], goal[i] = j, targets[k, j]
                 continue
             for n in range(STATE):
                 ahead[k, n] = state[n, i] if sound else before[n, i]
