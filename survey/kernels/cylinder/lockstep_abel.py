@@ -305,24 +305,11 @@ def abels(P, starts, targets, tolerance, limit, floats, status):
         if free:
             for i in range(LANES):
                 if row[i] < 0:
-                    column[i], doubt[i] = 0, -1
+                    doubt[i] = -1
             waiting = _refill(
-                P,
-                starts,
-                targets,
-                waiting,
-                state,
-                fixed,
-                axes,
-                row,
-                sizes,
-                goal,
-                started,
-                column,
-                ahead,
-                floats,
-                status,
-            )
+                P, starts, targets, waiting, state, fixed, axes, row, sizes, goal, started, column, ahead,
+                floats, status
+            )  # fmt: skip
             if not busy(row):
                 return
         series(T, state, fixed)

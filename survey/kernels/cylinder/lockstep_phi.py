@@ -35,9 +35,9 @@ TABLE = R + ORDER + 1
 (AT, TURNED, W, TIME, TIME_LOW, W_BOUND, T_BOUND, COUNT, COLUMN, RATE) = range(10)
 STATE = 10
 FIXED = BOUND_G + 1  # rows of what stays fixed: as the columns of `flow.coefficients`
-# Of a step: its length, the error bound of w at its targets, a lower bound of w, an upper bound of |dw/dphi|.
-H, W_WITHIN, LOWEST, STEEPEST = range(4)
-STEP = 4
+# Of a step: the error bound of w at its targets, a lower bound of w, an upper bound of |dw/dphi|.
+W_WITHIN, LOWEST, STEEPEST = range(3)
+STEP = 3
 FAR = 2.0  # phi is the variable while w^2 is greater than this times the bound of |g|, ...
 SURE = 1e-3  # and while the error bound of w is smaller than this share of it
 BLOCK = 8
@@ -184,7 +184,7 @@ def _advance(T, state, before, step, fixed, tolerance):
         grown = h * most_g * most
         within = bound * (1.0 + grown + grown * grown) + local  # grown < 1
         now = 1.02 * _contracted(_low_q(T, i), r, h) * bound + local
-        step[H, i], step[W_WITHIN, i], step[LOWEST, i], step[STEEPEST, i] = h, within, lowest, slope
+        step[W_WITHIN, i], step[LOWEST, i], step[STEEPEST, i] = within, lowest, slope
         high = state[TIME, i] + spent
         state[TIME_LOW, i] += spent - (high - state[TIME, i])
         state[T_BOUND, i] += h * within * most + cut_t + ROUNDOFF_UP * (4.0 * h * inverse)
@@ -238,7 +238,6 @@ def _refill(P, starts, targets, waiting, state, fixed, row, goal, ahead):
     for i in range(LANES):
         while waiting < len(P) and row[i] < 0:
             p, w0 = P[waiting], starts[waiting, 1]
-            ahead[waiting, W] = 0.0  # it has not begun
             if math.isfinite(targets[waiting, 0]) and w0 > 0.0:
                 psi, turns = reduced(starts[waiting, 0])
                 slip = (4.0 * ROUNDOFF_UP) * (turns != 0.0)
@@ -262,20 +261,15 @@ def _refill(P, starts, targets, waiting, state, fixed, row, goal, ahead):
 def abels(P, starts, targets, tolerance, limit, floats, status, ahead):
     """Follow each row as far as phi is the variable; arguments as in `lockstep_abel.abels`.
 
-    `ahead` (rows, STATE): how far; W is 0 where a row has not begun, and COLUMN is the number of its targets where all
-    are known.
+    `ahead` (rows, STATE), zeros when called: how far. W stays 0 where a row has not begun, and COLUMN is the number of
+    its targets where all are known.
     """
     work = np.zeros((TABLE + 2 * STATE + STEP + FIXED, LANES))  # LLVM: rows do not overlap
     second = TABLE + STATE
     third = second + STATE
     fourth = third + STEP
-    T, state, before, step, fixed = (
-        work[:TABLE],
-        work[TABLE:second],
-        work[second:third],
-        work[third:fourth],
-        work[fourth:],
-    )
+    T, state, before = work[:TABLE], work[TABLE:second], work[second:third]
+    step, fixed = work[third:fourth], work[fourth:]
     tolerance = min(tolerance, COARSEST)
     row, goal, block = np.full(LANES, -1), np.zeros(LANES), np.zeros(6 * BLOCK)
     waiting, free, ended = 0, True, np.zeros(LANES, dtype=np.bool_)
@@ -298,12 +292,8 @@ def abels(P, starts, targets, tolerance, limit, floats, status, ahead):
             size, j = finite(targets[k]), int(state[COLUMN, i])
             if sound:
                 j = _record(T, before, state, step, i, block, targets[k, :size], j, floats[k], status[k])
-            if (
-                j < size
-                and sound
-                and state[COUNT, i] < limit
-                and _far(state[W, i], state[W_BOUND, i], fixed[BOUND_G, i])
-            ):
+            far = _far(state[W, i], state[W_BOUND, i], fixed[BOUND_G, i])
+            if j < size and sound and far and state[COUNT, i] < limit:
                 state[COLUMN, i], goal[i] = j, targets[k, j]
                 continue
             for n in range(STATE):

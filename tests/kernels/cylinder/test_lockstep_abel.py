@@ -75,7 +75,7 @@ def test_bars_hold_on_hard_systems(scale):
 
 
 def test_phi_is_the_variable_far_from_turning_points():
-    """Three digits more than the bars ask for, by mpmath; and no solution is left to steps in time."""
+    """No solution is left to steps in time, and values of three are within their bars of mpmath's."""
     rows = drawn(lockstep.LANES, 9, (0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 3, 0))
     rows[:, 7] = np.linspace(3.0, 30.0, len(rows))
     over = np.linspace(0.0, 2 * np.pi, 25)
