@@ -55,11 +55,10 @@ KERNEL_HASH = kernel_hash()
 
 def _cache_directory():
     """A writable directory for compiled kernels, or None (a read-only home compiles again in each process)."""
-    base = os.environ.get("NUMBA_CACHE_DIR") or platformdirs.user_cache_dir("survey")
-    path = Path(base) / KERNEL_HASH
     try:
+        path = Path(os.environ.get("NUMBA_CACHE_DIR") or platformdirs.user_cache_dir("survey")) / KERNEL_HASH
         path.mkdir(parents=True, exist_ok=True)
-    except OSError:
+    except (OSError, RuntimeError):  # platformdirs raises RuntimeError for a user who has no home
         return None
     return path if os.access(path, os.W_OK) else None
 

@@ -42,7 +42,10 @@ def keep(digest: str) -> None:
 
 def _folder() -> Path | None:
     """The folder of the hashes; None without a home: the current folder may be untrusted."""
-    folder = platformdirs.user_state_path("survey") / "scenes"
+    try:
+        folder = platformdirs.user_state_path("survey") / "scenes"
+    except RuntimeError:
+        return None
     return folder if folder.is_absolute() else None
 
 

@@ -30,8 +30,8 @@ def note(workflow, estimated, measured, compiling):
     for part in PARTS:
         if estimated.get(part, 0.0) > 0.0 and measured.get(part, 0.0) > SHORT:
             record[part] = [float(f"{seconds:.3g}") for seconds in (estimated[part], measured[part])]
-    path = _path()
-    with contextlib.suppress(OSError):
+    with contextlib.suppress(OSError, RuntimeError):  # RuntimeError: no home
+        path = _path()
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=path.parent) as folder:
             whole = Path(folder) / path.name
@@ -90,7 +90,7 @@ def _records():
     try:
         found = json.loads(_path().read_text(encoding="utf-8"))
         return [one for one in found if _is_record(one)]
-    except (OSError, ValueError, TypeError, RecursionError):
+    except (OSError, ValueError, TypeError, RuntimeError):  # too deep, or no home: RuntimeError
         return []
 
 

@@ -21,12 +21,13 @@ def _folder(function):
 
 def kernel(function):
     """Compile on the first call, and keep it."""
-    folder, previous = _folder(function), numba.config.CACHE_DIR
+    previous = numba.config.CACHE_DIR
     try:
+        folder = _folder(function)
         folder.mkdir(parents=True, exist_ok=True)
         numba.config.CACHE_DIR = str(folder)
         return numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-    except OSError:
+    except (OSError, RuntimeError):  # no place to keep it, or no home
         return numba.njit(nogil=True, error_model="numpy")(function)
     finally:
         numba.config.CACHE_DIR = previous

@@ -134,6 +134,7 @@ def test_a_state_folder_that_others_can_write_is_not_believed(strange):
 def test_without_a_home_to_write_a_run_goes_on_and_a_stranger_is_not_trusted(strange, home, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_STATE_HOME", home)
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))  # where platformdirs looks instead of a relative folder
     digest = survey.open(strange.path).attrs["scene_hash"]
     (tmp_path / "relative/survey/scenes").mkdir(parents=True)
     (tmp_path / "relative/survey/scenes" / digest).touch()  # a stranger's folder, as it may be unpacked
