@@ -3,7 +3,7 @@
 import numpy as np
 
 from survey.kernels.cylinder import records as rc
-from survey.kernels.cylinder.steps import TURNING
+from survey.kernels.cylinder.steps import TURNING, UNDETERMINED
 from survey.measures.cylinder import basins, fate, portrait
 from survey.status import INVALID_PARAMETERS, OK
 
@@ -23,7 +23,10 @@ def dense(point, names, name):
     columns = int(np.prod([shape[i] for i in dense], dtype=int))
     last = np.broadcast_to(arrays[-1], shape).transpose(order).reshape(-1, columns)
     small = [shape[i] if i in points else 1 for i in range(len(shape))]
-    rows = np.stack([np.broadcast_to(array, small).ravel() for array in arrays[:-1]], axis=-1)
+    rows = np.empty((*small, len(names)))
+    for i, array in enumerate(arrays[:-1]):
+        rows[..., i] = array
+    rows = rows.reshape(-1, len(names))
 
     def back(values):
         return values.reshape([shape[i] for i in order]).transpose(np.argsort(order))
@@ -52,7 +55,9 @@ def at_times(results, good, back):
     floats, turnings, status = results
     status = np.where(good, status, INVALID_PARAMETERS)
     lost = status != OK
-    floats[lost], turnings[lost | (turnings > MOST_TURNINGS)] = np.nan, -2
+    if lost.any():
+        floats[lost], turnings[lost] = np.nan, UNDETERMINED
+    turnings[turnings > MOST_TURNINGS] = UNDETERMINED
     columns = {"phi": rc.PHI, "w": rc.W, "phi_error": rc.PHI_BAR, "w_error": rc.W_BAR}
     results = {name: back(floats[..., at]) for name, at in columns.items()}
     return results | {"turnings": back(turnings), "status": back(status)}

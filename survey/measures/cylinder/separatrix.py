@@ -220,9 +220,10 @@ def exact_starts(rows):
     phi0 is 0 there: of any other angle of binary64 sine and cosine are transcendental, but the energies of saddles are
     algebraic.
     """
-    still = (rows[:, 0] == 0.0) & (rows[:, 1] == 0.0) & (rows[:, rc.PHI0] == 0.0) & (rows[:, rc.W0] != 0.0)
+    at = np.flatnonzero((rows[:, rc.PHI0] == 0.0) & (rows[:, 0] == 0.0))  # as a rule, none
+    some = rows[at, : rc.GIVEN]
     found = {}
-    for i in np.flatnonzero(still & np.isfinite(rows[:, : rc.GIVEN]).all(axis=1)):
+    for i in at[(some[:, 1] == 0.0) & (some[:, rc.W0] != 0.0) & np.isfinite(some).all(axis=1)]:
         exact = [Fraction(float(x)) for x in (*rows[i, 2:6], rows[i, rc.W0])]
         if quartic.is_degenerate(quartic.at_zero(*exact)):
             branch = branch_of(rows[i])

@@ -200,16 +200,16 @@ def _rows(problem, method, asked, answers, chosen, axis, open_points):
     sought, degree = _sought(asked), np.full(problem.span.size, DEGREES.size)
     degree[chosen] = _degrees(problem, axis, asked.rtol, sought)[chosen]
     first = degree.copy()
-    for at in range(axis.most):  # a row whose series has not converged goes on to the next degree
-        rows = np.flatnonzero((degree == at) & (at <= first + RETRIES))
-        if rows.size:
-            share = NODES_SHARE * asked.rtol
-            values, series, bars, turns = _series(problem, method, share, rows, int(DEGREES[at]), axis, sought)
-            served = _served(values, bars[:, :, None], asked.rtol).mean(axis=2).min(axis=0)
-            good = (served >= MOST) | ((served > 0) & (at == first[rows] + RETRIES))
-            degree[rows[~good]] += 1
-            rows, series, bars = rows[good], np.ascontiguousarray(series[:, good]), bars[:, good]
-            turns = None if turns is None else turns[:, good]
+    while (at := int(degree.min())) < axis.most:  # a row whose series has not converged goes on to the next degree
+        rows = np.flatnonzero(degree == at)
+        share = NODES_SHARE * asked.rtol
+        values, series, bars, turns = _series(problem, method, share, rows, int(DEGREES[at]), axis, sought)
+        served = _served(values, bars[:, :, None], asked.rtol).mean(axis=2).min(axis=0)
+        last = at == first[rows] + RETRIES
+        good = (served >= MOST) | ((served > 0) & last)
+        degree[rows] = np.where(good | last, DEGREES.size, at + 1)
+        rows, series, bars = rows[good], np.ascontiguousarray(series[:, good]), bars[:, good]
+        turns = None if turns is None else turns[:, good]
         if rows.size:
             _answer(problem, asked, answers, rows, series, bars, turns, axis, open_points)
 

@@ -320,3 +320,18 @@ def test_many_against_dop853():
     assert (np.abs(a - b)[both][:, :2] <= a[both][:, 2:] + b[both][:, 2:]).all()
     known = both & (n >= 0) & (m >= 0)
     assert np.array_equal(n[known], m[known])
+
+
+def test_rows_that_no_closed_form_serves_have_the_same_bits_among_those_that_one_serves():
+    """`auto` looks at some rows first: the others are solved as if they stood alone."""
+    rng = np.random.default_rng(11)
+    rows = np.column_stack([rng.uniform(-1, 1, (256, 6)), rng.uniform(-3, 3, (256, 2))])
+    rows[:, :2] = np.where(np.arange(256)[:, None] % 7 == 1, rows[:, :2], 0.0)
+    rows[:: 1 + 256 // auto.SAMPLE, :2] = 0.0  # those that are looked at
+    own, times, targets = np.flatnonzero(rows[:, 0]), np.full((256, 1), 15.0), rows[:, 6:7] + 1.0
+    assert 20 < own.size < 40
+    for measure, columns in ((auto.trajectories, times), (auto.abel, targets)):
+        among = measure(taylor, rows, columns, 1e-10)
+        for i in own:
+            for part, alone in zip(among, measure(taylor, rows[i : i + 1], columns[i : i + 1], 1e-10), strict=True):
+                np.testing.assert_array_equal(part[i], alone[0])
