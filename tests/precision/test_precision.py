@@ -4,6 +4,7 @@ import csv
 import importlib.util
 import json
 
+import numba
 import numpy as np
 import pytest
 
@@ -122,3 +123,16 @@ def test_a_scene_has_several_charts_and_samples_keep_the_rows_that_one_solution_
     records = precision.measure("gyrostat_abel", case)
     assert {(r.method, r.work) for r in records} == {(m, w) for m in ("auto", "taylor", "dop853", "rk4") for w in works}
     assert all(record.error <= record.setting for record in records)
+
+
+def test_no_call_that_compiles_is_timed():
+    """As one whose first points need double-double arithmetic at this accuracy, and at none before."""
+
+    def solve(point, options, rtol):
+        calls.append(rtol)
+        function = numba.njit(lambda x: x + np.sin(x)) if len(calls) == 1 else np.sin
+        function(rtol)
+
+    calls = []
+    seconds = precision._per_point(solve, {"a": np.zeros(1)}, {}, 0.5)
+    assert len(calls) == precision.REPEATS + 1 and seconds < 0.01
