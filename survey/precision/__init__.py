@@ -313,16 +313,16 @@ def _against(solve, references, name, rtol):
 
 
 def _per_point(solve, point, options, rtol):
-    """Median seconds of processor time per point of a few calls: all run on one thread, beside others perhaps."""
-    times, begin = [], time.perf_counter()
-    while len(times) < REPEATS and (not times or time.perf_counter() - begin < ENOUGH_SECONDS):
+    """Median seconds of processor time per point of a few calls: all run on one thread, beside others perhaps.
+
+    Those that compile do not count, as for the first points that need double-double arithmetic.
+    """
+    times, compiled, begin = [], [], time.perf_counter()
+    while len(times + compiled) < REPEATS and (not times or time.perf_counter() - begin < ENOUGH_SECONDS):
         compiling, start = compile_seconds(), time.process_time()
         solve(point, options, rtol)
-        if compile_seconds() == compiling:
-            times.append(time.process_time() - start)
-        else:  # as for the first points that need double-double arithmetic
-            begin = time.perf_counter()
-    return float(np.median(times)) / _points(point)
+        (times if compile_seconds() == compiling else compiled).append(time.process_time() - start)
+    return float(np.median(times or compiled)) / _points(point)
 
 
 def _thinned(point):

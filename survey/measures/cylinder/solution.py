@@ -103,7 +103,7 @@ def _in_time(method, rows, times, rtol):
         ends = np.zeros(len(P), dtype=np.int64)
         method.flow_trajectories(P, starts, at, tolerance, budget, floats, turnings, ends)
         np.copyto(status, ends[:, None], where=~np.isfinite(floats[..., rc.PHI]))  # else OK
-        if np.fmin.reduce(floats[..., rc.W_BAR], axis=None) < LEAST_BAR:
+        if np.fmin.reduce(floats[..., rc.W_BAR], axis=None, initial=np.inf) < LEAST_BAR:
             lost = (floats[..., rc.W] != 0) & (floats[..., rc.W_BAR] < LEAST_BAR)
             floats[..., rc.W_BAR][lost] = LEAST_BAR
         return floats, turnings, status

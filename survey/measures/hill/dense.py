@@ -200,7 +200,8 @@ def _rows(problem, method, asked, answers, chosen, axis, open_points):
     sought, degree = _sought(asked), np.full(problem.span.size, DEGREES.size)
     degree[chosen] = _degrees(problem, axis, asked.rtol, sought)[chosen]
     first = degree.copy()
-    while (at := int(degree.min())) < axis.most:  # a row whose series has not converged goes on to the next degree
+    # a row whose series has not converged goes on to the next degree
+    while (at := int(degree.min(initial=axis.most))) < axis.most:
         rows = np.flatnonzero(degree == at)
         share = NODES_SHARE * asked.rtol
         values, series, bars, turns = _series(problem, method, share, rows, int(DEGREES[at]), axis, sought)
