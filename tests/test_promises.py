@@ -386,8 +386,8 @@ def test_a_home_that_cannot_be_written_is_fine(folder):
 def test_a_user_without_a_home_is_fine(folder):
     """As in a container that runs under a number which no table of users knows."""
     homeless = "import pwd\ndef unknown(_):\n    raise KeyError\npwd.getpwuid = unknown\n" + PROGRAM
-    environment = {key: value for key, value in os.environ.items() if key not in ("HOME", "NUMBA_CACHE_DIR")}
-    environment = {key: value for key, value in environment.items() if not key.startswith("XDG_")}
+    places = ("HOME", "NUMBA_CACHE_DIR", "XDG_")
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(places)}
     words = ["run", "sweep.toml", "--set", "axes.w0.num=2", "--set", "axes.phi0.num=2"]
     command = [sys.executable, "-c", homeless, *words]
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120)
