@@ -12,6 +12,7 @@ import hashlib
 import inspect
 import os
 import time
+from functools import cache
 from pathlib import Path
 
 import llvmlite
@@ -28,13 +29,21 @@ APART = ("__main__.py", "accessor.py", "analysis", "cli.py", "precision", "show"
 
 def source_hash(*names):
     """Hash (16 hex digits) of the compilers' versions and of these modules and packages of survey."""
-    root = Path(__file__).parents[1]
+    root = str(Path(__file__).parents[1])
     digest = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__}".encode())
     for name in sorted(names):
-        path = root / name
-        for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
-            digest.update(f"{file.relative_to(root).as_posix()}\0".encode() + file.read_bytes() + b"\0")
+        for file in sorted(_sources(os.path.join(root, name))):
+            within = file[len(root) + 1 :].replace(os.sep, "/")
+            with open(file, "rb", buffering=0) as source:  # every start of survey reads them all
+                digest.update(f"{within}\0".encode() + source.readall() + b"\0")
     return digest.hexdigest()[:16]
+
+
+def _sources(path):
+    """The Python files in the folder `path` and below, or `path` itself where it is a file."""
+    if not os.path.isdir(path):
+        return [path]
+    return [os.path.join(folder, file) for folder, _, files in os.walk(path) for file in files if file.endswith(".py")]
 
 
 def deciding():
@@ -43,13 +52,18 @@ def deciding():
     return [name for name in names if name not in APART and not name.startswith("__pycache__")]
 
 
+@cache
+def deciding_hash():
+    """Hash (16 hex digits) of all that decides numbers of the output, read once: only runs that keep files need it."""
+    return source_hash(*deciding())
+
+
 def kernel_hash():
     """Hash (16 hex digits) of what is compiled and of the CPU that it is compiled for."""
     cpu = f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
     return hashlib.sha256(f"{source_hash(*COMPILED)} {cpu}".encode()).hexdigest()[:16]
 
 
-SOURCE_HASH = source_hash(*deciding())
 KERNEL_HASH = kernel_hash()
 
 

@@ -11,7 +11,6 @@ import math
 
 import numpy as np
 
-from survey.kernels import lanes
 from survey.kernels.body import motion
 from survey.kernels.cylinder import fate, returns, steps
 from survey.kernels.cylinder.flow import (
@@ -29,9 +28,9 @@ from survey.kernels.cylinder.flow import (
     values,
 )
 from survey.kernels.floquet import runge_kutta
-from survey.kernels.hill.matrix import rounding
+from survey.kernels.hill import dop853 as hill
+from survey.kernels.hill.dop853 import DOUBT, LARGEST, SMALLEST, STEP_LIMIT
 from survey.kernels.jit import inline, kernel
-from survey.kernels.lanes import column, relative
 from survey.kernels.libration import danby
 from survey.kernels.libration.danby import COLUMN, COLUMNS
 from survey.kernels.math.dop853 import E3, E5, STAGES, A, B, C, combined
@@ -59,119 +58,21 @@ _FIRST = LOW + 1  # stages lie in the lines of the table after the low series
 ADAPTIVE = True
 NODES = tuple(C[:STAGES])
 _WEIGHT = float(np.abs(B).sum())  # 12.9: some of B are negative
-_SMALLEST, _LARGEST = 0.2, 5.0
-# Zeros are counted by signs at the ends of steps: a step stays below this many radians of the fastest phase.
-_LONGEST = 2.0
-_STEP_LIMIT = 200_000
-_DOUBT = 0.01
 _OTHER = 0.3
 # of a slope of Danby's equations, of the largest one: steps show at most 3.7 where their estimate does not exceed it
 _SLOPE_ROUNDINGS = 4.0
 
 
 floquet_factors = runge_kutta.factors
+hill_step = hill.hill_step
+hill_walk = hill.hill_walk
+hill_walk_pieces = hill.hill_walk_pieces
 orbit_motion = runge_kutta.motion
 
 
 def floquet_reach(rtol):
     """How far the norm of A times half a step may go for accuracy rtol."""
     return 0.5 * (1e4 * max(rtol, 1e-13)) ** (1 / (ORDER + 1))
-
-
-@inline
-def hill_step(z, h, slopes):
-    """P and its local truncation bounds over one step, from z at the nodes; `slopes` (STAGES + 1, 4) is scratch."""
-    fundamental(A, STAGES, _hill_slope, z, 2, h, slopes[STAGES], slopes)
-    size = 0.0
-    for i in range(STAGES):
-        size = max(size, abs(z[i]))
-    # an error of order h^9 is (h sqrt z)^3 of the estimate of order h^6
-    doubt = _DOUBT * (h * np.sqrt(size)) ** 3
-    p11, d11 = _sums(1.0, h, slopes[:, 0], doubt)
-    p21, d21 = _sums(0.0, h, slopes[:, 1], doubt)
-    p12, d12 = _sums(0.0, h, slopes[:, 2], doubt)
-    p22, d22 = _sums(1.0, h, slopes[:, 3], doubt)
-    # one entry's estimate may vanish by symmetry (constant z): each takes the largest of all, in the scale of the phase
-    rate = max(np.sqrt(size), 1.0 / h)
-    estimate = max(max(d11, d22), max(d12 * rate, d21 / rate))
-    return p11, p12, p21, p22, estimate, estimate / rate, estimate * rate
-
-
-@inline
-def _hill_slope(z, i, state, out):
-    for c in range(2):
-        out[2 * c], out[2 * c + 1] = state[2 * c + 1], -z[i] * state[2 * c]
-
-
-@inline
-def _sums(start, h, slopes, doubt):
-    """The new value, and dop853.f's combination of the estimates of order 5 and 3, which must not vanish by chance."""
-    value, fifth, third = 0.0, 0.0, 0.0
-    for j in range(STAGES):
-        value += B[j] * slopes[j]
-        fifth += E5[j] * slopes[j]
-        third += E3[j] * slopes[j]
-    return start + h * value, abs(h) * (combined(fifth, third) + doubt * abs(fifth))
-
-
-@inline
-def hill_walk(potential, p, row, table, span, tolerance, out):
-    """Integrate y'' + z y = 0 from 0 to `span`, local errors below `tolerance`.
-
-    (z, size of the terms whose sum z is) = potential(t, p, row, table).
-
-    Fills `out` as `survey.kernels.lanes.chain` does. False when STEP_LIMIT steps did not reach the end.
-    """
-    return hill_walk_pieces(potential, p, row, table, np.array([0.0, span]), 0.0, span, tolerance, out)
-
-
-@inline
-def hill_walk_pieces(potential, p, row, table, edges, slack, longest, tolerance, out):
-    """As `hill_walk`, from the first to the last of `edges`; z may jump at those between, where a step ends.
-
-    No step is longer than `longest`. `potential` is evaluated no nearer to an edge than `slack`, so on the right side.
-    """
-    z, slopes = np.empty(STAGES), np.empty((STAGES + 1, 4))
-    longest = min(longest, 0.25 * (edges[-1] - edges[0]))  # else a coefficient whose average rules escapes the estimate
-    piece, t, steps, h = 1, edges[0], 0, min(longest, 0.1)
-    y1, v1, s1, t1, w1 = 1.0, 0.0, 0.0, 0.0, 0.0
-    y2, v2, s2, t2, w2 = 0.0, 1.0, 0.0, 0.0, 0.0
-    zeros1, zeros2, total = 0.0, 0.0, 0.0
-    for _ in range(_STEP_LIMIT):
-        final = t + 1.01 * h >= edges[piece]
-        if final:
-            h = edges[piece] - t
-        size, terms = 0.0, 0.0
-        for i in range(STAGES):
-            inside = min(max(t + C[i] * h, edges[piece - 1] + slack), edges[piece] - slack)
-            z[i], scale = potential(inside, p, row, table)
-            size, terms = max(size, abs(z[i])), max(terms, scale)
-        wave = np.sqrt(size) + 1e-3
-        p11, p12, p21, p22, d11, d12, d21 = hill_step(z, h, slopes)
-        error = d11  # the largest of all four entries
-        if error <= tolerance and h * wave <= 1.01 * _LONGEST:
-            # The stages pass through sums of size 60 that cancel; t itself is rounded.
-            r11, r12, r21 = rounding(terms, h)
-            matrix = (p11, p12, p21, p22, d11 + 2.0 * r11, d12 + 8.0 * r12, d21 + 4.0 * r21)
-            old1, old2 = y1, y2
-            y1, v1, s1, t1, w1 = column(matrix, y1, v1, s1, t1, w1)
-            y2, v2, s2, t2, w2 = column(matrix, y2, v2, s2, t2, w2)
-            zeros1 += 1.0 if (y1 < 0.0) != (old1 < 0.0) else 0.0
-            zeros2 += 1.0 if (y2 < 0.0) != (old2 < 0.0) else 0.0
-            total += relative(matrix, h)
-            steps += 1
-            t = edges[piece] if final else t + h
-            piece += 1 if final else 0
-            if piece == len(edges):
-                out[lanes.Y1], out[lanes.DY1], out[lanes.Y2], out[lanes.DY2] = y1, v1, y2, v2
-                lanes.bars(s1, w1, s2, w2, steps, total, out)
-                out[lanes.Y1_ZEROS], out[lanes.Y2_ZEROS] = zeros1, zeros2
-                return True
-        elif not error >= 0.0:
-            return False
-        h *= min(_LARGEST, max(_SMALLEST, 0.9 * (tolerance / (error + 1e-300)) ** 0.125))
-        h = min(h, longest, _LONGEST / wave)
-    return False
 
 
 @inline
@@ -219,7 +120,7 @@ def flow_begin(p, phi, w, tolerance, T):
     h = T[LAST, STEP] if T[LAST, STEP] > 0.0 else 0.1 / rate
     for _ in range(50):
         _x, w1, _e, _y = flow_at(p, T, h)
-        doubt, speed = 8.0 * _DOUBT * (h * rate) ** 3, max(rate, 1.0 / h)
+        doubt, speed = 8.0 * DOUBT * (h * rate) ** 3, max(rate, 1.0 / h)
         dphi, dw = _flow_estimate(T, h, PHI, doubt), _flow_estimate(T, h, W, doubt)
         # where the motion starts at rest, one of them may vanish by symmetry: each bounds the other, with less weight
         dphi, dw = max(dphi, _OTHER * dw / speed), max(dw, _OTHER * dphi * speed)
@@ -289,7 +190,7 @@ def _body_begin(G, state, tolerance, T, V):
     h = min(T[LAST, motion.STEP] if T[LAST, motion.STEP] > 0.0 else 0.1 * longest, longest)
     for _ in range(50):
         _body_at(G, T, h, new)
-        doubt, error = 8.0 * _DOUBT * (h / longest) ** 3, 0.0
+        doubt, error = 8.0 * DOUBT * (h / longest) ** 3, 0.0
         for k in range(motion.STATE):
             share = motion.size_of(state) if k < 3 else 1.0
             error = max(error, _flow_estimate(T, h, k, doubt) / share)
@@ -340,7 +241,7 @@ def _danby_step(e, d1, d2, angle, h, slopes, state, work):
                 rate = max(rate, abs(slope))
             value = start + h * change  # one addition, whose rounding is the one that the bar counts
             # an error of order h^9 is h^3 of the estimate of order h^6
-            error = max(error, abs(h) * combined(fifth, third) + abs(h) ** 4 * _DOUBT * abs(fifth))
+            error = max(error, abs(h) * combined(fifth, third) + abs(h) ** 4 * DOUBT * abs(fifth))
             size = max(size, abs(value))
             work[one + i, 0], work[one + 4 + i, 0] = value, start
         worst = max(worst, error)
@@ -356,7 +257,7 @@ def danby_walk(e, d1, d2, tolerance, out):
     for i in range(len(e)):
         danby.start(work, 1)
         angle, h, steps = 0.0, 0.1 * math.sqrt(1.0 - e[i]), 0
-        for _ in range(_STEP_LIMIT):
+        for _ in range(STEP_LIMIT):
             last = angle + 1.01 * h >= math.pi
             h = math.pi - angle if last else h
             error = _danby_step(e[i], d1[i], d2[i], angle, h, slopes, state, work)
@@ -365,7 +266,7 @@ def danby_walk(e, d1, d2, tolerance, out):
                 angle, steps = angle + h, steps + 1
                 if last:
                     break
-            h *= min(_LARGEST, max(_SMALLEST, 0.9 * (tolerance[i] / (error + 1e-300)) ** 0.125))
+            h *= min(LARGEST, max(SMALLEST, 0.9 * (tolerance[i] / (error + 1e-300)) ** 0.125))
             h = min(h, 1.0)
         danby.finish(work, 0, steps, out[i])
         if not last:

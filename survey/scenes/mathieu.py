@@ -19,14 +19,13 @@ from math import cos, pi
 import numpy as np
 
 from survey import status
-from survey.kernels.hill import taylor_double
+from survey.kernels.hill import dop853, taylor_double
 from survey.kernels.hill.answers import NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math import double as dd
 from survey.measures.hill import dense, monodromy, motion
 from survey.measures.hill import why as hill_why
 from survey.measures.rows import Rows
-from survey.methods import dop853
 from survey.scene import Parameter
 
 TITLE = "Stability of Mathieu's equation"

@@ -27,8 +27,8 @@ import numpy as np
 
 from survey import status
 from survey.errors import BadInput
+from survey.kernels.hill import dop853, taylor_double
 from survey.kernels.hill import satellite as motion
-from survey.kernels.hill import taylor_double
 from survey.kernels.hill.answers import LARGEST, NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE
 from survey.kernels.hill.satellite import potential, sample, tabulate
 from survey.kernels.jit import kernel
@@ -40,7 +40,6 @@ from survey.measures.hill import motion as hill_motion
 from survey.measures.hill import why as hill_why
 from survey.measures.hill.satellite import Motion, moduli, planar_angle, rates
 from survey.measures.rows import Rows
-from survey.methods import dop853
 from survey.scene import Option, Output, Parameter, Trajectory
 
 TITLE = "Out-of-plane stability of a satellite's planar librations and rotations"

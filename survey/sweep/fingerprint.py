@@ -18,7 +18,7 @@ from survey.sweep.cost import block_geometry
 @cache
 def code_version():
     """What identifies the code that solves blocks: it must be the same on every worker, but not the processor."""
-    return {"survey": __version__, "sources": jit.SOURCE_HASH}
+    return {"survey": __version__, "sources": jit.deciding_hash()}
 
 
 def compilers():
@@ -51,7 +51,7 @@ def fingerprint(workflow):
         "rtol": request.rtol,
         "variables": sorted(request.variables),
         "block_geometry": block_geometry(workflow),
-        "kernels": jit.SOURCE_HASH,
+        "kernels": jit.deciding_hash(),
         "scene_hash": getattr(workflow.scene, "HASH", "") or _hash_of_plugin(workflow.scene),
     } | ({"proves": True} if workflow.proves else {})
 

@@ -11,6 +11,7 @@ from survey.kernels.math.double import loose, mul, neg, quick_two_sum, times, tw
 GRID = 16.0
 LARGEST = 3.2
 _ORDERS = 60
+_BITS = 400
 
 
 def _pair(number):
@@ -19,15 +20,16 @@ def _pair(number):
     return high, float(number - Fraction(high))
 
 
-def _row(x):
-    """sin and cos of a fraction, as hi and lo."""
-    terms = [Fraction(0), Fraction(0)]
+def _row(j):
+    """sin and cos of j / GRID, as hi and lo: their series in integers, in units of 2^-_BITS."""
+    sums, term = [0, 0], 1 << _BITS
     for n in range(_ORDERS):
-        terms[n % 2] += (-1) ** (n // 2) * x**n / factorial(n)
-    return *_pair(terms[1]), *_pair(terms[0])
+        sums[n % 2] += (-1) ** (n // 2) * term
+        term = term * j // (int(GRID) * (n + 1))
+    return *_pair(Fraction(sums[1], 1 << _BITS)), *_pair(Fraction(sums[0], 1 << _BITS))
 
 
-_TABLE = np.array([_row(Fraction(j, int(GRID))) for j in range(int(LARGEST * GRID) + 2)])
+_TABLE = np.array([_row(j) for j in range(int(LARGEST * GRID) + 2)])
 # 1/n!, whose sign alternates in pairs
 _S3, _S5, _S7 = (_pair(Fraction((-1) ** (n // 2), factorial(n))) for n in (3, 5, 7))
 _C4, _C6 = (_pair(Fraction((-1) ** (n // 2), factorial(n))) for n in (4, 6))

@@ -14,7 +14,7 @@ from survey.kernels.lanes import RESULTS
 from survey.kernels.math.roundoff import EPS
 from survey.measures.hill import dense, pointwise
 from survey.measures.hill.answers import NO_SQUARES, Answers
-from survey.methods import dop853, taylor16
+from survey.methods import taylor16
 
 # A discriminant with a wider bar, relative to 1 + |D|, is ill conditioned, if so few steps (0.2 s a hundred points) do.
 ILL, FEW_STEPS = 1e-11, 500
@@ -49,6 +49,8 @@ def solve(problem, asked, answers, decide=True):
             d, bar = abs(answers.floats[DISCRIMINANT]), answers.floats[DISCRIMINANT + 1]
             _exactly(problem, answers, np.flatnonzero(ours & (bar > ILL * (1 + d))), asked, FEW_STEPS)
     elif left.any() and problem.walk is not None:
+        from survey.methods import dop853  # with all families' kernels: few points need it
+
         other = Answers(left.size, asked)
         pointwise.solve(problem, dop853, asked, other, left)
         decided = np.flatnonzero(left & (other.status == status.OK) & (other.verdict != UNDECIDED))

@@ -18,11 +18,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from survey.kernels.hill import sampled_double
+from survey.kernels.hill import dop853, sampled_double
 from survey.kernels.jit import fresh, inline, kernel
 from survey.kernels.lanes import RESULTS
 from survey.measures.hill import monodromy, multiprecision, pointwise
-from survey.methods import dop853
 
 SIZES = (65, 513, 4097)
 # Evenly spread points of the part that is solved at which z is probed, however smooth it seems; those when a scene is
