@@ -8,6 +8,7 @@ numba's own cache returns stale results when an imported module changes; here it
 every source that is compiled, of the versions and of the CPU, so that any edit starts an empty one.
 """
 
+import gc
 import hashlib
 import inspect
 import os
@@ -77,8 +78,29 @@ def _cache_directory():
     return path if os.access(path, os.W_OK) else None
 
 
+class _Compiling(event.TimingListener):
+    """Measures the time spent in compiling, and has the garbage collector run seldom meanwhile.
+
+    What a compiler builds lives until it is done; looking through it again and again took 6 to 16 % of its time.
+    """
+
+    SELDOM = (10_000, 20, 20)
+
+    def on_start(self, start):
+        if self._depth == 0:
+            self._usual = gc.get_threshold()
+            if self._usual[0]:  # 0: the collector is off
+                gc.set_threshold(*map(max, self._usual, self.SELDOM))
+        super().on_start(start)
+
+    def on_end(self, end):
+        super().on_end(end)
+        if self._depth == 0:
+            gc.set_threshold(*self._usual)
+
+
 _DIRECTORY = _cache_directory()
-_COMPILING = event.TimingListener()
+_COMPILING = _Compiling()
 event.register("numba:compile", _COMPILING)
 
 

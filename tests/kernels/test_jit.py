@@ -1,0 +1,46 @@
+"""What the decorators of kernels do to the process that compiles."""
+
+import gc
+
+import numpy as np
+import pytest
+
+from survey.kernels import jit
+
+
+@pytest.fixture
+def usual():
+    before = gc.get_threshold()
+    yield
+    gc.set_threshold(*before)
+
+
+def compiled(seen):
+    """Compile a kernel that asks for the collector's thresholds while it is typed."""
+    from numba.extending import overload
+
+    def asked(x):
+        raise NotImplementedError
+
+    @overload(asked)
+    def _asked(x):
+        seen.append(gc.get_threshold())
+        return lambda x: x
+
+    return jit.fresh(lambda x: asked(x[0]))(np.zeros(1))
+
+
+@pytest.mark.parametrize("given, meanwhile", [((700, 10, 10), (10_000, 20, 20)), ((30_000, 5, 90), (30_000, 20, 90))])
+def test_the_collector_runs_seldom_while_kernels_are_compiled_and_as_before_afterwards(usual, given, meanwhile):
+    seen = []
+    gc.set_threshold(*given)
+    compiled(seen)
+    assert set(seen) == {meanwhile}
+    assert gc.get_threshold() == given
+
+
+def test_a_collector_that_is_off_stays_off(usual):
+    seen = []
+    gc.set_threshold(0, 10, 10)
+    compiled(seen)
+    assert {one[0] for one in seen} == {0} and gc.get_threshold()[0] == 0
