@@ -54,6 +54,7 @@ from survey.scene import Request, exists
 SETTINGS = tuple(10.0**-n for n in range(4, 14))
 REPEATS = 5
 ENOUGH_SECONDS = 0.5
+LONG = 20.0  # seconds that a method may take for a work at one setting: if more, it gets no finer ones
 # Points of a map on which methods other than auto, which treats a map as a whole, are timed.
 POINTS = 10_000
 
@@ -162,10 +163,13 @@ def measure(scene, case, peers=False, say=lambda line: None):
             solve(point, options, SETTINGS[0]) if peer or work not in whole else solve(
                 point, options, SETTINGS[0], everything=True
             )
+        slow = set()
         for setting in SETTINGS:
             errors = {}
             for work, (point, _options) in works.items():
-                references = case.references(work)
+                if work in slow:
+                    continue
+                began, references = time.process_time(), case.references(work)
                 if method == "auto":  # it treats a dense row as a whole: its error is the one within such a row
                     errors, references = {}, [_within(reference, point) for reference in references]
                 if id(references) not in errors:
@@ -176,6 +180,9 @@ def measure(scene, case, peers=False, say=lambda line: None):
                 asked = solve if peer or work not in whole else partial(solve, everything=True)
                 seconds = _per_point(asked, *timed[work], setting)
                 records.append(Record(work, method, peer, setting, error, seconds, wrong, compile_seconds))
+                if time.process_time() - began > LONG:
+                    slow.add(work)
+                    say(f"{scene}: {method or peer} takes long for {work}: no setting finer than {setting:g}")
         say(f"{scene}: {method or peer} measured")
     return records
 

@@ -54,6 +54,14 @@ def test_records_hold_what_was_measured_and_the_asked_accuracy_is_reached(quick,
     assert any("measured" in line for line in said)
 
 
+def test_a_method_that_takes_long_at_one_setting_gets_no_finer_ones(quick, monkeypatch):
+    said = []
+    monkeypatch.setattr(precision, "LONG", 0.0)
+    records = precision.measure("satellite", quick, say=said.append)
+    assert {record.setting for record in records} == {1e-4}
+    assert any("rk4 takes long for row: no setting finer than 0.0001" in line for line in said)
+
+
 @pytest.mark.slow
 def test_a_first_call_compiles_in_a_process_of_its_own():
     assert precision._cold("satellite", "rk4") > 0
