@@ -92,7 +92,7 @@ def flow_turnings(P, starts, times, tolerance, limit, turnings):
 
 def flow_abels(P, starts, targets, tolerance, limit, floats, status):
     """See `lockstep_abel.abels`, and for programs `steps.abels`."""
-    solve = _abels_in_lockstep if P.shape[1] == COLUMNS else _abels_one_by_one
+    solve = _abels_in_lockstep if P.shape[1] == COLUMNS else flow_abels_by_row
     solve(P, starts, targets, tolerance, limit, floats, status)
 
 
@@ -102,7 +102,8 @@ def _abels_in_lockstep(P, starts, targets, tolerance, limit, floats, status):
 
 
 @kernel
-def _abels_one_by_one(P, starts, targets, tolerance, limit, floats, status):
+def flow_abels_by_row(P, starts, targets, tolerance, limit, floats, status):
+    """See `steps.abels`."""
     steps.abels(flow_setting, flow_begin, flow_at, P, starts, targets, tolerance, limit, floats, status)
 
 

@@ -13,6 +13,7 @@ Everything specific to a scene is in the file of its name in `cases/`:
     MOST                   {method: number of points that it is timed on}, for slow ones (optional)
     SCENE                  the scene, where the file has another name: its name, or the object of one's own (optional)
     ALL                    works for which all outputs are asked, not ERROR and the verdict alone (optional)
+    NOTE                   what a reader of the chart must know, such as that peers are asked for less (optional)
 
 Where a parameter for which one solution serves all values (times, angles) varies along the last axis, samples of the
 work keep whole rows.
@@ -97,7 +98,7 @@ def write(scene, directory, peers=False, say=lambda line: None):
     name = getattr(case, "NAME", scene)
     paths = [directory / f"precision_{name}.{kind}" for kind in ("json", "csv", "png")]
     machine = provenance() | {"system": platform.platform(), "threads": 1} | limit(scene, case)
-    machine["missing_peers"] = missing(peers)
+    machine |= {"missing_peers": missing(peers), "note": getattr(case, "NOTE", "")}
     machine |= {"load": psutil.getloadavg(), "entry": "scene.solve", "outputs": outputs(case), "works": described(case)}
     machine["peers"] = {peer: version(peer) for peer in sorted({r.peer for r in records} - {""})}
     paths[0].write_text(

@@ -1,5 +1,7 @@
 """The work-precision chart as a figure: one panel per work, one line per method or peer, and the machine's limit."""
 
+from textwrap import fill
+
 import matplotlib.pyplot as plt
 
 # Okabe and Ito's colours that are visible as lines
@@ -7,6 +9,7 @@ COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 MARKERS = "osD^vP*X<>"
 LEAST_ERROR = 1e-17  # a logarithmic axis has no zero
 MOST_PANELS = 5  # in a row
+SMALL, PLAIN = 17, 11  # characters in an inch of small text, and of plain text
 
 
 def draw(records, machine, scene, name, path):
@@ -32,19 +35,19 @@ def draw(records, machine, scene, name, path):
         axes.set(title=work, xlabel="time per point on one thread (s)", xscale="log", yscale="log")
         axes.grid(alpha=0.3)
     for axes in panels[:, 0]:
-        axes.set_ylabel(f"largest error of the {name}, relative to 1 + |value|")
+        axes.set_ylabel(f"largest error of {name} / (1 + |value|)")
     named = {
         label: line for axes in panels.ravel() for line, label in zip(*axes.get_legend_handles_labels(), strict=True)
     }
     title = _asked(machine) + "in brackets: compilation time, not included"
     if machine["missing_peers"]:
         title += f"; not installed: {', '.join(machine['missing_peers'])}"
+    title = "\n".join(fill(line, int(SMALL * size[0])) for line in title.splitlines())
     figure.legend(
         named.values(), named.keys(), loc="outside lower center", ncols=5, fontsize=8, title=title, title_fontsize=8
     )
-    figure.suptitle(
-        f"{scene}: error against time, lower left is better (numbers at points: wrong verdicts on the references)"
-    )
+    words = f"{scene}: error against time, lower left is better (numbers at points: wrong verdicts on the references)"
+    figure.suptitle(fill(words, int(PLAIN * size[0])))
     figure.savefig(path, dpi=150)
     plt.close(figure)
 
@@ -58,6 +61,7 @@ def _asked(machine):
     words = f"timed: {machine['entry']}, outputs: {'; '.join(asked)}; one thread, processor time"
     peers = ", ".join(f"{name} {number}" for name, number in machine.get("peers", {}).items())
     words += f"; peers: {peers}" if peers else ""
+    words += f"\n{machine['note']}" if machine.get("note") else ""
     return f"{words}\n{machine['cpu']}, load at the end {load} (1, 5, 15 min)\n"
 
 

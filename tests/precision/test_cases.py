@@ -15,7 +15,15 @@ from survey.precision.known import references as known
 from survey.truth.hill import mathieu
 
 QUICK = ("mathieu", "libration", "libration_orders", "libration_elliptic_near_1")
-SLOW = (pytest.param(name, marks=pytest.mark.slow) for name in ("satellite_families", "brun_motion", "gyrostat_body"))
+LONG = (
+    "satellite_families",
+    "brun_motion",
+    "gyrostat_body",
+    "brun_triaxial",
+    "satellite_triaxial",
+    "gyrostat_integrable",
+)
+SLOW = (pytest.param(name, marks=pytest.mark.slow) for name in LONG)
 SETTING = 1e-8
 
 

@@ -33,6 +33,10 @@ METHODS = {
             "for w0 >= 0",
             ("P", "starts", "targets", "tolerance", "limit", "floats", "status"),
         ),
+        "flow_abels_by_row": Function(
+            "the same, one row after the other, where that is compiled sooner",
+            ("P", "starts", "targets", "tolerance", "limit", "floats", "status"),
+        ),
         "flow_image": Function(
             "fill `node` with the image of x under one return map, see `kernels.cylinder.returns.image`",
             ("kind", "p", "eqs", "count", "anchor", "x", "tolerance", "node"),

@@ -170,7 +170,7 @@ def _rotations(method, cycles, rtol):
 
     def period(x):
         rows = solution.rows(six, section, side * np.maximum(x, 0.0))
-        floats, status = solution.abel(method, rows, (section + 2.0 * math.pi * side)[:, None], rtol)
+        floats, status = solution.abel(method, rows, (section + 2.0 * math.pi * side)[:, None], rtol, by_row=True)
         return np.where(status[:, 0] == OK, floats[:, 0, rc.TIME], np.nan), floats[:, 0, rc.TIME_BAR]
 
     return np.column_stack([side * w, bar, *_within(period, w, bar)])
@@ -189,7 +189,7 @@ def _librations(method, cycles, rtol):
     def half(x, b):
         rows = solution.rows(six, x, np.zeros(len(x)))
         rows[:, :2] *= b
-        floats, status = solution.abel(method, rows, np.column_stack([angle, angle - 2.0 * math.pi]), rtol)
+        floats, status = solution.abel(method, rows, np.column_stack([angle, angle - 2.0 * math.pi]), rtol, by_row=True)
         met = (status[:, 0] == OK) & (status[:, 1] == TURNING)
         return np.where(met[:, None, None], floats, np.nan)
 

@@ -126,16 +126,18 @@ def _count(method, rows, times, tolerance, asked, results):
         turnings[pick] = np.where(status[pick] == OK, counted, turnings[pick])
 
 
-def abel(method, rows, targets, rtol, before=False):
+def abel(method, rows, targets, rtol, before=False, by_row=False):
     """VALUE to TIME_BAR of `records` (last axis) and status at phi = `targets` (rows, columns).
 
     Where w0 = 0 and g != 0 the solution starts at its turning point; it is followed forward in time, or backward if
     `before`; both branches lie to the side of g, and at targets on the other side it has turned at t = 0.
+
+    `by_row`: one row after the other, which is compiled 12 s sooner than lock step: for those who need few.
     """
     back = rows[:, rc.W0] == 0.0 if before else np.zeros(len(rows), bool)
     phi0, past = rows[:, rc.PHI0, None], back | (rows[:, rc.W0] < 0)
     if len(rows) and (past == past[0]).all() and (targets >= phi0).all():  # as a rule
-        return _branch(method, rows, targets, rtol, 1.0, past[0])
+        return _branch(method, rows, targets, rtol, 1.0, past[0], by_row)
     floats, status = np.full((*targets.shape, rc.STATE), np.nan), np.zeros(targets.shape, dtype=np.int64)
     for side in (1.0, -1.0):
         onward = targets >= phi0 if side > 0 else targets < phi0
@@ -148,9 +150,12 @@ def abel(method, rows, targets, rtol, before=False):
             if (mine == mine[0]).all() and same[-1] - same[0] < same.size:  # picking costs more than solving
                 at = slice(same[0], same[-1] + 1)
                 some = slice(None) if picked.all() else picked
-                floats[some, at], status[some, at] = _branch(method, rows[some], targets[some, at], rtol, side, past)
+                floats[some, at], status[some, at] = _branch(
+                    method, rows[some], targets[some, at], rtol, side, past, by_row
+                )
                 continue
-            found = _branch(method, rows[picked], np.where(mine, targets[picked], side * np.inf), rtol, side, past)
+            at = np.where(mine, targets[picked], side * np.inf)
+            found = _branch(method, rows[picked], at, rtol, side, past, by_row)
             for result, new in zip((floats, status), found, strict=True):
                 held = result[picked]
                 held[mine] = new[mine]
@@ -158,12 +163,12 @@ def abel(method, rows, targets, rtol, before=False):
     return floats, status
 
 
-def _branch(method, rows, targets, rtol, side, past):
+def _branch(method, rows, targets, rtol, side, past, by_row):
     """As `abel`, for targets on one side of phi0 (1 or -1), which the motion reaches at t < 0 if `past`."""
     rows = reverse(rows) if past else rows
     rows = mirror(rows) if side < 0 else rows.copy()
     rows[:, rc.W0] = np.abs(rows[:, rc.W0])
-    floats, status = _in_phi(method, rows, side * targets if side < 0 else targets, rtol)
+    floats, status = _in_phi(method, rows, side * targets if side < 0 else targets, rtol, by_row)
     if side < 0 or past:
         floats[..., rc.VALUE] *= np.where(status == TURNING, side, side * (-1.0 if past else 1.0))
         floats[..., rc.TIME] *= -1.0 if past else 1.0
@@ -171,8 +176,9 @@ def _branch(method, rows, targets, rtol, side, past):
     return floats, status
 
 
-def _in_phi(method, rows, targets, rtol):
+def _in_phi(method, rows, targets, rtol, by_row):
     targets, back = _sorted(targets)
+    solve = getattr(method, "flow_abels_by_row", method.flow_abels) if by_row else method.flow_abels
     budget = STEPS * min(method.FLOW_WORK, 10)
 
     def run(pick, tolerance):
@@ -180,7 +186,7 @@ def _in_phi(method, rows, targets, rtol):
         floats = np.full((*targets[pick].shape, rc.STATE), np.nan)
         status = np.zeros(targets[pick].shape, dtype=np.int64)
         at = np.array(targets[pick], order="C")
-        method.flow_abels(P, starts, at, tolerance, budget, floats, status)
+        solve(P, starts, at, tolerance, budget, floats, status)
         return floats, status
 
     return back(_repeated(run, np.isfinite(targets), tolerances(method, rtol), rtol))

@@ -16,6 +16,10 @@ from survey.scenes import gyrostat as scene
 
 SCENE = "gyrostat"
 ERROR = "limit_phi"
+NOTE = (
+    "survey decides each fate with a certificate, for all time; peers integrate to t = 200 and tell the fate from the "
+    "state there"
+)
 MOST = {"rk4": 8, "dop853": 40}  # points that a slow method is timed on
 _NAMES = ("b12", "b31", "d", "c23", "s2", "s3", "phi0", "w0")
 _QUESTION = {"question": "fate"}

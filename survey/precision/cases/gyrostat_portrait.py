@@ -17,6 +17,10 @@ from survey.precision.peers import System
 
 SCENE = "gyrostat"
 ERROR = "cycle_multiplier"
+NOTE = (
+    "survey finds all equilibria, all cycles and where every branch ends; peers are given one point of one cycle and "
+    "its period, and integrate that turn"
+)
 MOST = {"rk4": 2, "dop853": 10}  # points that a slow method is timed on
 _NAMES = ("b12", "b31", "d", "c23", "s2", "s3")
 _QUESTION = {"question": "portrait"}
