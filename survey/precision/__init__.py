@@ -37,10 +37,9 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import psutil
 
-from survey import modules, scenes
+from survey import grid, modules, scenes
 from survey.errors import BadInput
 from survey.file.labels import provenance
-from survey.grid import lines
 from survey.kernels.jit import compile_seconds
 from survey.measures.cylinder import basins, fate
 from survey.measures.floquet import dense as floquet
@@ -58,6 +57,7 @@ ENOUGH_SECONDS = 0.5
 LONG = 20.0  # seconds that a method may take for a work at one setting: if more, it gets no finer ones
 # Points of a map on which methods other than auto, which treats a map as a whole, are timed.
 POINTS = 10_000
+TOGETHER = 5_000  # scattered points with which a reference is solved, as from 4,096 on they may share series
 
 
 @dataclass
@@ -224,19 +224,26 @@ def _peer(case, peer):
     return solve
 
 
-def _lines(point):
-    """The `lines` of a work, whose arrays have as many dimensions each, of length 1 where they do not vary."""
+def _axes(point):
+    """{name: (its dimensions, its values)} of a work, whose arrays have as many dimensions each, of length 1 where they
+    do not vary.
+    """
     shapes = {name: np.shape(values) for name, values in point.items()}
     own = {name: tuple(i for i, size in enumerate(shape) if size > 1) for name, shape in shapes.items()}
-    return lines({name: (own[name], np.ravel(values)) for name, values in point.items()})
+    return {name: (own[name], np.ravel(values)) for name, values in point.items()}
 
 
 def _within(reference, point):
-    """The reference as the first point of a row of the work, if the work has rows."""
+    """The reference as the first point of a row of the work, or of scattered points about it, if the work has such."""
     parameters, options, exact, verdict = reference
-    dense = [name for name in _lines(point) if np.shape(point[name])[-1] > 1]
+    axes = _axes(point)
+    dense = [name for name in grid.lines(axes) if np.shape(point[name])[-1] > 1]
     if not dense:
-        return reference
+        about = {name: values[:TOGETHER] for name, (_, values) in axes.items() if np.size(values) >= TOGETHER}
+        if not about or not all(v.min() <= parameters[name] <= v.max() for name, v in about.items()):
+            return reference
+        whole = {name: np.array([value]) for name, value in parameters.items()}
+        return whole | {name: np.append(whole[name], v) for name, v in about.items()}, options, exact, verdict
     whole = {name: np.array([[value]]) for name, value in parameters.items()}
     whole |= {name: np.concatenate([whole[name], np.atleast_2d(point[name])], axis=1) for name in dense}
     return whole, options, exact, verdict
@@ -250,7 +257,8 @@ def _solver(module, method, error):
         used = check_parameters(module, module.TITLE, options, point)
         asked = [o.name for o in module.OUTPUTS if exists(o, options) and not o.on_request]
         wanted = frozenset(name for name in asked if everything or name in (error, "verdict"))
-        request = Request(options, method, rtol, wanted, _lines(point))
+        axes = _axes(point)
+        request = Request(options, method, rtol, wanted, grid.lines(axes), grid.fixed(axes), grid.ranges(axes))
         ndim = max(np.ndim(values) for values in point.values()) or 1
         arrays = {key: np.asarray(point.get(key, p.default), float) for key, p in used.items()}
         dense.panels.cache_clear()  # every call includes its set-up

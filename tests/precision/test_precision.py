@@ -7,9 +7,10 @@ import json
 import numba
 import numpy as np
 import pytest
+import xarray as xr
 
 import survey.precision.cases as folder
-from survey import modules, precision
+from survey import evaluate, modules, precision, scenes
 from survey.errors import BadInput
 
 FIELDS = ["work", "method", "peer", "setting", "error", "seconds_per_point", "wrong_verdicts", "compile_seconds"]
@@ -145,3 +146,23 @@ def test_no_call_that_compiles_is_timed(monkeypatch):
     monkeypatch.setattr(precision, "ENOUGH_SECONDS", 0.0)  # one call is enough, if it does not compile
     seconds = precision._per_point(solve, {"a": np.zeros(1)}, {}, 0.5)
     assert len(calls) == 2 and seconds < 0.01
+
+
+def test_scattered_points_are_measured_as_users_get_them_and_references_among_them():
+    """From 4,096 points on they share series: times per point and errors are those of such points."""
+    random = np.random.default_rng(1)
+    point = {"a": random.uniform(0.0, 5.0, 6_000), "q": random.uniform(0.0, 1.0, 6_000)}
+    exact = {"discriminant": 2 * np.cos(np.pi * np.sqrt(2.0))}
+    inside = precision._within(({"a": 2.0, "q": 0.0}, {}, exact, 1), point | {"q": point["q"] - 0.5})
+    assert {name: (values.size, values[0]) for name, values in inside[0].items()} == {
+        "a": (5_001, 2.0),
+        "q": (5_001, 0.0),
+    }
+    outside = ({"a": 9.0, "q": 0.0}, {}, exact, 1)
+    assert precision._within(outside, point) is outside
+    solve = precision._solver(modules.load(scenes, "mathieu", "scene"), "auto", "discriminant")
+    grid = xr.DataArray(inside[0]["a"], dims="p"), xr.DataArray(inside[0]["q"], dims="p")
+    ds = evaluate("mathieu", a=grid[0], q=grid[1], variables=["discriminant", "verdict"], rtol=1e-8)
+    assert (solve(inside[0], {}, 1e-8)["discriminant"] == ds.discriminant.values).all()  # the same way, the same bits
+    error, wrong = precision._against(solve, [inside], "discriminant", 1e-8)
+    assert error < 1e-8 and not wrong
