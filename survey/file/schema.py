@@ -195,7 +195,10 @@ def surfaces(ds):
     if flags(ds.surface_axis.attrs) != {dim: k for k, dim in enumerate(axes)}:
         raise Damaged("the flags of surface_axis must be the axes of the survey, from 0")
     for dim in axes:
-        _on_axis(ds, dim, f"surface_{dim}")
+        if ds.sizes[dim] > 1:  # else a plane was taken out
+            _on_axis(ds, dim, f"surface_{dim}")
+        elif not np.isfinite(ds[f"surface_{dim}"].values).all():
+            raise Damaged(f"surface_{dim} contains values that are not finite")
     if not (ds.surface_position_error.values >= 0).all():
         raise Damaged("surface_position_error must hold numbers that are not negative")
     corners = ds.variables.get("surface_corners")

@@ -1,7 +1,7 @@
 """The surfaces of [boundaries] of a survey of three parameters: in perspective, and where they meet a plane."""
 
 import numpy as np
-from matplotlib.colors import LightSource, to_rgb
+from matplotlib.colors import to_rgb
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
@@ -23,8 +23,7 @@ COLOURS = {
 }  # fmt: skip
 OTHERS = ("#F0E442", "#999999", "#8DA0CB", "#B3DE69")
 VIEW = {"elev": 24.0, "azim": -58.0}
-ZOOM = 1.0
-LIGHT = LightSource(azdeg=-100.0, altdeg=50.0)
+LIGHT = np.array([0.76, -0.42, 0.5])  # of length 1, nearly: from the right of the viewer
 
 
 def draw_surfaces(axes, ds):
@@ -34,6 +33,9 @@ def draw_surfaces(axes, ds):
     """
     if "surface_vertices" not in ds:
         raise BadInput(f"{NAME}: the file contains none; run the workflow with surfaces = true under [boundaries]")
+    flat = [dim for dim in ds.status.dims if ds.sizes[dim] < 2]
+    if flat:
+        raise BadInput(f"{NAME}: {flat[0]} has one value here; they are drawn in all three axes, so leave --at out")
     if axes.name != "3d":
         raise BadInput(f"{NAME}: they are drawn onto axes made with projection='3d'; leave ax out for new ones")
     schema.surfaces(ds)
@@ -55,7 +57,7 @@ def draw_surfaces(axes, ds):
     axes.add_collection3d(drawn, autolim=False)
     axes.set(xlim=ends[0], ylim=ends[1], zlim=ends[2])
     axes.view_init(**VIEW)
-    axes.set_box_aspect((1.0, 1.0, 0.8), zoom=ZOOM)
+    axes.set_box_aspect((1.0, 1.0, 0.8))
     for axis, dim, log in zip((axes.xaxis, axes.yaxis, axes.zaxis), dims, logs, strict=True):
         axis.set_major_locator(MaxNLocator(5, integer=log and np.ptp(_scaled(ds[dim].values, log)) > 2))
         axis.set_label_text(label_of(ds[dim], 26))
@@ -150,7 +152,7 @@ def _shade(triangles):
     with np.errstate(all="ignore"):
         normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    return 0.65 + 0.35 * np.nan_to_num(abs(normal @ LIGHT.direction), nan=1.0)
+    return 0.6 + 0.4 * np.nan_to_num(abs(normal @ LIGHT), nan=1.0)
 
 
 def _scaled(values, log):
