@@ -12,7 +12,7 @@ from survey.file.labels import flag_codes
 from survey.grid import logarithmic
 from survey.show.boundaries import CURVES
 from survey.show.layout import add_legend
-from survey.show.text import label_of, spaced
+from survey.show.text import formula, label_of, spaced
 
 NAME = "surfaces"  # of the figure
 # light enough to be shaded, and apart for the colour-blind (Okabe and Ito)
@@ -22,6 +22,7 @@ COLOURS = {
     "odd_antiperiodic": "#D9598C",
 }  # fmt: skip
 OTHERS = ("#F0E442", "#999999", "#8DA0CB", "#B3DE69")
+NARROW = 5.0  # inches: of a figure in which names of axes do not fit
 VIEW = {"elev": 24.0, "azim": -58.0}
 LIGHT = np.array([0.76, -0.42, 0.5])  # of length 1, nearly: from the right of the viewer
 
@@ -58,11 +59,13 @@ def draw_surfaces(axes, ds):
     axes.set(xlim=ends[0], ylim=ends[1], zlim=ends[2])
     axes.view_init(**VIEW)
     axes.set_box_aspect((1.0, 1.0, 0.8))
+    narrow = axes.figure.get_figwidth() < NARROW
     for axis, dim, log in zip((axes.xaxis, axes.yaxis, axes.zaxis), dims, logs, strict=True):
         axis.set_major_locator(MaxNLocator(5, integer=log and np.ptp(_scaled(ds[dim].values, log)) > 2))
-        axis.set_label_text(label_of(ds[dim], 26))
+        axis.set_label_text(formula(ds[dim].attrs.get("symbol", ""), dim) if narrow else label_of(ds[dim], 26))
         axis.pane.set_facecolor("#F7F7F7")
-        axis.labelpad = 8.0
+        axis.labelpad = -4.0 if narrow else 8.0
+        axis.set_tick_params(pad=-2.0 if narrow else 3.0)
         if log:
             axis.set_major_formatter(FuncFormatter(lambda value, _: f"{10.0**value:.3g}"))
     handles = [Patch(color=colours[code], label=_label(name)) for code, name in names.items() if (kinds == code).any()]
