@@ -62,7 +62,8 @@ def draw_surfaces(axes, ds):
     narrow = axes.figure.get_figwidth() < NARROW
     for axis, dim, log in zip((axes.xaxis, axes.yaxis, axes.zaxis), dims, logs, strict=True):
         axis.set_major_locator(MaxNLocator(5, integer=log and np.ptp(_scaled(ds[dim].values, log)) > 2))
-        axis.set_label_text(formula(ds[dim].attrs.get("symbol", ""), dim) if narrow else label_of(ds[dim], 26))
+        text = label_of(ds[dim], 44 if axis is axes.zaxis else 26)  # the vertical one has more room
+        axis.set_label_text(formula(ds[dim].attrs.get("symbol", ""), dim) if narrow else text)
         axis.pane.set_facecolor("#F7F7F7")
         axis.labelpad = -4.0 if narrow else 8.0
         axis.set_tick_params(pad=-2.0 if narrow else 3.0)
