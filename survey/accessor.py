@@ -55,6 +55,8 @@ class Survey:
         Solutions of Abel's equation at several angles are curves, one for each value of the first parameter, up to
         their turning points; at one angle (`ds.survey.slice(phi=1.0).survey.map("w")`) they are a map.
 
+        `map("surfaces")` draws the surfaces of [boundaries] in three parameters, onto axes with projection="3d".
+
         Undecided, failed and outside points are marked and counted in the legend; points where the outputs are
         undefined are grey, listed by their status; edges of tongues are drawn where the file contains them, unless
         `boundaries` is False. Draws onto the matplotlib Axes `ax`, by default a new figure's, and returns it
@@ -72,7 +74,7 @@ class Survey:
             ds, var = verdicts.combined(ds, var), "combined"
         colours = {"cmap": cmap, "vmin": vmin, "vmax": vmax, "robust": robust}
         with _settings(style):
-            ax = _new_axes(figure_size(style, width)) if ax is None else ax
+            ax = _new_axes(figure_size(style, width), figures.projection_of(var)) if ax is None else ax
             figures.onto(ax, ds, var, boundaries, style, (x, y), colours)
         return ax
 
@@ -198,10 +200,10 @@ def _settings(style):
         yield
 
 
-def _new_axes(size):
+def _new_axes(size, projection=None):
     import matplotlib.pyplot as plt
 
-    return plt.figure(figsize=size, layout="constrained").subplots()
+    return plt.figure(figsize=size, layout="constrained").subplots(subplot_kw={"projection": projection})
 
 
 def _new_figure():

@@ -302,6 +302,8 @@ def _audited(report):
     """What an audit without complaints has done."""
     parts = {"point": report["points"], "edge": report["edges"], "cell": report["cells"]}
     numbers = [counted(number, noun) for noun, number in parts.items() if number]
+    vertices = report["vertices"]
+    numbers += [f"{vertices} vertices" if vertices > 1 else "1 vertex"] if vertices else []
     silent = f" (no answer at {counted(report['silent'], 'other')})" if report["silent"] else ""
     if not numbers:
         return "no points were solved again"
@@ -548,6 +550,9 @@ def _summarise(finished, paths):
     if attributes.get("curves_lost"):
         curves = counted(attributes["curves_lost"], "curve")
         err.print(f"edges: {curves} could not be followed to the map's border (curve_complete = 0)")
+    if attributes.get("surfaces_left_out"):
+        lost = counted(attributes["surfaces_left_out"], "triangle")
+        err.print(f"surfaces: {lost} left out, of which a corner is not certain (at edges and tips)")
     if "edge_left_out" in attributes:
         err.print(f"edges: not searched for {attributes['edge_left_out']}, where they accumulate", markup=False)
     if finished.already_complete:

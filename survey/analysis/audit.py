@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 import xarray as xr
 
-from survey import status
+from survey import measures, status
 from survey.analysis.given import options_at
 from survey.api import evaluate
 from survey.errors import Damaged
@@ -19,15 +19,17 @@ from survey.measures.hill.edges import FACTORS
 from survey.request import user_scene
 from survey.request.checks import methods_of
 from survey.scene import Request, exists
+from survey.sweep import boundaries
 
 
 def audit(ds, points, seed=0):
     """Solve random points of `ds` again by other methods at higher accuracy; floats, codes and counts must agree.
 
-    So must random edges, and cells at random positions. Returns {"points": number that some method answered, "silent":
-    number that none did, "edges", "cells": numbers checked, "method", "complaints"}.
+    So must random edges and vertices of surfaces, and cells at random positions. Returns {"points": number that some
+    method answered, "silent": number that none did, "edges", "cells", "vertices": numbers checked, "method",
+    "complaints"}.
     """
-    report = {"points": 0, "silent": 0, "edges": 0, "cells": 0, "method": "", "complaints": []}
+    report = {"points": 0, "silent": 0, "edges": 0, "cells": 0, "vertices": 0, "method": "", "complaints": []}
     if not points:
         return report
     name = user_scene.of_dataset(ds)
@@ -51,12 +53,14 @@ def audit(ds, points, seed=0):
         for output, wrong, describe in _differences(flat, solved, outputs, decided):
             for i in np.flatnonzero(wrong.reshape(len(wrong), -1).any(axis=1)):
                 report["complaints"].append(f"{output} at {_position(given, i)}: {describe(i)}, by {method}")
-    for what, check in (("edge", _edges), ("cell", _cells)):
-        if ds.sizes.get(what) and used:
-            chosen = np.sort(random.choice(ds.sizes[what], min(points, ds.sizes[what]), replace=False))
+    vertices = partial(_vertices, module, options, used[:1], rtol)
+    for what, dim, check in (("edges", "edge", _edges), ("cells", "cell", _cells),
+                             ("vertices", "surface_vertex", vertices)):  # fmt: skip
+        if ds.sizes.get(dim) and used:
+            chosen = np.sort(random.choice(ds.sizes[dim], min(points, ds.sizes[dim]), replace=False))
             solve = partial(_solve, name, used[0], options, rtol, ds, module)
             report["complaints"] += [f"{line}, by {used[0]}" for line in check(ds, chosen, solve, random)]
-            report[f"{what}s"] = chosen.size
+            report[what] = chosen.size
     return report | {"points": int(answered.sum()), "silent": int((~answered).sum())}
 
 
@@ -104,6 +108,32 @@ def _edges(ds, chosen, solve, _):
         signs.append(np.where(abs(values) > bars, np.sign(values), 0.0))
     for i in np.flatnonzero(signs[0] * signs[1] > 0):
         yield f"edge_position at {_position(point | {axis: x}, i)}: {of[i]} has no zero within its error bar"
+
+
+def _vertices(module, options, methods, rtol, ds, chosen, _solve, _random):
+    """Complaints about vertices of surfaces where the function of their class certainly has the same sign on both
+    sides."""
+    schema.surfaces(ds)
+    measure, names = measures.question(module.FAMILY, "surfaces"), list(ds.status.dims)
+    if measure is None or not np.isin(ds.surface_class.values, list(measure.CLASSES.values())).all():
+        raise Damaged(f"surface_class contains codes that are no boundaries of {ds.attrs['scene']}")
+    box = boundaries.square_over([ds[name].values for name in names])
+    fixed = {p.name: float(ds[p.name]) for p in module.PARAMETERS if p.name in ds.coords and not ds[p.name].dims}
+    functions = measure.Functions(module, box, names, fixed, options, *methods, rtol)
+    numbers = np.searchsorted(np.cumsum(ds.surface_vertices.values), chosen, side="right")
+    kinds, axis = ds.surface_class.values[numbers], ds.surface_axis.values[chosen].astype(int)
+    point = {name: ds[f"surface_{name}"].values[chosen] for name in names}
+    middle = box.positions(np.stack([*point.values()], axis=1))
+    off = np.zeros_like(middle)
+    off[np.arange(chosen.size), axis] = ds.surface_position_error.values[chosen]
+    words = {code: word for word, code in measure.CLASSES.items()}
+    for kind in np.unique(kinds):
+        own, signs = np.flatnonzero(kinds == kind), []
+        for side in (-1.0, 1.0):
+            values, bars = functions.sharp(middle[own] + side * off[own], int(kind))
+            signs.append(np.where(abs(values) > bars, np.sign(values), 0.0))
+        for i in own[signs[0] * signs[1] > 0]:
+            yield f"surface_position_error at {_position(point, i)}: no {words[kind]} within it"
 
 
 def _cells(ds, chosen, solve, random):

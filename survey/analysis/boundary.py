@@ -1,4 +1,4 @@
-"""Where the verdict changes: edges, curves or cells in the file, or else neighbouring points, as one table."""
+"""Where the verdict changes: edges, curves, surfaces or cells of the file, or neighbouring points, as one table."""
 
 import numpy as np
 import xarray as xr
@@ -14,6 +14,8 @@ def find(ds, kind=None, index=None):
     """Positions on the boundary along the dimension `place` (see `ds.survey.boundary`)."""
     if "curve_count" in ds:
         found = _curves(ds)
+    elif "surface_vertices" in ds:
+        found = _surfaces(ds)
     elif "edge_count" in ds:
         found = _edges(ds)
     elif "cell_verdict" in ds:
@@ -43,6 +45,18 @@ def _curves(ds):
         if source in ds:
             found[name] = ("place", ds[source].values[which], ds[source].attrs)
     return _table(ds, found, "curves from the file")
+
+
+def _surfaces(ds):
+    """Every vertex of every surface."""
+    schema.surfaces(ds)
+    number = ds.surface_vertices.values
+    which = np.repeat(np.arange(number.size), number)
+    along = [name for name, v in ds.data_vars.items() if v.dims == ("surface_vertex",)]
+    found = {name.removeprefix("surface_"): ("place", ds[name].values, ds[name].attrs) for name in along}
+    found["surface"] = ("place", which, {"long_name": "surface, counted from 0", "units": "1"})
+    found["kind"] = ("place", ds.surface_class.values[which], ds.surface_class.attrs)
+    return _table(ds, found, "vertices of surfaces from the file")
 
 
 def _edges(ds):

@@ -21,7 +21,7 @@ NO_FORMULAS = "tex2jax_ignore mathjax_ignore"
 # Attributes that concern the file, not a point.
 OF_FILE = (
     "points", "accuracy_missed", "status_counts", "verdict_counts", "areas", "boundaries", "refine", "refine_points",
-    "complete",
+    "surfaces", "surfaces_left_out", "complete",
 )  # fmt: skip
 
 

@@ -59,6 +59,8 @@ def _workflow(ds, ranges, num):
     axes = [dim for dim in ds.status.dims if dim in ds.coords]
     if data.get("boundaries", {}).get("axis") not in (None, *axes):
         del data["boundaries"]
+    if len(axes) != 3:
+        data.get("boundaries", {}).pop("surfaces", None)
     if len(axes) != 2:
         data.pop("refine", None)
     return data

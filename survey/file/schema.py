@@ -1,7 +1,7 @@
 """The structure of a survey's dataset, checked when one is opened, since the file may be untrusted.
 
-Only attributes, types, dimensions and coordinates are read here; edges, curves and cells are checked where they are
-used.
+Only attributes, types, dimensions and coordinates are read here; edges, curves, surfaces and cells are checked where
+they are used.
 """
 
 import math
@@ -15,13 +15,13 @@ from survey.errors import Damaged
 RATIO, SPARE = 1032, 2**20
 CHUNK = 2**28  # bytes: tiles of survey are a hundred times smaller
 AXIS = 10**8  # values: more than a workflow allows
-ROUNDED = 1e-9  # of an axis: by how much the end of a cell may lie beyond it
+ROUNDED = 1e-9  # of an axis: by how much the end of a cell, or a vertex, may lie beyond it
 AREA = 1e300  # so that sums and fractions of areas stay within the range of floats
 VARIABLES, FLAGS = 2000, 28
 REQUIRED = ("scene", "options", "method", "rtol")
 TEXTS = (
-    "scene", "options", "method", "title", "summary", "scene_text", "scene_hash", "workflow", "boundaries", "refine",
-    "status_counts", "verdict_counts", "areas",
+    "scene", "options", "method", "title", "summary", "scene_text", "scene_hash", "workflow", "boundaries", "surfaces",
+    "refine", "status_counts", "verdict_counts", "areas",
 )  # fmt: skip
 PACKING = ("scale_factor", "add_offset", "missing_value", "_Unsigned")
 ENCODINGS = ("utf-8", "ascii")
@@ -181,16 +181,45 @@ def curves(ds):
     _coded(ds, "curve_class")
 
 
+def surfaces(ds):
+    """Raise Damaged unless the boundary surfaces are consistent: vertices, triangles and classes, on the three axes."""
+    axes = ds.status.dims
+    if len(axes) != 3 or ds.attrs.get("surfaces") != ", ".join(axes):
+        raise Damaged("the attribute surfaces must name the three axes of the survey")
+    _along(ds, "surface", "surface_vertices", "surface_triangles", "surface_class")
+    _along(ds, "surface_vertex", "surface_position_error", "surface_axis", *(f"surface_{dim}" for dim in axes))
+    _divided(ds, "surface_vertices", "surface_vertex")
+    _divided(ds, "surface_triangles", "surface_triangle")
+    _coded(ds, "surface_class")
+    _coded(ds, "surface_axis")
+    if flags(ds.surface_axis.attrs) != {dim: k for k, dim in enumerate(axes)}:
+        raise Damaged("the flags of surface_axis must be the axes of the survey, from 0")
+    for dim in axes:
+        if ds.sizes[dim] > 1:  # else a plane was taken out
+            _on_axis(ds, dim, f"surface_{dim}")
+        elif not np.isfinite(ds[f"surface_{dim}"].values).all():
+            raise Damaged(f"surface_{dim} contains values that are not finite")
+    if not (ds.surface_position_error.values >= 0).all():
+        raise Damaged("surface_position_error must hold numbers that are not negative")
+    corners = ds.variables.get("surface_corners")
+    if corners is None or corners.dims[:1] != ("surface_triangle",) or corners.shape[1:] != (3,):
+        raise Damaged("surface_corners must hold three vertices of each surface_triangle")
+    if corners.dtype.kind not in "iu":
+        raise Damaged("surface_corners must hold integers")
+    ends = np.cumsum(ds.surface_vertices.values.astype(np.int64))
+    last = np.repeat(ends, ds.surface_triangles.values)[:, None]
+    first = np.repeat(ends - ds.surface_vertices.values, ds.surface_triangles.values)[:, None]
+    if not ((corners.values >= first) & (corners.values < last)).all():
+        raise Damaged("surface_corners must be vertices of the triangle's own surface")
+
+
 def cells(ds):
     """Raise Damaged unless the cells of a refined map and the areas of its verdicts are consistent."""
     if ds.attrs.get("refine") != ", ".join(ds.status.dims) or len(ds.status.dims) != 2:
         raise Damaged("the attribute refine must name the two axes of the map")
     _along(ds, "cell", "cell_verdict", *(f"cell_{dim}_{end}" for dim in ds.status.dims for end in ("low", "high")))
     for dim in ds.status.dims:
-        first, last = np.sort(ds[dim].values.astype(float)[[0, -1]])
-        ends = np.concatenate([ds[f"cell_{dim}_{end}"].values.astype(float) for end in ("low", "high")])
-        if not ((ends - first >= ROUNDED * (first - last)) & (ends - last <= ROUNDED * (last - first))).all():
-            raise Damaged(f"cell_{dim}_low and cell_{dim}_high must lie on the axis {dim}")
+        _on_axis(ds, dim, f"cell_{dim}_low", f"cell_{dim}_high")
     _coded(ds, "cell_verdict")
     if "undecided" not in flags(ds.cell_verdict.attrs) or not ds.sizes["cell"]:
         raise Damaged("cell_verdict must have a flag undecided, and values")
@@ -217,6 +246,14 @@ def _along(ds, what, *names):
         variable = ds.variables.get(name)
         if variable is None or variable.dims != (what,) or variable.dtype.kind not in "iuf":
             raise Damaged(f"{name} must hold a number for each {what}")
+
+
+def _on_axis(ds, dim, *names):
+    """Raise Damaged unless the values of these variables lie on the axis `dim`."""
+    first, last = np.sort(ds[dim].values.astype(float)[[0, -1]])
+    values = np.concatenate([ds[name].values.astype(float) for name in names])
+    if not ((values - first >= ROUNDED * (first - last)) & (values - last <= ROUNDED * (last - first))).all():
+        raise Damaged(f"{' and '.join(names)} must lie on the axis {dim}")
 
 
 def _divided(ds, count, what):

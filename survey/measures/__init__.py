@@ -37,6 +37,20 @@ QUESTIONS = {
         ),
         "Seeds": Value("x, kind, index, low, high: edges to begin from, see `measures.hill.curves`", type),
     },
+    # The surfaces that [boundaries] draws in a box of three parameters, see `measures.isosurfaces`.
+    "surfaces": {
+        "refusal": Function("why the scene has no surfaces, in words; None if it has", ("scene",)),
+        "Functions": Value(
+            "the functions, {class: function} in a box of three `axes`, whose zeros are the surfaces: "
+            "Functions(scene, box, axes, fixed, options, method, rtol) has on_lattice(x) -> {class: (values, bounds)}, "
+            "sharp(x, class) -> (values, bounds) and passing(x, class) -> (does it?, {name: (values, bounds)})",
+            type,
+            needed=True,
+        ),
+        "CLASSES": Value("{name: code} of the surfaces' classes", dict, needed=True),
+        "TITLE": Value("what a class is, one line", str, needed=True),
+        "ALONG": Value("survey.scene.Output of what is known at each vertex", tuple, needed=True),
+    },
     # The edges of tongues on each row of a map, between which verdicts do not change.
     "edges": {
         "find": Function(

@@ -8,6 +8,7 @@ from survey.request.schema import Spread
 from survey.sweep.line import second_axis
 from survey.wording import short
 
+OF_SURFACES = ("vertices", "triangles", "class", "corners", "position_error", "axis")  # variables surface_NAME
 MIN_FRACTION = 1e-6  # width of a cell as a fraction of its axis
 
 
@@ -55,6 +56,32 @@ def _check_closed(measure, scene, name, table, axes, given):
         if axes[key].size < 2:
             raise BadInput(f"boundaries: the axis {key} has one value, but curves need a range; give two or more")
     return names[-1]
+
+
+def check_surfaces(scene, name, table, given, proves=False):
+    """Are surfaces requested? Raises BadInput where there can be none."""
+    if table is None or not table.surfaces:
+        return False
+    what, remedy = "boundaries.surfaces", "change the axes, or leave it out"
+    measure = measures.question(scene.FAMILY, "surfaces")
+    if measure is None:
+        raise BadInput(f"{what}: no boundary surfaces are known for the scene {name}; leave it out")
+    refusal = measure.refusal(scene) if hasattr(measure, "refusal") else None
+    if refusal:
+        raise BadInput(f"{what}: {name} {refusal}; leave it out")
+    check_even(scene, name, what)
+    if proves:
+        raise BadInput(f"{what}: surfaces cannot be proved; leave it out")
+    if table.axis is not None:
+        raise BadInput("boundaries.axis: surfaces are searched for along all three axes; leave it out")
+    axes = {key: values for key, values in given.items() if np.ndim(values)}
+    if len(axes) != 3 or min(values.size for values in axes.values()) < 2:
+        shape = ", ".join(f"{key} ({values.size})" for key, values in axes.items())
+        raise BadInput(f"{what}: they need exactly three axes of two values or more, not {shape or 'none'}; {remedy}")
+    taken = set(OF_SURFACES) | {output.name for output in measure.ALONG}
+    for key in sorted(taken & set(axes)):
+        raise BadInput(f"{what}: an axis named {key} would hide surface_{key} in the file; rename the parameter")
+    return True
 
 
 def check_even(scene, name, table):

@@ -52,6 +52,7 @@ class OutputTable(Table):
 
 class BoundariesTable(Table):
     axis: str | None = None
+    surfaces: bool = False
 
 
 class RefineTable(Table):

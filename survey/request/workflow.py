@@ -16,20 +16,22 @@ from survey.grid import Grid
 from survey.request import physical, user_scene
 from survey.request.axes import as_float, check_domain, check_size, grid_of, values_of
 from survey.request.checks import check_options, check_parameters, check_request, is_number, unknown_parameter
-from survey.request.edges_and_cells import check_boundaries, check_refine
+from survey.request.edges_and_cells import check_boundaries, check_refine, check_surfaces
 from survey.request.function_scene import FunctionScene
 from survey.request.output_path import check_path
 from survey.request.schema import File, complaint
 from survey.scene import Request
 from survey.wording import plain, reason_of, short, shown
 
+SURFACES = "surfaces"  # a figure that is no variable
+
 
 @dataclass(frozen=True)
 class Workflow:
     """A checked survey: `scene` is the scene's module; `text` is the workflow as it was run.
 
-    `boundaries`: the axis along which edges are searched. `refine`: for each axis the width of the smallest cells as a
-    fraction of it, and whether it is logarithmic.
+    `boundaries`: the axis along which edges are searched; `surfaces`: are surfaces searched instead? `refine`: for each
+    axis the width of the smallest cells as a fraction of it, and whether it is logarithmic.
     """
 
     name: str
@@ -41,6 +43,7 @@ class Workflow:
     figures: tuple[str, ...]
     text: str
     boundaries: str | None = None
+    surfaces: bool = False
     refine: Mapping[str, tuple[float, bool]] | None = None
     style: str = "screen"
     proves: bool = False  # the cells of `refine`, or the edges of a row, are theorems
@@ -121,8 +124,11 @@ def check(data, text="", output=None, default_path="survey.nc", near=None, prove
         group = parameters[key].instead_of or key
         others = [p.name for p in scene.PARAMETERS if group in (p.name, p.instead_of) and p.name != key]
         check_domain(parameters[key], values, request.variables, others)
+    surfaces = check_surfaces(scene, name, file.boundaries, given, proves)
     for figure in file.output.figures:
-        if figure not in request.variables:
+        if figure == SURFACES and not surfaces:
+            raise BadInput("output.figures: there are no surfaces; write surfaces = true under [boundaries]")
+        if figure not in (*request.variables, SURFACES):
             raise BadInput(f"output.figures: {modules.unknown('variable', figure, sorted(request.variables))}")
     if file.output.figures and not any(np.ndim(values) for values in given.values()):
         raise BadInput("output.figures: a figure needs at least one axis, and every parameter is a single number")
@@ -137,7 +143,8 @@ def check(data, text="", output=None, default_path="survey.nc", near=None, prove
         path=check_path(next(path for path in (output, file.output.path, default_path) if path is not None)),
         figures=tuple(file.output.figures),
         text=text or _as_toml(data),
-        boundaries=check_boundaries(scene, name, file.boundaries, given, proves),
+        boundaries=None if surfaces else check_boundaries(scene, name, file.boundaries, given, proves),
+        surfaces=surfaces,
         refine=check_refine(scene, name, file, given, proves),
         proves=proves,
         style=file.output.style,

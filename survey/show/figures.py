@@ -12,7 +12,7 @@ from matplotlib.text import Text
 from survey import modules
 from survey.errors import BadInput
 from survey.file.labels import masked
-from survey.show import family
+from survey.show import family, surfaces
 from survey.show.ensemble import draw_ensemble, is_ensemble
 from survey.show.layout import alone, fit
 from survey.show.maps import draw_map
@@ -34,8 +34,13 @@ def draw(ds, name=None, style=None, width="single"):
     """The figure of one variable over the survey's axes; not a figure of pyplot, which would show it in notebooks."""
     with matplotlib.rc_context(style_named(style).rc):
         figure = Figure(figsize=figure_size(style, width), layout="constrained")
-        onto(figure.subplots(), ds, name, style=style)
+        onto(figure.subplots(subplot_kw={"projection": projection_of(name)}), ds, name, style=style)
     return figure
+
+
+def projection_of(name):
+    """The projection of the axes on which this is drawn, as matplotlib names it."""
+    return "3d" if isinstance(name, str) and name == surfaces.NAME else None
 
 
 def onto(axes, ds, name=None, boundaries=True, style=None, across=(None, None), colours=None):
@@ -49,6 +54,11 @@ def onto(axes, ds, name=None, boundaries=True, style=None, across=(None, None), 
                 and ds[key].dtype.kind in "iuf"]  # fmt: skip
     name = name or ("verdict" if "verdict" in ds else drawable[0])
     bars = [f"{key}_error" for key in drawable if f"{key}_error" in ds]
+    if projection_of(name) == "3d":
+        surfaces.draw_surfaces(axes, ds)
+        if not paper:
+            axes.set_title(title_of(ds, ds.surface_class), fontsize=10 if alone(axes) else 8)
+        return
     if name not in drawable and name not in bars:
         raise BadInput(modules.unknown("variable", name, drawable))
     for text in axes.findobj(Text):  # perhaps made while the user had LaTeX on

@@ -16,6 +16,7 @@ from survey.show.layout import add_legend
 from survey.show.marks import hatched, marks, marks_without_answer
 from survey.show.palette import UNDECIDED, colours_of, greys, hatch_of, kinds_of
 from survey.show.style import style_named
+from survey.show.surfaces import section
 from survey.show.text import WIDE, label_of, spaced
 
 MAX_DRAWN = 2000  # points along an axis: in a picture of a larger map a cell stands for several points
@@ -66,9 +67,10 @@ def draw_map(axes, ds, variable, state, boundaries, paper, asked):
         handles += marks_without_answer(axes, x, y, failed, outside, number, paper)
         missing &= ~np.isin(state.values, list(scene_statuses(ds).values()))
         handles += [Patch(color="#dddddd", label="does not apply")] if missing.any() else []
-    if boundaries and "curve_count" in ds:
+    if boundaries and ("curve_count" in ds or "surface_vertices" in ds):
         gaps = colours_of(flag_codes(variable.attrs)).get("unstable") if "flag_values" in variable.attrs else None
-        handles += draw_boundaries(axes, in_plane(ds, variable), x, y, gaps)
+        plane = in_plane(ds, variable) if "curve_count" in ds else section(ds, variable)
+        handles += draw_boundaries(axes, plane, x, y, gaps)
     if handles:
         add_legend(axes, handles)
     axes.set(xlabel=label_of(x, WIDE), ylabel=label_of(y, WIDE))

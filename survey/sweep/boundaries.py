@@ -96,8 +96,8 @@ def _measure(workflow, question):
 
 def _closed(workflow, measure):
     """The variables of curves found without rows: on one map, or on each map of the stack along further axes."""
-    names, fixed = list(workflow.grid.sizes), _fixed(workflow)
-    square, third = _square(workflow, *names[:2]), names[2:]
+    names, fixed = list(workflow.grid.sizes), fixed_of(workflow)
+    square, third = square_of(workflow, *names[:2]), names[2:]
     planes = _planes(workflow, third)
     if hasattr(measure, "searched"):
         found = [
@@ -111,7 +111,7 @@ def _closed(workflow, measure):
     )
     points = [curves.count.sum() for curves in found]
     values = np.column_stack([flat, *(np.repeat([plane[name] for plane in planes], points) for name in third)])
-    kind = _flags(measure.TITLE, measure.CLASSES, kind)
+    kind = flagged(measure.TITLE, measure.CLASSES, kind)
     variables = _of_curves(workflow, names, count, kind, values, error, "on the curve")
     for output in measure.ALONG:
         along, errors = (np.concatenate([curves.along[output.name][i] for curves in found]) for i in (0, 1))
@@ -128,7 +128,7 @@ def _planes(workflow, names):
     return [dict(zip(names, map(float, values), strict=True)) for values in product(*axes)]
 
 
-def _fixed(workflow):
+def fixed_of(workflow):
     return {name: float(values) for name, (dims, values) in workflow.grid.parameters.items() if not dims}
 
 
@@ -137,15 +137,15 @@ def _on_a_line(workflow, measure):
     (axis,) = workflow.grid.sizes
     values = np.asarray(workflow.grid.parameters[axis][1])
     ends = float(values.min()), float(values.max())
-    found = on_line(workflow.scene, workflow.request.options, axis, ends, _fixed(workflow))
-    parameter, named = _named(workflow, axis)
+    found = on_line(workflow.scene, workflow.request.options, axis, ends, fixed_of(workflow))
+    parameter, named = parameter_of(workflow, axis)
     position = named | {"long_name": f"{parameter.long_name} at the boundary"}
     return {
         "edge_count": ((), np.int32(found.position.size), {
             "long_name": "number of boundaries", "units": "1", "sample_dimension": "edge"}),
         "edge_position": ("edge", found.position, position | {"ancillary_variables": "edge_position_error"}),
         "edge_position_error": ("edge", found.error, named | {"long_name": "error bound of edge_position"}),
-        "edge_class": ("edge", *_flags(measure.TITLE, measure.CLASSES, found.kind)),
+        "edge_class": ("edge", *flagged(measure.TITLE, measure.CLASSES, found.kind)),
     }  # fmt: skip
 
 
@@ -161,7 +161,7 @@ def _of_curves(workflow, names, count, kind, values, error, where):
                        "of its logarithm if the axis is logarithmic"}),
     }  # fmt: skip
     for i, name in enumerate(names):
-        parameter, named = _named(workflow, name)
+        parameter, named = parameter_of(workflow, name)
         variables[f"curve_{name}"] = ("curve_point", values[:, i], named | {
             "long_name": f"{parameter.long_name} {where}", "ancillary_variables": "curve_position_error"})  # fmt: skip
     return variables
@@ -216,7 +216,7 @@ def _rows(workflow, axis, other, edges):
     rows = edges.complete.size
     dims, shape = tuple(other), tuple(workflow.grid.sizes[dim] for dim in other)
     count = np.bincount(edges.row, minlength=rows).astype(np.int32).reshape(shape)
-    parameter, named = _named(workflow, axis)
+    parameter, named = parameter_of(workflow, axis)
     position = named | {"long_name": f"{parameter.long_name} at the edge of a tongue"}
     return {
         "edge_count": (dims, count, {
@@ -234,7 +234,7 @@ def _curves(workflow, across, axis, other, edges, each):
     """The variables of the curves on each map of the axes `across` (its rows) and `axis`, and of their folds."""
     grid, further = workflow.grid, [dim for dim in other if dim != across]
     place = dict(zip(other, np.unravel_index(edges.row, [grid.sizes[dim] for dim in other]), strict=True))
-    found, square = [], _square(workflow, across, axis)
+    found, square = [], square_of(workflow, across, axis)
     curve_of, curves_before = np.full(edges.row.size, -1), 0
     for plane in _planes(workflow, further):
         own = np.ones(edges.row.size, bool)
@@ -293,7 +293,7 @@ def _of_folds(workflow, across, names, square, further, found):
         "long_name": f"curve that turns back in {across}, counted from 0", "units": "1",
         "instance_dimension": "curve"})}  # fmt: skip
     for i, name in enumerate(names):
-        parameter, named = _named(workflow, name)
+        parameter, named = parameter_of(workflow, name)
         variables[f"fold_{name}"] = ("fold", at_folds[:, i], named | {
             "long_name": f"{parameter.long_name} at the fold of an edge",
             "ancillary_variables": f"fold_{name}_error"})  # fmt: skip
@@ -301,14 +301,18 @@ def _of_folds(workflow, across, names, square, further, found):
         variables[f"fold_{name}_error"] = ("fold", abs(ends - at_folds[:, i]).max(axis=0), named | {
             "long_name": f"error bound of fold_{name}"})  # fmt: skip
     for name in further:
-        parameter, named = _named(workflow, name)
+        parameter, named = parameter_of(workflow, name)
         values = np.concatenate([np.full(len(folds.curve), plane[name]) for plane, _, folds, _ in found])
         variables[f"fold_{name}"] = ("fold", values, named | {"long_name": parameter.long_name})
     return variables
 
 
-def _square(workflow, *names):
-    values = [np.asarray(workflow.grid.parameters[name][1]) for name in names]
+def square_of(workflow, *names):
+    return square_over([np.asarray(workflow.grid.parameters[name][1]) for name in names])
+
+
+def square_over(values):
+    """The Square, or box, that axes with these values span."""
     low, high = (np.array([end(v) for v in values]) for end in (np.min, np.max))
     return Square(low, high, np.array([logarithmic(v) for v in values]))
 
@@ -318,7 +322,7 @@ def _pieces(workflow, name):
 
     Tongues accumulate at these singular values: the parts end half way to the map's nearest value, or MARGIN before.
     """
-    line = _square(workflow, name)
+    line = square_of(workflow, name)
     excluded = np.array(next(p for p in workflow.scene.PARAMETERS if p.name == name).excluded)
     known = np.asarray(workflow.grid.parameters[name][1])
     inner = excluded[(excluded > line.low) & (excluded < line.high)]
@@ -329,7 +333,7 @@ def _pieces(workflow, name):
 
 def _parts(workflow, name):
     """The same parts, in values of the parameter."""
-    return _square(workflow, name).parameters(np.array(_pieces(workflow, name))[..., None])[..., 0].tolist()
+    return square_of(workflow, name).parameters(np.array(_pieces(workflow, name))[..., None])[..., 0].tolist()
 
 
 def _columns(pieces):
@@ -362,17 +366,17 @@ def _with_rectangles(x, kind, index, pieces):
     return x, kind, index, low, high
 
 
-def _named(workflow, name):
+def parameter_of(workflow, name):
     """A parameter, with the attributes of its values."""
     parameter = next(p for p in workflow.scene.PARAMETERS if p.name == name)
     return parameter, {"units": parameter.units, "symbol": parameter.symbol}
 
 
 def _class(workflow, kind):
-    return _flags("kind of the periodic solution at the edge", _measure(workflow, "edges").CLASSES, kind)
+    return flagged("kind of the periodic solution at the edge", _measure(workflow, "edges").CLASSES, kind)
 
 
-def _flags(title, classes, kind):
+def flagged(title, classes, kind):
     return kind.astype(np.int8), flag_attributes(classes) | {"long_name": title, "units": "1"}
 
 

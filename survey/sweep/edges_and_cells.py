@@ -1,6 +1,6 @@
-"""What [boundaries] and [refine] add to the file of a map: edges of tongues and curves, and cells."""
+"""What [boundaries] and [refine] add to the file of a map: edges of tongues and curves, surfaces, and cells."""
 
-from survey.sweep import boundaries, dispatch, refine
+from survey.sweep import boundaries, dispatch, refine, surfaces
 
 
 def find(workflow, once, progress=None):
@@ -8,6 +8,8 @@ def find(workflow, once, progress=None):
     found, parts = [], requested(workflow)
     if "edges" in parts and not (workflow.proves and workflow.refine is None):
         found.append(parts["edges"].find(workflow, _on_threads(progress), once))
+    if "surfaces" in parts:
+        found.append(parts["surfaces"].find(workflow, _on_threads(progress), once))
     if workflow.proves:
         from survey.sweep import proofs  # most runs prove nothing
 
@@ -37,6 +39,9 @@ def _on_threads(progress=None):
 
 
 def requested(workflow):
-    """{"edges", "cells": the module that finds them}, as far as the workflow requests them."""
-    tables = {"edges": (boundaries, workflow.boundaries), "cells": (refine, workflow.refine)}
+    """{"edges", "surfaces", "cells": the module that finds them}, as far as the workflow requests them."""
+    tables = {
+        "edges": (boundaries, workflow.boundaries), "surfaces": (surfaces, workflow.surfaces),
+        "cells": (refine, workflow.refine),
+    }  # fmt: skip
     return {what: module for what, (module, table) in tables.items() if table}

@@ -78,7 +78,7 @@ def _about(workflow):
         "options": ",".join(f"{key}={value}" for key, value in request.options.items()),
         "method": request.method,
         "axes": ",".join(workflow.grid.sizes),
-        "tables": ",".join(name for name in ("boundaries", "refine") if getattr(workflow, name)),
+        "tables": ",".join(name for name in ("boundaries", "surfaces", "refine") if getattr(workflow, name)),
     }
 
 

@@ -24,6 +24,16 @@ def test_coupled_oscillators_resonate_at_the_sum_alone():
     assert (survey.evaluate(scene, Omega=beside, epsilon=epsilon).verdict == 1).all()
 
 
+@pytest.mark.parametrize("frequency, product", [(2.0, 1.0), (1.24, 0.62**2), (1.62, 0.62)])
+def test_damping_suppresses_resonances_from_a_strength_on(frequency, product):
+    """To first order epsilon = 4 c sqrt(omega_i omega_j): of the next order is c^2."""
+    scene, c = str(FOLDER / "damped_oscillators.py"), 0.004
+    limit = 4 * c * np.sqrt(product)
+    Omega = frequency + 0.5 * limit * np.linspace(-1, 1, 41)
+    below, above = (survey.evaluate(scene, Omega=Omega, epsilon=k * limit, c=c).verdict.values for k in (0.98, 1.02))
+    assert (below == 1).all() and (above == 0).any()
+
+
 @pytest.mark.parametrize("lost", [0.0, 1.0])
 def test_ground_resonance_by_plain_integration(lost):
     """M(t) is solved by numpy at every time: another code, another integrator."""

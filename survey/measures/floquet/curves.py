@@ -54,16 +54,7 @@ def searched(scene, square, axes, fixed, options):
     if scene.FAMILY == "orbit":
         return joined(scene.curves(square, axes, fixed), [output.name for output in ALONG])
 
-    def matrices(x, rtol=RTOL):
-        values = square.parameters(x)
-        point = fixed | {name: values[:, k] for k, name in enumerate(axes)}
-        request = Request(options, "auto", rtol, frozenset(["monodromy"]))
-        with np.errstate(all="ignore"):
-            out = scene.solve(point, request)
-        found = out["monodromy"], out["monodromy_error"]
-        # a system of one's own may have a conserved quantity
-        return scene.judged(values, axes, fixed, *found) if hasattr(scene, "judged") else found
-
+    matrices = matrices_of(scene, square, axes, fixed, options)
     found, on_lattice = [], matrices(contours.lattice(LINES), ROUGH)
     for kind, function in bifurcations.functions(on_lattice[0].shape[1], scene.structure).items():
         values, bars = function(*on_lattice)
@@ -80,6 +71,22 @@ def searched(scene, square, axes, fixed, options):
                 known = {"angle": (angle[part], bar[part]), "outside": (outside[part], 0.0 * bar[part])}
                 found.append((kind, square.parameters(x[part]), error[part], known))
     return joined(found, [output.name for output in ALONG])
+
+
+def matrices_of(scene, square, axes, fixed, options, method="auto"):
+    """matrices(positions (N, axes), rtol) -> (M, E), the monodromy matrices without what is conserved."""
+
+    def matrices(x, rtol=RTOL):
+        values = square.parameters(x)
+        point = fixed | {name: values[:, k] for k, name in enumerate(axes)}
+        request = Request(options, method, rtol, frozenset(["monodromy"]))
+        with np.errstate(all="ignore"):
+            out = scene.solve(point, request)
+        found = out["monodromy"], out["monodromy_error"]
+        # a system of one's own may have a conserved quantity
+        return scene.judged(values, axes, fixed, *found) if hasattr(scene, "judged") else found
+
+    return matrices
 
 
 def _lines(function, grain, values):
