@@ -40,6 +40,8 @@ RTOL, ROUGH = 1e-13, 1e-9  # of M for points of curves, and to see where these a
 
 def refusal(axes, scene):
     """Why there are no curves on a map of these axes, in words; None if there are."""
+    if scene is not None and scene.FAMILY == "orbit" and scene.symmetry is not None:
+        return "curves are not known of orbits with REVERSED; see where the verdict changes on the map, or zoom there"
     if scene is not None and scene.FAMILY == "orbit" and scene.continued is not None:
         along = scene.own[scene.continued.index].name
         if "branch" in axes:
