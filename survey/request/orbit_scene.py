@@ -91,7 +91,7 @@ class OrbitScene(TracedScene):
     @property
     def _one(self):
         """Seconds of an orbit."""
-        return 5e-4 + 1e-4 * len(self.states) ** 2
+        return (5e-4 + 1e-4 * len(self.states) ** 2) * (1.0 if self.symmetry is None else 5.0)
 
     def cost(self, options, sizes):
         """Seconds per point, roughly: one set of curves serves its row, one set of orbits all branches."""
