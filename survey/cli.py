@@ -548,6 +548,9 @@ def _summarise(finished, paths):
     if attributes.get("curves_lost"):
         curves = counted(attributes["curves_lost"], "curve")
         err.print(f"edges: {curves} could not be followed to the map's border (curve_complete = 0)")
+    if attributes.get("curves_unexplained"):
+        segments = counted(attributes["curves_unexplained"], "segment")
+        err.print(f"edges: along {segments} of lines across the map, curves do not explain the change of stability")
     if "edge_left_out" in attributes:
         err.print(f"edges: not searched for {attributes['edge_left_out']}, where they accumulate", markup=False)
     if finished.already_complete:
