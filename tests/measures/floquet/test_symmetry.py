@@ -145,6 +145,18 @@ def test_all_multipliers_and_the_monodromy_matrix():
     assert abs(np.sort(found[1:3].imag) - np.sort(vertical.imag)).max() < 1e-7
 
 
+def test_the_trajectory_against_scipy():
+    ds = survey.evaluate(str(FOLDER / "lyapunov.py"), mu=MU, a=0.3)
+    motion = ds.survey.trajectory()
+    start = np.concatenate([ds.x0.values, np.eye(6).ravel()])
+    t = motion.t.values
+    exact = solve_ivp(rhs, (0, t[-1]), start, "DOP853", t_eval=t[:: len(t) // 7], rtol=1e-12, atol=1e-13)
+    for k, name in enumerate(lyapunov.STATES):
+        off = abs(motion[name].values[:: len(t) // 7] - exact.y[k])
+        # SciPy's own errors grow by the multiplier, some 1500
+        assert (off <= motion[f"{name}_error"].values[:: len(t) // 7] + 1e-9).all()
+
+
 def test_continuation_and_a_start_that_knows_small_orbits_alone():
     scene, a = str(FOLDER / "lyapunov.py"), [0.05, 0.3, 0.62, 0.7]
     whole = survey.evaluate(scene, mu=[0.01, MU], a=a)
