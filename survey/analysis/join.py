@@ -23,7 +23,15 @@ from survey.wording import counted, shown
 
 SAME = ("scene", "scene_hash", "options", "method", "rtol")
 SUMMED = ("wall_time_s", "compile_time_s")
-OF_RUN = ("fingerprint", "blocks_reused", "points_reused", "edge_left_out", "edge_incomplete_rows", "curves_lost")
+OF_RUN = (
+    "fingerprint",
+    "blocks_reused",
+    "points_reused",
+    "edge_left_out",
+    "edge_incomplete_rows",
+    "curves_lost",
+    "curves_unexplained",
+)
 
 
 def concat(datasets: Iterable[xr.Dataset | str | os.PathLike[str]]) -> xr.Dataset:

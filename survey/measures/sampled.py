@@ -15,7 +15,8 @@ class Curves:
     """Curves one after another: `count` points each, of class `kind`.
 
     Per point its `parameters` (m, 2), its `error` (m), in the unit square of the map, and `along`: {name of
-    ALONG: (values, errors)}.
+    ALONG: (values, errors)}. `unexplained`: segments of lines across the map along which a curve is missing, by what is
+    known at their ends; None where nothing is counted.
     """
 
     count: np.ndarray
@@ -23,6 +24,7 @@ class Curves:
     parameters: np.ndarray
     error: np.ndarray
     along: dict
+    unexplained: int | None = None
 
 
 def sampled(position, low, high, first=FIRST):

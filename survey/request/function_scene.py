@@ -11,7 +11,9 @@ from survey.errors import BadInput
 from survey.scene import Parameter
 from survey.wording import plain
 
-_KEYS = re.compile(r"\b(PARAMETERS|PERIOD|EVEN|BREAKS|STATES|STRUCTURE|CONSERVED|START|CONTINUATION|DAMPING)\b")
+_KEYS = re.compile(
+    r"\b(PARAMETERS|PERIOD|EVEN|BREAKS|STATES|STRUCTURE|CONSERVED|START|CONTINUATION|REVERSED|HELD|TRANSVERSE|DAMPING)\b"
+)
 # Beginnings of those lines of numba's messages that do not say what is wrong.
 CHATTER = ("Failed in", "During", "This error", "There are", "- Of which", "Overload", "File ", "Unknown", "^", "[1]")
 _known = {}  # by hash: a worker process compiles a scene once, for all of its blocks

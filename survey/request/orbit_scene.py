@@ -10,11 +10,13 @@ from survey.errors import BadInput
 from survey.measures.floquet import curves, orbit, orbit_curves, orbit_motion
 from survey.measures.floquet.continuation import Range
 from survey.measures.floquet.equation import Equation
+from survey.measures.floquet.symmetry import Symmetry
 from survey.request.floquet_scene import SAME, TRIED
 from survey.request.traced_scene import TracedScene
 from survey.scene import Parameter, plus_minus
 
 LARGEST = 16  # states
+NEARBY = 0.01  # relative to the start: where symmetries are tried
 ELSEWHERE = "give a better start, or another point"
 BRANCH = Parameter(
     "branch", "number of the orbit among those of the point, by the mean square of its states; from the last if < 0",
@@ -37,6 +39,7 @@ class OrbitScene(TracedScene):
     jacobian: Callable | None
     states: tuple[str, ...]
     continued: Range | None
+    symmetry: Symmetry | None
     FAMILY = "orbit"
     AUDIT = ("dop853",)
     OPTIONS = ()
@@ -57,19 +60,24 @@ class OrbitScene(TracedScene):
 
     @cached_property
     def equation(self):
-        return Equation(self.f, len(self.states), self.period, self.start)
+        return Equation(self.f, len(self.states), self.period, self.start, self.symmetry)
 
     @property
     def DIMENSIONS(self):
         """Coordinates: the names of the states, numbers of multipliers, of rows and columns."""
         number = np.arange(1, len(self.states) + 1)
-        judged = number[:-1] if self.period is None else number
+        judged = number[: self.equation.judged]
         return {"state": np.array(self.states), "multiplier": judged, "row": number, "column": number}
 
     @property
     def NOTES(self):
         """What the system is, as global attributes of a file."""
         notes = {"states": ", ".join(self.states), "autonomous": str(self.period is None)}
+        if self.symmetry is not None:
+            notes["reversed"] = ", ".join(self.states[k] for k in self.symmetry.odd)
+            notes["held"] = self.states[self.symmetry.held]
+            if self.symmetry.transverse:
+                notes["transverse"] = ", ".join(self.states[k] for k in self.symmetry.transverse)
         if self.continued is not None:
             index, low, high = self.continued
             notes["continuation"] = f"{self.own[index].name} from {low:g} to {high:g}"
@@ -83,7 +91,7 @@ class OrbitScene(TracedScene):
     @property
     def _one(self):
         """Seconds of an orbit."""
-        return 5e-4 + 1e-4 * len(self.states) ** 2
+        return (5e-4 + 1e-4 * len(self.states) ** 2) * (1.0 if self.symmetry is None else 5.0)
 
     def cost(self, options, sizes):
         """Seconds per point, roughly: one set of curves serves its row, one set of orbits all branches."""
@@ -114,6 +122,8 @@ class OrbitScene(TracedScene):
     def why(self, answer):
         """Why a point has its verdict (see `survey.scenes`)."""
         radius = f"spectral radius {plus_minus(answer['spectral_radius'], answer['spectral_radius_error'])}"
+        if self.symmetry is not None and str(answer["verdict"]) == "stable":
+            return "the multipliers are simple and on the unit circle, within their error bars: f is reversible"
         return radius + {
             "unstable": ": it is certainly above 1",
             "stable": ": it is certainly below 1",
@@ -130,6 +140,10 @@ class OrbitScene(TracedScene):
         """Raise BadInput if f cannot be used, or contradicts the scene's other entries at these points (N, n)."""
         equation = self.equation
         given = points if len(points) else np.ones((1, len(self.own)))
+        if self.continued is not None:  # orbits are followed from where there is a start
+            begin = given.copy()
+            begin[:, self.continued.index] = self.continued.low
+            given = np.concatenate([given, begin])
         x0, period = self._called(equation.begin, given)
         known = np.isfinite(x0).all(axis=1) & (period > 0) & np.isfinite(period)
         if len(points) and not known.any():
@@ -140,6 +154,34 @@ class OrbitScene(TracedScene):
             for own, programs in self._called(equation.traced, point[None], x[None]):
                 if own.size and len(points):
                     self._compare(programs, point, x, T)
+                    if self.symmetry is not None:
+                        self._check_symmetry(programs, point, x)
+
+    def _check_symmetry(self, programs, point, x):
+        """Refuse REVERSED, TRANSVERSE and START where f contradicts them, at states about the start."""
+        symmetry, n, here = self.symmetry, len(self.states), self._where(point)
+        for key, some in (("REVERSED", symmetry.odd), ("TRANSVERSE", symmetry.transverse)):
+            for k in some:
+                if x[k] != 0.0:
+                    self._refuse(f"START has {self.states[k]} = {x[k]:g} at {here}", f"states of {key} begin at 0")
+        spread = np.random.default_rng(1).standard_normal((TRIED.size, n))
+        states = x + NEARBY * spread * (abs(x).max() + 1e-300)
+        states[:, list(symmetry.transverse)] = 0.0
+        numbers = tuple(np.repeat(one, TRIED.size, axis=0) for one in programs.numbers(point[None]))
+        f, back = (programs.slopes(numbers, np.zeros(TRIED.size), one)[0] for one in (states, symmetry.signs * states))
+        off = abs(back + symmetry.signs * f).max(axis=0)
+        if (off > SAME * abs(f).max()).any():
+            k = int(off.argmax())
+            self._refuse(
+                f"REVERSED: the derivative of {self.states[k]} is not what time reversed would give, at {here}",
+                "name the states whose sign changes with the direction of time",
+            )
+        A = programs.along(programs.A, numbers, np.zeros((TRIED.size, 1)), states[:, :, None], np.zeros((*f.shape, 1)))
+        if symmetry.couples(A[0][:, 0]).any() or f[:, list(symmetry.transverse)].any():
+            self._refuse(
+                f"TRANSVERSE: where these states are 0, f couples them to the others at {here}",
+                "leave TRANSVERSE out, or name all states of a group",
+            )
 
     def _try(self, point, x):
         """Raise BadInput unless f, run as Python, fills its array."""

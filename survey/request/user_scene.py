@@ -34,8 +34,14 @@ that of the periodic orbits of x' = f(t, x, p)
     STATES, PARAMETERS as above
     PERIOD             T, a number or a function of p; None: f does not depend on t, and T is found
     START              where Newton's method begins: the n states at t = 0, or a function of p that returns them; if
-                       PERIOD is None, a guess of the period after them
+                       PERIOD is None, a guess of the period after them; with CONTINUATION it may be NaN where there is
+                       no guess, and orbits are followed from elsewhere
     CONTINUATION       optional: (name, least, greatest value) of a parameter along which orbits are followed
+    REVERSED, HELD     optional, if PERIOD is None: the names of the states, half of all, that change their sign when
+                       time is reversed (checked), and of one of the others, whose value at t = 0 is that of START:
+                       orbits are sought in which the REVERSED are 0 at t = 0 and half a period later
+    TRANSVERSE         optional, with these: states that are 0 on all orbits, and do not act on the others there; the
+                       stability against motions in these states alone is judged
     jacobian(t, x, p, out)    optional: fills the n x n matrix df/dx, and is compared with that of the record
 
 and all optionally a docstring, TITLE and REFERENCES. It is executed like any Python file: use only files that you
@@ -275,6 +281,9 @@ def orbit(
     start: npt.ArrayLike | Callable[[Any], npt.ArrayLike],
     jacobian: Callable[[Any, Any, Any, Any], Any] | None = None,
     continuation: tuple[str, float, float] | None = None,
+    reversed: str | Iterable[str] | None = None,
+    held: str | None = None,
+    transverse: str | Iterable[str] = (),
     title: str | None = None,
 ) -> OrbitScene:
     """The scene of the periodic orbits of x' = f(t, x, p), for `survey.evaluate` and `survey.run`.
@@ -299,6 +308,13 @@ def orbit(
         those that are found from the start at 9 values. So points have all orbits of these curves, on any grid:
         the output `orbits` is their number, and the parameter `branch` says which one is meant: 1, 2, ..., by the mean
         square of the states, or -1, -2, ... from the largest; 1 by default.
+    reversed, held : for conservative systems without a given period, whose orbits form families: the states, half of
+        all, that change their sign when time is reversed (this is checked), and one of the others, whose value at
+        t = 0 stays that of the start, and tells the orbits of a family apart. Orbits are sought that are their own
+        mirror images, the `reversed` states 0 at t = 0 and half a period later; half of each is computed. The pair of
+        multipliers 1 that all such orbits have is not given or judged.
+    transverse : states, of these, that are 0 on all orbits, as out of a plane: stability against motions in these
+        states alone is judged, and only their multipliers are given.
 
     Raises survey.BadInput with one line that names what is wrong.
 
@@ -319,7 +335,8 @@ def orbit(
         text = ""
     name = f"orbit({getattr(function, '__name__', 'f').strip('<>')})"
     about = inspect.getdoc(function)
-    scene = _orbit(f, period, parameters, states, start, jacobian, continuation, name, text, title, about, ())
+    mirror = reversed, held, transverse
+    scene = _orbit(f, period, parameters, states, start, jacobian, continuation, mirror, name, text, title, about, ())
     _made[scene.HASH] = scene
     return scene
 
@@ -446,7 +463,8 @@ def _from_text(name: str, text: str) -> FunctionScene:
         about = module.__doc__ or inspect.getdoc(getattr(module.f, "py_func", module.f))
         of_orbit = getattr(module, "jacobian", None), getattr(module, "CONTINUATION", None)
         system = module.PERIOD, module.PARAMETERS, module.STATES, module.START
-        return _orbit(module.f, *system, *of_orbit, name, text, title, about, references)
+        mirror = tuple(getattr(module, key, None) for key in ("REVERSED", "HELD", "TRANSVERSE"))
+        return _orbit(module.f, *system, *of_orbit, mirror, name, text, title, about, references)
     optional = getattr(module, "EVEN", False), getattr(module, "BREAKS", ()), getattr(module, "DAMPING", 0.0)
     about = module.__doc__ or inspect.getdoc(getattr(module.z, "py_func", module.z))
     return _hill(module.z, module.PERIOD, module.PARAMETERS, *optional, name, text, title, about, references)
@@ -566,7 +584,7 @@ def _floquet(
 
 def _orbit(
     f: Any, period: Any, parameters: Any, states: Any, start: Any, jacobian: Any, continuation: Any,
-    name: str, text: str, title: str | None, about: str | None, references: Iterable[str],
+    mirror: tuple[Any, ...], name: str, text: str, title: str | None, about: str | None, references: Iterable[str],
 ) -> OrbitScene:  # fmt: skip
     """The checked scene; raises BadInput."""
     from survey.measures.floquet import orbit
@@ -591,6 +609,7 @@ def _orbit(
         refuse("STATES names one state: without a PERIOD, orbits need two")
     if period is not None and not callable(period) and not (is_number(period) and 0 < period < np.inf):
         refuse(f"PERIOD = {period!r}: it must be a positive number, a function of p that returns one, or None")
+    symmetry = _symmetry(mirror, names, period, refuse)
     needed = len(names) + (period is None)
     if not callable(start):
         try:
@@ -603,9 +622,10 @@ def _orbit(
     about = inspect.cleandoc(
         about or f"Periodic orbits of x' = f(t, x, p), p = ({', '.join(p.name for p in parameters)})."
     )
-    known = (f, period, parameters, names, start, jacobian, continued)
+    known = (f, period, parameters, names, start, jacobian, continued, *(() if symmetry is None else (symmetry,)))
     return OrbitScene(
-        f=f, period=period, start=start, jacobian=jacobian, states=names, continued=continued, own=parameters,
+        f=f, period=period, start=start, jacobian=jacobian, states=names, continued=continued, symmetry=symmetry,
+        own=parameters,
         **_described(name, text, title, about, references or ORBIT_REFERENCES, known),
     )  # fmt: skip
 
@@ -645,6 +665,40 @@ def _continued(
         refuse(f"CONTINUATION = {shown(given)}: the range is not within the domain, {own.domain}")
     own = replace(own, minimum=low, maximum=high, open_minimum=False, open_maximum=False)
     return (*parameters[:index], own, *parameters[index + 1 :]), Range(index, low, high)
+
+
+def _symmetry(mirror: tuple[Any, ...], names: tuple[str, ...], period: Any, refuse: Callable[[str], NoReturn]) -> Any:
+    """The `Symmetry` of the orbits that are sought, from REVERSED, HELD and TRANSVERSE, or None."""
+    from survey.measures.floquet.symmetry import Symmetry
+
+    odd, held, transverse = mirror
+    given = {"REVERSED": odd, "TRANSVERSE": transverse}
+    places = {}
+    for key, value in given.items():
+        some = (value,) if isinstance(value, str) else tuple(value) if isinstance(value, Iterable) else ()
+        for one in some:
+            if one not in names or some.count(one) > 1:
+                refuse(f"{key} names {one!r}; name states, each once: {', '.join(names)}")
+        places[key] = tuple(sorted(names.index(one) for one in some))
+    odd, transverse = places["REVERSED"], places["TRANSVERSE"]
+    if not odd:
+        if held is not None or transverse:
+            refuse(f"{'TRANSVERSE' if transverse else 'HELD'} is for orbits with REVERSED; name these states too")
+        return None
+    if period is not None:
+        refuse("REVERSED is for orbits whose PERIOD is not known; set PERIOD = None")
+    if 2 * len(odd) != len(names):
+        refuse(f"REVERSED names {len(odd)} of {len(names)} states; half of all must change their sign")
+    if transverse and len(transverse) == len(names):
+        refuse("TRANSVERSE names all states; some must move on the orbits")
+    if held not in names or names.index(held) in (*odd, *transverse):
+        others = [one for k, one in enumerate(names) if k not in (*odd, *transverse)]
+        refuse(f"HELD = {held!r}: name one of {', '.join(others)}, whose value at t = 0 is that of START")
+    if 2 * len(set(odd) & set(transverse)) != len(transverse):
+        refuse("TRANSVERSE: half of these states must be REVERSED, as a coordinate and its velocity")
+    if len(names) < 4 and not transverse:
+        refuse("REVERSED: in two states there is no other multiplier to judge; name four states at least")
+    return Symmetry(len(names), odd, names.index(held), transverse)
 
 
 def _state_names(states: Any, refuse: Callable[[str], NoReturn]) -> tuple[str, ...]:

@@ -37,8 +37,11 @@ def find(workflow, each=in_turn, once=lambda name, make: make()):
     """
     measure = _measure(workflow, "curves")
     if hasattr(measure, "refusal"):
-        make = _closed if len(workflow.grid.sizes) > 1 else _on_a_line
-        return xr.Dataset(make(workflow, measure), attrs={"boundaries": workflow.boundaries})
+        about = {"boundaries": workflow.boundaries}
+        if len(workflow.grid.sizes) < 2:
+            return xr.Dataset(_on_a_line(workflow, measure), attrs=about)
+        variables, unexplained = _closed(workflow, measure)
+        return xr.Dataset(variables, attrs=about | ({"curves_unexplained": unexplained} if unexplained else {}))
     grid, axis = workflow.grid, workflow.boundaries
     other = [dim for dim in grid.sizes if dim != axis]
     across = next((dim for dim in other if grid.sizes[dim] > 1), None)  # curves need a range
@@ -95,7 +98,9 @@ def _measure(workflow, question):
 
 
 def _closed(workflow, measure):
-    """The variables of curves found without rows: on one map, or on each map of the stack along further axes."""
+    """The variables of curves found without rows, on one map, or on each map of the stack along further axes; and
+    along how many segments of lines across these a curve is missing.
+    """
     names, fixed = list(workflow.grid.sizes), fixed_of(workflow)
     square, third = square_of(workflow, *names[:2]), names[2:]
     planes = _planes(workflow, third)
@@ -119,7 +124,7 @@ def _closed(workflow, measure):
         variables[f"curve_{output.name}"] = ("curve_point", along, about)
         variables[f"curve_{output.name}_error"] = ("curve_point", errors, {
             "long_name": f"error bound of curve_{output.name}", "units": output.units})  # fmt: skip
-    return variables
+    return variables, sum(getattr(curves, "unexplained", None) or 0 for curves in found)
 
 
 def _planes(workflow, names):

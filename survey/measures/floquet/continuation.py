@@ -135,11 +135,11 @@ class Curves:
     def _known(self, i, share, orbits, k):
         for curve in self.of_row[i]:
             for y in curve.crossings(np.array([share]))[1]:
-                if self.free:
+                if self.free and self.equation.symmetry is None:
                     same = abs(y[-2] - orbits.T[k]) <= SAME * orbits.T[k]
                     same &= (abs(y[:-2] - orbits.x[k]) <= orbits.size[k] * 2.1).all()
                 else:
-                    same = (abs(y[:-1] - orbits.x[k]) <= SAME * orbits.size[k].max()).all()
+                    same = (abs(y[: self.equation.n] - orbits.x[k]) <= SAME * orbits.size[k].max()).all()
                 if same:
                     return True
         return False
@@ -241,22 +241,34 @@ class _Walk:
         """The equations' left sides at y (K, m), their derivatives (K, m - 1, m), and what lengths are relative to."""
         n = self.n
         points, x, T = self._real(those, y)
-        X, M, moduli = rough_flow(self.equation, points, x, T)
+        value, slope, moduli = self._closing(those, points, x, T)
         inward = np.where(y[:, -1] < 0.99, DIFFERENCE, -DIFFERENCE)
         shifted = y.copy()
         shifted[:, -1] += inward
-        by_l = (rough_flow(self.equation, *self._real(those, shifted), derived=False)[0] - X) / inward[:, None]
-        value, slope, size = X - x, M - np.eye(n), np.ones_like(y)
+        by_l = (self._closing(those, *self._real(those, shifted), derived=False)[0] - value) / inward[:, None]
+        size = np.ones_like(y)
         size[:, :n] = floored(moduli)
         if self.free:
-            c, at = self.plane[:, those]
-            value = np.concatenate([value, (c * (x - at)).sum(axis=1)[:, None]], axis=1)
-            slope = bordered(slope, slopes(self.equation, points, X), c)
-            by_l = np.concatenate([by_l, np.zeros((len(y), 1))], axis=1)
+            c = self.plane[0, those]
             size[:, n] = T
             across = (c * slopes(self.equation, points, x)).sum(axis=1)
             slope[~(across >= ACROSS * (c * c).sum(axis=1))] = np.nan
         return value, np.concatenate([slope, by_l[:, :, None]], axis=2), size
+
+    def _closing(self, those, points, x, T, derived=True):
+        """What is to be 0 for orbits to close, its derivatives by (x(0), T), and the largest moduli of the states."""
+        n, symmetry = self.n, self.equation.symmetry
+        X, M, moduli = rough_flow(self.equation, points, x, self.equation.share * T, derived)
+        M = M if derived else np.full((len(x), n, n), np.nan)
+        if symmetry is not None:
+            guess = self.equation.begin(points)[0]
+            return *symmetry.linearised(X, M, slopes(self.equation, points, X), x, guess), moduli
+        value, slope = X - x, M - np.eye(n)
+        if self.free:
+            c, at = self.plane[:, those]
+            value = np.concatenate([value, (c * (x - at)).sum(axis=1)[:, None]], axis=1)
+            slope = bordered(slope, slopes(self.equation, points, X), c)
+        return value, slope, moduli
 
 
 def rough_flow(equation, points, x, T, derived=True):

@@ -6,7 +6,8 @@ FINER times as dense, show where to look (marching squares). Every point is then
 function itself that are certain within the error bounds of M, and curves are followed on from their ends inside the
 map, into the tips of tongues (see `tips`). A tongue that is narrower everywhere than the distance of two of the dense
 lines may be missed, and one that the splines do not show. Curves are drawn wherever a multiplier passes, also
-where another one is outside the circle already: `outside` counts those.
+where another one is outside the circle already: `outside` counts those. `row_count` tells where they do not explain
+how many multipliers are outside.
 """
 
 from functools import partial
@@ -18,7 +19,7 @@ from scipy.interpolate import RectBivariateSpline
 from scipy.ndimage import binary_erosion
 
 from survey.measures import contours
-from survey.measures.floquet import bifurcations, tips
+from survey.measures.floquet import bifurcations, row_count, tips
 from survey.measures.floquet.stability import CROSSINGS
 from survey.measures.hill.edges import close_in
 from survey.measures.sampled import FLAT, LONGEST, joined
@@ -40,6 +41,8 @@ RTOL, ROUGH = 1e-13, 1e-9  # of M for points of curves, and to see where these a
 
 def refusal(axes, scene):
     """Why there are no curves on a map of these axes, in words; None if there are."""
+    if scene is not None and scene.FAMILY == "orbit" and scene.symmetry is not None:
+        return "curves are not known of orbits with REVERSED; see where the verdict changes on the map, or zoom there"
     if scene is not None and scene.FAMILY == "orbit" and scene.continued is not None:
         along = scene.own[scene.continued.index].name
         if "branch" in axes:
@@ -70,7 +73,11 @@ def searched(scene, square, axes, fixed, options):
             for part in contours.runs(sure):
                 known = {"angle": (angle[part], bar[part]), "outside": (outside[part], 0.0 * bar[part])}
                 found.append((kind, square.parameters(x[part]), error[part], known))
-    return joined(found, [output.name for output in ALONG])
+    curves = joined(found, [output.name for output in ALONG])
+    counts = row_count.outside(*on_lattice, scene.structure).reshape(LINES, LINES)
+    drawn = [(kind, square.positions(parameters)) for kind, parameters, _error, _known in found]
+    curves.unexplained = row_count.unexplained(counts, drawn)[0]
+    return curves
 
 
 def matrices_of(scene, square, axes, fixed, options, method="auto"):

@@ -9,6 +9,7 @@ import numpy as np
 from survey.kernels.floquet.flow import ORDER, flow
 from survey.kernels.math.roundoff import ROUNDOFF
 from survey.measures.floquet import trace
+from survey.measures.floquet.symmetry import SHARE, Symmetry
 from survey.measures.floquet.system import KEPT, Raised
 from survey.measures.floquet.trace import Graph, Unsupported
 
@@ -19,13 +20,14 @@ LOCK = threading.Lock()
 @dataclass(frozen=True, eq=False)
 class Equation:
     """x' = f(t, x, p) of n states. `period` is a value, a function of p, or None; `start` a value or a function of p,
-    the n states, and a guess of the period after them if `period` is None.
+    the n states, and a guess of the period after them if `period` is None. `symmetry`: of orbits that are sought.
     """
 
     f: Callable
     n: int
     period: float | Callable | None
     start: tuple | Callable
+    symmetry: Symmetry | None = None
     _traces: list = field(default_factory=list, repr=False)
     BRANCHES = "t or on a state"
 
@@ -33,6 +35,16 @@ class Equation:
     def free(self):
         """Is the period unknown?"""
         return self.period is None
+
+    @property
+    def share(self):
+        """Of the period, that is integrated."""
+        return 1.0 if self.symmetry is None else SHARE
+
+    @property
+    def judged(self):
+        """The number of multipliers that are judged."""
+        return self.n - self.free if self.symmetry is None else self.symmetry.judged
 
     def begin(self, points):
         """Guesses of the state (N, n) and of the period (N), which is what it is where it is known."""

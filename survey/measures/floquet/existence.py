@@ -99,8 +99,8 @@ class Path:
         self.defect += self.noise_X[:, :, -1]
         self.f_end = f[self.last, :, -1]
         A, dA = self.along(programs.A, self.noise_X)
-        largest = np.maximum.reduceat(abs(A).max(axis=1), self.first[:-1], axis=0)
-        self.scale = monodromy.balanced(largest)
+        self.largest = np.maximum.reduceat(abs(A).max(axis=1), self.first[:-1], axis=0)
+        self.scale = monodromy.balanced(self.largest)
         self.ratio = (self.scale[:, None, :] / self.scale[:, :, None])[self.point]
         self.norm = SAMPLED * (abs(A).max(axis=1) * self.ratio).sum(axis=2).max(axis=1)
         self.noise = SAMPLED * self.rows_of(dA)

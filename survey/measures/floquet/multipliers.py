@@ -276,7 +276,8 @@ def crossing(own, verdict, paired, signs=None):
         alone = own.isolated[rows, lead] & ~rivals.any(axis=1)
         complex_ = abs(leader.imag) > bars[rows, lead]
         kind = np.where(leader.real > 0, PLUS_ONE, MINUS_ONE)
-        kind = np.where(complex_, COLLISION if paired else NEIMARK_SACKER, kind)
+        # two pairs collide, and one is on the circle
+        kind = np.where(complex_, (COLLISION if n > 3 else UNDECIDED) if paired else NEIMARK_SACKER, kind)
         out[alone] = kind[alone]
     circle = (verdict == STABLE) & paired
     if not paired or not circle.any():

@@ -1,4 +1,4 @@
-"""Newton's method for x(T) = x(0), damped; see `measures.floquet.orbit`.
+"""Newton's method for x(T) = x(0), damped, or for half an orbit (`symmetry`); see `measures.floquet.orbit`.
 
 Source: P. Deuflhard, Newton Methods for Nonlinear Problems (2004), 3.3.
 """
@@ -38,22 +38,24 @@ class Located:
 def located(equation, points, reach, x, T, relax=True):
     """Located orbits at the points (N, parameters), and the numbers of those that are found, beginning at x (N, n), T.
 
-    With `relax`, those that are not found are looked for again from the state after a long time.
+    With `relax`, those that are not found are looked for again from the state after a long time, unless these orbits
+    are symmetric, as those of conservative systems, which attract nothing.
     """
     found = Located(*(np.full(np.shape(a), np.nan) for a in (x, T, x, x, x)), np.zeros(len(x), int))
     good = [np.zeros(0, int)]
     usable = np.flatnonzero(np.isfinite(points).all(axis=1) & np.isfinite(x).all(axis=1) & (T > 0) & np.isfinite(T))
     for inside, programs in equation.traced(points[usable], x[usable]):
         own = usable[inside]
-        orbits = Newton(programs, programs.numbers(points[own]), reach, x[own], T[own], equation.free)
+        orbits = Newton(programs, programs.numbers(points[own]), reach, x[own], T[own], equation)
         those = orbits.solve()
-        if relax:
+        if relax and equation.symmetry is None:
             those = np.sort(np.concatenate([those, orbits.again(np.setdiff1d(np.arange(own.size), those))]))
         found.x[own], found.T[own], found.guess[own] = orbits.x, orbits.T, orbits.guess
         if equation.free:
             found.phase[own] = orbits.phase
         numbers = chosen(orbits.numbers, those)
-        X, _M, size, steps = programs.flow(numbers, orbits.x[those], orbits.T[those], reach, derived=False)
+        span = equation.share * orbits.T[those]
+        X, _M, size, steps = programs.flow(numbers, orbits.x[those], span, reach, derived=False)
         there = np.isfinite(X).all(axis=1)
         found.size[own[those]], found.steps[own[those]] = size, steps
         good.append(own[those[there]])
@@ -61,12 +63,12 @@ def located(equation, points, reach, x, T, relax=True):
 
 
 class Newton:
-    """Newton's method for N points, from states x (N, n) and periods T (N), which are unknown too if `free`."""
+    """Newton's method for N points, from states x (N, n) and periods T (N), which may be unknown too."""
 
-    def __init__(self, programs, numbers, reach, x, T, free):
-        self.programs, self.numbers, self.reach = programs, numbers, reach
+    def __init__(self, programs, numbers, reach, x, T, equation):
+        self.programs, self.numbers, self.reach, self.equation = programs, numbers, reach, equation
         self.x, self.T, self.guess, self.period = x.copy(), T.copy(), x.copy(), T
-        self.phase = programs.slopes(numbers, np.zeros(len(x)), x)[0] if free else None
+        self.phase = programs.slopes(numbers, np.zeros(len(x)), x)[0] if equation.free else None
 
     def again(self, those):
         """As `solve`, for some points, from the state after a long time."""
@@ -80,7 +82,7 @@ class Newton:
             there = there[np.isfinite(T[there])]
         if not there.size:
             return those[:0]
-        other = Newton(self.programs, chosen(numbers, there), self.reach, x[there], T[there], free)
+        other = Newton(self.programs, chosen(numbers, there), self.reach, x[there], T[there], self.equation)
         found, to = other.solve(), those[there]
         for name in ("x", "T", "guess", *(("phase",) if free else ())):
             getattr(self, name)[to[found]] = getattr(other, name)[found]
@@ -144,6 +146,8 @@ class Newton:
 
     def _moved(self, those, step):
         x = self.x[those] + step[:, : self.x.shape[1]]
+        if self.equation.symmetry is not None:
+            x = self.equation.symmetry.started(x, self.guess[those])
         if self.phase is None:
             return x, self.T[those]
         T = self.T[those]
@@ -152,12 +156,15 @@ class Newton:
     def _linearised(self, those, x, T, how):
         """G, the inverse of its derivative, and the sizes of the unknowns."""
         numbers, n = chosen(self.numbers, those), x.shape[1]
-        X, M, size, _steps = self.programs.flow(numbers, x, T, **how)
+        X, M, size, _steps = self.programs.flow(numbers, x, self.equation.share * T, **how)
         value, slope = X - x, M - np.eye(n)
         if self.phase is not None:
-            f, c = self.programs.slopes(numbers, T, X)[0], self.phase[those]
-            plane = (c * (x - self.guess[those])).sum(axis=1)
-            value, slope = np.concatenate([value, plane[:, None]], axis=1), bordered(slope, f, c)
+            f, c, guess = self.programs.slopes(numbers, T, X)[0], self.phase[those], self.guess[those]
+            if self.equation.symmetry is None:
+                plane = (c * (x - guess)).sum(axis=1)
+                value, slope = np.concatenate([value, plane[:, None]], axis=1), bordered(slope, f, c)
+            else:
+                value, slope = self.equation.symmetry.linearised(X, M, f, x, guess)
             size = np.concatenate([size, T[:, None]], axis=1)
             across = (c * self.programs.slopes(numbers, T, x)[0]).sum(axis=1)
             slope[~(across >= ACROSS * (c * c).sum(axis=1))] = np.nan

@@ -7,12 +7,13 @@ Orbits are shown to exist, and bounds made of all outputs, by `existence`.
 """
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from survey import status
 from survey.kernels.floquet.flow import ORDER
-from survey.measures.floquet import existence, monodromy, stability
+from survey.measures.floquet import existence, monodromy, shooting, stability
 from survey.measures.floquet.continuation import Curves
 from survey.measures.floquet.newton import chosen, located
 from survey.measures.floquet.recomputed import recomputed
@@ -23,6 +24,7 @@ CHUNK = 2048  # points that are solved together
 SAME = 1e-6  # relative: what one orbit is, found twice
 ROWS = 64  # whose curves are followed together
 CALL = 200_000  # numbers of a series that are recorded together
+FINER = 4.0  # steps, along symmetric orbits that are not shown to exist otherwise
 
 _of_floquet = {o.name: o for o in stability.OUTPUTS}
 OUTPUTS = (
@@ -77,8 +79,8 @@ def solve_branches(equation, points, branch, continued, method, rtol, wanted):
             full = np.ones(len(own), bool)
             parts.append(found.outputs(full, rtol, wanted, callable(equation.period)))
             count += len(own)
-    order = [numbered(orbits, equation.free) for orbits in of_point]
-    empty = Found(1, equation.n, equation.free).outputs(np.ones(1, bool), rtol, wanted, callable(equation.period))
+    order = [numbered(orbits, equation.free and equation.symmetry is None) for orbits in of_point]
+    empty = Found(equation, 1).outputs(np.ones(1, bool), rtol, wanted, callable(equation.period))
     out = {name: np.concatenate([*(part[name] for part in parts), empty[name]]) for name in empty}
     pick = np.full(len(points), count)
     for i, k, number in zip(np.flatnonzero(known), place, branch[known].astype(int), strict=True):
@@ -125,25 +127,38 @@ def _chunk(equation, points, method, rtol, wanted):
 
 def _shown(equation, points, guess, period, method, rtol, relax=True):
     """What is Found from these guesses."""
-    N, n, reach = len(points), equation.n, _reach(rtol)
-    found = Found(N, n, equation.free)
+    N, reach = len(points), _reach(rtol)
+    found = Found(equation, N)
     orbits, good = located(equation, points, reach, guess, period, relax)
-    for inside, programs in equation.traced(points[good], guess[good]):
+    _show(found, equation, points, orbits, good, method, reach)
+    left = good[~found.good[good]]
+    if equation.symmetry is not None and left.size:
+        _show(found, equation, points, orbits, left, method, reach / FINER, finer=True)
+    return found
+
+
+def _show(found, equation, points, orbits, good, method, reach, finer=False):
+    """Put the orbits, of the points `good`, that are shown to exist into `found`."""
+    n, symmetry = equation.n, equation.symmetry
+    certified = existence.certified if symmetry is None else partial(shooting.certified, symmetry=symmetry)
+    for inside, programs in equation.traced(points[good], orbits.guess[good]):
         own = good[inside]
         numbers = programs.numbers(points[own])
+        if finer:
+            span = equation.share * orbits.T[own]
+            orbits.steps[own] = programs.flow(numbers, orbits.x[own], span, reach, derived=False)[3]
         ends = np.cumsum(orbits.steps[own]) * n * (ORDER + 1)
         cuts = np.searchsorted(ends, np.arange(CALL, ends[-1], CALL)) if own.size else []
         for some in np.split(np.arange(own.size), cuts):
             if some.size:
                 those = own[some]
                 plane = (orbits.phase[those], orbits.guess[those]) if equation.free else None
-                near = programs, chosen(numbers, some), orbits.x[those], orbits.T[those]
+                near = programs, chosen(numbers, some), orbits.x[those], equation.share * orbits.T[those]
                 if hasattr(method, "orbit_motion"):
-                    shown = recomputed(*near, plane, orbits.steps[those], method)
+                    shown = recomputed(*near, plane, orbits.steps[those], method, symmetry)
                 else:
-                    shown = existence.certified(*near, orbits.guess[those], plane, orbits.steps[those], method, reach)
+                    shown = certified(*near, orbits.guess[those], plane, orbits.steps[those], method, reach)
                 found.put(those, shown)
-    return found
 
 
 def _reach(rtol):
@@ -154,9 +169,9 @@ def _reach(rtol):
 class Found:
     """The results of N points as they come in."""
 
-    def __init__(self, N, n, free):
-        m = n - free
-        self.n, self.m, self.free = n, m, free
+    def __init__(self, equation, N):
+        n, m = equation.n, equation.judged
+        self.structure = "none" if equation.symmetry is None else "reversible"
         self.good, self.square = np.zeros(N, bool), np.full(N, np.nan)
         self.x, self.dx, self.T, self.dT = (np.full(shape, np.nan) for shape in ((N, n), (N, n), N, N))
         self.M, self.others = np.full((N, 2, n, n), np.nan), monodromy.Matrices.empty(N, m)
@@ -174,7 +189,7 @@ class Found:
         """The wanted outputs; `known`: the points that have a start and a period."""
         N = len(self.good)
         matrices = self.others
-        answer = stability.assess(matrices, "none", rtol, wanted)
+        answer = stability.assess(matrices, self.structure, rtol, wanted)
         answer.status[~self.good] = NO_ORBIT
         answer.status[~known] = status.INVALID_PARAMETERS
         answer.verdict[~self.good], answer.crossing[~self.good] = stability.UNDECIDED, stability.UNDECIDED

@@ -18,8 +18,8 @@ SHIFT = 1e-6  # relative to the largest state
 ROUNDINGS = 16  # of a step
 
 
-def recomputed(programs, numbers, x, T, plane, steps, method):
-    """As `existence.certified`: Shown, of orbits near x (N, n), T (N)."""
+def recomputed(programs, numbers, x, T, plane, steps, method, symmetry=None):
+    """As `existence.certified`: Shown, of orbits near x (N, n), T (N), or half of it."""
     N, n = x.shape
     count = DENSER * np.maximum(steps, 8)
     shift = SHIFT * abs(x).max(axis=1, keepdims=True) + 1e-300
@@ -32,7 +32,11 @@ def recomputed(programs, numbers, x, T, plane, steps, method):
         dM = abs(M - half) + size[:, :, None] * abs(M).max(axis=(1, 2), keepdims=True)
         moved = abs(other - half) / shift[:, :, None]
         value, slope, off = X - x, M - np.eye(n), dX
-        if plane is not None:
+        if symmetry is not None:
+            f_end = programs.slopes(numbers, T, X)[0]
+            value, slope = symmetry.linearised(X, M, 2.0 * f_end, x, x)
+            off = np.concatenate([dX[:, symmetry.ends], np.zeros((N, n + 1 - symmetry.ends.size))], axis=1)
+        elif plane is not None:
             f_end = programs.slopes(numbers, T, X)[0]
             planar = (plane[0] * (x - plane[1])).sum(axis=1)[:, None]
             value = np.concatenate([value, planar], axis=1)
@@ -49,11 +53,16 @@ def recomputed(programs, numbers, x, T, plane, steps, method):
         judged, bounds = M, E
         if plane is not None:
             f, df = programs.slopes(numbers, np.zeros(N), x, dx)
+        if plane is not None and symmetry is None:
             judged, bounds = deflated(M, E, f, df)
         x, T = x + step[:, :n], T if plane is None else T + step[:, n]
         good = np.isfinite(E).all(axis=(1, 2)) & np.isfinite(dx).all(axis=1)
         good &= (dx < 1e-3 * abs(x).max(axis=1, keepdims=True) + 1e-12).all(axis=1)
-        return Shown(good, x, dx, T, dT, M, E, (x * x).sum(axis=1), monodromy.Matrices.plain(judged, bounds))
+        others = monodromy.Matrices.plain(judged, bounds)
+        if symmetry is not None:
+            M, E, others = symmetry.matrices(M, E, f, df, symmetry.block(M), symmetry.block(E))
+            T, dT = 2.0 * T, 2.0 * dT
+        return Shown(good, x, dx, T, dT, M, E, (x * x).sum(axis=1), others)
 
 
 def _product(A, B):
