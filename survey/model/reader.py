@@ -214,7 +214,7 @@ class Model:
 
 def _read(path):
     """(the table, the bytes of the series) of a model; raises ValueError where the file holds none."""
-    if not isinstance(path, str | os.PathLike):
+    if not isinstance(path, str | os.PathLike) and not hasattr(path, "seek"):  # a file that is open already
         raise TypeError(f"Model: give the path of a file that survey model has made, not {path!r:.80}")
     try:
         with zipfile.ZipFile(path) as archive:
