@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 
 import survey
+from survey.analysis import point
 from survey.errors import BadInput
+from survey.share import page
+from survey.show import boundaries
 
 ROOT = Path(__file__).parents[2]
 
@@ -99,6 +102,31 @@ def test_three_axes_have_boundaries_on_every_plane(tmp_path):
         off = np.minimum(abs(at.a.values + c - expected), abs(at.a.values + c - other))
         assert at.a.size > 2 and (off < 1e-8).all()
     assert ds.survey.slice(c=0.5).survey.map() is not None
+
+
+def test_a_plane_that_crosses_those_of_the_curves_holds_none(tmp_path, monkeypatch):
+    """Curves found on planes of a and r, of which a plane of a and q has points alone."""
+    hill = survey.hill(
+        lambda u, p: p[0] + p[1] * np.cos(2 * u) + p[2] * np.cos(4 * u),
+        period=np.pi,
+        parameters=("a", "q", "r"),
+        even=True,
+    )
+    axes = {"a": {"start": 0.0, "stop": 4.0, "num": 9}, "q": {"values": [0.5, 1.0]}, "r": {"values": [0.0, 1.0]}}
+    ds = survey.run({"scene": hill, "axes": axes, "boundaries": {}}, output=tmp_path / "o.nc")
+    assert ds.attrs["boundaries"] == "r" and (ds.curve_r.values == 1.0).any()
+    assert not boundaries.curves_of(boundaries.in_plane(ds, ds.verdict.isel(r=1)))
+    here = boundaries.in_plane(ds, ds.verdict.isel(q=1))
+    assert boundaries.curves_of(here) and (here.curve_q.values == 1.0).all()
+    assert here.sizes["curve_point"] == (ds.curve_q.values == 1.0).sum()
+    chosen = point.plane(ds, {"q": "1"})  # as --at q=1 does
+    assert chosen.status.dims == ("a", "r", "q")
+    seen = []
+    monkeypatch.setattr(page, "_curves", lambda ds, axes: seen.append(ds) or {"curves": [], "edges": []})
+    monkeypatch.setattr(page, "_series", lambda *_: (None, "of points"))
+    page.made(chosen)
+    assert len(seen) == 1 and (seen[0].curve_q.values == 1.0).all()
+    assert seen[0].sizes["curve"] == here.sizes["curve"]
 
 
 def test_margins_are_the_distances_to_the_edges():
