@@ -408,7 +408,7 @@ def _option_condition(option: Option) -> str:
 
 
 def _parameter_line(module: Any, p: Parameter) -> str:
-    unit = " (any consistent units)" if p.units == "1" else f" ({p.units})"
+    unit = _unit(p.units, module, p.name in getattr(module, "RATIOS", ()))
     need = (
         f"default {p.default:g}"
         if p.default is not None
@@ -423,16 +423,26 @@ def _parameter_line(module: Any, p: Parameter) -> str:
 
 def _outputs_line(module: Any, same: list[Output]) -> str:
     """One line for the outputs of a name; those that differ only in their dimensions are listed once."""
-    texts = list(dict.fromkeys(_output_text(o) for o in same))
+    texts = list(dict.fromkeys(_output_text(module, o) for o in same))
     if len(texts) < len(same):
         return texts[0]
-    return " | ".join(_output_text(o) + condition(module, o.when) for o in same)
+    return " | ".join(_output_text(module, o) + condition(module, o.when) for o in same)
 
 
-def _output_text(o: Output) -> str:
+def _output_text(module: Any, o: Output) -> str:
     what = ", ".join(f"{name} {code}" for name, code in o.flags.items()) if o.flags is not None else ""
-    unit = "" if o.flags is not None or o.integer else " (no unit)" if o.units == "1" else f" ({o.units})"
+    untold = o.flags is not None or o.integer or (o.units == "1" and hasattr(module, "RATIOS"))
+    unit = "" if untold else _unit(o.units, module)
     return "; ".join(part for part in (f"{o.long_name}{unit}", what, o.applies) if part)
+
+
+def _unit(units: str, module: Any, ratio: bool = False) -> str:
+    """The unit of a parameter or an output, in parentheses; an own scene does not tell unless it names one."""
+    if units != "1":
+        return f" ({units})"
+    if isinstance(module, FunctionScene):
+        return ""
+    return " (any consistent units)" if hasattr(module, "RATIOS") and not ratio else " (no unit)"
 
 
 def _method_line(module: Any, name: str) -> str:

@@ -49,12 +49,10 @@ class Parameter:
 
     @property
     def domain(self) -> str:
-        """The domain in words, such as `0 <= k, k != 1`."""
-        words = []
-        if self.minimum > -inf:
-            words.append(f"{self.minimum:g} {'<' if self.open_minimum else '<='} {self.name}")
-        if self.maximum < inf:
-            words.append(f"{self.name} {'<' if self.open_maximum else '<='} {self.maximum:g}")
+        """The domain in words, such as `0 <= k <= 10, k != 1`."""
+        low = f"{self.minimum:g} {'<' if self.open_minimum else '<='} " if self.minimum > -inf else ""
+        high = f" {'<' if self.open_maximum else '<='} {self.maximum:g}" if self.maximum < inf else ""
+        words = [f"{low}{self.name}{high}"] if low or high else []
         words += [f"{self.name} != {value:g}" for value in self.excluded]
         if self.but_for:
             words[-1] += f" (there request the variables {self.but_for}* alone)"

@@ -254,7 +254,7 @@ def draw(found):
     mu, e = np.linspace(1e-4, 0.0485, 400), np.linspace(0.0, 0.92, 300)
     ds = survey.evaluate("libration_elliptic", mu=xr.DataArray(mu, dims="mu"), e=xr.DataArray(e, dims="e"))
     axes.contourf(mu, e, (ds.verdict == 1).transpose("e", "mu"), levels=[0.5, 1.5], colors=["#dbe9f4"])
-    colors = {HARMLESS: "0.6", STABLE: "tab:blue", UNSTABLE: "tab:orange", OPEN: "black"}
+    colors, ends = {HARMLESS: "0.6", STABLE: "tab:blue", UNSTABLE: "tab:orange", OPEN: "black"}, []
     for k, up in dict.fromkeys((row[0], row[-1]) for row in found):
         own = sorted((row for row in found if (row[0], row[-1]) == (k, up)), key=lambda row: row[1])
         for one in own:
@@ -262,15 +262,34 @@ def draw(found):
             for two in sorted(after, key=lambda two, one=one: abs(two[2] - one[2]))[:1]:
                 what = two[3] if one[1] == 0.0 else one[3]
                 axes.plot([one[2], two[2]], [one[1], two[1]], color=colors[what], linewidth=1.4)
-        axes.annotate(f"{k[0]},{k[1]}", (own[0][2], own[0][1]), (-3, -2), textcoords="offset points", fontsize=6,
-                      rotation=90, va="top", ha="left", annotation_clip=False)  # fmt: skip
+        ends.append((own[0][2], own[0][1], f"{k[0]},{k[1]}"))
+    below = sorted(end for end in ends if end[1] == 0.0)
+    for (x, y, text), at in zip(below, spread([x for x, _, _ in below], 0.0012), strict=True):
+        axes.annotate(text, (x, y), (at, -0.03), fontsize=8, rotation=90, va="top", ha="center",
+                      arrowprops={"arrowstyle": "-", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 0})  # fmt: skip
+    for x, y, text in ends:
+        if y > 0.0:
+            axes.annotate(text, (x, y), (4, -4), textcoords="offset points", fontsize=8, va="top")
     for what, color in colors.items():
         if any(row[3] == what for row in found):
             axes.plot([], [], color=color, label=what)
-    axes.set(xlabel=r"$\mu$", ylabel="$e$", xlim=(0, 0.0485), ylim=(-0.03, 0.92),
+    axes.set(xlabel=r"$\mu$", ylabel="$e$", xlim=(0, 0.0485), ylim=(-0.1, 0.92),
              title=r"Resonances $k_1\theta_1 + k_2\theta_2 = 0$ (mod $2\pi$) of order 3 and 4")  # fmt: skip
     axes.legend(loc="upper right")
     return figure
+
+
+def spread(x, least):
+    """Ascending positions moved apart, until neighbours have the least distance."""
+    x = np.array(x)
+    for _ in range(1000):
+        short = least - np.diff(x)
+        if (short <= 1e-3 * least).all():
+            break
+        push = 0.5 * np.maximum(short, 0.0)
+        x[:-1] -= 0.5 * push
+        x[1:] += 0.5 * push
+    return x
 
 
 if __name__ == "__main__":

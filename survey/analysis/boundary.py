@@ -24,7 +24,9 @@ def find(ds, kind=None, index=None):
         found = _between_points(ds)
     for name, value in (("kind", kind), ("index", index)):
         if value is not None and name not in found:
-            raise BadInput(f"{name}: no boundary in the file has one; run the workflow with [boundaries]")
+            raise BadInput(
+                f"boundary: this survey knows no {name} of its boundaries; run its workflow with [boundaries]"
+            )
     if kind is not None:
         classes = flag_codes(found.kind.attrs)
         if kind not in classes:

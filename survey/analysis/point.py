@@ -92,8 +92,13 @@ def plane(ds, at):
         if name in ds.status.dims:
             labelled = name not in ds.coords or ds[name].dtype.kind not in "iuf"
             i = nearest_indices(ds, {name: text if labelled else _number(name, text)})[name]
-            drawn = alone or name in ds.status.dims[:2]
-            ds = of_points(ds).isel({name: i}) if drawn else ds.isel({name: [i]})
+            drawn = name in ds.status.dims[:2]
+            if alone or (drawn and "curve_count" not in ds):
+                ds = of_points(ds).isel({name: i})
+                continue
+            ds = ds.isel({name: [i]})
+            if drawn:  # the last dimension is not; curves of its planes are kept
+                ds = ds.assign(status=ds.status.transpose(..., name))
             continue
         others = [dim for dim in ds.dims if dim in ds.coords and dim not in ds.status.dims]
         if name not in others:

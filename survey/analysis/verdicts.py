@@ -6,6 +6,7 @@ import xarray as xr
 from survey import modules, status
 from survey.errors import BadInput
 from survey.file.labels import UNDECIDED, flag_attributes, flag_codes
+from survey.wording import shown
 
 COMBINED = {"no": 0, "yes": 1}
 
@@ -24,6 +25,8 @@ def where(ds, name):
     """True where the verdict, or the status, is `name`."""
     kinds = _kinds(ds)
     codes = flag_codes(ds.status.attrs)
+    if not isinstance(name, str):
+        raise BadInput(f"where: give the name of one verdict or status, not {shown(name)}; join several by | and &")
     if name in kinds:
         found = kinds[name]
     elif name in codes:

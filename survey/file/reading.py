@@ -39,7 +39,10 @@ def load(path, chunks="auto"):
     try:
         path = Path(path)
     except TypeError:
-        raise BadInput(f"open: give the path of a netCDF file written by survey run, not {shown(path)}") from None
+        several = "; survey.concat joins several" if isinstance(path, list | tuple) else ""
+        raise BadInput(
+            f"open: give the path of a netCDF file written by survey run, not {shown(path)}{several}"
+        ) from None
     _refuse_absent(path)
     try:
         _refuse_changed(path)

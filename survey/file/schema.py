@@ -121,7 +121,9 @@ def _check_points(ds):
         if name not in ds.data_vars:
             continue
         if ds[name].dtype.kind != "i" or set(ds[name].dims) != set(axes):
-            raise Damaged(f"the variable {name} must hold an integer for each point")
+            raise Damaged(
+                f"the variable {name} must hold an integer for each point (means and other arithmetic leave none)"
+            )
 
 
 def _check_variable(ds, name, variable):

@@ -13,6 +13,7 @@ Sources: J. C. Mason, D. C. Handscomb, Chebyshev Polynomials (2003); I. Schur, J
 import hashlib
 import json
 import math
+import os
 import zipfile
 import zlib
 from functools import cached_property
@@ -213,6 +214,8 @@ class Model:
 
 def _read(path):
     """(the table, the bytes of the series) of a model; raises ValueError where the file holds none."""
+    if not isinstance(path, str | os.PathLike) and not hasattr(path, "seek"):  # a file that is open already
+        raise TypeError(f"Model: give the path of a file that survey model has made, not {path!r:.80}")
     try:
         with zipfile.ZipFile(path) as archive:
             for member in (TABLE, SERIES):

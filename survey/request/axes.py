@@ -53,8 +53,8 @@ def check_domain(parameter, values, outputs, others=()):
         what = "is" if np.ndim(values) == 0 else "has an end"
         instead = f"; instead of {parameter.name} you can give {' or '.join(others)}" if others else ""
         raise BadInput(
-            f"axes.{parameter.name} {what} {value:g}, outside its domain; allowed: {parameter.domain}{instead}"
-            f"{physical.hint(parameter, float(value))}"
+            f"axes.{parameter.name} {what} {value:g}, outside its domain; allowed: {parameter.domain}"
+            f"{physical.hint(parameter, float(value))}{instead}"
         )
 
 

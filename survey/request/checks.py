@@ -78,7 +78,7 @@ def _why_excluded(scene, when, key, given, table):
     for name, allowed in when.items():
         if not any(allowed) and options[name] in given:
             return f"cannot be combined with {table}{options[name]}, which is also given; leave out one of them"
-    return f"cannot be combined with the rest{condition(scene, when, key)}"
+    return f"does not apply here{condition(scene, when, key)}"
 
 
 def unknown_parameter(scene, key, known):

@@ -85,6 +85,8 @@ def _axial(a, b, c):
     for name, moment in zip(MOMENTS, (a, b, c), strict=True):
         if not bool((moment >= 0).all()):
             raise BadInput(f"{name} = {shown(float(moment.min()))}: a moment of inertia must be positive, or 0")
+    if not bool(((a <= b + c) & (b <= a + c) & (c <= a + b)).all()):
+        raise BadInput("A, B, C: no body has these moments of inertia: none may exceed the sum of the two others")
     for one, other, axial in ((a, b, c), (b, c, a), (a, c, b)):
         if bool(((one == other) & (one > 0)).all()):
             return axial / one

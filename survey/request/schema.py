@@ -94,7 +94,8 @@ def complaint(error):
     )
     tag = 2 if first["loc"][0] in ("axes", "refine") else None  # pydantic names the kind of axis after the axis
     key = ".".join(short(part, 40) for i, part in enumerate(first["loc"]) if i != tag)
-    more = "" if error.error_count() == 1 else f" (and {error.error_count() - 1} more)"
+    left = error.error_count() - 1
+    more = f" (and {left} more {'mistake' if left == 1 else 'mistakes'})" if left else ""
     if first["type"] == extra and first["loc"][-1] == "values":
         return f"{key} cannot be combined with other keys; give either values alone, or start, stop and num"
     if first["type"] == extra:
@@ -104,6 +105,10 @@ def complaint(error):
         return f"{key} is missing; add it to the workflow{more}"
     if key.startswith("axes.") and isinstance(first["input"], list):
         return f"{key} is a list; write {key.removeprefix('axes.')} = {{ values = [...] }}{more}"
+    if key.startswith("axes.body") and isinstance(first["input"], str):
+        return f"{key}: bodies are named under [options], as in body = {shown(first['input'])}; several, in Python"
+    if first["type"] in ("float_type", "int_type") and isinstance(first["input"], str):
+        return f"{key} = {shown(first['input'])}: it must be a number, without quotes{more}"
     if first["type"] == "list_type":
         example = "[0.1, 0.2]" if key.startswith("axes.") else '["NAME"]'
         return (

@@ -45,6 +45,7 @@ CONTRACT = {
     "STATUS": Value(
         "{name: sentence}: its own reasons why a point has no answer; its own sentence for a common one", dict
     ),
+    "RATIOS": Value("parameters without a unit, in a scene whose others are in any consistent units", tuple),
     "DIMENSIONS": Value("{name: coordinates} of the extra dimensions that its outputs name in `dims`", dict),
     "EVEN": Value("is the coefficient of its Hill equation even about the half period? True if not given", bool),
     "states": Value(

@@ -55,6 +55,7 @@ from survey.status import INVALID_PARAMETERS, NO_CONVERGENCE, OK, OVERFLOW
 TITLE = "Rotation of an axisymmetric body in a Newtonian field (Brun's problem)"
 FAMILY = "nutation"
 AUDIT = ("chebyshev", "carlson")  # the second where the first needs too many nodes
+RATIOS = ("l", "alpha", "beta", "ratio")
 REFERENCES = (
     "Bekov, Shinibaev et al.: quadratures of Kobb's type, a body in a Newtonian field (errata: survey/scenes/brun.md)",
 )

@@ -45,6 +45,7 @@ from survey.status import INVALID_PARAMETERS, NO_CONVERGENCE, OK, OVERFLOW
 TITLE = "Rotation of a body with three unequal moments of inertia in a Newtonian field (Clebsch's case)"
 FAMILY = "body"
 AUDIT = ("dop853",)
+RATIOS = ("gamma1", "gamma2", "gamma3")
 REFERENCES = (
     "A. Clebsch, Ueber die Bewegung eines Koerpers in einer Fluessigkeit, Math. Ann. 3 (1871) 238",
     "Bekov, Shinibaev et al.: quadratures of Kobb's type, a body in a Newtonian field (errata: survey/scenes/brun.md)",

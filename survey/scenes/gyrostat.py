@@ -97,6 +97,7 @@ from survey.status import INVALID_PARAMETERS
 TITLE = "Gyrostat with Barnett-London effect, rotation about axis 1"
 FAMILY = "cylinder"
 AUDIT = ("dop853", "full")
+RATIOS = ("saddle",)
 REFERENCES = (
     "M. E. Lesina, Ya. V. Zinovyeva (2004): Integration of the equations of a gyrostat with Barnett-London effect",
 )

@@ -54,6 +54,7 @@ from survey.status import INVALID_PARAMETERS, NO_CONVERGENCE, OK, OVERFLOW
 TITLE = "Gyrostat with Barnett-London effect, the whole body"
 FAMILY = "body"
 AUDIT = ("dop853",)
+RATIOS = ("gamma1", "gamma2", "gamma3")
 REFERENCES = gyrostat.REFERENCES
 _LARGE = {"minimum": -1e12, "maximum": 1e12}
 _MOST = 1e12  # of reduced parameters, as in the scene gyrostat

@@ -46,6 +46,7 @@ from survey.scenes import gyrostat
 TITLE = "Gyrostat with Barnett-London effect, the integrable cases"
 FAMILY = "cylinder"
 AUDIT = ("dop853",)
+RATIOS = ()
 REFERENCES = gyrostat.REFERENCES
 _LARGE = {"minimum": -1e9, "maximum": 1e9}
 _CASES = ("inclined", "trigonometric", "elliptic", "quartic")

@@ -45,6 +45,7 @@ TITLE = "Out-of-plane stability of planar motions of a satellite with three uneq
 FAMILY = "floquet"
 STATUS = {}
 AUDIT = ("dop853",)
+RATIOS = ("roll_ratio", "yaw_ratio", "k", "one_minus_k")
 REFERENCES = (
     "I. S. Astakhova, Transformation of satellite equations to Hill's equation (errata: survey/scenes/satellite.md)",
     "P. C. Hughes, Spacecraft Attitude Dynamics (1986), chapter 9: the relative equilibrium",

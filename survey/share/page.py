@@ -76,6 +76,7 @@ def made(ds, progress=None):
     axes = [dim for dim in ds.status.dims if ds.sizes[dim] > 1]
     if len(axes) != 2 or any(ds[dim].dtype.kind not in "fi" for dim in axes):
         raise BadInput(f"share: a page shows a map of two numeric axes, and this file has {', '.join(axes) or 'none'}")
+    ds = boundaries.in_plane(ds, ds.status.squeeze())
     ds = ds.squeeze([dim for dim in ds.status.dims if ds.sizes[dim] == 1]).sortby(axes)
     proof = proved.of(ds)
     packed, why = _series(ds, proof, progress)

@@ -57,15 +57,19 @@ CURVES = {
 
 
 def in_plane(ds, variable):
-    """The curves in the plane that is drawn, where a third axis makes a stack of planes."""
+    """The curves that lie in the plane that is drawn, where a third axis makes a stack of planes.
+
+    Curves found on planes that cross it are left out: they meet it in points.
+    """
     fixed = [c for c in variable.coords.values() if c.ndim == 0 and c.name in ds.dims and f"curve_{c.name}" in ds]
     if not fixed:
         return ds
     here = np.repeat(True, ds.sizes["curve_point"])
     for coordinate in fixed:
         here &= ds[f"curve_{coordinate.name}"].values == float(coordinate)
-    firsts = np.cumsum(ds.curve_count.values) - ds.curve_count.values
-    return ds.isel(curve_point=here, curve=here[firsts])
+    curve = np.repeat(np.arange(ds.sizes["curve"]), ds.curve_count.values)
+    whole = np.bincount(curve[~here], minlength=ds.sizes["curve"]) == 0
+    return ds.isel(curve_point=whole[curve], curve=whole)
 
 
 def curves_of(ds):

@@ -6,6 +6,7 @@ Elsewhere (scripts, pipes) nothing is said.
 import contextlib
 import sys
 import threading
+import time
 
 PATIENCE = 0.5  # seconds of compiling that pass without a word
 SECONDS = {"hill": 20, "cylinder": 40, "abel": 40, "nutation": 20, "danby": 10, "normal_form": 10}  # measured, 2 cores
@@ -41,16 +42,25 @@ def compiling(name, scene, say):
     from numba.core import event
 
     class Listener(event.Listener):
-        timer = None
+        timer, depth, spent, said = None, 0, 0.0, False
 
         def on_start(self, _):
-            if self.timer is None:
-                self.timer = threading.Timer(PATIENCE, say, [sentence(name, scene)])
+            self.depth += 1
+            if self.depth == 1 and not self.said:
+                self.began = time.perf_counter()
+                self.timer = threading.Timer(max(PATIENCE - self.spent, 0.0), self.tell)
                 self.timer.daemon = True
                 self.timer.start()
 
         def on_end(self, _):
-            pass
+            self.depth -= 1
+            if self.depth == 0 and not self.said:
+                self.timer.cancel()
+                self.spent += time.perf_counter() - self.began
+
+        def tell(self):
+            self.said = True
+            say(sentence(name, scene))
 
     listener = Listener()
     event.register("numba:compile", listener)

@@ -31,7 +31,7 @@ def on_line(scene, options, along, ends, fixed):
     Raises BadInput where the scene's family knows no curves.
     """
     measure = measures.question(scene.FAMILY, "curves")
-    if hasattr(measure, "searched"):
+    if measure.refusal([along], scene) is None:
         second, bounds, scene = "", (0.0, 1.0), _Flat(scene)
         others = fixed
     else:
@@ -40,10 +40,10 @@ def on_line(scene, options, along, ends, fixed):
         others = {name: value for name, value in fixed.items() if name != second}
     low, high = (np.array(pair, float) for pair in zip(ends, bounds, strict=True))
     square = Square(low, high, np.array([False, False]))
-    if second:
-        curves = measure.closed(square, [along, second], others, options)
-    else:
+    if hasattr(measure, "searched"):
         curves = measure.searched(scene, square, [along, second], others, options)
+    else:
+        curves = measure.closed(square, [along, second], others, options)
     value = fixed.get(second, 0.0)
     here = np.flatnonzero(curves.parameters[:, 1] == value)
     position, kind = curves.parameters[here, 0], np.repeat(curves.kind, curves.count)[here]

@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 
 import survey
+from survey.analysis import point
 from survey.errors import BadInput
+from survey.share import page
+from survey.show import boundaries
 
 ROOT = Path(__file__).parents[2]
 
@@ -101,6 +104,31 @@ def test_three_axes_have_boundaries_on_every_plane(tmp_path):
     assert ds.survey.slice(c=0.5).survey.map() is not None
 
 
+def test_a_plane_that_crosses_those_of_the_curves_holds_none(tmp_path, monkeypatch):
+    """Curves found on planes of a and r, of which a plane of a and q has points alone."""
+    hill = survey.hill(
+        lambda u, p: p[0] + p[1] * np.cos(2 * u) + p[2] * np.cos(4 * u),
+        period=np.pi,
+        parameters=("a", "q", "r"),
+        even=True,
+    )
+    axes = {"a": {"start": 0.0, "stop": 4.0, "num": 9}, "q": {"values": [0.5, 1.0]}, "r": {"values": [0.0, 1.0]}}
+    ds = survey.run({"scene": hill, "axes": axes, "boundaries": {}}, output=tmp_path / "o.nc")
+    assert ds.attrs["boundaries"] == "r" and (ds.curve_r.values == 1.0).any()
+    assert not boundaries.curves_of(boundaries.in_plane(ds, ds.verdict.isel(r=1)))
+    here = boundaries.in_plane(ds, ds.verdict.isel(q=1))
+    assert boundaries.curves_of(here) and (here.curve_q.values == 1.0).all()
+    assert here.sizes["curve_point"] == (ds.curve_q.values == 1.0).sum()
+    chosen = point.plane(ds, {"q": "1"})  # as --at q=1 does
+    assert chosen.status.dims == ("a", "r", "q")
+    seen = []
+    monkeypatch.setattr(page, "_curves", lambda ds, axes: seen.append(ds) or {"curves": [], "edges": []})
+    monkeypatch.setattr(page, "_series", lambda *_: (None, "of points"))
+    page.made(chosen)
+    assert len(seen) == 1 and (seen[0].curve_q.values == 1.0).all()
+    assert seen[0].sizes["curve"] == here.sizes["curve"]
+
+
 def test_margins_are_the_distances_to_the_edges():
     ds = survey.evaluate("satellite", k=[0.3, 0.5], rho=1.2)
     found = ds.survey.margin(k=0.5)
@@ -110,6 +138,38 @@ def test_margins_are_the_distances_to_the_edges():
     np.testing.assert_array_equal(found.distance, found.edge - found.value)
     text = repr(ds.survey.point(k=0.5))
     assert f"rho = {float(found.edge.sel(parameter='rho')):.6g} +- " in text and "nearest boundaries" in text
+
+
+def test_boundaries_of_a_gyrostats_fates():
+    """Fates on both sides of the stable manifolds differ, and between them they do not."""
+    system = {"phi0": 0.5, "b12": 0.7, "b31": -0.4, "d": 1.1, "s2": 0.5}
+    found = survey.edge("gyrostat", along="w0", near=1.0, question="fate", **system)
+    low, high = found.edge.values
+    assert (found.edge_error < 1e-9).all() and found.edge_class.values.tolist() == [0, 0]
+    w0 = [low - 1e-7, low + 1e-7, high - 1e-7, high + 1e-7]
+    fates = survey.evaluate("gyrostat", w0=w0, question="fate", **system)
+    below, first, last, above = zip(fates.verdict.values, fates.limit_phi.values.round(6), strict=True)
+    assert first == last and below != first and above != last
+
+
+@pytest.mark.slow
+def test_folds_of_a_gyrostats_equilibria_lie_on_the_astroid():
+    """g = -d cos sin + s2 cos - s3 sin: equilibria meet where s2^(2/3) + s3^(2/3) = d^(2/3)."""
+    found = survey.edge("gyrostat", along="s2", s2=(0.2, 1.0), question="portrait", b12=0.7, b31=-0.4, d=1.0, s3=0.1)
+    names = found.edge_class.attrs["flag_meanings"].split()
+    (fold,) = [k for k, code in enumerate(found.edge_class.values) if names[code] == "fold"]
+    assert abs(found.edge.values[fold] - (1.0 - 0.1 ** (2 / 3)) ** 1.5) <= found.edge_error.values[fold] < 1e-10
+
+
+@pytest.mark.slow
+def test_the_homoclinic_curve_of_an_own_abel_equation():
+    """I = 0.2545..., the current at which a junction's branch returns to its saddle: the bracket of josephson_curve."""
+    rows = (ROOT / "results" / "josephson_curve.md").read_text().splitlines()
+    (row,) = [line.split("|") for line in rows if line.startswith("| 0.2 |")]
+    scene = str(ROOT / "workflows" / "josephson.py")
+    found = survey.edge(scene, along="I", I=(0.2, 0.3), question="portrait", a=0.2)
+    assert found.edge.size == 1
+    assert abs(float(found.edge[0]) - float(row[2])) <= float(row[3]) + float(found.edge_error[0]) + 1e-10
 
 
 def test_what_has_no_boundaries_is_told():

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import subprocess
 import sys
 from decimal import Decimal
@@ -296,6 +297,18 @@ def test_the_checker_needs_nothing_but_flint(tmp_path):
         [sys.executable, "-I", "alone.py", "map.cert", "-j", "2"], cwd=tmp_path, capture_output=True, text=True
     )
     assert ran.returncode == 0 and ran.stdout.startswith("PROVED\n"), ran
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a pipe without a reader is another error there")
+def test_a_reader_may_leave(tmp_path):
+    """As in survey-check OUT.cert | head -1: no traceback, and the certificate is proved."""
+    (tmp_path / "map.cert").write_text(proof())
+    read, write = os.pipe()
+    os.close(read)
+    command = [sys.executable, checker.__file__, tmp_path / "map.cert"]
+    ran = subprocess.run(command, stdout=write, stderr=subprocess.PIPE, text=True)
+    os.close(write)
+    assert (ran.returncode, ran.stderr) == (0, "")
 
 
 def flipped(letter, other, number=0):

@@ -63,7 +63,17 @@ def test_a_scene_says_what_it_takes():
     told = survey.describe("satellite")["parameters"]
     assert "in degrees" in told["amplitude_deg"] and "any unit" in told["A, B, C"]
     assert "Sun-Jupiter" in survey.describe("libration_elliptic")["parameters"]["body"]
-    assert "any consistent units" in survey.describe("brun")["parameters"]["A"]
+    brun = survey.describe("brun")
+    assert "any consistent units" in brun["parameters"]["A"] and "no unit" in brun["parameters"]["ratio"]
+    assert "no unit" not in brun["outputs"]["period"] and "(rad)" in brun["outputs"]["precession"]
+    assert "modulus of the planar motion (no unit)" in told["k"]
+
+
+def test_moments_that_no_body_has_are_refused():
+    with pytest.raises(survey.BadInput, match="none may exceed the sum of the two others"):
+        survey.evaluate("satellite", amplitude=0.1, A=1.0, B=1.0, C=3.0)
+    flat = survey.evaluate("satellite", amplitude=0.1, A=0.7, B=1.4, C=0.7)  # a disc: equality is allowed
+    assert float(flat.inertia_ratio) == 2.0
 
 
 # NAIF's kernel of constants gm_de440.tpc, in full: BODY10 the Sun, BODY1 to BODY8 the planets' systems, 399 and 301

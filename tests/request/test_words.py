@@ -45,7 +45,27 @@ def test_an_end_outside_its_domain_names_what_may_take_its_place():
     body = {"k": 0.5, "inertia_ratio": {"start": -1.0, "stop": 1.5, "num": 5}}
     assert message(workflow.check, given | {"axes": body}).endswith("instead of inertia_ratio you can give rho")
     e = {"mu": 0.01, "e": {"start": 0.0, "stop": 1.0, "num": 3}}
-    assert message(workflow.check, given | {"scene": "libration_elliptic", "axes": e}).endswith("0 <= e, e < 1")
+    assert message(workflow.check, given | {"scene": "libration_elliptic", "axes": e}).endswith("0 <= e < 1")
+    degrees = {"amplitude": {"start": 0.0, "stop": 90.0, "num": 5}, "rho": 1.0}
+    turned = message(workflow.check, given | {"axes": degrees})
+    assert "allowed: 0 <= amplitude < 1.5708 (rad); if it is in degrees, give amplitude_deg = 90" in turned
+    assert turned.endswith("instead of amplitude you can give k or one_minus_k")
+
+
+def test_values_of_a_workflow_that_are_words():
+    """A number in quotes, a body among the axes; and how many mistakes there are besides the first."""
+    assert message(workflow.check, a_survey(a="1")) == "axes.a = '1': it must be a number, without quotes"
+    libration = {"scene": "libration", "axes": {"body": "Earth-Moon"}}
+    assert message(workflow.check, libration).startswith("axes.body: bodies are named under [options], as in body = '")
+    listed = {"scene": "libration", "axes": {"body": {"values": ["Earth-Moon", "Sun-Jupiter"]}}}
+    assert message(workflow.check, listed).endswith("several, in Python")
+    assert message(workflow.check, {}).endswith("(and 1 more mistake)")
+
+
+def test_what_is_opened_is_one_file(tmp_path):
+    assert message(survey.open, ["a.nc", "b.nc"]).endswith("survey.concat joins several")
+    with pytest.raises(TypeError, match="give the path of a file that survey model has made, not 3"):
+        survey.Model(3)
 
 
 def test_functions_are_told_of_keywords_and_files_of_their_names(tmp_path):

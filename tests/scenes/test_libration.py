@@ -71,5 +71,5 @@ def test_what_is_not_proved_is_said():
 
 @pytest.mark.parametrize("mu", [0.0, -0.01, 0.51])
 def test_a_mass_outside_the_domain_is_refused(mu):
-    with pytest.raises(survey.BadInput, match="allowed: 1e-100 <= mu, mu <= "):
+    with pytest.raises(survey.BadInput, match="allowed: 1e-100 <= mu <= "):
         survey.evaluate("libration", mu=mu)

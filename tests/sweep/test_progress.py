@@ -4,6 +4,7 @@ import io
 import time
 import types
 
+from numba.core import event
 from rich.console import Console
 
 from survey.sweep import announce, progress
@@ -37,6 +38,20 @@ def test_compiling_is_named_once_it_takes_a_moment(monkeypatch):
         function_of_own(2.0)  # compiled already
         time.sleep(0.1)
     assert said == []
+
+
+def test_what_is_compiled_in_a_moment_is_not_named_later(monkeypatch):
+    monkeypatch.setattr(announce, "PATIENCE", 1.0)
+    said = []
+    with announce.compiling("gyrostat", types.SimpleNamespace(FAMILY="cylinder"), said.append):
+        for _ in range(2):
+            with event.trigger_event("numba:compile"):
+                pass
+        time.sleep(1.2)
+        assert said == []
+        with event.trigger_event("numba:compile"):
+            time.sleep(1.2)
+        assert len(said) == 1
 
 
 def test_a_notebook_and_a_terminal_see_a_bar_and_a_script_nothing(monkeypatch):

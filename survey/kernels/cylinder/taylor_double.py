@@ -6,8 +6,9 @@ turning points stay uncounted, or whose fate float64 leaves open, as next to sep
 Source: see `kernels.cylinder.flow_double`.
 """
 
+import numpy as np
+
 from survey.kernels.cylinder import flow_double
-from survey.kernels.cylinder.steps import finite
 
 ORDER = 30
 SERVES = ()  # a last resort, never a user's choice
@@ -21,12 +22,16 @@ def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, stat
     One call per row, so that a run can be interrupted.
     """
     for i in range(len(P)):
-        asked = times[i, : finite(times[i])]
+        asked = _asked(times[i])
         status[i] = flow_double.trajectory(P[i], starts[i, 0], starts[i, 1], asked, floats[i], turnings[i])
 
 
 def flow_abels(P, starts, targets, tolerance, limit, floats, status):
     """See `steps.abels`, and `flow_trajectories`."""
     for i in range(len(P)):
-        asked = targets[i, : finite(targets[i])]
-        flow_double.abel(P[i], starts[i, 0], starts[i, 1], asked, floats[i], status[i])
+        flow_double.abel(P[i], starts[i, 0], starts[i, 1], _asked(targets[i]), floats[i], status[i])
+
+
+def _asked(row):
+    """The numbers before the first infinity or NaN; not `steps.finite`, which would be compiled in each process."""
+    return row[: np.argmin(np.append(np.isfinite(row), False))]
