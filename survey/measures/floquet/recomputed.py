@@ -35,7 +35,10 @@ def recomputed(programs, numbers, x, T, plane, steps, method, symmetry=None):
         if symmetry is not None:
             f_end = programs.slopes(numbers, T, X)[0]
             value, slope = symmetry.linearised(X, M, 2.0 * f_end, x, x)
-            off = np.concatenate([dX[:, symmetry.ends], np.zeros((N, n + 1 - symmetry.ends.size))], axis=1)
+            # these states are 0 at the end, where rounding of others on the way has grown
+            grown = ROUNDINGS * EPS * (count[:, None] + abs(M).sum(axis=2)) * abs(X).max(axis=1, keepdims=True)
+            off = np.zeros((N, n + 1))
+            off[:, : symmetry.ends.size] = (dX + grown)[:, symmetry.ends]
         elif plane is not None:
             f_end = programs.slopes(numbers, T, X)[0]
             planar = (plane[0] * (x - plane[1])).sum(axis=1)[:, None]
