@@ -170,7 +170,8 @@ PYTHON = [
     (lambda ds: survey.evaluate("libration", body="Earth-Mon"), "did you mean 'Earth-Moon'?"),
     (lambda ds: survey.evaluate("libration", m1=1.0), "m2 is missing: give all of m1, m2"),
     (lambda ds: survey.evaluate("satellite", amplitude=0.5, A=-1.0, B=-1.0, C=-0.5), "A = -1.0: a moment of inertia"),
-    (lambda ds: survey.evaluate("satellite", amplitude=0.5, A=0.0, B=0.0, C=1.0), "must be equal and positive"),
+    (lambda ds: survey.evaluate("satellite", amplitude=0.5, A=0.0, B=0.0, C=1.0), "none may exceed the sum"),
+    (lambda ds: survey.evaluate("satellite", amplitude=0.5, A=1.0, B=2.0, C=2.5), "must be equal and positive"),
     (lambda ds: survey.evaluate("satellite", amplitude=0.5, A=1.0, B=1.0), "C is missing: give all of A, B, C"),
     (lambda ds: survey.evaluate("satellite", k=True, rho=1.0), "k = True: it must be a real number"),
     (
