@@ -31,7 +31,7 @@ def on_line(scene, options, along, ends, fixed):
     Raises BadInput where the scene's family knows no curves.
     """
     measure = measures.question(scene.FAMILY, "curves")
-    if measure.refusal([along], scene) is None:
+    if not hasattr(measure, "closed"):  # curves are searched for, on any axis
         second, bounds, scene = "", (0.0, 1.0), _Flat(scene)
         others = fixed
     else:
