@@ -53,6 +53,14 @@ class Equation:
             return guess[:, :-1], guess[:, -1]
         return guess, self.periods(points)
 
+    def pinned(self, points, x):
+        """The states x (N, n), with the one that is held on a family of symmetric orbits as `start` gives it."""
+        if self.symmetry is None:
+            return x
+        x, held = x.copy(), self.symmetry.held
+        x[:, held] = self.begin(points)[0][:, held]
+        return x
+
     def periods(self, points):
         """The periods (N) of a system that depends on t."""
         return np.array([self._row("PERIOD(p)", self.period, p, 1)[0] for p in points])

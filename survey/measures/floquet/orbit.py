@@ -73,7 +73,8 @@ def solve_branches(equation, points, branch, continued, method, rtol, wanted):
         for i in range(0, len(where), CHUNK):
             own = where[i : i + CHUNK]
             period = T[i : i + CHUNK] if equation.free else equation.periods(different[own])
-            found = _shown(equation, different[own], x[i : i + CHUNK], period, method, rtol, relax=False)
+            start = equation.pinned(different[own], x[i : i + CHUNK])  # curves are cubics between their points
+            found = _shown(equation, different[own], start, period, method, rtol, relax=False)
             for k in np.flatnonzero(found.good):
                 of_point[own[k]].append((found.square[k], tuple(found.x[k]), found.T[k], count + k))
             full = np.ones(len(own), bool)

@@ -203,3 +203,14 @@ def test_what_f_contradicts():
         )  # fmt: skip
         with pytest.raises(survey.BadInput, match=words):
             survey.evaluate(scene, A=0.5, w=1.0, b=0.1)
+
+
+def test_an_orbit_on_a_curve_has_the_held_state_of_its_start(monkeypatch):
+    """Between their points curves are cubics, which miss it by 1e-11: the orbit would be a neighbour's."""
+    monkeypatch.setattr("survey.measures.floquet.continuation.LONGEST", 0.5)
+    scene = beams(continuation=("A", 0.1, 3.0))
+    exact = 4 * float(mpmath.ellipk(0.9**2 / (2 * (1 + 0.9**2)))) / math.sqrt(1 + 0.9**2)
+    for rtol in (1e-8, 1e-10):
+        ds = survey.evaluate(scene, A=0.9, w=0.7, b=1.0, rtol=rtol, branch=1)
+        assert ds.x0.values.tolist() == [0.9, 0.0, 0.0, 0.0]
+        assert abs(float(ds.period) - exact) <= float(ds.period_error) + 1e-15 < 1e-9
