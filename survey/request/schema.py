@@ -107,7 +107,7 @@ def complaint(error):
         return f"{key} is a list; write {key.removeprefix('axes.')} = {{ values = [...] }}{more}"
     if key.startswith("axes.body") and isinstance(first["input"], str):
         return f"{key}: bodies are named under [options], as in body = {shown(first['input'])}; several, in Python"
-    if first["type"] in ("float_type", "int_type") and isinstance(first["input"], str):
+    if first["type"] in ("float_type", "int_type") and _is_number(first["input"]):
         return f"{key} = {shown(first['input'])}: it must be a number, without quotes{more}"
     if first["type"] == "list_type":
         example = "[0.1, 0.2]" if key.startswith("axes.") else '["NAME"]'
@@ -116,6 +116,15 @@ def complaint(error):
         )
     message = first["msg"].partition(" or instance of")[0].replace("dictionary", "table")
     return f"{key} = {shown(first['input'])}: {message[0].lower()}{message[1:]}{more}"
+
+
+def _is_number(given):
+    """Is it a text that reads as a number?"""
+    try:
+        float(given)
+    except (TypeError, ValueError):
+        return False
+    return isinstance(given, str)
 
 
 def _nearest(location):
