@@ -120,11 +120,13 @@ def complaint(error):
 
 def _is_number(given):
     """Is it a text that reads as a number?"""
+    if not isinstance(given, str):
+        return False
     try:
         float(given)
-    except (TypeError, ValueError):
+    except ValueError:
         return False
-    return isinstance(given, str)
+    return True
 
 
 def _nearest(location):
