@@ -10,7 +10,6 @@ import xarray as xr
 
 from survey import measures
 from survey.file.labels import meaning
-from survey.measures import isosurfaces
 from survey.measures.tasks import in_turn
 from survey.sweep import boundaries
 
@@ -21,6 +20,8 @@ BYTES_PER_TRIANGLE = 12
 
 def find(workflow, each=in_turn, once=lambda name, make: make()):
     """The dataset of the surfaces; `each` and `once` as in `survey.sweep.boundaries.find`."""
+    from survey.measures import isosurfaces  # it imports much of SciPy, which other runs need not wait for
+
     measure = measures.question(workflow.scene.FAMILY, "surfaces")
     names, box = list(workflow.grid.sizes), boundaries.square_of(workflow, *workflow.grid.sizes)
     functions = measure.Functions(workflow.scene, box, names, boundaries.fixed_of(workflow), workflow.request.options)
@@ -31,6 +32,8 @@ def find(workflow, each=in_turn, once=lambda name, make: make()):
 
 def plan(workflow, cost):
     """({what is known beforehand: bytes}, estimated seconds on one thread), as in `survey.sweep.boundaries.plan`."""
+    from survey.measures import isosurfaces
+
     measure = measures.question(workflow.scene.FAMILY, "surfaces")
     lines, numbers = isosurfaces.LINES, 3 + 1 + 2 * len(measure.ALONG)
     known = {"lattice": f"{lines} x {lines} x {lines}", "bytes_per_vertex": 8 * numbers + 1,
