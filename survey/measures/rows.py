@@ -25,13 +25,17 @@ class Rows:
         """`per_row` of several arrays, (arrays, rows)."""
         found = np.empty((len(arrays), self.rows))
         for column, array in zip(found, arrays, strict=True):
-            column[:] = self.per_row(array)
+            first = self._first(array)
+            column.reshape(first.shape)[...] = first
         return found
 
     def per_row(self, array):
         """One value per row, of an array that is constant along the lanes."""
-        first = self._full(array)[(..., *[0] * self.lane_axes)]
-        return np.array(first, order="C").reshape(self.rows)
+        return np.array(self._first(array), order="C").reshape(self.rows)
+
+    def _first(self, array):
+        """The array at the first of the lanes, in the shape of the rows."""
+        return self._full(array)[(..., *[0] * self.lane_axes)]
 
     def per_point(self, array):
         """All values (rows, lanes), contiguous float64; a copy, as for read-only views kernels would compile again."""

@@ -7,6 +7,8 @@ Mathematics 14 (2005) 99-117. Domain: every parameter value; explicit, so steps 
 
 import math
 
+import numpy as np
+
 from survey.kernels.body import motion
 from survey.kernels.cylinder import (
     basins,
@@ -16,6 +18,7 @@ from survey.kernels.cylinder import (
     lines,
     lockstep,
     lockstep_abel,
+    lockstep_phi,
     returns,
     steps,
     winding,
@@ -91,14 +94,23 @@ def flow_turnings(P, starts, times, tolerance, limit, turnings):
 
 
 def flow_abels(P, starts, targets, tolerance, limit, floats, status):
-    """See `lockstep_abel.abels`, and for programs `steps.abels`."""
-    solve = _abels_in_lockstep if P.shape[1] == COLUMNS else flow_abels_by_row
-    solve(P, starts, targets, tolerance, limit, floats, status)
+    """See `lockstep_phi.abels` and `lockstep_abel.abels`, and for programs `steps.abels`."""
+    if P.shape[1] != COLUMNS:
+        flow_abels_by_row(P, starts, targets, tolerance, limit, floats, status)
+        return
+    ahead = np.zeros((len(P), lockstep_phi.STATE))
+    _abels_in_angle(P, starts, targets, tolerance, limit, ahead, floats, status)
+    _abels_in_time(P, starts, targets, tolerance, limit, ahead, floats, status)
 
 
 @kernel
-def _abels_in_lockstep(P, starts, targets, tolerance, limit, floats, status):
-    lockstep_abel.abels(P, starts, targets, tolerance, limit, floats, status)
+def _abels_in_angle(P, starts, targets, tolerance, limit, ahead, floats, status):
+    lockstep_phi.abels(P, starts, targets, tolerance, limit, ahead, floats, status)
+
+
+@kernel
+def _abels_in_time(P, starts, targets, tolerance, limit, ahead, floats, status):
+    lockstep_abel.abels(P, starts, targets, tolerance, limit, ahead, floats, status)
 
 
 @kernel

@@ -171,7 +171,7 @@ def solve(point, request):
         slowly = partial(_state, method=method, request=request, times=times)
         out = _state_in_lanes(given, columns, valid, slowly, wanted) if auto else slowly(given, valid)
     if "t" not in point:
-        unsettled.settle(out, _ordered(given), solver, valid, request)
+        unsettled.settle(out, columns, solver, valid, request)
     out |= derived.solve(out, request.variables)
     out |= on_request.solve(given, valid, times, out, request)
     return {name: _back(block, values) for name, values in out.items()}

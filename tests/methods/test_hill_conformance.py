@@ -39,7 +39,7 @@ def step(method, start, h, parts=1):
     times = start + (np.arange(parts)[:, None] + np.array(method.NODES)) * (h / parts)
     samples[0, :, 0] = -2 * np.cos(2 * times)
     if getattr(method, "ADAPTIVE", False):
-        a, b, c, d, *_ = method.hill_step(samples[0, 0, 0] + 1.0, h, np.empty((13, 4)))
+        a, b, c, d, *_ = method.hill_step(samples[0, 0, 0] + 1.0, h)
         return np.array([a, c, b, d])
     out = np.empty((1, 10))
     method.hill_chain(samples, 0.0, np.full((1, parts), h / parts), np.ones(1), ZERO, ZERO, ZERO + 1, out)

@@ -436,7 +436,8 @@ def trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
     T, state, before, fixed, fate = split(work)
     tolerance = min(tolerance, COARSEST)
     row, column, block = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64), np.zeros(_SIZE)
-    waiting, steps = _refill(P, starts, times, 0, state, fixed, row, column, status), 0
+    waiting = np.int64(0)  # a literal 0 would have `_refill` compiled twice
+    waiting, steps = _refill(P, starts, times, waiting, state, fixed, row, column, status), 0
     while busy(row):
         step(T, state, before, fixed, fate, tolerance)
         steps += LANES

@@ -181,7 +181,7 @@ def _pass(T, state, before, fixed, q, i, block, targets, j, doubt, started, floa
     turned = v1 <= 0.0
     if turned:
         c = coefficients(T, i)
-        given = (q, (before[PSI, i], c), True)
+        given = (constant(q), (before[PSI, i], c), True)
         reach = bracketed(to_rest, _at, given, 0.5 * reach, (0.0, reach), (1e-17 + 1e-16 * reach, 0.0), 60)[1]
         x, v1 = _moved(c, reach)
         x1 = before[PSI, i] + x
@@ -286,10 +286,10 @@ def _calm(state, fixed, goal, doubt, started, calm):
 
 
 @inline
-def abels(P, starts, targets, tolerance, limit, floats, status):
+def abels(P, starts, targets, tolerance, limit, ahead, floats, status):
     """w and t at the ascending targets >= phi0 of each row, which end at its first infinity; as `steps.abels`.
 
-    P (rows, 10) from `flow.coefficients`.
+    P (rows, 10) from `flow.coefficients`; `ahead` as `lockstep_phi.abels` left it, which comes first.
     """
     work, block = np.zeros((ROWS, LANES)), np.zeros(_SIZE)
     T, state, before, fixed, fate = split(work)
@@ -298,9 +298,7 @@ def abels(P, starts, targets, tolerance, limit, floats, status):
     row, sizes = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
     column, doubt = np.zeros(LANES, dtype=np.int64), np.full(LANES, -1)
     goal, started, calm = np.zeros(LANES), np.zeros(LANES, dtype=np.bool_), np.zeros(LANES, dtype=np.bool_)
-    waiting, free = 0, True
-    ahead = np.zeros((len(P), far.STATE))
-    far.abels(P, starts, targets, tolerance, limit, floats, status, ahead)
+    waiting, free = np.int64(0), True  # a literal 0 would have `_refill` compiled twice
     while True:
         if free:
             for i in range(LANES):

@@ -258,7 +258,7 @@ def _refill(P, starts, targets, waiting, state, fixed, row, goal, ahead):
 
 
 @inline
-def abels(P, starts, targets, tolerance, limit, floats, status, ahead):
+def abels(P, starts, targets, tolerance, limit, ahead, floats, status):
     """Follow each row as far as phi is the variable; arguments as in `lockstep_abel.abels`.
 
     `ahead` (rows, STATE), zeros when called: how far. W stays 0 where a row has not begun, and COLUMN is the number of
@@ -272,7 +272,8 @@ def abels(P, starts, targets, tolerance, limit, floats, status, ahead):
     step, fixed = work[third:fourth], work[fourth:]
     tolerance = min(tolerance, COARSEST)
     row, goal, block = np.full(LANES, -1), np.zeros(LANES), np.zeros(6 * BLOCK)
-    waiting, free, ended = 0, True, np.zeros(LANES, dtype=np.bool_)
+    waiting = np.int64(0)  # a literal 0 would have `_refill` compiled twice
+    free, ended = True, np.zeros(LANES, dtype=np.bool_)
     while True:
         if free:
             waiting = _refill(P, starts, targets, waiting, state, fixed, row, goal, ahead)

@@ -10,7 +10,7 @@ from survey.kernels.hill.matrix import rounding
 from survey.kernels.jit import inline
 from survey.kernels.lanes import column, relative
 from survey.kernels.math.dop853 import E3, E5, STAGES, A, B, C, combined
-from survey.kernels.math.runge_kutta import fundamental
+from survey.kernels.unroll import unroll
 
 SMALLEST, LARGEST = 0.2, 5.0  # ratios of a step to the one before
 # Zeros are counted by signs at the ends of steps: a step stays below this many radians of the fastest phase.
@@ -20,38 +20,51 @@ DOUBT = 0.01
 
 
 @inline
-def hill_step(z, h, slopes):
-    """P and its local truncation bounds over one step, from z at the nodes; `slopes` (STAGES + 1, 4) is scratch."""
-    fundamental(A, STAGES, _hill_slope, z, 2, h, slopes[STAGES], slopes)
+def hill_step(z, h):
+    """P and its local truncation bounds over one step, from z at the nodes."""
+    sums = _sums(z, h)
     size = 0.0
     for i in range(STAGES):
         size = max(size, abs(z[i]))
     # an error of order h^9 is (h sqrt z)^3 of the estimate of order h^6
     doubt = DOUBT * (h * np.sqrt(size)) ** 3
-    p11, d11 = _sums(1.0, h, slopes[:, 0], doubt)
-    p21, d21 = _sums(0.0, h, slopes[:, 1], doubt)
-    p12, d12 = _sums(0.0, h, slopes[:, 2], doubt)
-    p22, d22 = _sums(1.0, h, slopes[:, 3], doubt)
+    p11, d11 = _ended(1.0, h, sums[0:3], doubt)
+    p21, d21 = _ended(0.0, h, sums[3:6], doubt)
+    p12, d12 = _ended(0.0, h, sums[6:9], doubt)
+    p22, d22 = _ended(1.0, h, sums[9:12], doubt)
     # one entry's estimate may vanish by symmetry (constant z): each takes the largest of all, in the scale of the phase
     rate = max(np.sqrt(size), 1.0 / h)
     estimate = max(max(d11, d22), max(d12 * rate, d21 / rate))
     return p11, p12, p21, p22, estimate, estimate / rate, estimate * rate
 
 
-@inline
-def _hill_slope(z, i, state, out):
-    for c in range(2):
-        out[2 * c], out[2 * c + 1] = state[2 * c + 1], -z[i] * state[2 * c]
+@unroll
+def _sums(z, h):
+    """Of y and v of both columns: the slopes' sums with the weights B, E5 and E3, 12 numbers."""
+    sums, steps = [], [[h * float(a) for a in row[:STAGES]] for row in A]
+    for start in ((1.0, 0.0), (0.0, 1.0)):
+        slopes = []
+        for i in range(STAGES):
+            y, v = start
+            for j in range(i):
+                if A[i, j] != 0.0:
+                    y, v = y + steps[i][j] * slopes[j][0], v + steps[i][j] * slopes[j][1]
+            slopes.append((v, -z[i] * y))
+        for k in range(2):
+            for weights in (B, E5, E3):
+                sums.append(_sum(weights[j] * slopes[j][k] for j in range(STAGES) if weights[j] != 0.0))
+    return tuple(sums)
+
+
+def _sum(terms):
+    first, *others = terms
+    return sum(others, first)
 
 
 @inline
-def _sums(start, h, slopes, doubt):
+def _ended(start, h, sums, doubt):
     """The new value, and dop853.f's combination of the estimates of order 5 and 3, which must not vanish by chance."""
-    value, fifth, third = 0.0, 0.0, 0.0
-    for j in range(STAGES):
-        value += B[j] * slopes[j]
-        fifth += E5[j] * slopes[j]
-        third += E3[j] * slopes[j]
+    value, fifth, third = sums
     return start + h * value, abs(h) * (combined(fifth, third) + doubt * abs(fifth))
 
 
@@ -72,7 +85,7 @@ def hill_walk_pieces(potential, p, row, table, edges, slack, longest, tolerance,
 
     No step is longer than `longest`. `potential` is evaluated no nearer to an edge than `slack`, so on the right side.
     """
-    z, slopes = np.empty(STAGES), np.empty((STAGES + 1, 4))
+    z = np.empty(STAGES)
     longest = min(longest, 0.25 * (edges[-1] - edges[0]))  # else a coefficient whose average rules escapes the estimate
     piece, t, steps, h = 1, edges[0], 0, min(longest, 0.1)
     y1, v1, s1, t1, w1 = 1.0, 0.0, 0.0, 0.0, 0.0
@@ -88,7 +101,7 @@ def hill_walk_pieces(potential, p, row, table, edges, slack, longest, tolerance,
             z[i], scale = potential(inside, p, row, table)
             size, terms = max(size, abs(z[i])), max(terms, scale)
         wave = np.sqrt(size) + 1e-3
-        p11, p12, p21, p22, d11, d12, d21 = hill_step(z, h, slopes)
+        p11, p12, p21, p22, d11, d12, d21 = hill_step(z, h)
         error = d11  # the largest of all four entries
         if error <= tolerance and h * wave <= 1.01 * _LONGEST:
             # The stages pass through sums of size 60 that cancel; t itself is rounded.

@@ -95,8 +95,12 @@ def _first_steps(problem, method, asked):
 
 
 def _first_tolerance(problem, rtol):
-    """The first rung (R, L) with a tolerance of 0.01 rtol, or the top one; UNTRIED at NaN."""
-    first = int(np.searchsorted(-TOLERANCES.rungs, -max(0.01 * rtol, TOLERANCES.rungs[-1])))
+    """The first rung (R, L) whose tolerance is a share of rtol, or the top one; UNTRIED at NaN.
+
+    The share falls as the number of steps grows whose errors add up: with rtol^(-1/8) for a method of order 8.
+    """
+    tolerance = 0.03 * rtol**1.125
+    first = int(np.searchsorted(-TOLERANCES.rungs, -max(tolerance, TOLERANCES.rungs[-1])))
     return np.where(_first_rungs(problem, 0.0, 0.0) == UNTRIED, UNTRIED, first)
 
 

@@ -83,7 +83,7 @@ def test_phi_is_the_variable_far_from_turning_points():
     ahead = np.zeros((len(rows), lockstep_phi.STATE))
     P, starts = solution.split(rows)
     again, codes = np.empty_like(floats), np.empty_like(status)
-    lockstep_phi.abels(P, starts, rows[:, 6:7] + over, 1e-13, solution.STEPS, again, codes, ahead)
+    lockstep_phi.abels(P, starts, rows[:, 6:7] + over, 1e-13, solution.STEPS, ahead, again, codes)
     assert (ahead[:, lockstep_phi.COLUMN] == len(over)).all() and (status == steps.OK).all()
     np.testing.assert_array_equal(again, floats)
     assert floats[..., 2].max() < 1e-10 and floats[..., 3].max() < 1e-10
