@@ -136,11 +136,12 @@ class Survey:
 
     def slice(self, **coords):
         """The survey at the values of some axes nearest to `coords`, such as a row of a map, which `survey.map()` draws
-        as a curve with its error band. Returns a Dataset, lazy if this one is.
+        as a curve with its error band. Returns a Dataset, lazy if this one is; a plane keeps the curves of [boundaries]
+        that lie in it.
         """
         from survey.analysis import point
 
-        return point.of_points(self._ds).isel(point.nearest_indices(self._ds, coords))
+        return point.section(self._ds, coords)
 
     def boundary(self, kind=None, index=None):
         """Where the verdict changes: positions along the dimension `place`, as a Dataset.

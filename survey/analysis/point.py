@@ -43,6 +43,18 @@ def of_points(ds):
     return part
 
 
+def section(ds, coords):
+    """The survey at the values of some axes nearest to `coords`; a plane with its curves."""
+    indices = nearest_indices(ds, coords)
+    part = of_points(ds).isel(indices)
+    if part.status.ndim < 2 or "curve_count" not in ds:
+        return part
+    from survey.show.boundaries import in_plane  # loads matplotlib
+
+    curves = in_plane(ds, ds.status.isel(indices))
+    return part.assign({name: v for name, v in curves.data_vars.items() if name.startswith("curve_")})
+
+
 def nearest_indices(ds, coords):
     """{dimension: index of the nearest value} for numbers by axis; raises BadInput for an unknown axis or one outside.
 

@@ -119,6 +119,11 @@ def test_a_plane_that_crosses_those_of_the_curves_holds_none(tmp_path, monkeypat
     here = boundaries.in_plane(ds, ds.verdict.isel(q=1))
     assert boundaries.curves_of(here) and (here.curve_q.values == 1.0).all()
     assert here.sizes["curve_point"] == (ds.curve_q.values == 1.0).sum()
+    part = ds.survey.slice(q=1.0)
+    np.testing.assert_array_equal(part.curve_a, here.curve_a)
+    assert part.survey.boundary().sizes["place"] == here.sizes["curve_point"]
+    assert len(part.survey.map().lines) == here.sizes["curve"]
+    assert ds.survey.slice(r=1.0).sizes["curve"] == 0 and "curve_count" not in ds.survey.slice(q=1.0, r=1.0)
     chosen = point.plane(ds, {"q": "1"})  # as --at q=1 does
     assert chosen.status.dims == ("a", "r", "q")
     seen = []
