@@ -215,6 +215,8 @@ def _labelled(key: str, value: Any) -> xr.DataArray:
             raise BadInput(
                 f"{short(key, 40)}: an array of {array.ndim} dimensions needs names for them; give a DataArray"
             )
+        if array.dtype.kind not in "iuf":  # before xarray takes it: older ones fail on whole numbers beyond floats
+            raise _not_real(key, given)
         value = xr.DataArray(array, dims=(key,) if array.ndim else ())
     if value.dtype.kind not in "iuf":
         raise _not_real(key, value.values if isinstance(given, xr.DataArray) else given)

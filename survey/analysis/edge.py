@@ -16,6 +16,7 @@ from survey.request.edges_and_cells import check_even
 from survey.request.function_scene import FunctionScene
 from survey.scene import plus_minus
 from survey.sweep import boundaries
+from survey.sweep.progress import watched
 from survey.wording import shown
 
 FIRST, WIDER, MOST = 0.05, 8.0, 5  # half the first range around a value, relative to 1 + |value|; how it is widened
@@ -177,11 +178,16 @@ def margin(ds):
         raise BadInput(f"margin: no boundaries are known for the scene {ds.attrs['scene']}")
     here, options = parameters(ds), options_at(ds, module)
     rows = []
-    for name in here:
-        try:
-            rows.append((name, *_margin(scene, options, name, here)))
-        except BadInput:  # no boundaries are known along this parameter, or it cannot vary
-            continue
+    with watched(ds.attrs["scene"], module, 1, lambda: _seconds(measure, here), "parameters") as progress:
+        for done, name in enumerate(here):
+            if progress:
+                progress(done, len(here))
+            try:
+                rows.append((name, *_margin(scene, options, name, here)))
+            except BadInput:  # no boundaries are known along this parameter, or it cannot vary
+                continue
+        if progress:
+            progress(len(here), len(here))
     if not rows:
         raise BadInput(f"margin: no boundaries are known along {', '.join(here)} of {ds.attrs['scene']}")
     names, values, edges, errors, words = map(np.array, zip(*rows, strict=True))
@@ -221,9 +227,14 @@ def is_quick(ds):
     """Are the margins of a point found within about a second?"""
     module = user_scene.find(user_scene.of_dataset(ds))[1]
     measure = measures.question(module.FAMILY, "curves")
-    if measure is None or hasattr(measure, "searched"):
-        return False
-    return not hasattr(measure, "seconds") or sum(measure.seconds([name]) for name in parameters(ds)) < 1.0
+    return measure is not None and _seconds(measure, parameters(ds)) < 1.0
+
+
+def _seconds(measure, names):
+    """An estimate of how long boundaries along each of these parameters take; infinite where they are searched for."""
+    if hasattr(measure, "searched"):
+        return np.inf
+    return sum(measure.seconds([name]) for name in names) if hasattr(measure, "seconds") else 0.0
 
 
 def in_words(found):

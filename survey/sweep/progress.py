@@ -110,10 +110,10 @@ def _left(done, total, reused, elapsed, left):
 
 
 @contextlib.contextmanager
-def watched(name, scene, points, seconds):
+def watched(name, scene, points, seconds, what="blocks"):
     """For a call from Python: names compiling; yields what to call with (done, total), or None if nothing is shown.
 
-    `seconds()` estimates how long it takes.
+    `seconds()` estimates how long it takes; `what` is counted.
     """
     if not announce.is_watched():
         yield None
@@ -124,4 +124,4 @@ def watched(name, scene, points, seconds):
         announce.compiling(name, scene, lambda text: shown.print(text, markup=False)),
         Progress(shown, workflow, silent=quick) as progress,
     ):
-        yield None if quick else lambda done, total: progress(done, total, 0)
+        yield None if quick else lambda done, total: progress(done, total, 0, what)

@@ -48,7 +48,7 @@ def _sampled(integrator, start, parameters, span, order, system):
 
 @cache
 def _build(slope, states, parameters, lanes, rtol):
-    names = heyoka.make_vars(*(f"y{i}" for i in range(states)))
+    names = [heyoka.make_vars(f"y{i}") for i in range(states)]
     slopes = slope(names, [heyoka.par[i] for i in range(parameters)], heyoka.sin, heyoka.cos)
     return heyoka.taylor_adaptive_batch(
         list(zip(names, slopes, strict=True)), np.zeros((states, lanes)), pars=np.zeros((parameters, lanes)),
