@@ -257,10 +257,10 @@ def _solver(module, method, error):
         used = check_parameters(module, module.TITLE, options, point)
         asked = [o.name for o in module.OUTPUTS if exists(o, options) and not o.on_request]
         wanted = frozenset(name for name in asked if everything or name in (error, "verdict"))
-        axes = _axes(point)
-        request = Request(options, method, rtol, wanted, grid.lines(axes), grid.fixed(axes), grid.ranges(axes))
         ndim = max(np.ndim(values) for values in point.values()) or 1
         arrays = {key: np.asarray(point.get(key, p.default), float) for key, p in used.items()}
+        axes = _axes(arrays)
+        request = Request(options, method, rtol, wanted, grid.lines(axes), grid.fixed(axes), grid.ranges(axes))
         dense.panels.cache_clear()  # every call includes its set-up
         floquet.panels.cache_clear()
         fate.forget()

@@ -69,6 +69,7 @@ PARAMETERS = (
 OPTIONS = (Option("direction", ("1", "-1"), "sense of a rotation: 1 as the orbit, -1 against it"),)
 _GIVEN = (("A", "roll_ratio"), ("B", "yaw_ratio"), ("C",), ("k", "one_minus_k", "amplitude"))
 _SHARED = tuple(o for o in stability.OUTPUTS if o.name not in ("exponent", "period", "monodromy"))
+_MULTIPLIERS = {"multiplier_re", "multiplier_im"}
 _MATRIX = next(o for o in stability.OUTPUTS if o.name == "monodromy")
 OUTPUTS = (
     *_SHARED,
@@ -98,13 +99,18 @@ def solve(point, request):
     wanted = set(request.variables) or {o.name for o in OUTPUTS if not o.on_request}
     asked = {o.name for o in (*_SHARED, _MATRIX)} & wanted
     asked |= {"spectral_radius"} if wanted & {"exponent", "exponent_per_orbit"} else set()
-    asked |= {"multiplier_re", "multiplier_im"} if "verdict" in wanted else set()
     k, kc, _, _ = moduli({names[3]: columns[3]})
     lines, turning = _lines(names, columns, request)
     if lines:
         found = _answers(names, turning, columns, request, asked, lines)
     else:
         found = _one_by_one(names, columns, k > 1, request, asked)
+    if "verdict" in wanted:
+        verdict = found["verdict"] = found["verdict"].astype(np.int8)
+        symmetric = (found["status"] == status.OK) & (verdict == UNDECIDED) & _axial(names, columns)
+        if symmetric.any():
+            some = [values[symmetric] for values in columns]
+            verdict[symmetric] = _by_symmetry(_one_by_one(names, some, k[symmetric] > 1, request, _MULTIPLIERS))
     return _derived(found, wanted, names, columns, k, kc)
 
 
@@ -265,16 +271,14 @@ def _derived(out, wanted, names, columns, k, kc):
     out["exponent_per_orbit"] = growth / orbits
     out["exponent_per_orbit_error"] = off / orbits + (_ULPS * EPS + noise) * abs(growth / orbits)
     out["period"], out["period_error"] = period, _ULPS * EPS * period
-    if "verdict" in wanted:
-        out["verdict"] = np.where(_axial(names, columns) & ok, _by_symmetry(out), out["verdict"]).astype(np.int8)
     kept = {name: values for name, values in out.items() if name.removesuffix("_error") in wanted}
     return kept | {"status": out["status"]}
 
 
 def _by_symmetry(out):
-    """Verdicts of bodies with an axis of symmetry: two multipliers are 1, the others decide."""
+    """Verdicts of undecided bodies with an axis of symmetry: two multipliers are 1, the others decide."""
     value = out["multiplier_re"] + 1j * out["multiplier_im"]
     clear = abs(value - 1.0) > out["multiplier_re_error"] + out["multiplier_im_error"]
-    pair = (clear.sum(axis=-1) == 2) & (out["verdict"] == UNDECIDED)
+    pair = clear.sum(axis=-1) == 2
     upper = clear & (value.imag > out["multiplier_im_error"])  # a pair off the real line, and alone, is on the circle
-    return np.where(pair & (upper.sum(axis=-1) == 1), MARGINAL, out["verdict"])
+    return np.where(pair & (upper.sum(axis=-1) == 1), MARGINAL, UNDECIDED)

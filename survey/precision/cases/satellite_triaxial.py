@@ -41,8 +41,8 @@ def works():
     columns = random.uniform(0.1, 0.9, 5_000), random.uniform(-0.6, 0.05, 5_000), random.uniform(0.05, 1.2, 5_000)
     scattered = dict(zip(_NAMES, columns, strict=True))
     return {
-        "line": (_map(np.array([-0.3]), 2_000), {}),
-        "map 100x120": (_map(np.linspace(-0.6, 0.6, 100), 120), {}),
+        "line": (_map(np.array([-0.3]), 10_000), {}),
+        "map 400x600": (_map(np.linspace(-0.6, 0.6, 400), 600), {}),
         "scattered": (scattered, {}),
     }
 
