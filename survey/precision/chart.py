@@ -1,12 +1,18 @@
 """The work-precision chart as a figure: one panel per work, one line per method or peer, and the machine's limit."""
 
+from functools import partial
 from textwrap import fill
 
 import matplotlib.pyplot as plt
+import numpy as np
 
-# Okabe and Ito's colours that are visible as lines
-COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999", "#5D3A9B", "#8C6D31")
-MARKERS = "osD^vP*X<>"
+# Colours, mostly Okabe and Ito's, and markers: the same in every chart, and those of methods that are named in few.
+STYLES = {
+    "auto": ("#D55E00", "o"), "dop853": ("#0072B2", "s"), "rk4": ("#009E73", "D"), "taylor": ("#CC79A7", "^"),
+    "taylor16": ("#CC79A7", "^"), "magnus6": ("#5D3A9B", "v"), "CyRK": ("#E69F00", "P"), "diffrax": ("#56B4E9", "*"),
+    "heyoka": ("#000000", "X"), "scipy": ("#999999", "<"),
+}  # fmt: skip
+OTHERS = (("#8C6D31", ">"), ("#CC79A7", "v"), ("#5D3A9B", "^"), ("#0072B2", "D"), ("#009E73", "s"))
 LEAST_ERROR = 1e-17  # a logarithmic axis has no zero
 MOST_PANELS = 5  # in a row
 SMALL, PLAIN = 17, 11  # characters in an inch of small text, and of plain text
@@ -16,6 +22,8 @@ def draw(records, machine, scene, name, path):
     """Draw the records of `survey precision`, and the least times in `machine`, to `path`."""
     works = list(dict.fromkeys(record.work for record in records))
     runs = list(dict.fromkeys((record.method, record.peer) for record in records))
+    unnamed = [method or peer for method, peer in runs if (method or peer) not in STYLES]
+    styles = STYLES | {name: OTHERS[k % len(OTHERS)] for k, name in enumerate(unnamed)}
     lines = -(-len(works) // MOST_PANELS)
     columns = -(-len(works) // lines)
     size = (max(4.6 * columns, 8.0), 1.0 + 4.6 * lines)
@@ -27,12 +35,14 @@ def draw(records, machine, scene, name, path):
     for axes, work in zip(panels.ravel(), works, strict=False):
         of_work = [record for record in records if record.work == work]
         _limit(axes, [entry for entry in machine["least"] if entry["work"] == work], of_work)
-        for number, (method, peer) in enumerate(runs):
-            style = {"marker": MARKERS[number % len(MARKERS)], "color": COLOURS[number % len(COLOURS)]}
+        for method, peer in runs:
+            colour, marker = styles[method or peer]
+            style = {"marker": marker, "color": colour}
             of_run = [r for r in of_work if (r.method, r.peer) == (method, peer)]
             if of_run:  # closed forms do not answer every work
                 _line(axes, of_run, style)
         axes.set(title=work, xlabel="time per point on one thread (s)", xscale="log", yscale="log")
+        axes.xaxis.set_minor_formatter(partial(_between, axes))
         axes.grid(alpha=0.3)
     for axes in panels[:, 0]:
         axes.set_ylabel(f"largest error of {name} / (1 + |value|)")
@@ -50,6 +60,14 @@ def draw(records, machine, scene, name, path):
     figure.suptitle(fill(words, int(PLAIN * size[0])))
     figure.savefig(path, dpi=150)
     plt.close(figure)
+
+
+def _between(axes, x, _position):
+    """Labels between powers of ten, where an axis shows few of these: at 2 and 5."""
+    low, high = np.log10(axes.get_xlim())
+    power = int(np.floor(np.log10(x)))
+    mantissa = round(x / 10.0**power)
+    return rf"$\mathdefault{{{mantissa}\times10^{{{power}}}}}$" if mantissa in (2, 5) and high - low < 1.5 else ""
 
 
 def _asked(machine):

@@ -14,7 +14,8 @@ def integrate(system, rtol):
     for i, (start, parameters, span) in enumerate(zip(system.start, system.parameters, system.span, strict=True)):
         solved = solve_ivp(_slope, (0.0, span), start, "DOP853", shares * span, args=(system.slope, parameters),
                            rtol=rtol, atol=rtol)  # fmt: skip
-        states[i, : len(solved.t)] = np.transpose(solved.y)
+        if solved.success:  # else fewer times were reached, or none
+            states[i] = np.transpose(solved.y)
     return states[:, 0] if system.samples is None else states
 
 
