@@ -63,6 +63,12 @@ def assess(matrices, structure, rtol, asked, period=None, growth=None):
     M, E = matrices.M, matrices.E
     N, n = M.shape[:2]
     found, paired = Answers(N, n), structure != "none"
+    rough = ~(E <= rtol * (1 + abs(M))).all(axis=(1, 2))
+    if asked == {"monodromy"}:  # as for boundaries: nothing of multipliers is computed
+        found.floats[:] = np.nan
+        known = np.isfinite(M).all(axis=(1, 2)) & np.isfinite(E).all(axis=(1, 2))
+        found.missed, found.status[:] = rough, np.where(known, status.OK, status.OVERFLOW)
+        return found
     discs = multipliers.Discs(matrices)
     found.verdict = multipliers.verdicts(discs, M, E, paired)
     signs = multipliers.krein(discs) if structure == "symplectic" else None
@@ -89,7 +95,6 @@ def assess(matrices, structure, rtol, asked, period=None, growth=None):
         least = np.where(real, abs(centre.real), np.minimum(abs(centre.real), abs(centre.imag)))
         wide = ~(bars <= rtol * (1 + least)).all(axis=1)
         far = ~(bar <= rtol * (1 + value))
-        rough = ~(E <= rtol * (1 + abs(M))).all(axis=(1, 2))
     found.missed = lost | ((found.verdict == UNDECIDED) & ("verdict" in asked))
     found.missed |= (wide & ("multiplier_re" in asked)) | (far & ("spectral_radius" in asked))
     found.missed |= rough & ("monodromy" in asked)

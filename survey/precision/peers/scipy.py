@@ -14,7 +14,9 @@ def integrate(system, rtol):
     for i, (start, parameters, span) in enumerate(zip(system.start, system.parameters, system.span, strict=True)):
         solved = solve_ivp(_slope, (0.0, span), start, "DOP853", shares * span, args=(system.slope, parameters),
                            rtol=rtol, atol=rtol)  # fmt: skip
-        if solved.success:  # else fewer times were reached, or none
+        if span == 0.0:  # no step, and no value either
+            states[i] = start
+        elif solved.success:
             states[i] = np.transpose(solved.y)
     return states[:, 0] if system.samples is None else states
 
