@@ -60,30 +60,55 @@ def roots(a, bars):
     Journal of the ACM 17 (1970) 661-674); P(z_k) by its value and what that may be off.
     """
     found, radii = np.full((len(a), 4), complex(np.nan, np.nan)), np.full((len(a), 4), np.nan)
-    for i, (row, bar) in enumerate(zip(a * BINOMIALS, bars * BINOMIALS, strict=True)):
-        first = next((k for k in range(5) if row[k] != 0.0), 5)
-        row, bar, degree = row[first:], bar[first:], 4 - first
-        if degree < 1 or not np.isfinite(row).all():
-            continue
-        z = np.roots(row).astype(complex)
-        for _ in range(2):  # Weierstrass's simultaneous iteration refines all roots
-            gaps = z[:, None] - z[None] + np.eye(degree)
-            move = np.polyval(row, z) / (row[0] * np.prod(gaps, axis=1))
-            z = np.where(np.isfinite(move) & (np.abs(move) < 0.1 * (1 + np.abs(z))), z - move, z)
-        gaps = z[:, None] - z[None] + np.eye(degree)
-        blur = np.polyval(np.abs(row) * 4 * (degree + 1) * ROUNDING + bar, np.abs(z))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            radius = degree * (np.abs(np.polyval(row, z)) + blur) / np.abs((row[0]) * np.prod(gaps, axis=1))
-        radius = np.where(np.isfinite(radius), radius * 1.1 / max(1.0 - bar[0] / abs(row[0]), 0.1), np.inf)
-        # a disc on the real axis that meets no other holds a real root
-        alone = (np.abs(gaps) + 2 * np.eye(degree) * 1e300 > radius[:, None] + radius[None]).all(axis=1)
-        real = alone & (np.abs(z.imag) <= radius)
-        z, radius = np.where(real, z.real, z), np.where(real, radius + np.abs(z.imag), radius)
-        order = np.lexsort((z.imag, z.real, ~real))
-        found[i, :degree], radii[i, :degree] = z[order], radius[order]
+    rows, bars = a * BINOMIALS, bars * BINOMIALS
+    some = np.isfinite(rows) & (rows != 0.0)
+    leading, trailing = some.argmax(axis=1), some[:, ::-1].argmax(axis=1)
+    for first in range(4):
+        for last in range(5 - first):
+            alike = np.isfinite(rows).all(axis=1) & some.any(axis=1) & (leading == first) & (trailing == last)
+            if alike.any():
+                own = slice(0, 4 - first)
+                found[alike, own], radii[alike, own] = _discs(rows[alike, first:], bars[alike, first:], last)
     unknown = ~np.isfinite(radii)
     found[unknown], radii[unknown] = complex(np.nan, np.nan), np.nan
     return found, radii
+
+
+def _discs(rows, bars, zeros):
+    """The roots of polynomials, the highest power's coefficients first and not 0, the last `zeros` 0; and their radii.
+
+    The bounds of the coefficients are `bars`.
+    """
+    degree = rows.shape[1] - 1
+    one, companion = np.eye(degree), np.zeros((len(rows), degree - zeros, degree - zeros))
+    companion[:, 1:, :-1] = np.eye(degree - zeros)[1:, 1:]
+    companion[:, :1] = -rows[:, None, 1 : degree - zeros + 1] / rows[:, :1, None]
+    z = np.zeros((len(rows), degree), complex)
+    z[:, : degree - zeros] = np.linalg.eigvals(companion)
+    for _ in range(2):  # Weierstrass's simultaneous iteration refines all roots but double ones
+        with np.errstate(all="ignore"):
+            move = _value(rows, z) / (rows[:, :1] * np.prod(z[:, :, None] - z[:, None] + one, axis=2))
+        z = np.where(np.isfinite(move) & (np.abs(move) < 0.1 * (1 + np.abs(z))), z - move, z)
+    gaps = z[:, :, None] - z[:, None] + one
+    blur = _value(np.abs(rows) * 4 * (degree + 1) * ROUNDING + bars, np.abs(z))
+    with np.errstate(all="ignore"):
+        radius = degree * (np.abs(_value(rows, z)) + blur) / np.abs(rows[:, :1] * np.prod(gaps, axis=2))
+    share = np.maximum(1.0 - bars[:, :1] / np.abs(rows[:, :1]), 0.1)
+    radius = np.where(np.isfinite(radius), radius * 1.1 / share, np.inf)
+    # a disc on the real axis that meets no other holds a real root
+    alone = (np.abs(gaps) + 2 * one * 1e300 > radius[:, :, None] + radius[:, None]).all(axis=2)
+    real = alone & (np.abs(z.imag) <= radius)
+    z, radius = np.where(real, z.real, z), np.where(real, radius + np.abs(z.imag), radius)
+    order = np.lexsort((z.imag, z.real, ~real), axis=1)
+    return np.take_along_axis(z, order, axis=1), np.take_along_axis(radius, order, axis=1)
+
+
+def _value(rows, z):
+    """The polynomials (rows, coefficients) at z (rows, m)."""
+    value = np.zeros_like(z)
+    for k in range(rows.shape[1]):
+        value = value * z + rows[:, k, None]
+    return value
 
 
 def is_degenerate(a):
