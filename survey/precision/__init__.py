@@ -23,6 +23,7 @@ import csv
 import importlib.util
 import json
 import os
+import pickle
 import platform
 import subprocess
 import sys
@@ -159,7 +160,8 @@ def measure(scene, case, peers=False, say=lambda line: None):
     for (method, peer), (solve, most) in runs.items():
         works = full if peer or method == "auto" else thinned
         timed = {work: (_sample(point, most, shared), options) for work, (point, options) in works.items()}
-        compile_seconds = _first_call(solve, *timed[_smallest(works)]) if peer else _cold(scene, method)
+        smallest = timed[_smallest(works)]
+        compile_seconds = _first_call(solve, *smallest) if peer else _cold(scene, method, smallest)
         for work, (point, options) in timed.items():  # every path is compiled before it is timed
             solve(point, options, SETTINGS[0]) if peer or work not in whole else solve(
                 point, options, SETTINGS[0], everything=True
@@ -270,10 +272,12 @@ def _solver(module, method, error):
     return solve
 
 
-def _cold(scene, method):
-    """Compile seconds of the method in a new process with an empty kernel cache."""
-    program = f"from survey import precision; print(precision.first_call({scene!r}, {method!r}))"
+def _cold(scene, method, work):
+    """Compile seconds of the method for a work in a new process with an empty kernel cache."""
     with TemporaryDirectory() as empty:
+        given = Path(empty, "work.pickle")
+        given.write_bytes(pickle.dumps(work))
+        program = f"from survey import precision; print(precision.first_call({scene!r}, {method!r}, {str(given)!r}))"
         environment = os.environ | {"NUMBA_CACHE_DIR": empty}
         done = subprocess.run(
             [sys.executable, "-c", program], capture_output=True, text=True, check=True, env=environment
@@ -281,13 +285,13 @@ def _cold(scene, method):
     return float(done.stdout)
 
 
-def first_call(scene, method):
-    """Seconds of the first call of a scene's method in this process, minus those of the second."""
+def first_call(scene, method, path):
+    """Seconds of the first call of a scene's method in this process, minus those of the second.
+
+    `path`: a file that holds the work, whose making may compile kernels.
+    """
     case = _case(scene)
-    module, works = _scene(scene, case), case.works()
-    point, options = works[_smallest(works)]
-    point = _sample(point, getattr(case, "MOST", {}).get(method), _shared(module))
-    return _first_call(_solver(module, method, case.ERROR), point, options)
+    return _first_call(_solver(_scene(scene, case), method, case.ERROR), *pickle.loads(Path(path).read_bytes()))
 
 
 def _smallest(works):
@@ -301,12 +305,12 @@ def _shared(module):
 
 
 def _first_call(solve, point, options):
-    """Seconds of the first call minus those of the second."""
+    """Seconds of processor time of the first call minus those of the second."""
     times = []
     for _ in range(2):
-        start = time.perf_counter()
+        start = time.process_time()
         solve(point, options, 1e-8)
-        times.append(time.perf_counter() - start)
+        times.append(time.process_time() - start)
     return max(0.0, times[0] - times[1])
 
 

@@ -22,7 +22,7 @@ def quick(monkeypatch):
     case = modules.load(folder, "satellite", "scene")
     monkeypatch.setattr(precision, "SETTINGS", (1e-4, 1e-8))
     monkeypatch.setattr(precision, "REPEATS", 1)
-    monkeypatch.setattr(precision, "_cold", lambda scene, method: float(len(method)))
+    monkeypatch.setattr(precision, "_cold", lambda _scene, method, _work: float(len(method)))
     row = {"k": np.array([[0.5]]), "rho": np.linspace(0.6, 4.0, 8)[None, :]}
     monkeypatch.setattr(case, "works", lambda: {"row": (row, {})})
     return case
@@ -65,7 +65,7 @@ def test_a_method_that_takes_long_at_one_setting_gets_no_finer_ones(quick, monke
 
 @pytest.mark.slow
 def test_a_first_call_compiles_in_a_process_of_its_own():
-    assert precision._cold("satellite", "rk4") > 0
+    assert precision._cold("satellite", "rk4", ({"k": np.array([0.5]), "rho": np.array([1.0])}, {})) > 0
 
 
 def test_a_peer_is_judged_by_its_discriminant(quick):
