@@ -157,7 +157,7 @@ def evaluate(
     given |= {key: xr.DataArray(float(p.default)) for key, p in used.items() if key not in given}
     _check_single_values(used, given, request)
     _check_dimensions(module, given)
-    if any(array.chunks for array in given.values()):
+    if any(map(_is_lazy, given.values())):
         user_scene.check(module)
         return _lazy(module, scene, request, given)
     grid = _grid(used, given)
@@ -222,7 +222,12 @@ def _labelled(key: str, value: Any) -> xr.DataArray:
         raise _not_real(key, value.values if isinstance(given, xr.DataArray) else given)
     if value.size == 0:
         raise BadInput(f"{short(key, 40)}: an empty array has no points; give at least one value")
-    return value.astype(float) if value.chunks else value.copy(data=np.array(value.values, dtype=float))
+    return value.astype(float) if _is_lazy(value) else value.copy(data=np.array(value.values, dtype=float))
+
+
+def _is_lazy(array: xr.DataArray) -> bool:
+    """Is it a dask array? (`chunks` alone is slow where it is not.)"""
+    return not isinstance(array.data, np.ndarray) and bool(array.chunks)
 
 
 def _array(key: str, value: Any) -> npt.NDArray[Any]:
@@ -256,7 +261,7 @@ def _check_dimensions(module: Any, given: dict[str, xr.DataArray]) -> None:
 
 def _check_single_values(used: dict[str, Parameter], given: dict[str, xr.DataArray], request: Request) -> None:
     for key, array in given.items():
-        if array.ndim == 0 and not array.chunks and not used[key].holds(array.values, request.variables):
+        if array.ndim == 0 and not _is_lazy(array) and not used[key].holds(array.values, request.variables):
             raise BadInput(f"{key} = {float(array):g} is outside its domain; allowed: {used[key].domain}"
                            f"{physical.hint(used[key], float(array))}")  # fmt: skip
 

@@ -15,6 +15,8 @@ class Rows:
         self.order, self.lane_axes = of_rows + of_lanes, len(of_lanes)
         self.rows = prod(self.shape[axis] for axis in of_rows)
         self.lanes = prod(self.shape[axis] for axis in of_lanes)
+        self.sorted_shape = [self.shape[axis] for axis in self.order]
+        self.back_order = sorted(range(len(self.order)), key=self.order.__getitem__)
 
     def _size(self, array, axis):
         """Length of `array` along an axis of the block (arrays with fewer dimensions broadcast from the right)."""
@@ -50,6 +52,5 @@ class Rows:
 
     def back(self, array):
         """(rows, lanes), or (rows, 1), in the block's shape."""
-        full = np.broadcast_to(array, (self.rows, self.lanes))
-        sorted_shape = [self.shape[axis] for axis in self.order]
-        return np.ascontiguousarray(full.reshape(sorted_shape).transpose(np.argsort(self.order)))
+        full = np.broadcast_to(array, (self.rows, self.lanes)) if array.shape != (self.rows, self.lanes) else array
+        return np.ascontiguousarray(full.reshape(self.sorted_shape).transpose(self.back_order))
