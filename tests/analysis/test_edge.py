@@ -1,16 +1,19 @@
 """Boundaries along a line and margins of points, against the files' [boundaries], closed forms and kept values."""
 
 import csv
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 import survey
-from survey.analysis import point
+from survey.analysis import edge, point
 from survey.errors import BadInput
 from survey.share import page
 from survey.show import boundaries
+from survey.sweep import announce
 
 ROOT = Path(__file__).parents[2]
 
@@ -143,6 +146,18 @@ def test_margins_are_the_distances_to_the_edges():
     np.testing.assert_array_equal(found.distance, found.edge - found.value)
     text = repr(ds.survey.point(k=0.5))
     assert f"rho = {float(found.edge.sel(parameter='rho')):.6g} +- " in text and "nearest boundaries" in text
+
+
+def test_margins_that_take_long_have_a_bar(monkeypatch, capsys):
+    monkeypatch.setattr(announce, "is_watched", lambda: True)
+    monkeypatch.setattr(announce, "console", lambda: Console(file=sys.stderr, force_terminal=True, width=120))
+    ds = survey.evaluate("mathieu", a=2.0, q=1.5)
+    capsys.readouterr()
+    ds.survey.margin()
+    assert "parameters" not in capsys.readouterr().err  # a moment's work
+    monkeypatch.setattr(edge, "_seconds", lambda *_: 60.0)
+    ds.survey.margin()
+    assert "2/2" in (said := capsys.readouterr().err) and "parameters" in said
 
 
 def test_boundaries_of_a_gyrostats_fates():

@@ -63,7 +63,8 @@ def assess(matrices, structure, rtol, asked, period=None, growth=None):
     M, E = matrices.M, matrices.E
     N, n = M.shape[:2]
     found, paired = Answers(N, n), structure != "none"
-    rough = ~(E <= rtol * (1 + abs(M))).all(axis=(1, 2))
+    with np.errstate(invalid="ignore"):
+        rough = ~(E <= rtol * (1 + abs(M))).all(axis=(1, 2))
     if asked == {"monodromy"}:  # as for boundaries: nothing of multipliers is computed
         found.floats[:] = np.nan
         known = np.isfinite(M).all(axis=(1, 2)) & np.isfinite(E).all(axis=(1, 2))
