@@ -209,17 +209,14 @@ def _labelled(key: str, value: Any) -> xr.DataArray:
     given = value
     if isinstance(value, xr.Variable):
         value = xr.DataArray(value)
-    if not isinstance(value, xr.DataArray):
-        array = value if hasattr(value, "dask") else _array(key, value)
-        if array.ndim > 1:
-            raise BadInput(
-                f"{short(key, 40)}: an array of {array.ndim} dimensions needs names for them; give a DataArray"
-            )
-        if array.dtype.kind not in "iuf":  # before xarray takes it: older ones fail on whole numbers beyond floats
-            raise _not_real(key, given)
-        value = xr.DataArray(array, dims=(key,) if array.ndim else ())
-    if value.dtype.kind not in "iuf":
+    unnamed = not isinstance(value, xr.DataArray)
+    array = _array(key, value) if unnamed and not hasattr(value, "dask") else value
+    if unnamed and array.ndim > 1:
+        raise BadInput(f"{short(key, 40)}: an array of {array.ndim} dimensions needs names for them; give a DataArray")
+    if array.dtype.kind not in "iuf":  # xarray itself may fail on whole numbers beyond floats
         raise _not_real(key, value.values if isinstance(given, xr.DataArray) else given)
+    if unnamed:
+        value = xr.DataArray(array, dims=(key,) if array.ndim else ())
     if value.size == 0:
         raise BadInput(f"{short(key, 40)}: an empty array has no points; give at least one value")
     return value.astype(float) if _is_lazy(value) else value.copy(data=np.array(value.values, dtype=float))

@@ -103,6 +103,12 @@ def largest(a, b):
     return _chosen(lambda: max(a, b), lambda builder, x, y: builder.select(builder.fcmp_ordered(">", y, x), y, x), a, b)
 
 
+def summed(terms):
+    """The sum of numbers or symbols, in their order; that of Python begins with 0."""
+    first, *others = terms
+    return sum(others, first)
+
+
 def changes_sign(a, b):
     """1.0 where one of two numbers or symbols is negative and the other is not, else 0.0."""
 

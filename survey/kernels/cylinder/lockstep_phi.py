@@ -23,7 +23,7 @@ from survey.kernels.cylinder.lockstep import COARSEST, FALL, LANES, NEAREST, bus
 from survey.kernels.cylinder.steps import OK, STEP_LIMIT, conclude, finite, unturned
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
-from survey.kernels.unroll import unroll
+from survey.kernels.unroll import summed, unroll
 
 ORDER = 16
 VARIED = 4  # order of the integral of g / w^2
@@ -71,17 +71,12 @@ def _orders(first, last):
         omega, r = ([T[row + n, i] for n in range(first + 1)] for row in (OMEGA, R))
         q = [T[Q + n, i] for n in range(first)]
         for n in range(first, last):
-            q.append(T[G_ + n, i] - _sum(omega[k] * q[n - k] for k in range(1, n + 1)) if n else T[G_, i])
+            q.append(T[G_ + n, i] - summed(omega[k] * q[n - k] for k in range(1, n + 1)) if n else T[G_, i])
             omega.append((T[F_ + n, i] + q[n]) * (1.0 / (n + 1)))
-            r.append(-_sum(omega[k] * r[n + 1 - k] for k in range(1, n + 2)))
+            r.append(-summed(omega[k] * r[n + 1 - k] for k in range(1, n + 2)))
             T[Q + n, i], T[OMEGA + n + 1, i], T[R + n + 1, i] = q[n], omega[n + 1], r[n + 1]
 
     return expand
-
-
-def _sum(terms):
-    first, *others = terms
-    return sum(others, first)
 
 
 _low_orders, _middle_orders, _high_orders = _orders(0, 7), _orders(7, 12), _orders(12, ORDER)
@@ -139,7 +134,7 @@ def _elapsed(r, s):
 @unroll
 def _contracted(q, r, h):
     """What dw has been multiplied by at h: exp(-integral of g / w^2), to 1 %."""
-    rates = [_sum(q[k] * r[n - k] for k in range(n + 1)) * (1.0 / (n + 1)) for n in range(VARIED + 1)]
+    rates = [summed(q[k] * r[n - k] for k in range(n + 1)) * (1.0 / (n + 1)) for n in range(VARIED + 1)]
     half = 0.0625 * h * polynomial(rates, h)  # of an eighth of the exponent
     part = (1.0 - half) / (1.0 + half)
     part *= part

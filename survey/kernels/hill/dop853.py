@@ -10,7 +10,7 @@ from survey.kernels.hill.matrix import rounding
 from survey.kernels.jit import inline
 from survey.kernels.lanes import column, relative
 from survey.kernels.math.dop853 import E3, E5, STAGES, A, B, C, combined
-from survey.kernels.unroll import unroll
+from survey.kernels.unroll import summed, unroll
 
 SMALLEST, LARGEST = 0.2, 5.0  # ratios of a step to the one before
 # Zeros are counted by signs at the ends of steps: a step stays below this many radians of the fastest phase.
@@ -52,13 +52,8 @@ def _sums(z, h):
             slopes.append((v, -z[i] * y))
         for k in range(2):
             for weights in (B, E5, E3):
-                sums.append(_sum(weights[j] * slopes[j][k] for j in range(STAGES) if weights[j] != 0.0))
+                sums.append(summed(weights[j] * slopes[j][k] for j in range(STAGES) if weights[j] != 0.0))
     return tuple(sums)
-
-
-def _sum(terms):
-    first, *others = terms
-    return sum(others, first)
 
 
 @inline

@@ -1,7 +1,7 @@
 """The steps of explicit Runge-Kutta methods, once for all systems; the bits are those of the loops written out.
 
 Three stay apart: two that round in another order, rk4's step of Hill's equation and dop853's of the flow; and dop853's
-of Hill's equation, written out, which leaves out the zeros of the tableau and is a tenth faster.
+of Hill's equation, written out, which leaves out the zeros of the tableau and is faster.
 
 Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.1.
 """
