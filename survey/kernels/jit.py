@@ -104,12 +104,18 @@ _COMPILING = _Compiling()
 event.register("numba:compile", _COMPILING)
 
 
-def is_new():
-    """Has this machine compiled no kernel of these sources yet, and can it keep them?"""
-    return _DIRECTORY is not None and not numba.config.DISABLE_JIT and next(_DIRECTORY.rglob("*.nbi"), None) is None
+def is_first(work):
+    """Is this machine's kernel cache asked about `work` (a file's name) for the first time?"""
+    if _DIRECTORY is None or numba.config.DISABLE_JIT:
+        return False
+    try:
+        (_DIRECTORY / f"{work}.begun").touch(exist_ok=False)
+    except OSError:
+        return False
+    return True
 
 
-# On a new machine, waits for the process that compiles further kernels for this one (see `sweep.compile_ahead`).
+# At a first use, waits for the process that compiles further kernels for this one (see `sweep.compile_ahead`).
 other_compiler = None
 waited = 0.0
 

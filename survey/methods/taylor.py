@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from survey.kernels import jit
 from survey.kernels.body import motion
 from survey.kernels.cylinder import (
     basins,
@@ -26,6 +27,7 @@ from survey.kernels.cylinder import (
 from survey.kernels.cylinder.flow import LAST, PHI, TRUNC_PHI, TRUNC_W, W, inside, longest_step, series
 from survey.kernels.cylinder.flow import ORDER as _ORDER
 from survey.kernels.cylinder.program import COLUMNS
+from survey.kernels.cylinder.records import STATE
 from survey.kernels.jit import inline, kernel
 
 ORDER = 20
@@ -99,8 +101,19 @@ def flow_abels(P, starts, targets, tolerance, limit, floats, status):
         flow_abels_by_row(P, starts, targets, tolerance, limit, floats, status)
         return
     ahead = np.zeros((len(P), lockstep_phi.STATE))
+    if jit.other_compiler:  # compile the longer one, by a call on nothing, while that process compiles the other
+        _abels_in_time(P[:0], starts[:0], targets[:0], tolerance, limit, ahead[:0], floats[:0], status[:0])
+        jit.wait_for_other_compiler()
     _abels_in_angle(P, starts, targets, tolerance, limit, ahead, floats, status)
     _abels_in_time(P, starts, targets, tolerance, limit, ahead, floats, status)
+
+
+def flow_abels_ahead():
+    """Compile what `flow_abels` waits for."""
+    P, none = np.empty((0, COLUMNS)), np.empty((0, 2))
+    P.flags.writeable = False
+    floats = np.empty((0, 2, STATE))
+    _abels_in_angle(P, none, none, 0.0, 0, np.empty((0, lockstep_phi.STATE)), floats, np.empty((0, 2), np.int64))
 
 
 @kernel

@@ -7,6 +7,7 @@ import numpy as np
 
 from survey import methods
 from survey.measures.cylinder import basins, blocks, equation, orbit, solution
+from survey.measures.cylinder.ahead import of_functions
 from survey.measures.cylinder.fate import MOST_OF_PROGRAM
 from survey.measures.hill.multiprecision import Unsupported
 from survey.modules import load
@@ -51,6 +52,7 @@ class AbelScene(FunctionScene):
     FAMILY = "abel"
     AUDIT = ("dop853",)
     STATUS = STATUS
+    compile_ahead = staticmethod(of_functions)
     DIMENSIONS = gyrostat.DIMENSIONS | {"equilibrium": np.arange(1, MOST_OF_PROGRAM + 1)}
 
     @property

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from survey.measures.floquet import dense, monodromy, motion, probing, stability
+from survey.measures.floquet.ahead import compile_ahead
 from survey.measures.floquet.system import System
 from survey.request.traced_scene import TracedScene
 from survey.scene import plus_minus
@@ -36,6 +37,7 @@ class FloquetScene(TracedScene):
     AUDIT = ("dop853",)
     OPTIONS = ()
     STATUS = STATUS
+    compile_ahead = staticmethod(compile_ahead)
 
     @cached_property
     def _system(self):

@@ -8,6 +8,7 @@ import numpy as np
 
 from survey.errors import BadInput
 from survey.measures.floquet import curves, orbit, orbit_curves, orbit_motion
+from survey.measures.floquet.ahead import compile_ahead
 from survey.measures.floquet.continuation import Range
 from survey.measures.floquet.equation import Equation
 from survey.measures.floquet.symmetry import Symmetry
@@ -44,6 +45,7 @@ class OrbitScene(TracedScene):
     AUDIT = ("dop853",)
     OPTIONS = ()
     STATUS = STATUS
+    compile_ahead = staticmethod(compile_ahead)
 
     @property
     def PARAMETERS(self):

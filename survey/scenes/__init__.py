@@ -16,8 +16,9 @@ NaN, an integer its `fill`. Where a scene gives a status of its own, the verdict
 status. `solve` is pure and thread-safe, and gives a point the same bits in any block.
 
 In `why` and `trajectory`, `point` maps each parameter to a number, and `answer` holds everything that is known of one
-point, {name: array}, flags as words. `compile_ahead` runs in a process of its own while a map is solved; the map waits
-for it (`survey.kernels.jit.wait_for_other_compiler`) where it needs what is compiled there.
+point, {name: array}, flags as words. `compile_ahead` runs in a process of its own at the first use of a question, and
+the solver waits for its end, or for its next `yield`, where it needs what is compiled there (see
+`survey.kernels.jit.wait_for_other_compiler`).
 """
 
 import ast
@@ -71,7 +72,8 @@ CONTRACT = {
         ("names", "ends", "options"),
     ),
     "compile_ahead": Function(
-        "compile some kernels of a map of these variables, by calls on next to nothing; see above", ("variables",)
+        "compile some kernels of a map of these variables, by calls on next to nothing; see above",
+        ("variables", "options"),
     ),
 }
 

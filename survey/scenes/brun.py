@@ -177,6 +177,17 @@ def solve(point, request):
     return {name: _back(block, values) for name, values in out.items()}
 
 
+def compile_ahead(variables, options):
+    """Compile some of the kernels that periods need (see `survey.scenes`)."""
+    if "motion" not in options:
+        brun_lanes.compile_others()
+        yield
+    if "sign" in options:
+        nutation.of_integrals(np.empty((0, 3)), 1)
+    else:
+        nutation.of_states(np.empty((0, 7)))
+
+
 def _ordered(given):
     """The parameters (m, n) of a state or of scaled integrals, in the order of PARAMETERS."""
     return np.array([given[p.name] for p in PARAMETERS if p.name in given])
@@ -235,6 +246,7 @@ def _completed(out, given, valid, done, slowly):
 def _state(given, valid, method, request, times):
     points = _ordered(given).T.copy()
     points[~valid] = _HARMLESS
+    nutation.compile_periods(method)
     rows, kinds, count, heights, starts = nutation.of_states(points)
     a, c = points[:, 0], points[:, 1]
     drift = points[:, 6] * ((a - c) / (a * c))
@@ -275,6 +287,7 @@ def _with_motion(out, valid, kinds, times, motions):
 def _scaled(given, valid, sign, method, rtol):
     points = np.column_stack([given["l"], given["alpha"], given["beta"]])
     points[~valid] = 1.0
+    nutation.compile_periods(method)
     rows, kinds, count, heights = nutation.of_integrals(points, sign)
     ratio = np.where(valid, given["ratio"], 1.0)
     drift = np.repeat(points[:, 1] * ((1.0 - ratio) / ratio), 2)

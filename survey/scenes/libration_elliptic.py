@@ -38,6 +38,7 @@ import numpy as np
 
 from survey.measures import linear_motion
 from survey.measures.libration import danby, motion
+from survey.measures.libration.danby_double import compile_ahead as compile_ahead
 from survey.measures.rows import Rows
 from survey.scene import Parameter, Trajectory, plus_minus
 

@@ -69,7 +69,7 @@ def solve(point, request):
     return {name: block.back(values) for name, values in out.items()}
 
 
-def compile_ahead(variables):
+def compile_ahead(variables, options):
     """Compile some of the kernels of a map of these variables (see `survey.scenes`)."""
     dense.compile_ahead(_sample, np.empty(0), variables)
 

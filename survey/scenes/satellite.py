@@ -172,7 +172,7 @@ def _rotates(names, ends):
     return low < edge if name == "one_minus_k" else low > edge
 
 
-def compile_ahead(variables):
+def compile_ahead(variables, options):
     """Compile some of the kernels of a map of these variables (see `survey.scenes`)."""
     if not _separatrix_alone(variables):
         dense.compile_ahead(sample, np.empty((0, 6)), variables)

@@ -9,8 +9,8 @@ import threading
 import time
 
 PATIENCE = 0.5  # seconds of compiling that pass without a word
-SECONDS = {"hill": 20, "cylinder": 40, "abel": 40, "nutation": 20, "danby": 10, "normal_form": 10}  # measured, 2 cores
-USUAL = 30
+SECONDS = {"hill": 8, "cylinder": 10, "abel": 18, "nutation": 15, "danby": 8, "normal_form": 5}  # measured, 2 cores
+USUAL = 10
 
 
 def is_watched():
@@ -31,7 +31,7 @@ def always_compiled(scene):
 
 
 def sentence(name, scene):
-    """`compiling gyrostat, once on this machine, about 40 s`."""
+    """`compiling gyrostat, once on this machine, about 10 s`."""
     when = "in each process that solves it" if always_compiled(scene) else "on this machine"
     return f"compiling {name}, once {when}, about {SECONDS.get(scene.FAMILY, USUAL)} s"
 

@@ -1,4 +1,4 @@
-"""On a new machine, a separate process compiles some of the kernels that a run will need later."""
+"""At the first use of a scene on a machine, a separate process compiles some of the kernels that are needed later."""
 
 import contextlib
 import subprocess
@@ -8,23 +8,30 @@ from survey.kernels import jit
 from survey.sweep.dispatch import cpus
 
 
-def program(scene, variables):
-    """The Python program that calls the scene's `compile_ahead` for a map of these variables."""
-    return f"import gc; gc.disable(); from {scene.__name__} import compile_ahead; compile_ahead({list(variables)})"
+def program(scene, request):
+    """The Python program that calls the scene's `compile_ahead` for what is asked; where that yields, it says so."""
+    ahead, call = scene.compile_ahead, f"({list(request.variables)}, {dict(request.options)})"
+    steps = f"from {ahead.__module__} import {ahead.__name__} as ahead\nfor _ in ahead{call} or (): print(flush=True)"
+    return f"import gc; gc.disable(); {steps}"
 
 
 @contextlib.contextmanager
 def compiling_ahead(scene, request):
     """Where kernels are not compiled yet, compile some in another process while this one compiles the longest."""
-    if not (hasattr(scene, "compile_ahead") and request.method == "auto" and jit.is_new() and cpus() > 1):
+    ahead = getattr(scene, "compile_ahead", None)
+    if not (ahead and request.method == "auto" and cpus() > 1 and jit.is_first(_work(ahead, request.options))):
         yield
         return
-    command = [sys.executable, "-c", program(scene, request.variables)]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    jit.other_compiler = process.wait
-    try:
-        yield
-    finally:
-        jit.other_compiler = None
-        process.kill()
-        process.wait()
+    command = [sys.executable, "-c", program(scene, request)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+        jit.other_compiler = process.stdout.readline  # a line, or the end
+        try:
+            yield
+        finally:
+            jit.other_compiler = None
+            process.kill()
+
+
+def _work(ahead, options):
+    """A name of what is compiled: other scenes, and other questions, need other kernels."""
+    return "-".join([ahead.__module__, ahead.__name__, *map(str, options.values())])

@@ -7,6 +7,7 @@ import numpy as np
 from survey import status
 from survey.file.labels import layout, round_up
 from survey.sweep import dispatch
+from survey.sweep.compile_ahead import compiling_ahead
 from survey.sweep.cost import points_per_block
 
 
@@ -62,13 +63,14 @@ def compute(grid, scene, request, threads=None, progress=None):
             result[name][block] = values
 
     blocks = grid.blocks(points_per_block(scene, request, grid))
-    if len(blocks) == 1:
-        task(blocks[0])
-    else:
 
-        def report(done, _=None):
-            if progress:
-                progress(done, len(blocks))
+    def report(done, _=None):
+        if progress:
+            progress(done, len(blocks))
 
-        dispatch.on_threads(lambda number: task(blocks[number]), range(len(blocks)), report, threads=threads)
+    with compiling_ahead(scene, request):
+        if len(blocks) == 1:
+            task(blocks[0])
+        else:
+            dispatch.on_threads(lambda number: task(blocks[number]), range(len(blocks)), report, threads=threads)
     return result

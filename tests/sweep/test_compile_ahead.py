@@ -56,3 +56,63 @@ def test_the_map_reads_what_the_process_beside_it_compiles(tmp_path, scene, row,
     assert found == dict(
         zip(("hill_chain", "discriminants", "exponents", "transcendental"), (COMPILED, *kernels), strict=True)
     )
+
+
+# the call, and kernels that it must read from disk: another signature would be compiled a second time
+READING = """
+import importlib
+import numpy as np
+import survey
+{call}
+for name in {kernels}:
+    module, kernel = name.split(":")
+    found = getattr(importlib.import_module(module), kernel).stats
+    print(name, len(found.cache_hits), len(found.cache_misses))
+"""
+GYROSTAT = 'survey.evaluate("gyrostat", b12=0.7, b31=-0.4, d=1.1, c23=0.3, s2=0.3, s3=0.1, {more})'
+FLOWS = "survey.methods.taylor:"
+OWN = """scene = survey.abel(
+    lambda phi, p: -p[0], lambda phi, p: p[1] - np.sin(phi), period=2 * np.pi, parameters=("a", "I")
+)
+survey.evaluate(scene, question="portrait", a=0.3, I=0.5)"""
+STATE = 'survey.evaluate("brun", A=1.0, C=0.5, epsilon=0.3, theta0=1.0, p_theta0=0.1, p_psi=0.3, p_phi=0.2{more})'
+BRUN = ["lanes:wells", "lanes_double:begin", "lanes_double:go", "lanes_double:end", "brun_lanes:enter"]
+FLOQUET = ["steps:_over", "steps:next_term", "steps:_missing", "steps:products"]
+DANBY = ["danby_double:chain", "traces_double:measure"]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(dispatch.cpus() == 1, reason="nothing is compiled beside on one processor")
+@pytest.mark.parametrize(
+    ("call", "kernels"),
+    [
+        (GYROSTAT.format(more='question="abel", phi0=0.1, w0=2.0, phi=3.0'), [FLOWS + "_abels_in_angle"]),
+        (GYROSTAT.format(more='question="fate", phi0=0.1, w0=2.0'), [FLOWS + "flow_fates"]),
+        (GYROSTAT.format(more='question="portrait"'), [FLOWS + "flow_fates", FLOWS + "flow_abels_by_row"]),
+        (
+            OWN,
+            [FLOWS + "flow_fates", FLOWS + "flow_abels_by_row"],
+        ),
+        (STATE.format(more=""), [f"survey.kernels.nutation.{name}" for name in BRUN]),
+        (
+            'survey.evaluate("brun", l=0.5, alpha=0.1, beta=0.2, sign="1")',
+            [f"survey.kernels.nutation.{name}" for name in BRUN],
+        ),
+        (STATE.format(more=', t=1.0, motion="at_t"'), ["survey.kernels.nutation.brun:of_states"]),
+        (
+            'survey.evaluate("satellite_triaxial", A=0.5, B=0.8, C=1.0, k=0.2)',
+            [f"survey.kernels.floquet.{name}" for name in FLOQUET],
+        ),
+        (
+            'survey.evaluate("libration_elliptic", mu=0.01, e=0.9, rtol=1e-15)',
+            [f"survey.kernels.libration.{name}" for name in DANBY],
+        ),
+    ],
+)
+def test_kernels_are_compiled_ahead_for_the_arguments_of_the_call(tmp_path, call, kernels):
+    done = subprocess.run(
+        [sys.executable, "-c", READING.format(call=call, kernels=kernels)], capture_output=True, text=True,
+        env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_DISABLE_JIT": "0"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines() == [f"{name} {READ}" for name in kernels]

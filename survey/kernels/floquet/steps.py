@@ -491,3 +491,41 @@ def gradients(F, error, doubt, first, B, out):
                 multiply(A, step, 0.0, Z)
                 A[:] = Z
             out[i, q] *= math.exp(min(2.0 * more, 700.0)) * (1.0 + 1e-9)
+
+
+def compile_some():
+    """Compile some of the kernels that `factors` calls, by calls on zeros."""
+    one, two, three, operations, which, terms = _zeros()
+    extend(operations, one, terms, which[:0], two, one, one, three, 0)
+    norm_of(three, two, terms[:0], 0, two, one)
+    _row_norms(two, 1, one, one)
+    _rounded(two, two, np.zeros((2, 1)), one, one, 0, 0.0)
+    _halves(np.zeros((ORDER + 1, 1, 1)), two, two)
+
+
+def compile_others():
+    """As `compile_some`, for a process beside that one."""
+    one, two, three, _operations, which, terms = _zeros()
+    needed, two_terms = np.zeros((1, 1), np.bool_), np.zeros((2, 1, 1))
+    _over(two, two, one, one, np.zeros((4, 1, 1)), one)
+    next_term(three, two, terms[:0], which[:0], needed, 0, 1, one, three, three, two_terms)
+    many = np.zeros((ORDER + 1 + BEYOND, 1))
+    _missing(many, many, many, one, one, one, one)
+
+
+def compile_further():
+    """Compile what comes after `factors`."""
+    one, _two, three, _operations, which, _terms = _zeros()
+    complex_three = three.astype(np.complex128)
+    products(three, one, one, np.zeros(2, np.int64), 1, three, three, three)
+    carried(three, one, one, np.zeros(2, np.int64), which[:0], 1, complex_three, complex_three, three)
+
+
+def _zeros():
+    """Arrays of numbers of one, two and three dimensions; operations, indices and terms."""
+    return (
+        *(np.zeros((1,) * k) for k in (1, 2, 3)),
+        np.zeros((1, 5), np.int64),
+        np.zeros(1, np.int64),
+        np.zeros((1, 4), np.int64),
+    )

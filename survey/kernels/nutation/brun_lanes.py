@@ -156,6 +156,31 @@ def answer(polynomials, fill, known_u, points, actions, out, wells, done):
         which = left if exactly else in_state(done, CANCELLED, CANCELLED, left)
 
 
+def compile_some(kernel):
+    """Compile some of the kernels of which `of_states` or `of_integrals` is made, by calls on zeros."""
+    work, answers = np.zeros(lanes_double.ALL), np.zeros(OUTPUTS * TILE)
+    (states if kernel is of_states else integrals)(work)
+    nl.approach_slowly(work, 1)
+    nl.inside(work)
+    nl.approach(work, 1)
+    nl.means(work, 1)
+    nl.small_actions(work)
+    (answer_states if kernel is of_states else answer_integrals)(work, answers)
+    action.mend(work, answers)
+
+
+def compile_others():
+    """As `compile_some`, for a process beside that one."""
+    work, answers = np.zeros(lanes_double.ALL), np.zeros(OUTPUTS * TILE)
+    one, which = np.zeros(1), np.zeros(1, np.int64)
+    enter(np.zeros((GIVEN, 1)), which, 0, work)
+    leave(work, answers, which, 0, np.zeros((OUTPUTS, 1)), one, one)
+    nl.wells(work, 1)
+    lanes_double.begin(work)
+    lanes_double.go(work, 1)
+    lanes_double.end(work)
+
+
 @kernel
 def of_states(points, actions, out, wells, done):
     """Outputs (OUTPUTS, n) of initial states (GIVEN, n), the numbers of wells (n), and which are DONE (n).

@@ -37,6 +37,9 @@ METHODS = {
             "the same, one row after the other, where that is compiled sooner",
             ("P", "starts", "targets", "tolerance", "limit", "floats", "status"),
         ),
+        "flow_abels_ahead": Function(
+            "compile some of what `flow_abels` calls, while another process compiles the rest"
+        ),
         "flow_image": Function(
             "fill `node` with the image of x under one return map, see `kernels.cylinder.returns.image`",
             ("kind", "p", "eqs", "count", "anchor", "x", "tolerance", "node"),

@@ -20,6 +20,7 @@ from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, BOUND_G, coefficient
 from survey.kernels.cylinder.flow_double import energy as energy_beside
 from survey.kernels.cylinder.program import COLUMNS, MEAN
 from survey.kernels.cylinder.steps import OK, SEPARATRIX, STEP_LIMIT
+from survey.kernels.jit import wait_for_other_compiler
 from survey.measures.cylinder import ends
 from survey.measures.cylinder.solution import tolerances, trajectories
 
@@ -364,6 +365,7 @@ def fates(method, skeleton, starts, tolerance, more=1):
         return out
     if skeleton.stratum in (I0, I1):
         return (_free if skeleton.stratum == I0 else _conservative)(skeleton, starts)
+    wait_for_other_compiler()
     out = np.zeros((len(starts), rc.FATE))
     s, starts = skeleton, np.pad(starts, ((0, 0), (0, 4 - starts.shape[1])))
     section = s.section if s.stratum == G else math.atan2(s.p[0], s.p[1])

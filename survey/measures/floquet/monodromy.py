@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 
 from survey import measures
+from survey.kernels import jit
 from survey.kernels.floquet import sizes, steps
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.measures.floquet import probing
@@ -186,6 +187,9 @@ def _call(points, method, those, place, programs, numbers, count, sharp):
         share = points.edges[those, -1] / np.where(high > low, high - low, 1.0)
         noise = points.noise[those, k] + 4 * ROUNDOFF_UP * points.size[those, k] * share
         found = np.empty((point.size, n, n)), np.empty(point.size), np.empty(point.size)
+        if jit.other_compiler:
+            steps.compile_some()
+            jit.wait_for_other_compiler()
         method.floquet_factors(
             program.operations, program.signs, program.inside, program.order, program.used, program.terms,
             np.ascontiguousarray(numbers[k][place]), scale, noise, n, point, middle, half, *found,
@@ -193,6 +197,7 @@ def _call(points, method, those, place, programs, numbers, count, sharp):
         where = np.repeat(offset, steps_of) + index
         F[where], error[where], doubt[where] = found
         offset += steps_of
+    jit.wait_for_other_compiler()
     found = Matrices.empty(len(those), n)
     steps.products(F, error, doubt, first, n, found.M, found.E, found.R)
     if callable(sharp):

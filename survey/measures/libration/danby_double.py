@@ -7,6 +7,7 @@ leave open. Verdicts are decided with about 27 digits; values are rounded once, 
 import numpy as np
 
 from survey import status
+from survey.kernels.jit import wait_for_other_compiler
 from survey.kernels.libration import danby_double, traces_double
 from survey.measures.libration import panels
 from survey.measures.libration.answers import Answers
@@ -16,6 +17,7 @@ POINTS, VALUES = 1000, 50_000  # of a kernel call, to keep it below about a seco
 
 def solve(e, mu, rtol, answers, points, dense=False):
     """Answer the `points` (ascending) of rows e (R) of mu (R, L), in place; by the rows' series first, if `dense`."""
+    wait_for_other_compiler()
     row_of = points // mu.shape[1]
     if dense:
         for row in np.unique(row_of):
@@ -29,6 +31,12 @@ def solve(e, mu, rtol, answers, points, dense=False):
         results = _results(e[row_of[first : first + POINTS]], mu.reshape(-1)[some])
         traces_double.measure(results, rtol, status.OVERFLOW, *own.all)
         _take(answers, some, own)
+
+
+def compile_ahead(variables, options):
+    """Compile the kernels of points that are solved one by one (see `survey.scenes`)."""
+    one = np.full(1, 1e-3)
+    traces_double.measure(_results(one, one), 1e-9, status.OVERFLOW, *Answers(1).all)
 
 
 def _take(answers, points, own):

@@ -6,6 +6,7 @@ and from these, at given times, those of a motion.
 
 import numpy as np
 
+from survey.kernels import jit
 from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.nutation import brun, brun_lanes
 from survey.kernels.nutation import records as rc
@@ -43,6 +44,9 @@ def in_lanes(kernel, points, actions):
     """
     n = points.shape[1]
     out, wells, done = np.empty((OUTPUTS, n)), np.empty(n), np.empty(n)
+    if jit.other_compiler:
+        brun_lanes.compile_some(kernel)
+        jit.wait_for_other_compiler()
     kernel(points, actions, out, wells, done)
     return out, wells, done == brun_lanes.DONE
 
@@ -50,6 +54,13 @@ def in_lanes(kernel, points, actions):
 def named(values):
     """{name: values, name_error: error bounds} of the answers of `in_lanes`."""
     return dict(zip((*NAMES, *(f"{name}_error" for name in NAMES)), values, strict=True))
+
+
+def compile_periods(method):
+    """Compile what `periods` calls, while another process compiles what finds the wells."""
+    if jit.other_compiler:
+        periods(method, np.empty((0, nu.SIZE)), np.empty(0, np.int64), 1e-6)
+        jit.wait_for_other_compiler()
 
 
 def periods(method, rows, kinds, rtol):

@@ -1,0 +1,35 @@
+"""What a process of its own compiles at the first use of a question (see `survey.sweep.compile_ahead`).
+
+The kernels are called on nothing. They are those that come after the cycles of fates and portraits, or one of the two
+of Abel's equation.
+"""
+
+import numpy as np
+
+from survey.kernels.cylinder import records as rc
+from survey.kernels.cylinder.flow import coefficients
+from survey.kernels.cylinder.program import COLUMNS
+from survey.methods import taylor
+
+
+def compile_ahead(variables, options):
+    """For the gyrostat's questions but those on separatrices."""
+    if options.get("question") == "abel" and "separatrix" not in options:
+        taylor.flow_abels_ahead()
+    _compile(coefficients(*np.zeros(6)), options)
+
+
+def of_functions(variables, options):
+    """For a user's f and g."""
+    _compile(np.zeros(COLUMNS + 1), options)
+
+
+def _compile(p, options):
+    question, none = options.get("question"), np.empty((0, 2))
+    if question in ("fate", "portrait") and "separatrix" not in options:
+        tables, sizes = [np.empty((0, 10)) for _ in range(4)], np.zeros(6, np.int64)
+        fates = np.empty((0, 4)), 0.0, 0, np.empty((0, rc.FATE))
+        taylor.flow_fates(p, 0.0, np.zeros(2), sizes, *tables, *fates)
+    if question == "portrait":
+        floats, status = np.empty((0, 2, rc.STATE)), np.empty((0, 2), np.int64)
+        taylor.flow_abels_by_row(p[None][:0], none, none, 0.0, 0, floats, status)
