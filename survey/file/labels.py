@@ -43,6 +43,8 @@ def layout(scene, request):
 def round_up(errors):
     """float64 error bars (not negative) as float32, rounded up."""
     errors = np.asarray(errors, dtype=float)
+    if errors.size > 1 and not any(errors.strides):  # one number for all points, as a rule NaN
+        return np.broadcast_to(round_up(errors.flat[:1])[0], errors.shape)
     with np.errstate(over="ignore"):
         small = errors.astype(np.float32)
     bits = small.view(np.int32)
@@ -148,7 +150,9 @@ class Tally:
             chunk = slice(first, first + CHUNK)
             missed = np.zeros(min(CHUNK, size - first), bool)
             for name in bars:
-                missed |= _exceeds(flat[name][chunk], flat[f"{name}_error"][chunk], self.rtol).any(axis=-1)
+                bar = flat[f"{name}_error"][chunk]
+                if (bar > self.rtol).any():
+                    missed |= _exceeds(flat[name][chunk], bar, self.rtol).any(axis=-1)
             self.missed += int(np.count_nonzero(missed))
         self.points += size
         for name, codes in self.codes.items():

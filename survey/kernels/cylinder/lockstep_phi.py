@@ -195,30 +195,27 @@ def _record(T, before, state, step, i, block, targets, first, floats, status):
     psi, turns, w, t, t_low = before[AT, i], before[TURNED, i], before[W, i], before[TIME, i], before[TIME_LOW, i]
     inverse, size, end = 1.0 / before[W, i], len(targets), state[AT, i]
     high, slope, late, slowest = step[W_WITHIN, i], step[STEEPEST, i], state[T_BOUND, i], 1.0 / step[LOWEST, i]
-    while first < size and unturned(targets[first], turns) <= end:
-        count = 0
-        while count < BLOCK and first + count < size:
-            goal = unturned(targets[first + count], turns)
-            if goal > end:
-                break
-            block[count] = max(goal - psi, 0.0)
-            block[BLOCK + count] = 3e-16 * abs(targets[first + count])
-            count += 1
-        for j in range(count, BLOCK):
-            block[j] = 0.0
+    last = first
+    while last < size and unturned(targets[last], turns) <= end:
+        last += 1
+    while first < last:
+        for j in range(BLOCK):  # the last of a block may lie beyond the step
+            target = targets[min(first + j, size - 1)]
+            block[j] = max(unturned(target, turns) - psi, 0.0)
+            block[BLOCK + j] = 3e-16 * abs(target)
         for j in range(BLOCK):
             s, slip = block[j], block[BLOCK + j]
             value, time = w + w * _rise(omega, s), t + (_elapsed(r, s) * inverse + t_low)
             block[2 * BLOCK + j], block[3 * BLOCK + j] = value, time
             block[4 * BLOCK + j] = 1.02 * (high + slope * slip)
             block[5 * BLOCK + j] = 1.02 * (late + slip * slowest) + 4e-16 * time
-        for j in range(count):
+        for j in range(min(BLOCK, last - first)):
             row = floats[first + j]
             row[rc.VALUE], row[rc.TIME] = block[2 * BLOCK + j], block[3 * BLOCK + j]
             row[rc.VALUE_BAR], row[rc.TIME_BAR] = block[4 * BLOCK + j], block[5 * BLOCK + j]
             status[first + j] = OK
-        first += count
-    return first
+        first += BLOCK
+    return last
 
 
 @inline
@@ -228,7 +225,7 @@ def _far(w, bound, most_g):
 
 
 @kernel
-def _refill(P, starts, targets, waiting, state, fixed, row, goal, ahead):
+def _refill(P, starts, targets, waiting, state, fixed, row, sizes, goal, ahead):
     """Give free lanes the rows that wait; returns the first that still waits."""
     for i in range(LANES):
         while waiting < len(P) and row[i] < 0:
@@ -245,7 +242,7 @@ def _refill(P, starts, targets, waiting, state, fixed, row, goal, ahead):
                         state[k, i] = 0.0
                     state[AT, i], state[TURNED, i], state[W, i], state[RATE, i] = psi, turns, w0, 2.0 + bend / w0
                     state[W_BOUND, i], state[T_BOUND, i] = bound, slip / w0
-                    row[i], goal[i] = waiting, targets[waiting, 0]
+                    row[i], sizes[i], goal[i] = waiting, finite(targets[waiting]), targets[waiting, 0]
             waiting += 1
         if row[i] < 0:
             state[AT, i], state[W, i] = 0.0, 1.0  # a free lane moves too
@@ -266,12 +263,13 @@ def abels(P, starts, targets, tolerance, limit, ahead, floats, status):
     T, state, before = work[:TABLE], work[TABLE:second], work[second:third]
     step, fixed = work[third:fourth], work[fourth:]
     tolerance = min(tolerance, COARSEST)
-    row, goal, block = np.full(LANES, -1), np.zeros(LANES), np.zeros(6 * BLOCK)
+    row, sizes = np.full(LANES, -1), np.zeros(LANES, np.int64)
+    goal, block = np.zeros(LANES), np.zeros(6 * BLOCK)
     waiting = np.int64(0)  # a literal 0 would have `_refill` compiled twice
     free, ended = True, np.zeros(LANES, dtype=np.bool_)
     while True:
         if free:
-            waiting = _refill(P, starts, targets, waiting, state, fixed, row, goal, ahead)
+            waiting = _refill(P, starts, targets, waiting, state, fixed, row, sizes, goal, ahead)
             if not busy(row):
                 return
         _series(T, state, fixed)
@@ -285,7 +283,7 @@ def abels(P, starts, targets, tolerance, limit, ahead, floats, status):
             if row[i] < 0 or not ended[i]:
                 continue
             k, sound = row[i], math.isfinite(state[W, i]) and state[W_BOUND, i] < SURE * state[W, i]
-            size, j = finite(targets[k]), int(state[COLUMN, i])
+            size, j = sizes[i], int(state[COLUMN, i])
             if sound:
                 j = _record(T, before, state, step, i, block, targets[k, :size], j, floats[k], status[k])
             far = _far(state[W, i], state[W_BOUND, i], fixed[BOUND_G, i])

@@ -84,9 +84,10 @@ def _abel(method, rtol, before, rows, targets, served):
 
 def _left_open(results, rtol):
     """What double-double arithmetic may still answer: what misses rtol, unless by too many steps or an overflow."""
-    status = results[-1]
-    answered = (status == OK) | (status == TURNING) | (status == NO_CONVERGENCE) | (status == SEPARATRIX)
-    return answered & solution.missed(results, max(rtol, FINEST))
+    status, missed = results[-1], solution.missed(results, max(rtol, FINEST))
+    if missed.any():
+        missed &= (status == OK) | (status == TURNING) | (status == NO_CONVERGENCE) | (status == SEPARATRIX)
+    return missed
 
 
 def _completed(results, missed, solve, rows, columns):

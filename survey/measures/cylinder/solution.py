@@ -212,6 +212,8 @@ def _repeated(run, asked, ladder, rtol):
 def missed(results, rtol):
     """Where the answer misses the asked accuracy, or there is none."""
     floats, status = results[0], results[-1]
+    if not status.any() and all((floats[..., bar] <= rtol).all() for bar in (rc.PHI_BAR, rc.W_BAR)):  # as a rule
+        return np.zeros(status.shape, bool)
     good = (status == OK) | (status == TURNING)
     for value, bar in ((rc.PHI, rc.PHI_BAR), (rc.W, rc.W_BAR)):  # VALUE and TIME likewise
         good &= floats[..., bar] <= rtol * (1.0 + np.abs(floats[..., value]))
