@@ -30,10 +30,8 @@ def workflow(scene):
     for p, number in zip(axes, NUMBERS, strict=False):
         low, high = ends(p)
         lines += [f"{p.name} = {{ start = {low:g}, stop = {high:g}, num = {number} }}  # {_about(p)}"]
-    for p in existing:
-        if p in axes:
-            continue
-        line = f"{p.name} = {p.default if p.default is not None else inside(p):g}  # {_about(p)}"
+    for i, p in enumerate(p for p in existing if p not in axes):
+        line = f"{p.name} = {p.default if p.default is not None else inside(p, i):g}  # {_about(p)}"
         lines += [line if p.default is None else f"# {line}"]
     lines += [f"# {p.name} instead of {p.instead_of}: {_about(p)}" for p in module.PARAMETERS
               if p.instead_of in used]  # fmt: skip
@@ -84,6 +82,8 @@ def ends(p):
     return float(f"{low:.3g}"), float(f"{high:.3g}")
 
 
-def inside(p):
+def inside(p, number=0):
+    """A value of the parameter, another one for each `number`: where two are equal, motions are special."""
     low, high = ends(p)
-    return next((x for x in (0.5, 1.0) if low < x < high and p.holds([x]).all()), round(low + 0.3 * (high - low), 3))
+    some = (0.5 + 0.1 * number, 0.5, 1.0)
+    return next((x for x in some if low < x < high and p.holds([x]).all()), round(low + 0.3 * (high - low), 3))

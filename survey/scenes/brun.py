@@ -235,12 +235,13 @@ def _scaled_in_lanes(given, valid, sign, slowly, wanted):
 def _completed(out, given, valid, done, slowly):
     """`out` of nutations, with what the lanes have left."""
     out |= {"verdict": np.full(valid.size, nu.NUTATION), "status": np.full(valid.size, OK)}
-    left = np.flatnonzero(~(done & valid))
+    left = np.flatnonzero(valid & ~done)
     if left.size:
         part = slowly({name: values[left] for name, values in given.items()}, valid[left])
         for name, values in out.items():
             values[left] = part[name]
-    return out
+    out["status"][~valid] = INVALID_PARAMETERS
+    return _emptied(out, ~valid)
 
 
 def _state(given, valid, method, request, times):
