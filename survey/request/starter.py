@@ -22,24 +22,26 @@ def workflow(scene):
     """The text of a workflow that runs as it is, each key with a comment."""
     name, module = find(scene)
     options = check_options(module, {}, ())
+    given = getattr(module, "STARTER", {})
     existing = [p for p in module.PARAMETERS if exists(p, options) and not p.instead_of]
-    axes = sorted(existing, key=lambda p: p.default is not None)[:2]
+    axes = sorted(existing, key=lambda p: (not isinstance(given.get(p.name), tuple), p.default is not None))[:2]
     used = check_parameters(module, name, options, {p.name: 0.0 for p in axes} | _missing(existing))
     lines = [f'title = "{module.TITLE}"', f'scene = "{name}"', *_options(module, options), "", "[axes]"]
     lines += ['# in this order the dimensions; { start, stop, num, spacing = "log" }, { values = [...] }, or a number']
     for p, number in zip(axes, NUMBERS, strict=False):
-        low, high = ends(p)
+        low, high = given.get(p.name) or ends(p)
         lines += [f"{p.name} = {{ start = {low:g}, stop = {high:g}, num = {number} }}  # {_about(p)}"]
     for i, p in enumerate(p for p in existing if p not in axes):
-        line = f"{p.name} = {p.default if p.default is not None else inside(p, i):g}  # {_about(p)}"
-        lines += [line if p.default is None else f"# {line}"]
+        value = given.get(p.name, inside(p, i) if p.default is None else p.default)
+        line = f"{p.name} = {value:g}  # {_about(p)}"
+        lines += [line if p.default is None or p.name in given else f"# {line}"]
     lines += [f"# {p.name} instead of {p.instead_of}: {_about(p)}" for p in module.PARAMETERS
               if p.instead_of in used]  # fmt: skip
     lines += ["", "[solver]", 'method = "auto"  # or one that `survey scenes` lists for this scene',
               "rtol = 1e-10  # the accuracy asked for: |error| <= rtol (1 + |value|)", "", "[output]",
               f'path = "{name.removesuffix(".py").replace("/", "_")}.nc"']  # fmt: skip
     drawn = [o.name for o in module.OUTPUTS if exists(o, options) and not o.dims]
-    figure = "verdict" if "verdict" in drawn else drawn[0]
+    figure = given.get("figures", "verdict" if "verdict" in drawn else drawn[0])
     lines += [f'figures = ["{figure}"]  # pictures beside the file; of {", ".join(dict.fromkeys(drawn))}',
               "# variables = [...]  # which outputs are stored; all by default"]  # fmt: skip
     if measures.question(module.FAMILY, "curves") is not None:

@@ -49,6 +49,11 @@ CONTRACT = {
     "RATIOS": Value("parameters without a unit, in a scene whose others are in any consistent units", tuple),
     "DIMENSIONS": Value("{name: coordinates} of the extra dimensions that its outputs name in `dims`", dict),
     "EVEN": Value("is the coefficient of its Hill equation even about the half period? True if not given", bool),
+    "STARTER": Value(
+        "what `survey init` asks: {parameter: number, or (start, stop) of an axis}, besides what must be given; and "
+        '"figures": the output that is drawn',
+        dict,
+    ),
     "states": Value(
         "names of the states of its linear periodic system; coordinates, then momenta if symplectic", tuple
     ),

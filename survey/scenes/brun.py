@@ -126,6 +126,10 @@ def _extra(name, long_name, symbol, when, applies):
 _PHASED = dict.fromkeys(("beta1", "beta2"), "p_phi is not 0 and A is not C") | {"beta3": "without jumps at poles"}
 _VERDICTS = {"undecided": -1, "separatrix": 0, "regular_nutation": 1, "regular_precession": 2, "pole_passage": 3}
 _ANGLE = {"units": "rad", "when": _MOTION, "applies": f"{_MOVES}; without the jumps of pi in passing a pole"}
+STARTER = {
+    "p_psi": (-0.99, 0.99), "p_phi": (0.05, 0.95), "A": 1.0, "C": 0.6, "epsilon": 1.0, "theta0": 1.0, "p_theta0": 0.2,
+    "figures": "precession",
+}  # fmt: skip
 OUTPUTS = (
     Output("u", "u = cos theta at t", "u", when=_MOTION, applies=_MOVES),
     Output("psi", "angle of precession at t, 0 at first, unwrapped", r"\psi", **_ANGLE),

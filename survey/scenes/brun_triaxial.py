@@ -84,6 +84,7 @@ OPTIONS = (
 _VERDICT = {"undecided": clebsch.UNDECIDED, "unstable": clebsch.UNSTABLE, "stable": clebsch.STABLE}
 _KEPT = {"H": ("energy", "H"), "F2": ("integral F2", "F_2"), "F3": ("integral F3", "F_3")}
 _HAS_RATE = "where the moment is the least and epsilon < 0, or the largest and epsilon > 0"
+STARTER = {"B": (0.01, 0.99), "C": (0.01, 0.99), "A": 1.0, "Omega": 0.8}
 OUTPUTS = (
     Output("verdict", "is the rotation stable?", flags=_VERDICT, when=_ROTATION),
     Output("verdict", "is the critical motion stable?", flags=_VERDICT, when=_CRITICAL),

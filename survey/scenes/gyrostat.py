@@ -162,6 +162,16 @@ DIMENSIONS = {
     "branch": np.array(destinations.BRANCHES),
 }
 
+STARTER = {
+    "phi0": (-3.14, 3.14),
+    "w0": (-4.0, 4.0),
+    "b12": 0.7,
+    "b31": -0.4,
+    "d": 1.1,
+    "c23": 0.3,
+    "s2": 0.5,
+    "s3": -0.2,
+}
 OUTPUTS = (
     Output("phi", "angle of rotation at t, unwrapped", r"\varphi", units="rad", when=_TIME),
     Output("w", "angular velocity", "w", when={"question": ("trajectory", "abel")},

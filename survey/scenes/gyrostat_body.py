@@ -125,6 +125,10 @@ def _as_reduced(name, as_name=None, applies=None):
                   applies or f"{_SET}; {o.applies}", when, o.dims)  # fmt: skip
 
 
+STARTER = {
+    "lambda1": (-8.0, 8.0), "A22": (0.2, 2.6), "A33": 0.7, "B12": 0.5, "B31": -0.9, "C11": 0.1, "C22": -1.2, "C23": 0.3,
+    "s2": -0.4, "s3": 0.4, "omega1": -2.0, "gamma2": 1.0, "gamma3": 0.3,
+}  # fmt: skip
 OUTPUTS = (
     Output("case", "the paper's case: off the set, about the vertical, A or B", when=_ON_SET,
            flags={"off": 0, "vertical": 1, "A": 2, "B": 3}, fill=-1),

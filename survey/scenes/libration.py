@@ -79,6 +79,7 @@ _VERDICTS = {
 }
 _BELOW = "at mu < mu_R = 0.0385208965..."
 _SERIES = _BELOW + ", where the series keep digits: not at mu -> 0, next to mu_R, or with a divisor below 1e-20"
+STARTER = {"mu": (0.001, 0.05)}
 OUTPUTS = (
     Output("omega1", "greater frequency in the plane", r"\omega_1", applies=_BELOW),
     Output("omega2", "smaller frequency in the plane (of negative energy)", r"\omega_2", applies=_BELOW),

@@ -55,6 +55,7 @@ PARAMETERS = (
     Parameter("e", "eccentricity of the primaries' orbits", "e", minimum=0.0, maximum=1.0, open_maximum=True),
 )
 OPTIONS = ()
+STARTER = {"mu": (0.0005, 0.06), "e": (0.0, 0.7)}
 OUTPUTS = danby.OUTPUTS
 
 

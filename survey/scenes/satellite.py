@@ -69,6 +69,7 @@ OPTIONS = (
 )
 why = hill_why.why
 _CRITERION = {"silent": 0, "certifies_stability": 1}
+STARTER = {"k": (0.0, 0.98), "rho": (0.0, 4.0)}
 OUTPUTS = (
     *monodromy.OUTPUTS,
     Output("exponent_per_orbit", "growth of the logarithm of the amplitude per orbital revolution", r"\mu",

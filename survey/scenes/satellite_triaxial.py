@@ -72,6 +72,7 @@ _GIVEN = (("A", "roll_ratio"), ("B", "yaw_ratio"), ("C",), ("k", "one_minus_k", 
 _SHARED = tuple(o for o in stability.OUTPUTS if o.name not in ("exponent", "period", "monodromy"))
 _MULTIPLIERS = {"multiplier_re", "multiplier_im"}
 _MATRIX = next(o for o in stability.OUTPUTS if o.name == "monodromy")
+STARTER = {"A": (0.05, 0.7), "B": (0.75, 1.0)}
 OUTPUTS = (
     *_SHARED,
     Output("exponent", "growth of the logarithm of the amplitude per period", r"\mu T"),

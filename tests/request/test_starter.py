@@ -6,6 +6,7 @@ import tomllib
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import survey
@@ -25,6 +26,17 @@ def test_a_starter_is_a_sound_workflow_that_names_what_can_be_changed(name, tmp_
     assert len(checked.grid.sizes) in (1, 2) and checked.grid.points > 40
     for p in checked.scene.PARAMETERS:
         assert p.when or f"{p.name} " in text, p.name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", survey.scenes())
+def test_a_starter_draws_something_that_changes(name, tmp_path):
+    text = starter.workflow(name)
+    (tmp_path / "start.toml").write_text(text)
+    (drawn,) = tomllib.loads(text)["output"]["figures"]
+    found = survey.run(tmp_path / "start.toml", output=tmp_path / "o.nc")
+    assert (found.status == 0).mean() >= 0.5
+    assert np.unique(found[drawn].values[found.status.values == 0]).size > 1
 
 
 def test_the_command_writes_one_that_runs(program):

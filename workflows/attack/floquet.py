@@ -59,7 +59,7 @@ def scaled_scene(n):
 
 
 def _names(n):
-    return (*(f"b{i}{j}" for i in range(n) for j in range(n)), "c", "w", "T")
+    return (*(f"b{i}_{j}" for i in range(n) for j in range(n)), "c", "w", "T")
 
 
 def _unimodular(random, n, largest):
@@ -92,7 +92,7 @@ def _blocks(random, n, region, period):
 
 
 def _scaled(random, number, method, rtol):
-    n, region = int(random.choice([2, 3, 4, 6])), str(random.choice(["generic", "generic", "edge", "constant"]))
+    n, region = int(random.choice([2, 3, 4, 6, 9, 12])), str(random.choice(["generic", "generic", "edge", "constant"]))
     rows, known = [], {}
     while len(rows) < number:
         period = float(random.choice([1.0, 2 * pi, 0.3, 10.0]))
@@ -239,7 +239,7 @@ def _coupled_names(m):
 
 
 def _coupled(random, number, method, rtol):
-    m, period = int(random.choice([2, 3])), float(random.choice([pi, 1.0, 5.0]))
+    m, period = int(random.choice([2, 3, 6])), float(random.choice([pi, 1.0, 5.0]))
     waves = [np.column_stack(_waves(random, number, period)) for _ in range(m)]
     if random.random() < 0.2:
         waves[1][:, 0] = waves[0][:, 0]  # multipliers that meet, or nearly
