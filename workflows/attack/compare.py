@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import xarray as xr
+from scipy.optimize import linear_sum_assignment
 
 import survey
 from survey import status
@@ -222,6 +223,15 @@ def _truth(batch, answer, counts, faults):
     return worst
 
 
+def _order(answer, own, part):
+    """For each multiplier of the points `part` the nearest of their `own`: moduli that are nearly equal may be sorted
+    one way or the other.
+    """
+    mine, theirs = (found["multiplier_re"] + 1j * found["multiplier_im"] for found in (answer, own))
+    off = np.nan_to_num(abs(mine[part][:, :, None] - theirs[:, None, :]), nan=1.0)
+    return np.array([linear_sum_assignment(each)[1] for each in off])
+
+
 def _solved_again(batch, answer, counts, faults):
     """Some of the points in another order, alone, at another rtol: within the sum of both bars, no other verdict."""
     random = np.random.default_rng(int(batch.rtol * 1e16))
@@ -230,12 +240,16 @@ def _solved_again(batch, answer, counts, faults):
     other = replace(batch, given=each, cross=(), chosen=None, rtol=float(10.0 ** -random.uniform(6, 13)))
     ds = solve(other)
     ok = (answer["status"][part] == status.OK) & (ds["status"].values == status.OK)
+    own = {name: _flat(other, ds[name]) for name in ds.data_vars}
+    order = _order(answer, own, part) if "multiplier_re" in own else None
     for name in ds.data_vars:
         if f"{name}_error" not in ds:
             continue
-        a, b = answer[name][part], _flat(other, ds[name])
+        a, b, bar = answer[name][part], own[name], own[f"{name}_error"].astype(float)
+        if name.startswith("multiplier_"):
+            b, bar = (np.take_along_axis(values, order, axis=1) for values in (b, bar))
         with np.errstate(invalid="ignore"):
-            apart = np.abs(a - b) > answer[f"{name}_error"][part] + _flat(other, ds[f"{name}_error"]).astype(float)
+            apart = np.abs(a - b) > answer[f"{name}_error"][part] + bar
         apart = _any(apart) & ok
         if apart.any():
             _report(other, counts, faults, "lies", np.flatnonzero(apart), f"{name} alone or at another rtol",

@@ -4,7 +4,7 @@ The polynomial is monic: the characteristic one of M, whose roots are the multip
 reversible systems ("paired": with l, 1 / l is a multiplier), that whose roots are the s = l + 1 / l. Weierstrass's
 iteration finds its roots z_i in lanes, from those at the nearest node; its corrections W_i at the end bound their
 errors, since the roots are the eigenvalues of diag(z_i) - W 1^T: Gershgorin's discs of it, in units that make one of
-them narrow, hold one root each. Of coefficients known to within their `doubts` W_i is known to within a bound.
+them narrow, hold one root each. Of coefficients known to within `doubts` W_i is known to within a bound.
 
 A point whose discs meet, or whose answer misses what is asked, is `missed`: its own monodromy has to tell.
 
@@ -21,6 +21,7 @@ from survey.kernels.math.chebyshev import restrict
 from survey.kernels.math.roundoff import EPS, ROUNDOFF_UP
 
 LANES = 32
+PARTS = 4  # of what is nearest to a node, along each side
 ITERATIONS = 7
 UNDECIDED, UNSTABLE, STABLE = -1, 0, 1  # as in measures.floquet.multipliers, and so are those below
 PLUS_ONE, MINUS_ONE, NEIMARK_SACKER, COLLISION = 1, 2, 3, 4
@@ -34,13 +35,15 @@ def answer(
 ):
     """Answer the points places (R, L) of rows at x (R): columns of `floats`, `signs`, ... as in `stability.Answers`.
 
-    series (n1, K m), of K coefficients, m terms along the row each, known to within doubts (K); table (m, L or more, a
-    multiple of LANES): T_k at the points of a row. near (R + L): the nearest node of each row, then of each column;
-    starts (n1, m, d, 2): the roots at the nodes. Of K = 2 d coefficients the last d are those of the Krein form.
+    series (n1, K m), of K coefficients, m terms along the row each; table (m, L or more, a multiple of LANES): T_k at
+    the points of a row. near (R + L): the part of each row, then of each column, of which each node has PARTS; doubts
+    (K, parts, parts): how well the coefficients are known there; starts (n1, m, d, 2): the roots at the nodes. Of
+    K = 2 d coefficients the last d are those of the Krein form.
     """
     K, m, d, R, L = len(doubts), len(table), starts.shape[2], len(x), places.shape[1]
     work, own = np.empty((2, K * m)), np.empty((1, K * m))
-    c, z, y, own_places = np.empty((K, LANES)), np.empty((d, LANES)), np.empty((d, LANES)), np.empty(LANES, np.int64)
+    c, bars, own_places = np.empty((K, LANES)), np.empty((K, LANES)), np.empty(LANES, np.int64)
+    z, y = np.empty((d, LANES)), np.empty((d, LANES))
     for r in range(R):
         restrict(series, x[r : r + 1], work, own)
         for first in range(0, L, LANES):
@@ -54,10 +57,13 @@ def answer(
                         sums[lane] += weight * one[lane]
             for lane in range(LANES):
                 column, own_places[lane] = first + min(lane, count - 1), places[r, first + min(lane, count - 1)]
+                one, two = near[r], near[R + column]
+                for k in range(K):
+                    bars[k, lane] = doubts[k, one, two]
                 for i in range(d):
-                    z[i, lane] = starts[near[r], near[R + column], i, 0]
-                    y[i, lane] = starts[near[r], near[R + column], i, 1]
-            _lanes(c, doubts, z, y, own_places, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed)
+                    z[i, lane] = starts[one // PARTS, two // PARTS, i, 0]
+                    y[i, lane] = starts[one // PARTS, two // PARTS, i, 1]
+            _lanes(c, bars, z, y, own_places, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed)
 
 
 @kernel
@@ -70,7 +76,8 @@ def answer_points(
     """
     K, m, d, n1, N = len(doubts), starts.shape[1], starts.shape[2], len(series), x.shape[1]
     across, along, part = np.empty((n1, LANES)), np.empty((m, LANES)), np.empty(LANES)
-    c, z, y, own_places = np.empty((K, LANES)), np.empty((d, LANES)), np.empty((d, LANES)), np.empty(LANES, np.int64)
+    c, bars, own_places = np.empty((K, LANES)), np.empty((K, LANES)), np.empty(LANES, np.int64)
+    z, y = np.empty((d, LANES)), np.empty((d, LANES))
     for first in range(0, N, LANES):
         count = min(LANES, N - first)
         for lane in range(LANES):
@@ -80,9 +87,12 @@ def answer_points(
                 across[1, lane] = x[0, p]
             if m > 1:
                 along[1, lane] = x[1, p]
+            one, two = near[0, p], near[1, p]
+            for k in range(K):
+                bars[k, lane] = doubts[k, one, two]
             for i in range(d):
-                z[i, lane] = starts[near[0, p], near[1, p], i, 0]
-                y[i, lane] = starts[near[0, p], near[1, p], i, 1]
+                z[i, lane] = starts[one // PARTS, two // PARTS, i, 0]
+                y[i, lane] = starts[one // PARTS, two // PARTS, i, 1]
         _polynomials(across)
         _polynomials(along)
         for k in range(K):
@@ -97,7 +107,7 @@ def answer_points(
                 one = along[j]
                 for lane in range(LANES):
                     sums[lane] += part[lane] * one[lane]
-        _lanes(c, doubts, z, y, own_places, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed)
+        _lanes(c, bars, z, y, own_places, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed)
 
 
 @kernel
@@ -110,8 +120,10 @@ def _polynomials(table):
 
 
 @kernel
-def _lanes(c, doubts, z, y, places, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed):
-    """Answer the first `count` of LANES points from their coefficients c (K, LANES) and roots z + i y (d, LANES)."""
+def _lanes(c, bars, z, y, places, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed):
+    """Answer the first `count` of LANES points from their coefficients c (K, LANES), known to within `bars`, and roots
+    z + i y (d, LANES), nearly.
+    """
     K, d = len(c), len(z)
     w, gap, parts = np.empty((d, LANES)), np.empty((d, LANES)), np.empty((6, LANES))
     rho, lane_z = np.empty(d), np.empty((d, 2))
@@ -119,7 +131,7 @@ def _lanes(c, doubts, z, y, places, count, n, paired, asked, rtol, floats, signs
     angle, order = np.empty(n), np.empty(n, np.int64)
     form = np.empty((2, d))
     _roots(c, d, z, y, parts)
-    _corrections(c, d, doubts, z, y, w, gap, parts)
+    _corrections(c, d, bars, z, y, w, gap, parts)
     for lane in range(count):
         p = places[lane]
         widest = 0.0
@@ -137,7 +149,7 @@ def _lanes(c, doubts, z, y, places, count, n, paired, asked, rtol, floats, signs
         if paired:
             if K > d:
                 for i in range(d):
-                    form[0, i], form[1, i] = c[d + i, lane], doubts[d + i]
+                    form[0, i], form[1, i] = c[d + i, lane], bars[d + i, lane]
             decided, open_signs = _paired(lane_z, rho, form, K > d, re, im, bar, sign)
         else:
             for i in range(d):
@@ -199,7 +211,7 @@ def _product(z, y, i, d, qr, qi):
 
 
 @kernel
-def _corrections(c, d, doubts, z, y, w, gap, parts):
+def _corrections(c, d, bars, z, y, w, gap, parts):
     """Fill w with bounds of the corrections |W_i|, and `gap` with the distance of each root to the nearest other."""
     pr, pi, qr, qi, size, bound = parts[0], parts[1], parts[2], parts[3], parts[4], parts[5]
     lanes = len(size)
@@ -211,9 +223,9 @@ def _corrections(c, d, doubts, z, y, w, gap, parts):
             size[lane] = math.sqrt(x[lane] * x[lane] + t[lane] * t[lane])
             bound[lane], near[lane] = 8.0 * d * ROUNDOFF_UP, math.inf
         for k in range(d):
-            a = c[k]
+            a, doubt = c[k], bars[k]
             for lane in range(lanes):
-                bound[lane] = bound[lane] * size[lane] + doubts[k] + 8.0 * d * ROUNDOFF_UP * abs(a[lane])
+                bound[lane] = bound[lane] * size[lane] + doubt[lane] + 8.0 * d * ROUNDOFF_UP * abs(a[lane])
         for lane in range(lanes):
             total = math.sqrt(pr[lane] * pr[lane] + pi[lane] * pi[lane]) + bound[lane]
             own[lane] = total / math.sqrt(qr[lane] * qr[lane] + qi[lane] * qi[lane]) * (1.0 + 8.0 * d * EPS)

@@ -68,6 +68,21 @@ def lagrange(x, n):
     return abs(cosines @ by_columns(n).T) + 8 * n * EPS
 
 
+@cache
+def largest_lagrange(n, parts):
+    """Bounds (parts n, n) of the magnitudes of the Lagrange polynomials of n nodes on parts of [-1, 1].
+
+    Node i is in the middle of the parts from parts i on; in the angle all parts are equal. Between samples of the angle
+    a polynomial exceeds them by d^2 / 8 times its second derivative, at most n^2 sqrt 2 (Bernstein; Fejer).
+    """
+    samples = 16
+    angles = np.linspace(0.0, np.pi, n * parts * samples + 1)
+    sizes = abs(np.cos(angles[:, None] * np.arange(n)) @ by_columns(n).T)
+    within = [sizes[k : k - samples or None : samples] for k in range(samples + 1)]
+    beyond = (np.pi / (parts * samples)) ** 2 / 8 * np.sqrt(2.0)
+    return np.max([part[: n * parts] for part in within], axis=0) + beyond + 1e-12
+
+
 def expand(values, matrix, ulps):
     """The series of each row of `values` (R, n) at nodes, by `matrix` (n, n; [from, to]), and its `_doubt` (R)."""
     series = np.zeros_like(values)

@@ -7,8 +7,9 @@ or whose Krein signs, is solved on its own. Of symplectic and reversible systems
 s = l + 1 / l, and Krein signs come from the traces of J times polynomials of M: with adj(l - M) = sum_k l^(n-1-k) B_k
 and v the eigenvector of l, |v|^2 / (v* i J v) = tr(adj(l - M) i J) / p'(l).
 
-The bound of a coefficient: that at the nodes times the Lebesgue constants, the tails of the series, and rounding; at
-a few points that are no nodes it is tried. All depends on the axes of the map, never on the block.
+The bound of a coefficient: those at the nodes times the largest magnitudes that their Lagrange polynomials have in a
+part of the panel, the tails of the series, and rounding; at a few points that are no nodes it is tried. All depends on
+the axes of the map, never on the block.
 
 Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 4, 8 and 15; F. R. Gantmacher,
 The Theory of Matrices (1959), IV.4 (B_k).
@@ -21,6 +22,7 @@ from functools import lru_cache
 import numpy as np
 
 from survey.kernels.floquet import characteristic, steps
+from survey.kernels.floquet.characteristic import PARTS
 from survey.kernels.math import chebyshev
 from survey.kernels.math.roundoff import EPS
 from survey.measures.floquet import monodromy
@@ -78,7 +80,9 @@ class Map:
 
 @dataclass(frozen=True)
 class Panel:
-    """A part of the map: middles and radii of its sides, series (n1, K n2), their bounds, and roots at the nodes."""
+    """A part of the map: middles and radii of its sides, series (n1, K n2), their bounds (K, PARTS n1, PARTS n2), where
+    n1 is 1 (K, 1, PARTS n2), and roots at the nodes.
+    """
 
     middle: tuple[float, ...]
     radius: tuple[float, ...]
@@ -194,7 +198,7 @@ def _answer(key, panel, x, y, places, answer):
     table[0, : y.size], table[1, : y.size] = 1.0, y
     for k in range(2, n2):
         table[k] = 2.0 * table[1] * table[k - 1] - table[k - 2]
-    near = np.concatenate([_nearest(x, n1), _nearest(y, n2)])
+    near = np.concatenate([_part(x, n1), _part(y, n2)])
     characteristic.answer(
         panel.series, panel.doubts, np.ascontiguousarray(x), table, near, panel.starts, np.ascontiguousarray(places),
         key.system.n, key.paired, np.array(key.asked), key.rtol, answer.floats, answer.signs,
@@ -206,10 +210,10 @@ def _answer_points(key, panel, x, places, answer):
     """Answer the points of a panel at x (2, N), each between -1 and 1."""
     n1, K = len(panel.series), len(panel.doubts)
     n2 = panel.series.shape[1] // K
-    near = np.stack([_nearest(x[0], n1), _nearest(x[1], n2)])
-    # terms beyond these, of all n2 series, are a tenth of the bound at most
+    near = np.stack([_part(x[0], n1), _part(x[1], n2)])
+    # terms beyond these, of all n2 series, are a tenth of the bounds at most
     rest = np.cumsum(abs(panel.series[::-1]), axis=0)[::-1].reshape(n1, K, n2)
-    terms = (rest > 0.1 * panel.doubts[:, None] / n2).sum(axis=0)
+    terms = (rest > 0.1 * panel.doubts.min(axis=(1, 2))[:, None] / n2).sum(axis=0)
     characteristic.answer_points(
         panel.series, terms, 1.1 * panel.doubts, x, near, panel.starts, places,
         key.system.n, key.paired, np.array(key.asked), key.rtol, answer.floats, answer.signs,
@@ -217,9 +221,10 @@ def _answer_points(key, panel, x, places, answer):
     )  # fmt: skip
 
 
-def _nearest(x, n):
-    """The number of the node nearest to x in its angle."""
-    return np.clip((np.arccos(np.clip(x, -1.0, 1.0)) * (n / np.pi)).astype(np.int64), 0, n - 1)
+def _part(x, n):
+    """The number of the part that holds x, of which each of n nodes has PARTS, all equal in the angle; 0 if n is 1."""
+    last = n * PARTS - 1 if n > 1 else 0
+    return np.clip((np.arccos(np.clip(x, -1.0, 1.0)) * (n * PARTS / np.pi)).astype(np.int64), 0, last)
 
 
 @lru_cache(maxsize=32)
@@ -268,7 +273,8 @@ def _panel(key, sides, budget):
     served = _served(key, panel, x)
     if served < MOST or not _holds(panel, tried, values[len(x) :], bars[len(x) :]):
         # what varies most is cut: the size of the coefficients, or what they need
-        nodes_alone = replace(panel, doubts=np.median(bars[: len(x)], axis=0))
+        own = bars[: len(x)].T.reshape(-1, *(sizes if len(sizes) == 2 else (1, sizes[0])))
+        nodes_alone = replace(panel, doubts=_in_parts(own))
         hopeless = _served(key, nodes_alone, x) < LEAST
         return None, spent, None if hopeless else _steepest(sizes, values[: len(x)])
     return panel, spent, None
@@ -419,15 +425,17 @@ def _expanded(key, middle, radius, sizes, values, bars):
     K = values.shape[1]
     ulps = [(4 + abs(m) + r) / r for m, r in zip(middle, radius, strict=True)]
     n1, n2 = sizes if len(sizes) == 2 else (1, sizes[0])
-    series, doubts = np.empty((n1, K, n2)), np.empty(K)
+    series, doubts = np.empty((n1, K, n2)), []
     for k in range(K):
         grid = values[:, k].reshape(n1, n2)
         own, doubt = chebyshev.expand(grid, chebyshev.by_columns(n2), ulps[-1])
-        total = doubt.max() + chebyshev.lebesgue(n2) * bars[:, k].max()
+        total = doubt[:, None] + bars[:, k].reshape(n1, n2) @ chebyshev.largest_lagrange(n2, PARTS).T
         if n1 > 1:
             own, tail = chebyshev.transform(own, chebyshev.by_columns(n1), ulps[0])
-            total = tail + chebyshev.lebesgue(n1) * total
-        series[:, k], doubts[k] = own, total
+            total = tail + chebyshev.largest_lagrange(n1, PARTS) @ total
+        series[:, k] = own
+        doubts.append(1.0001 * total)  # rounding of these sums
+    doubts = np.array(doubts)
     if not np.isfinite(doubts).all():
         return None
     d = key.system.n // (2 if key.paired else 1)
@@ -437,6 +445,12 @@ def _expanded(key, middle, radius, sizes, values, bars):
     roots = np.linalg.eigvals(companion)
     starts = np.stack([roots.real, roots.imag], axis=-1).reshape(n1, n2, d, 2)
     return Panel(middle, radius, series.reshape(n1, K * n2), doubts, np.ascontiguousarray(starts))
+
+
+def _in_parts(bars):
+    """Bounds (K, n1, n2) at the nodes, in the parts next to each."""
+    along = np.repeat(bars, PARTS, axis=2)
+    return np.repeat(along, PARTS, axis=1) if bars.shape[1] > 1 else along
 
 
 def _served(key, panel, x):
@@ -457,7 +471,8 @@ def _holds(panel, x, values, bars):
         one = np.cos(np.arange(series.shape[2]) * np.arccos(at[-1]))
         two = np.cos(np.arange(len(series)) * np.arccos(at[0])) if len(series) > 1 else np.ones(1)
         off = abs(np.einsum("i,ikj,j->k", two, series, one) - value)
-        if not (off <= panel.doubts + bar).all():
+        here = panel.doubts[:, _part(at[0], len(series)), _part(at[-1], series.shape[2])]
+        if not (off <= here + bar).all():
             return False
     return True
 
