@@ -42,12 +42,12 @@ def on_line(scene, options, along, ends, fixed):
         bounds, scene = (0.0, 1.0), _Flat(scene)
     others = {name: value for name, value in fixed.items() if name != second}
     low, high = (np.array(pair, float) for pair in zip(ends, bounds, strict=True))
-    square = Square(low, high, np.array([False, False]))
+    value = fixed.get(second, 0.0)
+    square = Square(low, high, np.array([False, False]), across=float(value != bounds[0]))
     if hasattr(measure, "searched"):
         curves = measure.searched(scene, square, [along, second], others, options)
     else:
         curves = measure.closed(square, [along, second], others, options)
-    value = fixed.get(second, 0.0)
     here = np.flatnonzero(curves.parameters[:, 1] == value)
     position, kind = curves.parameters[here, 0], np.repeat(curves.kind, curves.count)[here]
     error = np.asarray(curves.error)[here] * (ends[1] - ends[0]) + np.spacing(abs(position))

@@ -41,7 +41,7 @@ def closed(square, axes, fixed, options):
             here = dict(zip(axes, square.parameters(x).T, strict=True))
             return _function(name, here["e"], here["mu"])
 
-        for x, error in contours.lines(on_map, square.grain, LINES):
+        for x, error in contours.lines(on_map, square, LINES):
             found.append((code, square.parameters(x), error, {}))
     return joined(found, [])
 
