@@ -68,6 +68,8 @@ OF_HDF5 = (
 )  # fmt: skip
 MORE = ["_FillValue", "scale_factor", "_Encoding", "units", "calendar", "missing_value", "coordinates", "symbol"]
 NUMBERS = (np.nan, np.inf, -np.inf, 1e308, -1e308, 5e-324, 0.0, -1.0, 99.0)
+# What Matplotlib 3.8 calls in a newer pyparsing; Python shows users none of these.
+OLDER = {"category": DeprecationWarning, "message": r"'\w+' (argument is )?deprecated"}
 
 
 def base(folder, scene="evil.py"):
@@ -250,6 +252,7 @@ def command(words):
     code = None
     with redirect_stdout(out), redirect_stderr(err), warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always")
+        warnings.filterwarnings("ignore", **OLDER)
         try:
             cli.main(words)
         except SystemExit as end:
@@ -277,6 +280,7 @@ def answered(call, markup=False):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             warnings.filterwarnings("ignore", "zoom:")
+            warnings.filterwarnings("ignore", **OLDER)
             text = call()
     except SurveyError as refusal:
         return unseen(str(refusal)) + ["two lines"] * ("\n" in str(refusal))

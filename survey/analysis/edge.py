@@ -22,6 +22,8 @@ from survey.wording import shown
 FIRST, WIDER, MOST = 0.05, 8.0, 5  # half the first range around a value, relative to 1 + |value|; how it is widened
 INSIDE = 1e-3  # of a range: how far from an end that does not belong to the domain
 WIDEST = 1e4  # of a domain that is searched as a whole
+_UNKNOWN = "no boundaries are known for the scene"
+_INSTEAD = "run a line of points and see where the verdict changes: ds.survey.boundary()"
 
 
 def edge(
@@ -56,7 +58,7 @@ def edge(
     name, module = user_scene.find(scene)
     measure = measures.question(module.FAMILY, "curves")
     if measure is None:
-        raise BadInput(f"edge: no boundaries are known for the scene {name}")
+        raise BadInput(f"edge: {_UNKNOWN} {name}; {_INSTEAD}")
     if hasattr(measure, "trace"):
         check_even(module, name, "edge")
     names = {option.name for option in module.OPTIONS}
@@ -175,7 +177,7 @@ def margin(ds):
     module = user_scene.find(scene)[1]
     measure = measures.question(module.FAMILY, "curves")
     if measure is None:
-        raise BadInput(f"margin: no boundaries are known for the scene {ds.attrs['scene']}")
+        raise BadInput(f"margin: {_UNKNOWN} {ds.attrs['scene']}; {_INSTEAD}")
     here, options = parameters(ds), options_at(ds, module)
     rows = []
     with watched(ds.attrs["scene"], module, 1, lambda: _seconds(measure, here), "parameters") as progress:

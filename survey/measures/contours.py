@@ -13,27 +13,50 @@ HALVINGS = 30
 SURE = 1e-9  # half the width of what brackets a point
 
 
-def lattice(number):
-    """Positions (number^2, 2) of the crossings of the lines, the second axis running fastest."""
+def lattice(number, across=None):
+    """Positions (number^2, 2) of the crossings of the lines, the second axis running fastest.
+
+    `across`: only those (number, 2) at this position on the second axis.
+    """
     ticks = np.linspace(0.0, 1.0, number)
-    first, second = np.meshgrid(ticks, ticks, indexing="ij")
+    first, second = np.meshgrid(ticks, ticks if across is None else across, indexing="ij")
     return np.stack([first.ravel(), second.ravel()], axis=1)
 
 
-def lines(function, grain, number, values=None, halvings=HALVINGS):
+def lines(function, square, number, values=None, halvings=HALVINGS):
     """[(positions (m, 2), errors (m))] of the curves function(x) = 0, from border to border or round.
+
+    Where only a border of the `square` is asked for, the points there, each alone.
 
     function(positions (m, 2)) -> (values, error bounds), NaN where there is none; `values`: those on the `lattice`,
     where they are known.
     """
-    first, second = lattice(number).T.reshape(2, number, number)
-    values = (function(lattice(number))[0] if values is None else values).reshape(number, number)
+    x = lattice(number, square.across)
+    values = function(x)[0] if values is None else values
+    if square.across is not None:
+        return _crossings(function, square, x, values, halvings)
+    values, (first, second) = values.reshape(number, number), x.T.reshape(2, number, number)
     found = contourpy.contour_generator(second, first, np.ma.masked_invalid(values)).lines(0.0)
-    return [part for line in found for part in closed_in(function, np.asarray(line)[:, ::-1], grain, number, halvings)]
+    drawn = []
+    for line in found:
+        x, error, sure = _closed_in(function, np.asarray(line)[:, ::-1], square.grain, number, halvings)
+        drawn += [(x[part], error[part]) for part in runs(sure)]
+    return drawn
 
 
-def closed_in(function, x, grain, number, halvings):
-    """The curve through positions x, each between two crossings of lines; cut where a sign cannot be made certain."""
+def _crossings(function, square, x, values, halvings):
+    """The points on the line through positions x (number, 2) at which the sign of the function changes."""
+    with np.errstate(invalid="ignore"):
+        changes = np.isfinite(values[1:] + values[:-1]) & ((values[1:] > 0.0) != (values[:-1] > 0.0))
+    if not changes.any():
+        return []
+    start = 0.5 * (x[1:] + x[:-1])[changes]
+    found, error, sure = _closed_in(function, start, square.grain, len(x), halvings)
+    return [(found[[i]], error[[i]]) for i in np.flatnonzero(sure)]
+
+
+def _closed_in(function, x, grain, number, halvings):
+    """(positions, errors, are signs certain?) of a curve through positions x, each between two crossings of lines."""
     step, rows = (number - 1) * x, np.arange(len(x))
     along = np.argmax(abs(step - np.rint(step)), axis=1)
     x[rows, 1 - along] = np.rint(step)[rows, 1 - along] / (number - 1)
@@ -54,10 +77,10 @@ def closed_in(function, x, grain, number, halvings):
     t, width, sure = close_in(at, 0.5 * (low + high), high - low, np.full(len(x), grain))
     sure &= (width < SURE) & (t >= 0.0) & (t <= 1.0)
     x[rows, along] = t
-    return [(x[part], width[part] + grain) for part in runs(sure)]
+    return x, width + grain, sure
 
 
 def runs(good):
-    """Index arrays of the runs of at least two that are good."""
+    """Index arrays of the runs of at least two that are good, or of a single point."""
     parts = np.split(np.arange(good.size), 1 + np.flatnonzero(np.diff(good)))
-    return [part for part in parts if part.size > 1 and good[part[0]]]
+    return [part for part in parts if (part.size > 1 or good.size == 1) and good[part[0]]]

@@ -16,7 +16,8 @@ class Curves:
 
     Per point its `parameters` (m, 2), its `error` (m), in the unit square of the map, and `along`: {name of
     ALONG: (values, errors)}. `unexplained`: segments of lines across the map along which a curve is missing, by what is
-    known at their ends; None where nothing is counted.
+    known at their ends; None where nothing is counted. `complete`: is it shown that there are no others? None where
+    this is not known.
     """
 
     count: np.ndarray
@@ -25,6 +26,7 @@ class Curves:
     error: np.ndarray
     along: dict
     unexplained: int | None = None
+    complete: bool | None = None
 
 
 def sampled(position, low, high, first=FIRST):

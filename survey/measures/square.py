@@ -7,11 +7,15 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Square:
-    """Ends of both axes (2), ascending, and which of them are logarithmic."""
+    """Ends of both axes (2), ascending, and which of them are logarithmic.
+
+    `across`: the position on the second axis, 0 or 1, of the border that alone is asked for; None: the whole square is.
+    """
 
     low: np.ndarray
     high: np.ndarray
     log: np.ndarray
+    across: float | None = None
 
     def parameters(self, x):
         """Parameters (..., 2) at positions (..., 2); exact at the border."""

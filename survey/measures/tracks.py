@@ -9,10 +9,11 @@ across the curve, by positions at which a has certain and opposite signs where b
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from survey.measures.contours import runs
+from survey.measures import contours
 from survey.measures.sampled import FLAT, LONGEST, inside
 
 STEP = 1e-5  # of differences, in units of the map and of x
@@ -21,6 +22,7 @@ LEAST, MOST = 3e-5, 2000  # step on the map at which a curve is given up, and po
 SLOW = 12  # points that have not come further than as many of the LEAST steps end a curve
 SAME, APART = 3e-4, 0.05  # of the map, and of x: curves so near to one another are one
 WIDEST = 1e-6  # error of a point that is kept
+DENSER = 4  # times the nodes of a line of the lattice, where one line alone is searched
 TINY = 1e-300
 
 
@@ -36,7 +38,7 @@ class Track:
 
     def certain(self):
         """The runs of points that are certain."""
-        return [part_of(self, part) for part in runs(self.sure)]
+        return [part_of(self, part) for part in contours.runs(self.sure)]
 
     def passes(self, u, turn):
         """Does the curve pass u = (x, position)? x and x + turn are the same."""
@@ -153,7 +155,11 @@ class Follower:
         run = np.where(high == low, 1.0, high - low)
         share = np.where(high > 1.0, (1.0 - low) / run, np.where(high < 0.0, -low / run, 1.0))
         axis = int(np.argmin(share))
-        at, end = u + share[axis] * (beyond - u), float(high[axis] > 1.0)
+        return self.on_border(u + share[axis] * (beyond - u), axis, float(high[axis] > 1.0))
+
+    def on_border(self, at, axis, end):
+        """The row of the point next to `at` where the position on the axis is `end`; None if it is not found."""
+        at = at.copy()
         for _ in range(8):
             at[1 + axis] = end
             values, slopes = self._at(at), self._slopes(at)
@@ -231,13 +237,18 @@ def _near(u, tangent, new, ahead):
         not turned or chord <= 1e-3)  # fmt: skip
 
 
-def from_lattice(number, things, function_of, grain):
+def from_lattice(number, things, function_of, square):
     """[(label, Track)] of all curves that part the nodes of a lattice of so many lines each way.
+
+    Where only a border of the `square` is asked for: of their points there, Tracks of one point.
 
     things(position) -> [(label, side, place, a)] where b = 0; function_of(label): what a Follower takes, and by how
     much places differ that are the same (an infinite number if none are). A curve is begun where, from one node to the
     next, a changes its sign on things of one label and side that are near.
     """
+    if square.across is not None:
+        x = contours.lattice((number - 1) * DENSER + 1, square.across)
+        return list(_on_line(x, things, function_of, square))
     ticks = np.linspace(0.0, 1.0, number)
     known = [[things(np.array([one, two])) for two in ticks] for one in ticks]
     found = []
@@ -247,13 +258,23 @@ def from_lattice(number, things, function_of, grain):
                 if k < number and m < number:
                     here, there = np.array([ticks[i], ticks[j]]), np.array([ticks[k], ticks[m]])
                     for label, start in _changes(known[i][j], known[k][m], here, there):
-                        _add(found, label, *function_of(label), grain, start)
+                        _add(found, label, *function_of(label), square.grain, start)
     found.sort(key=lambda one: -len(one[1].x))
     alone = []
     for label, track in found:
         if not any(own == label and track.within(longer, function_of(label)[1]) for own, longer in alone):
             alone.append((label, track))
     return alone
+
+
+def _on_line(x, things, function_of, square):
+    """(label, Track of one point) of the curves that part the positions x (m, 2) on a border."""
+    nodes = [(position, things(position)) for position in x]
+    for (here, some), (there, others) in pairwise(nodes):
+        for label, start in _changes(some, others, here, there):
+            row = Follower(function_of(label)[0], square.grain).on_border(start, 1, square.across)
+            if row is not None:
+                yield label, Track(*(np.array([value]) for value in row))
 
 
 def _add(found, label, function, turn, grain, start):
@@ -267,7 +288,7 @@ def _add(found, label, function, turn, grain, start):
     if landed is None or known(landed[0]):
         return
     track = follower.track(landed[0])
-    if track is not None:
+    if track is not None and len(track.x) > 1:
         found.append((label, track))
 
 

@@ -27,7 +27,12 @@ MOST_LABELS = 30  # on an axis
 def save(ds, path, name=None, style=None, width="single"):
     """Draw variable `name` (the verdict, or the first output) of `ds` to `path` (PNG, PDF or SVG)."""
     with matplotlib.rc_context(style_named(style).rc), np.errstate(over="ignore"):  # of ticks, near the largest number
-        draw(ds, name, style, width).savefig(path, dpi=style_named(style).dpi)
+        try:
+            draw(ds, name, style, width).savefig(path, dpi=style_named(style).dpi)
+        except OverflowError:  # of ticks, before Matplotlib 3.11
+            raise BadInput(
+                f"{path}: Matplotlib {matplotlib.__version__} draws no numbers near the largest; use 3.11 or newer"
+            ) from None
 
 
 def draw(ds, name=None, style=None, width="single"):

@@ -55,7 +55,7 @@ def draw_surfaces(axes, ds):
     # edges of the faces' colours: else the background shows between them
     drawn = Poly3DCollection(places[corners], facecolors=faces, edgecolors=faces, linewidths=0.2, zsort="average")
     drawn.set_rasterized(True)
-    axes.add_collection3d(drawn, autolim=False)
+    axes.add_collection(drawn, autolim=False)  # that of 3d takes no autolim before Matplotlib 3.10
     axes.set(xlim=ends[0], ylim=ends[1], zlim=ends[2])
     axes.view_init(**VIEW)
     axes.set_box_aspect((1.0, 1.0, 0.8))

@@ -65,7 +65,8 @@ def along(scene, options, name, ends, fixed):
     """(OnLine, index of each or None, are these all?) between `ends` of the parameter `name`; `fixed`: all others."""
     measure = measures.question(scene.FAMILY, "curves")
     if hasattr(measure, "refusal"):
-        return on_line(scene, options, name, ends, fixed), None, None
+        found = on_line(scene, options, name, ends, fixed)
+        return found, None, found.complete
     parameters = {name: ((name,), np.array(ends))} | {key: ((), np.float64(value)) for key, value in fixed.items()}
     line = SimpleNamespace(scene=scene, grid=Grid({name: 2}, parameters), request=Request(options))
     edges = _edges(line, name)

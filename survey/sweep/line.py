@@ -18,11 +18,15 @@ SAME = 4.0  # error bounds within which two points are the same
 
 @dataclass(frozen=True)
 class OnLine:
-    """Boundaries, ascending: `position`, its `error`, `kind` (a code of the family's CLASSES)."""
+    """Boundaries, ascending: `position`, its `error`, `kind` (a code of the family's CLASSES).
+
+    `complete`: is it shown that these are all? None where this is not known.
+    """
 
     position: np.ndarray
     error: np.ndarray
     kind: np.ndarray
+    complete: bool | None = None
 
 
 def on_line(scene, options, along, ends, fixed):
@@ -31,20 +35,19 @@ def on_line(scene, options, along, ends, fixed):
     Raises BadInput where the scene's family knows no curves.
     """
     measure = measures.question(scene.FAMILY, "curves")
-    if not hasattr(measure, "closed"):  # curves are searched for, on any axis
-        second, bounds, scene = "", (0.0, 1.0), _Flat(scene)
-        others = fixed
-    else:
-        second = second_axis(measure, scene, along, fixed)
+    second = second_axis(measure, scene, along, fixed) if hasattr(measure, "closed") else ""  # searched on any axis
+    if second:
         bounds = _bounds(next(p for p in scene.PARAMETERS if p.name == second), fixed[second])
-        others = {name: value for name, value in fixed.items() if name != second}
+    else:
+        bounds, scene = (0.0, 1.0), _Flat(scene)
+    others = {name: value for name, value in fixed.items() if name != second}
     low, high = (np.array(pair, float) for pair in zip(ends, bounds, strict=True))
-    square = Square(low, high, np.array([False, False]))
+    value = fixed.get(second, 0.0)
+    square = Square(low, high, np.array([False, False]), across=float(value != bounds[0]))
     if hasattr(measure, "searched"):
         curves = measure.searched(scene, square, [along, second], others, options)
     else:
         curves = measure.closed(square, [along, second], others, options)
-    value = fixed.get(second, 0.0)
     here = np.flatnonzero(curves.parameters[:, 1] == value)
     position, kind = curves.parameters[here, 0], np.repeat(curves.kind, curves.count)[here]
     error = np.asarray(curves.error)[here] * (ends[1] - ends[0]) + np.spacing(abs(position))
@@ -52,11 +55,16 @@ def on_line(scene, options, along, ends, fixed):
     position, error, kind = position[order], error[order], kind[order]
     near = np.diff(position) <= SAME * (error[1:] + error[:-1])
     keep = np.concatenate([[True], ~(near & (np.diff(kind) == 0))]) if position.size else np.zeros(0, bool)
-    return OnLine(position[keep], error[keep], kind[keep])
+    return OnLine(position[keep], error[keep], kind[keep], curves.complete)
 
 
 def second_axis(measure, scene, along, fixed):
-    """The parameter that spans a map with `along` on which curves are known; raises BadInput if there is none."""
+    """The parameter that spans a map with `along` on which curves are known; "" where they are known along it alone.
+
+    Raises BadInput if there is neither.
+    """
+    if measure.refusal([along], scene) is None:
+        return ""
     for p in scene.PARAMETERS:
         known = p.name != along and np.isfinite(fixed.get(p.name, np.nan))
         if known and measure.refusal([along, p.name], scene) is None:

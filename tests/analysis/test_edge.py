@@ -202,5 +202,9 @@ def test_what_has_no_boundaries_is_told():
     ):
         with pytest.raises(BadInput, match=match):
             survey.edge("satellite", **keywords)
-    with pytest.raises(BadInput, match="no boundaries are known"):
-        survey.edge("libration", along="mu")
+    with pytest.raises(BadInput, match="no boundaries are known for the scene gyrostat_body"):
+        survey.edge("gyrostat_body", along="lambda1")
+    with pytest.raises(BadInput, match="boundaries are known along mu alone, not on periods"):
+        survey.edge("libration", along="periods", near=1e9, mu=0.01, order="8")
+    with pytest.raises(BadInput, match="known of the scene gyrostat, whose parameters the outputs reduced_NAME are"):
+        survey.edge("gyrostat_integrable", along="w0", near=1.0, case="elliptic", C22=0.5, C33=0.3, S2=0.2)

@@ -98,7 +98,7 @@ def flow(
                     end = span[i]
                 else:
                     h = 0.5 * rest if h > 0.5 * rest else h
-                    unit = math.exp2(math.ceil(math.log2(span[i]))) / DIGITS
+                    unit = math.ldexp(1.0 / DIGITS, math.ceil(math.log2(span[i])))  # numba 0.61 knows no exp2
                     end = t[lane] + max(math.floor(h / unit), 1.0) * unit
                 before, own = t[lane], s[lane]
                 taken = end - before

@@ -110,7 +110,7 @@ def counted(plane, kind, xy, error, known):
     """A row of `found` with the numbers of cycles to the left and to the right of some points of the curve."""
     sides = np.full((2, len(xy)), np.nan)
     x = plane.positions(xy)
-    for i in _spread(x) if len(xy) > 2 else ():
+    for i in _spread(x) if len(xy) > 2 and plane.square.across is None else ():
         along = x[i + 1] - x[i - 1]
         across = np.array([-along[1], along[0]]) / max(np.hypot(*along), TINY)
         for side, sign in zip(sides, (1.0, -1.0), strict=True):

@@ -61,12 +61,12 @@ def curves(plane):
     """[(Connection, positions (m, 2), errors (m))] of the curves."""
     if plane.conservative:
         return  # every branch is part of a connection, see `separatrices`
-    everything = _traced(plane, contours.lattice(LINES), np.ones((4, 2)))
+    everything = _traced(plane, contours.lattice(LINES, plane.square.across), np.ones((4, 2)))
     for connection in _every():
         values = connection.miss(*(everything[:, *branch] for branch in connection.branches))[0]
         if np.nanmin(values, initial=0.0) < 0.0 < np.nanmax(values, initial=0.0):
             function = partial(missed, plane, connection)
-            for x, error in contours.lines(function, plane.square.grain, LINES, values, HALVINGS):
+            for x, error in contours.lines(function, plane.square, LINES, values, HALVINGS):
                 for part in contours.runs(_smooth(function, x, error)):
                     yield connection, x[part], error[part]
 

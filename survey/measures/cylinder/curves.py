@@ -39,6 +39,8 @@ def refusal(axes, scene):
     """Why there are no curves on a map of these axes, in words; None if there are."""
     if scene.FAMILY == "abel":
         return _refusal_of_own(axes, scene)
+    if not {p.name for p in scene.PARAMETERS}.issuperset(SYSTEM):
+        return "curves are known of the scene gyrostat, whose parameters the outputs reduced_NAME are; ask there"
     own = set(axes[:2])
     if len(axes) in (2, 3) and (own == set(STATE) or own <= set(SYSTEM)) and set(axes[2:]) <= set(SYSTEM):
         return None
@@ -86,6 +88,8 @@ def closed(square, axes, fixed, options):
 
 
 def seconds(axes):
-    """Estimated seconds on one thread of the curves on one map, measured."""
+    """Estimated seconds on one thread of the curves on one map, measured; or along one axis alone."""
     own = set(axes[:2])
-    return 0.1 if own == set(STATE) else 10.0 if own <= set(SYSTEM) else 12.0
+    if own <= set(STATE):
+        return 0.1
+    return 0.7 if len(axes) == 1 else 10.0 if own <= set(SYSTEM) else 12.0

@@ -150,7 +150,7 @@ def found(plane):
 
         return function, TWO_PI if kind == LIBRATION else math.inf
 
-    for (kind, _class), track in tracks.from_lattice(LINES, things, function_of, plane.square.grain):
+    for (kind, _class), track in tracks.from_lattice(LINES, things, function_of, plane.square):
         for part in track.certain():
             yield "cycle_fold", plane.square.parameters(part.x), part.error, _known(kind, part)
 

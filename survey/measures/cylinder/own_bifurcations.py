@@ -74,7 +74,7 @@ def found(plane):
     for things, function, drawn in ((_extrema, _fold, _folds), (_rests, _hopf, _hopfs)):
         at = partial(_at, plane, function)
         for _label, track in tracks.from_lattice(
-            LINES, partial(things, plane), lambda _, at=at: (at, TWO_PI), plane.square.grain
+            LINES, partial(things, plane), lambda _, at=at: (at, TWO_PI), plane.square
         ):
             for part in track.certain():
                 yield from drawn(plane, part)
@@ -209,8 +209,8 @@ def _ends(plane):
         return tuple(np.array(values).T)
 
     for number in NUMBERS:
-        values, bars = known(contours.lattice(LINES), number)
+        values, bars = known(contours.lattice(LINES, plane.square.across), number)
         if (abs(values) > bars).any():
-            for x, error in contours.lines(partial(known, number=number), plane.square.grain, LINES, values):
+            for x, error in contours.lines(partial(known, number=number), plane.square, LINES, values):
                 yield "ends", plane.square.parameters(x), error, {}
             return

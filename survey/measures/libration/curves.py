@@ -1,19 +1,21 @@
-"""The curves that [boundaries] draws on maps of mu and e of the elliptic problem: Danby's A and B, and KC.
+"""The boundaries of the triangular points: critical mass ratios; of the elliptic problem, curves on maps of mu and e.
 
-On A and B a pair of multipliers meets at -1, on KC two pairs of unlike kind meet on the unit circle: zeros of the
-half-period factors A and B, and of K where 0 < t < 2 (`scenes/libration_elliptic.md`, section 3). They are searched for
-on LINES lines of the map each way, and every point is bracketed on its line by certain signs.
+Of the circular problem they are the numbers of `critical`. Of the elliptic one they are Danby's A and B, and KC: on A
+and B a pair of multipliers meets at -1, on KC two pairs of unlike kind meet on the unit circle. They are zeros of the
+half-period factors A and B, and of K where 0 < t < 2 (`scenes/libration_elliptic.md`, section 3), searched for on LINES
+lines of the map each way; every point is bracketed on its line by certain signs.
 """
 
 import numpy as np
 
 from survey.kernels.libration.traces import discriminant, product
 from survey.measures import contours
-from survey.measures.libration import danby
+from survey.measures.libration import critical, danby
 from survey.measures.sampled import joined
 
-CLASSES = {"A": 0, "B": 1, "KC": 2}
-TITLE = "curve of Danby's diagram: multipliers meet at -1 (A, B), or two pairs on the unit circle (KC)"
+DANBY = {"A": 0, "B": 1, "KC": 2}
+CLASSES = DANBY | critical.CLASSES
+TITLE = "curve of Danby's diagram, where multipliers meet at -1 (A, B) or two pairs meet (KC); or critical mass ratio"
 AXES = ("mu", "e")
 ALONG = ()
 LINES = 129
@@ -21,21 +23,25 @@ LINES = 129
 
 def refusal(axes, scene):
     """Why there are no curves on a map of these axes, in words; None if there are."""
-    if scene.FAMILY == "danby" and set(axes) == set(AXES) and len(axes) == 2:
+    if scene.FAMILY == "normal_form":
+        return None if list(axes) == ["mu"] else f"boundaries are known along mu alone, not on {', '.join(axes)}"
+    if set(axes) == set(AXES) and len(axes) == 2:
         return None
     return f"curves are known on the axes mu and e of libration_elliptic, not on {', '.join(axes) or 'none'}"
 
 
 def closed(square, axes, fixed, options):
     """The Curves on the map of `axes`, the unit square `square`."""
+    if set(axes) != set(AXES):
+        return _of_circular(square)
     found = []
-    for name, code in CLASSES.items():
+    for name, code in DANBY.items():
 
         def on_map(x, name=name):
             here = dict(zip(axes, square.parameters(x).T, strict=True))
             return _function(name, here["e"], here["mu"])
 
-        for x, error in contours.lines(on_map, square.grain, LINES):
+        for x, error in contours.lines(on_map, square, LINES):
             found.append((code, square.parameters(x), error, {}))
     return joined(found, [])
 
@@ -43,6 +49,19 @@ def closed(square, axes, fixed, options):
 def seconds(axes):
     """Estimated seconds on one thread of the curves on one map, measured; or along one axis alone."""
     return 1.0 if len(axes) > 1 else 0.4
+
+
+def _of_circular(square):
+    """The Curves on a map of mu and something on which no verdict depends."""
+    low, high = square.low[0], square.high[0]
+    across = [(kind, mu, bar) for kind, mu, bar in critical.ratios() if low <= mu <= high]
+    found = [
+        (kind, np.array([[mu, square.low[1]], [mu, square.high[1]]]), np.full(2, bar / (high - low)), {})
+        for kind, mu, bar in across
+    ]
+    curves = joined(found, [])
+    curves.complete = True
+    return curves
 
 
 def _function(name, e, mu):

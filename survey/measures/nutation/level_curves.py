@@ -38,7 +38,7 @@ def traced(square, axes, fixed):
         def on_map(x, function=function):
             return function(states(square, axes, fixed, x))
 
-        for x, error in contours.lines(on_map, square.grain, LINES):
+        for x, error in contours.lines(on_map, square, LINES):
             found.append((function, x, error, states(square, axes, fixed, x)))
     return [(function, *part) for function, *rest in found for part in _reaching(function, *rest)]
 

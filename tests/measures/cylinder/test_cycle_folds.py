@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from flow_truth import series
 
+import survey
 from survey.measures.cylinder import bifurcations, connections, curves, cycle_folds
 from survey.measures.square import Square
 
@@ -86,3 +87,13 @@ def test_two_cycles_are_lost(found):
     assert np.mean(abs(left - right)[known] == 2.0) > 0.7  # else there is another curve within ASIDE
     assert (found.along["multiplier"][0][on_folds] == 1.0).all()
     assert (found.error[on_folds] < 1e-8).all()
+
+
+def test_two_cycles_are_lost_at_a_fold_on_a_line():
+    """Portraits, which know nothing of folds, have two rotations more on one side."""
+    system = {"b31": 1.192, "d": 0.827, "c23": -0.824, "s2": -0.6, "s3": 1.121}
+    line = survey.edge("gyrostat", along="b12", b12=(-0.5, 0.0), question="portrait", **system)
+    own = line.edge_class.values == curves.CLASSES["cycle_fold"]
+    at, bar = (x.values[own].item() for x in (line.edge, line.edge_error))
+    beside = survey.evaluate("gyrostat", question="portrait", b12=[at - 1e-5, at + 1e-5], **system)
+    assert abs(np.diff(beside.rotations_minus.values)).item() == 2 and bar < 1e-9
