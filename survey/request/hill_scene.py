@@ -188,7 +188,9 @@ class HillScene(FunctionScene):
         lanes = [i for i in lines if of_z[i] <= 1 and not of_ranges[i]]
         if not lanes:
             return None
-        lane = max(lanes, key=lambda i: lines[i][0])
+        # of long ones the last: blocks cut it last, and each has to solve all rows' nodes
+        order, most = list(request.lines), max(lines[i][0] for i in lanes)
+        lane = max((i for i in lanes if 2 * lines[i][0] >= most), key=lambda i: order.index(names[i]))
         across = [i for i in lines if i != lane and of_z[i] <= dependence.ENTIRE and not of_ranges[i]]
         if not across:
             return user_rows.Axes(lane, lines[lane])
@@ -315,7 +317,9 @@ class HillScene(FunctionScene):
         for i in np.flatnonzero(np.array(of_z) <= 1):  # a mean of two z has no other spikes than these
             if not of_ranges[i]:
                 finite &= (points[:, i] == points[:, i].min()) | (points[:, i] == points[:, i].max())
-        self._check_spikes(points[finite], edges[finite], slack[finite])
+        finite &= ~user_equation.unprobed(self.z, points, edges, slack, size.max(axis=1))
+        if finite.any():
+            self._check_spikes(points[finite], edges[finite], slack[finite])
         if not self.EVEN:
             self._check_period(points, period, size.max(axis=1))
 

@@ -21,7 +21,7 @@ import numpy as np
 from survey.kernels.hill import dop853, sampled_double
 from survey.kernels.jit import fresh, inline, kernel
 from survey.kernels.lanes import RESULTS
-from survey.measures.hill import monodromy, multiprecision, pointwise
+from survey.measures.hill import bands, monodromy, multiprecision, pointwise
 
 SIZES = (65, 513, 4097)
 # Evenly spread points of the part that is solved at which z is probed, however smooth it seems; those when a scene is
@@ -224,6 +224,15 @@ def _agree(z, point, scale, u, values):
     return bool((abs(values - inside) <= SAME_Z * ROUNDING * scale).all())
 
 
+def unprobed(z, points, edges, slack, size):
+    """Which points (N), whose z is of this `size` (N), are known to have no spikes between samples (see `bands`)."""
+    if not len(points) or edges.shape[1] != 2 or slack.any():
+        return np.zeros(len(points), np.bool_)
+    with np.errstate(invalid="ignore"):
+        largest, end = np.nan_to_num(abs(points)).max(axis=0), np.nan_to_num(edges[:, -1]).max()
+        return bands.missed(z, tuple(largest.tolist()), float(end), SIZES[0]) <= 10 * RESOLVED * size
+
+
 def measured(z, points, edges, period, slack, probes=PROBES):
     """Of each piece `size` = max |z| and `rate` (N, P); of each point `scale` = B, NaN if z is not finite, and `rough`.
 
@@ -269,7 +278,19 @@ def measured(z, points, edges, period, slack, probes=PROBES):
             if number == SIZES[0] and period is not None:
                 off[some] = abs(known - values(some, number, mirrored=True)).max(axis=1)
             smooth = np.flatnonzero((last[some] <= RESOLVED * size[some]) | (number == SIZES[-1]))
+            if number == SIZES[0]:
+                smooth = smooth[
+                    ~unprobed(
+                        z,
+                        points[owner[some[smooth]]],
+                        edges[owner[some[smooth]]],
+                        slack[owner[some[smooth]]],
+                        size[some[smooth]],
+                    )
+                ]
             some = some[smooth]
+            if not some.size:
+                continue
             hidden = (between if number == SIZES[0] else missed)(some, known[smooth], size[some])
             hidden[~(hidden > 10 * RESOLVED * size[some] + 4 * noise[some])] = 0
             noise[some], last[some] = np.maximum(noise[some], hidden), np.maximum(last[some], hidden)
