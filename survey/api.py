@@ -247,10 +247,11 @@ def _not_real(key: str, value: Any) -> BadInput:
 
 def _check_dimensions(module: Any, given: dict[str, xr.DataArray]) -> None:
     """Raise BadInput if coordinates disagree along a shared dimension, or a dimension has the name of an output."""
-    if not any(array.dims for array in given.values()):
+    wide = [array for array in given.values() if array.dims]
+    if not wide:
         return
     try:
-        xr.align(*given.values(), join="exact", copy=False)
+        xr.align(*wide[: len(wide) if len(wide) > 1 else 0], join="exact", copy=False)
     except ValueError as error:
         raise BadInput(
             f"the parameters' coordinates disagree: {str(error).splitlines()[0]}; align them first"
