@@ -18,6 +18,8 @@ from survey.measures.hill.dependence import OTHER_NAMES
 ELLIPSES = (2.0, 4.0)
 # Of a library's function, in EPS; and how much more an interpolant at some hundred points may be off than its values.
 OF_FUNCTIONS, LEBESGUE = 4.0, 5.0
+# Of where samples are, in EPS of the end.
+OF_POSITIONS = 2.0
 ROUND = {"sin": math.cosh, "cos": math.cosh}
 STEEP = {"exp": math.exp, "sinh": math.cosh, "cosh": math.cosh}
 
@@ -125,7 +127,7 @@ def missed(z, largest, end, samples):
     least = math.inf
     for rho in ELLIPSES:
         wide, high = 0.25 * end * (rho + 1 / rho), 0.25 * end * (rho - 1 / rho)
-        u = Bound(0.5 * end + wide + high, high, end, 0.0)
+        u = Bound(0.5 * end + wide + high, high, end, OF_POSITIONS * EPS * end)
         try:
             found = _bound(_lifted(z)(u, [Bound(size, 0.0, size, 0.0) for size in largest]))
         except Exception:  # a user's code may raise anything
