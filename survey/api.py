@@ -27,6 +27,8 @@ from survey.sweep import announce, engine, solve
 from survey.sweep.progress import Progress, watched
 from survey.wording import counted, short, shown
 
+NUMBER = xr.DataArray(0.0)  # to copy one takes less time than to make it
+
 
 def run(
     workflow: str | os.PathLike[str] | Mapping[str, Any],
@@ -215,10 +217,12 @@ def _labelled(key: str, value: Any) -> xr.DataArray:
         raise BadInput(f"{short(key, 40)}: an array of {array.ndim} dimensions needs names for them; give a DataArray")
     if array.dtype.kind not in "iuf":  # xarray itself may fail on whole numbers beyond floats
         raise _not_real(key, value.values if isinstance(given, xr.DataArray) else given)
+    if array.size == 0:
+        raise BadInput(f"{short(key, 40)}: an empty array has no points; give at least one value")
+    if unnamed and array.ndim == 0 and isinstance(array, np.ndarray):
+        return NUMBER.copy(data=np.array(array, dtype=float))
     if unnamed:
         value = xr.DataArray(array, dims=(key,) if array.ndim else ())
-    if value.size == 0:
-        raise BadInput(f"{short(key, 40)}: an empty array has no points; give at least one value")
     return value.astype(float) if _is_lazy(value) else value.copy(data=np.array(value.values, dtype=float))
 
 
@@ -243,8 +247,11 @@ def _not_real(key: str, value: Any) -> BadInput:
 
 def _check_dimensions(module: Any, given: dict[str, xr.DataArray]) -> None:
     """Raise BadInput if coordinates disagree along a shared dimension, or a dimension has the name of an output."""
+    wide = [array for array in given.values() if array.dims]
+    if not wide:
+        return
     try:
-        xr.align(*given.values(), join="exact", copy=False)
+        xr.align(*wide[: len(wide) if len(wide) > 1 else 0], join="exact", copy=False)
     except ValueError as error:
         raise BadInput(
             f"the parameters' coordinates disagree: {str(error).splitlines()[0]}; align them first"

@@ -44,8 +44,11 @@ class Parameter:
         values = np.asarray(values, dtype=float)
         above = values > self.minimum if self.open_minimum else values >= self.minimum
         below = values < self.maximum if self.open_maximum else values <= self.maximum
-        exist = self.but_for and outputs and all(name.startswith(self.but_for) for name in outputs)
-        return np.isfinite(values) & above & below & (~np.isin(values, self.excluded) | bool(exist))
+        inside = np.isfinite(values) & above & below
+        if self.excluded and not (self.but_for and outputs and all(name.startswith(self.but_for) for name in outputs)):
+            for value in self.excluded:
+                inside = inside & (values != value)
+        return inside
 
     @property
     def domain(self) -> str:

@@ -103,3 +103,26 @@ def test_a_point_outside_the_domain_costs_itself_alone():
     assert mixed.status.values.tolist() == [0, 1, 0]
     assert np.isnan(mixed.w[1])
     np.testing.assert_array_equal(mixed.w[[0, 2]], good.w)
+
+
+@pytest.mark.parametrize(
+    ("scene", "given"),
+    [
+        ("satellite", {"k": 0.3, "rho": 1.5}),
+        ("gyrostat", {"question": "portrait", "b12": 0.1, "b31": 0.2, "d": 0.3, "s2": 0.1}),  # counts, cycles
+        ("gyrostat", SYSTEM | {"w0": 1.0, "t": 1.0}),
+        ("libration", {"mu": 0.01}),
+    ],
+)
+def test_a_lone_point_is_labelled_as_one_of_an_array_and_shares_nothing_with_the_next(scene, given):
+    options = {key: value for key, value in given.items() if key in ("question", "rtol")}
+    arrays = {key: xr.DataArray([value], dims="point") for key, value in given.items() if key not in options}
+    wanted = survey.evaluate(scene, **arrays, **options).isel(point=0)
+    for _ in range(2):
+        ds = survey.evaluate(scene, **given)
+        xr.testing.assert_identical(ds, wanted)
+        for name, variable in ds.variables.items():
+            assert (variable.encoding, variable.dtype) == (wanted[name].encoding, wanted[name].dtype)
+        ds.status.attrs["flag_values"][:] = 7
+        ds.status.attrs["long_name"] = ds.attrs["title"] = "changed"
+        ds.status.encoding["dtype"] = "int16"

@@ -6,6 +6,7 @@ they are used.
 
 import math
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 
@@ -101,14 +102,21 @@ def options(given):
 def flags(attributes):
     """{flag meaning: code} from the attributes of a CF flag variable; raises Damaged."""
     meanings, codes = attributes.get("flag_meanings"), np.atleast_1d(attributes.get("flag_values", ()))
-    names = meanings.split() if isinstance(meanings, str) else []
-    if not names or codes.dtype.kind not in "iu" or codes.shape != (len(names),):
+    if not isinstance(meanings, str) or codes.dtype.kind not in "iu" or codes.ndim != 1:
+        meanings, codes = "", np.zeros(0, int)
+    return dict(_flags(meanings, tuple(codes.tolist())))
+
+
+@lru_cache(maxsize=64)
+def _flags(meanings, codes):
+    names = meanings.split()
+    if not names or len(codes) != len(names):
         raise Damaged("flag_meanings and flag_values must pair each meaning with an integer")
-    if len(names) > FLAGS or len(set(names)) < len(names) or np.unique(codes).size < codes.size:
+    if len(names) > FLAGS or len(set(names)) < len(names) or len(set(codes)) < len(codes):
         raise Damaged(f"flag_meanings and flag_values have duplicates, or more than {FLAGS} entries")
-    if codes.min() < -128 or codes.max() > 127:
+    if min(codes) < -128 or max(codes) > 127:
         raise Damaged("flag_values must fit into a byte")
-    return dict(zip(names, codes.tolist(), strict=True))
+    return dict(zip(names, codes, strict=True))
 
 
 def _check_points(ds):

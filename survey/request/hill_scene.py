@@ -188,7 +188,9 @@ class HillScene(FunctionScene):
         lanes = [i for i in lines if of_z[i] <= 1 and not of_ranges[i]]
         if not lanes:
             return None
-        lane = max(lanes, key=lambda i: lines[i][0])
+        # of long ones the last: blocks cut it last, and each has to solve all rows' nodes
+        order, most = list(request.lines), max(lines[i][0] for i in lanes)
+        lane = max((i for i in lanes if 2 * lines[i][0] >= most), key=lambda i: order.index(names[i]))
         across = [i for i in lines if i != lane and of_z[i] <= dependence.ENTIRE and not of_ranges[i]]
         if not across:
             return user_rows.Axes(lane, lines[lane])
@@ -224,19 +226,26 @@ class HillScene(FunctionScene):
 
     def _ranges(self, points):
         """Period (N), edges of the pieces (N, P + 1; NaN where there are none) and slack (N; see `user_equation`)."""
-        each = points if callable(self.period) or callable(self.breaks) else points[:1]
-        period = np.array([self._period(p) for p in each])
+        if callable(self.period) or callable(self.breaks):
+            period, edges, slack = self._ranges_of(points)
+        else:
+            period, edges, slack = (np.repeat(values, len(points), axis=0) for values in self._same_ranges)
+        edges[~np.isfinite(points).all(axis=1)] = np.nan
+        return period, edges, slack
+
+    @cached_property
+    def _same_ranges(self):
+        """As `_ranges_of` any point, where all have the same."""
+        return self._ranges_of(np.empty((1, 0)))
+
+    def _ranges_of(self, points):
+        period = np.array([self._period(p) for p in points])
         period = np.where(period > 0, period, np.nan)
-        breaks = [np.atleast_1d(self._value("BREAKS", self.breaks, p)) for p in each]
+        breaks = [np.atleast_1d(self._value("BREAKS", self.breaks, p)) for p in points]
         rows = [self._row(some, length) for some, length in zip(breaks, period, strict=True)]
         most = max((len(row) for row in rows), default=2)
         edges = np.array([[*row, *[row[-1]] * (most - len(row))] for row in rows]).reshape(len(rows), most)
-        slack = np.array([user_equation.SLACK * (some.size > 0) for some in breaks]) * period
-        if each is not points:
-            number = len(points)
-            period, edges, slack = np.full(number, period[0]), np.tile(edges, (number, 1)), np.full(number, slack[0])
-        edges[~np.isfinite(points).all(axis=1)] = np.nan
-        return period, edges, slack
+        return period, edges, np.array([user_equation.SLACK * (some.size > 0) for some in breaks]) * period
 
     def _row(self, breaks, period):
         """0, the breaks inside the part that is solved, and its end."""
@@ -287,6 +296,9 @@ class HillScene(FunctionScene):
 
     def check(self, points):
         """Raise BadInput if z cannot be compiled, or contradicts the scene's other entries at these points (N, n)."""
+        _checked(self, points.shape, points.tobytes())
+
+    def _check(self, points):
         self._try(points[0] if len(points) else np.ones(len(self.PARAMETERS)))
         if not len(points):
             return
@@ -315,7 +327,9 @@ class HillScene(FunctionScene):
         for i in np.flatnonzero(np.array(of_z) <= 1):  # a mean of two z has no other spikes than these
             if not of_ranges[i]:
                 finite &= (points[:, i] == points[:, i].min()) | (points[:, i] == points[:, i].max())
-        self._check_spikes(points[finite], edges[finite], slack[finite])
+        finite &= ~user_equation.unprobed(self.z, points, edges, slack, size.max(axis=1))
+        if finite.any():
+            self._check_spikes(points[finite], edges[finite], slack[finite])
         if not self.EVEN:
             self._check_period(points, period, size.max(axis=1))
 
@@ -385,6 +399,12 @@ class HillScene(FunctionScene):
             return function(*arguments)
         except user_equation.Raised as error:
             self._refuse(f"z(u, p) raises {error.__cause__!r}", "make it return nan there")
+
+
+@lru_cache(maxsize=64)
+def _checked(scene, shape, values):
+    """`check` once for the same points: what it raises is raised again."""
+    scene._check(np.frombuffer(values).reshape(shape).copy())  # kernels would be compiled again for what is read-only
 
 
 @lru_cache(maxsize=64)

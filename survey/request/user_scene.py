@@ -51,7 +51,8 @@ Changes in what it imports are not noticed when a run is resumed. z is continued
 
 z is known by samples. Every point has one at least every T/128 (T/256 if EVEN), stored as `z_resolved_width`; at the
 ends and middles of the axes there is one every T/16384 (T/32768), and a spike that only these show is refused. Features
-narrower than both may go unseen; near BREAKS the samples are as dense as necessary.
+narrower than both may go unseen; near BREAKS the samples are as dense as necessary. A z without BREAKS that its code
+shows to have no spikes (see `survey.measures.hill.bands`) needs no such samples.
 
 A (or M, C, K) is run once, as Python, to record its operations on t and p; the record gives the power series of A in
 every step, for all points, and bounds of the rounding. Branches are followed as the code takes them: points that take

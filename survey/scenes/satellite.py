@@ -235,7 +235,6 @@ def _wanted(request):
 def _derived(out, row, rho, block, request, period):
     """The outputs in the block's shape, with those that follow from the others, the rows' motions and `rho`."""
     wanted, ok = _wanted(request), out["status"] == status.OK
-    ok = out["status"] == status.OK
     if "period" in wanted:
         out["period"] = np.where(ok, period[:, None], np.nan)
         out["period_error"] = _PERIOD_ULPS * EPS * out["period"]
@@ -255,9 +254,8 @@ def _criteria(out, row, rho, period, wanted, ok):
     if "least_z" in wanted:
         least, _, bar = row.range_of_z(rho)
         found["least_z"] = least, bar
-    for name, (values, bars) in found.items():
-        out[name], out[f"{name}_error"] = np.where(ok, values, np.nan), np.where(ok, bars, np.nan)
-    found = scattering.solve(np.broadcast_to(rho, ok.shape), row.rotates[:, None], row.oblate, wanted)
+    if not wanted.isdisjoint(scattering.NAMES):
+        found |= scattering.solve(np.broadcast_to(rho, ok.shape), row.rotates[:, None], row.oblate, wanted)
     for name, (values, bars) in found.items():
         out[name], out[f"{name}_error"] = np.where(ok, values, np.nan), np.where(ok, bars, np.nan)
     if not wanted.isdisjoint(nonlinear.NAMES):

@@ -2,8 +2,6 @@
 
 from math import prod
 
-import numpy as np
-
 from survey import measures
 from survey.errors import BadInput
 from survey.file.labels import layout
@@ -39,7 +37,7 @@ def lone_cost(scene, request, grid):
 
 def points_per_block(scene, request, grid):
     """The number of points for which a block takes about BLOCK_SECONDS of kernel time."""
-    return int(np.clip(BLOCK_SECONDS / seconds_per_point(scene, request, grid), 1, BLOCK_POINTS))
+    return int(min(max(BLOCK_SECONDS / seconds_per_point(scene, request, grid), 1), BLOCK_POINTS))
 
 
 def regions_of(workflow):

@@ -21,11 +21,15 @@ def complete_integrals(k, kc):
     """K and E of arrays of moduli and complements, as `elliptic.complete` in numpy, which has nothing to compile."""
     a, b, weight, total = np.ones_like(kc), kc, 0.5, 0.5 * k * k
     for _ in range(MEANS):
-        wide = abs(a - b) > GAP * a
-        if not wide.any():
+        gap = a - b
+        wide = abs(gap) > GAP * a
+        number = np.count_nonzero(wide)
+        if not number:
             break
-        c = np.where(wide, 0.5 * (a - b), 0.0)
-        a, b = np.where(wide, 0.5 * (a + b), a), np.where(wide, np.sqrt(a * b), b)
+        c, mean, other = 0.5 * gap, 0.5 * (a + b), np.sqrt(a * b)
+        if number < wide.size:
+            c, mean, other = np.where(wide, c, 0.0), np.where(wide, mean, a), np.where(wide, other, b)
+        a, b = mean, other
         weight *= 2.0
         total = total + weight * c * c
     first = np.pi / (a + b)

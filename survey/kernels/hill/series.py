@@ -40,14 +40,14 @@ def _sum(c, tile, sums, count):
 
 
 @kernel
-def discriminants(rows, coefficients, bars, x, rtol, floats, verdict, missed):
+def discriminants(rows, coefficients, bars, at_nodes, weights, x, rtol, floats, verdict, missed):
     """D of the `rows` from its series at x (L): D, its bar and the verdict; `missed` where not enough.
 
-    Row rows[j]: D = sum_k coefficients[j, k] T_k(x) within bars[j], coefficients in a multiple of TERMS. Columns as in
-    `kernels.hill.answers.measure`.
+    Row rows[j]: D = sum_k coefficients[j, k] T_k(x) within bars[j] + sum_k at_nodes[j, k] weights[k] (weights (K, L);
+    K = 0: within bars[j]), coefficients and nodes in a multiple of TERMS. Columns as in `kernels.hill.answers.measure`.
     """
     terms, tiles = coefficients.shape[1], (len(x) + TILE - 1) // TILE
-    table, sums = np.empty((tiles, terms, TILE)), np.empty(TILE)
+    table, sums, bounds = np.empty((tiles, terms, TILE)), np.empty(TILE), np.empty(TILE)
     for t in range(tiles):
         _polynomials(x[t * TILE : (t + 1) * TILE], table[t])
     # A tile of the table stays in the first cache for some rows, and what is written within some pages.
@@ -56,24 +56,30 @@ def discriminants(rows, coefficients, bars, x, rtol, floats, verdict, missed):
         count = len(x) - t * TILE if t == tiles - 1 else TILE
         for j in range(start, len(rows) if start + ROWS > len(rows) else start + ROWS):
             _sum(coefficients[j], table[t], sums, count)
+            _sum(at_nodes[j], weights[:, t * TILE : t * TILE + count], bounds, count)
+            for i in range(count):
+                bounds[i] += bars[j]
             first = rows[j] * len(x) + t * TILE
             decided, misses = verdict[first : first + count], missed[first : first + count]
-            _decide(sums, bars[j], floats[:, first : first + count], rtol, decided, misses)
+            _decide(sums, bounds, len(weights) > 0 or not bars[j] <= rtol, floats[:, first : first + count], rtol,
+                    decided, misses)  # fmt: skip
 
 
 @splice
-def _decide(d, bar, floats, rtol, verdict, missed):
-    """D, its bar and the verdict of neighbouring points, and who missed. Views: an offset index is not vector code."""
+def _decide(d, bar, wide, floats, rtol, verdict, missed):
+    """D, its bar and the verdict of neighbouring points, and who missed; `wide`: the bars may miss rtol. Views: an
+    offset index is not vector code.
+    """
     for i in range(len(verdict)):
-        floats[0, i], floats[1, i] = d[i], bar
+        floats[0, i], floats[1, i] = d[i], bar[i]
     for i in range(len(verdict)):
-        stable, unstable = abs(d[i]) < 2.0 - bar, abs(d[i]) > 2.0 + bar
+        stable, unstable = abs(d[i]) < 2.0 - bar[i], abs(d[i]) > 2.0 + bar[i]
         verdict[i] = np.int8(STABLE) if stable else np.int8(UNSTABLE) if unstable else np.int8(UNDECIDED)
     for i in range(len(verdict)):
         missed[i] = verdict[i] == UNDECIDED
-    if not bar <= rtol:
+    if wide:
         for i in range(len(verdict)):
-            missed[i] |= not bar <= rtol * (1.0 + abs(d[i]))
+            missed[i] |= not bar[i] <= rtol * (1.0 + abs(d[i]))
 
 
 @splice

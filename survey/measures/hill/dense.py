@@ -6,9 +6,10 @@ Where p -> -p exchanges y1 and y2', D is a series in p^2 and its nodes those of 
 y1 + y2', and y1 - y2' is odd. Where the rows are an axis too, the coefficients are series across it, solved at its
 nodes; a panel of rows on which they do not converge is halved, and the rest is served row by row.
 
-The error bound: those at the nodes times the Lebesgue constants, the tails of the series, and rounding. Points
-whose verdict or accuracy it leaves open count as `missed`, and are solved one by one from their factors. All depends on
-the row and on the axes of the map, never on the block.
+The error bound: those at the nodes times the Lebesgue constants, or, of D where these are too large, times the Lagrange
+polynomials at each point (D, and with it the bounds, may fall by 1e5 along a row); the tails of the series, and
+rounding. Points whose verdict or accuracy it leaves open count as `missed`, and are solved one by one from their
+factors. All depends on the row and on the axes of the map, never on the block.
 
 Rotation numbers need the numbers of zeros of y1 and y2. The signs at T/2 tell their parity, and the numbers at the
 nodes around a point, between which they lie, the rest; a point where that is ambiguous, or contradicts the rotation
@@ -93,7 +94,7 @@ def compile_ahead(sample, no_rows, variables):
     answers = Answers(1, Asked(1.0, np.array([name in named for name in kernels.FLOATS])))
     if named <= ANSWERS:
         Answers(1, Asked(1.0, DISCRIMINANT)).assess(np.ones((1, RESULTS)), None)
-        _discriminants(answers, np.zeros(1, int), np.ones((1, TERMS)), np.ones(1), np.ones(1))
+        _discriminants(answers, np.zeros(1, int), np.ones((1, TERMS)), np.ones(1), np.ones(1), None)
         if grows:
             kernels.exponents(np.zeros(1, int), 1, 1.0, answers.floats, answers.verdict, answers.missed)
     else:
@@ -119,7 +120,7 @@ def scattered(box, method, asked, answers, position, p):
     sought, axis, open_points = _sought(asked, factors_only=True), _axis(box.line, box.even), np.ones(p.size, np.bool_)
     with _ONE_AT_A_TIME:
         served = [panel for part in _parts(box.row_axis) for panel in panels(part, method, asked.rtol, axis, sought)]
-    for low, high, series, bars, turns, _ in served:
+    for low, high, series, bars, turns, _, _ in served:
         inside = np.flatnonzero(open_points & (position >= low) & (position <= high))
         padded, number, bars = _shortened(series, bars)
         for some in np.split(inside, range(CALL_POINTS, inside.size, CALL_POINTS)):
@@ -204,24 +205,30 @@ def _rows(problem, method, asked, answers, chosen, axis, open_points):
     while (at := int(degree.min(initial=axis.most))) < axis.most:
         rows = np.flatnonzero(degree == at)
         share = NODES_SHARE * asked.rtol
-        values, series, bars, turns = _series(problem, method, share, rows, int(DEGREES[at]), axis, sought)
+        values, series, bars, turns, nodal = _series(problem, method, share, rows, int(DEGREES[at]), axis, sought)
         served = _served(values, bars[:, :, None], asked.rtol).mean(axis=2).min(axis=0)
+        if nodal is not None:
+            served = np.maximum(served, _served(values[0], nodal.between(), asked.rtol).mean(axis=1))
         last = at == first[rows] + RETRIES
         good = (served >= MOST) | ((served > 0) & last)
         degree[rows] = np.where(good | last, DEGREES.size, at + 1)
         rows, series, bars = rows[good], np.ascontiguousarray(series[:, good]), bars[:, good]
         turns = None if turns is None else turns[:, good]
+        nodal = None if nodal is None else nodal.of(good)
         if rows.size:
-            _answer(problem, asked, answers, rows, series, bars, turns, axis, open_points)
+            _answer(problem, asked, answers, rows, series, bars, turns, nodal, axis, open_points)
 
 
-def _answer(problem, asked, answers, rows, series, bars, turns, axis, open_points):
+def _answer(problem, asked, answers, rows, series, bars, turns, nodal, axis, open_points):
     wait_for_other_compiler()
     x = (problem.p[rows[0]] - axis.middle) / axis.radius  # all rows have the same points
     if len(series) > 1:
         _answer_by_factors(problem, asked, answers, rows, series, bars, turns, axis, x, open_points)
         return
-    _discriminants(answers, rows, series[0], bars[0], 2 * x * x - 1 if axis.even else x)
+    x, wide = 2 * x * x - 1 if axis.even else x, ~(bars[0] <= asked.rtol)
+    _discriminants(answers, rows[~wide], series[0, ~wide], bars[0, ~wide], x, None)
+    if wide.any():  # points may miss it: bounds of their own, which cost more
+        _discriminants(answers, rows[wide], series[0, wide], None, x, nodal.of(wide))
     if asked.wanted[kernels.EXPONENT // 2]:
         kernels.exponents(rows * x.size, x.size, asked.rtol, answers.floats, answers.verdict, answers.missed)
     open_points[rows] = answers.missed.reshape(problem.p.shape)[rows]
@@ -264,11 +271,54 @@ def _between(x, number, kept):
     return left, right, np.where(right > left, place - left, 0.0)
 
 
-def _discriminants(answers, rows, series, bars, x):
-    """D of the rows from their series, padded to TERMS, at x, in place."""
+def _discriminants(answers, rows, series, bars, x, nodal):
+    """D of the rows from their series at x, in place, within `bars`, or within what is `nodal`."""
+    at_nodes, weights = np.empty((len(series), 0)), np.empty((0, x.size))
+    if nodal is not None:
+        bars, at_nodes = nodal.doubts, _padded(nodal.bars)
+        weights = np.ascontiguousarray(_padded(chebyshev.lagrange(x, nodal.bars.shape[1])).T)
+    own = answers.asked.rtol, answers.floats, answers.verdict, answers.missed
+    discriminants(rows, _padded(series), bars, at_nodes, weights, x, *own)
+
+
+def _padded(series):
+    """The series (R, n), with zeros up to a multiple of TERMS."""
     padded = np.zeros((len(series), -(-series.shape[1] // TERMS) * TERMS))
     padded[:, : series.shape[1]] = series
-    discriminants(rows, padded, bars, x, answers.asked.rtol, answers.floats, answers.verdict, answers.missed)
+    return padded
+
+
+@dataclass(frozen=True)
+class Nodal:
+    """How far D from series of R rows may be off: `doubts` (R), and `bars` (R, n) times Lagrange polynomials."""
+
+    doubts: np.ndarray
+    bars: np.ndarray
+
+    def of(self, rows):
+        return Nodal(self.doubts[rows], self.bars[rows])
+
+    def between(self):
+        """Bounds (R, n) half way from each node to the next."""
+        n = self.bars.shape[1]
+        return self.doubts[:, None] + _combined(self.bars, chebyshev.lagrange(_half_way(n), n))
+
+    def across(self, x, doubt):
+        """The same of rows at x, from series across these rows, at nodes, that have a doubt of their own."""
+        weights = chebyshev.lagrange(x, len(self.doubts))
+        return Nodal(doubt + _combined(self.doubts[None], weights)[0], _combined(self.bars.T, weights).T)
+
+
+def _half_way(n):
+    return np.cos(np.pi * np.minimum(np.arange(1, n + 1), n - 1) / n)
+
+
+def _combined(values, weights):
+    """values (R, n) times weights (X, n) summed over n, in an order that does not depend on the number of rows."""
+    out = np.zeros((len(values), len(weights)))
+    for i in range(values.shape[1]):
+        out += values[:, i, None] * weights[:, i]
+    return out
 
 
 def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
@@ -276,7 +326,7 @@ def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
     with _ONE_AT_A_TIME:
         served = panels(problem.row_axis, method, asked.rtol, axis, _sought(asked))
     position, left = problem.positions[chosen], np.ones(chosen.size, np.bool_)
-    for low, high, series, bars, turns, of_nodes in served:
+    for low, high, series, bars, turns, of_nodes, nodal in served:
         inside = left & (position >= low) & (position <= high)
         rows, own = chosen[inside], np.empty((len(series), np.count_nonzero(inside), series.shape[2]))
         if rows.size:
@@ -289,7 +339,8 @@ def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
                 bar = np.minimum(bar, tails[:, None] + bars_there @ chebyshev.lagrange(x, bars_there.shape[1]).T)
             if len(own) > 1:
                 own[3], bar[3] = own[3] * odd[:, None], bar[3] * odd
-            _answer(problem, asked, answers, rows, own, bar, _across(turns, x), axis, open_points)
+            at_rows = None if nodal is None else nodal.across(x, of_nodes[0][0])
+            _answer(problem, asked, answers, rows, own, bar, _across(turns, x), at_rows, axis, open_points)
         left &= ~inside
     return chosen[left]
 
@@ -311,8 +362,8 @@ def _across(turns, x):
 
 @lru_cache(maxsize=64)
 def panels(row_axis, method, rtol, axis, sought):
-    """[(low, high, series (F, n, m), bounds (F), `turns` at the nodes, (tails (F), bounds at the nodes (F, n)))] of the
-    panels of rows on which what is sought converges, the same for all blocks.
+    """[(low, high, series (F, n, m), bounds (F), `turns` at nodes, (tails (F), bounds at nodes (F, n)), `Nodal`)] of
+    the panels of rows on which what is sought converges, the same for all blocks.
 
     The axis of rows is halved until it has converged to `rtol`, as long as all that is solved for it pays.
     """
@@ -333,8 +384,8 @@ def panels(row_axis, method, rtol, axis, sought):
 
 
 def _surface(row_axis, method, rtol, middle, radius, axis, budget, sought):
-    """((coefficients (F) of T_j in s by T_k in p, bounds (F), `turns` at the nodes, tails and bounds there), or None
-    where `rtol` is not met; rows solved, in `budget`).
+    """((coefficients (F) of T_j in s by T_k in p, bounds (F), `turns` at nodes, tails and bounds there, `Nodal`), or
+    None where `rtol` is not met; rows solved, in `budget`).
     """
     ends = row_axis.at(middle + radius * np.array([-1.0, 1.0]))
     size = np.sqrt((ends.bound * np.abs([1.0, axis.radius, axis.radius**2])).sum(axis=1))
@@ -345,7 +396,8 @@ def _surface(row_axis, method, rtol, middle, radius, axis, budget, sought):
         n, before = int(DEGREES[at]), doubt
         spent += n
         nodes = row_axis.at(middle + radius * chebyshev.symmetric_nodes(n))
-        values, series, bars, turns = _series(nodes, method, 0.0, np.arange(n), int(DEGREES[degree]), axis, sought)
+        found = _series(nodes, method, 0.0, np.arange(n), int(DEGREES[degree]), axis, sought)
+        values, series, bars, turns, nodal = found
         matrix, ulps = chebyshev.by_columns(n), (4 + abs(middle) + radius) / radius
         if sought.factors:
             odd = _odd(row_axis, axis, middle + radius * chebyshev.symmetric_nodes(n))
@@ -353,8 +405,12 @@ def _surface(row_axis, method, rtol, middle, radius, axis, budget, sought):
         surfaces, tails = zip(*(chebyshev.transform(of, matrix, ulps) for of in series), strict=True)
         tails = np.array(tails)
         doubts = tails + chebyshev.lebesgue(n) * bars.max(axis=1)
-        if _served(values, doubts[:, None, None], rtol).mean(axis=(1, 2)).min() >= MOST:
-            return (np.array(surfaces), doubts, turns, (tails, bars)), spent
+        served = _served(values, doubts[:, None, None], rtol).mean(axis=(1, 2)).min()
+        if nodal is not None and served < MOST:
+            between = nodal.across(_half_way(n), tails[0]).between()
+            served = _served(values[0], between, rtol).mean()
+        if served >= MOST:
+            return (np.array(surfaces), doubts, turns, (tails, bars), nodal), spent
         worst = doubts.argmax()
         doubt, tail = doubts[worst], tails[worst]
         if not doubt < 0.5 * before:
@@ -385,7 +441,8 @@ def _enough(kind, rtol):
 
 def _series(problem, method, rtol, rows, n, axis, sought):
     """What is sought at nodes (F, rows, n; n/2 if even), its coefficients, their bounds (F, rows), and, of factors, the
-    `turns` (5, rows, n) there: rotation numbers, and the least and the largest numbers of zeros of y1, and of y2.
+    `turns` (5, rows, n) there: rotation numbers, and the least and the largest numbers of zeros of y1, and of y2; of D
+    what is `Nodal`.
 
     If even, the coefficients are those of T_k(2 (p/radius)^2 - 1), and of factors those of (y1 + y2') / 2, y1', y2 and,
     of T_{2k + 1}(p/radius), (y1 - y2') / 2. Nodes are solved to `rtol` or as well as can be; an error bound is not
@@ -398,7 +455,8 @@ def _series(problem, method, rtol, rows, n, axis, sought):
     own = Answers(nodes.p.size, finer)
     pointwise.solve(nodes, method, finer, own)
     found = own.floats.reshape(len(own.floats), *nodes.p.shape)
-    values, bars = found[list(sought.rows)], found[[row + 1 for row in sought.rows]].max(axis=2)
+    values, at_nodes = found[list(sought.rows)], found[[row + 1 for row in sought.rows]]
+    bars = at_nodes.max(axis=2)
     turns = None
     if sought.factors:
         zeros = own.results[:, Y1_ZEROS:].T.reshape(2, *nodes.p.shape)
@@ -414,7 +472,8 @@ def _series(problem, method, rtol, rows, n, axis, sought):
         series, doubts = chebyshev.expand(values[3], chebyshev.odd_columns(x.size), ulps)
         expanded.append((series, 4 * doubts))
     series, doubts = (np.stack(of) for of in zip(*expanded, strict=True))
-    return values, series, doubts + chebyshev.lebesgue(n if odd else x.size) * bars, turns
+    nodal = None if sought.factors else Nodal(doubts[0], at_nodes[0])
+    return values, series, doubts + chebyshev.lebesgue(n if odd else x.size) * bars, turns, nodal
 
 
 def _served(values, bar, rtol):

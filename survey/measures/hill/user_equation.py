@@ -21,7 +21,7 @@ import numpy as np
 from survey.kernels.hill import dop853, sampled_double
 from survey.kernels.jit import fresh, inline, kernel
 from survey.kernels.lanes import RESULTS
-from survey.measures.hill import monodromy, multiprecision, pointwise
+from survey.measures.hill import bands, monodromy, multiprecision, pointwise
 
 SIZES = (65, 513, 4097)
 # Evenly spread points of the part that is solved at which z is probed, however smooth it seems; those when a scene is
@@ -40,6 +40,8 @@ BY_PHASE = 0.15
 # DOP853 makes no step longer than this share of the distance to a singularity: it would pass a spike unseen.
 STRIDE = 0.5
 CALL_SAMPLES = 4_000_000
+# So few points are asked one by one whether z may have spikes.
+FEW = 8
 # The most steps in double-double: 20 ms a hundred.
 EXACT_STEPS = 2000
 # z in float64 and with more digits may differ by this many times the rounding that the bounds allow for.
@@ -224,6 +226,19 @@ def _agree(z, point, scale, u, values):
     return bool((abs(values - inside) <= SAME_Z * ROUNDING * scale).all())
 
 
+def unprobed(z, points, edges, slack, size):
+    """Which points (N), whose z is of this `size` (N), are known to have no spikes between samples (see `bands`)."""
+    if not len(points) or edges.shape[1] != 2 or slack.any():
+        return np.zeros(len(points), np.bool_)
+    most, end = np.nan_to_num(abs(points)), float(np.nan_to_num(edges[:, -1]).max())
+    found = bands.missed(z, tuple(most.max(axis=0).tolist()), end, SIZES[0])
+    known = found <= 10 * RESOLVED * size
+    if isfinite(found):  # where z is small by its parameters, each for itself
+        for i in np.flatnonzero(~known)[:FEW]:
+            known[i] = bands.missed(z, tuple(most[i].tolist()), end, SIZES[0]) <= 10 * RESOLVED * size[i]
+    return known
+
+
 def measured(z, points, edges, period, slack, probes=PROBES):
     """Of each piece `size` = max |z| and `rate` (N, P); of each point `scale` = B, NaN if z is not finite, and `rough`.
 
@@ -269,11 +284,18 @@ def measured(z, points, edges, period, slack, probes=PROBES):
             if number == SIZES[0] and period is not None:
                 off[some] = abs(known - values(some, number, mirrored=True)).max(axis=1)
             smooth = np.flatnonzero((last[some] <= RESOLVED * size[some]) | (number == SIZES[-1]))
+            if number == SIZES[0]:
+                own = owner[some[smooth]]
+                smooth = smooth[~unprobed(z, points[own], edges[own], slack[own], size[some[smooth]])]
             some = some[smooth]
+            if not some.size:
+                continue
             hidden = (between if number == SIZES[0] else missed)(some, known[smooth], size[some])
             hidden[~(hidden > 10 * RESOLVED * size[some] + 4 * noise[some])] = 0
             noise[some], last[some] = np.maximum(noise[some], hidden), np.maximum(last[some], hidden)
         unresolved = unresolved[last[unresolved] > RESOLVED * size[unresolved]]
+        if not unresolved.size:
+            break
     length = (right - left)[:, 0]
     rate = np.where(length > 0, 2 * rate / np.where(length > 0, length, 1), 0)
     size, rate, noise, last, off = (a.reshape(shape) for a in (size, rate, noise, last, off))

@@ -98,6 +98,23 @@ def test_dense_maps_agree_with_their_points(surfaces, scene, ranges, options, fe
     assert both.mean() > 0.99 and (mine.verdict.values == alone.verdict.values)[both].all()
 
 
+def test_one_panel_serves_though_the_discriminant_falls_along_its_rows(surfaces):
+    """Where |D| = 1e5 at one end, its rounding there is as large as what is asked for at the other."""
+    axes = {"q": np.linspace(0.0, 15.0, 300), "a": np.linspace(0.0, 25.0, 240)}
+    dense = survey.evaluate("mathieu", **axes, variables=["discriminant", "verdict"])
+    assert len(surfaces[0]) == 1
+    random = np.random.default_rng(5)
+    places = {name: xr.DataArray(random.integers(0, axes[name].size, 1500), dims="point") for name in axes}
+    mine = dense.isel(places)
+    points = {name: mine[name].drop_vars(list(axes)) for name in axes}
+    alone = survey.evaluate("mathieu", **points, rtol=1e-13, method="dop853")
+    bar, exact = mine.discriminant_error.values.astype(float), alone.discriminant_error.values
+    assert (abs(mine.discriminant.values - alone.discriminant.values) <= bar + exact).all()
+    assert (bar <= 1e-10 * (1 + abs(mine.discriminant.values))).mean() > 0.99
+    both = (mine.verdict.values >= 0) & (alone.verdict.values >= 0)
+    assert both.mean() > 0.98 and (mine.verdict.values == alone.verdict.values)[both].all()
+
+
 @pytest.mark.parametrize("rtol", [1e-6, 1e-10])
 @pytest.mark.parametrize(("scene", "ranges", "options", "fewest"), [*MAPS, *STEEP])
 def test_all_outputs_of_maps_agree_with_their_points(served, scene, ranges, options, fewest, rtol):
