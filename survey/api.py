@@ -251,7 +251,8 @@ def _check_dimensions(module: Any, given: dict[str, xr.DataArray]) -> None:
     if not wide:
         return
     try:
-        xr.align(*wide[: len(wide) if len(wide) > 1 else 0], join="exact", copy=False)
+        if len(wide) > 1:
+            xr.align(*wide, join="exact", copy=False)
     except ValueError as error:
         raise BadInput(
             f"the parameters' coordinates disagree: {str(error).splitlines()[0]}; align them first"

@@ -8,9 +8,9 @@ from survey.kernels import jit
 from survey.sweep.dispatch import cpus
 
 
-def program(scene, request):
-    """The Python program that calls the scene's `compile_ahead` for what is asked; where that yields, it says so."""
-    ahead, call = scene.compile_ahead, f"({list(request.variables)}, {dict(request.options)})"
+def program(ahead, request):
+    """The Python program that calls a scene's `compile_ahead` for what is asked; where that yields, it says so."""
+    call = f"({list(request.variables)}, {dict(request.options)})"
     steps = f"from {ahead.__module__} import {ahead.__name__} as ahead\nfor _ in ahead{call} or (): print(flush=True)"
     return f"import gc; gc.disable(); {steps}"
 
@@ -22,7 +22,7 @@ def compiling_ahead(scene, request):
     if not (ahead and request.method == "auto" and cpus() > 1 and jit.is_first(_work(ahead, request.options))):
         yield
         return
-    command = [sys.executable, "-c", program(scene, request)]
+    command = [sys.executable, "-c", program(ahead, request)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
         jit.other_compiler = process.stdout.readline  # a line, or the end
         try:
@@ -33,5 +33,5 @@ def compiling_ahead(scene, request):
 
 
 def _work(ahead, options):
-    """A name of what is compiled: other scenes, and other questions, need other kernels."""
-    return "-".join([ahead.__module__, ahead.__name__, *map(str, options.values())])
+    """A name of what is compiled: other scenes, other questions and other kinds of options need other kernels."""
+    return "-".join([ahead.__module__, ahead.__name__, str(options.get("question")), *sorted(options)])

@@ -231,8 +231,12 @@ def test_a_row_of_its_own(tmp_path):
         ({"boundaries": {"axes": "rho"}}, r"unknown key boundaries.axes; did you mean 'axis'"),
         ({"axes": {"k": 0.5, "rho": 1.0}}, r"boundaries: they are drawn along an axis, and there is none"),
         (
-            {"scene": "libration", "axes": {"mu": {"values": [0.01, 0.02]}}, "options": {}},
-            r"no boundaries are known along mu: curves are known on the axes mu and e of libration_elliptic",
+            {
+                "scene": "brun",
+                "axes": {"l": 0.5, "alpha": 0.1, "beta": 0.2, "ratio": {"values": [0.2, 0.8]}},
+                "options": {"sign": "1"},
+            },
+            r"no boundaries are known along ratio: curves are known on two or three axes of l, alpha, beta",
         ),
     ],
 )

@@ -83,11 +83,17 @@ def largest_lagrange(n, parts):
     return np.max([part[: n * parts] for part in within], axis=0) + beyond + 1e-12
 
 
+def combined(values, matrix):
+    """values (R, n) times `matrix` (n, m; [from, to]), summed so that a row's bits do not depend on the others."""
+    out = np.zeros((len(values), matrix.shape[1]))
+    for i, weights in enumerate(matrix):
+        out += values[:, i, None] * weights
+    return out
+
+
 def expand(values, matrix, ulps):
     """The series of each row of `values` (R, n) at nodes, by `matrix` (n, n; [from, to]), and its `_doubt` (R)."""
-    series = np.zeros_like(values)
-    for i, weights in enumerate(matrix):  # in this order, so that a row's bits do not depend on the others
-        series += values[:, i, None] * weights
+    series = combined(values, matrix)
     return series, _doubt(np.abs(series), ulps)
 
 

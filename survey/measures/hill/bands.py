@@ -12,7 +12,7 @@ from functools import lru_cache
 
 from survey.kernels.math.roundoff import EPS
 from survey.measures.hill import multiprecision
-from survey.measures.hill.dependence import OTHER_NAMES
+from survey.measures.hill.dependence import OTHER_NAMES, StandIn, Unknown
 
 # Ellipses, by the sum of their half axes relative to those of an interval of half length 1.
 ELLIPSES = (2.0, 4.0)
@@ -20,15 +20,11 @@ ELLIPSES = (2.0, 4.0)
 OF_FUNCTIONS, LEBESGUE = 4.0, 5.0
 # Of where samples are, in EPS of the end.
 OF_POSITIONS = 2.0
-ROUND = {"sin": math.cosh, "cos": math.cosh}
+ROUND = frozenset({"sin", "cos"})
 STEEP = {"exp": math.exp, "sinh": math.cosh, "cosh": math.cosh}
 
 
-class Unknown(Exception):
-    """The code compares bounds, or uses what is not analytic everywhere."""
-
-
-class Bound:
+class Bound(StandIn):
     """Of an analytic function of u: its `size` and that of its imaginary part on the ellipse; on the interval itself
     its size, `real`, and its rounding, `off`.
     """
@@ -50,14 +46,6 @@ class Bound:
         imaginary = self.imaginary * other.size + self.size * other.imaginary
         return Bound(self.size * other.size, imaginary, real, off)
 
-    __radd__ = __sub__ = __rsub__ = __add__
-    __rmul__ = __mul__
-
-    def __neg__(self):
-        return self
-
-    __pos__ = __neg__
-
     def __truediv__(self, other):
         if not _is_number(other):
             raise Unknown
@@ -71,13 +59,7 @@ class Bound:
             out = out * self
         return out * (1.0 + OF_FUNCTIONS * EPS)
 
-    def _refused(self, *_):
-        raise Unknown
-
-    __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = __bool__ = __int__ = __float__ = __index__ = _refused
-    __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = __round__ = __floor__ = __ceil__ = __abs__ = _refused
-    __rtruediv__ = __rpow__ = _refused
-    __hash__ = None
+    __abs__ = __rtruediv__ = __rpow__ = StandIn._refused
 
 
 def _is_number(value):

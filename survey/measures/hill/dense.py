@@ -301,24 +301,17 @@ class Nodal:
     def between(self):
         """Bounds (R, n) half way from each node to the next."""
         n = self.bars.shape[1]
-        return self.doubts[:, None] + _combined(self.bars, chebyshev.lagrange(_half_way(n), n))
+        return self.doubts[:, None] + chebyshev.combined(self.bars, chebyshev.lagrange(_half_way(n), n).T)
 
     def across(self, x, doubt):
         """The same of rows at x, from series across these rows, at nodes, that have a doubt of their own."""
-        weights = chebyshev.lagrange(x, len(self.doubts))
-        return Nodal(doubt + _combined(self.doubts[None], weights)[0], _combined(self.bars.T, weights).T)
+        weights = chebyshev.lagrange(x, len(self.doubts)).T
+        doubts, bars = (chebyshev.combined(values, weights) for values in (self.doubts[None], self.bars.T))
+        return Nodal(doubt + doubts[0], bars.T)
 
 
 def _half_way(n):
     return np.cos(np.pi * np.minimum(np.arange(1, n + 1), n - 1) / n)
-
-
-def _combined(values, weights):
-    """values (R, n) times weights (X, n) summed over n, in an order that does not depend on the number of rows."""
-    out = np.zeros((len(values), len(weights)))
-    for i in range(values.shape[1]):
-        out += values[:, i, None] * weights[:, i]
-    return out
 
 
 def _surfaces(problem, method, asked, answers, chosen, axis, open_points):

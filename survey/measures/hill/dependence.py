@@ -20,7 +20,35 @@ class Unknown(Exception):
     """The dependence cannot be found; says why."""
 
 
-class Degrees:
+class StandIn:
+    """What runs in a user's code instead of numbers and tells something of them in which signs do not matter; a
+    subclass knows sums and products. Code that decides by it is refused.
+    """
+
+    __slots__ = ()
+
+    def __radd__(self, other):
+        return self + other
+
+    __sub__ = __rsub__ = __radd__
+
+    def __rmul__(self, other):
+        return self * other
+
+    def __neg__(self):
+        return self
+
+    __pos__ = __neg__
+
+    def _refused(self, *_):
+        raise Unknown("it decides by a parameter")
+
+    __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = __bool__ = __int__ = __float__ = __index__ = _refused
+    __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = __round__ = __floor__ = __ceil__ = _refused
+    __hash__ = None
+
+
+class Degrees(StandIn):
     """What stands for a value that depends on parameters: its degree in each."""
 
     __slots__ = ("of",)
@@ -33,14 +61,6 @@ class Degrees:
 
     def __mul__(self, other):
         return Degrees(map(_product, self.of, self._of(other)))
-
-    __radd__ = __sub__ = __rsub__ = __add__
-    __rmul__ = __mul__
-
-    def __neg__(self):
-        return self
-
-    __pos__ = __neg__
 
     def __truediv__(self, other):
         return self * Degrees(_at_most(self._of(other), OPAQUE))
@@ -61,13 +81,6 @@ class Degrees:
 
     def _of(self, other):
         return other.of if isinstance(other, Degrees) else (0,) * len(self.of)
-
-    def _refused(self, *_):
-        raise Unknown("it decides by a parameter")
-
-    __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = __bool__ = __int__ = __float__ = __index__ = _refused
-    __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = __round__ = __floor__ = __ceil__ = _refused
-    __hash__ = None
 
 
 def _product(a, b):
