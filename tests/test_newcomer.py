@@ -192,7 +192,10 @@ PYTHON = [
     (lambda ds: ds.survey.margin(k=5, rho=1.0), "lies outside the map"),
     (lambda ds: survey.edge("satellite", along="amplitude", amplitude=1.0, inertia_ratio=0.2), "give (low, high)"),
     (lambda ds: survey.edge("satellite", along="amplitude", inertia_ratio=[0.2, 0.3]), "it must be one number"),
-    (lambda ds: survey.edge("libration", along="mu"), "no boundaries are known along mu"),
+    (
+        lambda ds: survey.edge("brun", along="ratio", l=0.5, alpha=0.1, beta=0.2, sign="1"),
+        "no boundaries are known along ratio",
+    ),
     (lambda ds: survey.hill(z, period=1.0, parameters=("a", "a")), "give at least one name, each once"),
     (lambda ds: survey.hill(z, period=1.0, parameters="a", even="yes"), "even = 'yes': it must be True or False"),
     (

@@ -192,10 +192,8 @@ def abels(setting, begin, at, P, starts, targets, tolerance, limit, floats, stat
 
 @inline
 def finite(row):
-    """How many finite numbers of the ascending row stand before the first infinity or NaN."""
+    """How many finite numbers stand before the first infinity or NaN."""
     size = 0
-    if len(row) > 0 and math.isfinite(row[-1]):  # as a rule
-        return len(row)
     while size < len(row) and math.isfinite(row[size]):
         size += 1
     return size

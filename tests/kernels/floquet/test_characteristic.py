@@ -16,7 +16,7 @@ def answered(coefficients, doubts, starts, n, paired, rtol=1.0):
     table = np.zeros((1, characteristic.LANES))
     table[0, 0] = 1.0
     characteristic.answer(
-        series, np.array(doubts, dtype=float), np.zeros(1), table, np.zeros(2, np.int64),
+        series, np.array(doubts, dtype=float).reshape(-1, 1, 1), np.zeros(1), table, np.zeros(2, np.int64),
         np.stack([starts.real, starts.imag], axis=-1).reshape(1, 1, -1, 2), np.zeros((1, 1), np.int64), n, paired,
         np.array([True, True, True, False, False]), rtol, answer.floats, answer.signs, answer.verdict, answer.crossing,
         answer.missed,
