@@ -118,8 +118,11 @@ def ranges(parameters):
 def _ends(values):
     """The least and the greatest of the finite values."""
     values = np.asarray(values)
-    finite = values[np.isfinite(values)]
-    return float(finite.min(initial=np.inf)), float(finite.max(initial=-np.inf))
+    low, high = values.min(initial=np.inf), values.max(initial=-np.inf)
+    if not np.isfinite(high - low):
+        finite = values[np.isfinite(values)]
+        low, high = finite.min(initial=np.inf), finite.max(initial=-np.inf)
+    return float(low), float(high)
 
 
 def fixed(parameters):

@@ -252,7 +252,11 @@ def _within(reference, point):
 
 
 def _solver(module, method, error):
-    """A function of (point, options, rtol) that calls the scene for the output `error` and the verdict; see `works`."""
+    """A function of (point, options, rtol) that calls the scene for the output `error` and the verdict; see `works`.
+
+    A run knows its axes before its first block: they are described once for each point.
+    """
+    described = {}
 
     def solve(point, options, rtol, everything=False):
         options = check_options(module, options, point)
@@ -261,8 +265,10 @@ def _solver(module, method, error):
         wanted = frozenset(name for name in asked if everything or name in (error, "verdict"))
         ndim = max(np.ndim(values) for values in point.values()) or 1
         arrays = {key: np.asarray(point.get(key, p.default), float) for key, p in used.items()}
-        axes = _axes(arrays)
-        request = Request(options, method, rtol, wanted, grid.lines(axes), grid.fixed(axes), grid.ranges(axes))
+        if described.get("point") is not point:
+            axes = _axes(arrays)
+            described.update(point=point, axes=(grid.lines(axes), grid.fixed(axes), grid.ranges(axes)))
+        request = Request(options, method, rtol, wanted, *described["axes"])
         dense.panels.cache_clear()  # every call includes its set-up
         floquet.panels.cache_clear()
         fate.forget()

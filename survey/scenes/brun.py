@@ -315,11 +315,14 @@ def _finished(out, status, valid, count, heights):
 
 def _emptied(out, where):
     """`out` with nothing at the points `where`, and a verdict only where the status is ok."""
-    for values in out.values():
-        if values.dtype.kind == "f":
-            values[where] = np.nan
-    out["verdict"] = np.where(out["status"] == OK, out["verdict"], nutation.UNDECIDED)
-    out["wells"] = np.where(where, -1, out["wells"])
+    if where.any():
+        for values in out.values():
+            if values.dtype.kind == "f":
+                values[where] = np.nan
+        out["wells"] = np.where(where, -1, out["wells"])
+    lost = out["status"] != OK
+    if lost.any():
+        out["verdict"] = np.where(lost, nutation.UNDECIDED, out["verdict"])
     return out
 
 

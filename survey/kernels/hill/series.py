@@ -56,9 +56,13 @@ def discriminants(rows, coefficients, bars, at_nodes, weights, x, rtol, floats, 
         count = len(x) - t * TILE if t == tiles - 1 else TILE
         for j in range(start, len(rows) if start + ROWS > len(rows) else start + ROWS):
             _sum(coefficients[j], table[t], sums, count)
-            _sum(at_nodes[j], weights[:, t * TILE : t * TILE + count], bounds, count)
-            for i in range(count):
-                bounds[i] += bars[j]
+            if len(weights):
+                _sum(at_nodes[j], weights[:, t * TILE : t * TILE + count], bounds, count)
+                for i in range(count):
+                    bounds[i] += bars[j]
+            else:
+                for i in range(count):
+                    bounds[i] = bars[j]
             first = rows[j] * len(x) + t * TILE
             decided, misses = verdict[first : first + count], missed[first : first + count]
             _decide(sums, bounds, len(weights) > 0 or not bars[j] <= rtol, floats[:, first : first + count], rtol,

@@ -207,8 +207,10 @@ def _rows(problem, method, asked, answers, chosen, axis, open_points):
         share = NODES_SHARE * asked.rtol
         values, series, bars, turns, nodal = _series(problem, method, share, rows, int(DEGREES[at]), axis, sought)
         served = _served(values, bars[:, :, None], asked.rtol).mean(axis=2).min(axis=0)
-        if nodal is not None:
-            served = np.maximum(served, _served(values[0], nodal.between(), asked.rtol).mean(axis=1))
+        few = np.flatnonzero(served < MOST)
+        if nodal is not None and few.size:
+            between = _served(values[0, few], nodal.of(few).between(), asked.rtol)
+            served[few] = np.maximum(served[few], between.mean(axis=1))
         last = at == first[rows] + RETRIES
         good = (served >= MOST) | ((served > 0) & last)
         degree[rows] = np.where(good | last, DEGREES.size, at + 1)
@@ -332,7 +334,8 @@ def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
                 bar = np.minimum(bar, tails[:, None] + bars_there @ chebyshev.lagrange(x, bars_there.shape[1]).T)
             if len(own) > 1:
                 own[3], bar[3] = own[3] * odd[:, None], bar[3] * odd
-            at_rows = None if nodal is None else nodal.across(x, of_nodes[0][0])
+            wide = nodal is not None and not (bar[0] <= asked.rtol).all()
+            at_rows = nodal.across(x, of_nodes[0][0]) if wide else None
             _answer(problem, asked, answers, rows, own, bar, _across(turns, x), at_rows, axis, open_points)
         left &= ~inside
     return chosen[left]
