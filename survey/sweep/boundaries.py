@@ -23,7 +23,7 @@ from survey.measures.tasks import in_turn
 from survey.scene import Request
 from survey.sweep.line import OnLine, on_line
 
-ROWS = 32  # solved together
+ROWS = 128  # solved together
 COLUMNS = 9  # searched for curves that meet no row
 RTOL = 1e-13
 MARGIN = 1e-3  # of an axis: how close curves come to an excluded value, such as k = 1

@@ -36,6 +36,7 @@ CONVERGED = 1e-9
 DEEP, DEEPEST, FEW = 13, 45, 4
 HALVINGS = 3
 ROUNDS = 12
+TOGETHER = 8  # edges of a row that share its samples and its steps
 # So many half widths beside an edge the verdict is certain without double-double arithmetic.
 ASIDE = 8
 
@@ -153,9 +154,11 @@ def _zeros(series):
 
 def _close_in(solve, row, kind, x, radius, low, high):
     """(row, position, error, kind, index) of the zeros that change sign and lie on the axis, each once."""
+    order = np.lexsort((x, row))
+    row, kind, x, radius = (values[order] for values in (row, kind, x, radius))
 
     def function(who, x):
-        return of_kind(solve(row[who], x, FACTORS), kind[who])
+        return of_kind(_on_rows(solve, row[who], x, FACTORS), kind[who])
 
     scale = max(abs(low), abs(high))
     x, width, sure = close_in(function, x, np.minimum(1e-9 * scale, 1e-4 * radius), 4 * np.spacing(abs(x)))
@@ -167,8 +170,19 @@ def _close_in(solve, row, kind, x, radius, low, high):
     keep = np.concatenate([[True], ~same]) if x.size else np.zeros(0, bool)
     row, kind, x, width = (values[keep] for values in (row, kind, x, width))
     sides = x[:, None] + ASIDE * width[:, None] * np.array([-1.0, 1.0])
-    index = tongue(solve(row, sides, COUNTS), kind) if x.size else np.zeros(0, int)
+    index = tongue(_on_rows(solve, row, sides, COUNTS), kind) if x.size else np.zeros(0, int)
     return row, x, width, kind, index
+
+
+def _on_rows(solve, row, x, wanted):
+    """solve(row, x, wanted) at x (m, n) on rows that ascend; up to TOGETHER of one row are solved as one row of x."""
+    own = np.arange(row.size) - np.searchsorted(row, row)
+    slot = own % TOGETHER
+    line, starts = np.cumsum(slot == 0) - 1, np.flatnonzero(slot == 0)
+    together = np.repeat(x[starts, None], min(TOGETHER, slot.max(initial=0) + 1), axis=1)
+    together[line, slot] = x
+    out = solve(row[starts], together.reshape(starts.size, -1), wanted)
+    return {name: values.reshape(together.shape)[line, slot] for name, values in out.items()}
 
 
 def of_kind(out, kind):
@@ -215,32 +229,34 @@ def _complete(solve, rows, edges, low, high):
     """Which rows are complete: the factors' signs and the rotation number are as listed, at the ends and between."""
     order = np.lexsort((edges[1], edges[0]))
     row, x, width, kind, index = (values[order] for values in edges)
-    own = [np.flatnonzero(row == r) for r in rows]
-    most = max((mine.size for mine in own), default=0) + 3
-    points = np.full((rows.size, most), float(high))
-    for i, mine in enumerate(own):
-        points[i, 0] = low
-        points[i, 1 : mine.size + 2] = 0.5 * (np.concatenate([[low], x[mine]]) + np.concatenate([x[mine], [high]]))
+    place = np.searchsorted(rows, row)
+    number, own = np.bincount(place, minlength=rows.size), np.arange(row.size) - np.searchsorted(row, row)
+    # of each row both ends, the middles between them and its edges, and its upper end again
+    listed = np.full((rows.size, number.max(initial=0) + 2), float(high))
+    listed[:, 0], listed[place, own + 1] = low, x
+    points = np.pad(0.5 * (listed[:, :-1] + listed[:, 1:]), ((0, 0), (1, 1)), constant_values=(low, high))
     out = solve(rows, points, (*FACTORS, *COUNTS))
-    signs = np.stack([np.where(abs(out[n]) > out[f"{n}_error"], np.sign(out[n]), 0) for n in FACTORS])
-    band = _band(out)
+    known = np.arange(points.shape[1]) < number[:, None] + 3
+    last, close = number + 2, np.flatnonzero(own > 0)
+    # between edges closer than their errors nothing is known, nor at an end that is an edge
+    known[place[close], own[close] + 1] = np.diff(x)[close - 1] > (width[1:] + width[:-1])[close - 1]
+    for end, at in ((low, np.zeros_like(last)), (high, last)):
+        on = place[abs(x - end) <= width]
+        known[on, at[on]] = False
     sound = np.isfinite([out[name] for name in FACTORS]).all(axis=(0, 2))
-    for i, mine in enumerate(own):
-        # at both ends and between edges; between edges closer than their errors nothing is known
-        known = np.ones(mine.size + 3, np.bool_)
-        known[2:-2] = np.diff(x[mine]) > width[mine][1:] + width[mine][:-1]
-        known[[0, -1]] = [(abs(x[mine] - end) > width[mine]).all() for end in (low, high)]
-        seen = np.where(known, signs[:, i, : mine.size + 3], 0)
-        sound[i] &= _signs_agree(seen, kind[mine])
-        sound[i] &= _rotation_agrees(np.where(known, band[i, : mine.size + 3], np.nan), index[mine])
-    return sound
-
-
-def _signs_agree(seen, kind):
-    """Do the signs (4, m + 3; 0 unknown) of the factors at the ends and between m edges change at those alone?"""
-    turns = np.cumsum(np.pad(kind == np.arange(len(FACTORS))[:, None], ((0, 0), (2, 1))), axis=1)
-    straight = seen * np.where(turns % 2, -1, 1)
-    return bool(((straight >= 0).all(axis=1) | (straight <= 0).all(axis=1)).all())
+    signs = np.stack([np.where(known & (abs(out[n]) > out[f"{n}_error"]), np.sign(out[n]), 0) for n in FACTORS])
+    turns = np.zeros(signs.shape, int)
+    turns[kind, place, own + 2] = 1
+    # the factors change sign at their edges alone
+    straight = signs * np.where(np.cumsum(turns, axis=2) % 2, -1, 1)
+    sound &= ((straight >= 0).all(axis=2) | (straight <= 0).all(axis=2)).all(axis=0)
+    # every edge lies between its tongue n and a band beside it, at the ends of the row too
+    band = np.where(known, _band(out), np.nan)
+    before, after = (abs(band[place, own + side] - index) for side in (1, 2))
+    wrong = (before > 0.5) | (after > 0.5) | (before == after)
+    sound[place[wrong]] = False
+    each = np.arange(rows.size)
+    return sound & ~(abs(band[:, 0] - band[:, 1]) > 0) & ~(abs(band[each, last] - band[each, last - 1]) > 0)
 
 
 def _band(out):
@@ -249,10 +265,3 @@ def _band(out):
     nearest = np.rint(turns)
     inside = (out["verdict"] == STABLE) & (abs(turns - nearest) > bar)
     return np.where(out["verdict"] == UNSTABLE, nearest, np.where(inside, np.floor(turns) + 0.5, np.nan))
-
-
-def _rotation_agrees(band, index):
-    """Does every edge lie between its tongue n and a band beside it, as `band` (m + 3), at the ends too, says?"""
-    before, after = abs(band[1:-2] - index), abs(band[2:-1] - index)
-    wrong = (before > 0.5) | (after > 0.5) | (before == after)
-    return not wrong.any() and not (abs(band[[0, -2]] - band[[1, -1]]) > 0).any()
