@@ -154,11 +154,9 @@ def _zeros(series):
 
 def _close_in(solve, row, kind, x, radius, low, high):
     """(row, position, error, kind, index) of the zeros that change sign and lie on the axis, each once."""
-    order = np.lexsort((x, row))
-    row, kind, x, radius = (values[order] for values in (row, kind, x, radius))
 
     def function(who, x):
-        return of_kind(_on_rows(solve, row[who], x, FACTORS), kind[who])
+        return of_kind(on_rows(solve, row[who], x, FACTORS), kind[who])
 
     scale = max(abs(low), abs(high))
     x, width, sure = close_in(function, x, np.minimum(1e-9 * scale, 1e-4 * radius), 4 * np.spacing(abs(x)))
@@ -170,19 +168,21 @@ def _close_in(solve, row, kind, x, radius, low, high):
     keep = np.concatenate([[True], ~same]) if x.size else np.zeros(0, bool)
     row, kind, x, width = (values[keep] for values in (row, kind, x, width))
     sides = x[:, None] + ASIDE * width[:, None] * np.array([-1.0, 1.0])
-    index = tongue(_on_rows(solve, row, sides, COUNTS), kind) if x.size else np.zeros(0, int)
+    index = tongue(on_rows(solve, row, sides, COUNTS), kind) if x.size else np.zeros(0, int)
     return row, x, width, kind, index
 
 
-def _on_rows(solve, row, x, wanted):
-    """solve(row, x, wanted) at x (m, n) on rows that ascend; up to TOGETHER of one row are solved as one row of x."""
-    own = np.arange(row.size) - np.searchsorted(row, row)
-    slot = own % TOGETHER
+def on_rows(solve, row, x, wanted):
+    """solve(row, x, wanted) at x (m, n); up to TOGETHER neighbours of one row are solved as one row of x."""
+    order = np.lexsort((x[:, 0], row))
+    row, slot = row[order], np.arange(row.size)
+    slot = (slot - np.searchsorted(row, row)) % TOGETHER
     line, starts = np.cumsum(slot == 0) - 1, np.flatnonzero(slot == 0)
-    together = np.repeat(x[starts, None], min(TOGETHER, slot.max(initial=0) + 1), axis=1)
-    together[line, slot] = x
+    together = np.repeat(x[order[starts], None], slot.max(initial=0) + 1, axis=1)
+    together[line, slot] = x[order]
     out = solve(row[starts], together.reshape(starts.size, -1), wanted)
-    return {name: values.reshape(together.shape)[line, slot] for name, values in out.items()}
+    back = np.argsort(order)
+    return {name: values.reshape(together.shape)[line[back], slot[back]] for name, values in out.items()}
 
 
 def of_kind(out, kind):

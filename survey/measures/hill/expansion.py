@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from survey.measures.hill.edges import COUNTS, FACTORS, of_kind
+from survey.measures.hill.edges import COUNTS, FACTORS, of_kind, on_rows
 
 SPACING, LEAST = 1e-3, 1e-7  # between the nine points: as a fraction of a step, and at least
 STENCIL = np.array([-1.0, 0.0, 1.0])
@@ -54,7 +54,9 @@ def expander(solve, square):
         spacing = np.minimum(np.maximum(SPACING * length, LEAST)[:, None], 0.2 * (high - low))
         middle = np.clip(x, low + spacing, high - spacing)
         nine = square.parameters(middle[:, None] + spacing[:, None] * STENCIL[:, None])
-        out = solve(nine[..., 0].reshape(-1, 1), np.repeat(nine[..., 1], 3, axis=0), FACTORS + COUNTS[:count])
+        q, row = np.unique(nine[..., 0], return_inverse=True)  # seeds on one row share its values
+        wanted, p = FACTORS + COUNTS[:count], np.repeat(nine[..., 1], 3, axis=0)
+        out = on_rows(lambda own, x, names: solve(q[own, None], x, names), row.ravel(), p, wanted)
         f, _ = of_kind({name: values.reshape(-1, 3, 3) for name, values in out.items()}, kind)
         h, k = spacing.T
         gradient = np.stack([(f[:, 2, 1] - f[:, 0, 1]) / (2 * h), (f[:, 1, 2] - f[:, 1, 0]) / (2 * k)], axis=1)
