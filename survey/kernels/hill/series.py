@@ -186,6 +186,31 @@ def points(coefficients, number, bars, x, even, scale, turns, nodes, share, full
             )  # fmt: skip
 
 
+@kernel
+def discriminants_at(first, coefficients, number, bar, x, even, rtol, floats, verdict, missed):
+    """As `discriminants` at points on their own, from the `first` on: series and x as in `points`, of one function, D,
+    within `bar`.
+    """
+    terms, across = coefficients.shape
+    table, rows = np.empty((terms, TILE)), np.empty((across, TILE))
+    sums, part, bounds = np.empty(TILE), np.empty(TILE), np.full(TILE, bar)
+    for start in range(0, x.shape[1], TILE):
+        count = min(TILE, x.shape[1] - start)
+        end = start + count
+        _table(x[0, start:end], False, False, rows)
+        _table(x[1, start:end], even, False, table)
+        for i in range(count):
+            sums[i] = 0.0
+        for k in range(terms):
+            if number[k] == 0:
+                continue
+            _sum(coefficients[k, : number[k]], rows, part, count)
+            for i in range(count):
+                sums[i] += table[k, i] * part[i]
+        begin, end = first + start, first + end
+        _decide(sums, bounds, not bar <= rtol, floats[:, begin:end], rtol, verdict[begin:end], missed[begin:end])
+
+
 @splice
 def _count(own, mirrored, full_period, near, beyond, m_low, m_high, d_low, d_high):
     """Numbers of zeros, NaN where they are not known: between these of y1, and of y2, at nodes around the point, or

@@ -27,7 +27,7 @@ import numpy as np
 
 from survey import status
 from survey.kernels.hill import answers as kernels
-from survey.kernels.hill.series import TERMS, discriminants, factors, points
+from survey.kernels.hill.series import TERMS, discriminants, discriminants_at, factors, points
 from survey.kernels.jit import wait_for_other_compiler
 from survey.kernels.lanes import RESULTS, Y1_ZEROS
 from survey.kernels.math import chebyshev
@@ -47,8 +47,8 @@ RETRIES = 2
 _ONE_AT_A_TIME = threading.Lock()
 ANSWERS = frozenset({"discriminant", "exponent"})
 DISCRIMINANT = np.array([name == "discriminant" for name in kernels.FLOATS])
-# The parts of the axis across points on their own.
-ROWS_PER_PART, MOST_PARTS = 130, 8
+# The parts of the axis across points on their own: rows in each, of D and of factors, where more terms are summed.
+ROWS_PER_PART, MOST_PARTS = (260, 130), 8
 # Points of a call that answers from factors: their temporaries stay in the processor's cache.
 CALL_POINTS = 8192
 
@@ -117,9 +117,12 @@ def solve(problem, method, asked, answers):
 
 def scattered(box, method, asked, answers, position, p):
     """Answer points on their own (N each) from the series of their `box`; returns those (N, bool) to be solved."""
-    sought, axis, open_points = _sought(asked, factors_only=True), _axis(box.line, box.even), np.ones(p.size, np.bool_)
-    with _ONE_AT_A_TIME:
-        served = [panel for part in _parts(box.row_axis) for panel in panels(part, method, asked.rtol, axis, sought)]
+    sought, axis, open_points = _sought(asked), _axis(box.line, box.even), np.ones(p.size, np.bool_)
+    served = _served_panels(box, method, asked, axis, sought)
+    if not sought.factors and any(not bars[0] <= asked.rtol for _, _, _, bars, *_ in served):
+        # where D varies by many powers of ten, bounds of the factors are nearer
+        sought = _sought(asked, factors_only=True)
+        served = _served_panels(box, method, asked, axis, sought)
     for low, high, series, bars, turns, _, _ in served:
         inside = np.flatnonzero(open_points & (position >= low) & (position <= high))
         padded, number, bars = _shortened(series, bars)
@@ -130,13 +133,15 @@ def scattered(box, method, asked, answers, position, p):
                 (position[some] - 0.5 * (low + high)) / (0.5 * (high - low)),
                 (p[some] - axis.middle) / axis.radius,
             )
-            results = _at_points(box, axis, padded, number, bars, turns, across, along, position[some])
-            if some[-1] - some[0] == some.size - 1:
-                found, own = answers, slice(some[0], some[-1] + 1)
-                found.assess(results, None, first=some[0])
+            alone = some[-1] - some[0] == some.size - 1
+            found, first = (answers, some[0]) if alone else (Answers(some.size, asked), 0)
+            if sought.factors:
+                results = _at_points(box, axis, padded, number, bars, turns, across, along, position[some])
+                found.assess(results, None, first=first)
             else:
-                found, own = Answers(some.size, asked), slice(None)
-                found.assess(results, None)
+                _discriminants_at(found, first, padded[0], number[0], bars[0], np.stack([across, along]), axis.even)
+            own = slice(first, first + some.size)
+            if not alone:
                 answers.replace(some, found)
             failed = found.status[own] != status.OK
             open_points[some] = found.missed[own] | failed
@@ -144,9 +149,24 @@ def scattered(box, method, asked, answers, position, p):
     return open_points
 
 
-def _parts(row_axis):
+def _served_panels(box, method, asked, axis, sought):
+    with _ONE_AT_A_TIME:
+        return [
+            panel for part in _parts(box.row_axis, sought) for panel in panels(part, method, asked.rtol, axis, sought)
+        ]
+
+
+def _discriminants_at(answers, first, series, number, bar, x, even):
+    """D of the answers from the `first` on, at points x (2, N) across and along, from its series, and the exponent."""
+    asked, outputs = answers.asked, (answers.floats, answers.verdict, answers.missed)
+    discriminants_at(first, series, number, bar, x, even, asked.rtol, *outputs)
+    if asked.wanted[kernels.EXPONENT // 2]:
+        kernels.exponents(np.array([first]), x.shape[1], asked.rtol, *outputs)
+
+
+def _parts(row_axis, sought):
     """The axis in parts: the more points there are, the more of them pay, on which series have fewer terms."""
-    parts = int(np.clip(row_axis.number // ROWS_PER_PART, 1, MOST_PARTS))
+    parts = int(np.clip(row_axis.number // ROWS_PER_PART[sought.factors], 1, MOST_PARTS))
     ends = np.linspace(row_axis.low, row_axis.high, parts + 1)
     return [replace(row_axis, low=float(low), high=float(high)) for low, high in pairwise(ends)]
 
