@@ -67,6 +67,11 @@ def edge(
     known = [p.name for p in module.PARAMETERS]
     if along not in known:
         raise BadInput(f"along: {modules.unknown('parameter', along, known)}")
+    if hasattr(measure, "refusal"):
+        pairs = [[along], *([along, other] for other in known if other != along)]
+        if all(measure.refusal(axes, module) for axes in pairs):
+            why = measure.refusal([along], module)
+            raise BadInput(f"edge: no boundaries are known along {along} of {name}: {why}; {_INSTEAD}")
     chosen = {key: value for key, value in parameters.items() if key in names}
     options = check_options(module, chosen, [*given, along])
     used = check_parameters(module, name, options, dict.fromkeys([along, *given]))
@@ -115,15 +120,22 @@ def _find(scene, options, parameter, ends, near, fixed):
         found = boundaries.along(scene, options, parameter.name, ends, fixed)
         return found if near is None else _nearest(*found, near)
     low, high = _piece(parameter, near)
-    width = FIRST * (1.0 + abs(near))
+    width, sides, all_of = FIRST * (1.0 + abs(near)), {}, True
     for _ in range(MOST):
         here = max(low, near - width), min(high, near + width)
-        found = boundaries.along(scene, options, parameter.name, here, fixed)
-        position = found[0].position
-        if (here[0] == low or (position <= near).any()) and (here[1] == high or (position >= near).any()):
+        found, index, complete = boundaries.along(scene, options, parameter.name, here, fixed)
+        nearest, index, complete = _nearest(found, index, complete, near)
+        all_of = None if complete is None else complete and all_of
+        for i, position in enumerate(nearest.position):  # a wider range is searched more coarsely: the first counts
+            sides.setdefault(bool(position > near), (nearest, index, i))
+        if (here[0] == low or False in sides) and (here[1] == high or True in sides):
             break
         width *= WIDER
-    return _nearest(*found, near)
+    chosen = [sides[side] for side in sorted(sides)]
+    on_line = boundaries.OnLine(
+        *(np.array([getattr(one, name)[i] for one, _, i in chosen]) for name in ("position", "error", "kind"))
+    )
+    return on_line, None if index is None else np.array([numbers[i] for _, numbers, i in chosen], int), all_of
 
 
 def _piece(parameter, near):

@@ -142,7 +142,7 @@ def _rotations(given, options, status):
 def _critical(given, options, status):
     moments = [given[name] for name in _MOMENTS]
     found = clebsch.critical(moments, given["epsilon"], given["sigma"], given["p_psi"], float(options["sense"]))
-    exists = found.pop("exists")
+    exists, _certificate = found.pop("exists"), found.pop("certificate")
     return found, {"verdict": found.pop("verdict")}, np.where((status == OK) & ~exists, _NO_MOTION, status)
 
 

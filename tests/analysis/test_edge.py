@@ -202,7 +202,7 @@ def test_what_has_no_boundaries_is_told():
     ):
         with pytest.raises(BadInput, match=match):
             survey.edge("satellite", **keywords)
-    with pytest.raises(BadInput, match="no boundaries are known for the scene gyrostat_body"):
+    with pytest.raises(BadInput, match="no boundaries are known along lambda1 of gyrostat_body"):
         survey.edge("gyrostat_body", along="lambda1")
     with pytest.raises(BadInput, match="boundaries are known along mu alone, not on periods"):
         survey.edge("libration", along="periods", near=1e9, mu=0.01, order="8")

@@ -37,7 +37,7 @@ def rotation(inertia, epsilon, rate):
     middle = over.sign() * other.sign() < 0.0
     # (6): the rotation about the least axis with epsilon < 0, or the largest with epsilon > 0, must be fast enough
     needs = place * e.value > 0.0
-    roots = (A2 * _clipped(place * other)).sqrt() + (A3 * _clipped(place * over)).sqrt()
+    roots = (A2 * clipped(place * other)).sqrt() + (A3 * clipped(place * over)).sqrt()
     least = Bounded(abs(e.value)).sqrt() * roots / A1
     beyond = (bounded.of(abs(np.asarray(rate, dtype=float))) - least).sign()
     free_top = (e.value == 0.0) & (square.value == 0.0)
@@ -60,7 +60,7 @@ def rotation(inertia, epsilon, rate):
     }
 
 
-def _clipped(number):
+def clipped(number):
     """The number, or 0 where it is negative."""
     return Bounded(np.maximum(number.value, 0.0), np.clip(number.value + number.bar, 0.0, number.bar))
 
@@ -83,9 +83,9 @@ def _modes(a, b, c, d, verdict):
     inner = bounded.where(none, Bounded(0.0 * outer.value, abs(outer.value) + outer.bar), c / (a * outer))
     size, half = bounded.where(real, 1.0, c / a).sqrt(), b / (-2.0 * a)
     # sqrt(x) = p + i q of complex x: 2 p^2 = |x| + Re x, 2 q^2 = |x| - Re x
-    p, q = ((0.5 * _clipped(size + side * half)).sqrt() for side in (1.0, -1.0))
-    rises = [_clipped(x).sqrt() for x in (inner, outer)]
-    turns = [_clipped(-x).sqrt() for x in (inner, outer)]
+    p, q = ((0.5 * clipped(size + side * half)).sqrt() for side in (1.0, -1.0))
+    rises = [clipped(x).sqrt() for x in (inner, outer)]
+    turns = [clipped(-x).sqrt() for x in (inner, outer)]
     growth = bounded.where(real, _larger(*rises), p)
     slow, fast = (bounded.where(real, pick(*turns), q) for pick in (_smaller, _larger))
     growth, slow, fast = (Bounded(x.value, x.bar + doubt) for x in (growth, slow, fast))
@@ -122,8 +122,8 @@ def critical(inertia, epsilon, sigma, area, sign):
     rests = (above == 0.0) | (abs(turn.value) <= turn.bar)
     half = 0.5 * (D[0] + D[1] + D[2])
     second, third = D[0] * D[1] + D[0] * D[2] + D[1] * D[2], D[0] * D[1] * D[2]
-    kind = (third.sign()) * ((half * half - second) * y + third).sign()
-    kind = np.where(rests, 0.0, kind)
+    bracket = (half * half - second) * y + third
+    kind = np.where(rests, 0.0, third.sign() * bracket.sign())
     pairs = inertia[0] * inertia[1] + inertia[0] * inertia[2] + inertia[1] * inertia[2]
     product = inertia[0] * inertia[1] * inertia[2]
     beta, slope = s * e * (pairs + s * product), e * (pairs + 2.0 * (s * product))
@@ -133,6 +133,7 @@ def critical(inertia, epsilon, sigma, area, sign):
     exists = inside & (alpha.value != 0.0) & np.isfinite(alpha.bar)
     return {
         "exists": exists,
+        "certificate": third * bracket,
         "H": W - 0.5 * (s * F2),
         "F2": F2,
         "period": bounded.where(rests, np.nan, period),
