@@ -55,6 +55,11 @@ def edge(
     >>> survey.edge("satellite", along="rho", near=1.2, k=0.5).edge.values.round(6)
     array([1.026056, 1.604051])
     """
+    return _edge(scene, along, near, parameters)
+
+
+def _edge(scene, along, near, parameters, alone=False):
+    """As `edge`; with `alone`, it is searched until the nearest boundary on either side is found."""
     name, module = user_scene.find(scene)
     measure = measures.question(module.FAMILY, "curves")
     if measure is None:
@@ -75,7 +80,7 @@ def edge(
         near = _number("near", near, used[along])
     ends = _range(used[along], ends, near)
     user_scene.check(module)
-    found = _find(module, options, used[along], ends, near, fixed)
+    found = _find(module, options, used[along], ends, near, fixed, alone)
     return _described(module, measure, used, along, fixed, *found)
 
 
@@ -109,21 +114,38 @@ def _range(parameter, ends, near):
     return first, last
 
 
-def _find(scene, options, parameter, ends, near, fixed):
+def _find(scene, options, parameter, ends, near, fixed, alone):
     """(OnLine, index or None, complete or None) between `ends`, or the nearest on each side of `near`."""
     if ends is not None:
         found = boundaries.along(scene, options, parameter.name, ends, fixed)
         return found if near is None else _nearest(*found, near)
+
+    def between(first, last):
+        return boundaries.along(scene, options, parameter.name, (first, last), fixed)
+
     low, high = _piece(parameter, near)
     width = FIRST * (1.0 + abs(near))
-    for _ in range(MOST):
-        here = max(low, near - width), min(high, near + width)
-        found = boundaries.along(scene, options, parameter.name, here, fixed)
-        position = found[0].position
-        if (here[0] == low or (position <= near).any()) and (here[1] == high or (position >= near).any()):
-            break
+    first, last = max(low, near - width), min(high, near + width)
+    parts = [between(first, last)]
+    ends = {-1.0: (first, low), 1.0: (last, high)}
+    for _ in range(MOST - 1):
         width *= WIDER
-    return _nearest(*found, near)
+        position = np.concatenate([part[0].position for part in parts])
+        for side, (end, furthest) in ends.items():
+            if end != furthest and not (position.size if alone else (side * (position - near) >= 0.0).any()):
+                further = side * min(side * furthest, side * near + width)
+                parts.append(between(min(end, further), max(end, further)))
+                ends[side] = further, furthest
+    return _nearest(*_together(parts), near)
+
+
+def _together(parts):
+    """(OnLine, index or None, complete or None) of pieces of a line."""
+    found, index, complete = zip(*parts, strict=True)
+    order = np.argsort(np.concatenate([one.position for one in found]), kind="stable")
+    joined = (np.concatenate([getattr(one, name) for one in found])[order] for name in ("position", "error", "kind"))
+    numbers = None if any(i is None for i in index) else np.concatenate(index)[order]
+    return boundaries.OnLine(*joined), numbers, None if None in complete else all(complete)
 
 
 def _piece(parameter, near):
@@ -215,7 +237,7 @@ def _margin(scene, options, name, here):
     """(value, nearest boundary, its error bound, its class) along one parameter of a point."""
     value = here[name]
     others = {key: other for key, other in here.items() if key != name}
-    found = edge(scene, along=name, near=value, **others, **options)
+    found = _edge(scene, name, value, others | options, alone=True)
     if not found.edge.size:
         return value, np.nan, np.nan, ""
     nearest = int(abs(found.edge.values - value).argmin())

@@ -208,3 +208,28 @@ def test_what_has_no_boundaries_is_told():
         survey.edge("libration", along="periods", near=1e9, mu=0.01, order="8")
     with pytest.raises(BadInput, match="known of the scene gyrostat, whose parameters the outputs reduced_NAME are"):
         survey.edge("gyrostat_integrable", along="w0", near=1.0, case="elliptic", C22=0.5, C33=0.3, S2=0.2)
+
+
+def test_margins_of_own_linear_periodic_systems():
+    """The nearest change of the verdict, and none between; a rotor of twelve states too."""
+    point = {"omega": 20.0, "damping": 4000.0, "lost": 1.0}
+    scene = str(ROOT / "workflows" / "ground_resonance.py")
+    found = survey.edge(scene, along="omega", omega=(15.0, 25.0), damping=4000.0, lost=1.0)
+    assert found.edge.size == 1 and found.edge_error < 1e-6
+    at, bar = float(found.edge[0]), float(found.edge_error[0])
+    sides = survey.evaluate(scene, **point | {"omega": [at - 2.0 * bar, at + 2.0 * bar]}).verdict.values
+    assert sides.tolist() == [1, 0]
+
+
+def test_a_margin_is_that_of_the_nearest_boundary():
+    """Further pieces do not lose what nearer ones found: scanned by the verdict of Mathieu's damped equations."""
+    scene = str(ROOT / "workflows" / "ion_trap.py")
+    point = {"q": 0.7, "a": 0.1, "k": 0.05}
+    margin = survey.evaluate(scene, **point).survey.margin()
+    for name, value in point.items():
+        at, bar = float(margin.edge.sel(parameter=name)), float(margin.edge_error.sel(parameter=name))
+        side = np.sign(at - value)
+        line = [at - 3e-9 * side - bar * side, at + 3e-9 * side + bar * side]
+        assert survey.evaluate(scene, **point | {name: line}).verdict.values.tolist() == [1, 0]
+        between = np.linspace(2.0 * value - at if name != "k" else 0.0, at, 203)[1:-1]
+        assert (survey.evaluate(scene, **point | {name: between}).verdict == 1).all()
