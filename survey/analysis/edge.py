@@ -61,7 +61,7 @@ def edge(
 def _edge(scene, along, near, parameters, alone=False):
     """As `edge`; with `alone`, it is searched until the nearest boundary on either side is found."""
     name, module = user_scene.find(scene)
-    measure = measures.question(module.FAMILY, "curves")
+    measure = measures.curves(module)
     if measure is None:
         raise BadInput(f"edge: {_UNKNOWN} {name}; {_INSTEAD}")
     if hasattr(measure, "trace"):
@@ -197,7 +197,7 @@ def margin(ds):
     """The Dataset that `ds.survey.margin` describes, of one point (a dataset without axes)."""
     scene = user_scene.of_dataset(ds)
     module = user_scene.find(scene)[1]
-    measure = measures.question(module.FAMILY, "curves")
+    measure = measures.curves(module)
     if measure is None:
         raise BadInput(f"margin: {_UNKNOWN} {ds.attrs['scene']}; {_INSTEAD}")
     here, options = parameters(ds), options_at(ds, module)
@@ -250,7 +250,7 @@ def _margin(scene, options, name, here):
 def is_quick(ds):
     """Are the margins of a point found within about a second?"""
     module = user_scene.find(user_scene.of_dataset(ds))[1]
-    measure = measures.question(module.FAMILY, "curves")
+    measure = measures.curves(module)
     return measure is not None and _seconds(measure, parameters(ds)) < 1.0
 
 

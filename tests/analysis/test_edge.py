@@ -2,6 +2,7 @@
 
 import csv
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -233,3 +234,45 @@ def test_a_margin_is_that_of_the_nearest_boundary():
         assert survey.evaluate(scene, **point | {name: line}).verdict.values.tolist() == [1, 0]
         between = np.linspace(2.0 * value - at if name != "k" else 0.0, at, 203)[1:-1]
         assert (survey.evaluate(scene, **point | {name: between}).verdict == 1).all()
+
+
+def _verdict_changes(point, along, low, high):
+    """Where the verdict changes between neighbours, bisected by `evaluate` alone."""
+    line = np.linspace(low, high, 801)
+    verdict = survey.evaluate("brun_triaxial", **point | {along: line}).verdict.values
+    known = np.flatnonzero(verdict >= 0)
+    found = []
+    for i, j in pairwise(known):
+        if verdict[i] != verdict[j]:
+            a, b = line[i], line[j]
+            for _ in range(45):
+                middle = 0.5 * (a + b)
+                here = int(survey.evaluate("brun_triaxial", **point | {along: middle}).verdict)
+                a, b = (middle, b) if here == verdict[i] else (a, middle)
+            found.append(0.5 * (a + b))
+    return found
+
+
+@pytest.mark.parametrize("epsilon", [1.0, -1.0])
+def test_permanent_rotations_in_clebschs_case(epsilon):
+    """Along each parameter: (7) for Omega, and where the verdicts change, no more and no fewer."""
+    # with C the least moment and epsilon < 0, or A the largest and epsilon > 0, there is a critical rate
+    point = {"A": 2.0, "B": 1.5, "C": 1.0, "epsilon": epsilon, "Omega": 0.98, "axis": "A" if epsilon > 0.0 else "C"}
+    ranges = {"A": (0.51, 2.49), "B": (1.01, 2.99), "C": (0.51, 2.6), "epsilon": (-3.0, 3.0), "Omega": (-3.0, 3.0)}
+    for along, (low, high) in ranges.items():
+        fixed = {name: value for name, value in point.items() if name != along}
+        found = survey.edge("brun_triaxial", along=along, **fixed, **{along: (low, high)})
+        expected = _verdict_changes(point, along, low, high)
+        assert found.edge.size == len(expected) and found.attrs["complete"] == 1 and (found.edge_error < 1e-12).all()
+        np.testing.assert_allclose(found.edge, expected, atol=1e-11, rtol=0)
+    rate = float(survey.evaluate("brun_triaxial", **point).critical_rate)
+    exact = np.sin(np.arcsin(np.sqrt(0.75)) + np.arcsin(np.sqrt(0.5)))
+    assert epsilon < 0.0 or abs(rate - exact) < 1e-15
+    margin = survey.evaluate("brun_triaxial", **point).survey.margin()
+    assert abs(float(margin.edge.sel(parameter="Omega")) - rate) < 1e-14
+    assert set(margin.parameter.values) == set(ranges)
+
+
+def test_no_boundaries_of_other_questions_in_clebschs_case():
+    with pytest.raises(BadInput, match="known for the question rotation, not critical"):
+        survey.edge("brun_triaxial", along="A", near=2.0, B=1.5, C=1.0, sigma=0.1, p_psi=0.5, question="critical")
