@@ -55,8 +55,13 @@ def edge(
     >>> survey.edge("satellite", along="rho", near=1.2, k=0.5).edge.values.round(6)
     array([1.026056, 1.604051])
     """
+    return _edge(scene, along, near, parameters)
+
+
+def _edge(scene, along, near, parameters, alone=False):
+    """As `edge`; with `alone`, it is searched until the nearest boundary on either side is found."""
     name, module = user_scene.find(scene)
-    measure = measures.question(module.FAMILY, "curves")
+    measure = measures.curves(module)
     if measure is None:
         raise BadInput(f"edge: {_UNKNOWN} {name}; {_INSTEAD}")
     if hasattr(measure, "trace"):
@@ -67,11 +72,6 @@ def edge(
     known = [p.name for p in module.PARAMETERS]
     if along not in known:
         raise BadInput(f"along: {modules.unknown('parameter', along, known)}")
-    if hasattr(measure, "refusal"):
-        pairs = [[along], *([along, other] for other in known if other != along)]
-        if all(measure.refusal(axes, module) for axes in pairs):
-            why = measure.refusal([along], module)
-            raise BadInput(f"edge: no boundaries are known along {along} of {name}: {why}; {_INSTEAD}")
     chosen = {key: value for key, value in parameters.items() if key in names}
     options = check_options(module, chosen, [*given, along])
     used = check_parameters(module, name, options, dict.fromkeys([along, *given]))
@@ -80,7 +80,7 @@ def edge(
         near = _number("near", near, used[along])
     ends = _range(used[along], ends, near)
     user_scene.check(module)
-    found = _find(module, options, used[along], ends, near, fixed)
+    found = _find(module, options, used[along], ends, near, fixed, alone)
     return _described(module, measure, used, along, fixed, *found)
 
 
@@ -114,28 +114,38 @@ def _range(parameter, ends, near):
     return first, last
 
 
-def _find(scene, options, parameter, ends, near, fixed):
+def _find(scene, options, parameter, ends, near, fixed, alone):
     """(OnLine, index or None, complete or None) between `ends`, or the nearest on each side of `near`."""
     if ends is not None:
         found = boundaries.along(scene, options, parameter.name, ends, fixed)
         return found if near is None else _nearest(*found, near)
+
+    def between(first, last):
+        return boundaries.along(scene, options, parameter.name, (first, last), fixed)
+
     low, high = _piece(parameter, near)
-    width, sides, all_of = FIRST * (1.0 + abs(near)), {}, True
-    for _ in range(MOST):
-        here = max(low, near - width), min(high, near + width)
-        found, index, complete = boundaries.along(scene, options, parameter.name, here, fixed)
-        nearest, index, complete = _nearest(found, index, complete, near)
-        all_of = None if complete is None else complete and all_of
-        for i, position in enumerate(nearest.position):  # a wider range is searched more coarsely: the first counts
-            sides.setdefault(bool(position > near), (nearest, index, i))
-        if (here[0] == low or False in sides) and (here[1] == high or True in sides):
-            break
+    width = FIRST * (1.0 + abs(near))
+    first, last = max(low, near - width), min(high, near + width)
+    parts = [between(first, last)]
+    ends = {-1.0: (first, low), 1.0: (last, high)}
+    for _ in range(MOST - 1):
         width *= WIDER
-    chosen = [sides[side] for side in sorted(sides)]
-    on_line = boundaries.OnLine(
-        *(np.array([getattr(one, name)[i] for one, _, i in chosen]) for name in ("position", "error", "kind"))
-    )
-    return on_line, None if index is None else np.array([numbers[i] for _, numbers, i in chosen], int), all_of
+        position = np.concatenate([part[0].position for part in parts])
+        for side, (end, furthest) in ends.items():
+            if end != furthest and not (position.size if alone else (side * (position - near) >= 0.0).any()):
+                further = side * min(side * furthest, side * near + width)
+                parts.append(between(min(end, further), max(end, further)))
+                ends[side] = further, furthest
+    return _nearest(*_together(parts), near)
+
+
+def _together(parts):
+    """(OnLine, index or None, complete or None) of pieces of a line."""
+    found, index, complete = zip(*parts, strict=True)
+    order = np.argsort(np.concatenate([one.position for one in found]), kind="stable")
+    joined = (np.concatenate([getattr(one, name) for one in found])[order] for name in ("position", "error", "kind"))
+    numbers = None if any(i is None for i in index) else np.concatenate(index)[order]
+    return boundaries.OnLine(*joined), numbers, None if None in complete else all(complete)
 
 
 def _piece(parameter, near):
@@ -187,7 +197,7 @@ def margin(ds):
     """The Dataset that `ds.survey.margin` describes, of one point (a dataset without axes)."""
     scene = user_scene.of_dataset(ds)
     module = user_scene.find(scene)[1]
-    measure = measures.question(module.FAMILY, "curves")
+    measure = measures.curves(module)
     if measure is None:
         raise BadInput(f"margin: {_UNKNOWN} {ds.attrs['scene']}; {_INSTEAD}")
     here, options = parameters(ds), options_at(ds, module)
@@ -227,7 +237,7 @@ def _margin(scene, options, name, here):
     """(value, nearest boundary, its error bound, its class) along one parameter of a point."""
     value = here[name]
     others = {key: other for key, other in here.items() if key != name}
-    found = edge(scene, along=name, near=value, **others, **options)
+    found = _edge(scene, name, value, others | options, alone=True)
     if not found.edge.size:
         return value, np.nan, np.nan, ""
     nearest = int(abs(found.edge.values - value).argmin())
@@ -240,7 +250,7 @@ def _margin(scene, options, name, here):
 def is_quick(ds):
     """Are the margins of a point found within about a second?"""
     module = user_scene.find(user_scene.of_dataset(ds))[1]
-    measure = measures.question(module.FAMILY, "curves")
+    measure = measures.curves(module)
     return measure is not None and _seconds(measure, parameters(ds)) < 1.0
 
 

@@ -24,6 +24,7 @@ QUESTIONS = {
         "searched": Function(
             "the same from the outputs of the `scene`", ("scene", "square", "axes", "fixed", "options")
         ),
+        "serves": Function("are curves known of the scene? They are if it is missing", ("scene",)),
         "refusal": Function(
             "why there are no curves on a map of these axes, in words; None if there are", ("axes", "scene")
         ),
@@ -109,6 +110,12 @@ def question(family, name):
     module = modules.load(folder, name, "measure")
     contract.check_offered(module, QUESTIONS[name], "survey/measures/__init__.py")
     return module
+
+
+def curves(scene):
+    """The module that knows the scene's curves; None if there is none."""
+    found = question(scene.FAMILY, "curves")
+    return found if found is None or not hasattr(found, "serves") or found.serves(scene) else None
 
 
 @cache

@@ -17,7 +17,7 @@ def check_boundaries(scene, name, table, given, proves=False):
     if table is None:
         return None
     axes = [key for key, values in given.items() if np.ndim(values)]
-    measure = measures.question(scene.FAMILY, "curves")
+    measure = measures.curves(scene)
     if measure is None:
         raise BadInput(f"boundaries: no boundary curves are known for the scene {name}; leave the table out")
     if hasattr(measure, "refusal"):

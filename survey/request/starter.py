@@ -44,7 +44,8 @@ def workflow(scene):
     figure = given.get("figures", "verdict" if "verdict" in drawn else drawn[0])
     lines += [f'figures = ["{figure}"]  # pictures beside the file; of {", ".join(dict.fromkeys(drawn))}',
               "# variables = [...]  # which outputs are stored; all by default"]  # fmt: skip
-    if measures.question(module.FAMILY, "curves") is not None:
+    curves = measures.curves(module)
+    if curves and not (hasattr(curves, "refusal") and curves.refusal([p.name for p in axes], module)):
         lines += ["", "# [boundaries]  # the curves between verdicts, exact, in the file and its pictures"]
     if measures.question(module.FAMILY, "cells") is not None:
         lines += ["", "# [refine]  # cells as small as needed where the verdict changes, and the area of each verdict",

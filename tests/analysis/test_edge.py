@@ -2,6 +2,7 @@
 
 import csv
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -202,9 +203,71 @@ def test_what_has_no_boundaries_is_told():
     ):
         with pytest.raises(BadInput, match=match):
             survey.edge("satellite", **keywords)
-    with pytest.raises(BadInput, match="no boundaries are known along lambda1 of gyrostat_body"):
+    with pytest.raises(BadInput, match="no boundaries are known for the scene gyrostat_body"):
         survey.edge("gyrostat_body", along="lambda1")
     with pytest.raises(BadInput, match="boundaries are known along mu alone, not on periods"):
         survey.edge("libration", along="periods", near=1e9, mu=0.01, order="8")
     with pytest.raises(BadInput, match="known of the scene gyrostat, whose parameters the outputs reduced_NAME are"):
         survey.edge("gyrostat_integrable", along="w0", near=1.0, case="elliptic", C22=0.5, C33=0.3, S2=0.2)
+
+
+def test_margins_of_own_linear_periodic_systems():
+    """The nearest change of the verdict, and none between; a rotor of twelve states too."""
+    point = {"omega": 20.0, "damping": 4000.0, "lost": 1.0}
+    scene = str(ROOT / "workflows" / "ground_resonance.py")
+    found = survey.edge(scene, along="omega", omega=(15.0, 25.0), damping=4000.0, lost=1.0)
+    assert found.edge.size == 1 and found.edge_error < 1e-6
+    at, bar = float(found.edge[0]), float(found.edge_error[0])
+    sides = survey.evaluate(scene, **point | {"omega": [at - 2.0 * bar, at + 2.0 * bar]}).verdict.values
+    assert sides.tolist() == [1, 0]
+
+
+def test_a_margin_is_that_of_the_nearest_boundary():
+    """Further pieces do not lose what nearer ones found: scanned by the verdict of Mathieu's damped equations."""
+    scene = str(ROOT / "workflows" / "ion_trap.py")
+    point = {"q": 0.7, "a": 0.1, "k": 0.05}
+    margin = survey.evaluate(scene, **point).survey.margin()
+    for name, value in point.items():
+        at, bar = float(margin.edge.sel(parameter=name)), float(margin.edge_error.sel(parameter=name))
+        side = np.sign(at - value)
+        line = [at - 3e-9 * side - bar * side, at + 3e-9 * side + bar * side]
+        assert survey.evaluate(scene, **point | {name: line}).verdict.values.tolist() == [1, 0]
+        between = np.linspace(2.0 * value - at if name != "k" else 0.0, at, 203)[1:-1]
+        assert (survey.evaluate(scene, **point | {name: between}).verdict == 1).all()
+
+
+def _verdict_changes(point, along, low, high):
+    """Where the verdict changes between neighbours, bisected by `evaluate` alone."""
+    line = np.linspace(low, high, 801)
+    verdict = survey.evaluate("brun_triaxial", **point | {along: line}).verdict.values
+    known = np.flatnonzero(verdict >= 0)
+    found = []
+    for i, j in pairwise(known):
+        if verdict[i] != verdict[j]:
+            a, b = line[i], line[j]
+            for _ in range(45):
+                middle = 0.5 * (a + b)
+                here = int(survey.evaluate("brun_triaxial", **point | {along: middle}).verdict)
+                a, b = (middle, b) if here == verdict[i] else (a, middle)
+            found.append(0.5 * (a + b))
+    return found
+
+
+@pytest.mark.parametrize("epsilon", [1.0, -1.0])
+def test_permanent_rotations_in_clebschs_case(epsilon):
+    """Along each parameter: (7) for Omega, and where the verdicts change, no more and no fewer."""
+    # with C the least moment and epsilon < 0, or A the largest and epsilon > 0, there is a critical rate
+    point = {"A": 2.0, "B": 1.5, "C": 1.0, "epsilon": epsilon, "Omega": 0.98, "axis": "A" if epsilon > 0.0 else "C"}
+    ranges = {"A": (0.51, 2.49), "B": (1.01, 2.99), "C": (0.51, 2.6), "epsilon": (-3.0, 3.0), "Omega": (-3.0, 3.0)}
+    for along, (low, high) in ranges.items():
+        fixed = {name: value for name, value in point.items() if name != along}
+        found = survey.edge("brun_triaxial", along=along, **fixed, **{along: (low, high)})
+        expected = _verdict_changes(point, along, low, high)
+        assert found.edge.size == len(expected) and found.attrs["complete"] == 1 and (found.edge_error < 1e-12).all()
+        np.testing.assert_allclose(found.edge, expected, atol=1e-11, rtol=0)
+    rate = float(survey.evaluate("brun_triaxial", **point).critical_rate)
+    exact = np.sin(np.arcsin(np.sqrt(0.75)) + np.arcsin(np.sqrt(0.5)))
+    assert epsilon < 0.0 or abs(rate - exact) < 1e-15
+    margin = survey.evaluate("brun_triaxial", **point).survey.margin()
+    assert abs(float(margin.edge.sel(parameter="Omega")) - rate) < 1e-14
+    assert set(margin.parameter.values) == set(ranges)

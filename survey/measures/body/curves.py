@@ -8,14 +8,15 @@ the axis of the least or the largest moment is stable where
 
 and that about the middle one is not: where two moments are equal it changes if (7) holds. Critical motions are stable
 where the product in (12) is positive. Equation numbers: `scenes/brun_triaxial.md`. The curves are searched for on LINES
-lines of the map each way; every point is bracketed on its line by certain signs.
+lines of the map each way; every point is bracketed on its line by certain signs. Along one parameter alone those of
+rotations are known in closed form, see `critical_rates`.
 """
 
 import numpy as np
 
 from survey.errors import BadInput
 from survey.measures import bounded, contours
-from survey.measures.body import clebsch
+from survey.measures.body import clebsch, critical_rates
 from survey.measures.sampled import joined
 
 CLASSES = {"critical_rate": 0, "equal_moments": 1, "critical_motion": 2}
@@ -26,27 +27,32 @@ ALONG = ()
 LINES = 129
 
 
+def serves(scene):
+    """Are curves known of the scene? Of whole gyrostats they are not."""
+    return "Omega" in {p.name for p in scene.PARAMETERS}
+
+
 def refusal(axes, scene):
     """Why there are no curves on a map of these axes, in words; None if there are."""
-    if "Omega" not in {p.name for p in scene.PARAMETERS}:
-        return "no boundary curves are known, but of brun_triaxial"
-    if len(axes) in (2, 3) and any(set(axes) <= set(own) for own in AXES.values()):
+    if len(axes) in (1, 2, 3) and any(set(axes) <= set(own) for own in AXES.values()):
         return None
     known = " or of ".join(f"{', '.join(own)} (question {question})" for question, own in AXES.items())
-    return f"curves are known on two or three axes of {known}, not on {', '.join(axes) or 'none'}"
+    return f"curves are known on up to three axes of {known}, not on {', '.join(axes) or 'none'}"
 
 
 def closed(square, axes, fixed, options):
     """The Curves on the map of `axes`, the unit square `square`; `fixed` holds the other parameters."""
+    if options["question"] not in AXES:
+        raise BadInput(f"boundaries: question = {options['question']} has no verdict; ask rotation or critical")
+    if options["question"] == "rotation" and not set(axes) <= set(AXES["rotation"]):
+        return _on_a_line(square, axes[0], fixed, options["axis"])
     sense = {"sense": float(options.get("sense", 1))}
     first = options.get("axis", "A")  # of critical motions it does not matter
     one, other = (name for name in MOMENTS if name != first)
     functions = {
         "rotation": (("critical_rate", rate, one), ("equal_moments", equal, one), ("equal_moments", equal, other)),
         "critical": (("critical_motion", motion, one),),
-    }.get(options["question"])
-    if functions is None:
-        raise BadInput(f"boundaries: question = {options['question']} has no verdict; ask rotation or critical")
+    }[options["question"]]
     found = []
     for name, function, second in functions:
 
@@ -60,6 +66,19 @@ def closed(square, axes, fixed, options):
         lines = contours.lines(on_map, square, LINES)
         found += [(CLASSES[name], square.parameters(x), error, {}) for x, error in lines]
     return joined(found, [])
+
+
+def _on_a_line(square, name, fixed, axis):
+    """The Curves of rotations on the map of the parameter `name` and something on which nothing depends."""
+    low, high = float(square.low[0]), float(square.high[0])
+    with np.errstate(all="ignore"):
+        points, complete = critical_rates.along(name, low, high, fixed, axis)
+    curves = joined([
+        (CLASSES[kind], np.array([[x, square.low[1]], [x, square.high[1]]]), np.full(2, bar / (high - low)), {})
+        for kind, x, bar in points if low <= x <= high
+    ], [])  # fmt: skip
+    curves.complete = complete
+    return curves
 
 
 def rate(inertia, here):

@@ -15,7 +15,7 @@ from itertools import pairwise
 
 import contourpy
 import numpy as np
-from scipy.interpolate import RectBivariateSpline
+from scipy.interpolate import CubicSpline, RectBivariateSpline
 from scipy.ndimage import binary_erosion
 
 from survey.measures import contours
@@ -58,22 +58,26 @@ def searched(scene, square, axes, fixed, options):
         return joined(scene.curves(square, axes, fixed), [output.name for output in ALONG])
 
     matrices = matrices_of(scene, square, axes, fixed, options)
-    found, on_lattice = [], matrices(contours.lattice(LINES), ROUGH)
+    found, on_lattice = [], matrices(contours.lattice(LINES, square.across), ROUGH)
     for kind, function in bifurcations.functions(on_lattice[0].shape[1], scene.structure).items():
         values, bars = function(*on_lattice)
         # where no sign is certain all around, as where the function is 0 throughout, there is only noise
-        open_ = ~(abs(values) > bars).reshape(LINES, LINES)
-        values = np.where(binary_erosion(open_, np.ones((3, 3)), border_value=1).ravel(), np.nan, values)
+        open_ = ~(abs(values) > bars).reshape(LINES, -1)
+        around = np.ones((3, 3 if square.across is None else 1))
+        values = np.where(binary_erosion(open_, around, border_value=1).ravel(), np.nan, values)
 
         def on_map(x, function=function):
             return function(*matrices(x))
 
-        for x, error in _lines(on_map, square.grain, values.reshape(LINES, LINES)):
+        lines = _lines if square.across is None else partial(_crossings, across=square.across)
+        for x, error in lines(on_map, square.grain, values.reshape(open_.shape)):
             sure, angle, bar, outside = bifurcations.passing(*matrices(x), kind, scene.structure)
             for part in contours.runs(sure):
                 known = {"angle": (angle[part], bar[part]), "outside": (outside[part], 0.0 * bar[part])}
                 found.append((kind, square.parameters(x[part]), error[part], known))
     curves = joined(found, [output.name for output in ALONG])
+    if square.across is not None:
+        return curves
     counts = row_count.outside(*on_lattice, scene.structure).reshape(LINES, LINES)
     drawn = [(kind, square.positions(parameters)) for kind, parameters, _error, _known in found]
     curves.unexplained = row_count.unexplained(counts, drawn)[0]
@@ -107,15 +111,33 @@ def _lines(function, grain, values):
         dense = np.ma.masked_array(dense, hole)
     found = contourpy.contour_generator(fine, fine, dense).lines(0.0)
     parts = [_thinned(np.asarray(line)[:, ::-1]) for line in found]
-    return tips.followed(function, _closed_in(function, parts, spline, grain), grain) if parts else []
-
-
-def _closed_in(function, parts, spline, grain):
-    """The curves near positions, moved along the axis that crosses them best; cut where one is not certain."""
+    if not parts:
+        return []
     x = np.concatenate(parts)
     slope = abs(np.stack([spline.ev(*x.T, dx=1), spline.ev(*x.T, dy=1)], axis=1))
     border = (x == 0.0) | (x == 1.0)
     along = np.argmax(np.where(border, -1.0, slope), axis=1)
+    return tips.followed(function, _closed_in(function, parts, along, grain), grain)
+
+
+def _crossings(function, grain, values, across):
+    """As `_lines`, where only the border at `across` is asked for: the points on it, each alone."""
+    ticks, fine = np.linspace(0.0, 1.0, LINES), np.linspace(0.0, 1.0, (LINES - 1) * FINER + 1)
+    known = np.isfinite(values[:, 0])
+    dense = CubicSpline(ticks, np.where(known, values[:, 0], 0.0))(fine)
+    dense[np.interp(fine, ticks, np.where(known, 0.0, 1.0)) > 0.0] = np.nan
+    with np.errstate(invalid="ignore"):
+        at = np.flatnonzero(np.isfinite(dense[1:] + dense[:-1]) & ((dense[1:] > 0.0) != (dense[:-1] > 0.0)))
+    if not at.size:
+        return []
+    start = fine[at] + dense[at] / (dense[at] - dense[at + 1]) / (fine.size - 1)
+    parts = [np.array([[t, across]]) for t in start]
+    return _closed_in(function, parts, np.zeros(len(parts), int), grain, TRIED[:2])
+
+
+def _closed_in(function, parts, along, grain, tried=TRIED):
+    """The curves near positions, moved along the axis `along` of each; cut where one is not certain."""
+    x = np.concatenate(parts)
 
     def at(left, axis, who, t):
         here = np.repeat(x[left[who], None], t.shape[1], axis=1)
@@ -124,7 +146,7 @@ def _closed_in(function, parts, spline, grain):
         return value.reshape(t.shape), bar.reshape(t.shape)
 
     found, error = x.copy(), np.full(len(x), np.inf)
-    for times, other in TRIED:
+    for times, other in tried:
         left = np.flatnonzero(error == np.inf)
         axis = abs(along[left] - other)
         start, same = x[left, axis], np.ones(left.size)

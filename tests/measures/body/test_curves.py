@@ -25,8 +25,8 @@ def test_along_a_moment_all_changes_of_the_verdict_are_found():
     others = {"B": 1.5, "C": 1.0, "epsilon": 1.0, "Omega": 0.9, "axis": "A"}
     found = survey.edge("brun_triaxial", along="A", A=(0.5001, 2.4999), **others)
     assert found.edge_class.values.tolist() == [1, 1, 0]
-    assert found.edge.values[:2] == pytest.approx([1.0, 1.5], abs=1e-11)
-    aside = 10 * found.edge_error.values[:, None] * [-1, 1] + found.edge.values[:, None]
+    assert found.edge.values[:2].tolist() == [1.0, 1.5] and found.attrs["complete"] == 1
+    aside = (1e-13 + 10 * found.edge_error.values[:, None]) * [-1, 1] + found.edge.values[:, None]
     beside = survey.evaluate("brun_triaxial", A=aside.ravel(), **others)
     assert beside.verdict.values.reshape(3, 2).tolist() == [[1, 0], [0, 1], [1, 0]]
 
@@ -77,10 +77,10 @@ def test_stability_of_critical_motions_has_its_boundary():
         (
             "brun_triaxial",
             {"along": "omega1", "question": "trajectory", "t": 1.0, **BODY},
-            "no boundaries are known along omega1 of brun_triaxial",
+            "no boundaries are known along omega1",
         ),
         ("brun_triaxial", {"along": "A", "question": "trajectory", "t": 1.0, "B": 1.5, "C": 1.0}, "has no verdict"),
-        ("gyrostat_body", {"along": "A11"}, "but of brun_triaxial"),
+        ("gyrostat_body", {"along": "A11"}, "no boundaries are known for the scene gyrostat_body"),
     ],
 )
 def test_what_has_no_boundaries_says_so(scene, given, words):
