@@ -276,3 +276,9 @@ def test_permanent_rotations_in_clebschs_case(epsilon):
 def test_no_boundaries_of_other_questions_in_clebschs_case():
     with pytest.raises(BadInput, match="known for the question rotation, not critical"):
         survey.edge("brun_triaxial", along="A", near=2.0, B=1.5, C=1.0, sigma=0.1, p_psi=0.5, question="critical")
+
+
+def test_a_margin_that_cannot_be_found_says_why():
+    orbit = survey.evaluate(str(ROOT / "workflows" / "lyapunov.py"), mu=0.1, a=0.3)
+    with pytest.raises(BadInput, match=r"lyapunov\.py curves are not known of orbits with REVERSED"):
+        orbit.survey.margin()
