@@ -201,19 +201,23 @@ def margin(ds):
     if measure is None:
         raise BadInput(f"margin: {_UNKNOWN} {ds.attrs['scene']}; {_INSTEAD}")
     here, options = parameters(ds), options_at(ds, module)
-    rows = []
+    rows, reasons = [], []
     with watched(ds.attrs["scene"], module, 1, lambda: _seconds(measure, here), "parameters") as progress:
         for done, name in enumerate(here):
             if progress:
                 progress(done, len(here))
             try:
                 rows.append((name, *_margin(scene, options, name, here)))
-            except BadInput:  # no boundaries are known along this parameter, or it cannot vary
-                continue
+            except BadInput as refused:  # no boundaries are known along this parameter, or it cannot vary
+                reasons.append(str(refused))
         if progress:
             progress(len(here), len(here))
     if not rows:
-        raise BadInput(f"margin: no boundaries are known along {', '.join(here)} of {ds.attrs['scene']}")
+        raise BadInput(
+            f"margin: of {ds.attrs['scene']} {reasons[0].removeprefix('boundaries: ')}"
+            if reasons
+            else f"margin: {_UNKNOWN} {ds.attrs['scene']}"
+        )
     names, values, edges, errors, words = map(np.array, zip(*rows, strict=True))
     about = {"long_name": "of the parameter, in its unit"}
     return xr.Dataset(

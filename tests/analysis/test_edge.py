@@ -271,3 +271,9 @@ def test_permanent_rotations_in_clebschs_case(epsilon):
     margin = survey.evaluate("brun_triaxial", **point).survey.margin()
     assert abs(float(margin.edge.sel(parameter="Omega")) - rate) < 1e-14
     assert set(margin.parameter.values) == set(ranges)
+
+
+def test_a_margin_that_cannot_be_found_says_why():
+    orbit = survey.evaluate(str(ROOT / "workflows" / "lyapunov.py"), mu=0.1, a=0.3)
+    with pytest.raises(BadInput, match=r"lyapunov\.py curves are not known of orbits with REVERSED"):
+        orbit.survey.margin()
