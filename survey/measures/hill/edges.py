@@ -180,7 +180,7 @@ def on_rows(solve, row, x, wanted):
     line, starts = np.cumsum(slot == 0) - 1, np.flatnonzero(slot == 0)
     together = np.repeat(x[order[starts], None], slot.max(initial=0) + 1, axis=1)
     together[line, slot] = x[order]
-    out = solve(row[starts], together.reshape(starts.size, -1), wanted)
+    out = solve(row[starts], together.reshape(starts.size, together[:1].size), wanted)
     back = np.argsort(order)
     return {name: values.reshape(together.shape)[line[back], slot[back]] for name, values in out.items()}
 
