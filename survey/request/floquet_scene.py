@@ -295,5 +295,5 @@ def _effort(points):
     if not valid.size:
         return {}
     steps = points.steps(reach, np.ones(valid.size), valid).sum(axis=1).mean()
-    series = [len(program.used) for _own, programs, _numbers in points.groups for program in programs]
+    series = [len(program.used) for group in points.groups for program in group.programs]
     return {"series": float(np.mean(series)), "steps": float(steps)}
