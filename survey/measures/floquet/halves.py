@@ -116,8 +116,8 @@ class Waves:
         out = {}
         for row, own in kinds:
             out.setdefault(self._images(n, row), []).append(own)
-        return [(own, images, self._late(images, off[:, own]))
-                for images, own in ((images, np.sort(np.concatenate(parts))) for images, parts in out.items())]  # fmt: skip
+        some = [(np.sort(np.concatenate(parts)), images) for images, parts in out.items()]
+        return [(own, images, self._late(images, off[:, own])) for own, images in some]
 
     def _late(self, images, off):
         total = off[0] * (images.reversal is not None) + off[1] * (images.repetition is not None)
@@ -190,7 +190,7 @@ def _multiple(c, ends, d):
 
 
 def alike_or_opposite(alike, opposite):
-    """Signs r (n) with r_i = r_j only where `alike` (n, n) allows it, r_i = -r_j only where `opposite` does; or None."""
+    """Signs r (n) with r_i = r_j only where `alike` (n, n) is true, r_i = -r_j only where `opposite` is; or None."""
     n = len(alike)
     signs = np.zeros(n, np.int8)
     if not (alike | opposite).all():

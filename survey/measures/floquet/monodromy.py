@@ -125,7 +125,7 @@ class Points:
             self.growth[1, own] += bar * length + 4 * ROUNDOFF_UP * (abs(part) + abs(self.growth[0, own]))
 
     def steps(self, reach, factor, those):
-        """Numbers of steps (K, P) of what is integrated of some points, `factor` (K) times what norm and rate ask for."""
+        """Numbers of steps (K, P) of what is integrated of some points, `factor` (K) times what norm and rate ask."""
         length = self.lengths(those)
         with np.errstate(invalid="ignore"):
             least = 0.5 * length / reach * (self.size[those] + BY_RATE * self.rate[those])
