@@ -45,9 +45,8 @@ class Group:
 class Points:
     """Points of a System as a method's steps need them: sizes, noise, and the units that balance A.
 
-    `whole`: is the whole period integrated, whatever symmetry A has? `parts` (N, pieces), of equal length, of which the
-    first is integrated. `growth` (2, N): the integral of A's trace over the period, the logarithm of det M, and its
-    error bound; infinite where the trace depends on t.
+    `whole`: is the whole period integrated, whatever symmetry A has? `growth` (2, N): the integral of A's trace over the
+    period, the logarithm of det M, and its error bound; infinite where the trace depends on t.
     """
 
     def __init__(self, system, points, whole=False):
@@ -59,7 +58,6 @@ class Points:
         pieces = edges.shape[1] - 1
         self.size, self.noise, self.rate = np.zeros((3, len(points), pieces))
         self.scale = np.ones((len(points), self.n))
-        self.parts = np.ones((len(points), pieces), dtype=np.int64)
         self.growth = np.zeros((2, len(points)))
         self.groups = []
         where = np.flatnonzero(valid)
@@ -89,15 +87,17 @@ class Points:
         n, N = self.n, len(own)
         largest, scale, sampled = np.zeros((N, n, n)), np.empty((N, n)), []
         for k, (program, (*numbers, images, late)) in enumerate(zip(programs, given, strict=True)):
-            self.parts[own, k] = images.parts
-            low, high = self.ends(own[:1] if self.system.same_ranges else own, k)
-            t, A, E = low + (high - low) * TIMES, np.empty((N, TIMES.size, n, n)), np.empty((N, n, n))
+            edges = self.edges[own[:1]] if self.system.same_ranges else self.edges[own]
+            t = edges[:, k, None] + (edges[:, k + 1] - edges[:, k])[:, None] * TIMES
+            A, E = np.empty((N, TIMES.size, n, n)), np.empty((N, n, n))
             self._add_trace(own, program.trace(numbers), self.edges[own, k + 1] - self.edges[own, k])
-            sizes.samples(*program.sampled(numbers, t, late), *numbers, A, E, largest)
+            terms, values, errors = program.sampled(numbers, t, late)
+            errors[:, :, TIMES * images.parts > 1.0] = 0.0  # only what is integrated rounds
+            sizes.samples(terms, values, errors, *numbers, A, E, largest)
             sampled.append((numbers, A, E))
         sizes.balance(largest, scale)
         for k, (numbers, A, E) in enumerate(sampled):
-            low, high = self.ends(own, k)
+            low, high = self.edges[own, k, None], self.edges[own, k + 1, None]
             size, rate, noise = np.empty((3, N))
             sizes.measure(A, E, scale, WEIGHTS, TRANSFORM, RESOLVED, size, rate, noise)
             length = (high - low)[:, 0]
@@ -108,15 +108,6 @@ class Points:
         self.scale[own] = scale
         self.groups.append(Group(own, programs, [values for values, *_ in given], [piece[2] for piece in given]))
 
-    def ends(self, own, k):
-        """The ends (N, 1) of what is integrated of the piece k of the points `own`."""
-        low, high = self.edges[own, k, None], self.edges[own, k + 1, None]
-        return low, np.where(self.parts[own, k, None] == 1, high, low + (high - low) / self.parts[own, k, None])
-
-    def lengths(self, those):
-        """Of what is integrated of the pieces (K, P) of some points."""
-        return np.diff(self.edges[those], axis=1) / self.parts[those]
-
     def _add_trace(self, own, trace, length):
         value, bar = (0.0, np.inf) if trace is None else trace
         with np.errstate(all="ignore"):
@@ -125,8 +116,8 @@ class Points:
             self.growth[1, own] += bar * length + 4 * ROUNDOFF_UP * (abs(part) + abs(self.growth[0, own]))
 
     def steps(self, reach, factor, those):
-        """Numbers of steps (K, P) of what is integrated of some points, `factor` (K) times what norm and rate ask."""
-        length = self.lengths(those)
+        """Numbers of steps (K, P) of some points, `factor` (K) times what norm and rate ask for."""
+        length = np.diff(self.edges[those], axis=1)
         with np.errstate(invalid="ignore"):
             least = 0.5 * length / reach * (self.size[those] + BY_RATE * self.rate[those])
             count = np.ceil(factor[:, None] * np.maximum(np.ceil(least), 1.0))  # more on every rung
@@ -208,7 +199,7 @@ def solve(points, method, rtol, factor, those, sharp):
         mine = np.flatnonzero(number[those] == g)
         place = np.empty(len(points.points), dtype=np.int64)
         place[group.own] = np.arange(len(group.own))
-        work = np.cumsum((count[mine] * points.parts[those[mine]]).sum(axis=1)) * n * n
+        work = np.cumsum(count[mine].sum(axis=1)) * n * n
         cuts = np.searchsorted(work, np.arange(CALL_WORK, work[-1], CALL_WORK)) if work.size else []
         for some in np.split(mine, cuts):
             if some.size:
@@ -218,7 +209,8 @@ def solve(points, method, rtol, factor, those, sharp):
 
 
 def _call(points, method, those, place, group, count, sharp):
-    n, parts = points.n, points.parts[those]
+    n, parts = points.n, np.array([images.parts for images in group.images])
+    count = -(-count // parts)  # of the first parts
     first = np.concatenate([[0], np.cumsum((count * parts).sum(axis=1))])
     F, error, doubt = np.empty((first[-1], n, n)), np.empty(first[-1]), np.empty(first[-1])
     offset = first[:-1].copy()
@@ -229,11 +221,14 @@ def _call(points, method, those, place, group, count, sharp):
         if not point.size:
             continue
         index = np.arange(point.size) - np.repeat(np.cumsum(steps_of) - steps_of, steps_of)
-        low, high = (ends[:, 0] for ends in points.ends(those, k))
+        low, high = points.edges[those, k], points.edges[those, k + 1]
+        late = points.edges[those, -1]
+        if parts[k] > 1:
+            late = high = low + (high - low) / parts[k]
         start, end = (_ends(low, high, steps_of, point, index + shift) for shift in (0, 1))
         middle, half = 0.5 * (start + end), 0.5 * (end - start)
         # all is exact but the first and the last step of the piece, which meet others within their rounding
-        share = points.edges[those, -1] / np.where(high > low, high - low, 1.0)
+        share = late / np.where(high > low, high - low, 1.0)
         noise = points.noise[those, k] + 4 * ROUNDOFF_UP * points.size[those, k] * share
         ways = 1 if images.reversal is None else 2
         found = np.empty((ways * point.size, n, n)), np.empty(ways * point.size), np.empty(ways * point.size)
@@ -248,7 +243,7 @@ def _call(points, method, those, place, group, count, sharp):
         where = where if ways == 1 else np.concatenate([where, where + np.repeat(steps_of, steps_of)])
         F[where], error[where], doubt[where] = found
         images.complete(F, error, doubt, offset, steps_of)
-        offset += steps_of * parts[:, k]
+        offset += steps_of * parts[k]
     jit.wait_for_other_compiler()
     found = Matrices.empty(len(those), n)
     steps.products(F, error, doubt, first, n, found.M, found.E, found.R)
