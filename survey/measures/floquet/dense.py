@@ -317,7 +317,7 @@ def at_points(system, structure, points):
     if not system.smooth(points[0]):
         return None
     with np.errstate(all="ignore"):
-        own = monodromy.Points(system, points)
+        own = monodromy.Points(system, points, halves=True)
         if not _is_analytic(own):
             return None
         every, n, paired = np.arange(len(points)), system.n, structure != "none"

@@ -71,9 +71,9 @@ def _signs(given):
 
 
 class Waves:
-    """The sines and cosines of lines c t + d among the basis functions of a Program, and what else its parities need.
+    """The sines and cosines of lines c t + d among the basis functions of a Program, and what follows from them.
 
-    `places` of the waves, `lines` (places of c and d among the numbers, or None for 1 and 0), `cosine`.
+    `places` of the waves, `lines`: those of c and d among the numbers, or None for 1 and 0; `cosine`, or sine?
     """
 
     def __init__(self, program):
@@ -93,20 +93,17 @@ class Waves:
         """[(indices, Images, late)] of points, from values and error bounds of their numbers and the ends (N) of the
         piece; `late`: see `trace.Program.series`.
         """
-        values, errors = numbers
-        turns, off = np.zeros((2, len(low), len(self.places)), np.int8), np.zeros((2, len(low), len(self.places)))
+        (values, errors), terms = numbers, self.program.terms[:, pg.NUMBER]
+        given = np.zeros((2, 2, len(self.places), len(low)))  # c and d, values and error bounds
+        given[0, 0] = 1.0
+        for w, line in enumerate(self.lines):
+            for which, number in enumerate(line):
+                if number is not None:
+                    given[which, :, w] = values[:, number], errors[:, number]
         with np.errstate(all="ignore"):
-            for w, line in enumerate(self.lines):
-                c, d = (
-                    (np.full(len(low), fallback), 0.0) if k is None else (values[:, k], errors[:, k])
-                    for k, fallback in zip(line, (1.0, 0.0), strict=True)
-                )
-                turns[0, :, w], off[0, :, w] = _multiple(c, (low, high), d)
-                turns[1, :, w], off[1, :, w] = _multiple(c, (0.5 * high, -0.5 * low), (0.0 * low, 0.0))
-            present = (values[:, self.program.terms[:, pg.NUMBER]] != 0.0) | (
-                errors[:, self.program.terms[:, pg.NUMBER]] != 0.0
-            )
-        rows = np.concatenate([turns[0], turns[1], present], axis=1, dtype=np.int8)
+            turns, off = _multiples(*given, low, high)
+            present = (values[:, terms] != 0.0) | (errors[:, terms] != 0.0)
+        rows = np.concatenate([turns[0].T, turns[1].T, present], axis=1, dtype=np.int8)
         different = (rows != rows[:1]).any(axis=1)
         kinds = [(rows[0], np.flatnonzero(~different))]
         if different.any():
@@ -117,13 +114,13 @@ class Waves:
         for row, own in kinds:
             out.setdefault(self._images(n, row), []).append(own)
         some = [(np.sort(np.concatenate(parts)), images) for images, parts in out.items()]
-        return [(own, images, self._late(images, off[:, own])) for own, images in some]
+        return [(own, images, self._late(images, off[:, :, own])) for own, images in some]
 
     def _late(self, images, off):
         total = off[0] * (images.reversal is not None) + off[1] * (images.repetition is not None)
         # most often of all points: then what depends on t alone is still sampled once
-        alike = (total == total[:1]).all(axis=0)
-        return {place: total[: 1 if alike[w] else None, w, None] for w, place in enumerate(self.places)
+        alike = (total == total[:, :1]).all(axis=1)
+        return {place: total[w, : 1 if alike[w] else None, None] for w, place in enumerate(self.places)
                 if images.parts > 1}  # fmt: skip
 
     def _images(self, n, row):
@@ -169,22 +166,26 @@ class Waves:
         return known
 
 
-def _multiple(c, ends, d):
-    """(sign, off): (-1)^k and a bound of c (ends' sum) + 2 d - k pi; 0 where this is no multiple of pi.
+def _multiples(c, d, low, high):
+    """(sign, off) (2, waves, N): (-1)^k and bounds of c (low + high) + 2 d - k pi, then of c (high - low) / 2 - k pi;
+    0 where it is no multiple of pi.
 
-    c and d are (values (N), error bounds). Products are exact in two parts each.
+    c and d (2, waves, N) are values and error bounds. Products and sums are taken in two parts, which is nearly exact.
     """
-    parts = []
-    for end in ends:
-        product = c[0] * end
-        parts += [product, split_error(c[0], end, product)]
-    k = np.rint((parts[0] + parts[2] + 2.0 * d[0]) / PI[0])
+    ends = np.array([[high, 0.5 * high], [low, -0.5 * low]])[:, :, None]
+    products = c[0] * ends
+    lower = split_error(c[0], ends, products)
+    twice = np.stack([2.0 * d[0], 0.0 * d[0]])
+    k = np.rint((products[0] + products[1] + twice) / PI[0])
     turn = k * PI[0]
-    rest = (((parts[0] - turn) + parts[2]) + 2.0 * d[0]) + parts[1] + parts[3] - split_error(k, PI[0], turn)
-    size = abs(parts[0]) + abs(parts[2]) + 2.0 * abs(d[0])
-    # rounding of the sum where both ends count; with one it is exact (Sterbenz)
-    more = np.where(((parts[0] == 0.0) | (parts[2] == 0.0)) & (d[0] == 0.0), 0.0, 2 * EPS * size)
-    off = (abs(rest - k * PI[1]) + more + c[1] * (abs(ends[0]) + abs(ends[1])) + 2.0 * d[1]) * (1 + 8 * EPS)
+    total, rest = -turn, lower[0] + lower[1] - split_error(k, PI[0], turn) - k * PI[1]
+    for part in (*products, twice):
+        before, total = total, total + part
+        taken = total - before
+        rest = rest + ((before - (total - taken)) + (part - taken))
+    size = abs(products[0]) + abs(products[1]) + abs(twice)
+    given = c[1] * (abs(ends[0]) + abs(ends[1])) + np.stack([2.0 * d[1], 0.0 * d[1]])
+    off = (abs(total + rest) + given) * (1 + 8 * EPS) + EPS * EPS * size
     good = off <= NEAR * (1.0 + size)
     return np.where(good, 1 - 2 * (k % 2), 0).astype(np.int8), np.where(good, off, 0.0)
 

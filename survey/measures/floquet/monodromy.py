@@ -45,12 +45,12 @@ class Group:
 class Points:
     """Points of a System as a method's steps need them: sizes, noise, and the units that balance A.
 
-    `whole`: is the whole period integrated, whatever symmetry A has? `growth` (2, N): the integral of A's trace over the
+    `halves`: is no more integrated than symmetries of A ask for? `growth` (2, N): the integral of A's trace over the
     period, the logarithm of det M, and its error bound; infinite where the trace depends on t.
     """
 
-    def __init__(self, system, points, whole=False):
-        self.system, self.n, self.points, self.whole = system, system.n, points, whole
+    def __init__(self, system, points, halves=False):
+        self.system, self.n, self.points, self.halves = system, system.n, points, halves
         self.period, edges = system.ranges(points)
         valid = np.isfinite(points).all(axis=1) & np.isfinite(edges).all(axis=1)
         self.rough = valid.copy()
@@ -75,7 +75,7 @@ class Points:
             for some, pieces in before:
                 numbers = program.numbers(self.points[some])
                 ends = self.edges[some, k], self.edges[some, k + 1]
-                kinds = [(slice(None), Images(), None)] if self.whole else program.waves.found(self.n, numbers, *ends)
+                kinds = program.waves.found(self.n, numbers, *ends) if self.halves else [(slice(None), Images(), None)]
                 for those, images, late in kinds:
                     here = *(values[those] for values in numbers), images, late
                     found.append((some[those], [*(_of_those(piece, those) for piece in pieces), here]))
