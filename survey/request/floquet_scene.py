@@ -8,6 +8,7 @@ import numpy as np
 
 from survey.measures.floquet import dense, monodromy, motion, probing, stability
 from survey.measures.floquet.ahead import compile_ahead
+from survey.measures.floquet.halves import alike_or_opposite
 from survey.measures.floquet.system import System
 from survey.request.traced_scene import TracedScene
 from survey.scene import plus_minus
@@ -231,31 +232,16 @@ class FloquetScene(TracedScene):
 
     def _check_reversible(self, programs, point, edges, size):
         """Refuse A unless signs r of the states exist with r_i r_j A_ij(-t) = -A_ij(t)."""
-        n, times = len(self.states), edges[-1] * (0.013 + 0.97 * TRIED)
+        times = edges[-1] * (0.013 + 0.97 * TRIED)
         there, back = (
             np.array([self._at(programs, point, edges, t) for t in some]) for some in (times, edges[-1] - times)
         )
         odd, even = (abs(back + sign * there).max(axis=0) <= SAME * size for sign in (1, -1))
-        signs = np.zeros(n)
-        for first in range(n):
-            waiting = [first] if not signs[first] else []
-            signs[first] = signs[first] or 1.0
-            while waiting:
-                i = waiting.pop()
-                for j in range(n):
-                    for same, other in ((odd[i, j], even[i, j]), (odd[j, i], even[j, i])):
-                        wanted = None if same and other else signs[i] if same else -signs[i] if other else np.nan
-                        if wanted is None:
-                            continue
-                        if not signs[j]:
-                            signs[j] = wanted
-                            waiting.append(j)
-                        if signs[j] != wanted:
-                            self._refuse(
-                                "STRUCTURE = 'reversible', but no signs R give R A(-t) R = -A(t) at "
-                                f"{self._where(point)}",
-                                "move t = 0 to a centre of symmetry, or set STRUCTURE = 'none'",
-                            )
+        if alike_or_opposite(odd, even) is None:
+            self._refuse(
+                f"STRUCTURE = 'reversible', but no signs R give R A(-t) R = -A(t) at {self._where(point)}",
+                "move t = 0 to a centre of symmetry, or set STRUCTURE = 'none'",
+            )
 
     def _at(self, programs, point, edges, t):
         k = min(int(np.searchsorted(edges, t, side="right")) - 1, len(programs) - 1)
@@ -295,5 +281,5 @@ def _effort(points):
     if not valid.size:
         return {}
     steps = points.steps(reach, np.ones(valid.size), valid).sum(axis=1).mean()
-    series = [len(program.used) for _own, programs, _numbers in points.groups for program in programs]
+    series = [len(program.used) for group in points.groups for program in group.programs]
     return {"series": float(np.mean(series)), "steps": float(steps)}

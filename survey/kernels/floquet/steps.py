@@ -33,9 +33,10 @@ def factors(
     """Fill F (tasks, n, n), bounds `error` (tasks) of its rows' errors and `doubt` (tasks) of their relative size.
 
     Task k is the step of `point[k]` from middle[k] - half[k] to middle[k] + half[k]. numbers (N, count), scale (N, n):
-    A_ij is taken times scale_j / scale_i, powers of 2.
+    A_ij is taken times scale_j / scale_i, powers of 2. If there is room for twice as many, the propagators F^-1 of the
+    steps backwards follow.
     """
-    lanes = lanes_of(n)
+    lanes, ways = lanes_of(n), 2 if len(F) > len(point) else 1
     places = len(operations)
     S, X = np.zeros((places, ORDER + 1, lanes)), np.empty((ORDER + 1, n, n * lanes))
     B, C = np.zeros((places, ORDER + 1, n * lanes)), np.zeros((places, n, n * lanes))
@@ -71,16 +72,23 @@ def factors(
                 next_term(S, W, terms, used, needed, k, n, s, B, C, X)
                 _row_norms(X[k + 1], lanes, rows[0], w[k + 1])
                 _rounded(a, w, e, own, s, k, most)
-        _halves(X, even, odd)
         _missing(a, w, e, s, total, of_both, of_odd)
-        _over(even, odd, of_both, of_odd, work, found)
-        for lane in range(min(lanes, len(point) - start)):
-            step = F[start + lane]
-            for i in range(n):
-                for j in range(n):
-                    step[i, j] = odd[i, j * lanes + lane] + (1.0 if i == j else 0.0)
-            error[start + lane] = found[lane]
-            doubt[start + lane] = found[lane] * total[lane] * total[lane]
+        for way in range(ways):
+            _halves(X, even, odd)
+            if way > 0:  # U(1) and U(-1) change places
+                for i in range(n):
+                    one = odd[i]
+                    for q in range(n * lanes):
+                        one[q] = -one[q]
+            _over(even, odd, of_both, of_odd, work, found)
+            first = start + way * len(point)
+            for lane in range(min(lanes, len(point) - start)):
+                step = F[first + lane]
+                for i in range(n):
+                    for j in range(n):
+                        step[i, j] = odd[i, j * lanes + lane] + (1.0 if i == j else 0.0)
+                error[first + lane] = found[lane]
+                doubt[first + lane] = found[lane] * total[lane] * total[lane]
 
 
 @kernel

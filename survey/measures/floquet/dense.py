@@ -317,7 +317,7 @@ def at_points(system, structure, points):
     if not system.smooth(points[0]):
         return None
     with np.errstate(all="ignore"):
-        own = monodromy.Points(system, points)
+        own = monodromy.Points(system, points, halves=True)
         if not _is_analytic(own):
             return None
         every, n, paired = np.arange(len(points)), system.n, structure != "none"
@@ -339,7 +339,9 @@ def is_analytic(system, points):
 
 
 def _is_analytic(own):
-    return own.valid.all() and len(own.groups) == 1 and all(p.analytic for p in own.groups[0][1])
+    programs = own.groups[0].programs if own.groups else ()
+    same = all(group.programs is programs for group in own.groups)
+    return own.valid.all() and same and all(p.analytic for p in programs)
 
 
 def coefficients(M, E, scale, structure, steps_of=None):

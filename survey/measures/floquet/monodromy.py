@@ -2,7 +2,8 @@
 
 The period is cut at the breaks, and each piece into steps of equal length: as many as the norm of A, in units of
 the states that balance it, and the rate at which A varies ask for; points whose bounds miss the accuracy climb a
-ladder of more steps, and have their errors carried sharply (`stability`).
+ladder of more steps, and have their errors carried sharply (`stability`). Of a piece that a symmetry in t makes up of
+equal parts, the steps of the first alone are computed (`halves`).
 """
 
 from dataclasses import dataclass, fields
@@ -15,6 +16,7 @@ from survey.kernels import jit
 from survey.kernels.floquet import sizes, steps
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.measures.floquet import probing
+from survey.measures.floquet.halves import Images
 
 # Times at which A is looked at, as shares of a piece.
 TIMES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(12) + 0.5) / 12)
@@ -28,15 +30,27 @@ CALL_WORK = 4_000_000  # keeps a kernel call below about a second: steps n^2
 MOST_STEPS = 100_000  # of a point
 
 
+@dataclass(frozen=True)
+class Group:
+    """Points with the same recorded operations and symmetries: their numbers among all, of each piece the program,
+    the values of its numbers there, and its Images.
+    """
+
+    own: np.ndarray
+    programs: list
+    numbers: list
+    images: list
+
+
 class Points:
     """Points of a System as a method's steps need them: sizes, noise, and the units that balance A.
 
-    `growth` (2, N): the integral of A's trace over the period, the logarithm of det M, and its error bound; infinite
-    where the trace depends on t.
+    `halves`: is no more integrated than symmetries of A ask for? `growth` (2, N): the integral of A's trace over the
+    period, the logarithm of det M, and its error bound; infinite where the trace depends on t.
     """
 
-    def __init__(self, system, points):
-        self.system, self.n, self.points = system, system.n, points
+    def __init__(self, system, points, halves=False):
+        self.system, self.n, self.points, self.halves = system, system.n, points, halves
         self.period, edges = system.ranges(points)
         valid = np.isfinite(points).all(axis=1) & np.isfinite(edges).all(axis=1)
         self.rough = valid.copy()
@@ -48,20 +62,38 @@ class Points:
         self.groups = []
         where = np.flatnonzero(valid)
         for inside, programs in system.traced(points[where], edges[where]):
-            self._measure(where[inside], programs)
+            for own, found in self._alike(where[inside], programs):
+                self._measure(own, programs, found)
         self.valid = valid & np.isfinite(self.size).all(axis=1) & ~self.rough
 
-    def _measure(self, own, programs):
+    def _alike(self, own, programs):
+        """[(those of the points `own` with the same symmetries, of each piece (values and error bounds of its numbers,
+        Images, late: see `halves.Waves`))]."""
+        found = [(own, [])]
+        for k, program in enumerate(programs):
+            before, found = found, []
+            for some, pieces in before:
+                numbers = program.numbers(self.points[some])
+                ends = self.edges[some, k], self.edges[some, k + 1]
+                kinds = program.waves.found(self.n, numbers, *ends) if self.halves else [(slice(None), Images(), None)]
+                for those, images, late in kinds:
+                    here = *(values[those] for values in numbers), images, late
+                    found.append((some[those], [*(_of_those(piece, those) for piece in pieces), here]))
+        return found
+
+    def _measure(self, own, programs, given):
         """Norm and noise of A on each piece of the points `own`, and the units of their states."""
         self.rough[own] = False
-        points, n, N = self.points[own], self.n, len(own)
+        n, N = self.n, len(own)
         largest, scale, sampled = np.zeros((N, n, n)), np.empty((N, n)), []
-        for k, program in enumerate(programs):
+        for k, (program, (*numbers, images, late)) in enumerate(zip(programs, given, strict=True)):
             edges = self.edges[own[:1]] if self.system.same_ranges else self.edges[own]
             t = edges[:, k, None] + (edges[:, k + 1] - edges[:, k])[:, None] * TIMES
-            numbers, A, E = program.numbers(points), np.empty((N, TIMES.size, n, n)), np.empty((N, n, n))
+            A, E = np.empty((N, TIMES.size, n, n)), np.empty((N, n, n))
             self._add_trace(own, program.trace(numbers), self.edges[own, k + 1] - self.edges[own, k])
-            sizes.samples(*program.sampled(numbers, t), *numbers, A, E, largest)
+            terms, values, errors = program.sampled(numbers, t, late)
+            errors[:, :, TIMES * images.parts > 1.0] = 0.0  # only what is integrated rounds
+            sizes.samples(terms, values, errors, *numbers, A, E, largest)
             sampled.append((numbers, A, E))
         sizes.balance(largest, scale)
         for k, (numbers, A, E) in enumerate(sampled):
@@ -74,7 +106,7 @@ class Points:
             self.size[own, k] = np.where(np.isnan(rate), np.nan, size)
             self.noise[own, k] = noise
         self.scale[own] = scale
-        self.groups.append((own, programs, [numbers[0] for numbers, _A, _E in sampled]))
+        self.groups.append(Group(own, programs, [values for values, *_ in given], [piece[2] for piece in given]))
 
     def _add_trace(self, own, trace, length):
         value, bar = (0.0, np.inf) if trace is None else trace
@@ -90,6 +122,14 @@ class Points:
             least = 0.5 * length / reach * (self.size[those] + BY_RATE * self.rate[those])
             count = np.ceil(factor[:, None] * np.maximum(np.ceil(least), 1.0))  # more on every rung
         return np.where(length > 0, np.clip(np.nan_to_num(count, nan=1.0), 1, MOST_STEPS), 0).astype(np.int64)
+
+
+def _of_those(piece, those):
+    """A piece of `Points._alike`, of some of its points."""
+    values, errors, images, late = piece
+    # what is the same for all points has one row
+    late = late and {place: bars if len(bars) == 1 else bars[those] for place, bars in late.items()}
+    return values[those], errors[those], images, late
 
 
 def balanced(matrices):
@@ -152,51 +192,58 @@ def solve(points, method, rtol, factor, those, sharp):
     n = points.n
     count = points.steps(method.floquet_reach(rtol), factor, those)
     found = Matrices.empty(len(those), n)
-    group = np.full(len(points.points), -1)
-    for g, (own, _programs, _numbers) in enumerate(points.groups):
-        group[own] = g
-    for g, (own, programs, numbers) in enumerate(points.groups):
-        mine = np.flatnonzero(group[those] == g)
+    number = np.full(len(points.points), -1)
+    for g, group in enumerate(points.groups):
+        number[group.own] = g
+    for g, group in enumerate(points.groups):
+        mine = np.flatnonzero(number[those] == g)
         place = np.empty(len(points.points), dtype=np.int64)
-        place[own] = np.arange(len(own))
+        place[group.own] = np.arange(len(group.own))
         work = np.cumsum(count[mine].sum(axis=1)) * n * n
         cuts = np.searchsorted(work, np.arange(CALL_WORK, work[-1], CALL_WORK)) if work.size else []
         for some in np.split(mine, cuts):
             if some.size:
-                given = programs, numbers, count[some], sharp if isinstance(sharp, bool) else partial(sharp, some)
+                given = group, count[some], sharp if isinstance(sharp, bool) else partial(sharp, some)
                 found[some] = _call(points, method, those[some], place[those[some]], *given)
     return found
 
 
-def _call(points, method, those, place, programs, numbers, count, sharp):
-    n, total = points.n, count.sum(axis=1)
-    first = np.concatenate([[0], np.cumsum(total)])
+def _call(points, method, those, place, group, count, sharp):
+    n, parts = points.n, np.array([images.parts for images in group.images])
+    count = -(-count // parts)  # of the first parts
+    first = np.concatenate([[0], np.cumsum((count * parts).sum(axis=1))])
     F, error, doubt = np.empty((first[-1], n, n)), np.empty(first[-1]), np.empty(first[-1])
     offset = first[:-1].copy()
     scale = np.ascontiguousarray(points.scale[those])
-    for k, program in enumerate(programs):
+    for k, (program, values, images) in enumerate(zip(group.programs, group.numbers, group.images, strict=True)):
         steps_of = count[:, k]
         point = np.repeat(np.arange(len(those)), steps_of)
         if not point.size:
             continue
         index = np.arange(point.size) - np.repeat(np.cumsum(steps_of) - steps_of, steps_of)
         low, high = points.edges[those, k], points.edges[those, k + 1]
+        late = points.edges[those, -1]
+        if parts[k] > 1:
+            late = high = low + (high - low) / parts[k]
         start, end = (_ends(low, high, steps_of, point, index + shift) for shift in (0, 1))
         middle, half = 0.5 * (start + end), 0.5 * (end - start)
         # all is exact but the first and the last step of the piece, which meet others within their rounding
-        share = points.edges[those, -1] / np.where(high > low, high - low, 1.0)
+        share = late / np.where(high > low, high - low, 1.0)
         noise = points.noise[those, k] + 4 * ROUNDOFF_UP * points.size[those, k] * share
-        found = np.empty((point.size, n, n)), np.empty(point.size), np.empty(point.size)
+        ways = 1 if images.reversal is None else 2
+        found = np.empty((ways * point.size, n, n)), np.empty(ways * point.size), np.empty(ways * point.size)
         if jit.other_compiler:
             steps.compile_some()
             jit.wait_for_other_compiler()
         method.floquet_factors(
             program.operations, program.signs, program.inside, program.order, program.used, program.terms,
-            np.ascontiguousarray(numbers[k][place]), scale, noise, n, point, middle, half, *found,
+            np.ascontiguousarray(values[place]), scale, noise, n, point, middle, half, *found,
         )  # fmt: skip
         where = np.repeat(offset, steps_of) + index
+        where = where if ways == 1 else np.concatenate([where, where + np.repeat(steps_of, steps_of)])
         F[where], error[where], doubt[where] = found
-        offset += steps_of
+        images.complete(F, error, doubt, offset, steps_of)
+        offset += steps_of * parts[k]
     jit.wait_for_other_compiler()
     found = Matrices.empty(len(those), n)
     steps.products(F, error, doubt, first, n, found.M, found.E, found.R)

@@ -55,9 +55,9 @@ def _leading(points):
 def _sampled(points, n):
     """A at the nodes of all steps of a period (steps, 9, n, n), bounds of its rounding, and the steps' lengths."""
     found = []
-    for own, programs, _numbers in points.groups:
-        for k, program in enumerate(programs):
-            low, high = points.edges[own[0], k : k + 2]
+    for group in points.groups:
+        for k, program in enumerate(group.programs):
+            low, high = points.edges[group.own[0], k : k + 2]
             count = int(np.clip(points.size[0, k] * (high - low) / (2 * REACH), LEAST, MOST)) if high > low else 0
             if not count:
                 continue

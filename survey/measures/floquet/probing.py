@@ -82,9 +82,10 @@ def combined(few, *given):
 def spikes(points):
     """Where far more samples show a spike than those of a run (N; NaN: nowhere), of `monodromy.Points`."""
     found = np.full(len(points.points), np.nan)
-    for own, programs, _numbers in points.groups:
+    for group in points.groups:
+        own = group.own
         scale = points.scale[own]
-        for piece, program in enumerate(programs):
+        for piece, program in enumerate(group.programs):
             given = program.numbers(points.points[own]), *(points.edges[own, k, None] for k in (piece, piece + 1))
             one, fine = (rates(program, *given, scale, number) for number in (NUMBER, CHECKED))
             t = given[1] + (given[2] - given[1]) * (np.arange(CHECKED) + 0.5) / CHECKED

@@ -164,7 +164,8 @@ def judged(system, points, matrices):
 
 def _solve_some(system, structure, given, method, rtol, wanted, places, answer, results):
     """Answer points (N, parameters), each from its own monodromy matrix, at their `places`."""
-    points = monodromy.Points(system, given)
+    # another method is asked to answer a second way: without what symmetries tell
+    points = monodromy.Points(system, given, halves=method is monodromy.method_of("auto"))
     where = np.flatnonzero(points.valid)
     asked = wanted | ({"multiplier_re"} if wanted & {"multiplier_im", "krein"} else set())
     asked |= {"spectral_radius"} if "exponent" in wanted else set()

@@ -16,6 +16,7 @@ Numbers in the code are taken as exact binary64 numbers. With every value goes a
 import builtins
 import math
 import operator
+from functools import cached_property
 from types import CellType, CodeType, FunctionType, ModuleType
 
 import numpy as np
@@ -23,6 +24,7 @@ import numpy as np
 from survey.kernels.floquet import program as pg
 from survey.kernels.jit import fresh
 from survey.kernels.math.roundoff import ROUNDOFF_UP
+from survey.measures.floquet.halves import Waves
 
 HIGHEST = 64  # the largest exponent that is multiplied out
 MOST = 4000  # numbers, or basis functions
@@ -521,7 +523,7 @@ class Program:
                 last = len(inside)
             elif operands:
                 a, b, sign = operands
-                if self._is_line(a):
+                if self.is_line(a):
                     code += pg.OF_LINE
             rows.append((code, a, b, first, last))
             weights.append(sign)
@@ -535,7 +537,12 @@ class Program:
         """Is A analytic in the parameters too, as no branch depends on them?"""
         return all(self._decided(s) for s, _yes in (*self.graph.guards, *self.graph.equalities))
 
-    def _is_line(self, place):
+    @cached_property
+    def waves(self):
+        """What tells the symmetries of A in t."""
+        return Waves(self)
+
+    def is_line(self, place):
         """Is the basis function linear in t?"""
         operation, *operands = self.graph.series[place]
         return place == TIME or (operation == "combination" and all(b in (ONE, TIME) for b, _c in operands[0]))
@@ -604,15 +611,16 @@ class Program:
                 values[:, k], errors[:, k] = v, e
         return values, errors
 
-    def series(self, numbers, t, places, states=None):
+    def series(self, numbers, t, places, states=None, late=None):
         """{place: (values, error bounds)} (N or 1, m) of these basis functions at times t (N or 1, m).
 
-        `states` are values and error bounds (n, N, m) of the states, to first order in their errors.
+        `states` are values and error bounds (n, N, m) of the states, to first order in their errors; `late`, of waves
+        {place: (N or 1, 1)}, bounds of further errors of their phases.
         The bounds hold for the kernels, whose functions are those of the C library, rounded to 1 or 2 ulp.
         """
         values, errors = numbers
         u, found = ROUNDOFF_UP, {}
-        needed = self._needed(places)
+        needed = self.needed(places)
         with np.errstate(all="ignore"):
             for k in needed:
                 operation, *o = self.graph.series[k]
@@ -642,13 +650,15 @@ class Program:
                     e = (dx + abs(v) * dy) / abs(y) + u * abs(v)
                 else:
                     x, dx = found[o[0]]
+                    if late and k in late:
+                        dx = dx + late[k]
                     function, slope = FUNCTIONS[operation]
                     v = function(x)
                     e = abs(slope(x)) * dx + 0.5 * dx * dx + (2 if operation in ACCURATE else 6) * u * abs(v)
                 found[k] = v, e
         return {k: found[k] for k in places}
 
-    def _needed(self, places):
+    def needed(self, places):
         """Places of what these basis functions are made of, in order."""
         found, begun = [], set()
 
@@ -699,11 +709,11 @@ class Program:
         rounding = len(diagonal) * ROUNDOFF_UP * abs(own).sum(axis=1)
         return own.sum(axis=1), errors[:, diagonal[:, pg.NUMBER]].sum(axis=1) + rounding
 
-    def sampled(self, numbers, t):
+    def sampled(self, numbers, t, late=None):
         """(terms, values, error bounds): the terms with their basis functions numbered from 0, and these functions
-        (B, N, m) at times t (N, m); where they depend on t alone t may be (1, m), and N is 1.
+        (B, N, m) at times t (N, m); where they depend on t alone t may be (1, m), and N is 1. `late` as in `series`.
         """
-        found = self.series(numbers, t, self.used)
+        found = self.series(numbers, t, self.used, late=late)
         wide = max((len(values) for values, _bars in found.values()), default=1)
         out = np.empty((2, len(self.used), wide, t.shape[1]))
         for k, place in enumerate(self.used):
