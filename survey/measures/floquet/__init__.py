@@ -17,7 +17,8 @@ METHODS = {
             "fill F (tasks, n, n), bounds `error` (tasks) of the sums of its errors in a row and `doubt` (tasks), how "
             "large these are relative to F; task k is the step of length 2 half[k] about middle[k] of point point[k]. "
             "The first six say how A is computed from numbers (N, count), see `kernels.floquet.program`; A_ij is taken "
-            "times scale_j / scale_i, from scale (N, n), and `noise` (N) bounds the rounding of its rows",
+            "times scale_j / scale_i, from scale (N, n), and `noise` (N) bounds the rounding of its rows. The default "
+            "method is also asked for those of the steps backwards, which follow: then F has room for twice as many",
             ("operations", "signs", "inside", "order", "used", "terms", "numbers", "scale", "noise", "n", "point",
              "middle", "half", "F", "error", "doubt"),
         ),

@@ -81,6 +81,18 @@ def test_what_follows_from_a_part_agrees_with_the_whole_period_and_has_no_wider_
     assert np.median(part.E.max(axis=(1, 2)) / whole.E.max(axis=(1, 2))) < 1.05
 
 
+def test_what_a_phase_lacks_to_a_multiple_of_pi_counts_as_an_error_of_A():
+    A = oscillators(lambda t, p: math.cos(t))
+    near, exact = (points_of(A, period, p=(0.9, 0.0)) for period in (T * (1 + 1.6e-15), T))
+    lacks = float(near.period[0]) - 2 * mpmath.mp.pi
+    assert parts(near) == [2] and near.noise[0, 0] - exact.noise[0, 0] > 0.9 * float(lacks)
+    part, whole = (
+        monodromy.solve(each, AUTO, 1e-14, np.ones(1), np.zeros(1, int), sharp=False)
+        for each in (near, monodromy.Points(near.system, near.points))
+    )
+    assert (abs(part.M - whole.M) <= part.E + whole.E).all()
+
+
 def test_points_without_damping_are_told_from_those_with_it():
     A = oscillators(lambda t, p: math.cos(t), 1.0)
     p = np.array([[0.3, 0.1], [0.3, 0.0], [0.2, 0.2], [0.4, 0.0]])
