@@ -37,8 +37,7 @@ def rotation(inertia, epsilon, rate):
     middle = over.sign() * other.sign() < 0.0
     # (6): the rotation about the least axis with epsilon < 0, or the largest with epsilon > 0, must be fast enough
     needs = place * e.value > 0.0
-    roots = (A2 * clipped(place * other)).sqrt() + (A3 * clipped(place * over)).sqrt()
-    least = Bounded(abs(e.value)).sqrt() * roots / A1
+    least = Bounded(abs(e.value)).sqrt() * roots(A1, A2, A3, place) / A1
     beyond = (bounded.of(abs(np.asarray(rate, dtype=float))) - least).sign()
     free_top = (e.value == 0.0) & (square.value == 0.0)
     verdict = np.where(middle, np.where(kappa.sign() != 0.0, UNSTABLE, UNDECIDED), UNDECIDED)
@@ -58,6 +57,11 @@ def rotation(inertia, epsilon, rate):
         "frequency_slow": slow,
         "frequency_fast": fast,
     }
+
+
+def roots(A1, A2, A3, side):
+    """sqrt(s A2 (A1 - A3)) + sqrt(s A3 (A1 - A2)) of (7), s the `side`."""
+    return (A2 * clipped(side * (A1 - A3))).sqrt() + (A3 * clipped(side * (A1 - A2))).sqrt()
 
 
 def clipped(number):

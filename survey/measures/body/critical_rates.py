@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from survey.measures import bounded
-from survey.measures.bounded import Bounded
+from survey.measures.body import clebsch
 
 RATE, EQUAL = "critical_rate", "equal_moments"  # it is too slow, or its moment becomes the middle one
 MOMENTS = ("A", "B", "C")
@@ -31,7 +31,7 @@ def along(name, low, high, fixed, axis):
     side = _side(A1, A2, A3)
     if side == 0:
         return [], True if (A1 - A2) * (A1 - A3) < 0.0 else None
-    roots = _roots(A1, A2, A3, side)
+    roots = clebsch.roots(*map(bounded.of, (A1, A2, A3)), side)
     if name == "epsilon":
         turn = bounded.of(A1) * fixed["Omega"] / roots
         return [(RATE, side * float((turn * turn).value), float((turn * turn).bar))], True
@@ -77,20 +77,9 @@ def _side(A1, A2, A3):
     return float(np.sign(A1 - A2)) if np.sign(A1 - A2) == np.sign(A1 - A3) else 0.0
 
 
-def _roots(A1, A2, A3, side):
-    """sqrt(A2 |A1 - A3|) + sqrt(A3 |A1 - A2|)."""
-    A1, A2, A3 = (bounded.of(A) for A in (A1, A2, A3))
-    two, three = (_positive(side * (A1 - A)) for A in (A2, A3))
-    return (A2 * three).sqrt() + (A3 * two).sqrt()
-
-
-def _positive(number):
-    return Bounded(np.maximum(number.value, 0.0), number.bar)
-
-
 def _excess(A1, A2, A3, side, fixed):
     """Q (Bounded): positive where the rotation is fast enough."""
-    roots, turn = _roots(A1, A2, A3, side), bounded.of(A1) * fixed["Omega"]
+    roots, turn = clebsch.roots(*map(bounded.of, (A1, A2, A3)), side), bounded.of(A1) * fixed["Omega"]
     return turn * turn - side * fixed["epsilon"] * (roots * roots)
 
 

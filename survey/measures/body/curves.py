@@ -21,7 +21,7 @@ from survey.measures.sampled import joined
 
 CLASSES = {"critical_rate": 0, "equal_moments": 1, "critical_motion": 2}
 TITLE = "where the rotation becomes stable (at its critical rate, or as two moments are equal), or the critical motion"
-MOMENTS = ("A", "B", "C")
+MOMENTS = critical_rates.MOMENTS
 AXES = {"rotation": (*MOMENTS, "epsilon", "Omega"), "critical": (*MOMENTS, "epsilon", "sigma", "p_psi")}
 ALONG = ()
 LINES = 129
@@ -103,8 +103,7 @@ def motion(inertia, here):
 
 def _excess(inertia, side, here):
     A1, A2, A3 = inertia
-    roots = [(B * clebsch.clipped(side * (A1 - C))).sqrt() for B, C in ((A2, A3), (A3, A2))]
-    sine, omega = (roots[0] + roots[1]) / A1, bounded.of(here["Omega"])
+    sine, omega = clebsch.roots(A1, A2, A3, side) / A1, bounded.of(here["Omega"])
     return omega * omega - side * bounded.of(here["epsilon"]) * (sine * sine)
 
 
