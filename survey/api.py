@@ -1,5 +1,6 @@
 """What users call from Python: run, evaluate, open, scenes."""
 
+import functools
 import inspect
 import os
 from collections.abc import Hashable, Iterable, Mapping
@@ -26,8 +27,6 @@ from survey.scene import Option, Output, Parameter, Request, condition, exists
 from survey.sweep import announce, engine, solve
 from survey.sweep.progress import Progress, watched
 from survey.wording import counted, short, shown
-
-NUMBER = xr.DataArray(0.0)  # to copy one takes less time than to make it
 
 
 def run(
@@ -206,6 +205,12 @@ def _as_list(variables: Any) -> list[Any]:
         return [variables]
 
 
+@functools.cache
+def _a_number() -> xr.DataArray:
+    """A DataArray of one number: to copy it takes less time than to make another."""
+    return xr.DataArray(0.0)  # not where this module is loaded: xarray imports dask.array here, 0.3 s
+
+
 def _labelled(key: str, value: Any) -> xr.DataArray:
     """The parameter as a float64 DataArray."""
     given = value
@@ -220,7 +225,7 @@ def _labelled(key: str, value: Any) -> xr.DataArray:
     if array.size == 0:
         raise BadInput(f"{short(key, 40)}: an empty array has no points; give at least one value")
     if unnamed and array.ndim == 0 and isinstance(array, np.ndarray):
-        return NUMBER.copy(data=np.array(array, dtype=float))
+        return _a_number().copy(data=np.array(array, dtype=float))
     if unnamed:
         value = xr.DataArray(array, dims=(key,) if array.ndim else ())
     return value.astype(float) if _is_lazy(value) else value.copy(data=np.array(value.values, dtype=float))

@@ -14,6 +14,10 @@ def test_importing_survey_loads_nothing_heavy():
     assert not {"numba", "numpy", "xarray", "dask", "matplotlib", "netCDF4"} & set(loaded_by("import survey"))
 
 
+def test_nothing_that_a_first_point_alone_needs_is_loaded_before():
+    assert not {"dask.array", "scipy.special", "matplotlib"} & set(loaded_by("import survey; survey.evaluate"))
+
+
 def test_importing_a_scene_compiles_nothing():
     code = (
         "import gc, survey.scenes.satellite, survey.scenes.gyrostat; from numba.core.dispatcher import Dispatcher; "
