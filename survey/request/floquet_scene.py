@@ -48,8 +48,9 @@ class FloquetScene(TracedScene):
 
     @property
     def OUTPUTS(self):
-        """The outputs; Krein signs where the system is symplectic."""
-        return tuple(o for o in stability.OUTPUTS if o.name != "krein" or self.structure == "symplectic")
+        """The outputs; Krein signs and indices where the system is symplectic."""
+        symplectic = self.structure == "symplectic"
+        return tuple(o for o in stability.OUTPUTS if symplectic or o.name not in stability.SYMPLECTIC)
 
     @property
     def DIMENSIONS(self):

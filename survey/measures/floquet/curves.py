@@ -7,7 +7,7 @@ function itself that are certain within the error bounds of M, and curves are fo
 map, into the tips of tongues (see `tips`). A tongue that is narrower everywhere than the distance of two of the dense
 lines may be missed, and one that the splines do not show. Curves are drawn wherever a multiplier passes, also
 where another one is outside the circle already: `outside` counts those. `row_count` tells where they do not explain
-how many multipliers are outside.
+how many multipliers are outside, or, by the Maslov index, how often some have passed 1 or -1.
 """
 
 from functools import partial
@@ -19,7 +19,8 @@ from scipy.interpolate import CubicSpline, RectBivariateSpline
 from scipy.ndimage import binary_erosion
 
 from survey.measures import contours
-from survey.measures.floquet import bifurcations, row_count, tips
+from survey.measures.floquet import bifurcations, narrow, row_count, tips
+from survey.measures.floquet.multipliers import MINUS_ONE, PLUS_ONE
 from survey.measures.floquet.stability import CROSSINGS
 from survey.measures.hill.edges import close_in
 from survey.measures.sampled import FLAT, LONGEST, joined
@@ -58,7 +59,15 @@ def searched(scene, square, axes, fixed, options):
         return joined(scene.curves(square, axes, fixed), [output.name for output in ALONG])
 
     matrices = matrices_of(scene, square, axes, fixed, options)
-    found, on_lattice = [], matrices(contours.lattice(LINES, square.across), ROUGH)
+    lattice, found = contours.lattice(LINES, square.across), []
+    on_lattice = matrices(lattice, ROUGH)
+
+    def draw(kind, x, error):
+        sure, angle, bar, outside = bifurcations.passing(*matrices(x), kind, scene.structure)
+        for part in contours.runs(sure):
+            known = {"angle": (angle[part], bar[part]), "outside": (outside[part], 0.0 * bar[part])}
+            found.append((kind, square.parameters(x[part]), error[part], known))
+
     for kind, function in bifurcations.functions(on_lattice[0].shape[1], scene.structure).items():
         values, bars = function(*on_lattice)
         # where no sign is certain all around, as where the function is 0 throughout, there is only noise
@@ -71,33 +80,58 @@ def searched(scene, square, axes, fixed, options):
 
         lines = _lines if square.across is None else partial(_crossings, across=square.across)
         for x, error in lines(on_map, square.grain, values.reshape(open_.shape)):
-            sure, angle, bar, outside = bifurcations.passing(*matrices(x), kind, scene.structure)
-            for part in contours.runs(sure):
-                known = {"angle": (angle[part], bar[part]), "outside": (outside[part], 0.0 * bar[part])}
-                found.append((kind, square.parameters(x[part]), error[part], known))
+            draw(kind, x, error)
+    unexplained = None
+    if square.across is None:
+        drawn = [(kind, square.positions(parameters)) for kind, parameters, _error, _known in found]
+        indices = _indices_of(scene, square, axes, fixed, options)
+        passed = {kind: values.reshape(LINES, LINES) for kind, values in indices(lattice).items()}
+        for kind, values in passed.items():
+            for x, error in narrow.curves(lambda x, kind=kind: indices(x)[kind], values, kind, drawn):
+                draw(kind, x, error + square.grain)
+                drawn.append((kind, x))
+        counts = row_count.outside(*on_lattice, scene.structure).reshape(LINES, LINES)
+        unexplained = row_count.unexplained(counts, drawn, passed)[0]
     curves = joined(found, [output.name for output in ALONG])
-    if square.across is not None:
-        return curves
-    counts = row_count.outside(*on_lattice, scene.structure).reshape(LINES, LINES)
-    drawn = [(kind, square.positions(parameters)) for kind, parameters, _error, _known in found]
-    curves.unexplained = row_count.unexplained(counts, drawn)[0]
+    curves.unexplained = unexplained
     return curves
+
+
+def _indices_of(scene, square, axes, fixed, options):
+    """indices(positions (N, 2)) -> {kind: values (N)}, the Maslov indices; of systems that are not symplectic, {}."""
+    names = {} if scene.structure != "symplectic" else {PLUS_ONE: "index_plus_one", MINUS_ONE: "index_minus_one"}
+    solved = _solved(scene, square, axes, fixed, options, "auto", ["monodromy", *names.values()])
+
+    def indices(x):
+        out = solved(x, ROUGH) if names else {}
+        return {kind: out[name] for kind, name in names.items()}
+
+    return indices
 
 
 def matrices_of(scene, square, axes, fixed, options, method="auto"):
     """matrices(positions (N, axes), rtol) -> (M, E), the monodromy matrices without what is conserved."""
+    solved = _solved(scene, square, axes, fixed, options, method, ["monodromy"])
 
     def matrices(x, rtol=RTOL):
-        values = square.parameters(x)
-        point = fixed | {name: values[:, k] for k, name in enumerate(axes)}
-        request = Request(options, method, rtol, frozenset(["monodromy"]))
-        with np.errstate(all="ignore"):
-            out = scene.solve(point, request)
+        out = solved(x, rtol)
         found = out["monodromy"], out["monodromy_error"]
         # a system of one's own may have a conserved quantity
-        return scene.judged(values, axes, fixed, *found) if hasattr(scene, "judged") else found
+        return scene.judged(square.parameters(x), axes, fixed, *found) if hasattr(scene, "judged") else found
 
     return matrices
+
+
+def _solved(scene, square, axes, fixed, options, method, variables):
+    """solved(positions (N, axes), rtol) -> {name: values}, these variables of the scene."""
+
+    def solved(x, rtol):
+        values = square.parameters(x)
+        point = fixed | {name: values[:, k] for k, name in enumerate(axes)}
+        with np.errstate(all="ignore"):
+            return scene.solve(point, Request(options, method, rtol, frozenset(variables)))
+
+    return solved
 
 
 def _lines(function, grain, values):

@@ -30,7 +30,7 @@ _of_floquet = {o.name: o for o in stability.OUTPUTS}
 OUTPUTS = (
     Output("x0", "state of the periodic orbit at t = 0", "x_0", dims=("state",)),
     replace(_of_floquet["period"], long_name="period of the orbit"),
-    *(o for o in stability.OUTPUTS if o.name not in ("period", "krein")),
+    *(o for o in stability.OUTPUTS if o.name not in {"period", *stability.SYMPLECTIC}),
 )
 
 NUMBER = Output("orbits", "number of periodic orbits that are found and shown to exist", integer=True)

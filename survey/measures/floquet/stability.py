@@ -12,7 +12,7 @@ import numpy as np
 from survey import status
 from survey.kernels.math.roundoff import EPS
 from survey.measures import answers
-from survey.measures.floquet import dense, monodromy, multipliers
+from survey.measures.floquet import dense, maslov, monodromy, multipliers
 from survey.measures.floquet.answers import Answers
 from survey.measures.floquet.existence import deflated
 from survey.measures.floquet.multipliers import (
@@ -49,7 +49,9 @@ OUTPUTS = (
            dims=("multiplier",)),
     Output("crossing", "where multipliers leave, or have left, the unit circle first", flags=CROSSINGS),
     Output("verdict", "stability of the linear motion", flags=VERDICTS),
+    *maslov.OUTPUTS,
 )  # fmt: skip
+SYMPLECTIC = frozenset(["krein", *(o.name for o in maslov.OUTPUTS)])  # outputs of symplectic systems alone
 # Factors of the number of steps; from the second on, errors are carried sharply.
 LADDER = answers.Ladder(1.5 ** np.arange(16), np.arange(16) + 1, None, most=16)
 CHUNK = 65536  # points n^2 that are solved together: bounds the memory
@@ -131,6 +133,7 @@ def solve(system, structure, points, method, rtol, wanted, lines=None, ranges=No
     """
     n, shape = system.n, points.shape[:-1]
     flat = points.reshape(-1, points.shape[-1])
+    counted, wanted = [o.name for o in maslov.OUTPUTS if o.name in wanted], wanted - {o.name for o in maslov.OUTPUTS}
     answer, left = Answers(len(flat), system.judged), np.arange(len(flat))
     results = monodromy.Matrices.empty(len(flat) if "monodromy" in wanted else 0, n)
     period = system.periods(flat) if wanted & {"period", "exponent"} else None
@@ -149,6 +152,11 @@ def solve(system, structure, points, method, rtol, wanted, lines=None, ranges=No
         some = left[i : i + chunk]
         _solve_some(system, structure, flat[some], method, rtol, wanted, some, answer, results)
     out = outputs(answer, results, period, callable(system.period), wanted)
+    if counted:
+        parts = [maslov.indices(system, flat[i : i + chunk]) for i in range(0, max(len(flat), 1), chunk)]
+        indices = zip((o.name for o in maslov.OUTPUTS), np.concatenate(parts, axis=1), strict=True)
+        ok = answer.status == status.OK
+        out |= {name: np.where(ok, values, maslov.UNKNOWN) for name, values in indices if name in counted}
     return {name: values.reshape(*shape, *values.shape[1:]) for name, values in out.items()}
 
 

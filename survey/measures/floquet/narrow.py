@@ -1,0 +1,117 @@
+"""Curves of tongues that a lattice does not see, and of closed ones, from the Maslov index.
+
+On both sides of a tongue that is narrower than the cells of the lattice a function of `bifurcations` has the same sign,
+and no curve is found; but where its two edges count the same way, the index has changed by 2. Segments between points
+of the lattice along which curves do not explain how it changes are halved, by the index in between, until each of them
+is short. A closed tongue, or one that is narrower still, keeps both edges in one segment, and is drawn by two curves
+at the same place. Places on neighbouring lines of the lattice belong to one curve where the index takes the same step.
+"""
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from survey.measures.floquet import row_count
+from survey.measures.floquet.maslov import UNKNOWN
+
+SHARES = (0.5, 0.31, 0.69)  # of a segment: where it is cut, the first at which the index is known
+SHORT = 1e-9  # of the map: segments that are not cut any more
+SURE = 1e-6  # half the longest one that is drawn
+CUTS = 40
+ASIDE = 2.0  # cells: how far a curve may go from line to line
+
+
+@dataclass
+class _Segments:
+    """Parts, between `ends` (S, 2), of the lattice's lines `line` (S), at whose ends the index is `index` (S, 2)."""
+
+    line: np.ndarray
+    ends: np.ndarray
+    index: np.ndarray
+
+    def __getitem__(self, some):
+        return _Segments(self.line[some], self.ends[some], self.index[some])
+
+    def joined(self, others):
+        """These and the others."""
+        parts = ((getattr(one, name) for one in (self, *others)) for name in ("line", "ends", "index"))
+        return _Segments(*(np.concatenate(list(part)) for part in parts))
+
+    def cut(self, at, index):
+        """Those of both halves along which the index changes."""
+        halves = []
+        for side in (0, 1):
+            ends, values = self.ends.copy(), self.index.copy()
+            ends[:, 1 - side], values[:, 1 - side] = at, index
+            halves.append(_Segments(self.line, ends, values)[values[:, 0] != values[:, 1]])
+        return halves
+
+
+def curves(index, passed, kind, drawn):
+    """[(positions (m, 2), errors (m))] of curves of `kind` that are missing among those `drawn` [(kind, positions)].
+
+    `index(positions (N, 2))` is the index, and `passed` (n, n) its values on the lattice.
+    """
+    own, found = [one for one in drawn if one[0] == kind], []
+    lost = _unexplained(passed, own)
+    along = Counter(axis for axis, *_ in lost)
+    for axis, _number in along.most_common():
+        lines = passed if axis == 1 else passed.T
+        ticks = np.linspace(0.0, 1.0, len(lines))
+        where = np.array([segment[1:] for segment in (_unexplained(passed, own) if found else lost)
+                          if segment[0] == axis], int).reshape(-1, 3)  # fmt: skip
+        segments = _Segments(where[:, 0], ticks[where[:, 1:]], lines[where[:, :1], where[:, 1:]])
+        pieces = _linked(_shortened(index, segments, axis, ticks), axis, ticks)
+        found += pieces
+        own += [(kind, x) for x, _error in pieces]
+    return found
+
+
+def _unexplained(passed, own):
+    """The segments along which the index changes otherwise; the border's too, where no curve counts that ends there."""
+    return [segment for segment, explained in row_count.segments(passed, own, {}, border=0).items() if not explained]
+
+
+def _shortened(index, segments, axis, ticks):
+    """The segments, cut until they are short, or as far as the index is known in them."""
+    done = []
+    for _ in range(CUTS):
+        long = segments.ends[:, 1] - segments.ends[:, 0] > SHORT
+        done.append(segments[~long])
+        segments = segments[long]
+        if not segments.line.size:
+            break
+        at, value = np.empty(segments.line.size), np.full(segments.line.size, UNKNOWN)
+        for share in SHARES:
+            some = np.flatnonzero(value == UNKNOWN)
+            if some.size:
+                at[some] = segments.ends[some] @ [1.0 - share, share]
+                x = np.stack([at[some], ticks[segments.line[some]]], axis=1)
+                value[some] = index(x if axis == 0 else x[:, ::-1])
+        known = value != UNKNOWN
+        done.append(segments[~known])
+        near, far = segments[known].cut(at[known], value[known])
+        segments = near.joined([far])
+    return segments.joined(done)
+
+
+def _linked(segments, axis, ticks):
+    """[(positions (m, 2), errors (m))] of places on neighbouring lines at which the index takes the same step."""
+    middle, error = segments.ends.mean(axis=1), 0.5 * np.diff(segments.ends)[:, 0]
+    low, number = segments.index.min(axis=1), abs(np.diff(segments.index))[:, 0]
+    number[error > SURE] = 0
+    k = np.repeat(np.arange(len(number)), number)
+    step = low[k] + np.arange(k.size) - np.repeat(np.cumsum(number) - number, number)
+    line, middle, error = segments.line[k], middle[k], error[k]
+    pieces = []
+    for i in np.lexsort((middle, line)):
+        near = [piece for piece in pieces if line[piece[-1]] == line[i] - 1 and step[piece[-1]] == step[i]
+                and abs(middle[piece[-1]] - middle[i]) <= ASIDE * ticks[1]]  # fmt: skip
+        if near:
+            min(near, key=lambda piece: abs(middle[piece[-1]] - middle[i])).append(i)
+        else:
+            pieces.append([i])
+    pieces = [piece for piece in pieces if len(piece) > 1]
+    places = [np.stack([middle[piece], ticks[line[piece]]], axis=1) for piece in pieces]
+    return [(x if axis == 0 else x[:, ::-1].copy(), error[piece]) for x, piece in zip(places, pieces, strict=True)]
