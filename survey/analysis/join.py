@@ -96,12 +96,15 @@ def _part(given):
     return given
 
 
+def _plain(value):
+    return f"{value:g}" if isinstance(value, (float, np.floating)) else shown(value)
+
+
 def _check_alike(one, other):
     for key in SAME:
         if one.attrs.get(key) != other.attrs.get(key):
-            raise BadInput(
-                f"concat: the surveys have another {key}: {shown(one.attrs.get(key))} and {shown(other.attrs.get(key))}"
-            )
+            both = " and ".join(_plain(ds.attrs.get(key)) for ds in (one, other))
+            raise BadInput(f"concat: the surveys have another {key}: {both}")
     names = [set(ds.data_vars) for ds in (one, other)]
     if names[0] != names[1]:
         only = ", ".join(sorted(names[0] ^ names[1]))

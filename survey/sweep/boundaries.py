@@ -8,6 +8,7 @@ curves without the map's rows has `closed` or `searched`; of the others `edges` 
 follows them over the map, and `folds` finds where they turn back.
 """
 
+from functools import partial
 from itertools import pairwise, product
 from math import prod
 from types import SimpleNamespace
@@ -40,7 +41,7 @@ def find(workflow, each=in_turn, once=lambda name, make: make()):
         about = {"boundaries": workflow.boundaries}
         if len(workflow.grid.sizes) < 2:
             return xr.Dataset(_on_a_line(workflow, measure), attrs=about)
-        variables, unexplained = _closed(workflow, measure)
+        variables, unexplained = _closed(workflow, measure, each)
         return xr.Dataset(variables, attrs=about | ({"curves_unexplained": unexplained} if unexplained else {}))
     grid, axis = workflow.grid, workflow.boundaries
     other = [dim for dim in grid.sizes if dim != axis]
@@ -98,20 +99,17 @@ def _measure(workflow, question):
     return measures.question(workflow.scene.FAMILY, question)
 
 
-def _closed(workflow, measure):
+def _closed(workflow, measure, each):
     """The variables of curves found without rows, on one map, or on each map of the stack along further axes; and
     along how many segments of lines across these a curve is missing.
     """
     names, fixed = list(workflow.grid.sizes), fixed_of(workflow)
     square, third = square_of(workflow, *names[:2]), names[2:]
     planes = _planes(workflow, third)
-    if hasattr(measure, "searched"):
-        found = [
-            measure.searched(workflow.scene, square, names[:2], fixed | plane, workflow.request.options)
-            for plane in planes
-        ]
-    else:
-        found = [measure.closed(square, names[:2], fixed | plane, workflow.request.options) for plane in planes]
+    task = partial(measure.searched, workflow.scene) if hasattr(measure, "searched") else measure.closed
+    found = each(
+        lambda plane: task(square, names[:2], fixed | plane, workflow.request.options), planes, "maps of the curves"
+    )
     count, kind, flat, error = (
         np.concatenate([getattr(curves, name) for curves in found]) for name in ("count", "kind", "parameters", "error")
     )

@@ -19,6 +19,7 @@ from survey.sweep.announce import always_compiled
 
 MOST = 400  # records that are kept
 SHORT = 1.0  # seconds: a shorter run has spent them on beginning, and would tell a longer one a multiple of its time
+LITTLE = 0.1  # seconds of an estimate: as much as a run spends on beginning, on a slow machine
 PARTS = ("kernels", "further")  # [seconds estimated, measured] of the points; of edges, curves and cells
 
 
@@ -28,7 +29,7 @@ def note(workflow, estimated, measured, compiling):
         return
     record = _about(workflow) | {"hash": jit.KERNEL_HASH, "compiling": round(compiling, 2)}
     for part in PARTS:
-        if estimated.get(part, 0.0) > 0.0 and measured.get(part, 0.0) > SHORT:
+        if estimated.get(part, 0.0) > LITTLE and measured.get(part, 0.0) > SHORT:
             record[part] = [float(f"{seconds:.3g}") for seconds in (estimated[part], measured[part])]
     with contextlib.suppress(OSError, RuntimeError):  # RuntimeError: no home
         path = _path()

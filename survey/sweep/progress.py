@@ -1,14 +1,15 @@
-"""Progress and ETA on stderr: a bar on a terminal, occasional lines in a log."""
+"""Progress and ETA on stderr: a bar on a terminal or in a notebook, occasional lines in a log."""
 
 import contextlib
 import time
 from datetime import timedelta
+from importlib.util import find_spec
 from types import SimpleNamespace
 
 from survey.sweep import announce
 from survey.wording import counted
 
-LOG_SECONDS = 60
+LOG_SECONDS, NOTEBOOK_SECONDS = 60, 5  # between two lines, in a log and in a notebook without ipywidgets
 BAR_SECONDS = 0.2
 LONG = 2.0  # seconds of work, estimated, for which a call from Python has a bar
 
@@ -27,7 +28,7 @@ class Progress:
         self.naming = announce.compiling(self.workflow.name, getattr(self.workflow, "scene", None), self._say)
         if getattr(self.workflow, "scene", None) is not None:
             self.naming.__enter__()
-        if self.console.is_terminal or self.console.is_jupyter:
+        if self.console.is_terminal or (self.console.is_jupyter and find_spec("ipywidgets")):
             from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
             from rich.progress import Progress as Bar
 
@@ -59,12 +60,10 @@ class Progress:
                 self.logged = time.monotonic()
                 eta = _clock(_left(done, total, reused, elapsed, left))
                 self.bar.update(self.task, completed=done, eta=eta)
-        elif done != reused and (done == total or time.monotonic() - self.logged > LOG_SECONDS):
+        elif done != reused and (done == total or time.monotonic() - self.logged > self._pause):
             self.logged = time.monotonic()
             eta = _left(done, total, reused, elapsed, left)
-            first, space, rest = what.partition(" ")
-            of = counted(total, first.removesuffix("s")) + space + rest
-            self._line(f"{done:,} of {of}, {elapsed:.0f} s elapsed, ETA {eta:.0f} s")
+            self._line(f"{done:,} of {_counted(total, what)}, {elapsed:.0f} s elapsed, ETA {eta:.0f} s")
         if done == total and what == "blocks":
             self._line(f"computed {done - reused:,}, reused {reused:,} of {counted(total, 'block')}")
 
@@ -75,6 +74,12 @@ class Progress:
         if what == "blocks":
             points = counted(self.workflow.grid.points, "point")
             self._line(f"{points} in {counted(total, 'block')}, {reused:,} already done")
+        elif not self.bar:
+            self._line(f"searching: {_counted(total, what)}")
+
+    @property
+    def _pause(self):
+        return NOTEBOOK_SECONDS if self.console.is_jupyter else LOG_SECONDS
 
     def refining(self, settled, points, left):
         """Called as cells are refined, with the fraction of the map that is settled, the points solved, and seconds.
@@ -98,6 +103,12 @@ class Progress:
 
     def _line(self, text):
         self.console.print(f"{self.workflow.name}: {text}", markup=False)
+
+
+def _counted(total, what):
+    """`3 maps of the curves`, from `maps of the curves`."""
+    first, space, rest = what.partition(" ")
+    return counted(total, first.removesuffix("s")) + space + rest
 
 
 def _clock(seconds):
