@@ -143,7 +143,7 @@ def check(data, text="", output=None, default_path="survey.nc", near=None, prove
         path=check_path(next(path for path in (output, file.output.path, default_path) if path is not None)),
         figures=tuple(file.output.figures),
         text=text or _as_toml(data),
-        boundaries=None if surfaces else check_boundaries(scene, name, file.boundaries, given, proves),
+        boundaries=None if surfaces else check_boundaries(scene, name, file.boundaries, given, options, proves),
         surfaces=surfaces,
         refine=check_refine(scene, name, file, given, proves),
         proves=proves,
