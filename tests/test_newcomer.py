@@ -282,7 +282,7 @@ OWN = [
     (lambda: at(floquet(imaginary), a=1.0, e=0.1), "fills in a complex number; write real and imaginary parts"),
     (lambda: floquet(period=lambda a, e: 1.0), "period must be a function of one argument, the array p"),
     (lambda: floquet(breaks=90), "breaks: 90 lies outside 0 <= t <= T = 3.14159"),
-    (lambda: floquet(conserved="x"), "conserved = 'x': it must be 2 numbers, one for each of x, v"),
+    (lambda: floquet(conserved="x"), "conserved = 'x': there are 2 states, and each needs a number"),
     (lambda: floquet(parameters="a, e"), "write ('a', 'e')"),
     (lambda: floquet(parameters=("a", "exponent")), "rename 'exponent', which is taken"),
     (lambda: floquet(states="x v"), "write ('x', 'v')"),
@@ -325,6 +325,70 @@ def test_why_nothing_is_stable_without_a_structure():
     assert point.verdict == -1 and "their product is 1: state the structure if" in point.survey.point().why
     damped = at(floquet(None, K=K, C=lambda t, p, out: out.fill(0.1), states="x"), a=0.5, e=0.1)
     assert damped.verdict == 1 and "product" not in damped.survey.point().why
+
+
+@pytest.fixture(scope="module")
+def damped():
+    scene = survey.floquet(
+        K=K, C=lambda t, p, out: out.fill(0.1), period=np.pi, parameters=("a", "e"), states="x"
+    )  # fmt: skip
+    return survey.evaluate(scene, a=[0.5, 1.0, 1.5], e=[0.0, 1.0]), scene
+
+
+def labelled(scene):
+    cases = xr.DataArray([0.5, 1.0], dims="case", coords={"case": ["soft", "hard"]})
+    return survey.evaluate(scene, a=cases, e=0.1)
+
+
+DATASET = [
+    (lambda ds, scene: labelled(scene).survey.zoom(case=("soft", "hard")), "case = ('soft', 'hard'): give two numbers"),
+    (lambda ds, scene: ds.survey.zoom(a=(0.5, 1.0), num={"e": 3}), "num: unknown axis with a range 'e' (allowed: a)"),
+    (lambda ds, scene: ds.survey.zoom(a=(0.5, np.inf)), "a = (0.5, inf): give two numbers"),
+    (lambda ds, scene: ds.survey.trajectory(a=1.0, e=0.0, figure=True), "figure = True: give a matplotlib Figure"),
+    (lambda ds, scene: ds.survey.trajectory(a=1.0, e=0.0, time=1e9), "periods is too long to be drawn; give at most"),
+    (
+        lambda ds, scene: ds.isel(e=1).survey.point(a=1.0, e=0.5),
+        "e is 1 at all points of this survey, so it is no axis",
+    ),
+    (lambda ds, scene: ds.isel(e=1).survey.zoom(e=(0.5, 1.0)), "e is 1 at all points of this survey"),
+    (
+        lambda ds, scene: survey.edge(scene, along=["a"], e=1.0, a=(0, 1)),
+        "along = ['a']: give the name of one parameter",
+    ),
+    (lambda ds, scene: survey.edge(scene, along="a", e=1.0, a=(0, np.inf)), "a = (0, inf): it is searched along, so"),
+    (
+        lambda ds, scene: survey.edge(scene, along="a", e=1.0, a=(0, 1), rtol=1e-8),
+        "rtol does not apply here: edges are",
+    ),
+    (
+        lambda ds, scene: survey.edge("satellite", along="amplitude", inertia_ratio=0.2, amplitude=(0, 90)),
+        "allowed: 0 <= amplitude < 1.5708 (rad)",
+    ),
+    (
+        lambda ds, scene: survey.edge("brun_triaxial", along="Omega", A=1.0, B=0.5, C=0.3, Omega=(0, 2)),
+        "edge: none at Omega = 1, A = 1, B = 0.5, C = 0.3, epsilon = 1: the parameters lie outside the domain: ",
+    ),
+    (
+        lambda ds, scene: survey.edge(
+            survey.hill(z, period=np.pi, parameters="a", even=True, damping=0.1), along="a", a=(0.0, 1.0)
+        ),
+        "edges are known of undamped equations alone, not of hill(z); run a line of points",
+    ),
+]
+
+
+@pytest.mark.parametrize(("mistake", "words"), DATASET)
+def test_a_question_to_a_dataset_or_an_edge_that_is_wrong_answers_in_one_line(mistake, words, damped):
+    with pytest.raises(survey.BadInput) as refused:
+        mistake(*damped)
+    said = str(refused.value)
+    assert words in said and "\n" not in said and len(said) < 500, said
+
+
+def test_a_range_without_boundaries_has_none(damped):
+    assert survey.edge(damped[1], along="a", a=(2.0, 3.0), e=0.0).place.size == 0
+    assert survey.edge("brun_triaxial", along="Omega", A=1.0, B=0.8, C=0.7, Omega=(5.0, 6.0)).place.size == 0
+    assert survey.evaluate("satellite_triaxial", yaw_ratio=0.5, roll_ratio=0.4, amplitude=0.5).status == 1
 
 
 FILE = """from math import cos, pi

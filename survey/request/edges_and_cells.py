@@ -84,12 +84,12 @@ def check_surfaces(scene, name, table, given, proves=False):
     return True
 
 
-def check_even(scene, name, table):
+def check_even(scene, name, table, remedy="leave the table out"):
     """Raise BadInput where there are no factors at T/2, whose zeros are the edges."""
     if getattr(scene, "DAMPED", False):
-        raise BadInput(f"{table}: edges are known of undamped equations alone; leave the table out of {name}")
+        raise BadInput(f"{table}: edges are known of undamped equations alone, not of {name}; {remedy}")
     if not getattr(scene, "EVEN", True):
-        raise BadInput(f"{table}: the z of {name} is not even, so it has no half-period factors; leave the table out")
+        raise BadInput(f"{table}: the z of {name} is not even, so it has no half-period factors; {remedy}")
 
 
 def check_refine(scene, name, file, given, proves=False):

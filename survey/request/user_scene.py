@@ -638,7 +638,7 @@ def _floquet(
         except (TypeError, ValueError):
             conserved = ()
         if len(conserved) != len(names):
-            refuse(f"CONSERVED = {shown(given)}: it must be {len(names)} numbers, one for each of {', '.join(names)}")
+            refuse(f"CONSERVED = {shown(given)}: there are {len(names)} states, and each needs a number")
     if conserved is not None and (structure != "none" or len(names) < 2):
         refuse("CONSERVED is for STRUCTURE = 'none', and two states at least")
     equation = "x' = A(t, p) x" if "A" in matrices else "M q'' + C q' + K q = 0"
