@@ -39,6 +39,12 @@ SHELL = [
     ("run nothing.toml", "No such file or directory"),
     ("rum good.toml", "Did you mean 'run'?"),
     ("run map.nc", "survey info, plot and verify read it"),
+    (
+        "run good.toml --set boundaries=true",
+        "boundaries = True: it must be a valid table, [boundaries] on a line of its own",
+    ),
+    ("run good.toml --set boundaries.surfaces='yes'", "it must be true or false, without quotes"),
+    ("init floquet", "systems of your own are files, such as 'mine.py', or come from survey.floquet(...) in Python"),
     ("run satellite", "this is a scene: survey init satellite writes a workflow of it"),
     ("run own.py", "this is a scene's file: survey init own.py writes a workflow of it"),
     ("run twice.toml", "this is not TOML (a key is given twice: "),
@@ -299,6 +305,7 @@ OWN = [
     (lambda: at(orbit(start=lambda p: (0.0,)), F=0.3), "start(p) returns 1 numbers, not 2: the states; correct it"),
     (lambda: orbit(continuation=("G", 0, 1)), "give (name, least, greatest value) of one of F"),
     (lambda: at(orbit(continuation=("F", 0, 1)), F=0.3, branch=1.5), "branch != 0, a whole number"),
+    (lambda: at(orbit(), F=0.3, question="fate"), "question: unknown parameter of scene orbit(driven) 'question'"),
     (lambda: at(fill, a=1.0), "is a function; give survey.floquet(fill, period=...)"),
     (lambda: at(driven, F=1.0), "is a function; give survey.orbit(driven, period=...)"),
 ]

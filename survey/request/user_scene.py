@@ -372,6 +372,9 @@ def find(scene: Any, near: str | Path | None = None) -> tuple[str, Any]:
             files = [Path(at) / f"{scene}.py" for at in (".", near or ".")] if isinstance(scene, str) else []
             if any(map(os.path.isfile, files)):
                 raise BadInput(f"unknown scene {scene!r}; did you mean the file '{scene}.py'?") from None
+            if files and scene in ("hill", "abel", "floquet", "orbit"):
+                what = "systems of your own are files, such as 'mine.py', or come from"
+                raise BadInput(f"unknown scene {scene!r}: {what} survey.{scene}(...) in Python") from None
             raise
     path, text = _read(scene, near)
     found = _from_text(str(path), text)
