@@ -302,7 +302,7 @@ OWN = [
     ),
     (lambda: orbit(period=None, start=(1.0, 0.0, -6.0)), "start ends in -6, the guess of the period"),
     (lambda: orbit(start=lambda: (0.0, 0.0)), "start must be a function of one argument"),
-    (lambda: at(orbit(start=lambda p: (0.0,)), F=0.3), "start(p) returns 1 numbers, not 2: the states; correct it"),
+    (lambda: at(orbit(start=lambda p: (0.0,)), F=0.3), "start(p) returns (1,) numbers, not 2: the states; correct it"),
     (lambda: orbit(continuation=("G", 0, 1)), "give (name, least, greatest value) of one of F"),
     (lambda: at(orbit(continuation=("F", 0, 1)), F=0.3, branch=1.5), "branch != 0, a whole number"),
     (lambda: at(orbit(), F=0.3, question="fate"), "question: unknown parameter of scene orbit(driven) 'question'"),

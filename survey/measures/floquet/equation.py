@@ -72,7 +72,7 @@ class Equation:
             raise Raised(name) from error
         if row.shape != (size,):
             what = "the states and a guess of the period" if size > self.n else "the states" if size > 1 else "a number"
-            raise Unsupported(f"{name} returns {row.size} numbers, not {size}: {what}", "correct it")
+            raise Unsupported(f"{name} returns {row.shape} numbers, not {size}: {what}", "correct it")
         return row
 
     def traced(self, points, x0):
