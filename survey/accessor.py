@@ -126,6 +126,8 @@ class Survey:
         """
         from survey.analysis import point, trajectory
 
+        if not (figure is None or figure is False or hasattr(figure, "add_subplot")):
+            raise BadInput(f"figure = {shown(figure)}: give a matplotlib Figure, None for a new one, or False for none")
         found = trajectory.solve(point.nearest(self._ds, coords).load(), time)
         if figure is not False:
             from survey.show import portrait

@@ -149,7 +149,9 @@ def evaluate(
     scene, module = user_scene.find(scene)
     names = {option.name for option in module.OPTIONS}
     named = {key: value for key, value in parameters.items() if key not in names}
-    given = {key: _labelled(key, value) for key, value in physical.resolved(module, named).items()}
+    known = {p.name for p in module.PARAMETERS}
+    resolved = physical.resolved(module, named)
+    given = {key: _labelled(key, value) if key in known else value for key, value in resolved.items()}
     options = check_options(module, {key: parameters[key] for key in parameters if key in names}, given)
     used = check_parameters(module, scene, options, given)
     if variables is not None:

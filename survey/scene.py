@@ -17,7 +17,8 @@ class Parameter:
     outputs whose names begin with `but_for` exist at the excluded values too.
     `instead_of` names the parameter that this one replaces when it is given. `when` holds the option
     values for which the parameter exists ("": where the option does not). An axis of an `uncut` parameter is never cut
-    into blocks. One that is `number_option` may also stand among the options, as one number.
+    into blocks. One that is `number_option` may also stand among the options, as one number; a `whole` one is an
+    integer.
     """
 
     name: str
@@ -35,6 +36,7 @@ class Parameter:
     when: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     uncut: bool = False
     number_option: bool = False
+    whole: bool = False
 
     def holds(self, values: npt.ArrayLike, outputs: Collection[str] = ()) -> npt.NDArray[np.bool_]:
         """True where `values` (any shape) lie in the domain, that of `outputs` alone if these are given.
@@ -45,6 +47,8 @@ class Parameter:
         above = values > self.minimum if self.open_minimum else values >= self.minimum
         below = values < self.maximum if self.open_maximum else values <= self.maximum
         inside = np.isfinite(values) & above & below
+        if self.whole:
+            inside = inside & (values == np.floor(values))
         if self.excluded and not (self.but_for and outputs and all(name.startswith(self.but_for) for name in outputs)):
             for value in self.excluded:
                 inside = inside & (values != value)
@@ -57,6 +61,7 @@ class Parameter:
         high = f" {'<' if self.open_maximum else '<='} {self.maximum:g}" if self.maximum < inf else ""
         words = [f"{low}{self.name}{high}"] if low or high else []
         words += [f"{self.name} != {value:g}" for value in self.excluded]
+        words += ["a whole number"] * self.whole
         if self.but_for:
             words[-1] += f" (there request the variables {self.but_for}* alone)"
         return ", ".join(words) or "any finite number"

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from survey import measures, modules
+from survey import api, measures, modules, status
 from survey.analysis.given import options_at, parameters
 from survey.errors import BadInput
 from survey.file.labels import flag_attributes
@@ -65,7 +65,11 @@ def _edge(scene, along, near, parameters, alone=False):
     if measure is None:
         raise BadInput(f"edge: {_UNKNOWN} {name}; {_INSTEAD}")
     if hasattr(measure, "trace"):
-        check_even(module, name, "edge")
+        check_even(module, name, "edge", _INSTEAD)
+    if not isinstance(along, str):
+        raise BadInput(f"along = {shown(along)}: give the name of one parameter")
+    for key in parameters.keys() & {"rtol", "method", "variables"}:
+        raise BadInput(f"{key} does not apply here: edges are as exact as their error bounds say; leave it out")
     names = {option.name for option in module.OPTIONS}
     given = {key: value for key, value in parameters.items() if key not in names}
     ends = given.pop(along, None)
@@ -81,13 +85,31 @@ def _edge(scene, along, near, parameters, alone=False):
     ends = _range(used[along], ends, near)
     user_scene.check(module)
     found = _find(module, options, used[along], ends, near, fixed, alone)
+    if not (found[0].position.size or alone):
+        _check_inside(scene, module, {along: near if ends is None else sum(ends) / 2} | fixed, options)
     return _described(module, measure, used, along, fixed, *found)
+
+
+def _check_inside(scene, module, point, options):
+    """Raise BadInput where nothing was found since the parameters contradict each other."""
+    point = {key: value for key, value in point.items() if np.isfinite(value)}
+    try:
+        invalid = api.evaluate(scene, **point, **options).status == status.INVALID_PARAMETERS
+    except BadInput:  # the middle of a range may be excluded from the domain
+        return
+    if invalid:
+        where = ", ".join(f"{key} = {value:g}" for key, value in point.items())
+        raise BadInput(f"edge: none at {where}: {status.table(module)['invalid_parameters'][1]}")
 
 
 def _number(key, value, parameter):
     if not is_number(value) or not parameter.holds([value]).all():
-        raise BadInput(f"{key} = {shown(value)}: it must be one number in its domain; allowed: {parameter.domain}")
+        raise BadInput(f"{key} = {shown(value)}: it must be one number in its domain; allowed: {_domain(parameter)}")
     return float(value)
+
+
+def _domain(parameter):
+    return parameter.domain + ("" if parameter.units == "1" else f" ({parameter.units})")
 
 
 def _range(parameter, ends, near):
@@ -106,10 +128,10 @@ def _range(parameter, ends, near):
         first, last = map(float, ends)
     except (TypeError, ValueError):
         first = last = np.nan
-    if not (low <= first < last <= high):
+    if not (low <= first < last <= high and np.isfinite([first, last]).all()):
         raise BadInput(
             f"{name} = {shown(ends)}: it is searched along, so give (low, high) in its domain; allowed: "
-            f"{parameter.domain}"
+            f"{_domain(parameter)}"
         )
     return first, last
 

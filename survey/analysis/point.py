@@ -35,6 +35,13 @@ def nearest(ds, coords):
     return of_points(ds).isel(indices)
 
 
+def unknown_axis(ds, name, axes):
+    """One line for a name that is no axis of the survey; what is fixed is known, but no axis."""
+    if name in ds.coords and ds[name].ndim == 0 and ds[name].dtype.kind in "iuf":
+        return f"{name} is {float(ds[name]):g} at all points of this survey, so it is no axis; leave it out"
+    return modules.unknown("axis", name, axes)
+
+
 def of_points(ds):
     """The variables that have a value per point: no edges, no cells, no counts of the whole map."""
     names = [name for name, v in ds.data_vars.items() if set(ds.status.dims) <= set(v.dims)]
@@ -64,7 +71,7 @@ def nearest_indices(ds, coords):
     indices = {}
     for name, value in coords.items():
         if name not in axes:
-            raise BadInput(modules.unknown("axis", name, axes))
+            raise BadInput(unknown_axis(ds, name, axes))
         if name not in ds.coords or ds[name].dtype.kind not in "iuf":
             indices[name] = _place(ds, name, value)
             continue

@@ -7,16 +7,22 @@ import numpy as np
 
 from survey import api, modules
 from survey.analysis.given import options_at
+from survey.analysis.point import unknown_axis
 from survey.errors import BadInput, Damaged
 from survey.file.labels import count, describe
 from survey.grid import coordinates, logarithmic
 from survey.request import user_scene, workflow
+from survey.request.checks import is_number
 from survey.sweep import edges_and_cells, solve
+from survey.wording import shown
 
 
 def sweep(ds, ranges, num=None, output=None):
     """The dataset of the finer map, in memory; or written by `survey.run` where there is an `output`."""
     ranges = _ranges(ds, ranges)
+    for name in num if isinstance(num, dict) else ():
+        if name not in ranges:
+            raise BadInput(f"num: {modules.unknown('axis with a range', name, list(ranges))}")
     data = _workflow(ds, ranges, num)
     checked = workflow.check(data, output=output, default_path="zoom.nc")
     _warn(ds, ranges)
@@ -36,9 +42,9 @@ def _ranges(ds, ranges):
         raise BadInput(f"zoom: give a range for at least one axis, such as {axes[0] if axes else 'k'}=(0.1, 0.2)")
     for name, ends in ranges.items():
         if name not in axes:
-            raise BadInput(modules.unknown("axis", name, axes))
-        if np.shape(ends) != (2,) or not np.isfinite(np.asarray(ends, float)).all() or not ends[0] < ends[1]:
-            raise BadInput(f"{name} = {ends!r}: give two numbers, the lower one first, such as {name}=(0.1, 0.2)")
+            raise BadInput(unknown_axis(ds, name, axes))
+        if np.shape(ends) != (2,) or not all(map(is_number, ends)) or not -np.inf < ends[0] < ends[1] < np.inf:
+            raise BadInput(f"{name} = {shown(ends)}: give two numbers, the lower one first, such as {name}=(0.1, 0.2)")
     return {name: (float(low), float(high)) for name, (low, high) in ranges.items()}
 
 

@@ -26,7 +26,8 @@ QUESTIONS = {
         ),
         "serves": Function("are curves known of the scene? They are if it is missing", ("scene",)),
         "refusal": Function(
-            "why there are no curves on a map of these axes, in words; None if there are", ("axes", "scene")
+            "why there are no curves on a map of these axes, in words; None if there are; `options` may be missing",
+            ("axes", "scene", "options"),
         ),
         "seconds": Function("estimated seconds of `closed` on one thread; a tenth of a second if missing", ("axes",)),
         "CLASSES": Value("{name: code} of the curves' classes", dict),

@@ -10,8 +10,10 @@ Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equat
 
 import numpy as np
 
+from survey.errors import BadInput
 from survey.kernels.math.roundoff import EPS
 
+MOST = 4e6  # numbers in the matrices of a motion
 SAFETY = 4 / 63  # of the difference, of order 6, between a step and its halves
 _ROOT = np.sqrt(15.0)
 GAUSS = 0.5 + np.array([-0.1, 0.0, 0.1]) * _ROOT
@@ -32,6 +34,9 @@ def fundamental(matrices, lengths, periods, scale=1.0, terms=None):
     `scale` (n) holds the sizes of Y's components, `terms` (steps, n, n) what the rounding of A is relative to (or |A|).
     """
     h, n = lengths[:, None, None], matrices.shape[-1]
+    if len(lengths) * periods * n * n > MOST:
+        most = max(1, int(MOST / (len(lengths) * n * n))) * float(lengths.sum())
+        raise BadInput(f"time: a motion of {periods:,} periods is too long to be drawn; give at most {most:.3g}")
     terms = abs(matrices).max(axis=1) if terms is None else terms
     halves = [_step(matrices[:, 3 * i : 3 * i + 3], 0.5 * h) for i in range(2)]
     steps, units = halves[1] @ halves[0], np.divide.outer(scale * np.ones(n), scale * np.ones(n))

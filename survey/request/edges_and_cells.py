@@ -12,7 +12,7 @@ OF_SURFACES = ("vertices", "triangles", "class", "corners", "position_error", "a
 MIN_FRACTION = 1e-6  # width of a cell as a fraction of its axis
 
 
-def check_boundaries(scene, name, table, given, proves=False):
+def check_boundaries(scene, name, table, given, options, proves=False):
     """The axis along which edges are searched, the last one by default; None where no boundaries are requested."""
     if table is None:
         return None
@@ -21,7 +21,7 @@ def check_boundaries(scene, name, table, given, proves=False):
     if measure is None:
         raise BadInput(f"boundaries: no boundary curves are known for the scene {name}; leave the table out")
     if hasattr(measure, "refusal"):
-        return _check_closed(measure, scene, name, table, {key: given[key] for key in axes}, given)
+        return _check_closed(measure, scene, name, table, {key: given[key] for key in axes}, given, options)
     if not proves:  # proofs need no factors at T/2
         check_even(scene, name, "boundaries")
     if not axes:
@@ -34,7 +34,7 @@ def check_boundaries(scene, name, table, given, proves=False):
     return axis
 
 
-def _check_closed(measure, scene, name, table, axes, given):
+def _check_closed(measure, scene, name, table, axes, given, options):
     """The last of the axes {name: values}; raises BadInput where the measure knows no curves on these."""
     names = list(axes)
     refusal = None
@@ -42,12 +42,12 @@ def _check_closed(measure, scene, name, table, axes, given):
         fixed = {p.name: p.default if p.default is not None else np.nan for p in scene.PARAMETERS} | {
             key: float(value) for key, value in given.items() if not np.ndim(value)
         }
-        second_axis(measure, scene, names[0], fixed)
+        second_axis(measure, scene, names[0], fixed, options)
     else:
         stacks = [[*names[:2], third] for third in names[2:]] or [names]  # further axes make a stack of maps
-        refusal = next(filter(None, (measure.refusal(stack, scene) for stack in stacks)), None)
+        refusal = next(filter(None, (measure.refusal(stack, scene, options) for stack in stacks)), None)
     if refusal:
-        raise BadInput(f"boundaries: of {name} {refusal}; change the axes, or leave the table out")
+        raise BadInput(f"boundaries: of {name} {refusal}; change that, or leave the table out")
     if table.axis is not None:
         raise BadInput(
             f"boundaries.axis: the curves of {name} are found without rows, and no axis is searched; leave it out"
@@ -84,15 +84,12 @@ def check_surfaces(scene, name, table, given, proves=False):
     return True
 
 
-def check_even(scene, name, table):
+def check_even(scene, name, table, remedy="leave the table out"):
     """Raise BadInput where there are no factors at T/2, whose zeros are the edges."""
     if getattr(scene, "DAMPED", False):
-        raise BadInput(
-            f"{table}: edges are known of undamped equations alone, not of {name}; see where the verdict "
-            "changes on a map"
-        )
+        raise BadInput(f"{table}: edges are known of undamped equations alone, not of {name}; {remedy}")
     if not getattr(scene, "EVEN", True):
-        raise BadInput(f"{table}: the z of {name} is not even, so it has no half-period factors; leave the table out")
+        raise BadInput(f"{table}: the z of {name} is not even, so it has no half-period factors; {remedy}")
 
 
 def check_refine(scene, name, file, given, proves=False):

@@ -10,7 +10,7 @@ from survey.measures.floquet import dense, monodromy, motion, probing, stability
 from survey.measures.floquet.ahead import compile_ahead
 from survey.measures.floquet.halves import alike_or_opposite
 from survey.measures.floquet.system import System
-from survey.request.traced_scene import TracedScene
+from survey.request.traced_scene import TracedScene, rebinds
 from survey.scene import plus_minus
 
 LARGEST = 64  # states
@@ -124,13 +124,23 @@ class FloquetScene(TracedScene):
         if answer["verdict"] == "unstable":
             return f"{radius}: it is certainly above 1"
         if answer["verdict"] == "undecided":
-            return f"{radius}: the error bar allows multipliers outside the unit circle, and inside or on it"
+            words = f"{radius}: the error bar allows multipliers outside the unit circle, and inside or on it"
+            return f"{words}{self._why_never(answer)}"
         if self.structure == "none":
             return f"{radius}: it is certainly below 1"
         kind = "symplectic" if self.structure == "symplectic" else "reversible"
         if self.structure == "symplectic" and self._met(answer):
             return "all multipliers are on the unit circle: where error bars meet, Krein signs are the same"
         return f"all multipliers are simple and on the unit circle, within their error bars: the system is {kind}"
+
+    def _why_never(self, answer):
+        """What to state of a system whose multipliers have the product 1, so that none is stable without."""
+        if self.structure != "none" or self.conserved is not None or "multiplier_re_error" not in answer:
+            return ""
+        product = np.prod(np.asarray(answer["multiplier_re"]) + 1j * np.asarray(answer["multiplier_im"]))
+        if not abs(product - 1.0) < 1e-6:
+            return ""
+        return '; their product is 1: state the structure if the system is Hamiltonian ("symplectic") or "reversible"'
 
     def _met(self, answer):
         """Do the error bars of two multipliers meet?"""
@@ -152,6 +162,7 @@ class FloquetScene(TracedScene):
             self._try(point)
         system = self._system
         period, edges = self._called(system.ranges, given)
+        self._check_filled(given, period)
         if not len(points):
             if np.isfinite(edges).all():
                 self._called(system.traced, given, edges)
@@ -203,6 +214,25 @@ class FloquetScene(TracedScene):
             self._check_reversible(programs, point, edges, size)
         if len(programs) == 1:
             self._check_period(point, period, size)
+
+    def _check_filled(self, given, period):
+        """Refuse matrices that stay 0, and states of which nothing depends and that depend on nothing."""
+        points = np.concatenate([given[:1], self._elsewhere(given[:1])])
+        times = TRIED * (period[0] if np.isfinite(period[0]) else 1.0)
+        some = {}
+        for name, function in self.matrices.items():
+            shape = 2 * (self._size_of(name),)
+            some[name] = np.abs([self._of(function, (float(t), p), shape) for p in points for t in times]).max(axis=0)
+        for name, size in some.items():
+            if not size.any() and (name != "C" or rebinds(self.matrices[name])):  # no damping may be said by a C
+                self._refuse(f"{name}(t, p, out) leaves out all 0", "fill its entries: out[0, 0] = ..., not out = ...")
+        used = sum(size - np.diag(np.diag(size)) if name == "M" else size for name, size in some.items())
+        for k in np.flatnonzero(~(used.any(axis=0) | used.any(axis=1))):
+            added = ", to which velocities are added" if "A" not in some else ""
+            self._refuse(
+                f"STATES names {self.states[k]}, but its row and column of {' and '.join(sorted(some))} are all 0",
+                f"fill them, or leave it out of STATES{added}",
+            )
 
     def _check_conserved(self, given):
         """Refuse CONSERVED where w x is not the same a period later."""

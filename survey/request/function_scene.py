@@ -79,11 +79,17 @@ class FunctionScene:
     def _refuse(self, what, remedy):
         raise refusal(self.NAME, f"{what}; {remedy}")
 
+    def _refuse_name(self, call):
+        """Refuse a function that takes p, or x, for a mapping."""
+        if "x, p" in call:
+            self._refuse(f"{call} accesses an array by a name, but x and p hold numbers", "write x[0], ..., p[0], ...")
+        self._refuse(f"{call} accesses a parameter by name, but p is an array", "write p[0], p[1], ...")
+
     def _refuse_index(self, call, error):
         """Refuse a function that raised this IndexError, as `call` is written."""
         n = len(self.own)
         if "only integers" in str(error):
-            self._refuse(f"{call} accesses a parameter by name, but p is an array", "write p[0], p[1], ...")
+            self._refuse_name(call)
         self._refuse(f"{call} indexes beyond an array ({error})", f"PARAMETERS names {n}: p[0] to p[{n - 1}]")
 
 

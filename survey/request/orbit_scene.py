@@ -22,11 +22,13 @@ ELSEWHERE = "give a better start, or another point"
 BRANCH = Parameter(
     "branch", "number of the orbit among those of the point, by the mean square of its states; from the last if < 0",
     "i", default=1.0, minimum=-99.0, maximum=99.0, excluded=(0.0,), uncut=True,
+    whole=True,
 )  # fmt: skip
 STATUS = {
     "invalid_parameters": "outside the domain, or the start or the period is not finite, or the period not positive",
     "no_orbit": "Newton's method does not converge from the start, or no orbit is shown to exist near where it ends: "
-    "give a better start; or, with CONTINUATION, the point has fewer orbits than `branch`",
+    "give a better start, or PERIOD = None if f does not depend on t; or, with CONTINUATION, the point has fewer "
+    "orbits than `branch`",
 }
 
 
@@ -149,10 +151,12 @@ class OrbitScene(TracedScene):
         x0, period = self._called(equation.begin, given)
         known = np.isfinite(x0).all(axis=1) & (period > 0) & np.isfinite(period)
         if len(points) and not known.any():
-            what = "START(p) has no finite value" if not np.isfinite(x0).all() else "the period is not positive"
+            ends = "the guess of the period, the last number of START," if self.period is None else "PERIOD(p)"
+            what = "START(p) has no finite value" if not np.isfinite(x0).all() else f"{ends} is not positive"
             self._refuse(f"{what} at {self._where(points[0])}", "correct it")
         for point, x, T in zip(given[known], x0[known], period[known], strict=True):
             self._try(point, x)
+            self._check_filled(point, x, T)
             for own, programs in self._called(equation.traced, point[None], x[None]):
                 if own.size and len(points):
                     self._compare(programs, point, x, T)
@@ -190,6 +194,21 @@ class OrbitScene(TracedScene):
         n = len(self.states)
         sizes = f"STATES names {n} for x and out, PARAMETERS {len(self.own)} for p"
         self._tried(self.f, "f(t, x, p, out)", (0.25, x.copy(), point), (n,), sizes, f"of {n} numbers")
+
+    def _check_filled(self, point, x, T):
+        """Refuse f where the derivative of a state is 0 always: orbits are not isolated then."""
+        states = x + np.random.default_rng(1).standard_normal((2, TRIED.size, x.size))
+        points = np.concatenate([point[None], self._elsewhere(point[None])])
+        f = [
+            self._of(self.f, (float(t * T), y, p), (x.size,))
+            for p, some in zip(points, states, strict=True)
+            for t, y in zip(TRIED, some, strict=True)
+        ]
+        for k in np.flatnonzero(~np.any(f, axis=0)):
+            name = self.states[k]
+            self._refuse(
+                f"f(t, x, p, out) leaves out[{k}] 0: {name} never changes", f"fill out[{k}] = d{name}/dt, not out = ..."
+            )
 
     def _at(self, t, x, point):
         """f from the code run on numbers."""

@@ -114,6 +114,10 @@ def complaint(error):
         return (
             f"{key} = {shown(first['input'])}: it must be a list, such as --set '{key}={example}' (with quotes){more}"
         )
+    if first["type"] in ("model_type", "model_attributes_type", "dict_type"):
+        return f"{key} = {shown(first['input'])}: it must be a valid table, [{key}] on a line of its own{more}"
+    if first["type"].startswith("bool_"):
+        return f"{key} = {shown(first['input'])}: it must be true or false, without quotes{more}"
     message = first["msg"].partition(" or instance of")[0].replace("dictionary", "table")
     return f"{key} = {shown(first['input'])}: {message[0].lower()}{message[1:]}{more}"
 

@@ -45,7 +45,7 @@ def workflow(scene):
     lines += [f'figures = ["{figure}"]  # pictures beside the file; of {", ".join(dict.fromkeys(drawn))}',
               "# variables = [...]  # which outputs are stored; all by default"]  # fmt: skip
     curves = measures.curves(module)
-    if curves and not (hasattr(curves, "refusal") and curves.refusal([p.name for p in axes], module)):
+    if curves and not (hasattr(curves, "refusal") and curves.refusal([p.name for p in axes], module, options)):
         lines += ["", "# [boundaries]  # the curves between verdicts, exact, in the file and its pictures"]
     if measures.question(module.FAMILY, "cells") is not None:
         lines += ["", "# [refine]  # cells as small as needed where the verdict changes, and the area of each verdict",

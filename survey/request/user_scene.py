@@ -79,9 +79,11 @@ from __future__ import annotations
 import hashlib
 import inspect
 import os
+import re
 import stat
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from difflib import get_close_matches
 from functools import lru_cache
 from itertools import product
 from pathlib import Path
@@ -107,13 +109,25 @@ if TYPE_CHECKING:
     from survey.request.hill_scene import HillScene
     from survey.request.orbit_scene import OrbitScene
 
+FORMS = {  # by what the file holds: what else it must name
+    "abel": ("f", "g", "PARAMETERS"),
+    "floquet": ("STATES", "PERIOD", "PARAMETERS"),
+    "orbit": ("STATES", "PERIOD", "PARAMETERS", "START"),
+    "hill": ("PERIOD", "PARAMETERS"),
+}
+OPTIONAL = {  # that change what is computed
+    "abel": ("PERIOD",),
+    "floquet": ("STRUCTURE", "BREAKS", "CONSERVED"),
+    "orbit": ("CONTINUATION", "REVERSED", "HELD", "TRANSVERSE", "jacobian"),
+    "hill": ("EVEN", "BREAKS", "DAMPING"),
+}
+ALIKE = 0.9  # of two names: one is taken for a slip of the other
 EXAMPLES = {
     "f": "def f(phi, p): return -p[0]",
     "g": "def g(phi, p): return p[1] - sin(phi)",
-    "z": "def z(u, p): return p[0] + p[1] * cos(2 * u)",
     "STATES": 'STATES = ("x", "v"), the names of the states',
     "START": "START = (1.0, 0.0), or def START(p): return 1.0, 0.0",
-    "PERIOD": "PERIOD = 3.14 (its length in u), or a function of p",
+    "PERIOD": "PERIOD = 2 * pi (its length), or a function of p",
     "PARAMETERS": 'PARAMETERS = ("a", "b"), the names of p[0], p[1]',
 }
 _made: Any = {}  # by hash: what `hill` has made in this process
@@ -347,11 +361,21 @@ def find(scene: Any, near: str | Path | None = None) -> tuple[str, Any]:
     if isinstance(scene, FunctionScene):
         return scene.NAME, scene
     if callable(scene):
+        maker = {3: "floquet", 4: "orbit"}.get(_arguments(scene), "hill")
         raise BadInput(
-            f"scene = {shown(scene)} is a function; give survey.hill({getattr(scene, '__name__', 'z')}, period=...)"
+            f"scene = {shown(scene)} is a function; give survey.{maker}({getattr(scene, '__name__', 'z')}, period=...)"
         )
     if not isinstance(scene, (str, os.PathLike)) or not str(scene).endswith(".py"):
-        return scene, load(scene)
+        try:
+            return scene, load(scene)
+        except BadInput:
+            files = [Path(at) / f"{scene}.py" for at in (".", near or ".")] if isinstance(scene, str) else []
+            if any(map(os.path.isfile, files)):
+                raise BadInput(f"unknown scene {scene!r}; did you mean the file '{scene}.py'?") from None
+            if files and scene in ("hill", "abel", "floquet", "orbit"):
+                what = "systems of your own are files, such as 'mine.py', or come from"
+                raise BadInput(f"unknown scene {scene!r}: {what} survey.{scene}(...) in Python") from None
+            raise
     path, text = _read(scene, near)
     found = _from_text(str(path), text)
     trust.keep(found.HASH)  # naming the file means allowing it
@@ -438,29 +462,21 @@ def _from_text(name: str, text: str) -> FunctionScene:
     module.__file__ = name
     try:
         exec(compile(text, name, "exec"), module.__dict__)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise BadInput(f"{name}: the scene file failed to run ({type(error).__name__}: {reason(error)})") from None
-    is_abel = hasattr(module, "f") and hasattr(module, "g") and not hasattr(module, "z")
     matrices = {name: getattr(module, name) for name in "AMCK" if callable(getattr(module, name, None))}
-    is_floquet = bool(matrices.keys() & {"A", "K"}) and not hasattr(module, "z") and not is_abel
-    is_orbit = (
-        hasattr(module, "f") and hasattr(module, "STATES") and not (is_abel or is_floquet or hasattr(module, "z"))
-    )
-    needs = ("STATES", "PERIOD", "PARAMETERS") if is_floquet else ("z", "PERIOD", "PARAMETERS")
-    needs = ("PERIOD", "PARAMETERS", "START") if is_orbit else needs
-    for needed in ("f", "g", "PARAMETERS") if is_abel else needs:
-        if not hasattr(module, needed):
-            raise BadInput(f"{name}: {needed} is missing; write {EXAMPLES[needed]}")
+    form = _form(name, module, matrices)
+    _check_names(name, module, form)
     title, references = getattr(module, "TITLE", None), getattr(module, "REFERENCES", ())
-    if is_abel:
+    if form == "abel":
         about, period = module.__doc__ or inspect.getdoc(module.f), getattr(module, "PERIOD", None)
         return _abel(module.f, module.g, period, module.PARAMETERS, name, text, title, about, references)
-    if is_floquet:
+    if form == "floquet":
         about = module.__doc__ or inspect.getdoc(matrices.get("A", matrices.get("K")))
         more = getattr(module, "STRUCTURE", "none"), getattr(module, "BREAKS", ()), getattr(module, "CONSERVED", None)
         given = module.PERIOD, module.PARAMETERS, module.STATES, *more
         return _floquet(matrices, *given, name, text, title, about, references)
-    if is_orbit:
+    if form == "orbit":
         about = module.__doc__ or inspect.getdoc(getattr(module.f, "py_func", module.f))
         of_orbit = getattr(module, "jacobian", None), getattr(module, "CONTINUATION", None)
         system = module.PERIOD, module.PARAMETERS, module.STATES, module.START
@@ -469,6 +485,61 @@ def _from_text(name: str, text: str) -> FunctionScene:
     optional = getattr(module, "EVEN", False), getattr(module, "BREAKS", ()), getattr(module, "DAMPING", 0.0)
     about = module.__doc__ or inspect.getdoc(getattr(module.z, "py_func", module.z))
     return _hill(module.z, module.PERIOD, module.PARAMETERS, *optional, name, text, title, about, references)
+
+
+def _form(name: str, module: ModuleType, matrices: dict[str, Any]) -> str:
+    """Which of FORMS the file of this name holds; raises BadInput if it is none."""
+    if hasattr(module, "z"):
+        return "hill"
+    if hasattr(module, "f") and hasattr(module, "g"):
+        return "abel"
+    if matrices.keys() & {"A", "K"}:
+        return "floquet"
+    if hasattr(module, "f"):
+        return "orbit" if hasattr(module, "STATES") or _arguments(module.f) > 2 else "abel"
+    raise BadInput(
+        f"{name}: z is missing; write def z(u, p) for a Hill equation, or f(phi, p) and g(phi, p) for an Abel "
+        "equation, A(t, p, out) or K(t, p, out) for a linear periodic system, f(t, x, p, out) for periodic orbits"
+    )
+
+
+def _check_names(name: str, module: ModuleType, form: str) -> None:
+    """Raise BadInput where a name is missing, or another one looks like a slip of it, which would be ignored."""
+    others = [other for other in vars(module) if not other.startswith("_")]
+    for key in (*FORMS[form], *OPTIONAL[form]):
+        if hasattr(module, key):
+            continue
+        slips = [other for other in others if other != key and other.lower() == key.lower()]
+        slips += get_close_matches(key, [other for other in others if other.isupper()], cutoff=ALIKE)
+        if slips:
+            raise BadInput(f"{name}: {slips[0]} is not read; write {key}")
+        if key in FORMS[form]:
+            none = ", or None if f does not depend on t" if (form, key) == ("orbit", "PERIOD") else ""
+            raise BadInput(f"{name}: {key} is missing; write {EXAMPLES[key]}{none}")
+
+
+def _function(
+    letter: str, function: Any, arguments: tuple[str, ...], what: str, refuse: Callable[[str], NoReturn]
+) -> None:
+    """Refuse what is no function of these arguments, or has one of these names in another place."""
+    call = f"{letter}({', '.join(arguments)})"
+    count = {2: "two", 3: "three", 4: "four"}[len(arguments)]
+    if not callable(function) or _arguments(function) != len(arguments):
+        refuse(f"{letter} must be a function of {count} arguments, {call}{what}")
+    own = list(inspect.signature(getattr(function, "py_func", function)).parameters)
+    if any(mine in arguments and mine != right for mine, right in zip(own, arguments, strict=True)):
+        refuse(f"{letter}({', '.join(own)}): its arguments come in the order {call}; change it")
+
+
+def _of_parameters(key: str, function: Any, refuse: Callable[[str], NoReturn]) -> None:
+    """Refuse a function that cannot be called with the parameters p alone."""
+    if callable(function):
+        try:
+            inspect.signature(getattr(function, "py_func", function)).bind(None)
+        except TypeError:
+            refuse(f"{key} must be a function of one argument, the array p of the parameters, or no function")
+        except ValueError:  # its arguments cannot be known
+            pass
 
 
 def _hill(
@@ -482,15 +553,14 @@ def _hill(
     def refuse(message: str) -> NoReturn:
         raise refusal(name, message)
 
-    if not callable(z) or _arguments(z) != 2:
-        refuse("z must be a function of two arguments, z(u, p); the parameters are p[0], p[1], ...")
+    _function("z", z, ("u", "p"), "; the parameters are p[0], p[1], ...", refuse)
     parameters = _parameters(parameters, monodromy.OUTPUTS, (), refuse)
     names = [p.name for p in parameters]
     if not isinstance(even, (bool, np.bool_)):
         refuse(f"EVEN = {even!r}: it must be True or False")
     if not callable(period) and not (is_number(period) and 0 < period < np.inf):
         refuse(f"PERIOD = {period!r}: it must be a positive number, or a function of p that returns one")
-    breaks = _checked_breaks(breaks, period, refuse)
+    breaks = _checked_breaks(breaks, period, "u", refuse)
     c, place = None, None
     if isinstance(damping, str) or damping != 0:
         from survey.request.damped_scene import DampedScene, checked_damping
@@ -524,10 +594,7 @@ def _abel(
         raise refusal(name, message)
 
     for letter, function in (("f", f), ("g", g)):
-        if not callable(function) or _arguments(function) != 2:
-            refuse(
-                f"{letter} must be a function of two arguments, {letter}(phi, p); the parameters are p[0], p[1], ..."
-            )
+        _function(letter, function, ("phi", "p"), "; the parameters are p[0], p[1], ...", refuse)
     parameters = _parameters(parameters, gyrostat.OUTPUTS, ("phi0", "w0", "question", "branch"), refuse)
     if period is not None and not (is_number(period) and abs(period - 2 * np.pi) <= 1e-15 * period):
         refuse(f"PERIOD = {period!r}: it must be 2 pi, to which phi can be scaled, or None")
@@ -552,8 +619,7 @@ def _floquet(
     if ("A" in matrices) == ("K" in matrices) or (len(matrices) > 1 and "A" in matrices):
         refuse("give either A(t, p, out), or K(t, p, out) with or without M and C")
     for letter, function in matrices.items():
-        if not callable(function) or _arguments(function) != 3:
-            refuse(f"{letter} must be a function of three arguments, {letter}(t, p, out), that fills the matrix out")
+        _function(letter, function, ("t", "p", "out"), ", that fills the matrix out", refuse)
     parameters = _parameters(parameters, stability.OUTPUTS, ("multiplier", "row", "column"), refuse)
     names = _state_names(states, refuse)
     if "K" in matrices:
@@ -566,20 +632,25 @@ def _floquet(
         refuse(f"STRUCTURE = 'symplectic', but STATES names {len(names)} states; it must name an even number")
     if not callable(period) and not (is_number(period) and 0 < period < np.inf):
         refuse(f"PERIOD = {period!r}: it must be a positive number, or a function of p that returns one")
-    breaks = _checked_breaks(breaks, period, refuse)
+    breaks = _checked_breaks(breaks, period, "t", refuse)
+    _of_parameters("CONSERVED", conserved, refuse)
     if conserved is not None and not callable(conserved):
-        conserved = tuple(np.asarray(conserved, dtype=float).ravel().tolist())
+        given = conserved
+        try:
+            conserved = tuple(np.asarray(given, dtype=float).ravel().tolist())
+        except (TypeError, ValueError):
+            conserved = ()
         if len(conserved) != len(names):
-            refuse(f"CONSERVED names {len(conserved)} numbers; there are {len(names)} states")
+            refuse(f"CONSERVED = {shown(given)}: there are {len(names)} states, and each needs a number")
     if conserved is not None and (structure != "none" or len(names) < 2):
         refuse("CONSERVED is for STRUCTURE = 'none', and two states at least")
     equation = "x' = A(t, p) x" if "A" in matrices else "M q'' + C q' + K q = 0"
     about = inspect.cleandoc(about or f"{equation}, p = ({', '.join(p.name for p in parameters)}).")
-    given = (*matrices.items(), period, breaks, parameters, names, structure)
-    given += () if conserved is None else (conserved,)
+    known = (*matrices.items(), period, breaks, parameters, names, structure)
+    known += () if conserved is None else (conserved,)
     return FloquetScene(
         matrices=matrices, period=period, breaks=breaks, states=names, structure=structure, conserved=conserved,
-        own=parameters, **_described(name, text, title, about, references or FLOQUET_REFERENCES, given),
+        own=parameters, **_described(name, text, title, about, references or FLOQUET_REFERENCES, known),
     )  # fmt: skip
 
 
@@ -595,9 +666,8 @@ def _orbit(
         raise refusal(name, message)
 
     for letter, function in (("f", f), ("jacobian", jacobian)):
-        if not callable(function) or _arguments(function) != 4:
-            if function is not None or letter == "f":
-                refuse(f"{letter} must be a function of four arguments, {letter}(t, x, p, out), that fills out")
+        if function is not None or letter == "f":
+            _function(letter, function, ("t", "x", "p", "out"), ", that fills out", refuse)
     more = ("state", "multiplier", "row", "column", *(("orbits", "branch") if continuation is not None else ()))
     parameters = _parameters(parameters, orbit.OUTPUTS, more, refuse)
     continued = None
@@ -610,6 +680,8 @@ def _orbit(
         refuse("STATES names one state: without a PERIOD, orbits need two")
     if period is not None and not callable(period) and not (is_number(period) and 0 < period < np.inf):
         refuse(f"PERIOD = {period!r}: it must be a positive number, a function of p that returns one, or None")
+    for key, function in (("PERIOD", period), ("START", start)):
+        _of_parameters(key, function, refuse)
     symmetry = _symmetry(mirror, names, period, refuse)
     needed = len(names) + (period is None)
     if not callable(start):
@@ -620,6 +692,8 @@ def _orbit(
         if len(start) != needed or not np.isfinite(start).all():
             guess = " and a guess of the period" if period is None else ""
             refuse(f"START must be {needed} numbers, the states{guess}, or a function of p that returns them")
+        if period is None and start[-1] <= 0.0:
+            refuse(f"START ends in {start[-1]:g}, the guess of the period, as PERIOD is None; it must be positive")
     about = inspect.cleandoc(
         about or f"Periodic orbits of x' = f(t, x, p), p = ({', '.join(p.name for p in parameters)})."
     )
@@ -659,7 +733,7 @@ def _continued(
     except (TypeError, ValueError, IndexError, KeyError):
         good = False
     if not good:
-        refuse(f"CONTINUATION = {shown(given)}: give a parameter's name, its least and its greatest value")
+        refuse(f"CONTINUATION = {shown(given)}: give (name, least, greatest value) of one of {', '.join(names)}")
     index = names.index(name)
     own = parameters[index]
     if not own.holds([low, high]).all():
@@ -705,14 +779,16 @@ def _symmetry(mirror: tuple[Any, ...], names: tuple[str, ...], period: Any, refu
 def _state_names(states: Any, refuse: Callable[[str], NoReturn]) -> tuple[str, ...]:
     names = (states,) if isinstance(states, str) else tuple(states) if isinstance(states, Iterable) else ()
     if not names or any(not isinstance(n, str) or not n.isidentifier() or names.count(n) > 1 for n in names):
-        refuse(f"STATES = {states!r}: give the names of the states, each once, as identifiers")
+        refuse(f"STATES = {shown(states)}: give the names of the states, each once, as identifiers{_apart(states)}")
     return names
 
 
-def _checked_breaks(breaks: Any, period: Any, refuse: Callable[[str], NoReturn]) -> Any:
+def _checked_breaks(breaks: Any, period: Any, time: str, refuse: Callable[[str], NoReturn]) -> Any:
     """Positions in [0, T] as a tuple, or the function that returns them."""
     from survey.request.hill_scene import SAME
 
+    for key, function in (("PERIOD", period), ("BREAKS", breaks)):
+        _of_parameters(key, function, refuse)
     if callable(breaks):
         return breaks
     try:
@@ -721,7 +797,8 @@ def _checked_breaks(breaks: Any, period: Any, refuse: Callable[[str], NoReturn])
         refuse(f"BREAKS = {breaks!r}: it must be number(s) in [0, PERIOD], or a function of p that returns them")
     outside = [b for b in breaks if not 0 <= b <= (np.inf if callable(period) else period * (1 + SAME))]
     if outside:
-        refuse(f"BREAKS: {outside[0]:g} lies outside 0 <= u <= T; name positions within one period")
+        length = "" if callable(period) else f" = {period:g}"
+        refuse(f"BREAKS: {outside[0]:g} lies outside 0 <= {time} <= T{length}; name positions within one period")
     return breaks
 
 
@@ -734,12 +811,20 @@ def _parameters(
     parameters = tuple(p if isinstance(p, Parameter) else Parameter(str(p), str(p), _symbol(str(p))) for p in given)
     names = [p.name for p in parameters]
     taken = {o.name for o in outputs} | {"status", "method", "rtol", "variables", "scene", *more}
-    if not names or any(not n.isidentifier() or n in taken or names.count(n) > 1 for n in names):
+    wrong = next((n for n in names if not n.isidentifier() or n in taken or names.count(n) > 1), None)
+    if wrong is not None or not names:
+        because = f"; rename {wrong!r}, which is taken" if wrong in taken else _apart(wrong)
         refuse(
-            f"PARAMETERS = {names!r}: give at least one name, each once, as an identifier that is neither an output "
-            "nor a keyword"
+            f"PARAMETERS = {shown(names)}: give at least one name, each once, as an identifier that is neither an "
+            f"output nor a keyword{because}"
         )
     return parameters
+
+
+def _apart(names: Any) -> str:
+    """How several names in one text are written, if `names` is such a text."""
+    parts = re.split(r"[\s,;]+", names.strip()) if isinstance(names, str) else []
+    return f"; write {tuple(parts)!r}" if len(parts) > 1 and all(part.isidentifier() for part in parts) else ""
 
 
 def _symbol(name: str) -> str:

@@ -1,5 +1,6 @@
 """TOML -> a checked Workflow. Whatever can be refused is refused here, by name, before any work."""
 
+import os
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -53,6 +54,8 @@ def read(path, overrides=(), output=None, proves=False):
     """The checked Workflow in the TOML file `path`, with `KEY=VALUE` overrides; raises BadInput in one line."""
     path = Path(path)
     try:
+        if path.suffix == ".py" and os.path.isfile(path):
+            raise ValueError(f"this is a scene's file: survey init {short(path, 120)} writes a workflow of it")
         text = path.read_text(encoding="utf-8")
     except (OSError, ValueError) as error:
         raise BadInput(f"{short(path, 120)}: cannot read this workflow file ({_why(path, error)})") from None
@@ -70,7 +73,8 @@ def _parsed(text, path):
     try:
         return tomllib.loads(text)
     except ValueError as error:  # TOMLDecodeError, or an integer of more than 4300 digits
-        raise BadInput(f"{path}: this is not TOML ({short(error, 150)})") from None
+        twice = "a key is given twice: " if "overwrite a value" in str(error) else ""
+        raise BadInput(f"{path}: this is not TOML ({twice}{short(error, 150)})") from None
     except RecursionError:
         raise BadInput(f"{path}: this TOML is nested too deeply") from None
 
@@ -143,7 +147,7 @@ def check(data, text="", output=None, default_path="survey.nc", near=None, prove
         path=check_path(next(path for path in (output, file.output.path, default_path) if path is not None)),
         figures=tuple(file.output.figures),
         text=text or _as_toml(data),
-        boundaries=None if surfaces else check_boundaries(scene, name, file.boundaries, given, proves),
+        boundaries=None if surfaces else check_boundaries(scene, name, file.boundaries, given, options, proves),
         surfaces=surfaces,
         refine=check_refine(scene, name, file, given, proves),
         proves=proves,

@@ -35,7 +35,9 @@ def on_line(scene, options, along, ends, fixed):
     Raises BadInput where the scene's family knows no curves.
     """
     measure = measures.question(scene.FAMILY, "curves")
-    second = second_axis(measure, scene, along, fixed) if hasattr(measure, "closed") else ""  # searched on any axis
+    second = (
+        second_axis(measure, scene, along, fixed, options) if hasattr(measure, "closed") else ""
+    )  # searched on any axis
     if second:
         bounds = _bounds(next(p for p in scene.PARAMETERS if p.name == second), fixed[second])
     else:
@@ -58,18 +60,18 @@ def on_line(scene, options, along, ends, fixed):
     return OnLine(position[keep], error[keep], kind[keep], curves.complete)
 
 
-def second_axis(measure, scene, along, fixed):
+def second_axis(measure, scene, along, fixed, options):
     """The parameter that spans a map with `along` on which curves are known; "" where they are known along it alone.
 
     Raises BadInput if there is neither.
     """
-    if measure.refusal([along], scene) is None:
+    if measure.refusal([along], scene, options) is None:
         return ""
     for p in scene.PARAMETERS:
         known = p.name != along and np.isfinite(fixed.get(p.name, np.nan))
-        if known and measure.refusal([along, p.name], scene) is None:
+        if known and measure.refusal([along, p.name], scene, options) is None:
             return p.name
-    raise BadInput(f"no boundaries are known along {along}: {measure.refusal([along], scene)}")
+    raise BadInput(f"no boundaries are known along {along}: {measure.refusal([along], scene, options)}")
 
 
 def _bounds(parameter, value):

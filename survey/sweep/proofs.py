@@ -42,7 +42,8 @@ def equation_of(workflow):
     scene = workflow.scene
     if not hasattr(scene, "equation"):
         raise BadInput(
-            f"prove: {workflow.name} has no formulas to prove; choose mathieu, satellite or libration_elliptic"
+            f"prove: {workflow.name} has no formulas to prove; choose mathieu, satellite, libration_elliptic, or "
+            "a Hill equation of your own"
         )
     names, ends = {}, {}
     for key, (_, values) in workflow.grid.parameters.items():

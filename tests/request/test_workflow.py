@@ -195,3 +195,14 @@ def test_listed_values_and_numbers_arrive_exactly(k, rho):
 def test_a_parameter_in_the_way_is_named():
     with pytest.raises(BadInput, match=r"^axes.theta0 cannot be combined with axes.l, which is also given"):
         workflow.check({"scene": "brun", "axes": {"l": 1.0, "theta0": 1.0}})
+
+
+def test_boundaries_of_a_question_without_a_verdict_are_refused_before_any_point(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    axes = {"A": 1.0, "B": {"values": [0.8, 0.9]}, "C": {"values": [0.6, 0.7]}}
+    asked = {"scene": "brun_triaxial", "options": {"question": "trajectory"}, "boundaries": {}, "axes": axes | {"t": 1}}
+    with pytest.raises(BadInput, match="of brun_triaxial question = trajectory has no verdict"):
+        survey.run(asked)
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(BadInput, match="no boundaries are known along B: question = trajectory has no verdict"):
+        survey.edge("brun_triaxial", question="trajectory", along="B", A=1.0, C=0.7, t=1.0, B=(0.5, 0.9))

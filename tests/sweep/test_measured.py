@@ -91,8 +91,14 @@ def test_a_file_that_is_none_of_ours_is_as_good_as_none(mapped, text):
     assert [one["kernels"] for one in json.loads(path.read_text())] == [[1.0, 2.0]]
 
 
+def test_a_run_of_almost_nothing_tells_nothing(mapped):
+    measured.note(mapped, {"kernels": 1e-3}, {"kernels": 3.0}, 0.0)  # on a slow machine it took seconds to begin
+    assert measured.factor(mapped, "kernels", 10.0) == 1.0
+
+
 def test_a_run_is_noted_and_a_resumed_one_is_not(mapped, monkeypatch):
     monkeypatch.setattr(measured, "SHORT", 0.0)
+    monkeypatch.setattr(measured, "LITTLE", 0.0)
     small = with_axes(mapped, k=4, rho=5)
     engine.run(small, fresh=True)
     (noted,) = measured._records()

@@ -28,6 +28,8 @@ def along(name, low, high, fixed, axis):
     if name in MOMENTS:
         return _along_moment(name, low, high, fixed, axis, others)
     A1, A2, A3 = (fixed[moment] for moment in (axis, *others))
+    if 2.0 * max(A1, A2, A3) > (A1 + A2 + A3) * (1.0 + 4e-16):  # no body has such moments
+        return [], True
     side = _side(A1, A2, A3)
     if side == 0:
         return [], True if (A1 - A2) * (A1 - A3) < 0.0 else None

@@ -14,7 +14,6 @@ rotations are known in closed form, see `critical_rates`.
 
 import numpy as np
 
-from survey.errors import BadInput
 from survey.measures import bounded, contours
 from survey.measures.body import clebsch, critical_rates
 from survey.measures.sampled import joined
@@ -32,8 +31,10 @@ def serves(scene):
     return "Omega" in {p.name for p in scene.PARAMETERS}
 
 
-def refusal(axes, scene):
+def refusal(axes, scene, options=None):
     """Why there are no curves on a map of these axes, in words; None if there are."""
+    if options and options["question"] not in AXES:
+        return f"question = {options['question']} has no verdict ({' and '.join(AXES)} have)"
     if len(axes) in (1, 2, 3) and any(set(axes) <= set(own) for own in AXES.values()):
         return None
     known = " or of ".join(f"{', '.join(own)} (question {question})" for question, own in AXES.items())
@@ -42,8 +43,6 @@ def refusal(axes, scene):
 
 def closed(square, axes, fixed, options):
     """The Curves on the map of `axes`, the unit square `square`; `fixed` holds the other parameters."""
-    if options["question"] not in AXES:
-        raise BadInput(f"boundaries: question = {options['question']} has no verdict; ask rotation or critical")
     if options["question"] == "rotation" and not set(axes) <= set(AXES["rotation"]):
         return _on_a_line(square, axes[0], fixed, options["axis"])
     sense = {"sense": float(options.get("sense", 1))}

@@ -35,7 +35,7 @@ ALONG = (
 )  # fmt: skip
 
 
-def refusal(axes, scene):
+def refusal(axes, scene, options=None):
     """Why there are no curves on a map of these axes, in words; None if there are."""
     if scene.FAMILY == "abel":
         return _refusal_of_own(axes, scene)

@@ -125,7 +125,7 @@ class Critical(Equation):
         try:
             return graph.lift(np.asarray(trace.lifted(self.period)(p), dtype=object).reshape(-1)[0])
         except trace.Unsupported as error:
-            raise trace.Unsupported(f"PERIOD(p): {error}") from None
+            raise trace.Unsupported(f"PERIOD(p): {error}", error.remedy) from None
 
     @staticmethod
     def _linear(graph, A, T, v):

@@ -40,7 +40,7 @@ SURE = 1e-6  # the widest bracket of a point, half of it, that is drawn
 RTOL, ROUGH = 1e-13, 1e-9  # of M for points of curves, and to see where these are
 
 
-def refusal(axes, scene):
+def refusal(axes, scene, options=None):
     """Why there are no curves on a map of these axes, in words; None if there are."""
     if scene is not None and scene.FAMILY == "orbit" and scene.symmetry is not None:
         return "curves are not known of orbits with REVERSED; see where the verdict changes on the map, or zoom there"

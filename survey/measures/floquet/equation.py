@@ -72,7 +72,7 @@ class Equation:
             raise Raised(name) from error
         if row.shape != (size,):
             what = "the states and a guess of the period" if size > self.n else "the states" if size > 1 else "a number"
-            raise Unsupported(f"{name} returns {row.shape} numbers, not {size}: {what}")
+            raise Unsupported(f"{name} returns {row.shape} numbers, not {size}: {what}", "correct it")
         return row
 
     def traced(self, points, x0):
@@ -103,7 +103,7 @@ class Equation:
         rows = self._called(graph, graph.time, x.copy(), graph.parameters)
         programs = compiled(graph, x, rows)
         if self.free and trace.TIME in programs.A.order:
-            raise Unsupported("f(t, x, p, out) depends on t, so that PERIOD must be given")
+            raise Unsupported("f(t, x, p, out) depends on t, so that PERIOD must be given", "give the period of f in t")
         return programs
 
     @staticmethod
@@ -121,16 +121,17 @@ class Equation:
             value = trace.lifted(self.f)(time, x, p, out)
             out = out if value is None else np.array(value, dtype=object)
         except Unsupported as error:
-            raise Unsupported(f"f(t, x, p, out): {error}") from None
+            raise Unsupported(f"f(t, x, p, out): {error}", error.remedy) from None
         except ArithmeticError as error:
             raise Unsupported(f"f(t, x, p, out): {error}, while its operations are recorded") from None
         except Exception as error:
             raise Raised("f(t, x, p, out)") from error
         if out.shape != (n,):
-            raise Unsupported(f"f(t, x, p, out) returns an array of shape {out.shape}, not {(n,)}")
+            what = f"f(t, x, p, out) returns an array of shape {out.shape}, not {(n,)}"
+            raise Unsupported(what, "fill the entries of out, and return nothing")
         if not all(symbol.is_number for symbol, _yes in (*graph.guards, *graph.equalities)):
             raise Unsupported(f"f(t, x, p, out): a branch depends on {self.BRANCHES} (abs and maximum are branches)")
-        return [graph.lift(out[i]) for i in range(n)]
+        return [graph.entry(out[i], "f(t, x, p, out)") for i in range(n)]
 
 
 def compiled(graph, x, rows):

@@ -183,19 +183,16 @@ class System:
             if value is not None:
                 out = np.array(value, dtype=object)
         except Unsupported as error:
-            raise Unsupported(f"{name}(t, p, out): {error}") from None
+            raise Unsupported(f"{name}(t, p, out): {error}", error.remedy) from None
         except ArithmeticError as error:
             raise Unsupported(f"{name}(t, p, out): {error}, while its operations are recorded") from None
         except Exception as error:
             raise Raised(f"{name}(t, p, out)") from error
         if out.shape != (size, size):
-            raise Unsupported(f"{name}(t, p, out) returns an array of shape {out.shape}, not {(size, size)}")
-        return {
-            (i, j): out[i, j]
-            for i in range(size)
-            for j in range(size)
-            if isinstance(out[i, j], Symbol) or graph.lift(out[i, j]).value != 0.0
-        }
+            what = f"{name}(t, p, out) returns an array of shape {out.shape}, not {(size, size)}"
+            raise Unsupported(what, "fill the entries of out, and return nothing")
+        entries = {(i, j): graph.entry(out[i, j], f"{name}(t, p, out)") for i in range(size) for j in range(size)}
+        return {at: out[at] for at, x in entries.items() if isinstance(out[at], Symbol) or x.value != 0.0}
 
     def _of_second_order(self, graph):
         """The entries of A from those of M, C and K."""
@@ -212,7 +209,8 @@ class System:
         inverse = solved(dense(given["M"], m), identity(m), graph) if "M" in given else identity(m)
         for name in "MC":
             if any(isinstance(x, Symbol) and not x.is_number for x in given.get(name, {}).values()):
-                raise Unsupported(f"{name}(t, p, out) depends on t, so that the momenta are not M q' + C q / 2; give A")
+                what = f"{name}(t, p, out) depends on t, so that the momenta are not M q' + C q / 2"
+                raise Unsupported(what, "give A(t, p, out) in place of the matrices, or set STRUCTURE = 'none'")
         half = [[0.5 * x for x in row] for row in C]
         velocity = times(inverse, half, m)  # q' = M^-1 (p - C q / 2)
         for (i, j), value in velocity.items():
@@ -309,5 +307,7 @@ def _pivot(work, left, columns, graph):
             varies = isinstance(work[i][j], Symbol) and not work[i][j].is_number
             found.append((varies, (in_row[i] - 1) * (in_column[j] - 1), -size[i, j], i, j))
     if not found:
-        raise Unsupported("M(t, p, out) is singular")
+        raise Unsupported(
+            "M(t, p, out) is singular", "give every coordinate a mass, or leave M out: it is the identity"
+        )
     return min(found)[3:]

@@ -36,7 +36,11 @@ DISPATCHER = type(fresh(lambda: None))
 
 
 class Unsupported(Exception):
-    """The function cannot be traced; says why."""
+    """The function cannot be traced; says why, and what to do."""
+
+    def __init__(self, why, remedy="use + - * / ** and functions such as sin, exp, sqrt of math or numpy"):
+        super().__init__(why)
+        self.remedy = remedy
 
 
 def _power(x, y):
@@ -339,6 +343,13 @@ class Graph:
         if isinstance(x, np.ndarray) and x.ndim == 0:
             return self.lift(x.item())
         raise Unsupported(f"{type(x).__name__} is not a real number")
+
+    def entry(self, x, call):
+        """What a function, written as `call`, put into its array, as a symbol."""
+        try:
+            return self.lift(x)
+        except Unsupported as error:
+            raise Unsupported(f"an entry that {call} fills in is no number: {error}", "give one number each") from None
 
     def sum(self, x, y):
         """x + y."""

@@ -21,7 +21,7 @@ ALONG = ()
 LINES = 129
 
 
-def refusal(axes, scene):
+def refusal(axes, scene, options=None):
     """Why there are no curves on a map of these axes, in words; None if there are."""
     if scene.FAMILY == "normal_form":
         return None if list(axes) == ["mu"] else f"boundaries are known along mu alone, not on {', '.join(axes)}"

@@ -39,7 +39,7 @@ ALONG = (
 )  # fmt: skip
 
 
-def refusal(axes, scene):
+def refusal(axes, scene, options=None):
     """Why there are no curves on a map of these axes, in words; None if there are."""
     if len(axes) in (2, 3) and (set(axes) <= set(AXES) or set(axes) <= set(level_curves.STATE)):
         return None

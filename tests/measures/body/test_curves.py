@@ -87,3 +87,10 @@ def test_what_has_no_boundaries_says_so(scene, given, words):
     with pytest.raises(BadInput, match=words) as error:
         survey.edge(scene, near=1.0, **given)
     assert "\n" not in str(error.value)
+
+
+def test_a_body_that_cannot_exist_has_no_critical_rate():
+    """One moment exceeds the sum of the others, by a little or by much; at equality the body is a plate."""
+    for C, number in ((0.3, 0), (0.4999, 0), (0.5, 2)):
+        found = survey.edge("brun_triaxial", along="Omega", Omega=(-9.0, 9.0), axis="B", A=0.5, B=1.0, C=C)
+        assert found.place.size == number
