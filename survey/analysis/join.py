@@ -37,14 +37,16 @@ OF_RUN = (
 def concat(datasets: Iterable[xr.Dataset | str | os.PathLike[str]]) -> xr.Dataset:
     """Join surveys that differ in the values of one axis, or in one fixed parameter, which becomes an axis.
 
+    An axis of names, such as those of bodies, may have parameters along it, which differ too.
+
     Parameters
     ----------
     datasets : two or more datasets of surveys, or paths of their files, in any order.
 
     Returns
     -------
-    xarray.Dataset, sorted along that axis, with counts of the whole. Points that several contain are kept once. Edges,
-    curves and cells ([boundaries], [refine]) are left out: they belong to the parts.
+    xarray.Dataset, sorted along that axis if it is one of numbers, with counts of the whole. Points that several
+    contain are kept once. Edges, curves and cells ([boundaries], [refine]) are left out: they belong to the parts.
 
     Raises
     ------
@@ -56,18 +58,19 @@ def concat(datasets: Iterable[xr.Dataset | str | os.PathLike[str]]) -> xr.Datase
         raise BadInput(f"concat: give two or more surveys, not {len(parts)}")
     for part in parts[1:]:
         _check_alike(parts[0], part)
-    axis = _axis(parts)
+    axis, beside = _axis(parts)
     about = parts[0][axis].attrs
-    parts = [_along(part, axis) for part in parts]
+    parts = [_along(part, axis, beside) for part in parts]
     joined = reduce(lambda one, other: _joined(one, other, axis), parts)
     return _described(joined.assign_coords({axis: (axis, joined[axis].values, about)}), parts, axis)
 
 
-def _along(part, axis):
-    """The survey with the axis as a dimension."""
+def _along(part, axis, beside):
+    """The survey with the axis as a dimension, along which the coordinates `beside` are, too."""
     if axis in part.dims:
         return part
-    return part.assign_coords({axis: float(part[axis])}).expand_dims(axis)
+    values = {name: (axis, np.atleast_1d(part[name].values), part[name].attrs) for name in (axis, *beside)}
+    return part.drop_vars(values).expand_dims(axis).assign_coords(values)
 
 
 def merge(paths, output):
@@ -112,7 +115,7 @@ def _check_alike(one, other):
 
 
 def _axis(parts):
-    """The one coordinate that differs."""
+    """The one coordinate that differs, and the others that differ along it, if it is one of names."""
     names = set().union(*(part.coords for part in parts))
     absent = sorted(name for name in names if any(name not in part.coords for part in parts))
     if absent:
@@ -120,13 +123,16 @@ def _axis(parts):
     first = parts[0]
     different = [name for name in first.coords if any(not part[name].variable.equals(first[name].variable)
                                                       for part in parts[1:])]  # fmt: skip
+    named = [name for name in different if first[name].dtype.kind in "UO"]
+    if len(named) == 1 and all(part[name].dims in ((), (named[0],)) for part in parts for name in different):
+        return named[0], [name for name in different if name != named[0]]
     if len(different) != 1:
         what = f"in {', '.join(map(str, different))}" if different else "in none: they are of the same points"
         raise BadInput(f"concat: surveys are joined along one axis, and these differ {what}")
     name = different[0]
     if first[name].dtype.kind not in "iuf" or any(part[name].dims not in ((), (name,)) for part in parts):
-        raise BadInput(f"concat: {name} is no axis of numbers, along which surveys can be joined")
-    return name
+        raise BadInput(f"concat: {name} is no axis of numbers or names, along which surveys can be joined")
+    return name, []
 
 
 def _joined(one, other, axis):
@@ -134,12 +140,13 @@ def _joined(one, other, axis):
     _, at, there = np.intersect1d(one[axis].values, other[axis].values, return_indices=True)
     common = one.isel({axis: at}).equals(other.transpose(*one.status.dims, ...).isel({axis: there}))
     if at.size and not common:
-        value = float(one[axis].values[at[0]])
-        raise BadInput(f"concat: the surveys have different values at common points, such as {axis} = {value:g}; "
+        value = _plain(one[axis].values[at[0]])
+        raise BadInput(f"concat: the surveys have different values at common points, such as {axis} = {value}; "
                        "leave these out of one of them")  # fmt: skip
     rest = np.setdiff1d(np.arange(other.sizes[axis]), there)
     joined = xr.concat([one, other.isel({axis: rest})], axis, combine_attrs="override", join="exact")
-    return joined.transpose(*one.status.dims, ...).sortby(axis)
+    joined = joined.transpose(*one.status.dims, ...)
+    return joined.sortby(axis) if joined[axis].dtype.kind in "iuf" else joined
 
 
 def _described(joined, parts, axis):
@@ -169,7 +176,8 @@ def _workflow(text, coordinate):
     if not isinstance(data.get("axes"), dict):
         return text
     data = {key: table for key, table in data.items() if key not in ("boundaries", "refine")}
-    data["axes"] |= {coordinate.name: unchanged(coordinate.values)}
+    numbers = coordinate.dtype.kind in "iuf"
+    data["axes"] |= {coordinate.name: unchanged(coordinate.values) if numbers else coordinate.values.tolist()}
     return tomli_w.dumps(data)
 
 

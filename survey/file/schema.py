@@ -255,7 +255,7 @@ def _along(ds, what, *names):
     for name in names:
         variable = ds.variables.get(name)
         if variable is None or variable.dims != (what,) or variable.dtype.kind not in "iuf":
-            raise Damaged(f"{name} must hold a number for each {what}")
+            raise Damaged(f"{name} must hold a number for each {what}; join surveys by survey.concat, not by xarray")
 
 
 def _on_axis(ds, dim, *names):

@@ -83,3 +83,12 @@ def test_what_does_not_fit_is_refused():
     refused("was not written by survey", xr.Dataset())
     with pytest.raises(BadInput, match="give a list of surveys"):
         survey.concat(one)
+
+
+def test_bodies_are_joined_with_their_parameters():
+    bodies = ["Sun-Jupiter", "Earth-Moon", "Sun-Earth"]
+    whole = survey.evaluate("libration_elliptic", body=bodies, variables=["verdict", "a"])
+    for parts in ([whole.isel(body=[k]) for k in (2, 0, 1)], [whole.isel(body=[2, 0]), whole.isel(body=1)]):
+        joined = survey.concat(parts)
+        assert joined.body.values.tolist() == [bodies[k] for k in (2, 0, 1)] and joined.attrs["points"] == 3
+        xr.testing.assert_equal(joined.isel(body=[1, 2, 0]), whole)
