@@ -61,6 +61,10 @@ def searched(scene, square, axes, fixed, options):
     matrices = matrices_of(scene, square, axes, fixed, options)
     lattice, found = contours.lattice(LINES, square.across), []
     on_lattice = matrices(lattice, ROUGH)
+    functions = bifurcations.functions(on_lattice[0].shape[1], scene.structure)
+
+    def on_map(function, x):
+        return function(*matrices(x))
 
     def draw(kind, x, error):
         sure, angle, bar, outside = bifurcations.passing(*matrices(x), kind, scene.structure)
@@ -68,45 +72,43 @@ def searched(scene, square, axes, fixed, options):
             known = {"angle": (angle[part], bar[part]), "outside": (outside[part], 0.0 * bar[part])}
             found.append((kind, square.parameters(x[part]), error[part], known))
 
-    for kind, function in bifurcations.functions(on_lattice[0].shape[1], scene.structure).items():
+    for kind, function in functions.items():
         values, bars = function(*on_lattice)
         # where no sign is certain all around, as where the function is 0 throughout, there is only noise
         open_ = ~(abs(values) > bars).reshape(LINES, -1)
         around = np.ones((3, 3 if square.across is None else 1))
         values = np.where(binary_erosion(open_, around, border_value=1).ravel(), np.nan, values)
-
-        def on_map(x, function=function):
-            return function(*matrices(x))
-
         lines = _lines if square.across is None else partial(_crossings, across=square.across)
-        for x, error in lines(on_map, square.grain, values.reshape(open_.shape)):
+        for x, error in lines(partial(on_map, function), square.grain, values.reshape(open_.shape)):
             draw(kind, x, error)
-    unexplained = None
-    if square.across is None:
-        drawn = [(kind, square.positions(parameters)) for kind, parameters, _error, _known in found]
-        indices = _indices_of(scene, square, axes, fixed, options)
-        passed = {kind: values.reshape(LINES, LINES) for kind, values in indices(lattice).items()}
-        for kind, values in passed.items():
-            for x, error in narrow.curves(lambda x, kind=kind: indices(x)[kind], values, kind, drawn):
-                draw(kind, x, error + square.grain)
-                drawn.append((kind, x))
-        counts = row_count.outside(*on_lattice, scene.structure).reshape(LINES, LINES)
-        unexplained = row_count.unexplained(counts, drawn, passed)[0]
+    if square.across is not None:
+        return joined(found, [output.name for output in ALONG])
+    drawn, passed = [(kind, square.positions(parameters)) for kind, parameters, _error, _known in found], {}
+    for kind, index in _indices(scene, square, axes, fixed, options).items():
+        passed[kind] = index(lattice).reshape(LINES, LINES)
+        for x, error in narrow.curves(index, partial(on_map, functions[kind]), passed[kind], kind, drawn):
+            draw(kind, x, error + square.grain)
+            drawn.append((kind, x))
     curves = joined(found, [output.name for output in ALONG])
-    curves.unexplained = unexplained
+    counts = row_count.outside(*on_lattice, scene.structure).reshape(LINES, LINES)
+    curves.unexplained = row_count.unexplained(counts, drawn, passed)[0]
     return curves
 
 
-def _indices_of(scene, square, axes, fixed, options):
-    """indices(positions (N, 2)) -> {kind: values (N)}, the Maslov indices; of systems that are not symplectic, {}."""
-    names = {} if scene.structure != "symplectic" else {PLUS_ONE: "index_plus_one", MINUS_ONE: "index_minus_one"}
-    solved = _solved(scene, square, axes, fixed, options, "auto", ["monodromy", *names.values()])
+def _indices(scene, square, axes, fixed, options):
+    """{kind: index(positions (N, 2))}, the Maslov indices; {} where systems are not symplectic, or an excluded value
+    cuts the map into parts whose indices have nothing to do with one another.
+    """
+    ends = {name: (square.low[k], square.high[k]) for k, name in enumerate(axes)}
+    cut = any(ends[p.name][0] < x < ends[p.name][1] for p in scene.PARAMETERS if p.name in ends for x in p.excluded)
+    if cut or scene.structure != "symplectic":
+        return {}
 
-    def indices(x):
-        out = solved(x, ROUGH) if names else {}
-        return {kind: out[name] for kind, name in names.items()}
+    def index_of(name):
+        solved = _solved(scene, square, axes, fixed, options, "auto", ["monodromy", name])
+        return lambda x: solved(x, ROUGH)[name]
 
-    return indices
+    return {kind: index_of(name) for kind, name in ((PLUS_ONE, "index_plus_one"), (MINUS_ONE, "index_minus_one"))}
 
 
 def matrices_of(scene, square, axes, fixed, options, method="auto"):

@@ -18,6 +18,7 @@ from survey.measures.floquet.maslov import UNKNOWN
 SHARES = (0.5, 0.31, 0.69)  # of a segment: where it is cut, the first at which the index is known
 SHORT = 1e-9  # of the map: segments that are not cut any more
 SURE = 1e-6  # half the longest one that is drawn
+ZERO = 1e-3  # the largest value, of at most 1, of a function that is 0 there
 CUTS = 40
 ASIDE = 2.0  # cells: how far a curve may go from line to line
 
@@ -48,21 +49,26 @@ class _Segments:
         return halves
 
 
-def curves(index, passed, kind, drawn):
+def curves(index, function, passed, kind, drawn):
     """[(positions (m, 2), errors (m))] of curves of `kind` that are missing among those `drawn` [(kind, positions)].
 
-    `index(positions (N, 2))` is the index, and `passed` (n, n) its values on the lattice.
+    `index(positions (N, 2))` is the index, `passed` (n, n) its values on the lattice, and `function(positions)` that of
+    `bifurcations` with its bounds, which is 0 on the curves.
     """
     own, found = [one for one in drawn if one[0] == kind], []
-    lost = _unexplained(passed, own)
-    along = Counter(axis for axis, *_ in lost)
-    for axis, _number in along.most_common():
+    ticks = np.linspace(0.0, 1.0, len(passed))
+    most = Counter(axis for axis, *_ in _unexplained(passed, own)).most_common()
+    for axis, _number in most:  # what is found along the one explains most of the other
         lines = passed if axis == 1 else passed.T
-        ticks = np.linspace(0.0, 1.0, len(lines))
-        where = np.array([segment[1:] for segment in (_unexplained(passed, own) if found else lost)
-                          if segment[0] == axis], int).reshape(-1, 3)  # fmt: skip
+        lost = [segment[1:] for segment in _unexplained(passed, own) if segment[0] == axis]
+        where = np.array(lost, int).reshape(-1, 3)
         segments = _Segments(where[:, 0], ticks[where[:, 1:]], lines[where[:, :1], where[:, 1:]])
-        pieces = _linked(_shortened(index, segments, axis, ticks), axis, ticks)
+        segments = _shortened(index, segments, axis, ticks)
+        if not segments.line.size:
+            continue
+        values, _bars = function(_positions(segments, axis, ticks))
+        segments = segments[abs(values) <= ZERO]  # the index of a system that jumps does so without a passage
+        pieces = _linked(segments, axis, ticks)
         found += pieces
         own += [(kind, x) for x, _error in pieces]
     return found
@@ -94,6 +100,12 @@ def _shortened(index, segments, axis, ticks):
         near, far = segments[known].cut(at[known], value[known])
         segments = near.joined([far])
     return segments.joined(done)
+
+
+def _positions(segments, axis, ticks):
+    """The middles (S, 2) of the segments."""
+    x = np.stack([segments.ends.mean(axis=1), ticks[segments.line]], axis=1)
+    return x if axis == 0 else x[:, ::-1]
 
 
 def _linked(segments, axis, ticks):

@@ -85,3 +85,13 @@ def test_a_tongue_of_a_millionth_of_the_map_is_drawn():
     edges = np.array([characteristic_values(one, 1)[4:6] for one in q[0]]).T
     assert np.array_equal(q[0], q[1]) and 5e-6 < (edges[1] - edges[0]).max() < 2e-5
     assert (abs(np.sort(a, axis=0) - edges) <= error + 1e-11).all()  # of eigenvalues up to 3600
+
+
+def test_where_a_system_jumps_nothing_passes():
+    def jumps(t, p, out):
+        out[0, 0] = p[0] if p[0] + 0.1 * p[1] < 2.0 else p[0] + 30.0
+
+    scene = survey.floquet(K=jumps, period=PI, parameters=("a", "q"), states="x", structure="symplectic")
+    table = {"a": {"start": 1.2, "stop": 3.5, "num": 3}, "q": {"start": 0.0, "stop": 1.0, "num": 3}}
+    found = boundaries.find(check({"scene": scene, "axes": table, "boundaries": {}}))
+    assert found.sizes["curve"] == 0 and found.attrs["curves_unexplained"] >= 95
