@@ -74,7 +74,7 @@ def run(
         raise BadInput(f"workers = {shown(workers)}: it must be a positive integer, or None for threads")
     if block_timeout is not None and not (is_number(block_timeout) and 0 < block_timeout < np.inf):
         raise BadInput(f"block_timeout = {shown(block_timeout)}: it must be a positive number of seconds, or None")
-    held = earlier.find(checked, reuse)[0] if reuse is not None else None
+    held = earlier.find(checked, reuse, fresh)[0] if reuse is not None else None
     silent = not announce.is_watched()
     with Progress(announce.console(), checked, silent) as progress:
         engine.run(

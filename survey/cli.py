@@ -151,7 +151,7 @@ def run(workflow, output, overrides, workers, scheduler, block_timeout, fresh, r
     from survey.sweep import engine
 
     checked = read(workflow, overrides, output)
-    held, told = earlier.find(checked, reuse) if reuse else (None, "")
+    held, told = earlier.find(checked, reuse, fresh) if reuse else (None, "")
     if told and not quiet:
         err.print(plain(told), markup=False)
 

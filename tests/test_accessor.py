@@ -396,6 +396,7 @@ def test_lazy_files_are_read_in_part(mathieu, tmp_path):
         (lambda s: s.compare(survey.evaluate("mathieu", a=7.5, q=1.0)), "no value of a is common to both"),
         (lambda s: s.compare(survey.evaluate("libration", mu=0.01)), "the scenes differ"),
         (lambda s: s.slice(q=1.0).survey.slice(a=1.0).survey.areas(), "two values or more"),
+        (lambda s: s._ds.isel(a=[0, 1, 1, 2]).survey.areas(), "values of a must rise, or fall"),
     ],
 )
 def test_what_cannot_be_answered_is_said_in_one_line(mathieu, ask, words):

@@ -26,6 +26,9 @@ def of_map(ds):
         raise BadInput("this survey has no verdict, so there are no areas of it")
     if not ds.status.dims or min(ds.status.shape) < 2:
         raise BadInput("areas: every axis needs two values or more; remove the others with slice")
+    for dim in ds.status.dims:
+        if dim in ds.coords and ds[dim].dtype.kind in "iuf" and not _is_monotonic(ds[dim].values):
+            raise BadInput(f"areas: the values of {dim} must rise, or fall, without repetition: use ds.sortby")
     codes = flag_codes(ds.verdict.attrs)
     codes["no_answer"] = NO_ANSWER
     area, least, most = _counted(ds, list(codes.values()))
@@ -38,6 +41,11 @@ def of_map(ds):
     if len(ds.status.dims) == 2 and _can_be_refined(ds):
         found.attrs["areas"] += " ([refine] bounds it)"
     return found
+
+
+def _is_monotonic(values):
+    steps = np.diff(values.astype(float))
+    return bool((steps > 0).all() or (steps < 0).all())
 
 
 def _can_be_refined(ds):

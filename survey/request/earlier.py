@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from survey.errors import BadInput
 from survey.file import finished, reading
 from survey.file.blocks import of_output
 from survey.request import workflow as workflows
@@ -16,18 +17,26 @@ from survey.wording import short, shown
 FURTHER = ("boundaries", "refine")  # found anew
 
 
-def find(workflow, path):
+def find(workflow, path, fresh=False):
     """(survey.sweep.reuse.Earlier or None, a sentence on how much of the file at `path` is taken over, or why not).
 
-    Raises BadInput or Damaged if there is no survey in the file.
+    Raises BadInput or Damaged if there is no survey in the file, or if it is finished, nothing is taken from it and the
+    run would replace it without being `fresh`.
     """
     ds = reading.load(Path(path))
     found, why = None, _unlike(workflow, ds.attrs)
     if not why:
         found, why = _common(workflow, ds, Path(path))
+    if why and not (fresh or finished.lost(ds.attrs)) and _is_output(workflow, path):
+        remedy = "write another file with -o, or replace it with --fresh (in Python output=, fresh=True)"
+        raise BadInput(f"{path}: nothing can be taken from this file: {why}; {remedy}")
     if why:
         return None, f"{path}: nothing is taken from this file: {why}"
     return found, f"{path}: {found.points:,} of {workflow.grid.points:,} points are taken from this file"
+
+
+def _is_output(workflow, path):
+    return workflow.path.exists() and workflow.path.samefile(path)
 
 
 def _unlike(workflow, attributes):

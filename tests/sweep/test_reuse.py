@@ -77,6 +77,10 @@ def test_what_is_held_is_not_solved_and_the_bits_are_the_same(brun, monkeypatch,
 def test_it_is_told_why_nothing_is_taken(brun, override, why):
     held, told = earlier.find(workflow.read(brun, [override], "new.nc"), "old.nc")
     assert held is None and re.search(why, told)
+    over_it = workflow.read(brun, [override], "old.nc")
+    with pytest.raises(BadInput, match=f"{why}.*; write another file with -o, or replace it with --fresh"):
+        earlier.find(over_it, "old.nc")
+    assert earlier.find(over_it, "old.nc", fresh=True) == (None, told)
 
 
 def test_a_map_whose_series_take_the_whole_axis_is_solved_anew(tmp_path, monkeypatch):
