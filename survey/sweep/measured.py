@@ -19,7 +19,7 @@ from survey.sweep.announce import always_compiled
 
 MOST = 400  # records that are kept
 SHORT = 1.0  # seconds: a shorter run has spent them on beginning, and would tell a longer one a multiple of its time
-LITTLE = 0.01  # seconds of an estimate: beside the beginning of a run they cannot be measured
+LITTLE = 1e-3  # seconds of an estimate: beside the beginning of a run they cannot be measured
 PARTS = ("kernels", "further")  # [seconds estimated, measured] of the points; of edges, curves and cells
 
 

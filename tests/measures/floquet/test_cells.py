@@ -140,6 +140,8 @@ def test_where_there_are_none():
 
     def A(t, p, out):
         out[0, 0] = p[0] - p[1]
+        for j in range(1, len(out)):
+            out[0, j] = 1.0
 
     axes = {"a": {"start": 0.1, "stop": 1.0, "num": 3}, "b": {"start": 0.1, "stop": 1.0, "num": 3}}
     given = {"period": 2 * math.pi, "parameters": ("a", "b"), "states": ("x", "y")}
