@@ -47,7 +47,7 @@ def followed(function, pieces, grain):
         end.going = False
     _sides(function, [end for end in ends if end.going])
     for _ in range(MOST):
-        going = [end for end in ends if end.going]
+        going = [end for k, end in enumerate(ends) if end.going and not any(_faces(end, one) for one in ends[:k])]
         if not going:
             break
         _steps(function, going, ends, grain)
@@ -107,6 +107,8 @@ def _steps(function, going, ends, grain):
     inside = (t >= 0.0) & (t <= 1.0)
     off = abs(t - goals[rows, axis])
     for k, end in enumerate(going):
+        if not end.going:  # another one has met it
+            continue
         place = goals[k].copy()
         place[axis[k]] = t[k]
         other = met[k]
@@ -125,16 +127,24 @@ def _steps(function, going, ends, grain):
             end.step = min(1.5 * end.step, LONGEST)
 
 
+def _meets(end, other, reach):
+    """Is the tip of the other end, which comes from there, straight ahead of this one and not farther than `reach`?"""
+    run, ahead = other.x[-1] - end.x[-1], end.ahead
+    along = run @ ahead
+    return 0.0 < along <= reach and np.hypot(*(run - along * ahead)) <= 0.2 * along and ahead @ other.ahead < 0.0
+
+
+def _faces(end, other):
+    """Would both pass each other in their next steps? Then one of them waits."""
+    return other.going and _meets(end, other, 1.3 * (end.step + other.step)) and not _meets(end, other, 1.3 * end.step)
+
+
 def _goal(end, ends):
     """(where the next step leads to, the end of another piece that is met there, or None)."""
     tip, ahead = end.x[-1], end.ahead
     for other in ends:
-        if other is not end and len(other.x) == other.own:
-            run = other.x[-1] - tip
-            along = run @ ahead
-            if 0.0 < along <= 1.3 * end.step and np.hypot(*(run - along * ahead)) <= 0.2 * along:
-                if ahead @ other.ahead < 0.0:
-                    return other.x[-1], other
+        if other is not end and _meets(end, other, 1.3 * end.step):
+            return other.x[-1], other
     goal = tip + end.step * ahead
     with np.errstate(all="ignore"):
         room = np.where(ahead > 0.0, (1.0 - tip) / ahead, np.where(ahead < 0.0, -tip / ahead, np.inf))
