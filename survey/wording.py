@@ -35,6 +35,8 @@ def short(text, most=SHOWN):
 def shown(value, most=SHOWN):
     """The repr of a value in one short line, as messages show it."""
     try:
+        if type(value).__module__ == "numpy" and getattr(value, "shape", None) == ():
+            value = value.item()  # 0.5, not np.float64(0.5)
         return short(repr(value), most)
     except Exception:  # an integer of more than 4300 digits, or an object whose repr fails
         return f"a value of type {type(value).__name__} that cannot be shown"

@@ -99,14 +99,10 @@ def _part(given):
     return given
 
 
-def _plain(value):
-    return f"{value:g}" if isinstance(value, (float, np.floating)) else shown(value)
-
-
 def _check_alike(one, other):
     for key in SAME:
         if one.attrs.get(key) != other.attrs.get(key):
-            both = " and ".join(_plain(ds.attrs.get(key)) for ds in (one, other))
+            both = " and ".join(shown(ds.attrs.get(key)) for ds in (one, other))
             raise BadInput(f"concat: the surveys have another {key}: {both}")
     names = [set(ds.data_vars) for ds in (one, other)]
     if names[0] != names[1]:
@@ -140,7 +136,7 @@ def _joined(one, other, axis):
     _, at, there = np.intersect1d(one[axis].values, other[axis].values, return_indices=True)
     common = one.isel({axis: at}).equals(other.transpose(*one.status.dims, ...).isel({axis: there}))
     if at.size and not common:
-        value = _plain(one[axis].values[at[0]])
+        value = shown(one[axis].values[at[0]])
         raise BadInput(f"concat: the surveys have different values at common points, such as {axis} = {value}; "
                        "leave these out of one of them")  # fmt: skip
     rest = np.setdiff1d(np.arange(other.sizes[axis]), there)

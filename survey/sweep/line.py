@@ -35,9 +35,8 @@ def on_line(scene, options, along, ends, fixed):
     Raises BadInput where the scene's family knows no curves.
     """
     measure = measures.question(scene.FAMILY, "curves")
-    second = (
-        second_axis(measure, scene, along, fixed, options) if hasattr(measure, "closed") else ""
-    )  # searched on any axis
+    is_closed = hasattr(measure, "closed")  # others are searched along any axis
+    second = second_axis(measure, scene, along, fixed, options) if is_closed else ""
     if second:
         bounds = _bounds(next(p for p in scene.PARAMETERS if p.name == second), fixed[second])
     else:

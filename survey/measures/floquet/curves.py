@@ -84,8 +84,15 @@ def searched(scene, square, axes, fixed, options):
     if square.across is not None:
         return joined(found, [output.name for output in ALONG])
     drawn, passed = [(kind, square.positions(parameters)) for kind, parameters, _error, _known in found], {}
-    for kind, index in _indices(scene, square, axes, fixed, options).items():
-        passed[kind] = index(lattice).reshape(LINES, LINES)
+    names = _indices(scene, square, axes)
+    indices = _solved(scene, square, axes, fixed, options, "auto", ["monodromy", *names.values()])
+    on_lines = indices(lattice, ROUGH) if names else {}
+    for kind, name in names.items():
+
+        def index(x, name=name):
+            return indices(x, ROUGH)[name]
+
+        passed[kind] = on_lines[name].reshape(LINES, LINES)
         for x, error in narrow.curves(index, partial(on_map, functions[kind]), passed[kind], kind, drawn):
             draw(kind, x, error + square.grain)
             drawn.append((kind, x))
@@ -95,20 +102,15 @@ def searched(scene, square, axes, fixed, options):
     return curves
 
 
-def _indices(scene, square, axes, fixed, options):
-    """{kind: index(positions (N, 2))}, the Maslov indices; {} where systems are not symplectic, or an excluded value
+def _indices(scene, square, axes):
+    """{kind: name} of the outputs that are Maslov indices; {} where systems are not symplectic, or an excluded value
     cuts the map into parts whose indices have nothing to do with one another.
     """
     ends = {name: (square.low[k], square.high[k]) for k, name in enumerate(axes)}
     cut = any(ends[p.name][0] < x < ends[p.name][1] for p in scene.PARAMETERS if p.name in ends for x in p.excluded)
     if cut or scene.structure != "symplectic":
         return {}
-
-    def index_of(name):
-        solved = _solved(scene, square, axes, fixed, options, "auto", ["monodromy", name])
-        return lambda x: solved(x, ROUGH)[name]
-
-    return {kind: index_of(name) for kind, name in ((PLUS_ONE, "index_plus_one"), (MINUS_ONE, "index_minus_one"))}
+    return {PLUS_ONE: "index_plus_one", MINUS_ONE: "index_minus_one"}
 
 
 def matrices_of(scene, square, axes, fixed, options, method="auto"):

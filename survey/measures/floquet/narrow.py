@@ -57,11 +57,12 @@ def curves(index, function, passed, kind, drawn):
     """
     own, found = [one for one in drawn if one[0] == kind], []
     ticks = np.linspace(0.0, 1.0, len(passed))
-    most = Counter(axis for axis, *_ in _unexplained(passed, own)).most_common()
-    for axis, _number in most:  # what is found along the one explains most of the other
+    lost = _unexplained(passed, own)
+    for axis, _number in Counter(axis for axis, *_ in lost).most_common():
         lines = passed if axis == 1 else passed.T
-        lost = [segment[1:] for segment in _unexplained(passed, own) if segment[0] == axis]
-        where = np.array(lost, int).reshape(-1, 3)
+        if found:  # along the one axis, which explains most of the other
+            lost = _unexplained(passed, own)
+        where = np.array([segment[1:] for segment in lost if segment[0] == axis], int).reshape(-1, 3)
         segments = _Segments(where[:, 0], ticks[where[:, 1:]], lines[where[:, :1], where[:, 1:]])
         segments = _shortened(index, segments, axis, ticks)
         if not segments.line.size:
