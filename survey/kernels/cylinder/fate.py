@@ -43,6 +43,10 @@ from survey.kernels.math.roundoff import ROUNDOFF_UP
 UNDECIDED, EQUILIBRIUM, SADDLE, ROTATION_PLUS, ROTATION_MINUS, LIBRATION = -1, 0, 1, 2, 3, 4
 SPIN_UP_PLUS, SPIN_UP_MINUS, PERIODIC_ROTATION, PERIODIC_LIBRATION, EQUILIBRIUM_START = 5, 6, 7, 8, 9
 INFINITE, UNDETERMINED, NO_TURNS = -1, -2, -(2**31)
+# LIMIT of an undecided fate whose cycles are not known: the table that would decide it.
+NEEDS_PLUS, NEEDS_MINUS, NEEDS_LIBRATIONS = -2, -3, -4
+NOT_KNOWN = -1  # instead of the number of rows of a table of cycles
+PATIENT = 500  # steps that a motion without its cycles is followed, in case an equilibrium captures it
 TRUST = 1e-4
 GENERIC, REVERSIBLE = 0, 3  # strata that are followed; REVERSIBLE is I2, K = L = 0
 
@@ -150,7 +154,8 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
     """Fill out (VERDICT to STATUS of `records`) for `start` (START_PHI to START_W_BAR).
 
     LIMIT is a row of eqs (verdicts 0, 9), of plus or minus (2, 3) or of lib (4).
-    sizes = numbers of rows of these, then the stratum and whether weak foci attract.
+    sizes = numbers of rows of these, then the stratum and whether weak foci attract. Where a table of cycles is
+    NOT_KNOWN, equilibria alone decide.
     """
     count, n_plus, n_minus, n_lib, stratum, weak = sizes[0], sizes[1], sizes[2], sizes[3], sizes[4], sizes[5] > 0
     out[rc.VERDICT], out[rc.LIMIT] = UNDECIDED, -1
@@ -222,7 +227,11 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
                 shift = at_home - phi
                 same = not math.isnan(right) and not math.isnan(left) and stratum == GENERIC
                 same = same and between(eqs, count, min(right, unwrapped), max(right, unwrapped)) == 0
-                if same:
+                if same and n_lib == NOT_KNOWN:
+                    out[rc.LIMIT] = NEEDS_LIBRATIONS
+                    if n > PATIENT:
+                        return
+                elif same:
                     inside = between(eqs, count, left, unwrapped)
                     decided, which = libration_decides(lib, n_lib, row, inside, at_home, bar_phi,
                                                        right + (at_home - unwrapped), right_bar)  # fmt: skip
@@ -258,7 +267,16 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
                 axis = here
             else:
                 cycles, size, end = (plus, n_plus, ends[0]) if sign > 0 else (minus, n_minus, ends[1])
-                decided, which = rotation_decides(cycles, size, end, abs(w), own, before, before_bar)
+                decided, which = 0, -1
+                if size == NOT_KNOWN:
+                    out[rc.LIMIT] = NEEDS_PLUS if sign > 0 else NEEDS_MINUS
+                    rising = before > 0.0 and abs(w) - before > own + before_bar
+                    if rising:  # no equilibrium will capture it
+                        out[rc.RISING_FROM] = abs(w)
+                    if rising or n > PATIENT:
+                        return
+                else:
+                    decided, which = rotation_decides(cycles, size, end, abs(w), own, before, before_bar)
                 if decided < 0:
                     out[rc.STATUS] = SEPARATRIX
                     return

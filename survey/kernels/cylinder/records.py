@@ -17,4 +17,5 @@ STATE = 4
 # A fate: verdict, row of the table of its limit, turning points and unwrapped turns of the limit, status; where g = 0
 # also the angle that is reached.
 VERDICT, LIMIT, TURNINGS, NET_TURNS, STATUS, LIMIT_PHI, LIMIT_PHI_BAR = range(7)
+RISING_FROM = NET_TURNS  # of a rotation that grows from turn to turn and needs cycles: its last |w|
 FATE, FREE_FATE = 5, 7

@@ -34,6 +34,7 @@ NARROWEST = 1e-9  # gaps, relative, in which fates are told
 BACK = np.array([-1.0, -1.0, 1.0, 1.0, 1.0, 1.0])  # S1, see `solution`
 SHARP = 1e-13  # error of a state that is no more than rounding beside the least bar of a piece
 FEWEST = 1_000  # starts of one system: fewer are followed
+SELDOM = 0.08  # share of the time for all cycles that the fates of few starts take, as most need none
 SYSTEMS = 8  # whose curves are kept: on maps of more, blocks would find them again
 _LOCK = threading.Lock()
 
@@ -95,6 +96,8 @@ def asked(request, names):
 
 def cost(starts, each, system):
     """Seconds per start, of so many of one system: `each` where it is followed, `system` for the cycles."""
+    if starts <= fate.FEW:
+        return each + SELDOM * system / starts
     return (each if starts < FEWEST else 3e-6 + 0.2 / starts) + system / starts
 
 

@@ -15,7 +15,7 @@ from survey.kernels.cylinder import fate as kf
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder import returns as rt
 from survey.kernels.cylinder.program import COLUMNS
-from survey.measures.cylinder.fate import I1, followed, outline
+from survey.measures.cylinder.fate import I1, LIBRATIONS, MINUS, PLUS, Cycles, followed, outline
 from survey.measures.cylinder.separatrices import TWO_PI, Level, far_end
 from survey.measures.cylinder.separatrix import symmetric
 
@@ -62,17 +62,17 @@ def backward(s):
     flipped = s.p.copy()
     flipped[:2] *= -1.0
     turned = outline(flipped if len(s.p) > COLUMNS else flipped[:6])
-    return replace(turned, plus=_inverted(s.minus), minus=_inverted(s.plus), librations=_inverted(s.librations),
-                   thresholds=s.thresholds[::-1, ::-1], conclusive=s.conclusive)  # fmt: skip
+    swapped = {PLUS: MINUS, MINUS: PLUS, LIBRATIONS: LIBRATIONS}
+    return replace(turned, search=lambda _turned, kind, _above=0.0: _inverted(s.cycles(swapped[kind])))
 
 
 def _inverted(cycles):
     """Fixed points of the inverse of a return map."""
-    turned = cycles.copy()
-    turned[:, [rt.BELOW, rt.ABOVE]] *= -1.0
-    turned[:, rt.MULTIPLIER] = 1.0 / cycles[:, rt.MULTIPLIER]
-    turned[:, rt.MULTIPLIER_BAR] = cycles[:, rt.MULTIPLIER_BAR] / cycles[:, rt.MULTIPLIER] ** 2
-    return turned
+    table = cycles.table.copy()
+    table[:, [rt.BELOW, rt.ABOVE]] *= -1.0
+    table[:, rt.MULTIPLIER] = 1.0 / cycles.table[:, rt.MULTIPLIER]
+    table[:, rt.MULTIPLIER_BAR] = cycles.table[:, rt.MULTIPLIER_BAR] / cycles.table[:, rt.MULTIPLIER] ** 2
+    return Cycles(table, cycles.threshold[::-1], cycles.conclusive)
 
 
 def _number(s, end, index):

@@ -6,8 +6,9 @@ parameters alone and is computed once for all initial states.
 
 import math
 import sys
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -26,6 +27,9 @@ from survey.measures.cylinder.solution import tolerances, trajectories
 
 NO_TURNS = kf.NO_TURNS
 I0, I1, I2, G = 0, 1, 2, 3  # strata
+KINDS = PLUS, MINUS, LIBRATIONS = kf.NEEDS_PLUS, kf.NEEDS_MINUS, kf.NEEDS_LIBRATIONS  # of cycles
+_NONE = np.zeros((0, 10))
+FEW = 8  # starts of one system that are followed before its cycles are searched, which most may do without
 EXACT = 7e-16  # three ulp: K and L are 0 within the rounding of decimal parameters
 STEPS = 20_000  # budget of one fate: about 15 ms
 MORE = 10  # times the budget for those that use it up
@@ -178,8 +182,24 @@ def forget():
 
 
 @dataclass(frozen=True)
+class Cycles:
+    """Cycles of one kind, in a table as in `kernels.cylinder.returns`, and (w_c, w_d) of their map if they rotate."""
+
+    table: np.ndarray
+    threshold: tuple = (math.nan, math.nan)  # NaN where every turn from w > 0 is completed
+    conclusive: bool = True  # do the signs of D fit together (so the parity law holds), and did every map answer?
+
+
+def _no_cycles(s, kind, above=0.0):
+    return Cycles(_NONE)
+
+
+@dataclass(frozen=True)
 class Skeleton:
-    """What decides the fates at one parameter point; tables as in `kernels.cylinder.equilibria` and `returns`."""
+    """What decides the fates at one parameter point; tables as in `kernels.cylinder.equilibria` and `returns`.
+
+    Cycles are searched when they are first asked for, as they take almost all of the time.
+    """
 
     p: np.ndarray
     stratum: int
@@ -188,13 +208,38 @@ class Skeleton:
     ends: np.ndarray  # 1 attracting, 0 neutral, -1 repelling, for w -> +inf and w -> -inf
     section: float
     equilibria: np.ndarray
-    plus: np.ndarray
-    minus: np.ndarray
-    librations: np.ndarray
-    thresholds: np.ndarray  # (w_c, w_d) of the two rotation maps; NaN where every turn from w > 0 is completed
-    conclusive: bool  # do the signs of D fit together (so the parity law holds), and did every map answer?
     folded: bool  # is an equilibrium degenerate, or so nearly that float64 hides it, and with it cycles?
     unknown: bool = False  # does that hide how many equilibria there are?
+    search: Callable = _no_cycles  # of this skeleton and a kind, the Cycles; see `_searched`
+    found: dict = field(default_factory=dict)  # the Cycles by kind, as far as they are known
+
+    def cycles(self, kind):
+        """The Cycles of a kind: PLUS, MINUS or LIBRATIONS."""
+        if kind not in self.found:
+            self.found[kind] = self.search(self, kind)
+        return self.found[kind]
+
+    @property
+    def plus(self):
+        return self.cycles(PLUS).table
+
+    @property
+    def minus(self):
+        return self.cycles(MINUS).table
+
+    @property
+    def librations(self):
+        return self.cycles(LIBRATIONS).table
+
+    @property
+    def thresholds(self):
+        """(w_c, w_d) of the two rotation maps."""
+        return np.array([self.cycles(PLUS).threshold, self.cycles(MINUS).threshold])
+
+    @property
+    def conclusive(self):
+        """Are all Cycles?"""
+        return all(self.cycles(kind).conclusive for kind in KINDS)
 
 
 def sizes(b12, b31, d, c23, s2, s3):
@@ -225,17 +270,17 @@ def stratum_of(b12, b31, d, c23, s2, s3):
 def skeleton(method, six):
     """The skeleton of one parameter point (six numbers)."""
     s = outline(six)
-    if s.stratum != G or s.unknown:
-        return s
-    eqs, thresholds = s.equilibria, s.thresholds.copy()
-    plus, thresholds[0], first = _rotations(method, s.p, eqs, s.section, s.ends[0], s.K, s.L)
+    return replace(s, search=partial(_searched, method)) if s.stratum == G and not s.unknown else s
+
+
+def _searched(method, s, kind, above=0.0):
+    """The Cycles of a kind, rotations from that velocity on."""
+    if kind == LIBRATIONS:
+        return _librations(method, s.p, s.equilibria, s.folded)
+    if kind == PLUS:
+        return _rotations(method, s.p, s.equilibria, s.section, s.ends[0], s.K, s.L, above)
     mirrored = flow_of(signed(s.p, MIRROR))
-    minus, thresholds[1], second = _rotations(
-        method, mirrored, mirrored_equilibria(eqs), -s.section, s.ends[1], s.K, -s.L
-    )
-    librations, third = _librations(method, s.p, eqs, s.folded)
-    conclusive = first and second and third
-    return replace(s, plus=plus, minus=minus, librations=librations, thresholds=thresholds, conclusive=conclusive)
+    return _rotations(method, mirrored, mirrored_equilibria(s.equilibria), -s.section, s.ends[1], s.K, -s.L, above)
 
 
 def flow_of(six):
@@ -259,13 +304,11 @@ def _outline_of_program(p):
     saddles = eqs[eqs[:, eq.KIND] == eq.SADDLE, eq.ANGLE]
     highest = float(saddles[np.argmax(ends.potential(p, saddles))]) if len(saddles) else 0.0
     section = highest - 2.0 * math.pi if highest > math.pi else highest
-    none, thresholds = np.zeros((0, 10)), np.full((2, 2), np.nan)
-    return Skeleton(p, stratum, 0.0, 0.0, known.attract, section, eqs, none, none, none, thresholds, True, count < 0,
-                    count < 0)  # fmt: skip
+    return Skeleton(p, stratum, 0.0, 0.0, known.attract, section, eqs, count < 0, count < 0)
 
 
 def outline(six):
-    """The skeleton without its cycles, which take almost all of the time."""
+    """The skeleton without cycles."""
     if len(six) > COLUMNS:
         return _outline_of_program(np.array(six, dtype=float))
     six = [float(value) for value in six[:6]]
@@ -277,8 +320,7 @@ def outline(six):
     table = np.zeros((eq.MOST, 10))
     count, folded = eq.equilibria(p, table) if stratum != I0 else (0, False)
     eqs = table[:count]
-    none, thresholds = np.zeros((0, 10)), np.full((2, 2), np.nan)
-    return Skeleton(p, stratum, K, L, ends, _section(p, eqs), eqs, none, none, none, thresholds, True, folded)
+    return Skeleton(p, stratum, K, L, ends, _section(p, eqs), eqs, folded)
 
 
 def _section(p, eqs):
@@ -299,11 +341,12 @@ def mirrored_equilibria(eqs):
     return turned
 
 
-def _rotations(method, p, eqs, section, end, K, L):
-    """Cycles with w > 0 of the flow p, ascending in w; (w_c, w_d); are they conclusive?"""
+def _rotations(method, p, eqs, section, end, K, L, above):
+    """The Cycles with w > `above` of the flow p, ascending in w; conclusive only where these are all."""
     scale = p[BOUND_F] + math.sqrt(p[BOUND_DG])
     table, edges, fine = np.zeros((rt.MOST_CYCLES, 10)), np.zeros(7), max(FINE, method.FLOW_FINEST)
     xs = scale * np.geomspace(LEAST, 30.0, 80)
+    xs = xs[min(max(np.searchsorted(xs, above) - 1, 0), len(xs) - 2) :]
     found = method.flow_cycles(rt.ROTATION, p, eqs, len(eqs), section, 0, xs, fine, table, 0, edges)
     border, start, unknown = edges[:2].copy(), edges[4], edges[6]
     top, change, error, last = xs[-1], edges[2], edges[3], 0.0
@@ -325,7 +368,8 @@ def _rotations(method, p, eqs, section, end, K, L):
     near = np.sign(border[1] - border[0]) if border[0] > 0.0 else np.sign(start)
     sure = border[0] > 0.0 or start > LEAST * scale
     sides = [near, *(cycles[:, rt.ABOVE])], [*cycles[:, rt.BELOW], end]
-    return cycles, border, bool(unknown == 0.0 and sure and found < len(table) - 2 and sides[0] == sides[1])
+    fit = unknown == 0.0 and sure and found < len(table) - 2 and sides[0] == sides[1]
+    return Cycles(cycles, tuple(border), bool(fit))
 
 
 def _far_cycle(p, section, K, L, scale):
@@ -342,7 +386,7 @@ def _far_cycle(p, section, K, L, scale):
 
 
 def _librations(method, p, eqs, folded):
-    """Libration cycles, by their right turning point, of every interval where g < 0; are they conclusive?"""
+    """The Cycles of librations, by their right turning point, of every interval where g < 0."""
     table, edges, fine, found = np.zeros((rt.MOST_CYCLES, 10)), np.zeros(7), max(FINE, method.FLOW_FINEST), 0
     share, sure = 1.0 / (1.0 + np.exp(-np.linspace(-11.0, 11.0, 56))), True
     for i, row in enumerate(eqs):
@@ -354,28 +398,51 @@ def _librations(method, p, eqs, folded):
             found = method.flow_cycles(rt.LIBRATION, p, eqs, len(eqs), high, i, xs, fine, table, found, edges)
             against = row[eq.KIND] == eq.FOCUS and edges[4] * row[eq.STABLE] < 0.0 and abs(edges[4]) > edges[5]
             sure = sure and not against and edges[6] == 0.0
-    return table[:found], bool(sure and found < len(table) - 2)
+    return Cycles(table[:found], conclusive=bool(sure and found < len(table) - 2))
 
 
-def fates(method, skeleton, starts, tolerance, more=1):
-    """The fates (VERDICT to STATUS of `records`) of starts phi0, w0 (and their error bounds)."""
-    if len(skeleton.p) > COLUMNS and (skeleton.stratum != G or skeleton.unknown):
+def fates(method, s, starts, tolerance, more=1):
+    """The fates (VERDICT to STATUS of `records`) of starts phi0, w0 (and their error bounds) of the skeleton s."""
+    if len(s.p) > COLUMNS and (s.stratum != G or s.unknown):
         out = np.zeros((len(starts), rc.FATE))
-        out[:] = kf.UNDECIDED, -1, kf.UNDETERMINED, kf.NO_TURNS, NO_ENDS if skeleton.stratum != G else UNKNOWN
+        out[:] = kf.UNDECIDED, -1, kf.UNDETERMINED, kf.NO_TURNS, NO_ENDS if s.stratum != G else UNKNOWN
         return out
-    if skeleton.stratum in (I0, I1):
-        return (_free if skeleton.stratum == I0 else _conservative)(skeleton, starts)
+    if s.stratum in (I0, I1):
+        return (_free if s.stratum == I0 else _conservative)(s, starts)
     wait_for_other_compiler()
+    starts = np.pad(starts, ((0, 0), (0, 4 - starts.shape[1])))
+    known = {kind: s.cycles(kind).table for kind in (KINDS if len(starts) > FEW else s.found)}
+    run = partial(_by_tables, method, s, tolerance, more)
+    out = run(known, starts)
+    for kind in (PLUS, MINUS):
+        rising = (_needs(out) == kind) & (out[:, rc.RISING_FROM] > 0.0)
+        if rising.any():  # cycles below do not matter, and mostly there are none above
+            above = s.search(s, kind, out[rising, rc.RISING_FROM].min()).table
+            if not len(above):
+                out[rising] = run(known | {kind: above}, starts[rising])
+    while (needs := _needs(out)).any():
+        kind = int(needs.min())
+        known[kind] = s.cycles(kind).table
+        out[needs == kind] = run(known, starts[needs == kind])
+    return out
+
+
+def _needs(out):
+    """The kind of cycles that would decide each fate, or 0."""
+    return np.where((out[:, rc.VERDICT] == kf.UNDECIDED) & (out[:, rc.LIMIT] < -1), out[:, rc.LIMIT], 0)
+
+
+def _by_tables(method, s, tolerance, more, known, starts):
+    """`fates` by the equilibria and the tables of the `known` kinds of cycles alone."""
     out = np.zeros((len(starts), rc.FATE))
-    s, starts = skeleton, np.pad(starts, ((0, 0), (0, 4 - starts.shape[1])))
     section = s.section if s.stratum == G else math.atan2(s.p[0], s.p[1])
-    sizes = np.array([len(s.equilibria), len(s.plus), len(s.minus), len(s.librations),
-                      kf.GENERIC if s.stratum == G else kf.REVERSIBLE, int(s.K < 0.0)])  # fmt: skip
-    tables = [np.ascontiguousarray(table) for table in (s.equilibria, s.plus, s.minus, s.librations)]
-    size = max(1, BATCH // (more * method.FLOW_WORK))
+    tables = [np.ascontiguousarray(table) for table in (s.equilibria, *(known.get(kind, _NONE) for kind in KINDS))]
+    rows = [len(known[kind]) if kind in known else kf.NOT_KNOWN for kind in KINDS]
+    stratum = kf.GENERIC if s.stratum == G else kf.REVERSIBLE
+    sizes = np.array([len(s.equilibria), *rows, stratum, int(s.K < 0.0)])
+    size, limit = max(1, BATCH // (more * method.FLOW_WORK)), min(more * STEPS * method.FLOW_WORK, MOST)
     for i in range(0, len(starts), size):
         part = np.ascontiguousarray(starts[i : i + size])
-        limit = min(more * STEPS * method.FLOW_WORK, MOST)
         method.flow_fates(s.p, section, s.ends, sizes, *tables, part, tolerance, limit, out[i : i + size])
     return out
 

@@ -276,6 +276,18 @@ def test_parity_law():
     assert checked > 40
 
 
+def test_cycles_are_searched_where_fates_need_them():
+    """Fates by equilibria, and by the cycles above a motion that grows, are those by all cycles; most need none."""
+    random, searched = np.random.default_rng(17), []
+    for i in range(60):
+        system, starts = random_system(random, i), random.normal(size=(3, 2)) * [1, 2]
+        few, whole = cf.skeleton(taylor, system), cf.skeleton(taylor, system)
+        assert len(whole.plus) + len(whole.minus) + len(whole.librations) < 20  # all are known
+        assert np.array_equal(cf.fates(taylor, few, starts, 1e-9), cf.fates(taylor, whole, starts, 1e-9))
+        searched.append(len(few.found))
+    assert 20 < searched.count(0) < 60 and max(searched) > 1
+
+
 def test_beside_a_separatrix_fates_are_those_of_its_sides():
     """N1: double-double tells on which side of the stable branch of a saddle the doubles next to it start."""
     phi, nearest, saddle = 3.5, 1.85414457907569906, 4.65094863594827606
