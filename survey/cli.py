@@ -555,7 +555,7 @@ def _summarise(finished, paths):
         err.print(f"surfaces: {lost} left out, of which a corner is not certain (at edges and tips)")
     if attributes.get("curves_unexplained"):
         segments = counted(attributes["curves_unexplained"], "segment")
-        err.print(f"edges: along {segments} of lines, curves do not explain how multipliers pass the unit circle")
+        err.print(f"edges: along {segments} of lines across the map a curve is missing (curves_unexplained)")
     if "edge_left_out" in attributes:
         err.print(f"edges: not searched for {attributes['edge_left_out']}, where they accumulate", markup=False)
     if finished.already_complete:

@@ -97,13 +97,11 @@ def constant(system):
     return system["b12"] * system["s3"] - system["b31"] * system["s2"]
 
 
-def found(square, axes, fixed):
+def found(plane):
     """[(class, parameters (m, 2), errors (m), {name: (values, errors)})] of the curves and points on the map."""
-    plane = Plane(square, tuple(axes), fixed)
     with np.errstate(all="ignore"):
         hopfs = (row for curve in _hopfs(plane) for row in _hopf(plane, curve))
-        rows = [*_ends(plane), *connections.found(plane), *cycle_folds.found(plane), *_folds(plane), *hopfs]
-        return [counted(plane, *row) for row in rows]
+        return [*_ends(plane), *connections.found(plane), *cycle_folds.found(plane), *_folds(plane), *hopfs]
 
 
 def counted(plane, kind, xy, error, known):

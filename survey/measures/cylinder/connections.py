@@ -4,7 +4,8 @@ Two kinds are looked for: those on which w keeps its sign, over at most a turn, 
 loop, or a way back to another saddle). Of either a function of the parameters says by how much both branches miss each
 other: the difference of w where they pass the same equilibrium, or of their turning points. It is continuous, and
 beyond the angle that a branch does not reach it is continued by how far from it the branch turns. Its zeros are found
-as those of `survey.measures.contours`; connections with more turning points are not looked for.
+as those of `survey.measures.contours`, and followed on from where the lattice loses them, as where folds and points of
+codimension two are near (`survey.measures.tips`); connections with more turning points are not looked for.
 
 Saddles are told apart by their V; where two have the same the labels change, and a jump there is no zero.
 """
@@ -17,7 +18,7 @@ from itertools import product
 import numpy as np
 
 from survey.kernels.cylinder import connections as cn
-from survey.measures import contours
+from survey.measures import contours, tips
 from survey.methods import taylor
 
 LINES, HALVINGS = 97, 12
@@ -66,9 +67,16 @@ def curves(plane):
         values = connection.miss(*(everything[:, *branch] for branch in connection.branches))[0]
         if np.nanmin(values, initial=0.0) < 0.0 < np.nanmax(values, initial=0.0):
             function = partial(missed, plane, connection)
-            for x, error in contours.lines(function, plane.square, LINES, values, HALVINGS):
-                for part in contours.runs(_smooth(function, x, error)):
-                    yield connection, x[part], error[part]
+            pieces = contours.lines(function, plane.square, LINES, values, HALVINGS)
+            if plane.square.across is None:
+                pieces = tips.followed(function, _continuous(function, pieces), plane.square.grain)
+            for x, error in _continuous(function, pieces):
+                yield connection, x, error
+
+
+def _continuous(function, pieces):
+    """The pieces [(positions (m, 2), errors (m))] of curves without what is a jump of the function, and no zero."""
+    return [(x[part], error[part]) for x, error in pieces for part in contours.runs(_smooth(function, x, error))]
 
 
 def _traced(plane, x, wanted):

@@ -6,7 +6,7 @@ see `bifurcations`.
 
 import numpy as np
 
-from survey.measures.cylinder import bifurcations, own_bifurcations, separatrices
+from survey.measures.cylinder import bifurcations, cycle_counts, own_bifurcations, separatrices
 from survey.measures.cylinder.separatrices import SYSTEM
 from survey.measures.sampled import joined
 from survey.scene import Output
@@ -72,19 +72,28 @@ def searched(scene, square, axes, fixed, options):
         found = [(CLASSES[kind], *rest) for kind, *rest in separatrices.found(square, axes, flow)]
         return joined(found, [output.name for output in ALONG])
     plane = own_bifurcations.Plane(square, tuple(axes), fixed, scene)
-    with np.errstate(all="ignore"):
-        rows = [bifurcations.counted(plane, *row) for row in own_bifurcations.found(plane)]
-    return joined([(CLASSES[kind], *rest) for kind, *rest in rows], [output.name for output in ALONG])
+    return _of_parameters(plane, own_bifurcations.found(plane))
 
 
 def closed(square, axes, fixed, options):
     """The Curves on the map of `axes`, the unit square `square`; `fixed` holds the other parameters."""
-    if set(axes) == set(STATE):
-        rows = separatrices.found(square, axes, [fixed[name] for name in SYSTEM])
-    else:
-        rows = bifurcations.found(square, axes, fixed)
-    found = [(CLASSES[kind], *rest) for kind, *rest in rows]
+    if set(axes) != set(STATE):
+        plane = bifurcations.Plane(square, tuple(axes), fixed)
+        return _of_parameters(plane, bifurcations.found(plane))
+    found = [(CLASSES[kind], *rest) for kind, *rest in separatrices.found(square, axes, [fixed[k] for k in SYSTEM])]
     return joined(found, [output.name for output in ALONG])
+
+
+def _of_parameters(plane, found):
+    """The Curves on a map of parameters, with the numbers of cycles beside them and those that are unexplained."""
+    with np.errstate(all="ignore"):
+        rows = [bifurcations.counted(plane, *row) for row in found]
+        missed = None
+        if plane.square.across is None:
+            missed = cycle_counts.unexplained(plane, rows, cycle_counts.on_lattice(plane))
+    curves = joined([(CLASSES[kind], *rest) for kind, *rest in rows], [output.name for output in ALONG])
+    curves.unexplained = missed
+    return curves
 
 
 def seconds(axes):
@@ -92,4 +101,4 @@ def seconds(axes):
     own = set(axes[:2])
     if own <= set(STATE):
         return 0.1
-    return 0.7 if len(axes) == 1 else 10.0 if own <= set(SYSTEM) else 12.0
+    return 0.7 if len(axes) == 1 else 20.0 if own <= set(SYSTEM) else 30.0

@@ -18,8 +18,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline, RectBivariateSpline
 from scipy.ndimage import binary_erosion
 
-from survey.measures import contours
-from survey.measures.floquet import bifurcations, narrow, row_count, tips
+from survey.measures import contours, tips
+from survey.measures.floquet import bifurcations, narrow, row_count
 from survey.measures.floquet.multipliers import MINUS_ONE, PLUS_ONE
 from survey.measures.floquet.stability import CROSSINGS
 from survey.measures.hill.edges import close_in

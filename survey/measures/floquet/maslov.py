@@ -22,9 +22,9 @@ Sources: J. Robbin, D. Salamon, Topology 32 (1993) 827; V. I. Arnold, Functional
 import numpy as np
 
 from survey.measures.floquet import monodromy
+from survey.measures.segments import UNKNOWN
 from survey.scene import Output
 
-UNKNOWN = np.iinfo(np.int32).min
 OUTPUTS = tuple(
     Output(f"index_{name}", f"Maslov index relative to {goal}: it changes by 1 where a pair of multipliers passes it",
            integer=True, fill=UNKNOWN, on_request=True, applies=f"where no multiplier is {goal} within rounding")

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from survey.measures.floquet import row_count
-from survey.measures.floquet.maslov import UNKNOWN
+from survey.measures.segments import UNKNOWN, segments
 
 SHARES = (0.5, 0.31, 0.69)  # of a segment: where it is cut, the first at which the index is known
 SHORT = 1e-9  # of the map: segments that are not cut any more
@@ -77,7 +76,7 @@ def curves(index, function, passed, kind, drawn):
 
 def _unexplained(passed, own):
     """The segments along which the index changes otherwise; the border's too, where no curve counts that ends there."""
-    return [segment for segment, explained in row_count.segments(passed, own, {}, border=0).items() if not explained]
+    return [segment for segment, explained in segments(passed, own, {}, border=0).items() if not explained]
 
 
 def _shortened(index, segments, axis, ticks):

@@ -24,6 +24,7 @@ def closed_forms_alone(monkeypatch):
     monkeypatch.setattr(bifurcations.connections, "found", lambda plane: [])
     monkeypatch.setattr(bifurcations.cycle_folds, "found", lambda plane: [])
     monkeypatch.setattr(bifurcations, "COUNTED", 0)
+    monkeypatch.setattr(curves.cycle_counts, "LINES", 2)
 
 
 def points(axes, changes, square=SQUARE):

@@ -38,7 +38,12 @@ class _End:
 
 
 def followed(function, pieces, grain):
-    """The pieces [(positions (m, 2), errors (m))] of curves function(x) = 0, longer at ends that lie inside the map."""
+    """The pieces [(positions (m, 2), errors (m))] of curves function(x) = 0, longer at ends inside the map.
+
+    Those that meet end to end are one.
+    """
+    if not pieces:
+        return []
     ends = [_End(x[::sense], error[::sense]) for x, error in pieces for sense in (-1, 1)]
     for end in ends:
         tip = end.x[-1]
@@ -55,7 +60,34 @@ def followed(function, pieces, grain):
     for i, (x, error) in enumerate(pieces):
         (first, first_error), (last, last_error) = (end.new for end in ends[2 * i : 2 * i + 2])
         longer.append((np.concatenate([first[::-1], x, last]), np.concatenate([first_error[::-1], error, last_error])))
-    return longer
+    return _merged(longer)
+
+
+def _merged(pieces):
+    """The pieces, those one that end where another one and no third begins."""
+    ends = np.array([x[[0, -1]] for x, _error in pieces]).reshape(-1, 2)
+    widths = np.array([error[[0, -1]] for _x, error in pieces]).ravel()
+    met = np.hypot(*(ends[:, None] - ends).T) <= SAME + widths[:, None] + widths
+    np.fill_diagonal(met, False)
+    partner = np.where(met.sum(axis=0) == 1, met.argmax(axis=0), -1)
+    partner = np.where((partner >= 0) & (partner[partner] == np.arange(len(ends))), partner, -1)
+    done, left = [], set(range(len(pieces)))
+
+    def chain(end):
+        """The pieces from this end on: [(number, is it taken backwards?)]."""
+        passed = []
+        while end >= 0 and end // 2 in left:
+            left.discard(end // 2)
+            passed.append((end // 2, end % 2 == 1))
+            end = partner[end ^ 1]
+        return passed
+
+    for end in [*np.flatnonzero(partner < 0), *range(len(ends))]:  # what closes has no first piece
+        parts = [tuple(one[::-1] if back else one for one in pieces[number]) for number, back in chain(end)]
+        if parts:
+            whole = [parts[0], *((x[1:], error[1:]) for x, error in parts[1:])]
+            done.append(tuple(np.concatenate(one) for one in zip(*whole, strict=True)))
+    return done
 
 
 def _sides(function, ends):

@@ -1,0 +1,63 @@
+"""Do the curves on a map explain how an integer changes along the lines of a lattice?
+
+Between two points of a line at which the integer is known it changes by what the curves say that the segment meets. A
+segment whose curves do not add up to the change, with any signs, has lost one. A curve that it meets next to its ends
+may belong to the segment beside it, and two that it meets next to one another may be one that is drawn twice: these may
+count or not. Curves that end inside the map, as between the edges of a narrow tongue, or that cancel between two points
+of the lattice, do not show.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+
+UNKNOWN = np.iinfo(np.int32).min
+NEAR = 1e-3  # of the map: what chords of curves may be off
+
+
+def segments(values, curves, weights_of, border=1, optional=()):
+    """{(axis, number of the line across it, first, last point): do the curves explain the change of `values`?}, of
+    integers (n, n) at the lattice's points, or UNKNOWN; each of the curves [(kind, positions (m, 2))] counts for 1, or
+    for `weights_of` its kind; those of the kinds `optional` may count or not. The `border` is as many lines wide, which
+    are left out.
+    """
+    found = {}
+    for axis in (0, 1):
+        lines = values if axis == 1 else values.T  # along the axis, by the place on the other one
+        ticks = np.linspace(0.0, 1.0, len(lines))
+        for number in range(border, len(lines) - border):
+            line, (places, weights, free) = lines[number], _met(curves, axis, ticks[number], weights_of, optional)
+            for first, last in pairwise(np.flatnonzero(line != UNKNOWN)):
+                low, high = ticks[first], ticks[last]
+                inside = (places > low - NEAR) & (places < high + NEAR)
+                sure = (places > low + NEAR) & (places < high - NEAR) & ~free
+                change = line[last] - line[first]
+                found[axis, number, first, last] = _explained(change, weights[inside & sure], weights[inside & ~sure])
+    return found
+
+
+def _met(curves, axis, tick, weights_of, optional):
+    """Where the line along the axis, at `tick` of the other one, meets curves: positions, weights (1 but for
+    `weights_of` {kind: weight}), and which of them need not count: `optional`, or perhaps drawn twice.
+    """
+    places, weights, kinds = [np.zeros(0)], [np.zeros(0, int)], [np.zeros(0, int)]
+    for kind, x in curves:
+        off = x[:, 1 - axis] - tick
+        at = np.flatnonzero((off[:-1] < 0) != (off[1:] < 0))
+        share = off[at] / (off[at] - off[at + 1])
+        places.append(x[at, axis] + share * (x[at + 1, axis] - x[at, axis]))
+        weights.append(np.full(at.size, weights_of.get(kind, 1)))
+        kinds.append(np.full(at.size, kind))
+    place, kind = np.concatenate(places), np.concatenate(kinds)
+    near = (abs(place[:, None] - place) < NEAR) & (kind[:, None] == kind)
+    return place, np.concatenate(weights), (near.sum(axis=1) > 1) | np.isin(kind, optional)
+
+
+def _explained(change, weights, optional):
+    """Is the change a sum of all weights and some of the optional ones, each with either sign?"""
+    sums = {0}
+    for weight in weights:
+        sums = {total + sign * weight for total in sums for sign in (-1, 1)}
+    for weight in optional:
+        sums |= {total + sign * weight for total in sums for sign in (-1, 1)}
+    return int(change) in sums
