@@ -241,11 +241,18 @@ class _Walk:
         """The equations' left sides at y (K, m), their derivatives (K, m - 1, m), and what lengths are relative to."""
         n = self.n
         points, x, T = self._real(those, y)
-        value, slope, moduli = self._closing(those, points, x, T)
+        X, M, moduli = rough_flow(self.equation, points, x, self.equation.share * T)
+        value, slope = self._closing(those, points, x, X, M)
         inward = np.where(y[:, -1] < 0.99, DIFFERENCE, -DIFFERENCE)
         shifted = y.copy()
         shifted[:, -1] += inward
-        by_l = (self._closing(those, *self._real(those, shifted), derived=False)[0] - value) / inward[:, None]
+        others, _x, other_T = self._real(those, shifted)
+        moved = ~_flow_alike(self.equation, points, others, x) | (T != other_T)
+        if moved.any():
+            span = self.equation.share * other_T[moved]
+            X = X.copy()
+            X[moved] = rough_flow(self.equation, others[moved], x[moved], span, derived=False)[0]
+        by_l = (self._closing(those, others, x, X, M)[0] - value) / inward[:, None]
         size = np.ones_like(y)
         size[:, :n] = floored(moduli)
         if self.free:
@@ -255,20 +262,29 @@ class _Walk:
             slope[~(across >= ACROSS * (c * c).sum(axis=1))] = np.nan
         return value, np.concatenate([slope, by_l[:, :, None]], axis=2), size
 
-    def _closing(self, those, points, x, T, derived=True):
-        """What is to be 0 for orbits to close, its derivatives by (x(0), T), and the largest moduli of the states."""
+    def _closing(self, those, points, x, X, M):
+        """What is to be 0 for orbits to close, and its derivatives by (x(0), T), of X = x(T) and M = dX/dx(0)."""
         n, symmetry = self.n, self.equation.symmetry
-        X, M, moduli = rough_flow(self.equation, points, x, self.equation.share * T, derived)
-        M = M if derived else np.full((len(x), n, n), np.nan)
         if symmetry is not None:
             guess = self.equation.begin(points)[0]
-            return *symmetry.linearised(X, M, slopes(self.equation, points, X), x, guess), moduli
+            return symmetry.linearised(X, M, slopes(self.equation, points, X), x, guess)
         value, slope = X - x, M - np.eye(n)
         if self.free:
             c, at = self.plane[:, those]
             value = np.concatenate([value, (c * (x - at)).sum(axis=1)[:, None]], axis=1)
             slope = bordered(slope, slopes(self.equation, points, X), c)
-        return value, slope, moduli
+        return value, slope
+
+
+def _flow_alike(equation, points, others, x):
+    """Where motions from x (N, n) are the same at both points, as of a parameter that only chooses an orbit."""
+    alike = np.zeros(len(x), bool)
+    usable = np.flatnonzero(np.isfinite(points).all(axis=1) & np.isfinite(others).all(axis=1))
+    for inside, programs in equation.traced(points[usable], x[usable]):
+        own = usable[inside]
+        one, two = (programs.numbers(both[own])[0][:, programs.A.read] for both in (points, others))
+        alike[own] = (one == two).all(axis=1) & programs.holds(others[own])
+    return alike
 
 
 def rough_flow(equation, points, x, T, derived=True):

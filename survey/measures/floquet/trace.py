@@ -543,6 +543,11 @@ class Program:
         self.inside = np.array(inside, dtype=np.int64).reshape(-1, 2)
         self.order = self._order()
 
+    @cached_property
+    def read(self):
+        """Which numbers the kernel reads: those of the parameters on which nothing depends are not among them."""
+        return np.unique(np.concatenate([self.terms[:, 3], self.inside[:, 1]]))
+
     @property
     def analytic(self):
         """Is A analytic in the parameters too, as no branch depends on them?"""

@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import survey
+from survey.measures.floquet import continuation
 
 FOLDER = Path(__file__).parents[3] / "workflows"
 sys.path.insert(0, str(FOLDER))
@@ -214,3 +215,13 @@ def test_an_orbit_on_a_curve_has_the_held_state_of_its_start(monkeypatch):
         ds = survey.evaluate(scene, A=0.9, w=0.7, b=1.0, rtol=rtol, branch=1)
         assert ds.x0.values.tolist() == [0.9, 0.0, 0.0, 0.0]
         assert abs(float(ds.period) - exact) <= float(ds.period_error) + 1e-15 < 1e-9
+
+
+def test_a_parameter_that_only_chooses_the_orbit_does_not_change_motions():
+    """f of `beam` depends on w and b, and not on the amplitude A."""
+    equation, x = beams().equation, np.full((3, 4), 0.4)
+    points = np.tile([0.5, 0.7, 1.0], (3, 1))
+    others = points + 0.1 * np.eye(3)
+    assert continuation._flow_alike(equation, points, others, x).tolist() == [True, False, False]
+    end, other = (continuation.rough_flow(equation, p, x, np.full(3, 2.0), derived=False)[0] for p in (points, others))
+    assert (end == other).all(axis=1).tolist() == [True, False, False]
