@@ -7,10 +7,12 @@ from matplotlib.patheffects import withStroke
 from survey.file import schema
 from survey.file.labels import flag_codes
 from survey.show.marks import widened
+from survey.show.text import spaced
 
 _EDGES = "edges: even dark, odd grey;\nperiodic solid, antiperiodic dashed"
 _RIM = withStroke(linewidth=2.0, foreground="#444444")
 _PALE = {"color": "#FFFFFF", "lw": 1.2, "path_effects": [_RIM]}
+_THIN = {"color": "#000000", "ls": ":", "lw": 0.8}
 _POINT = {"ls": "none", "mec": "#000000", "mew": 0.8}
 # boundaries by class: label in the legend, and properties of matplotlib's line
 CURVES = {
@@ -84,6 +86,23 @@ def curves_of(ds):
     for kind, last, number in zip(kinds, ends, ds.curve_count.values, strict=True):
         found.setdefault(names[kind], []).append(slice(int(last - number), int(last)))
     return {name: found[name] for name in CURVES if name in found}
+
+
+def draw_edges(axes, ds, x):
+    """Draw the boundaries on the axis `x`, where a survey has no other, as lines across the figure, with labels."""
+    if "edge_count" not in ds or ds.edge_count.ndim or ds.attrs.get("boundaries") != x.name:
+        return
+    names, told = {code: name for name, code in flag_codes(ds.edge_class.attrs).items()}, set()
+    for position, code in zip(ds.edge_position.values, ds.edge_class.values, strict=True):
+        name = names.get(int(code), "boundary")
+        label, properties = CURVES.get(name, (spaced(name), _THIN))
+        if "marker" in properties or properties is _THIN:  # lines that look alike bear their names
+            axes.axvline(position, zorder=1, **_THIN)
+            axes.annotate(f"{label} ", (position, 1.0), xycoords=axes.get_xaxis_transform(), rotation=90, fontsize=7,
+                          ha="right", va="top")  # fmt: skip
+            continue
+        axes.axvline(position, zorder=1, label=None if label in told else label, **properties)
+        told.add(label)
 
 
 def draw_boundaries(axes, ds, x, y, gaps=None):

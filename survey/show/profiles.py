@@ -7,6 +7,7 @@ import numpy as np
 from survey import status
 from survey.file.labels import flag_codes, words_of
 from survey.grid import logarithmic
+from survey.show.boundaries import draw_edges
 from survey.show.layout import add_legend
 from survey.show.maps import IN_WORDS
 from survey.show.palette import kinds_of
@@ -19,7 +20,7 @@ WIDE_RANGE = 1e3  # of a quantity with poles from which on its axis is linear ab
 
 
 def draw_profile(axes, ds, variable, state, paper):
-    """Draw a variable along its one axis, `state` being the status."""
+    """Draw a variable along its one axis, `state` being the status, with the boundaries on it."""
     x = variable[variable.dims[0]]
     if "flag_values" in variable.attrs:
         shown, table, palette = kinds_of(ds, variable, state)
@@ -59,6 +60,7 @@ def draw_profile(axes, ds, variable, state, paper):
     if f"{variable.name}_error" in ds:
         bar = ds[f"{variable.name}_error"].isel({d: 0 for d in ds[variable.name].dims if d not in variable.dims})
         axes.fill_between(x, variable - bar, variable + bar, color="#56B4E9", alpha=0.5, lw=0, label="error bar")
+    draw_edges(axes, ds, x)
     bad = np.isin(state.values, list(status.UNANSWERED))
     if bad.any():
         axes.plot(x.values[bad], np.full(bad.sum(), axes.get_ylim()[0]), "x", color="#D55E00", label="no answer")

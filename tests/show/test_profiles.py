@@ -73,3 +73,31 @@ def test_poles_are_gaps_with_marks_on_a_symmetric_logarithmic_axis():
     assert np.isnan(np.asarray(curve.get_ydata(), float)).sum() == 1
     assert profile(x, y=(np.sin(20 * x), {})).get_yscale() == "linear"  # zeros are no poles
     assert profile(x, y=(1e4 * np.sin(20 * x), {})).get_yscale() == "linear"
+
+
+def test_boundaries_on_the_only_axis_are_lines_by_kind():
+    """Edges of tongues look as on maps and share an entry of the legend; others are dotted and bear their names."""
+    kinds = {"flag_values": np.array([0, 2, 9], np.int8), "flag_meanings": "even_antiperiodic even_periodic a02_is_0"}
+    ds = xr.Dataset(
+        {
+            "y": ("x", X**2, {"long_name": "square", "units": "1"}),
+            "status": ("x", np.zeros(X.size, np.int8)),
+            "edge_count": ((), 3),
+            "edge_position": ("edge", [1.1, 1.5, 1.8]),
+            "edge_class": ("edge", np.array([2, 0, 9], np.int8), kinds),
+        },
+        {"x": ("x", X, {"long_name": "side", "units": "1"})},
+        {"boundaries": "x"},
+    )
+    figure, axes = plt.subplots()
+    draw_profile(axes, ds, ds.y, ds.status, paper=False)
+    lines = {line.get_xdata()[0]: line for line in axes.lines if len(set(line.get_xdata())) == 1}
+    assert sorted(lines) == [1.1, 1.5, 1.8]
+    assert [lines[x].get_linestyle() for x in sorted(lines)] == ["-", "--", ":"]
+    assert sum("even dark" in text.get_text() for text in axes.get_legend().get_texts()) == 1
+    assert [(text.get_text().strip(), text.xy[0]) for text in axes.texts] == [("a02 is 0", 1.8)]
+    plt.close(figure)
+    figure, axes = plt.subplots()
+    draw_profile(axes, ds.assign_attrs(boundaries="z"), ds.y, ds.status, paper=False)
+    assert len(axes.lines) == 1
+    plt.close(figure)
