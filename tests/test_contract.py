@@ -4,11 +4,15 @@ import importlib.util
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import survey.methods
 import survey.scenes
 from survey import BadInput, contract, measures, modules
+from survey.scene import Request
+from survey.scenes import mathieu
+from survey.sweep import solve
 
 SCENE = Path(survey.scenes.__file__).with_name("mathieu.py")
 METHOD = Path(survey.methods.__file__).with_name("magnus6.py")
@@ -35,6 +39,8 @@ def changed(path, tmp_path, old, new):
         ("TITLE = ", "TITEL = ", "TITEL is not in the table; did you mean 'TITLE'"),
         ("AUDIT = ", "_AUDIT = ", "AUDIT is missing: methods by which"),
         ("def cost(options, sizes)", "def cost(options)", r"cost\(options\) must be cost\(options, sizes\)"),
+        ('FAMILY = "hill"', 'FAMILY = "hil"', "FAMILY names no family 'hil'"),
+        ('"dop853"', '"dop85"', "AUDIT: unknown method 'dop85'; did you mean 'dop853'"),
         ("OPTIONS = ()", "OPTIONS = []", r"OPTIONS = \[\] must be of type tuple"),
         ("def cost(options, sizes):", "cost = 1e-6\n\n\ndef _cost(options, sizes):", "cost must be a function"),
     ],
@@ -42,7 +48,7 @@ def changed(path, tmp_path, old, new):
 def test_a_typo_in_a_scene_is_one_line(tmp_path, old, new, words):
     scene = changed(SCENE, tmp_path, old, new)
     with pytest.raises(BadInput, match=words) as refused:
-        contract.check(scene, survey.scenes.CONTRACT, "survey/scenes/__init__.py")
+        survey.scenes._check(scene)
     line = str(refused.value)
     assert line.startswith(str(tmp_path / "mathieu.py")) and line.endswith("the table is in survey/scenes/__init__.py")
     assert "\n" not in line
@@ -101,3 +107,9 @@ def test_a_new_file_is_checked_when_it_is_loaded(tmp_path, monkeypatch):
     monkeypatch.setattr(survey.scenes, "__path__", [*survey.scenes.__path__, str(folder)])
     with pytest.raises(BadInput, match="did you mean 'trajectory'"):
         survey.evaluate("mathew", a=1.0, q=0.1)
+
+
+def test_an_output_that_a_scene_forgets_is_one_line():
+    request = Request({}, "auto", 1e-8, frozenset({"discriminant"}))
+    with pytest.raises(BadInput, match=r"solve returns no discriminant.*, which OUTPUTS declare"):
+        solve.stored(mathieu, request, {"status": np.zeros(1)}, (1,))

@@ -134,6 +134,11 @@ def check(module):
     contract.check(module, table, " and ".join(where))
 
 
+def is_family(name):
+    """Is there a family of this name, which the METHODS of a package here describe?"""
+    return _folder(name) is not None
+
+
 @cache
 def _folder(family):
     """The package whose METHODS name this family; None if there is none."""

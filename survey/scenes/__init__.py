@@ -28,7 +28,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
 
-from survey import contract, modules
+from survey import contract, measures, methods, modules
 from survey.contract import Function, Value
 from survey.errors import BadInput
 from survey.wording import short
@@ -131,7 +131,13 @@ def _loaded(name, point):
 
 @cache
 def _check(module):
-    contract.check(module, CONTRACT, "survey/scenes/__init__.py")
+    where = "survey/scenes/__init__.py"
+    contract.check(module, CONTRACT, where)
+    if not measures.is_family(module.FAMILY):
+        contract.refuse(module, f"FAMILY names no family {module.FAMILY!r}", where)
+    for name in module.AUDIT:
+        if name not in modules.names(methods):
+            contract.refuse(module, f"AUDIT: {modules.unknown('method', name, modules.names(methods))}", where)
 
 
 sys.modules[__name__].__class__ = _Folder

@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 
 from survey import status
+from survey.errors import BadInput
 from survey.file.labels import layout, round_up
 from survey.sweep import dispatch
 from survey.sweep.compile_ahead import compiling_ahead
 from survey.sweep.cost import points_per_block
+from survey.wording import listed
 
 
 def solve_block(scene, request, grid, block):
@@ -40,6 +42,9 @@ def solve_point(scene, request, point, shape):
 def stored(scene, request, solved, shape):
     """A scene's results in the file's types and the block's shape; status `overflow` where a bar does not fit."""
     arrays, table = {}, layout(scene, request)
+    left_out = [name for name in table if name not in solved]
+    if left_out:
+        raise BadInput(f"{scene.TITLE}: solve returns no {listed(left_out)}, which OUTPUTS declare")
     for name, (dtype, _, extra) in table.items():
         values = round_up(solved[name]) if name.endswith("_error") else np.asarray(solved[name])
         arrays[name] = values.astype(dtype, copy=False).reshape(shape + extra)
