@@ -7,6 +7,7 @@ a module is loaded.
 
 import sys
 from functools import cache
+from pkgutil import iter_modules
 
 from survey import contract, methods, modules
 from survey.contract import Function, Value
@@ -143,5 +144,6 @@ def is_family(name):
 def _folder(family):
     """The package whose METHODS name this family; None if there is none."""
     here = sys.modules[__name__]
-    folders = (modules.load(here, name, "family") for name in modules.names(here))
+    names = (module.name for module in iter_modules(here.__path__) if module.ispkg)  # others import much
+    folders = (modules.load(here, name, "family") for name in names)
     return next((folder for folder in folders if family in getattr(folder, "METHODS", ())), None)

@@ -33,7 +33,7 @@ def unexplained(plane, rows, counts):
     for kind, values in zip(KINDS, counts, strict=True):
         own = [(name, plane.positions(xy)) for name, xy, _error, known in rows if _counts_for(kind, name, known)]
         explained = segments(values, own, {"cycle_fold": 2}, optional=OPTIONAL)
-        missed |= {segment[:3] for segment, good in explained.items() if not good}
+        missed |= {segment for segment, good in explained.items() if not good}
     return len(missed)
 
 
