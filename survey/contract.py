@@ -5,6 +5,7 @@ A module's public names are those at its top level, imports and names with a lea
 
 import ast
 import inspect
+from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import lru_cache
@@ -15,33 +16,36 @@ from survey.errors import BadInput
 
 @dataclass(frozen=True)
 class Value:
-    """A public constant: its type (or types), what it means, and whether every module must have it."""
+    """A public constant: its type (or types), what it means, and whether every module must have it, or those modules
+    for which `needed(module)` is true.
+    """
 
     meaning: str
     kind: type | tuple[type, ...] = object
-    needed: bool = False
+    needed: bool | Callable = False
 
 
 @dataclass(frozen=True)
 class Function:
     """A public function: what it does, the names of its first arguments (None: any), and whether every module must
-    have it. Further arguments need defaults.
+    have it, as in `Value`. Further arguments need defaults.
     """
 
     meaning: str
     arguments: tuple[str, ...] | None = ()
-    needed: bool = False
+    needed: bool | Callable = False
 
 
-def check(module, table, where):
+def check(module, table, where, elsewhere=lambda name: ""):
     """Raise BadInput, in one line, if the module does not keep to the table.
 
-    `table` is {name: Value | Function}, and `where` the file in which it stands.
+    `table` is {name: Value | Function}, and `where` the file in which it stands; `elsewhere` says of a name where else
+    it has a meaning.
     """
     for name in public(module.__file__):
         if name not in table:
             near = get_close_matches(name, table, n=1, cutoff=0.6)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
+            hint = elsewhere(name) or (f"; did you mean {near[0]!r}?" if near else "")
             refuse(module, f"{name} is not in the table{hint} (a helper's name begins with an underscore)", where)
     check_offered(module, table, where)
 
@@ -50,7 +54,7 @@ def check_offered(module, table, where):
     """As `check`, but the module may have other public names besides."""
     for name, entry in table.items():
         if not hasattr(module, name):
-            if entry.needed:
+            if entry.needed(module) if callable(entry.needed) else entry.needed:
                 refuse(module, f"{name} is missing: {entry.meaning}", where)
         elif isinstance(entry, Function):
             _check_function(module, name, getattr(module, name), entry, where)

@@ -171,6 +171,12 @@ def test_ones_own_equation_has_points_trajectories_and_zooms():
     xr.testing.assert_equal(ds.survey.zoom(a=(0.25, 0.5)).y1, ds.y1)
 
 
+def test_options_without_a_motion_are_refused_in_one_line(monkeypatch):
+    monkeypatch.setattr("survey.scenes.mathieu.trajectory", lambda point, answer, options, time=None: None)
+    with pytest.raises(survey.BadInput, match=r"^the scene mathieu draws no trajectory$"):
+        survey.evaluate("mathieu", a=1.5, q=0.1).survey.trajectory()
+
+
 @pytest.mark.parametrize("mu", [0.01, 0.05])
 def test_the_orbit_beside_l4_is_the_exponential_of_the_matrix(mu):
     motion = survey.evaluate("libration", mu=mu).survey.trajectory(figure=False)

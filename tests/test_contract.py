@@ -62,6 +62,10 @@ def test_a_typo_in_a_scene_is_one_line(tmp_path, old, new, words):
         ("ORDER = 6", "ORDER = 6.0", "ORDER = 6.0 must be of type int"),
         ("def hill_density(rtol)", "def hill_density(tolerance)", r"must be hill_density\(rtol\)"),
         ("SERVES = ", "_SERVES = ", "SERVES is missing"),
+        ("def hill_scatter(", "def _hill_scatter(", "hill_scatter is missing: as hill_chain"),
+        ("ORDER = 6", "ADAPTIVE = True\nORDER = 6", "hill_walk is missing: fill out"),
+        ('COST = {"hill"', 'COST = {"hil"', "COST has 'hil', which SERVES does not name"),
+        ('SERVES = ("hill",)', 'SERVES = ("danby",)', "it is a name of the family 'hill', which SERVES must then name"),
     ],
 )
 def test_a_typo_in_a_method_is_one_line(tmp_path, old, new, words):

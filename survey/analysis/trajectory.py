@@ -25,6 +25,9 @@ def solve(point, time=None):
     # solved again: a motion is computed from parameters, never from other values in a file
     known = api.evaluate(user_scene.of_dataset(point), **given, **options)
     found = make(given, values(known), options, time)
+    if found is None:
+        asked = " and ".join(f"{key} = {value}" for key, value in options.items())
+        raise BadInput(f"the scene {name} draws no trajectory{asked and ' with ' + asked}")
     about = {"title": point.attrs.get("title", ""), "scene": name, "options": point.attrs.get("options", "")}
     about |= {"parameters": ", ".join(f"{key}={value!r}" for key, value in given.items())}
     shown = [f"${symbols[key]} = {value:.6g}$" for key, value in given.items() if value or len(given) <= SHOWN]

@@ -132,7 +132,17 @@ def check(module):
             contract.refuse(module, f"SERVES names no family {family!r}", where[0])
         table |= folder.METHODS[family]
         where.append(f"survey/measures/{folder.__name__.rpartition('.')[2]}/__init__.py")
-    contract.check(module, table, " and ".join(where))
+    contract.check(module, table, " and ".join(where), _of_another_family)
+    for name in ("COST", "ABOUT"):
+        if unknown := [family for family in getattr(module, name, ()) if family not in module.SERVES]:
+            contract.refuse(module, f"{name} has {unknown[0]!r}, which SERVES does not name", where[0])
+
+
+def _of_another_family(name):
+    """What to do about a method's public name that a family knows which the method does not serve."""
+    families = [family for folder in _folders() for family, table in folder.METHODS.items() if name in table]
+    words = " or ".join(map(repr, families))
+    return f"; it is a name of the family {words}, which SERVES must then name" if families else ""
 
 
 def is_family(name):
@@ -143,7 +153,11 @@ def is_family(name):
 @cache
 def _folder(family):
     """The package whose METHODS name this family; None if there is none."""
+    return next((folder for folder in _folders() if family in folder.METHODS), None)
+
+
+def _folders():
+    """The packages that have METHODS, loaded one after the other."""
     here = sys.modules[__name__]
     names = (module.name for module in iter_modules(here.__path__) if module.ispkg)  # others import much
-    folders = (modules.load(here, name, "family") for name in names)
-    return next((folder for folder in folders if family in getattr(folder, "METHODS", ())), None)
+    return (folder for folder in (modules.load(here, name, "family") for name in names) if hasattr(folder, "METHODS"))

@@ -17,3 +17,13 @@ CONTRACT = {
     "WHEN": Value("{option: values} for which it answers, as in a scene's outputs; always if not given", dict),
     "ADAPTIVE": Value("does it choose its own steps, from a tolerance? False if not given", bool),
 }
+
+
+def adaptive(method):
+    """Does the method choose its own steps?"""
+    return getattr(method, "ADAPTIVE", False)
+
+
+def fixed(method):
+    """Does the method take the steps that it is given?"""
+    return not adaptive(method)

@@ -68,7 +68,8 @@ CONTRACT = {
     "solve": Function("{output: array} of a block, see above", ("point", "request"), needed=True),
     "why": Function("a sentence: what decided the verdict, by which margin against which error bar", ("answer",)),
     "trajectory": Function(
-        "survey.scene.Trajectory: the motion at one point up to `time`, or as long as suits if that is None",
+        "survey.scene.Trajectory: the motion at one point up to `time`, or as long as suits if that is None; None if "
+        "these options have no motion",
         ("point", "answer", "options", "time"),
     ),
     "equation": Function(

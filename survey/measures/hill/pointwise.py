@@ -6,7 +6,7 @@ call of at most about a second.
 
 import numpy as np
 
-from survey import status
+from survey import methods, status
 from survey.kernels import jit
 from survey.kernels.hill.answers import UNTRIED, first_rungs, segments
 from survey.kernels.lanes import DY2_BAR, RESULTS, Y1_BAR, Y1_ZEROS
@@ -51,7 +51,7 @@ def solve(problem, method, asked, answers, where=None):
 
 def _solve(problem, method, asked, answers, chosen):
     """The answers of the `chosen` points of the flat problem."""
-    adaptive = getattr(method, "ADAPTIVE", False)
+    adaptive = methods.adaptive(method)
     run, ladder = (_walk, TOLERANCES) if adaptive else (_chain, STEPS)
     first = _first_tolerance(problem, asked.rtol) if adaptive else _first_steps(problem, method, asked)
     rung = first.reshape(-1)[chosen].copy()

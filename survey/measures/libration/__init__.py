@@ -9,19 +9,25 @@ e (N) is the eccentricity, d1 and d2 (N) are the rates (3 / 2)(1 +- s) of the eq
 unit.
 """
 
+from survey import methods
 from survey.contract import Function, Value
 
 METHODS = {
     "danby": {
-        "NODES": Value("where in a step 1 / (1 + e cos f) is sampled: fractions of the step", tuple),
+        "NODES": Value(
+            "where in a step 1 / (1 + e cos f) is sampled: fractions of the step", tuple, needed=methods.fixed
+        ),
         "WIDTH": Value("for the charts: number of rows of the coefficients of a step", int),
         "danby_steps": Function(
-            "numbers of steps (N) of half a period that are tried first for accuracy rtol", ("e", "rtol")
+            "numbers of steps (N) of half a period that are tried first for accuracy rtol",
+            ("e", "rtol"),
+            needed=methods.fixed,
         ),
         "danby_chain": Function(
             "fill out (N, RESULTS) for points of one mesh: h (steps) are the lengths of its steps, v (steps, NODES) is "
             "1 + cos f there; `kernels.libration.danby.chain` makes it of `danby_columns`",
             ("v", "h", "e", "d1", "d2", "out"),
+            needed=methods.fixed,
         ),
         "danby_columns": Function(
             "for the charts: the columns of one step, of which `danby_chain` is composed", ("v", "h", "work", "count")
@@ -29,6 +35,7 @@ METHODS = {
         "danby_walk": Function(
             "fill out (N, RESULTS) with local errors below tolerance (N); NaN where the end is not reached",
             ("e", "d1", "d2", "tolerance", "out"),
+            needed=methods.adaptive,
         ),
     },
     "normal_form": {

@@ -13,7 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from survey import measures, status
+from survey import measures, methods, status
 from survey.kernels.libration import traces
 from survey.kernels.libration.traces import (
     INVARIANTS,
@@ -111,7 +111,7 @@ def _by_series(e, mu, rtol, answers, left):
 def _point_by_point(e, d1, d2, method, rtol, results=None):
     """Answers of points (N each), each on a rung of its own; fills `results` (N, RESULTS) if they are given."""
     results = np.empty((e.size, RESULTS)) if results is None else results
-    adaptive = getattr(method, "ADAPTIVE", False)
+    adaptive = methods.adaptive(method)
     run, ladder = (_walk, TOLERANCES) if adaptive else (_chain, STEPS)
     asked = max(rtol, FINEST)
     if adaptive:
