@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from survey.errors import BadInput
-from survey.measures.floquet import curves, orbit, orbit_curves, orbit_motion
+from survey.measures.floquet import curves, family, orbit, orbit_curves, orbit_motion
 from survey.measures.floquet.ahead import compile_ahead
 from survey.measures.floquet.continuation import Range
 from survey.measures.floquet.equation import Equation
@@ -122,6 +122,13 @@ class OrbitScene(TracedScene):
         if refusal:
             raise BadInput(f"boundaries: {refusal}")
         return self._called(orbit_curves.searched, self, square, axes, fixed)
+
+    def family(self, square, axes, fixed, lines):
+        """The `measures.floquet.family.Family` of symmetric orbits on a map; raises BadInput."""
+        refusal = curves.refusal(axes, self)
+        if refusal:
+            raise BadInput(f"boundaries: {refusal}")
+        return self._called(family.Family, self, square, axes, fixed, lines)
 
     def why(self, answer):
         """Why a point has its verdict (see `survey.scenes`)."""

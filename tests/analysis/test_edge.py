@@ -274,6 +274,6 @@ def test_permanent_rotations_in_clebschs_case(epsilon):
 
 
 def test_a_margin_that_cannot_be_found_says_why():
-    orbit = survey.evaluate(str(ROOT / "workflows" / "lyapunov.py"), mu=0.1, a=0.3)
-    with pytest.raises(BadInput, match=r"lyapunov\.py curves are not known of orbits with REVERSED"):
-        orbit.survey.margin()
+    motion = survey.evaluate("brun_triaxial", question="trajectory", A=1.0, B=1.5, C=2.0, t=3.0)
+    with pytest.raises(BadInput, match=r"brun_triaxial no boundaries are known along A: question = trajectory has no"):
+        motion.survey.margin()

@@ -219,7 +219,8 @@ package: Taylor series in double-double arithmetic of the attack's own, of other
 equation for satellites, the eccentric anomaly for Danby's map), closed forms where z is piecewise constant, trapezoidal
 sums for Brun's problem (with 120 digits for a sample of the states beside a saddle, where double-double is too
 short), exact fractions, 60 digits of the closed forms of the normal form (whose integers are the package's), long
-motions and exact mirror images for fates and portraits. Some points of each batch are solved again, alone and at
+motions and exact mirror images for fates and portraits, 45 digits of the exponentials of matrices that are composed of
+integers for linear periodic systems. Some points of each batch are solved again, alone and at
 another rtol: both answers must lie within the sum of their bars.
 
 A **lie** is a value farther from the truth than its error bar and the truth's own doubt together. A **wrong** verdict

@@ -1,13 +1,14 @@
 """The curves that [boundaries] draws on a map of two parameters: where multipliers reach the unit circle or leave it.
 
-Those of periodic orbits are found by `orbit_curves`; what follows is about linear systems. There the curves are zeros
-of the functions of `bifurcations`. These are known on LINES lines of the map each way, and their splines, on lines
-FINER times as dense, show where to look (marching squares). Every point is then bracketed along an axis by signs of the
-function itself that are certain within the error bounds of M, and curves are followed on from their ends inside the
-map, into the tips of tongues (see `tips`). A tongue that is narrower everywhere than the distance of two of the dense
-lines may be missed, and one that the splines do not show. Curves are drawn wherever a multiplier passes, also
-where another one is outside the circle already: `outside` counts those. `row_count` tells where they do not explain
-how many multipliers are outside, or, by the Maslov index, how often some have passed 1 or -1.
+Those of periodic orbits are found by `orbit_curves`; what follows is about linear systems, and about orbits that are
+symmetric, whose multipliers `family` gives. There the curves are zeros of the functions of `bifurcations`. These are
+known on LINES lines of the map each way, and their splines, on lines FINER times as dense, show where to look (marching
+squares). Every point is then bracketed along an axis by signs of the function itself that are certain within the error
+bounds of M, and curves are followed on from their ends inside the map, into the tips of tongues (see `tips`). A tongue
+that is narrower everywhere than the distance of two of the dense lines may be missed, and one that the splines do not
+show. Curves are drawn wherever a multiplier passes, also where another one is outside the circle already: `outside`
+counts those. `row_count` tells where they do not explain how many multipliers are outside, or, by the Maslov index, how
+often some have passed 1 or -1.
 """
 
 from functools import partial
@@ -33,41 +34,51 @@ ALONG = (
     Output("outside", "number of other multipliers outside the unit circle: stability is lost or gained where it is 0",
            applies="where the error bounds allow one number alone"),
 )  # fmt: skip
-LINES, FINER = 97, 8
+LINES, LINES_OF_ORBITS, FINER = 97, 49, 8
 NEAR = 3e-5  # of the map: how near curves of splines are
+BESIDE = 1e-9  # of the map: how near zeros are of what is computed roughly
 TRIED = ((1.0, 0), (2.3, 0), (1.0, 1), (2.3, 1))  # one after another: times NEAR, along the best axis or the other
+TRIED_OF_ORBITS = TRIED[::2]
 SURE = 1e-6  # the widest bracket of a point, half of it, that is drawn
 RTOL, ROUGH = 1e-13, 1e-9  # of M for points of curves, and to see where these are
 
 
 def refusal(axes, scene, options=None):
     """Why there are no curves on a map of these axes, in words; None if there are."""
-    if scene is not None and scene.FAMILY == "orbit" and scene.symmetry is not None:
-        return "curves are not known of orbits with REVERSED; see where the verdict changes on the map, or zoom there"
     if scene is not None and scene.FAMILY == "orbit" and scene.continued is not None:
         along = scene.own[scene.continued.index].name
         if "branch" in axes:
-            return "curves are those of all orbits, whatever their number: let `branch` be a number, not an axis"
-        if along not in axes[:2]:
+            whose = "all orbits, whatever their number" if scene.symmetry is None else "the orbits of one number"
+            return f"curves are those of {whose}: let `branch` be a number, not an axis"
+        alone = scene.symmetry is not None and len([name for name in axes if name]) == 1
+        if along not in axes[:2] and not alone:
             return f"curves are drawn along {along}, the parameter of CONTINUATION, or on maps of it and another one"
     return None if len(axes) in (1, 2, 3) else f"curves are drawn on two axes, or three, not on {len(axes)}"
 
 
 def searched(scene, square, axes, fixed, options):
     """The Curves on the map of `axes`, the unit square `square`; `fixed` holds the other parameters."""
-    if scene.FAMILY == "orbit":
+    if scene.FAMILY == "orbit" and scene.symmetry is None:
         return joined(scene.curves(square, axes, fixed), [output.name for output in ALONG])
-
-    matrices = matrices_of(scene, square, axes, fixed, options)
-    lattice, found = contours.lattice(LINES, square.across), []
-    on_lattice = matrices(lattice, ROUGH)
-    functions = bifurcations.functions(on_lattice[0].shape[1], scene.structure)
+    if scene.FAMILY == "orbit":
+        structure, number = "reversible", LINES_OF_ORBITS
+        orbits = scene.family(square, axes, fixed, number)
+        matrices, roughly, on_lattice = orbits.matrices, orbits.rough, orbits.on_lattice()
+    else:
+        structure, number, roughly = scene.structure, LINES, None
+        matrices = matrices_of(scene, square, axes, fixed, options)
+        on_lattice = matrices(contours.lattice(number, square.across), ROUGH)
+    found = []
+    functions = bifurcations.functions(on_lattice[0].shape[1], structure)
 
     def on_map(function, x):
-        return function(*matrices(x))
+        return function(*matrices(x, RTOL))
+
+    def nearly(function, x):
+        return function(*roughly(x))
 
     def draw(kind, x, error):
-        sure, angle, bar, outside = bifurcations.passing(*matrices(x), kind, scene.structure)
+        sure, angle, bar, outside = bifurcations.passing(*matrices(x, RTOL), kind, structure)
         for part in contours.runs(sure):
             known = {"angle": (angle[part], bar[part]), "outside": (outside[part], 0.0 * bar[part])}
             found.append((kind, square.parameters(x[part]), error[part], known))
@@ -75,42 +86,46 @@ def searched(scene, square, axes, fixed, options):
     for kind, function in functions.items():
         values, bars = function(*on_lattice)
         # where no sign is certain all around, as where the function is 0 throughout, there is only noise
-        open_ = ~(abs(values) > bars).reshape(LINES, -1)
+        open_ = ~(abs(values) > bars).reshape(number, -1)
         around = np.ones((3, 3 if square.across is None else 1))
         values = np.where(binary_erosion(open_, around, border_value=1).ravel(), np.nan, values)
         lines = _lines if square.across is None else partial(_crossings, across=square.across)
-        for x, error in lines(partial(on_map, function), square.grain, values.reshape(open_.shape)):
+        sharp, values = partial(on_map, function), values.reshape(open_.shape)
+        if roughly is None:
+            pieces = lines(sharp, square.grain, values)
+        else:
+            pieces = lines(partial(nearly, function), square.grain, values, TRIED_OF_ORBITS)
+            pieces = _sharpened(sharp, pieces, square.grain)
+        for x, error in pieces:
             draw(kind, x, error)
     if square.across is not None:
         return joined(found, [output.name for output in ALONG])
     drawn, passed = [(kind, square.positions(parameters)) for kind, parameters, _error, _known in found], {}
-    names = _indices(scene, square, axes)
+    names = _indices(scene, square, axes) if structure == "symplectic" else {}
     indices = _solved(scene, square, axes, fixed, options, "auto", ["monodromy", *names.values()])
-    on_lines = indices(lattice, ROUGH) if names else {}
+    on_lines = indices(contours.lattice(number), ROUGH) if names else {}
     for kind, name in names.items():
 
         def index(x, name=name):
             return indices(x, ROUGH)[name]
 
-        passed[kind] = on_lines[name].reshape(LINES, LINES)
+        passed[kind] = on_lines[name].reshape(number, number)
         for x, error in narrow.curves(index, partial(on_map, functions[kind]), passed[kind], kind, drawn):
             draw(kind, x, error + square.grain)
             drawn.append((kind, x))
     curves = joined(found, [output.name for output in ALONG])
-    counts = row_count.outside(*on_lattice, scene.structure).reshape(LINES, LINES)
+    counts = row_count.outside(*on_lattice, structure).reshape(number, number)
     curves.unexplained = row_count.unexplained(counts, drawn, passed)[0]
     return curves
 
 
 def _indices(scene, square, axes):
-    """{kind: name} of the outputs that are Maslov indices; {} where systems are not symplectic, or an excluded value
-    cuts the map into parts whose indices have nothing to do with one another.
+    """{kind: name} of the outputs that are Maslov indices; {} where an excluded value cuts the map into parts whose
+    indices have nothing to do with one another.
     """
     ends = {name: (square.low[k], square.high[k]) for k, name in enumerate(axes)}
     cut = any(ends[p.name][0] < x < ends[p.name][1] for p in scene.PARAMETERS if p.name in ends for x in p.excluded)
-    if cut or scene.structure != "symplectic":
-        return {}
-    return {PLUS_ONE: "index_plus_one", MINUS_ONE: "index_minus_one"}
+    return {} if cut else {PLUS_ONE: "index_plus_one", MINUS_ONE: "index_minus_one"}
 
 
 def matrices_of(scene, square, axes, fixed, options, method="auto"):
@@ -138,10 +153,10 @@ def _solved(scene, square, axes, fixed, options, method, variables):
     return solved
 
 
-def _lines(function, grain, values):
-    """[(positions (m, 2), errors (m))] of the curves function(x) = 0, from its values on the lattice (LINES, LINES)."""
-    number, known = (LINES - 1) * FINER + 1, np.isfinite(values)
-    ticks, fine = np.linspace(0.0, 1.0, LINES), np.linspace(0.0, 1.0, number)
+def _lines(function, grain, values, tried=TRIED):
+    """[(positions (m, 2), errors (m))] of the curves function(x) = 0, from its values on the lattice (lines, lines)."""
+    lines, known = len(values), np.isfinite(values)
+    ticks, fine = np.linspace(0.0, 1.0, lines), np.linspace(0.0, 1.0, (lines - 1) * FINER + 1)
     spline = RectBivariateSpline(ticks, ticks, np.where(known, values, 0.0))
     dense = spline(fine, fine)
     if not known.all():
@@ -155,12 +170,13 @@ def _lines(function, grain, values):
     slope = abs(np.stack([spline.ev(*x.T, dx=1), spline.ev(*x.T, dy=1)], axis=1))
     border = (x == 0.0) | (x == 1.0)
     along = np.argmax(np.where(border, -1.0, slope), axis=1)
-    return tips.followed(function, _closed_in(function, parts, along, grain), grain)
+    return tips.followed(function, _closed_in(function, parts, along, grain, 0.5 / (lines - 1), tried), grain)
 
 
-def _crossings(function, grain, values, across):
+def _crossings(function, grain, values, tried=TRIED, *, across):
     """As `_lines`, where only the border at `across` is asked for: the points on it, each alone."""
-    ticks, fine = np.linspace(0.0, 1.0, LINES), np.linspace(0.0, 1.0, (LINES - 1) * FINER + 1)
+    lines = len(values)
+    ticks, fine = np.linspace(0.0, 1.0, lines), np.linspace(0.0, 1.0, (lines - 1) * FINER + 1)
     known = np.isfinite(values[:, 0])
     dense = CubicSpline(ticks, np.where(known, values[:, 0], 0.0))(fine)
     dense[np.interp(fine, ticks, np.where(known, 0.0, 1.0)) > 0.0] = np.nan
@@ -170,11 +186,25 @@ def _crossings(function, grain, values, across):
         return []
     start = fine[at] + dense[at] / (dense[at] - dense[at + 1]) / (fine.size - 1)
     parts = [np.array([[t, across]]) for t in start]
-    return _closed_in(function, parts, np.zeros(len(parts), int), grain, TRIED[:2])
+    return _closed_in(function, parts, np.zeros(len(parts), int), grain, 0.5 / (lines - 1), tried[: len(tried) // 2])
 
 
-def _closed_in(function, parts, along, grain, tried=TRIED):
-    """The curves near positions, moved along the axis `along` of each; cut where one is not certain."""
+def _sharpened(function, pieces, grain):
+    """The pieces [(positions (m, 2), errors (m))], which are nearly zeros of the function, bracketed by it."""
+    if not pieces:
+        return []
+    along = []
+    for x, _error in pieces:
+        step = abs(np.gradient(x, axis=0)) if len(x) > 1 else np.array([[0.0, 1.0]])
+        along.append(np.argmin(np.where((x == 0.0) | (x == 1.0), np.inf, step), axis=1))
+    parts = [x for x, _error in pieces]
+    return _closed_in(function, parts, np.concatenate(along), grain, SURE, TRIED[:1], BESIDE)
+
+
+def _closed_in(function, parts, along, grain, widest, tried=TRIED, near=NEAR):
+    """The curves near positions, moved along the axis `along` of each, by `widest` at most; cut where one is not
+    certain. Brackets are `near` wide at first.
+    """
     x = np.concatenate(parts)
 
     def at(left, axis, who, t):
@@ -188,8 +218,8 @@ def _closed_in(function, parts, along, grain, tried=TRIED):
         left = np.flatnonzero(error == np.inf)
         axis = abs(along[left] - other)
         start, same = x[left, axis], np.ones(left.size)
-        t, width, sure = close_in(partial(at, left, axis), start, times * NEAR * same, grain * same, 0.5 / (LINES - 1))
-        sure &= (width < SURE) & (t >= 0.0) & (t <= 1.0) & (abs(t - start) < 0.5 / (LINES - 1))
+        t, width, sure = close_in(partial(at, left, axis), start, times * near * same, grain * same, widest)
+        sure &= (width < SURE) & (t >= 0.0) & (t <= 1.0) & (abs(t - start) < widest)
         found[left[sure], axis[sure]], error[left[sure]] = t[sure], width[sure] + grain
     firsts = np.cumsum([0, *map(len, parts)])
     own = [first + run for first, last in pairwise(firsts) for run in contours.runs(np.isfinite(error[first:last]))]

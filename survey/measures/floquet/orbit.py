@@ -74,7 +74,7 @@ def solve_branches(equation, points, branch, continued, method, rtol, wanted):
             own = where[i : i + CHUNK]
             period = T[i : i + CHUNK] if equation.free else equation.periods(different[own])
             start = equation.pinned(different[own], x[i : i + CHUNK])  # curves are cubics between their points
-            found = _shown(equation, different[own], start, period, method, rtol, relax=False)
+            found = shown(equation, different[own], start, period, method, rtol, relax=False)
             for k in np.flatnonzero(found.good):
                 of_point[own[k]].append((found.square[k], tuple(found.x[k]), found.T[k], count + k))
             full = np.ones(len(own), bool)
@@ -122,12 +122,12 @@ def _chunk(equation, points, method, rtol, wanted):
     guess, period = np.full((N, n), np.nan), np.full(N, np.nan)
     guess[known], period[known] = equation.begin(points[known])
     known &= np.isfinite(guess).all(axis=1) & np.isfinite(period) & (period > 0)
-    found = _shown(equation, points, guess, period, method, rtol)
+    found = shown(equation, points, guess, period, method, rtol)
     return found.outputs(known, rtol, wanted, callable(equation.period))
 
 
-def _shown(equation, points, guess, period, method, rtol, relax=True):
-    """What is Found from these guesses."""
+def shown(equation, points, guess, period, method, rtol, relax=True):
+    """What is Found (N) from guesses of the state (N, n) and of the period (N); see `newton.located`."""
     N, reach = len(points), _reach(rtol)
     found = Found(equation, N)
     orbits, good = located(equation, points, reach, guess, period, relax)

@@ -12,6 +12,9 @@ from scipy.optimize import brentq
 
 import survey
 from survey.measures.floquet import continuation
+from survey.measures.floquet.multipliers import PLUS_ONE
+from survey.request.workflow import check
+from survey.sweep import boundaries
 
 FOLDER = Path(__file__).parents[3] / "workflows"
 sys.path.insert(0, str(FOLDER))
@@ -115,6 +118,11 @@ def test_halo_orbits_branch_off_where_scipy_says():
 
     a = brentq(off, 0.115, 0.122, xtol=1e-12)
     scene = str(FOLDER / "lyapunov.py")
+    edge = survey.edge(scene, along="a", mu=MU, a=(0.05, 0.4))
+    assert edge.edge_class.attrs["flag_meanings"].split()[0] == "plus_one" and edge.edge_class.values.tolist() == [1]
+    assert abs(float(edge.edge[0]) - a) < 1e-9 and float(edge.edge_error[0]) < 1e-9
+    across = survey.edge(scene, along="mu", a=a, mu=(0.01, 0.015))
+    assert abs(float(across.edge[0]) - MU) < 1e-9 and float(across.edge_error[0]) < 1e-9
     ds = survey.evaluate(scene, mu=MU, a=a + np.array([-1e-8, 1e-8]))
     assert ds.verdict.values.tolist() == [1, 0] and ds.crossing.values.tolist() == [1, 1]
     x, v = ds.x0.values[0, 0], ds.x0.values[0, 4]
@@ -215,6 +223,27 @@ def test_an_orbit_on_a_curve_has_the_held_state_of_its_start(monkeypatch):
         ds = survey.evaluate(scene, A=0.9, w=0.7, b=1.0, rtol=rtol, branch=1)
         assert ds.x0.values.tolist() == [0.9, 0.0, 0.0, 0.0]
         assert abs(float(ds.period) - exact) <= float(ds.period_error) + 1e-15 < 1e-9
+
+
+@pytest.mark.parametrize("more", [{}, {"continuation": ("A", 0.1, 3.0)}], ids=["start", "continuation"])
+def test_curves_are_the_band_edges_of_lames_equation(monkeypatch, more):
+    """With b = 1, z is dn, cn or sn of x = A cn where w = -A^2 / 2, 1 or 1 + A^2 / 2, and there alone l = 1."""
+    monkeypatch.setattr("survey.measures.floquet.curves.LINES_OF_ORBITS", 33)
+    axes = {"A": {"start": 0.3, "stop": 2.5, "num": 3}, "w": {"start": -2.0, "stop": 4.0, "num": 3}, "b": 1.0}
+    ds = boundaries.find(check({"scene": beams(**more), "axes": axes, "boundaries": {}}))
+    assert "curves_unexplained" not in ds.attrs and ds.curve_class.values.tolist() == [PLUS_ONE] * 3
+    A, w, found = ds.curve_A.values, ds.curve_w.values, set()
+    for last, count in zip(np.cumsum(ds.curve_count.values), ds.curve_count.values, strict=True):
+        a, error = A[last - count : last], ds.curve_position_error.values[last - count : last]
+        exact = {"dn": (-(a**2) / 2, a), "cn": (1.0 + 0.0 * a, 0.0 * a), "sn": (1.0 + a**2 / 2, a)}
+        size = {name: np.hypot(6.0, 2.2 * slope) for name, (_, slope) in exact.items()}
+        off = {name: abs(w[last - count : last] - at) / size[name] for name, (at, _) in exact.items()}
+        name = min(off, key=lambda name: off[name].max())
+        assert (off[name] <= error).all() and np.median(error) < 1e-11
+        found.add(name)
+        # from border to border: dn leaves at w = -2, sn at w = 4
+        assert a.min() == 0.3 and abs(a.max() - {"dn": 2.0, "cn": 2.5, "sn": 6**0.5}[name]) < 1e-9
+    assert found == {"dn", "cn", "sn"}
 
 
 def test_a_parameter_that_only_chooses_the_orbit_does_not_change_motions():

@@ -1,0 +1,173 @@
+"""Families of symmetric orbits (see `symmetry`) on a map of two parameters, or a line: their multipliers anywhere.
+
+On a lattice orbits are found from `start`, or, on every fourth line, by following them along the parameter of the
+continuation. In between, splines of x(0) and T are where Newton's method begins, and the orbit it finds is shown to
+exist (`shooting`).
+"""
+
+import numpy as np
+from scipy.interpolate import CubicSpline, RectBivariateSpline
+from scipy.ndimage import distance_transform_edt
+
+from survey.measures import contours
+from survey.measures.floquet import monodromy, orbit
+from survey.measures.floquet.continuation import Curves, floored
+from survey.measures.floquet.newton import located
+
+NOISE = 1e-9  # relative: a guess of the errors on the lattice, where orbits are not shown to exist
+REACHED, ENOUGH = 1e-13, 1e-9  # rtol of the series by which orbits are found, and of those that are told apart
+FOLLOWED = 4  # lines from one that is followed to the next; a power of two
+SAME = 1e-4  # relative: periods of one orbit, from cubic pieces of its curve
+HOLE = 1e-9  # the weight of what is unknown, but for rounding
+ALIKE = 0.05  # relative: how near its guess an orbit between these lines must be
+
+
+class Family:
+    """The orbits of an OrbitScene on the map of `axes`, the unit square `square`; `fixed`: the other parameters.
+
+    They are looked for on `lines` lines each way. Where orbits are continued, they are those number `fixed["branch"]`.
+    """
+
+    def __init__(self, scene, square, axes, fixed, lines):
+        self.equation, self.square, self.continued = scene.equation, square, scene.continued
+        self.method = monodromy.method_of("auto")
+        self.reach = self.method.floquet_reach(REACHED)
+        names = [p.name for p in scene.own]
+        self.given = np.array([fixed.get(name, np.nan) for name in names])
+        self.varied = [names.index(name) for name in axes if name in names]
+        self.branch = int(fixed.get("branch", 1))
+        self.x = contours.lattice(lines, square.across)
+        self.points, n = self._parameters(self.x), self.equation.n
+        self.states, self.T = np.full((len(self.x), n), np.nan), np.full(len(self.x), np.nan)
+        self._find(np.arange(len(self.x)).reshape(lines, -1))
+
+    def _parameters(self, x):
+        """All parameters (N, parameters) at positions (N, 2)."""
+        points = np.tile(self.given, (len(x), 1))
+        points[:, self.varied] = self.square.parameters(x)[:, : len(self.varied)]
+        return points
+
+    def _find(self, lattice):
+        """Find the orbits of the `lattice`, an array (lines, lines), or (lines, 1), of their numbers."""
+        if self.continued is None:
+            self._locate(lattice.ravel(), *self.equation.begin(self.points))
+        else:
+            along = self.continued.index
+            across = 1 - self.varied.index(along) if along in self.varied else 0  # the axis with a line for each place
+            each = np.arange(lattice.shape[across])
+            step = FOLLOWED if each.size > 1 else 1
+            followed = lattice.take(each[::step], across).ravel()
+            self._locate(followed, *self._followed(followed))
+            while step > 1:
+                self._interpolate(lattice.take(each[::step], across))
+                step //= 2
+                between = lattice.take(each[step :: 2 * step], across).ravel()
+                _points, x, T = self._near(self.x[between])
+                self._locate(between, x, T, ALIKE)
+        self._interpolate(lattice)
+
+    def _locate(self, those, x, T, alike=np.inf):
+        """Find orbits number `those` from x and T, from which they differ by less than `alike`."""
+        orbits, good = located(self.equation, self.points[those], self.reach, x, T)
+        off = (abs(orbits.x - x) / floored(orbits.size)).max(axis=1)
+        good = good[(off[good] <= alike) & (abs(orbits.T - T)[good] <= alike * orbits.T[good])]
+        self.states[those[good]], self.T[those[good]] = orbits.x[good], orbits.T[good]
+
+    def _followed(self, those):
+        """States and periods where Newton's method begins, of orbits that are followed along the continuation."""
+        points, equation = self.points[those], self.equation
+        values = points[:, self.continued.index]
+        others = points.copy()
+        others[:, self.continued.index] = 0.0
+        rows, row = np.unique(others, axis=0, return_inverse=True)
+        curves = Curves(equation, self.continued, rows, self.reach)
+        found = []
+        for k in range(len(rows)):
+            mine = np.flatnonzero(row.reshape(-1) == k)
+            which, *start = curves.starts(k, values[mine])
+            found.append((mine[which], *start))
+        which, x, T = (np.concatenate(one) for one in zip(*found, strict=True))
+        x, first = equation.pinned(points[which], x), np.full(len(points), -1)
+        for k in np.unique(which):
+            own = np.flatnonzero(which == k)
+            if (abs(T[own] - T[own[0]]) <= SAME * T[own]).all():  # one orbit, perhaps found twice
+                first[k] = own[0] if abs(self.branch) == 1 else -1
+                continue
+            several = orbit.shown(equation, points[which[own]], x[own], T[own], self.method, ENOUGH, relax=False)
+            order = [
+                (several.square[i], tuple(several.x[i]), several.T[i], own[i]) for i in np.flatnonzero(several.good)
+            ]
+            order = orbit.numbered(order, free=False)
+            if abs(self.branch) <= len(order):
+                first[k] = order[self.branch - (self.branch > 0)]
+        known = (first >= 0)[:, None]
+        return np.where(known, x[first], np.nan), np.where(known[:, 0], T[first], np.nan)
+
+    def _interpolate(self, lattice):
+        """Make splines of the states that are unknown and of T from those on a lattice, an array of their numbers."""
+        ticks = self.x[lattice[:, 0], 0], self.x[lattice[0], 1]
+        columns = [*self.states.T[self.equation.symmetry.unknown], self.T]
+        self._splines = [_spline(ticks, values[lattice]) for values in columns]
+
+    def on_lattice(self):
+        """(M, E) on the lattice, as `rough` gives them."""
+        return self._rough(self.points, self.states, self.T)
+
+    def rough(self, x):
+        """As `matrices`, several times as fast, but no orbit is shown to exist: E is a guess."""
+        points, start, T = self._near(x)
+        orbits, good = located(self.equation, points, self.reach, start, T)
+        known = np.isin(np.arange(len(x)), good)
+        return self._rough(points, np.where(known[:, None], orbits.x, np.nan), np.where(known, orbits.T, np.nan))
+
+    def matrices(self, x, rtol):
+        """(M, E) (N, m, m) at positions (N, 2), of the multipliers that are judged: (0 1; -1 2 K), see `symmetry`."""
+        points, start, T = self._near(x)
+        M, E = np.full((2, len(x), self.equation.judged, self.equation.judged), np.nan)
+        for i in range(0, len(x), orbit.CHUNK):
+            own = slice(i, i + orbit.CHUNK)
+            found = orbit.shown(self.equation, points[own], start[own], T[own], self.method, rtol, relax=False)
+            M[own], E[own] = found.others.M, found.others.E
+        return M, E
+
+    def _near(self, x):
+        """The parameters at positions (N, 2), and where Newton's method begins there."""
+        points, symmetry = self._parameters(x), self.equation.symmetry
+        columns = np.stack([spline(x) for spline in self._splines], axis=1)
+        columns[((x < 0.0) | (x > 1.0)).any(axis=1)] = np.nan
+        start = np.zeros((len(x), self.equation.n))
+        start[:, symmetry.unknown] = columns[:, :-1]
+        return points, self.equation.pinned(points, start), columns[:, -1]
+
+    def _rough(self, points, x, T):
+        """(M, E) of orbits from x (N, n), of the periods T; NaN where x is."""
+        n, symmetry = self.equation.n, self.equation.symmetry
+        X, f = np.full((len(x), n, n), np.nan), np.full((len(x), n), np.nan)
+        good = np.flatnonzero(np.isfinite(x).all(axis=1))
+        for inside, programs in self.equation.traced(points[good], x[good]):
+            own = good[inside]
+            numbers = programs.numbers(points[own])
+            X[own] = programs.flow(numbers, x[own], self.equation.share * T[own], self.reach)[1]
+            f[own] = programs.slopes(numbers, np.zeros(own.size), x[own])[0]
+        own = symmetry.block(X)
+        found = symmetry.matrices(X, _noise(X), f, _noise(f), own, _noise(own))[2]
+        return found.M, found.E
+
+
+def _noise(A):
+    """Guesses of the errors of arrays (N, ...)."""
+    return np.broadcast_to(NOISE * abs(A).max(axis=tuple(range(1, A.ndim)), keepdims=True), A.shape)
+
+
+def _spline(ticks, values):
+    """The function of positions (N, 2) that has these values; NaN beside points where they are unknown."""
+    known = np.isfinite(values)
+    if not known.any():
+        return lambda x: np.full(len(x), np.nan)
+    values = values[tuple(distance_transform_edt(~known, return_distances=False, return_indices=True))]
+    hole = np.where(known, 0.0, 1.0)
+    if len(ticks[1]) == 1:
+        along = CubicSpline(ticks[0], values[:, 0])
+        return lambda x: np.where(np.interp(x[:, 0], ticks[0], hole[:, 0]) > 0.0, np.nan, along(x[:, 0]))
+    both, outside = RectBivariateSpline(*ticks, values), RectBivariateSpline(*ticks, hole, kx=1, ky=1)
+    return lambda x: np.where(outside.ev(*x.T) > HOLE, np.nan, both.ev(*x.T))
