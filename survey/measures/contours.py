@@ -6,6 +6,7 @@ lines may be missed. Positions are those of `survey.measures.square`.
 
 import contourpy
 import numpy as np
+from scipy.ndimage import distance_transform_edt
 
 from survey.measures.hill.edges import close_in
 
@@ -21,6 +22,14 @@ def lattice(number, across=None):
     ticks = np.linspace(0.0, 1.0, number)
     first, second = np.meshgrid(ticks, ticks if across is None else across, indexing="ij")
     return np.stack([first.ravel(), second.ravel()], axis=1)
+
+
+def filled(values):
+    """The values on a lattice, those that are not finite replaced by the nearest ones that are; 0 if none is."""
+    unknown = ~np.isfinite(values)
+    if unknown.all():
+        return np.zeros(values.shape)
+    return values[tuple(distance_transform_edt(unknown, return_distances=False, return_indices=True))]
 
 
 def lines(function, square, number, values=None, halvings=HALVINGS):

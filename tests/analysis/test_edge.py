@@ -273,6 +273,17 @@ def test_permanent_rotations_in_clebschs_case(epsilon):
     assert set(margin.parameter.values) == set(ranges)
 
 
+def test_margins_of_orbits_along_all_parameters():
+    """From a fold in the damping, or the force, that in the frequency, along which orbits are continued, is back."""
+    scene = str(ROOT / "workflows" / "duffing.py")
+    margin = survey.evaluate(scene, omega=1.5, F=0.3, zeta=0.05).survey.margin()
+    assert set(margin.parameter.values) == {"omega", "F", "zeta"} and (margin.edge_error < 1e-12).all()
+    for name in ("F", "zeta"):
+        at = {"F": 0.3, "zeta": 0.05} | {name: float(margin.edge.sel(parameter=name))}
+        back = survey.edge(scene, along="omega", omega=(1.2, 1.8), **at)
+        assert abs(back.edge.values - 1.5).min() < 1e-10
+
+
 def test_a_margin_that_cannot_be_found_says_why():
     motion = survey.evaluate("brun_triaxial", question="trajectory", A=1.0, B=1.5, C=2.0, t=3.0)
     with pytest.raises(BadInput, match=r"brun_triaxial no boundaries are known along A: question = trajectory has no"):

@@ -4,9 +4,10 @@ The unknowns y = (x(0), l), or (x(0), T, l) where T is unknown, l the share of t
 equations (see `newton`); a curve is followed by its arc length: a step along the tangent, and Newton's method across
 it. Where T is unknown, x(0) stays in a plane across the motion, which moves along with the curve.
 
-Curves begin at the orbits that Newton's method finds from the start at SEEDS values of l, and end where l leaves its
-range, after MOST_STEPS steps, or where these become too short. Curves that branch off are not looked for. They depend
-on the other parameters and the range alone: so a point has the same orbits, in the same order, on every grid.
+Curves begin at the orbits that Newton's method finds, from the start as a rule, at SEEDS values of l, and end where l
+leaves its range, after MOST_STEPS steps, or where these become too short. Curves that branch off are not looked for.
+They depend on the other parameters and the range alone: so a point has the same orbits, in the same order, on every
+grid.
 
 Source: H. B. Keller, in Applications of Bifurcation Theory (1977) 359 (pseudo-arclength).
 """
@@ -95,14 +96,19 @@ def _bisected(c, values, low, high):
 
 
 class Curves:
-    """The curves of each of R rows, sets of parameters whose continued one does not matter."""
+    """The curves of each of R rows, sets of parameters whose continued one does not matter.
 
-    def __init__(self, equation, continued, rows, reach):
+    begin(points) gives [(states (R, n), periods (R))] from which Newton's method begins; the start if it is missing.
+    """
+
+    def __init__(self, equation, continued, rows, reach, begin=None):
         self.equation, self.continued, self.rows, self.reach = equation, continued, rows, reach
         self.free = equation.free
         self.of_row = [[] for _ in rows]
         for share in np.linspace(0.0, 1.0, SEEDS):
-            self._follow(share)
+            points = self.points(np.arange(len(rows)), share)
+            for x, T in begin(points) if begin else [equation.begin(points)]:
+                self._follow(share, *located(equation, points, reach, x, T))
 
     def points(self, those, share):
         """The parameters of these rows, with the continued one at shares of its range."""
@@ -111,11 +117,10 @@ class Curves:
         points[:, index] = low + (high - low) * share
         return points
 
-    def _follow(self, share):
-        """Follow the curves through the orbits at this share of the range, but for those that are known."""
-        everyone = np.arange(len(self.rows))
-        points = self.points(everyone, share)
-        orbits, good = located(self.equation, points, self.reach, *self.equation.begin(points))
+    def _follow(self, share, orbits, good):
+        """Follow the curves through the `good` ones of Located orbits at this share of the range, but for those that
+        are known.
+        """
         those = np.array([i for i in good if not self._known(i, share, orbits, i)], dtype=int)
         if not those.size:
             return

@@ -50,9 +50,9 @@ def refusal(axes, scene, options=None):
         if "branch" in axes:
             whose = "all orbits, whatever their number" if scene.symmetry is None else "the orbits of one number"
             return f"curves are those of {whose}: let `branch` be a number, not an axis"
-        alone = scene.symmetry is not None and len([name for name in axes if name]) == 1
-        if along not in axes[:2] and not alone:
-            return f"curves are drawn along {along}, the parameter of CONTINUATION, or on maps of it and another one"
+        alone = len([name for name in axes if name]) == 1
+        if scene.symmetry is not None and along not in axes[:2] and not alone:
+            return f"curves are drawn along one parameter, or on maps of {along}, that of CONTINUATION, and another one"
     return None if len(axes) in (1, 2, 3) else f"curves are drawn on two axes, or three, not on {len(axes)}"
 
 
@@ -157,7 +157,7 @@ def _lines(function, grain, values, tried=TRIED):
     """[(positions (m, 2), errors (m))] of the curves function(x) = 0, from its values on the lattice (lines, lines)."""
     lines, known = len(values), np.isfinite(values)
     ticks, fine = np.linspace(0.0, 1.0, lines), np.linspace(0.0, 1.0, (lines - 1) * FINER + 1)
-    spline = RectBivariateSpline(ticks, ticks, np.where(known, values, 0.0))
+    spline = RectBivariateSpline(ticks, ticks, contours.filled(values))
     dense = spline(fine, fine)
     if not known.all():
         hole = RectBivariateSpline(ticks, ticks, np.where(known, 0.0, 1.0), kx=1, ky=1)(fine, fine) > 0.0
@@ -178,7 +178,7 @@ def _crossings(function, grain, values, tried=TRIED, *, across):
     lines = len(values)
     ticks, fine = np.linspace(0.0, 1.0, lines), np.linspace(0.0, 1.0, (lines - 1) * FINER + 1)
     known = np.isfinite(values[:, 0])
-    dense = CubicSpline(ticks, np.where(known, values[:, 0], 0.0))(fine)
+    dense = CubicSpline(ticks, contours.filled(values[:, 0]))(fine)
     dense[np.interp(fine, ticks, np.where(known, 0.0, 1.0)) > 0.0] = np.nan
     with np.errstate(invalid="ignore"):
         at = np.flatnonzero(np.isfinite(dense[1:] + dense[:-1]) & ((dense[1:] > 0.0) != (dense[:-1] > 0.0)))

@@ -7,7 +7,6 @@ exist (`shooting`).
 
 import numpy as np
 from scipy.interpolate import CubicSpline, RectBivariateSpline
-from scipy.ndimage import distance_transform_edt
 
 from survey.measures import contours
 from survey.measures.floquet import monodromy, orbit
@@ -161,11 +160,7 @@ def _noise(A):
 
 def _spline(ticks, values):
     """The function of positions (N, 2) that has these values; NaN beside points where they are unknown."""
-    known = np.isfinite(values)
-    if not known.any():
-        return lambda x: np.full(len(x), np.nan)
-    values = values[tuple(distance_transform_edt(~known, return_distances=False, return_indices=True))]
-    hole = np.where(known, 0.0, 1.0)
+    hole, values = np.where(np.isfinite(values), 0.0, 1.0), contours.filled(values)
     if len(ticks[1]) == 1:
         along = CubicSpline(ticks[0], values[:, 0])
         return lambda x: np.where(np.interp(x[:, 0], ticks[0], hole[:, 0]) > 0.0, np.nan, along(x[:, 0]))

@@ -4,7 +4,8 @@
     minus_one       period doubling
     neimark_sacker  a complex pair
 
-Orbits are followed along ROWS lines of the map each way (`continuation`). Where det(M - 1), det(M + 1) or the product
+Orbits are followed along ROWS lines of the map each way (`continuation`); on a line along another parameter than that
+of the continuation, from the orbits that this gives at nine places. Where det(M - 1), det(M + 1) or the product
 of all l_i l_j - 1 changes its sign there, Newton's method on the equations of `critical` finds the orbit that has the
 multiplier, and the curve is followed from it in the space of all unknowns, in which folds of orbits and cusps of their
 curves are nothing special. Every point that is kept is shown to exist, with bounds of its parameters
@@ -105,10 +106,22 @@ class _Map:
         rows = np.tile(self.given, (len(lines), 1))
         for k, other in enumerate(self.varied):
             rows[:, other] = self.square.parameters(lines)[:, k]
-        curves = Curves(self.equation, Range(index, low, high), rows, self.reach)
+        elsewhere = self.continued is not None and self.continued.index not in self.varied
+        begin = self._continued if elsewhere else None
+        curves = Curves(self.equation, Range(index, low, high), rows, self.reach, begin)
         for row, of_row in enumerate(curves.of_row):
             for curve in of_row:
                 yield from self._of_curve(curves, row, curve.finer(FINER), axis)
+
+    def _continued(self, points):
+        """[(states, periods)] of the first, second, ... orbits at points (N, parameters), by the continuation."""
+        curves, n = Curves(self.equation, self.continued, points, self.reach), self.equation.n
+        found = [curves.starts(k, point[[self.continued.index]])[1:] for k, point in enumerate(points)]
+        for i in range(max(len(T) for _x, T in found)):
+            some = [k for k, (_x, T) in enumerate(found) if i < len(T)]
+            x, T = np.full((len(points), n), np.nan), np.full(len(points), np.nan)
+            x[some], T[some] = [found[k][0][i] for k in some], [found[k][1][i] for k in some]
+            yield x, T if self.equation.free else self.equation.periods(points)
 
     def _of_curve(self, curves, row, y, axis):
         """The same of one curve of orbits."""

@@ -207,12 +207,21 @@ def sorted_pair(x, y):
     return x[order], y[order]
 
 
+@pytest.mark.slow
+def test_a_map_without_the_parameter_of_the_continuation():
+    """From each point of the fold of Duffing's oscillator, that in the frequency is back."""
+    scene = str(WORKFLOWS / "duffing.py")
+    ds = found(scene, F=(0.05, 0.4), zeta=(0.01, 0.15), omega=1.5)
+    assert ds.curve_class.values.tolist() == [CLASSES["plus_one"]] and ds.curve_position_error.max() < 1e-12
+    F, zeta = ds.curve_F.values, ds.curve_zeta.values
+    assert {F.min(), F.max()} == {0.05, 0.4}
+    for k in (0, F.size // 2, -1):
+        back = survey.edge(scene, along="omega", omega=(1.2, 1.8), F=F[k], zeta=zeta[k])
+        assert abs(back.edge.values - 1.5).min() < 1e-10
+
+
 def test_where_there_are_none():
     scene = str(WORKFLOWS / "duffing.py")
-    with pytest.raises(BadInput, match="along omega, the parameter of CONTINUATION"):
-        found(scene, F=(0.1, 0.2), zeta=(0.01, 0.1), omega=1.0)
-    with pytest.raises(BadInput, match="along omega, the parameter of CONTINUATION"):
-        survey.edge(scene, along="F", F=(0.1, 0.2), omega=1.0)
     with pytest.raises(BadInput, match="let `branch` be a number"):
         found(scene, omega=(1.0, 1.2), F=(0.1, 0.2), branch=(1, 2))
 

@@ -246,6 +246,12 @@ def test_curves_are_the_band_edges_of_lames_equation(monkeypatch, more):
     assert found == {"dn", "cn", "sn"}
 
 
+def test_maps_without_the_amplitude_have_no_curves():
+    axes = {"w": {"start": 0.5, "stop": 1.5, "num": 3}, "b": {"start": 0.5, "stop": 1.5, "num": 3}, "A": 1.0}
+    with pytest.raises(survey.BadInput, match="on maps of A, that of CONTINUATION, and another one"):
+        check({"scene": beams(continuation=("A", 0.1, 3.0)), "axes": axes, "boundaries": {}})
+
+
 def test_a_parameter_that_only_chooses_the_orbit_does_not_change_motions():
     """f of `beam` depends on w and b, and not on the amplitude A."""
     equation, x = beams().equation, np.full((3, 4), 0.4)
