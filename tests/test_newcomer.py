@@ -375,12 +375,6 @@ DATASET = [
         lambda ds, scene: survey.edge("brun_triaxial", along="Omega", A=1.0, B=0.5, C=0.3, Omega=(0, 2)),
         "edge: none at Omega = 1, A = 1, B = 0.5, C = 0.3, epsilon = 1: the parameters lie outside the domain: ",
     ),
-    (
-        lambda ds, scene: survey.edge(
-            survey.hill(z, period=np.pi, parameters="a", even=True, damping=0.1), along="a", a=(0.0, 1.0)
-        ),
-        "edges are known of undamped equations alone, not of hill(z); run a line of points",
-    ),
 ]
 
 

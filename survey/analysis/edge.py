@@ -12,7 +12,6 @@ from survey.errors import BadInput
 from survey.file.labels import flag_attributes
 from survey.request import user_scene
 from survey.request.checks import check_options, check_parameters, is_number
-from survey.request.edges_and_cells import check_even
 from survey.request.function_scene import FunctionScene
 from survey.scene import plus_minus
 from survey.sweep import boundaries
@@ -64,8 +63,6 @@ def _edge(scene, along, near, parameters, alone=False):
     measure = measures.curves(module)
     if measure is None:
         raise BadInput(f"edge: {_UNKNOWN} {name}; {_INSTEAD}")
-    if hasattr(measure, "trace"):
-        check_even(module, name, "edge", _INSTEAD)
     if not isinstance(along, str):
         raise BadInput(f"along = {shown(along)}: give the name of one parameter")
     for key in parameters.keys() & {"rtol", "method", "variables"}:

@@ -93,6 +93,9 @@ QUESTIONS = {
 }
 
 
+QUESTIONS["trace_curves"] = QUESTIONS["curves"]  # of scenes that `curves` does not serve
+
+
 def method(name):
     """The method `name`. Raises BadInput if there is none, or if it does not keep to its families' tables."""
     module = modules.load(methods, name, "method")
@@ -116,8 +119,8 @@ def question(family, name):
 
 def curves(scene):
     """The module that knows the scene's curves; None if there is none."""
-    found = question(scene.FAMILY, "curves")
-    return found if found is None or not hasattr(found, "serves") or found.serves(scene) else None
+    found = (question(scene.FAMILY, name) for name in ("curves", "trace_curves"))
+    return next((one for one in found if one and (not hasattr(one, "serves") or one.serves(scene))), None)
 
 
 @cache

@@ -75,9 +75,7 @@ class DampedScene(FunctionScene):
         """The requested outputs of a block (see `survey.scenes`)."""
         wanted = frozenset({"discriminant", "exponent", "verdict", "period", "rotation_number"})
         out = self._inner.solve(point, replace(request, variables=wanted))
-        c = self._damping(point, out["status"].shape)
-        turn = c * out["period"]
-        bar = abs(turn) * (ROUNDING + out["period_error"] / out["period"])
+        c, turn, bar = self._loss(point, out)
         exponent, off = out["exponent"] - turn, out["exponent_error"] + bar + EPS * abs(out["exponent"])
         certain = np.where(exponent + off < 0.0, 1, np.where(exponent - off > 0.0, 0, -1))
         verdict = np.where(c == 0.0, out["verdict"], np.where(out["status"] == status.OK, certain, -1))
@@ -88,9 +86,19 @@ class DampedScene(FunctionScene):
         known = {"discriminant": trace, "discriminant_error": error, "exponent": exponent, "exponent_error": off}
         return {**out, **known, "verdict": verdict.astype(np.int8)}
 
-    def _damping(self, point, shape):
+    def _loss(self, point, out):
+        """c, c T and a bound of its error, in the shape of the outputs `out`."""
         given = self.damping if self.place is None else point[self.PARAMETERS[self.place].name]
-        return np.broadcast_to(np.asarray(given, float), shape)
+        c = np.broadcast_to(np.asarray(given, float), out["status"].shape)
+        turn = c * out["period"]
+        return c, turn, abs(turn) * (ROUNDING + out["period_error"] / out["period"])
+
+    def product(self, point, out):
+        """The product of the multipliers, e^(-2 c T), and its error bound, where the outputs are `out`."""
+        _c, turn, bar = self._loss(point, out)
+        with np.errstate(over="ignore"):
+            value = np.exp(-2.0 * turn)
+            return value, value * (np.expm1(4.0 * bar) + ROUNDING)
 
     def why(self, answer):
         """Why the point has its verdict (see `survey.scenes`)."""

@@ -20,10 +20,9 @@ def check_boundaries(scene, name, table, given, options, proves=False):
     measure = measures.curves(scene)
     if measure is None:
         raise BadInput(f"boundaries: no boundary curves are known for the scene {name}; leave the table out")
-    if hasattr(measure, "refusal"):
+    by_rows = measures.question(scene.FAMILY, "edges") is not None  # and so proofs are made
+    if hasattr(measure, "refusal") and not (proves and by_rows):
         return _check_closed(measure, scene, name, table, {key: given[key] for key in axes}, given, options)
-    if not proves:  # proofs need no factors at T/2
-        check_even(scene, name, "boundaries")
     if not axes:
         raise BadInput("boundaries: they are drawn along an axis, and there is none; add one")
     if table.axis is not None and table.axis not in axes:
@@ -87,7 +86,7 @@ def check_surfaces(scene, name, table, given, proves=False):
 def check_even(scene, name, table, remedy="leave the table out"):
     """Raise BadInput where there are no factors at T/2, whose zeros are the edges."""
     if getattr(scene, "DAMPED", False):
-        raise BadInput(f"{table}: edges are known of undamped equations alone, not of {name}; {remedy}")
+        raise BadInput(f"{table}: it is known of undamped equations alone, not of {name}; {remedy}")
     if not getattr(scene, "EVEN", True):
         raise BadInput(f"{table}: the z of {name} is not even, so it has no half-period factors; {remedy}")
 

@@ -36,7 +36,7 @@ def find(workflow, each=in_turn, once=lambda name, make: make()):
     `each`: see `survey.measures.tasks`; `once(name, make)` gives the arrays of `make()`, or those that an
     earlier run has kept under this name.
     """
-    measure = _measure(workflow, "curves")
+    measure = measures.curves(workflow.scene)
     if hasattr(measure, "refusal"):
         about = {"boundaries": workflow.boundaries}
         if len(workflow.grid.sizes) < 2:
@@ -64,7 +64,7 @@ def find(workflow, each=in_turn, once=lambda name, make: make()):
 
 def along(scene, options, name, ends, fixed):
     """(OnLine, index of each or None, are these all?) between `ends` of the parameter `name`; `fixed`: all others."""
-    measure = measures.question(scene.FAMILY, "curves")
+    measure = measures.curves(scene)
     if hasattr(measure, "refusal"):
         found = on_line(scene, options, name, ends, fixed)
         return found, None, found.complete
@@ -79,7 +79,7 @@ def plan(workflow, cost):
 
     `cost` is the scene's estimate for a point, in seconds.
     """
-    measure = _measure(workflow, "curves")
+    measure = measures.curves(workflow.scene)
     if hasattr(measure, "refusal"):
         sizes = workflow.grid.sizes
         seconds = measure.seconds(list(sizes)) if hasattr(measure, "seconds") else 0.1  # measured, per map
@@ -282,7 +282,7 @@ def _on_plane(workflow, square, across, axis, of_rows, plane, each):
     pieces = [_pieces(workflow, name) for name in (across, axis)]
     searched = _measure(workflow, "edges"), solve, square, _columns(pieces[1])
     found = [(square.positions(of_rows[0]), *of_rows[1:]), *(_of_columns(*searched, *piece) for piece in pieces[0])]
-    measure = _measure(workflow, "curves")
+    measure = measures.curves(workflow.scene)
     seeds = measure.Seeds(*_with_rectangles(*(np.concatenate(v) for v in zip(*found, strict=True)), pieces))
     curves = measure.trace(solve, square, seeds, each)
     return curves, _measure(workflow, "folds").find(solve, square, curves)

@@ -34,7 +34,7 @@ def on_line(scene, options, along, ends, fixed):
 
     Raises BadInput where the scene's family knows no curves.
     """
-    measure = measures.question(scene.FAMILY, "curves")
+    measure = measures.curves(scene)
     is_closed = hasattr(measure, "closed")  # others are searched along any axis
     second = second_axis(measure, scene, along, fixed, options) if is_closed else ""
     if second:

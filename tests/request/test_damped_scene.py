@@ -85,5 +85,3 @@ def test_what_cannot_be_is_refused():
     for damping in (True, float("nan"), [0.1], "not a name"):
         with pytest.raises(BadInput, match="damping = "):
             scene(damping=damping)
-    with pytest.raises(BadInput, match="edges are known of undamped equations alone"):
-        survey.edge(scene(damping=0.1), along="a", near=1.0, q=0.3)

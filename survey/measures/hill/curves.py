@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from survey.measures.hill import trace_curves
 from survey.measures.hill.edges import ASIDE, COUNTS, FACTORS, close_in, of_kind, tongue
 from survey.measures.hill.expansion import expander
 from survey.measures.tasks import in_turn
@@ -30,6 +31,11 @@ NEAR = 0.02  # of a step: how far a seed may lie from the curve that goes throug
 REACH = 2.0  # of a step: no point of it is farther from its beginning
 WIDE = 1e-7  # half the width of the first bracket of a point
 CHUNK = 1024  # points bracketed together
+
+
+def serves(scene):
+    """Has the scene factors at T/2?"""
+    return not trace_curves.serves(scene)
 
 
 @dataclass

@@ -218,10 +218,15 @@ def close_in(function, x, width, grain, widest=np.inf):
             least = 3 * bar[:, 1] / abs(slope) + 2 * grain[left]
             reach = np.minimum(least + 4 * bend * step**2 / wide, 0.5 * wide)  # bars, and Newton's error
         better = certain & (abs(step) <= wide) & (least < 0.5 * wide) & (attempt < ROUNDS - 1)
-        x[left[better]] += step[better]
-        width[left] = np.where(better, reach, np.where(certain, wide, 3 * wide))
-        sure[left] = certain & ~better
-        left = left[(better | ~certain) & (width[left] <= widest)]
+        # the function is far from straight between certain signs: the half that holds the zero
+        halved = certain & (abs(step) > wide) & (abs(f[:, 1]) > bar[:, 1]) & (attempt < ROUNDS - 1)
+        step = np.where(halved, np.copysign(0.5 * wide, f[:, 1] * f[:, 0]), step)
+        on = better | halved
+        x[left[on]] += step[on]
+        reach = np.where(halved, 0.5 * wide, reach)
+        width[left] = np.where(on, reach, np.where(certain, wide, 3 * wide))
+        sure[left] = certain & ~on
+        left = left[(on | ~certain) & (width[left] <= widest)]
     return x, width, sure
 
 
