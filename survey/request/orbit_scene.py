@@ -90,7 +90,7 @@ class OrbitScene(TracedScene):
     @property
     def curves_seconds(self):
         """Seconds that the curves of a map take, roughly: some thousands of orbits."""
-        return 6e3 * self._one
+        return (6e3 if self.symmetry is None else 15e3) * self._one
 
     @property
     def _one(self):

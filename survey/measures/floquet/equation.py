@@ -55,7 +55,7 @@ class Equation:
 
     def pinned(self, points, x):
         """The states x (N, n), with the one that is held on a family of symmetric orbits as `start` gives it."""
-        if self.symmetry is None:
+        if self.symmetry is None or not len(x):
             return x
         x, held = x.copy(), self.symmetry.held
         x[:, held] = self.begin(points)[0][:, held]

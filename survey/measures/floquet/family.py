@@ -85,22 +85,24 @@ class Family:
             mine = np.flatnonzero(row.reshape(-1) == k)
             which, *start = curves.starts(k, values[mine])
             found.append((mine[which], *start))
-        which, x, T = (np.concatenate(one) for one in zip(*found, strict=True))
-        x, first = equation.pinned(points[which], x), np.full(len(points), -1)
+        which, states, periods = (np.concatenate(one) for one in zip(*found, strict=True))
+        states = equation.pinned(points[which], states)
+        x, T = np.full((len(points), equation.n), np.nan), np.full(len(points), np.nan)
         for k in np.unique(which):
-            own = np.flatnonzero(which == k)
-            if (abs(T[own] - T[own[0]]) <= SAME * T[own]).all():  # one orbit, perhaps found twice
-                first[k] = own[0] if abs(self.branch) == 1 else -1
-                continue
-            several = orbit.shown(equation, points[which[own]], x[own], T[own], self.method, ENOUGH, relax=False)
-            order = [
-                (several.square[i], tuple(several.x[i]), several.T[i], own[i]) for i in np.flatnonzero(several.good)
-            ]
-            order = orbit.numbered(order, free=False)
-            if abs(self.branch) <= len(order):
-                first[k] = order[self.branch - (self.branch > 0)]
-        known = (first >= 0)[:, None]
-        return np.where(known, x[first], np.nan), np.where(known[:, 0], T[first], np.nan)
+            own = self._chosen(points[k], states[which == k], periods[which == k])
+            if own is not None:
+                x[k], T[k] = states[which == k][own], periods[which == k][own]
+        return x, T
+
+    def _chosen(self, point, x, T):
+        """Which of the orbits near x (K, n) and T at a point is number `branch`; None if there are not so many."""
+        if (abs(T - T[0]) <= SAME * T).all():  # one orbit, perhaps found twice
+            return 0 if abs(self.branch) == 1 else None
+        points = np.tile(point, (len(x), 1))
+        found = orbit.shown(self.equation, points, x, T, self.method, ENOUGH, relax=False)
+        shown = [(found.square[i], tuple(found.x[i]), found.T[i], i) for i in np.flatnonzero(found.good)]
+        order = orbit.numbered(shown, free=False)
+        return order[self.branch - (self.branch > 0)] if abs(self.branch) <= len(order) else None
 
     def _interpolate(self, lattice):
         """Make splines of the states that are unknown and of T from those on a lattice, an array of their numbers."""
