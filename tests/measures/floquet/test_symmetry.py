@@ -252,6 +252,22 @@ def test_maps_without_the_amplitude_have_no_curves():
         check({"scene": beams(continuation=("A", 0.1, 3.0)), "axes": axes, "boundaries": {}})
 
 
+def test_a_map_without_orbits_has_no_curves():
+    """x'' = b x, b > 0, has no periodic solutions."""
+
+    def f(t, x, p, out):
+        out[0], out[1], out[2], out[3] = x[1], p[1] * x[0], x[3], -x[2]
+
+    scene = survey.orbit(
+        f, states=("x", "v", "z", "u"), period=None, parameters=("A", "b"), held="x", reversed=("v", "u"),
+        start=lambda p: (p[0], 0.0, 0.0, 0.0, 5.0), transverse=("z", "u"), continuation=("A", 0.1, 2.0),
+    )  # fmt: skip
+    axes = {"A": {"start": 0.1, "stop": 1.0, "num": 3}, "b": {"start": 0.1, "stop": 1.0, "num": 3}}
+    ds = boundaries.find(check({"scene": scene, "axes": axes, "boundaries": {}}))
+    assert ds.sizes["curve"] == 0
+    assert survey.edge(scene, along="A", b=0.5, A=(0.1, 1.0)).place.size == 0
+
+
 def test_a_parameter_that_only_chooses_the_orbit_does_not_change_motions():
     """f of `beam` depends on w and b, and not on the amplitude A."""
     equation, x = beams().equation, np.full((3, 4), 0.4)
