@@ -68,7 +68,7 @@ def check_surfaces(scene, name, table, given, proves=False):
     refusal = measure.refusal(scene) if hasattr(measure, "refusal") else None
     if refusal:
         raise BadInput(f"{what}: {name} {refusal}; leave it out")
-    check_even(scene, name, what)
+    _check_even(scene, name, what)
     if proves:
         raise BadInput(f"{what}: surfaces cannot be proved; leave it out")
     if table.axis is not None:
@@ -83,12 +83,12 @@ def check_surfaces(scene, name, table, given, proves=False):
     return True
 
 
-def check_even(scene, name, table, remedy="leave the table out"):
+def _check_even(scene, name, table):
     """Raise BadInput where there are no factors at T/2, whose zeros are the edges."""
     if getattr(scene, "DAMPED", False):
-        raise BadInput(f"{table}: it is known of undamped equations alone, not of {name}; {remedy}")
+        raise BadInput(f"{table}: it is known of undamped equations alone, not of {name}; leave the table out")
     if not getattr(scene, "EVEN", True):
-        raise BadInput(f"{table}: the z of {name} is not even, so it has no half-period factors; {remedy}")
+        raise BadInput(f"{table}: the z of {name} is not even, so it has no half-period factors; leave the table out")
 
 
 def check_refine(scene, name, file, given, proves=False):
@@ -103,7 +103,7 @@ def check_refine(scene, name, file, given, proves=False):
     if measure is None:
         raise BadInput(f"refine: [refine] is not supported for the scene {name}; leave the table out")
     if not proves:
-        check_even(scene, name, "refine")
+        _check_even(scene, name, "refine")
     if len(axes) != 2 or min(values.size for values in axes.values()) < 2:
         raise BadInput("refine: cells need exactly two axes of two values or more; fix the other parameters")
     if not proves:  # `survey.sweep.proofs` says what cannot be proved

@@ -118,17 +118,18 @@ class OrbitScene(TracedScene):
 
     def curves(self, square, axes, fixed):
         """What `measures.floquet.orbit_curves` finds on the map of `axes`, or on a line; raises BadInput."""
-        refusal = curves.refusal(axes, self)
-        if refusal:
-            raise BadInput(f"boundaries: {refusal}")
+        self._check_curves(axes)
         return self._called(orbit_curves.searched, self, square, axes, fixed)
 
     def family(self, square, axes, fixed, lines):
         """The `measures.floquet.family.Family` of symmetric orbits on a map; raises BadInput."""
+        self._check_curves(axes)
+        return self._called(family.Family, self, square, axes, fixed, lines)
+
+    def _check_curves(self, axes):
         refusal = curves.refusal(axes, self)
         if refusal:
             raise BadInput(f"boundaries: {refusal}")
-        return self._called(family.Family, self, square, axes, fixed, lines)
 
     def why(self, answer):
         """Why a point has its verdict (see `survey.scenes`)."""

@@ -38,7 +38,7 @@ LINES, LINES_OF_ORBITS, FINER = 97, 49, 8
 NEAR = 3e-5  # of the map: how near curves of splines are
 BESIDE = 1e-9  # of the map: how near zeros are of what is computed roughly
 TRIED = ((1.0, 0), (2.3, 0), (1.0, 1), (2.3, 1))  # one after another: times NEAR, along the best axis or the other
-TRIED_OF_ORBITS = TRIED[::2]
+TRIED_OF_ORBITS = TRIED[::2]  # which take long
 SURE = 1e-6  # the widest bracket of a point, half of it, that is drawn
 RTOL, ROUGH = 1e-13, 1e-9  # of M for points of curves, and to see where these are
 
@@ -58,9 +58,9 @@ def refusal(axes, scene, options=None):
 
 def searched(scene, square, axes, fixed, options):
     """The Curves on the map of `axes`, the unit square `square`; `fixed` holds the other parameters."""
-    if scene.FAMILY == "orbit" and scene.symmetry is None:
-        return joined(scene.curves(square, axes, fixed), [output.name for output in ALONG])
     if scene.FAMILY == "orbit":
+        if scene.symmetry is None:
+            return joined(scene.curves(square, axes, fixed), [output.name for output in ALONG])
         structure, number = "reversible", LINES_OF_ORBITS
         orbits = scene.family(square, axes, fixed, number)
         matrices, roughly, on_lattice = orbits.matrices, orbits.rough, orbits.on_lattice()

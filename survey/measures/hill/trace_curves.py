@@ -37,10 +37,8 @@ class _System:
 
     def solve(self, point, request):
         """{"monodromy": (N, 2, 2), "monodromy_error": ...}, a matrix of that trace and determinant."""
-        asked = replace(
-            request, method="taylor16", variables=frozenset({"discriminant"})
-        )  # more digits would be of no use
-        out = self.scene.solve(point, asked)
+        # `auto` would go on to more digits beside the curves, which are of no use here
+        out = self.scene.solve(point, replace(request, method="taylor16", variables=frozenset({"discriminant"})))
         trace, bar = out["discriminant"], out["discriminant_error"]
         M, E = np.zeros((2, *trace.shape, 2, 2))
         M[..., 0, 0], E[..., 0, 0], M[..., 1, 0], M[..., 0, 1] = trace, bar, 1.0, -1.0
