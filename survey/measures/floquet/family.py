@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline, RectBivariateSpline
 
 from survey.measures import contours
 from survey.measures.floquet import monodromy, orbit
-from survey.measures.floquet.continuation import Curves, floored
+from survey.measures.floquet.continuation import floored
 from survey.measures.floquet.newton import located
 
 NOISE = 1e-9  # relative: a guess of the errors on the lattice, where orbits are not shown to exist
@@ -74,20 +74,10 @@ class Family:
 
     def _followed(self, those):
         """States and periods where Newton's method begins, of orbits that are followed along the continuation."""
-        points, equation = self.points[those], self.equation
-        values = points[:, self.continued.index]
-        others = points.copy()
-        others[:, self.continued.index] = 0.0
-        rows, row = np.unique(others, axis=0, return_inverse=True)
-        curves = Curves(equation, self.continued, rows, self.reach)
-        found = []
-        for k in range(len(rows)):
-            mine = np.flatnonzero(row.reshape(-1) == k)
-            which, *start = curves.starts(k, values[mine])
-            found.append((mine[which], *start))
-        which, states, periods = (np.concatenate(one) for one in zip(*found, strict=True))
-        states = equation.pinned(points[which], states)
-        x, T = np.full((len(points), equation.n), np.nan), np.full(len(points), np.nan)
+        points = self.points[those]
+        found = zip(*orbit.followed(self.equation, self.continued, points, self.reach), strict=True)
+        which, states, periods = map(np.concatenate, found)
+        x, T = np.full((len(points), self.equation.n), np.nan), np.full(len(points), np.nan)
         for k in np.unique(which):
             own = self._chosen(points[k], states[which == k], periods[which == k])
             if own is not None:

@@ -54,27 +54,13 @@ def solve_branches(equation, points, branch, continued, method, rtol, wanted):
     known = np.isfinite(points).all(axis=1) & (branch == np.floor(branch))
     different, place = np.unique(points[known], axis=0, return_inverse=True)
     place = place.reshape(-1)
-    others = different.copy()
-    others[:, continued.index] = 0.0
-    rows, row = np.unique(others, axis=0, return_inverse=True)
-    row = row.reshape(-1)
     parts, of_point = [], [[] for _ in different]
     count = 0
-    for first in range(0, len(rows), ROWS):
-        curves = Curves(equation, continued, rows[first : first + ROWS], _reach(rtol))
-        where, x, T = [], [], []
-        for k in range(len(curves.rows)):
-            mine = np.flatnonzero(row == first + k)
-            which, *start = curves.starts(k, different[mine, continued.index])
-            where.append(mine[which])
-            x.append(start[0])
-            T.append(start[1])
-        where, x, T = (np.concatenate(one) for one in (where, x, T))
+    for where, x, T in followed(equation, continued, different, _reach(rtol)):
         for i in range(0, len(where), CHUNK):
             own = where[i : i + CHUNK]
             period = T[i : i + CHUNK] if equation.free else equation.periods(different[own])
-            start = equation.pinned(different[own], x[i : i + CHUNK])  # curves are cubics between their points
-            found = shown(equation, different[own], start, period, method, rtol, relax=False)
+            found = shown(equation, different[own], x[i : i + CHUNK], period, method, rtol, relax=False)
             for k in np.flatnonzero(found.good):
                 of_point[own[k]].append((found.square[k], tuple(found.x[k]), found.T[k], count + k))
             full = np.ones(len(own), bool)
@@ -93,6 +79,27 @@ def solve_branches(equation, points, branch, continued, method, rtol, wanted):
         out[NUMBER.name] = np.full(len(points), NUMBER.fill)
         out[NUMBER.name][known] = np.array([len(one) for one in order], int)[place]
     return out
+
+
+def followed(equation, continued, points, reach):
+    """Orbits at `points` (N, parameters), by following them along `continued`: (numbers of the points, states, periods)
+    of some of the points at a time. A point may have several, and one of them more than once.
+    """
+    others = points.copy()
+    others[:, continued.index] = 0.0
+    rows, row = np.unique(others, axis=0, return_inverse=True)
+    row = row.reshape(-1)
+    for first in range(0, len(rows), ROWS):
+        curves = Curves(equation, continued, rows[first : first + ROWS], reach)
+        where, x, T = [], [], []
+        for k in range(len(curves.rows)):
+            mine = np.flatnonzero(row == first + k)
+            which, *start = curves.starts(k, points[mine, continued.index])
+            where.append(mine[which])
+            x.append(start[0])
+            T.append(start[1])
+        where, x, T = (np.concatenate(one) for one in (where, x, T))
+        yield where, equation.pinned(points[where], x), T  # curves are cubics between their points
 
 
 def numbered(orbits, free):
