@@ -171,8 +171,9 @@ def exponents(first, count, rtol, floats, verdict, missed):
 def _squares(result, squares, i, full_period):
     """sin^2 and cos^2 of half the angle, each with its bar: -y1' y2 and y1 y2', or row i of `squares` if it has rows.
 
-    With `full_period` the results are those at T: then (2 - D) / 4 and (2 + D) / 4, D = y1 + y2', and the zeros of
-    y2 in (0, T) give the band (that solution's angle advances from 0 to between d pi and (d + 1) pi).
+    With `full_period` the results are those at T: then (2 - D) / 4 and (2 + D) / 4, D = y1 + y2', the smaller one from
+    their product, and the zeros of y2 in (0, T) give the band (that solution's angle advances from 0 to between d pi
+    and (d + 1) pi).
     """
     y1, dy1, y2, dy2 = result[lanes.Y1], result[lanes.DY1], result[lanes.Y2], result[lanes.DY2]
     y1_bar, dy2_bar = result[lanes.Y1_BAR], result[lanes.DY2_BAR]
@@ -182,9 +183,49 @@ def _squares(result, squares, i, full_period):
         trace, size = y1 + dy2, abs(y1) + abs(dy2) + 2.0
         bar = 0.25 * (y1_bar + dy2_bar + 2.0 * EPS * size)
         sine, cosine, sine_bar, cosine_bar = 0.25 * (2.0 - trace), 0.25 * (2.0 + trace), bar, bar
+        both, both_bar = _both(result)
+        if abs(sine) < abs(cosine):
+            sine, sine_bar = _sharper(sine, sine_bar, both, both_bar, cosine, cosine_bar)
+        else:
+            cosine, cosine_bar = _sharper(cosine, cosine_bar, both, both_bar, sine, sine_bar)
     if len(squares) > 0:
         sine, sine_bar, cosine, cosine_bar = squares[i, 0], squares[i, 1], squares[i, 2], squares[i, 3]
     return sine, sine_bar, cosine, cosine_bar
+
+
+@inline
+def _both(result):
+    """sin^2 cos^2 of half the angle and its bar, from the results at T: (t^2 - s^2 - p^2) / 4, where t is half the
+    difference of y2 and y1', p half their sum, and s half the difference of y1 and y2', as det M = 1.
+
+    Next to an edge t is nearly the root of s^2 + p^2, which is 0 where both solutions are periodic: it is known to the
+    bars of the results where the trace is known to their root. Times in units that balance the bars of y2 and y1'.
+    """
+    unit = sqrt(result[lanes.DY1_BAR] / result[lanes.Y2_BAR]) if result[lanes.Y2_BAR] > 0.0 else 1.0
+    unit = unit if 0.0 < unit < np.inf else 1.0
+    b, c = result[lanes.Y2] * unit, result[lanes.DY1] / unit
+    b_bar = result[lanes.Y2_BAR] * unit + EPS * abs(b)
+    c_bar = result[lanes.DY1_BAR] / unit + EPS * abs(c)
+    t, p, s = 0.5 * abs(b - c), 0.5 * (b + c), 0.5 * (result[lanes.Y1] - result[lanes.DY2])
+    bar = 0.5 * (b_bar + c_bar)
+    s_bar = 0.5 * (result[lanes.Y1_BAR] + result[lanes.DY2_BAR]) + EPS * abs(s)
+    radius = sqrt(s * s + p * p)
+    t_bar, radius_bar = bar + EPS * t, sqrt(s_bar * s_bar + bar * bar) + 4.0 * EPS * radius + LEAST
+    low, high = t - radius, t + radius
+    wide = (t_bar + radius_bar) * (1.0 + 8.0 * EPS)
+    product, product_bar = _product(low, high, wide + EPS * abs(low), wide + EPS * high)
+    return 0.25 * product, 0.25 * product_bar * (1.0 + 8.0 * EPS)
+
+
+@inline
+def _sharper(value, bar, product, product_bar, other, other_bar):
+    """The value and its bar, or `product` / `other` if that is known better."""
+    least = abs(other) - other_bar
+    if not least > 0.0:
+        return value, bar
+    quotient = product / other
+    found = (product_bar + abs(quotient) * other_bar) / least * (1.0 + 4.0 * EPS) + 2.0 * EPS * abs(quotient)
+    return (quotient, found) if found < bar else (value, bar)
 
 
 @inline

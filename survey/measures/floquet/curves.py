@@ -69,7 +69,8 @@ def searched(scene, square, axes, fixed, options):
         matrices = matrices_of(scene, square, axes, fixed, options)
         on_lattice = matrices(contours.lattice(number, square.across), ROUGH)
     found = []
-    functions = bifurcations.functions(on_lattice[0].shape[1], structure)
+    n = on_lattice[0].shape[1]
+    functions = scene.functions(n) if hasattr(scene, "functions") else bifurcations.functions(n, structure).items()
 
     def on_map(function, x):
         return function(*matrices(x, RTOL))
@@ -78,12 +79,12 @@ def searched(scene, square, axes, fixed, options):
         return function(*roughly(x))
 
     def draw(kind, x, error):
-        sure, angle, bar, outside = bifurcations.passing(*matrices(x, RTOL), kind, structure)
+        sure, angle, bar, outside = bifurcations.passing(*matrices(x, RTOL)[:2], kind, structure)
         for part in contours.runs(sure):
             known = {"angle": (angle[part], bar[part]), "outside": (outside[part], 0.0 * bar[part])}
             found.append((kind, square.parameters(x[part]), error[part], known))
 
-    for kind, function in functions.items():
+    for kind, function in functions:
         values, bars = function(*on_lattice)
         # where no sign is certain all around, as where the function is 0 throughout, there is only noise
         open_ = ~(abs(values) > bars).reshape(number, -1)
@@ -110,11 +111,13 @@ def searched(scene, square, axes, fixed, options):
             return indices(x, ROUGH)[name]
 
         passed[kind] = on_lines[name].reshape(number, number)
-        for x, error in narrow.curves(index, partial(on_map, functions[kind]), passed[kind], kind, drawn):
+        for x, error in narrow.curves(index, partial(on_map, dict(functions)[kind]), passed[kind], kind, drawn):
             draw(kind, x, error + square.grain)
             drawn.append((kind, x))
+    if len(on_lattice) > 2:
+        passed = {kind: one.reshape(number, number) for kind, one in scene.passed(*on_lattice[2:]).items()}
     curves = joined(found, [output.name for output in ALONG])
-    counts = row_count.outside(*on_lattice, structure).reshape(number, number)
+    counts = row_count.outside(*on_lattice[:2], structure).reshape(number, number)
     curves.unexplained = row_count.unexplained(counts, drawn, passed)[0]
     return curves
 
@@ -129,12 +132,14 @@ def _indices(scene, square, axes):
 
 
 def matrices_of(scene, square, axes, fixed, options, method="auto"):
-    """matrices(positions (N, axes), rtol) -> (M, E), the monodromy matrices without what is conserved."""
+    """matrices(positions (N, axes), rtol) -> (M, E), the monodromy matrices without what is conserved, and "edges" with
+    their error, if the scene counts them.
+    """
     solved = _solved(scene, square, axes, fixed, options, method, ["monodromy"])
 
     def matrices(x, rtol=RTOL):
         out = solved(x, rtol)
-        found = out["monodromy"], out["monodromy_error"]
+        found = tuple(out[name + end] for name in ("monodromy", "edges") if name in out for end in ("", "_error"))
         # a system of one's own may have a conserved quantity
         return scene.judged(square.parameters(x), axes, fixed, *found) if hasattr(scene, "judged") else found
 

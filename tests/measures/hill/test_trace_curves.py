@@ -10,6 +10,7 @@ from scipy import special
 import survey
 from survey.errors import BadInput
 from survey.measures.floquet.curves import CLASSES
+from survey.measures.hill import trace_curves
 from survey.request.workflow import check
 from survey.sweep import boundaries
 
@@ -62,6 +63,41 @@ def test_the_curves_of_an_equation_that_is_not_even():
             on = (abs(ds.curve_a.values - value) < 1e-6) & (kind == code)
             here = (value > -1.9) & (value < 5.9)
             assert not here.any() or np.ptp(ds.curve_q.values[on]) > 0.9 * np.ptp(ds.curve_q.values[here])
+
+
+def test_narrow_tongues_and_bands_are_drawn_whole():
+    """Tongues a millionth of the map wide at small q, and bands as narrow at the bottom right."""
+    axes = {"q": {"start": 0.0, "stop": 10.0, "num": 3}, "a": {"start": -12.0, "stop": 40.0, "num": 3}}
+    ds = boundaries.find(check({"scene": SHIFTED, "axes": axes, "boundaries": {}}))
+    assert "curves_unexplained" not in ds.attrs and ds.curve_position_error.max() < 1e-12
+    assert np.bincount(ds.curve_class.values).tolist() == [0, 7, 6]  # a0 to a6 and b1 to b6, none in pieces
+    start = np.cumsum(ds.curve_count.values) - ds.curve_count.values
+    ends = np.stack([start, start + ds.curve_count.values - 1])
+    on_border = (np.isin(ds.curve_q.values, [0.0, 10.0]) | np.isin(ds.curve_a.values, [-12.0, 40.0]))[ends]
+    assert on_border.all()
+    kind = np.repeat(ds.curve_class.values, ds.curve_count.values)
+    q = ds.curve_q.values
+    plus = [*(special.mathieu_a(n, q) for n in (0, 2, 4, 6)), *(special.mathieu_b(n, q) for n in (2, 4, 6))]
+    minus = [f(n, q) for n in (1, 3, 5) for f in (special.mathieu_a, special.mathieu_b)]
+    for code, values in ((CLASSES["plus_one"], plus), (CLASSES["minus_one"], minus)):
+        off = abs(ds.curve_a.values - np.array(values)).min(axis=0) / 52.0
+        assert (off <= ds.curve_position_error.values + 1e-13)[kind == code].all()
+
+
+def test_a_missing_curve_is_noticed(monkeypatch):
+    """By the number of edges that verdict and rotation number count."""
+    lines = trace_curves.curves._lines
+    monkeypatch.setattr(trace_curves.curves, "_lines", lambda *args: lines(*args)[1:])
+    assert curves(SHIFTED).attrs["curves_unexplained"] > 0
+
+
+def test_verdicts_beside_an_edge_need_no_double_double():
+    """A narrow tongue is known to the error bars of the four values, where D - 2 is lost in that of D."""
+    q, place = 0.1, np.array([-1e-9, 1e-9])
+    a = np.concatenate([f(3, q) + place for f in (special.mathieu_b, special.mathieu_a)])
+    ds = survey.evaluate(SHIFTED, a=a, q=q, method="taylor16")
+    assert ds.verdict.values.ravel().tolist() == [1, 0, 0, 1]
+    assert (abs(abs(ds.discriminant) - 2.0) < 1e-11).all() and (ds.discriminant_error < 1e-14).all()
 
 
 def test_damped_curves_lie_where_the_linear_system_has_them():
