@@ -66,8 +66,10 @@ class _System:
         return {kind: np.where(doubt == 0.0, count, UNKNOWN).astype(int) for kind, count in counts.items()}
 
     def solve(self, point, request):
-        """{"monodromy": (N, 2, 2), "monodromy_error": ...}, with damping a matrix of that trace and determinant; without
-        it, in units of T / pi for time, also how many "edges" of tongues have been passed (N), and "edges_error".
+        """{"monodromy": (N, 2, 2), "monodromy_error": ...}, with damping a matrix of that trace and determinant.
+
+        Without it times are in units of T / pi, and there is also how many "edges" of tongues have been passed (N),
+        with "edges_error".
         """
         wanted = {"discriminant"} if self.damped else {*ENTRIES, *COUNTS, "period"}
         # `auto` would go on to more digits beside the curves, which are of no use here
