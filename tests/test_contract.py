@@ -92,7 +92,7 @@ def test_a_typo_in_what_is_asked_of_a_family_is_one_line(tmp_path, old, new, wor
 
 def test_questions_are_found_by_the_folder_of_their_family():
     found = {family: [q for q in measures.QUESTIONS if measures.question(family, q)] for family in FAMILIES}
-    assert found["hill"] == ["curves", "surfaces", "edges", "folds", "cells", "trace_curves"]
+    assert found["hill"] == ["curves", "surfaces", "edges", "folds", "cells", "trace_curves", "trace_cells"]
     assert found["nutation"] == ["curves"]
     assert measures.question("no family", "curves") is None
 

@@ -56,7 +56,7 @@ def _can_be_refined(ds):
         scene = user_scene.find(user_scene.of_dataset(ds))[1]
     except BadInput:
         return False
-    return measures.question(scene.FAMILY, "cells") is not None
+    return measures.cells(scene) is not None
 
 
 def _of_cells(ds):

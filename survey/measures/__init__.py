@@ -80,6 +80,7 @@ QUESTIONS = {
             "why there are no cells on maps of the scene about a point {parameter: value}, in words; None if there are",
             ("scene", "point"),
         ),
+        "serves": Function("are cells known of the scene? They are if it is missing", ("scene",)),
         "keywords": Function("what `find` is told besides of this scene, {name: value}", ("scene",)),
         "Side": Value("low, high, depth, log: a side of a rectangle and how often it may be halved", type, needed=True),
         "accuracy": Function(
@@ -93,7 +94,8 @@ QUESTIONS = {
 }
 
 
-QUESTIONS["trace_curves"] = QUESTIONS["curves"]  # of scenes that `curves` does not serve
+# of scenes that `curves` and `cells` do not serve
+QUESTIONS |= {"trace_curves": QUESTIONS["curves"], "trace_cells": QUESTIONS["cells"]}
 
 
 def method(name):
@@ -119,7 +121,16 @@ def question(family, name):
 
 def curves(scene):
     """The module that knows the scene's curves; None if there is none."""
-    found = (question(scene.FAMILY, name) for name in ("curves", "trace_curves"))
+    return _serving(scene, "curves")
+
+
+def cells(scene):
+    """The module that knows the scene's cells; None if there is none."""
+    return _serving(scene, "cells")
+
+
+def _serving(scene, name):
+    found = (question(scene.FAMILY, name) for name in (name, f"trace_{name}"))
     return next((one for one in found if one and (not hasattr(one, "serves") or one.serves(scene))), None)
 
 

@@ -83,10 +83,15 @@ def check_surfaces(scene, name, table, given, proves=False):
     return True
 
 
-def _check_even(scene, name, table):
-    """Raise BadInput where there are no factors at T/2, whose zeros are the edges."""
+def _check_undamped(scene, name, table):
+    """Raise BadInput where Hill's equation is damped."""
     if getattr(scene, "DAMPED", False):
         raise BadInput(f"{table}: it is known of undamped equations alone, not of {name}; leave the table out")
+
+
+def _check_even(scene, name, table):
+    """Raise BadInput where there are no factors at T/2, whose zeros are the edges."""
+    _check_undamped(scene, name, table)
     if not getattr(scene, "EVEN", True):
         raise BadInput(f"{table}: the z of {name} is not even, so it has no half-period factors; leave the table out")
 
@@ -99,11 +104,10 @@ def check_refine(scene, name, file, given, proves=False):
     if file.refine is None:
         return None
     axes = {key: values for key, values in given.items() if np.ndim(values)}
-    measure = measures.question(scene.FAMILY, "cells")
+    _check_undamped(scene, name, "refine")
+    measure = measures.cells(scene)
     if measure is None:
         raise BadInput(f"refine: [refine] is not supported for the scene {name}; leave the table out")
-    if not proves:
-        _check_even(scene, name, "refine")
     if len(axes) != 2 or min(values.size for values in axes.values()) < 2:
         raise BadInput("refine: cells need exactly two axes of two values or more; fix the other parameters")
     if not proves:  # `survey.sweep.proofs` says what cannot be proved

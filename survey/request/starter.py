@@ -47,7 +47,7 @@ def workflow(scene):
     curves = measures.curves(module)
     if curves and not (hasattr(curves, "refusal") and curves.refusal([p.name for p in axes], module, options)):
         lines += ["", "# [boundaries]  # the curves between verdicts, exact, in the file and its pictures"]
-    if measures.question(module.FAMILY, "cells") is not None:
+    if measures.cells(module) is not None:
         lines += ["", "# [refine]  # cells as small as needed where the verdict changes, and the area of each verdict",
                   "# width = 0.001  # of the smallest cells, as a fraction of the axes"]  # fmt: skip
     return "\n".join(lines) + "\n"

@@ -67,8 +67,8 @@ def plan(workflow, cost):
 
 
 def _measure(workflow):
-    """The module `cells` of the scene's family."""
-    return measures.question(workflow.scene.FAMILY, "cells")
+    """The module that knows the scene's cells."""
+    return measures.cells(workflow.scene)
 
 
 def _cut(workflow, at, axis):

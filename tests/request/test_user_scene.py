@@ -150,13 +150,10 @@ def test_dask_input_stays_lazy_and_gives_the_same_bits():
         np.testing.assert_array_equal(ds[name].compute(), loaded[name])
 
 
-def test_where_z_is_not_even_the_outputs_say_so_and_there_are_no_cells():
+def test_where_z_is_not_even_the_outputs_say_so():
     odd = scene(lambda u, p: p[0] + p[1] * np.sin(2 * u) ** 3, even=False)
     ds = survey.evaluate(odd, a=1.0, q=1.0)
     assert ds.y1.attrs["long_name"].startswith("y1(T),") and ds.dy2.attrs["symbol"] == "y_2'(T)"
-    axes = {"a": {"start": -1.0, "stop": 10.0, "num": 8}, "q": {"start": 1.0, "stop": 2.0, "num": 8}}
-    with pytest.raises(BadInput, match=r"refine: the z of .* is not even"):
-        survey.run({"scene": odd, "axes": axes, "refine": {"width": 0.1}})
 
 
 BAD = [

@@ -18,6 +18,7 @@ from survey.kernels.hill.answers import STABLE, UNDECIDED, UNSTABLE
 from survey.kernels.hill.cells import ENOUGH, UNSOLVED, descend
 from survey.kernels.math.chebyshev import lebesgue, nodes, tail, to_coefficients
 from survey.kernels.math.roundoff import EPS
+from survey.measures.hill import trace_curves
 from survey.measures.hill.edges import FACTORS
 from survey.measures.tasks import in_turn
 
@@ -87,6 +88,11 @@ def _factors(out):
     """The factors and their bounds (B, 4, n, n)."""
     values = np.stack([out[name] for name in FACTORS], axis=1)
     return values, np.stack([out[f"{name}_error"] for name in FACTORS], axis=1)
+
+
+def serves(scene):
+    """Has the scene factors at T/2?"""
+    return not trace_curves.serves(scene)
 
 
 def find(solve, x, y, each=in_turn, report=None, values=_factors, descend=descend):
