@@ -2,6 +2,7 @@
 
 import gc
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -39,6 +40,33 @@ if sys.platform == "win32":  # what they try is signals, links, pipes, modes, sh
         "sweep/test_cluster.py",
         "sweep/test_faults.py",
     ]
+
+# Tests of one family run in one worker, before all others, so that two workers seldom compile the same kernels.
+FAMILIES = {
+    "cylinder": "cylinder|gyrostat|(?<!l)abel|(?<!work)(?<!over)flow|junction",
+    "hill": "hill|satellite|mathieu|taylor16|user_scene|damped|test_lie",
+    "nutation": "nutation|brun",
+    "libration": "libration|danby",
+    "floquet": "floquet|orbit|own_systems",
+}
+
+
+def pytest_collection_modifyitems(items):
+    """Name each test's family, or its file, as the group that is one worker's (see --dist loadgroup)."""
+
+    def group(item):
+        name = item.nodeid.removeprefix("tests/").lower()
+        return next((family for family, words in FAMILIES.items() if re.search(words, name)), item.path.name)
+
+    groups = {}
+    for item in items:
+        groups.setdefault(group(item), []).append(item)
+    order = [*FAMILIES, *sorted(groups.keys() - FAMILIES, key=lambda name: -len(groups[name]))]
+    items[:] = [item for name in order for item in groups.get(name, [])]
+    for name, own in groups.items():
+        for item in own:
+            item.add_marker(pytest.mark.xdist_group(name))
+
 
 hypothesis.settings.register_profile("untimed", deadline=None)
 hypothesis.settings.load_profile("untimed")

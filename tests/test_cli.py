@@ -38,6 +38,7 @@ def test_quiet_says_nothing_and_o_chooses_the_file(program, small):
         assert file["w"].shape == (6, 2) and file["w"].dimensions == ("w0", "t")
 
 
+@pytest.mark.slow
 def test_worker_processes_give_the_same_file(program, small):
     for name, words in (("a.nc", ()), ("b.nc", ("--workers", "2"))):
         assert program("run", "small.toml", "--quiet", "-o", name, *words).returncode == 0
@@ -175,7 +176,7 @@ def test_no_color_is_honoured(program, ran):
     assert "\x1b" not in program("info", "small.nc", env={"NO_COLOR": "1", "FORCE_COLOR": "1"}).stdout
 
 
-@pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143)])
+@pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), pytest.param("SIGTERM", 143, marks=pytest.mark.slow)])
 def test_an_interrupted_run_can_be_resumed(program, small, name, code):
     many = ("axes.w0.num=4000", "axes.t.num=40", "axes.t.stop=40")
     command = ["run", "small.toml", *[word for text in many for word in ("--set", text)]]

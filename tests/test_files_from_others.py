@@ -61,10 +61,12 @@ def test_mutations_that_once_ended_in_a_traceback_or_in_hidden_text(folder):
     checked(folder, (10459, 10509, 10569, 10089, 11392), draw=False)
 
 
+@pytest.mark.slow
 def test_mutations_are_drawn_or_refused(folder):
     checked(folder, range(1000, 1002))
 
 
+@pytest.mark.slow
 def test_mutations_of_cells_and_areas(folder):
     """A cell that ends at -1e308, of which a picture overflows; areas of a single verdict, joined with another file."""
     checked(folder, (20506,))

@@ -121,7 +121,7 @@ def wait_for(what, seconds=60.0):
 
 
 @pytest.mark.parametrize("kills", [4, pytest.param(200, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("words", [(), ("--workers", "2")])
+@pytest.mark.parametrize("words", [(), pytest.param(("--workers", "2"), marks=pytest.mark.slow)])
 def test_kills_at_random_times_lose_and_corrupt_nothing(folder, unbroken, kills, words):
     dice = random.Random(kills)
     killed = 0
@@ -208,6 +208,7 @@ main()
 """
 
 
+@pytest.mark.slow
 def test_cells_go_on_where_a_kill_left_them(tmp_path):
     (tmp_path / "cells.toml").write_text(CELLS)
     command = [sys.executable, "-c", PARTS, "run", "cells.toml"]
@@ -231,7 +232,7 @@ def _parts_of_cells(folder):
     return {file.stem for file in (folder / "cells.nc.blocks").glob("cells-*.extra")}
 
 
-@pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143)])
+@pytest.mark.parametrize(("name", "code"), [pytest.param("SIGINT", 130, marks=pytest.mark.slow), ("SIGTERM", 143)])
 def test_workers_stop_promptly_with_the_run(folder, name, code):
     heeding = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731  (a background job ignores it)
     running = start(folder, "--workers", "2", stderr=subprocess.PIPE, preexec_fn=heeding)
@@ -351,6 +352,7 @@ def test_a_file_size_limit_is_one_line_and_the_run_can_go_on(folder, unbroken):
     same(folder, unbroken)
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_one_line_and_the_run_can_go_on(folder, unbroken):
     disk = folder / "disk"
     disk.mkdir()
@@ -383,6 +385,7 @@ def test_a_home_that_cannot_be_written_is_fine(folder):
     assert running.returncode == 0 and "status: ok: 4" in stderr, stderr
 
 
+@pytest.mark.slow
 def test_a_user_without_a_home_is_fine(folder):
     """As in a container that runs under a number which no table of users knows."""
     homeless = "import pwd\ndef unknown(_):\n    raise KeyError\npwd.getpwuid = unknown\n" + PROGRAM

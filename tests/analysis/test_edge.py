@@ -273,6 +273,7 @@ def test_permanent_rotations_in_clebschs_case(epsilon):
     assert set(margin.parameter.values) == set(ranges)
 
 
+@pytest.mark.slow
 def test_margins_of_orbits_along_all_parameters():
     """From a fold in the damping, or the force, that in the frequency, along which orbits are continued, is back."""
     scene = str(ROOT / "workflows" / "duffing.py")

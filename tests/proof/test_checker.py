@@ -135,7 +135,7 @@ def errors(number, system="mathieu", nodes=8):
 @pytest.mark.parametrize("number, system, nodes, least", [
     (40, "mathieu", 8, 1e-6),
     (40, "meissner", 8, 1e-6),
-    (40, "danby", 3, 1e-7),
+    pytest.param(40, "danby", 3, 1e-7, marks=pytest.mark.slow),
     *(pytest.param(1000, *what, marks=pytest.mark.slow) for what in (
         ("mathieu", 8, 1e-6), ("meissner", 8, 1e-6), ("satellite", 6, 1e-6), ("danby", 3, 1e-7))),
 ])  # fmt: skip
@@ -151,7 +151,7 @@ def test_the_truncation_bound_exceeds_the_true_error(number, system, nodes, leas
         ((40,), 10**6),
         ((40, "meissner"), 10**6),
         pytest.param((10, "satellite", 6), 10**6, marks=pytest.mark.slow),
-        ((10, "danby", 6), 10**5),
+        pytest.param((10, "danby", 6), 10**5, marks=pytest.mark.slow),
     ],
     ids=SYSTEMS,
 )
@@ -196,6 +196,7 @@ def test_a_certificate_is_proved():
     assert checker.Certificate(proof()).shares["o"] < 0.2
 
 
+@pytest.mark.slow
 def test_danbys_strip_is_proved():
     """Against the package's own kernels; the strip between A and KC, which is thinner than the cells, is seen."""
     statement = checker.check(proof("danby"))

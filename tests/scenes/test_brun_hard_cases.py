@@ -70,6 +70,7 @@ def test_hard_cases():
         assert misses(1, 120) == []
 
 
+@pytest.mark.slow
 def test_hard_cases_of_scaled_integrals():
     with mp.workdps(60):
         assert scaled_misses(1, 90) == []

@@ -68,7 +68,7 @@ def random_points(count, seed):
         yield family, k, random.uniform(-4, 4)
 
 
-@pytest.mark.parametrize("rtol", [1e-6, 1e-12])
+@pytest.mark.parametrize("rtol", [1e-6, pytest.param(1e-12, marks=pytest.mark.slow)])
 def test_random_points_against_mpmath(rtol):
     sharp = []
     for family, k, rho in random_points(16, seed=int(-np.log10(rtol))):

@@ -76,6 +76,7 @@ def start(folder, file, *words, **more):
     return subprocess.Popen(command, cwd=folder, env=os.environ | more, stderr=subprocess.PIPE, text=True)
 
 
+@pytest.mark.slow
 def test_a_cluster_gives_the_same_file(cluster, small, surveyed):
     running = start(small.parent, cluster[0])
     stderr = running.communicate(timeout=180)[1]

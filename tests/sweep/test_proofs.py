@@ -86,7 +86,7 @@ MAPS = {  # scene: its axes
 
 @pytest.mark.parametrize(
     "scene",
-    [pytest.param(name, marks=[pytest.mark.slow] * (name != "mathieu")) for name in MAPS],
+    [pytest.param(name, marks=[pytest.mark.slow] * (name != "own.py")) for name in MAPS],
 )
 def test_refine_agrees(scene, here):
     """The cells of `survey run` have no other verdict, and its areas lie within the proved bounds."""
@@ -237,6 +237,7 @@ def test_the_edges_of_a_row_of_satellites(axis, ends, fixed, options, number):
         assert all(any(a <= y and x <= b for a, b, _ in proved) for x, y in reach if ends[0] < x and y < ends[1])
 
 
+@pytest.mark.slow
 def test_the_edges_of_a_row_of_danbys_map():
     """B, A and KC at e = 0.2, against the table made by another method."""
     table = Path(__file__).parents[2] / "results" / "libration_elliptic_boundaries.csv"

@@ -64,6 +64,7 @@ def commands(page):
     return [line for line in lines if line.startswith("survey ")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", [page for page in PAGES if commands(page)], ids=lambda path: path.stem)
 def test_the_commands_of_a_page_run(page, folder, monkeypatch):
     monkeypatch.setattr(cli, "_stop_on_sigterm", lambda: None)
@@ -243,6 +244,7 @@ def test_every_picture_of_a_page_lies_in_the_results(page):
         assert (ROOT / "results" / name).is_file() and "/" not in name, target
 
 
+@pytest.mark.slow
 def test_maps_of_the_documentation_are_pages_that_zoom(tool, tmp_path, monkeypatch):
     live = tool("live_maps")
     monkeypatch.setattr(live, "MAPS", {name: live.MAPS[name] for name in ("mathieu_proved", "brun_states")})

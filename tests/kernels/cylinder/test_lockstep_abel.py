@@ -49,7 +49,7 @@ def agree(rows, over, tolerance=1e-13):
     return theirs.mean(), same.mean()
 
 
-@pytest.mark.parametrize("tolerance", [1e-11, 1e-13, 1e-16])
+@pytest.mark.parametrize("tolerance", [pytest.param(1e-11, marks=pytest.mark.slow), 1e-13, 1e-16])
 def test_bars_hold_on_random_systems(tolerance):
     theirs, both = agree(drawn(2000, 3), np.linspace(0.0, 9.0, 40), tolerance)
     assert theirs > 0.9 and both > theirs - 0.01
@@ -74,6 +74,7 @@ def test_bars_hold_on_hard_systems(scale):
     assert both > theirs - 0.02
 
 
+@pytest.mark.slow
 def test_phi_is_the_variable_far_from_turning_points():
     """No solution is left to steps in time, and values of three are within their bars of mpmath's."""
     rows = drawn(lockstep.LANES, 9, (0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 3, 0))

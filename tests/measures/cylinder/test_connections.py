@@ -107,6 +107,7 @@ def test_a_cycle_is_born_in_a_homoclinic_connection():
     assert np.mean(abs(left - right)[known] == 1) > 0.9
 
 
+@pytest.mark.slow
 def test_curves_run_into_each_other_and_explain_the_numbers_of_cycles(monkeypatch):
     """Connections end at points of codimension two or in one another; without one of them segments are missed."""
     monkeypatch.setattr(cycle_counts, "LINES", 15)

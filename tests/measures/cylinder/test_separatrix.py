@@ -30,6 +30,14 @@ CASES = {  # six, number of the saddle, phi0, stable, left
     "b, beside the saddle, three turns on": (GENERIC, 2, 4.66 + 6 * np.pi, False, False),
     "(61)": ((1.0, 0.0, -2.0, 0.0, 0.5, 0.0), 1, 4.0, False, False),
 }
+# of which the others are variations
+TELLING = (
+    "a loop that turns",
+    "b, unstable to the right",
+    "to a second saddle",
+    "b, beside the saddle, three turns on",
+    "(61)",
+)
 TIMES = np.array([[-5.0, -0.3, 0.0, 0.2, 2.0, 7.0]])
 
 
@@ -38,7 +46,9 @@ def start(case):
     return np.array([[*six, phi0, number]], float), {"stable": stable, "left": left}
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name not in TELLING)) for name in CASES]
+)
 def test_trajectories_lie_within_narrow_bars(name):
     case = CASES[name]
     rows, how = start(case)

@@ -108,6 +108,7 @@ def symmetric(x, near):
     return half, y, D, speed
 
 
+@pytest.mark.slow
 def test_halo_orbits_branch_off_where_scipy_says():
     """There z(0) alone comes back to v_z = 0 at the half period. The verdict changes within 1e-8 of it."""
     gamma = lyapunov.distance(MU)
@@ -225,7 +226,11 @@ def test_an_orbit_on_a_curve_has_the_held_state_of_its_start(monkeypatch):
         assert abs(float(ds.period) - exact) <= float(ds.period_error) + 1e-15 < 1e-9
 
 
-@pytest.mark.parametrize("more", [{}, {"continuation": ("A", 0.1, 3.0)}], ids=["start", "continuation"])
+@pytest.mark.parametrize(
+    "more",
+    [pytest.param({}, marks=pytest.mark.slow), {"continuation": ("A", 0.1, 3.0)}],
+    ids=["start", "continuation"],
+)
 def test_curves_are_the_band_edges_of_lames_equation(monkeypatch, more):
     """With b = 1, z is dn, cn or sn of x = A cn where w = -A^2 / 2, 1 or 1 + A^2 / 2, and there alone l = 1."""
     monkeypatch.setattr("survey.measures.floquet.curves.LINES_OF_ORBITS", 33)
