@@ -61,7 +61,7 @@ def pytest_collection_modifyitems(items):
     groups = {}
     for item in items:
         groups.setdefault(group(item), []).append(item)
-    order = [*FAMILIES, *sorted(groups.keys() - FAMILIES, key=lambda name: -len(groups[name]))]
+    order = [*FAMILIES, *sorted(groups.keys() - FAMILIES, key=lambda name: (-len(groups[name]), name))]
     items[:] = [item for name in order for item in groups.get(name, [])]
     for name, own in groups.items():
         for item in own:
