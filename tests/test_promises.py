@@ -313,6 +313,7 @@ def test_a_bad_point_costs_itself_alone(tmp_path):
     assert reading.check(tmp_path / "with.nc") == [] and bad.discriminant.sel(k=1.0).isnull().all()
 
 
+@pytest.mark.slow
 def test_a_log_gets_a_line_now_and_then(folder):
     """Without a terminal, as under nohup; a minute is shortened to a twentieth of a second."""
     program = "import survey.sweep.progress; survey.sweep.progress.LOG_SECONDS = 0.05; " + PROGRAM

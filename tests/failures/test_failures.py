@@ -20,6 +20,7 @@ SHARE = 0.2
 KEYS = ("name", "method", "points", "refused", "missed", "lies")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in SCENES])
 def test_no_method_lies(scene):
     module = modules.load(planes, scene, "scene")

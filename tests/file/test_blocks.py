@@ -273,7 +273,11 @@ def test_a_disk_that_refuses_leaves_the_old_file(copy, small, monkeypatch, where
 CALLS = [(os, "fsync"), (os, "replace"), (blocks, "pack"), (map_file.MapFile, "write"), (netcdf.File, "define")]
 
 
-@pytest.mark.parametrize(("where", "name"), CALLS, ids=lambda value: getattr(value, "__name__", value))
+@pytest.mark.parametrize(
+    ("where", "name"),
+    [pytest.param(*call, marks=[pytest.mark.slow] * (call[1] in ("fsync", "write"))) for call in CALLS],
+    ids=lambda value: getattr(value, "__name__", value),
+)
 def test_an_error_at_each_write_call_in_turn_loses_nothing(copy, small, surveyed, monkeypatch, where, name):
     """The k-th call fails, k = 1, 2, ...: the old file stands, or the new one does; the next run goes on."""
     monkeypatch.setattr(cost, "BLOCK_POINTS", 8)

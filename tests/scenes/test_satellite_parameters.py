@@ -50,7 +50,10 @@ def doubles(x, count):
     return (np.float64(x).view(np.int64) + np.arange(-count, count + 1)).view(np.float64)
 
 
-@pytest.mark.parametrize(("first", "second", "between", "options"), WAYS)
+@pytest.mark.parametrize(
+    ("first", "second", "between", "options"),
+    [pytest.param(*way, marks=[pytest.mark.slow] * (i % 2 > 0)) for i, way in enumerate(WAYS)],
+)
 def test_doubles_one_after_another_about_an_edge(first, second, between, options):
     """No verdict is left open, there is one switch, and mpmath finds it between the same two doubles."""
 

@@ -85,7 +85,10 @@ def test_hills_method_gives_the_reference(case):
         assert abs(found - known) < mpf("1e-22")
 
 
-@pytest.mark.parametrize(("family", "n", "k"), CELLS)
+@pytest.mark.parametrize(
+    ("family", "n", "k"),
+    [pytest.param(*cell, marks=[pytest.mark.slow] * (i % 3 > 0)) for i, cell in enumerate(CELLS)],
+)
 def test_no_verdict_is_wrong_and_none_is_open(family, n, k):
     edges = tongue(family, n, k)
     rho = beside(*edges)

@@ -102,7 +102,7 @@ def test_verify_finds_what_was_changed(folder, tmp_path, change, line):
     assert done.returncode == 3 and line in done.stderr and "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("name", ["map", "own"])
+@pytest.mark.parametrize("name", [pytest.param("map", marks=pytest.mark.slow), "own"])
 def test_run_makes_the_same_bits_again_from_a_bundle(folder, tmp_path, name):
     if name == "map":
         with zipfile.ZipFile(folder / "map.zip") as archive:

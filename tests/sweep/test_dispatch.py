@@ -112,6 +112,7 @@ def test_a_worker_that_freezes_is_replaced(tmp_path, in_time, monkeypatch):
     assert heard.dead == [] and sorted(heard.results) == [n * n for n in NUMBERS]
 
 
+@pytest.mark.slow
 def test_a_task_without_end_stops_the_run_in_one_line(in_time, monkeypatch):
     monkeypatch.setattr(dispatch, "COMPILE_SECONDS", 3.0)
 
@@ -328,6 +329,7 @@ def test_workers_that_never_have_memory_stop_the_run(in_time, monkeypatch):
     assert starving.starts == clusters.STRIKES
 
 
+@pytest.mark.slow
 def test_a_cluster_without_workers_is_told_and_waited_for(in_time, monkeypatch, caplog):
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr(clusters, "WORKERLESS_SECONDS", 0.2)

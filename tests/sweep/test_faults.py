@@ -173,6 +173,7 @@ def _published(calls):
     return next(number for number, line in enumerate(calls, 1) if "rename" in line and "output.nc" in line)
 
 
+@pytest.mark.slow
 def test_a_kill_at_any_call_from_the_publication_on_leaves_what_the_next_run_removes(faults):
     words = ("plain.toml",)
     calls = faults.whole(words)[1]

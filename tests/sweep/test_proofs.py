@@ -84,10 +84,8 @@ MAPS = {  # scene: its axes
 }
 
 
-@pytest.mark.parametrize(
-    "scene",
-    [pytest.param(name, marks=[pytest.mark.slow] * (name != "own.py")) for name in MAPS],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", MAPS)
 def test_refine_agrees(scene, here):
     """The cells of `survey run` have no other verdict, and its areas lie within the proved bounds."""
     axes = "".join(

@@ -44,7 +44,7 @@ def brun(tmp_path, monkeypatch):
         (["output.variables=['period', 'verdict']"], 20),  # fewer variables
     ],
 )
-@pytest.mark.parametrize("block", [7, 10**6])
+@pytest.mark.parametrize("block", [7, pytest.param(10**6, marks=pytest.mark.slow)])
 def test_what_is_held_is_not_solved_and_the_bits_are_the_same(brun, monkeypatch, overrides, points, block):
     monkeypatch.setattr(cost, "BLOCK_POINTS", block)
     sizes, solved = [], solve.solve_point

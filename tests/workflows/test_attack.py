@@ -21,6 +21,7 @@ def found(family, seed, size, index=0):
     return sum((compare.Counter(row[3]) for row in part["rows"]), compare.Counter()), faults
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("family", "size"), [
     ("satellite", 40), ("mathieu", 60), ("libration_elliptic", 40), ("libration", 60), ("own", 40), ("floquet", 60),
     *(pytest.param(*one, marks=pytest.mark.slow) for one in (("gyrostat", 150), ("brun", 150))),  # compile for long

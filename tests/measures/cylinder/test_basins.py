@@ -39,9 +39,8 @@ def compared(six, starts):
     return known.mean(), int((differ.any(axis=1) & decided).sum())
 
 
-@pytest.mark.parametrize(
-    "systems, starts, seed", [(4, 150, 11), pytest.param(400, 300, 12, marks=pytest.mark.slow)], ids=["few", "many"]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("systems, starts, seed", [(4, 150, 11), (400, 300, 12)], ids=["few", "many"])
 def test_no_start_is_told_otherwise_than_it_ends(systems, starts, seed):
     """Verdict, limit, turning points and turns, of starts over two turns and at rest; 120,000 of them where slow."""
     random = np.random.default_rng(seed)

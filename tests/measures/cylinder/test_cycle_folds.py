@@ -60,7 +60,8 @@ def folds(found):
     return np.repeat(found.kind == curves.CLASSES["cycle_fold"], found.count)
 
 
-@pytest.mark.parametrize("rotating", [pytest.param(True, marks=pytest.mark.slow), False], ids=["rotation", "libration"])
+@pytest.mark.slow
+@pytest.mark.parametrize("rotating", [True, False], ids=["rotation", "libration"])
 def test_return_maps_touch_the_identity_within_the_error(found, rotating):
     w = found.along["cycle_w"][0]
     some = np.flatnonzero(folds(found) & ((w != 0.0) == rotating))

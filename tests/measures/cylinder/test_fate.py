@@ -151,7 +151,8 @@ def ended(six, phi, w, time):
     return run.t_events[0], run.y_events[0], run.y[:, -1]
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(5, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 5])
 def test_long_integration_agrees(seed):
     random, late = np.random.default_rng(seed), 0
     count, each = (8, 4) if seed == 1 else (60, 16)

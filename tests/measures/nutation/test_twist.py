@@ -89,7 +89,9 @@ def truth(level, alpha, beta, sign, ratio, well):
         return dict(zip(NAMES, (mp.det(kept), bordered((0, 2)), mp.det(second), bordered((0, 1, 2))), strict=True))
 
 
-@pytest.mark.parametrize("case", HARD)
+@pytest.mark.parametrize(
+    "case", [pytest.param(case, marks=[pytest.mark.slow] * (i % 3 > 0)) for i, case in enumerate(HARD)]
+)
 def test_determinants_are_those_of_the_frequency_map(case):
     level, alpha, beta, sign, ratio = case
     ds = survey.evaluate("brun", l=level, alpha=alpha, beta=beta, ratio=ratio, sign=str(sign), variables=[*NAMES])
