@@ -29,10 +29,15 @@ FAMILIES = {
     "brun": (0.15, 2500),
     "libration": (0.056, 2000),
     "floquet": (0.02, 500),
+    "orbit": (0.002, 100),
 }
 WHERE = {"satellite": ("hill", "satellites"), "mathieu": ("hill", "mathieu"), "own": ("hill", "own"),
          "libration_elliptic": ("danby", "chunk"), "gyrostat_fate": ("fate", "chunk")}  # fmt: skip
-SEEDS = (*sorted(FAMILIES.keys() - {"floquet"}), "floquet")  # later families last: those before keep their points
+SEEDS = (
+    *sorted(FAMILIES.keys() - {"floquet", "orbit"}),
+    "floquet",
+    "orbit",
+)  # later families last: those before keep their points
 FOLDER, TRUTHS = Path(__file__).parent, Path(truth.__file__).parent
 LISTED = 60  # faults in the page
 
