@@ -12,6 +12,7 @@ import numpy as np
 from survey import api
 from survey.errors import BadInput
 from survey.kernels.math.roundoff import EPS
+from survey.measures.hill.edges import has_factors
 from survey.model.reader import HALF
 from survey.request.function_scene import FunctionScene
 
@@ -43,7 +44,7 @@ def of(workflow, names, fixed):
 def _hill(workflow, names, fixed):
     """The factors at T/2; or, where z is not even, D alone."""
     scene = workflow.scene
-    even = getattr(scene, "EVEN", True) and not getattr(scene, "DAMPED", False)
+    even = has_factors(scene)
     wanted = HALF if even else ("discriminant",)
     outputs = {o.name: o for o in scene.OUTPUTS}
     solve = _evaluated(workflow, names, fixed, wanted)

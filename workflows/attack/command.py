@@ -33,11 +33,8 @@ FAMILIES = {
 }
 WHERE = {"satellite": ("hill", "satellites"), "mathieu": ("hill", "mathieu"), "own": ("hill", "own"),
          "libration_elliptic": ("danby", "chunk"), "gyrostat_fate": ("fate", "chunk")}  # fmt: skip
-SEEDS = (
-    *sorted(FAMILIES.keys() - {"floquet", "orbit"}),
-    "floquet",
-    "orbit",
-)  # later families last: those before keep their points
+LATER = ("floquet", "orbit")
+SEEDS = (*sorted(FAMILIES.keys() - set(LATER)), *LATER)  # later families last: those before keep their points
 FOLDER, TRUTHS = Path(__file__).parent, Path(truth.__file__).parent
 LISTED = 60  # faults in the page
 

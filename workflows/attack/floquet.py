@@ -29,12 +29,17 @@ NAMES = ("a", "q", "s", "c", "T")
 
 
 def chunk(random, size):
+    return mixed(random, size, [_scaled, _scaled, _damped, _coupled], [1, 16, 40, 200])
+
+
+def mixed(random, size, kinds, numbers):
+    """Batches of these kinds, functions of (random, number, method, rtol), and numbers of points; `size` in all."""
     used = 0
     while used < size:
-        kind = str(random.choice(["scaled", "scaled", "damped", "coupled"]))
-        number, rtol, method = int(random.choice([1, 16, 40, 200])), accuracy(random), str(random.choice(METHODS))
+        kind = kinds[random.choice(len(kinds))]
+        number, rtol, method = int(random.choice(numbers)), accuracy(random), str(random.choice(METHODS))
         number = min(number, 4) if method == "dop853" else number
-        yield {"scaled": _scaled, "damped": _damped, "coupled": _coupled}[kind](random, number, method, rtol)
+        yield kind(random, number, method, rtol)
         used += number
 
 
@@ -94,6 +99,12 @@ def _blocks(random, n, region, period):
     return L, kinds
 
 
+def _entries(S, L, R):
+    """Those of B = S L R, L in units of 2^-40; None if float64 does not hold them."""
+    B = S.dot(L).dot(R).ravel()
+    return None if any(int(float(x)) != x for x in B) else [float(x) * 2.0**-40 for x in B]
+
+
 def _scaled(random, number, method, rtol):
     n = int(random.choice([2, 3, 4, 6, 9, 12], p=[0.3, 0.22, 0.26, 0.2, 0.01, 0.01]))  # 9 and 12 take long
     region = str(random.choice(["generic", "generic", "edge", "constant"]))
@@ -102,12 +113,12 @@ def _scaled(random, number, method, rtol):
         period = float(random.choice([1.0, 2 * pi, 0.3, 10.0]))
         S, R = _unimodular(random, n, int(random.choice([1, 3, 20], p=[0.4, 0.4, 0.2] if n < 6 else [0.6, 0.39, 0.01])))
         L, kinds = _blocks(random, n, "edge" if region == "edge" else "generic", period)
-        B = S.dot(L).dot(R)
-        if any(int(float(x)) != x for x in B.ravel()):
+        B = _entries(S, L, R)
+        if B is None:
             continue
         c = 0.0 if region == "constant" else float(random.uniform(-3, 3))
         w = 2 * pi * int(random.integers(1, 5)) / period
-        row = [*(float(x) * 2.0**-40 for x in B.ravel()), c, w, period]
+        row = [*B, c, w, period]
         known[tuple(row)] = S, R, L, kinds
         rows.append(row)
 

@@ -17,8 +17,7 @@ from mpmath import mp, mpf
 
 import survey
 from attack.compare import Batch
-from attack.floquet import DIGITS, METHODS, _blocks, _compared, _flow, _pair, _unimodular
-from attack.hill import accuracy
+from attack.floquet import DIGITS, _blocks, _compared, _entries, _flow, _pair, _unimodular, mixed
 from survey.truth.hill_flow import TWO_PI
 
 NEAR = 1e-3
@@ -28,13 +27,7 @@ VARIABLES = ["multiplier_re", "multiplier_im", "spectral_radius", "exponent", "x
 
 
 def chunk(random, size):
-    used = 0
-    while used < size:
-        kind = str(random.choice(["forced", "rotating"]))
-        number, rtol, method = int(random.choice([1, 4, 16, 40])), accuracy(random), str(random.choice(METHODS))
-        number = min(number, 4) if method == "dop853" else number
-        yield {"forced": _forced, "rotating": _rotating}[kind](random, number, method, rtol)
-        used += number
+    return mixed(random, size, [_forced, _rotating], [1, 4, 16, 40])
 
 
 def _batch(kind, region, names, p, truth, scene, method, rtol, n):
@@ -70,24 +63,23 @@ def _names(n):
 
 def _forced(random, number, method, rtol):
     n, region = int(random.choice([2, 3, 4])), str(random.choice(["generic", "edge"]))
-    rows, known = [], []
+    rows, known = [], {}
     while len(rows) < number:
         period = float(random.choice([1.0, TWO_PI, 0.3]))
         S, R = _unimodular(random, n, int(random.choice([1, 3])))
         L, kinds = _blocks(random, n, region, period)
-        B = S.dot(L).dot(R)
-        if any(int(float(x)) != x for x in B.ravel()):
+        B = _entries(S, L, R)
+        if B is None:
             continue
         alone = region == "edge" or min(abs(float(L[i, i])) * 2.0**-40 for i in range(n)) < LEAST
         c, s = random.uniform(-2, 2), 0.0 if alone else random.uniform(-1, 1)
-        row = [*(float(x) * 2.0**-40 for x in B.ravel()), c, s, 10 ** random.uniform(-9, -4), period]
+        row = [*B, c, s, 10 ** random.uniform(-9, -4), period]
+        known[tuple(row)] = S, R, L, kinds
         rows.append(row)
-        known.append((row, (S, R, L, kinds)))
 
     def truth(given, answer):
-        parts = {tuple(row): one for row, one in known}
         p = np.column_stack([given[name] for name in _names(n)])
-        found = [(*_flow(n, [*row[: n * n], 0.0, 1.0, row[-1]], parts[tuple(row)])[:2], None) for row in p]
+        found = [(*_flow(n, [*row[: n * n], 0.0, 1.0, row[-1]], known[tuple(row)])[:2], None) for row in p]
         with mp.workdps(DIGITS):
             at = [[mpf(row[n * n]) * mp.cos(i) for i in range(n)] for row in p]
         return _near(answer, found, p[:, -1], at)
@@ -123,19 +115,20 @@ def rotating_scene(n):
             x[i] += p[3] * (y[0] * y[i - 1] + np.sin(y[i - 1]))
         return np.append(x, TWO_PI / (p[1] * (1.0 + p[2] * p[0])))
 
-    names = ("m", "v", "k", "e", "off", *(f"g{i}" for i in range(2, n)))
-    return survey.orbit(f, period=None, parameters=names, states=[f"x{i}" for i in range(n)], start=start)
+    return survey.orbit(f, period=None, parameters=_rotating_names(n), states=[f"x{i}" for i in range(n)], start=start)
+
+
+def _rotating_names(n):
+    return ("m", "v", "k", "e", "off", *(f"g{i}" for i in range(2, n)))
 
 
 def _rotating(random, number, method, rtol):
     n, region = int(random.choice([2, 3, 4])), str(random.choice(["generic", "edge"]))
-    names = ("m", "v", "k", "e", "off", *(f"g{i}" for i in range(2, n)))
-    rows = []
+    names, rows = _rotating_names(n), []
+    growths, sizes = ((-3, -0.3), (-2, 0.2)) if region == "generic" else ((-13, -3), (-4, -2))  # their powers of ten
     for _ in range(number):
-        growth = random.choice([-1, 1], n - 2) * 10 ** random.uniform(
-            *((-3, -0.3) if region == "generic" else (-13, -3)), n - 2
-        )
-        m = 10 ** random.uniform(*((-2, 0.2) if region == "generic" else (-4, -2)))
+        growth = random.choice([-1, 1], n - 2) * 10 ** random.uniform(*growths, n - 2)
+        m = 10 ** random.uniform(*sizes)
         rows.append([m, random.uniform(0.5, 2), random.uniform(-0.3, 0.3), random.uniform(-0.3, 0.3),
                      random.choice([-1, 1]) * 10 ** random.uniform(-9, -3), *growth])  # fmt: skip
 

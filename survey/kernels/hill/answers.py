@@ -183,13 +183,14 @@ def _squares(result, squares, i, full_period):
         trace, size = y1 + dy2, abs(y1) + abs(dy2) + 2.0
         bar = 0.25 * (y1_bar + dy2_bar + 2.0 * EPS * size)
         sine, cosine, sine_bar, cosine_bar = 0.25 * (2.0 - trace), 0.25 * (2.0 + trace), bar, bar
+    if len(squares) > 0:
+        sine, sine_bar, cosine, cosine_bar = squares[i, 0], squares[i, 1], squares[i, 2], squares[i, 3]
+    elif full_period:
         both, both_bar = _both(result)
         if abs(sine) < abs(cosine):
             sine, sine_bar = _sharper(sine, sine_bar, both, both_bar, cosine, cosine_bar)
         else:
             cosine, cosine_bar = _sharper(cosine, cosine_bar, both, both_bar, sine, sine_bar)
-    if len(squares) > 0:
-        sine, sine_bar, cosine, cosine_bar = squares[i, 0], squares[i, 1], squares[i, 2], squares[i, 3]
     return sine, sine_bar, cosine, cosine_bar
 
 

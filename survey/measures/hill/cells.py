@@ -18,8 +18,7 @@ from survey.kernels.hill.answers import STABLE, UNDECIDED, UNSTABLE
 from survey.kernels.hill.cells import ENOUGH, UNSOLVED, descend
 from survey.kernels.math.chebyshev import lebesgue, nodes, tail, to_coefficients
 from survey.kernels.math.roundoff import EPS
-from survey.measures.hill import trace_curves
-from survey.measures.hill.edges import FACTORS
+from survey.measures.hill.edges import FACTORS, has_factors
 from survey.measures.tasks import in_turn
 
 OUTPUTS = FACTORS  # what `find` asks of the scene
@@ -91,8 +90,8 @@ def _factors(out):
 
 
 def serves(scene):
-    """Has the scene factors at T/2?"""
-    return not trace_curves.serves(scene)
+    """Are its cells found here?"""
+    return has_factors(scene)
 
 
 def find(solve, x, y, each=in_turn, report=None, values=_factors, descend=descend):

@@ -17,8 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from survey.measures.hill import trace_curves
-from survey.measures.hill.edges import ASIDE, COUNTS, FACTORS, close_in, of_kind, tongue
+from survey.measures.hill.edges import ASIDE, COUNTS, FACTORS, close_in, has_factors, of_kind, tongue
 from survey.measures.hill.expansion import expander
 from survey.measures.tasks import in_turn
 
@@ -34,8 +33,8 @@ CHUNK = 1024  # points bracketed together
 
 
 def serves(scene):
-    """Has the scene factors at T/2?"""
-    return not trace_curves.serves(scene)
+    """Are its curves found here?"""
+    return has_factors(scene)
 
 
 @dataclass

@@ -41,6 +41,11 @@ TOGETHER = 8  # edges of a row that share its samples and its steps
 ASIDE = 8
 
 
+def has_factors(scene):
+    """Has the scene factors at T/2? They need an even z and no damping."""
+    return getattr(scene, "EVEN", True) and not getattr(scene, "DAMPED", False)
+
+
 @dataclass
 class Edges:
     """Edges by row, ascending: `row`, `position`, its `error`, `kind` (of CLASSES), `index`; and who is `complete`."""

@@ -7,8 +7,8 @@ Stable where 2 - D and 2 + D are both positive, unstable where one is negative; 
 import numpy as np
 
 from survey.measures import sign_cells
-from survey.measures.hill import trace_curves
 from survey.measures.hill.cells import MOST, POINTS, VERDICTS, Side, accuracy
+from survey.measures.hill.edges import has_factors
 from survey.measures.tasks import in_turn
 
 OUTPUTS = ("discriminant",)
@@ -18,7 +18,7 @@ __all__ = ["MOST", "OUTPUTS", "POINTS", "VERDICTS", "Side", "accuracy", "find", 
 
 def serves(scene):
     """Are its cells found here?"""
-    return trace_curves.serves(scene) and not getattr(scene, "DAMPED", False)
+    return not has_factors(scene) and not getattr(scene, "DAMPED", False)
 
 
 def find(solve, x, y, each=in_turn, report=None):

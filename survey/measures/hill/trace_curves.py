@@ -21,10 +21,10 @@ import numpy as np
 
 from survey.kernels.hill.answers import STABLE, UNSTABLE
 from survey.kernels.math.roundoff import EPS
-from survey.measures.floquet import bifurcations, curves
+from survey.measures.floquet import curves
 from survey.measures.floquet.curves import ALONG, CLASSES, TITLE, refusal
 from survey.measures.floquet.multipliers import MINUS_ONE, PLUS_ONE
-from survey.measures.hill.edges import COUNTS
+from survey.measures.hill.edges import COUNTS, has_factors
 from survey.measures.segments import UNKNOWN
 
 ENTRIES = ("y1", "y2", "dy1", "dy2")  # by rows
@@ -34,57 +34,66 @@ __all__ = ["ALONG", "CLASSES", "TITLE", "refusal", "searched", "serves"]
 
 def serves(scene):
     """Are its curves found here?"""
-    return getattr(scene, "DAMPED", False) or not getattr(scene, "EVEN", True)
+    return not has_factors(scene)
 
 
 def searched(scene, square, axes, fixed, options):
     """The Curves on the map of `axes`, the unit square `square`; `fixed` holds the other parameters."""
-    return curves.searched(_System(scene), square, axes, fixed, options)
+    system = _Damped if getattr(scene, "DAMPED", False) else _Undamped
+    return curves.searched(system(scene), square, axes, fixed, options)
 
 
 class _System:
-    """The scene as a linear periodic system, of whose monodromy matrix the trace and the determinant are known."""
+    """The scene as a linear periodic system."""
 
     FAMILY = "floquet"
 
     def __init__(self, scene):
         self.scene, self.PARAMETERS = scene, scene.PARAMETERS
-        self.damped = getattr(scene, "DAMPED", False)
-        self.structure = "none" if self.damped else "reversible"
 
-    def functions(self, n):
-        """[(class of the zeros, function(M, E, ...) -> (values, error bounds))], of what `solve` gives."""
-        if self.damped:
-            return list(bifurcations.functions(n, self.structure).items())
+    def solved(self, point, request, *wanted):
+        """These outputs of the scene."""
+        # `auto` would go on to more digits beside the curves, which are of no use here
+        return self.scene.solve(point, replace(request, method="taylor16", variables=frozenset(wanted)))
+
+
+class _Undamped(_System):
+    """Time is in units of T / pi."""
+
+    structure = "reversible"
+
+    def functions(self, _n):
+        """[(class of the zeros, function of what `solve` gives -> (values, error bounds))]."""
         return [(PLUS_ONE if which in (0, 3) else MINUS_ONE, partial(_edge, which)) for which in range(4)]
 
-    @staticmethod
-    def passed(edges, doubt):
+    def passed(self, edges, doubt):
         """{class: how many of its edges have been passed (N)}, UNKNOWN where that is not certain."""
         plus = (edges + 3) // 4 + edges // 4
         counts = {PLUS_ONE: plus, MINUS_ONE: edges - plus}
         return {kind: np.where(doubt == 0.0, count, UNKNOWN).astype(int) for kind, count in counts.items()}
 
     def solve(self, point, request):
-        """{"monodromy": (N, 2, 2), "monodromy_error": ...}, with damping a matrix of that trace and determinant.
+        """{"monodromy": (N, 2, 2), "edges": how many edges of tongues have been passed (N), and "_error" of both}."""
+        out = self.solved(point, request, *ENTRIES, *COUNTS, "period")
+        M, E = (np.stack([out[name + end] for name in ENTRIES], axis=-1) for end in ("", "_error"))
+        unit = (out["period"] / np.pi)[:, None] ** np.array([0.0, -1.0, 1.0, 0.0])
+        M, E = ((unit * entries).reshape(-1, 2, 2) for entries in (M, E + 8 * EPS * abs(M)))
+        edges, doubt = _passed(M, out)
+        return {"monodromy": M, "monodromy_error": E, "edges": edges, "edges_error": doubt}
 
-        Without it times are in units of T / pi, and there is also how many "edges" of tongues have been passed (N),
-        with "edges_error".
-        """
-        wanted = {"discriminant"} if self.damped else {*ENTRIES, *COUNTS, "period"}
-        # `auto` would go on to more digits beside the curves, which are of no use here
-        out = self.scene.solve(point, replace(request, method="taylor16", variables=frozenset(wanted)))
-        if not self.damped:
-            M, E = (np.stack([out[name + end] for name in ENTRIES], axis=-1) for end in ("", "_error"))
-            unit = (out["period"] / np.pi)[:, None] ** np.array([0.0, -1.0, 1.0, 0.0])
-            M, E = ((unit * entries).reshape(-1, 2, 2) for entries in (M, E + 8 * EPS * abs(M)))
-            edges, doubt = _passed(M, out)
-            return {"monodromy": M, "monodromy_error": E, "edges": edges, "edges_error": doubt}
-        trace, bar = out["discriminant"], out["discriminant_error"]
-        M, E = np.zeros((2, *trace.shape, 2, 2))
-        M[..., 0, 0], E[..., 0, 0], M[..., 1, 0], M[..., 0, 1] = trace, bar, 1.0, -1.0
+
+class _Damped(_System):
+    """Of the monodromy matrix the trace and the determinant are known."""
+
+    structure = "none"
+
+    def solve(self, point, request):
+        """{"monodromy": (N, 2, 2), "monodromy_error": ...}, a matrix of that trace and determinant."""
+        out = self.solved(point, request, "discriminant")
+        M, E = np.zeros((2, *out["discriminant"].shape, 2, 2))
+        M[..., 0, 0], E[..., 0, 0] = out["discriminant"], out["discriminant_error"]
         product, E[..., 0, 1] = self.scene.product(point, out)
-        M[..., 0, 1] = -product
+        M[..., 1, 0], M[..., 0, 1] = 1.0, -product
         return {"monodromy": M, "monodromy_error": E}
 
 
