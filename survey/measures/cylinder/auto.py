@@ -57,36 +57,50 @@ def _served(rows):
 
 def _trajectories(method, rtol, rows, times, served):
     solve = partial(solution.trajectories, rtol=rtol)
-    results = solve(closed if served else method, rows, times)
-    if served:
-        missed, uncounted = solution.missed(results, rtol), results[1] == UNDETERMINED
-        if uncounted.any():
-            missed |= uncounted
-            results[0][uncounted] = np.nan
-            results[2][uncounted & (results[2] == OK)] = closed.NO_CONVERGENCE
-        if not missed.any():
-            return results
-        results = _completed(results, missed, partial(solve, method), rows, times)
-    left = _left_open(results, rtol) | ((results[1] == UNDETERMINED) & (results[2] == OK))
-    return _completed(results, left, partial(solve, taylor_double), rows, times)
+    if not served:
+        results = solve(method, rows, times)
+        return _completed(results, _left_open(results, rtol), partial(solve, taylor_double), rows, times)
+    results = solve(closed, rows, times)
+    missed, uncounted = solution.missed(results, rtol), results[1] == UNDETERMINED
+    if uncounted.any():
+        missed |= uncounted
+        results[0][uncounted] = np.nan
+        results[2][uncounted & (results[2] == OK)] = closed.NO_CONVERGENCE
+    return _further(solve, method, rtol, results, missed, rows, times)
 
 
 def _abel(method, rtol, before, rows, targets, served):
     solve = partial(solution.abel, rtol=rtol, before=before)
-    results = solve(closed if served else method, rows, targets)
-    if served:
-        missed = solution.missed(results, rtol) & (results[-1] != EQUILIBRIUM)
-        if not missed.any():
-            return results
-        results = _completed(results, missed, partial(solve, method), rows, targets)
-    return _completed(results, _left_open(results, rtol), partial(solve, taylor_double), rows, targets)
+    if not served:
+        results = solve(method, rows, targets)
+        return _completed(results, _left_open(results, rtol), partial(solve, taylor_double), rows, targets)
+    results = solve(closed, rows, targets)
+    missed = solution.missed(results, rtol) & (results[-1] != EQUILIBRIUM)
+    return _further(solve, method, rtol, results, missed, rows, targets)
+
+
+def _further(solve, method, rtol, results, missed, rows, columns):
+    """`results` of closed forms, with those of `method`, and then in double-double arithmetic, where they are missed."""
+    some = missed.any(axis=1)
+    if not some.any():
+        return results
+    rows, columns, own = rows[some], columns[some], tuple(result[some] for result in results)
+    own = _completed(own, missed[some], partial(solve, method), rows, columns)
+    own = _completed(own, _left_open(own, rtol), partial(solve, taylor_double), rows, columns)
+    for result, new in zip(results, own, strict=True):
+        result[some] = new
+    return results
 
 
 def _left_open(results, rtol):
-    """What double-double arithmetic may still answer: what misses rtol, unless by too many steps or an overflow."""
+    """What double-double arithmetic may still answer: what misses rtol, unless by too many steps or an overflow, and
+    what has turned an undetermined number of times.
+    """
     status, missed = results[-1], solution.missed(results, max(rtol, FINEST))
     if missed.any():
         missed &= (status == OK) | (status == TURNING) | (status == NO_CONVERGENCE) | (status == SEPARATRIX)
+    if len(results) == 3:
+        missed |= (results[1] == UNDETERMINED) & (status == OK)
     return missed
 
 
