@@ -4,14 +4,18 @@ coefficients.
 Source: J. C. Mason, D. C. Handscomb, Chebyshev Polynomials (2003), 2.4.1.
 """
 
+import math
+
 import numpy as np
 
 from survey.kernels import lanes
 from survey.kernels.hill.answers import STABLE, UNDECIDED, UNSTABLE
 from survey.kernels.jit import kernel, splice
+from survey.kernels.math.roundoff import EPS
 
 TILE = 64
 TERMS = 8  # as many as `_sum` spells out
+ROOT_2 = math.sqrt(2.0)
 ROWS = 8
 
 
@@ -40,32 +44,48 @@ def _sum(c, tile, sums, count):
 
 
 @kernel
-def discriminants(rows, coefficients, bars, at_nodes, weights, x, rtol, floats, verdict, missed):
+def _lagrange(n, x, tile, top, weights):
+    """Magnitudes of the Lagrange polynomials of the n nodes at x in the first lanes of `weights` (others rows: 0), from
+    T_k in the rows of `tile`; see `chebyshev.lagrange`. `top` keeps T_n, whose recurrence errs by less than n^2 EPS.
+    """
+    for i in range(len(x)):
+        top[i] = abs(2.0 * x[i] * tile[n - 1, i] - tile[n - 2, i]) + n * n * EPS
+    for k in range(len(weights)):
+        angle = math.pi * (k + 0.5) / n
+        node, share = math.cos(angle), math.sin(angle) / n if k < n else 0.0
+        for i in range(len(x)):
+            weights[k, i] = min((share * top[i] + 2.0 * EPS) / abs(x[i] - node), ROOT_2)
+
+
+@kernel
+def discriminants(rows, coefficients, bars, at_nodes, n, x, rtol, floats, verdict, missed):
     """D of the `rows` from its series at x (L): D, its bar and the verdict; `missed` where not enough.
 
-    Row rows[j]: D = sum_k coefficients[j, k] T_k(x) within bars[j] + sum_k at_nodes[j, k] weights[k] (weights (K, L);
-    K = 0: within bars[j]), coefficients and nodes in a multiple of TERMS. Columns as in `kernels.hill.answers.measure`.
+    Row rows[j]: D = sum_k coefficients[j, k] T_k(x) within bars[j], to which is added, if n > 0, what is `at_nodes` (R,
+    K), of which n count, times the magnitudes of Lagrange's polynomials; K and terms are multiples of TERMS. Columns
+    as in `kernels.hill.answers.measure`.
     """
     terms, tiles = coefficients.shape[1], (len(x) + TILE - 1) // TILE
-    table, sums, bounds = np.empty((tiles, terms, TILE)), np.empty(TILE), np.empty(TILE)
-    for t in range(tiles):
-        _polynomials(x[t * TILE : (t + 1) * TILE], table[t])
+    kept = tiles if len(rows) > ROWS else 1  # of the tables: of no more than what is read again
+    table, weights = np.empty((kept, terms, TILE)), np.empty((kept, at_nodes.shape[1], TILE))
+    sums, bounds = np.empty(TILE), np.empty(TILE)
     # A tile of the table stays in the first cache for some rows, and what is written within some pages.
     for turn in range((len(rows) + ROWS - 1) // ROWS * tiles):
         start, t = turn // tiles * ROWS, turn % tiles
-        count = len(x) - t * TILE if t == tiles - 1 else TILE
+        count, place = len(x) - t * TILE if t == tiles - 1 else TILE, t if kept > 1 else 0
+        if start == 0:
+            own = x[t * TILE : t * TILE + count]
+            _polynomials(own, table[place])
+            if n > 0:
+                _lagrange(n, own, table[place], sums, weights[place])
         for j in range(start, len(rows) if start + ROWS > len(rows) else start + ROWS):
-            _sum(coefficients[j], table[t], sums, count)
-            if len(weights):
-                _sum(at_nodes[j], weights[:, t * TILE : t * TILE + count], bounds, count)
-                for i in range(count):
-                    bounds[i] += bars[j]
-            else:
-                for i in range(count):
-                    bounds[i] = bars[j]
+            _sum(coefficients[j], table[place], sums, count)
+            _sum(at_nodes[j], weights[place], bounds, count)
+            for i in range(count):
+                bounds[i] += bars[j]
             first = rows[j] * len(x) + t * TILE
             decided, misses = verdict[first : first + count], missed[first : first + count]
-            _decide(sums, bounds, len(weights) > 0 or not bars[j] <= rtol, floats[:, first : first + count], rtol,
+            _decide(sums, bounds, n > 0 or not bars[j] <= rtol, floats[:, first : first + count], rtol,
                     decided, misses)  # fmt: skip
 
 

@@ -80,7 +80,7 @@ def _abel(method, rtol, before, rows, targets, served):
 
 
 def _further(solve, method, rtol, results, missed, rows, columns):
-    """`results` of closed forms, with those of `method`, and then in double-double arithmetic, where they are missed."""
+    """`results` of closed forms; where they are missed those of `method`, and then of double-double arithmetic."""
     some = missed.any(axis=1)
     if not some.any():
         return results

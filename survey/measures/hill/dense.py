@@ -295,12 +295,11 @@ def _between(x, number, kept):
 
 def _discriminants(answers, rows, series, bars, x, nodal):
     """D of the rows from their series at x, in place, within `bars`, or within what is `nodal`."""
-    at_nodes, weights = np.empty((len(series), 0)), np.empty((0, x.size))
+    at_nodes, nodes = np.empty((len(series), 0)), 0
     if nodal is not None:
-        bars, at_nodes = nodal.doubts, _padded(nodal.bars)
-        weights = np.ascontiguousarray(_padded(chebyshev.lagrange(x, nodal.bars.shape[1])).T)
+        bars, at_nodes, nodes = nodal.doubts, _padded(nodal.bars), nodal.bars.shape[1]
     own = answers.asked.rtol, answers.floats, answers.verdict, answers.missed
-    discriminants(rows, _padded(series), bars, at_nodes, weights, x, *own)
+    discriminants(rows, _padded(series), bars, at_nodes, nodes, x, *own)
 
 
 def _padded(series):
@@ -323,11 +322,11 @@ class Nodal:
     def between(self):
         """Bounds (R, n) half way from each node to the next."""
         n = self.bars.shape[1]
-        return self.doubts[:, None] + chebyshev.combined(self.bars, chebyshev.lagrange(_half_way(n), n).T)
+        return self.doubts[:, None] + chebyshev.combined(self.bars, chebyshev.lagrange(_half_way(n), n))
 
     def across(self, x, doubt):
         """The same of rows at x, from series across these rows, at nodes, that have a doubt of their own."""
-        weights = chebyshev.lagrange(x, len(self.doubts)).T
+        weights = chebyshev.lagrange(x, len(self.doubts))
         doubts, bars = (chebyshev.combined(values, weights) for values in (self.doubts[None], self.bars.T))
         return Nodal(doubt + doubts[0], bars.T)
 
@@ -351,7 +350,7 @@ def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
             bar, odd = np.repeat(bars[:, None], rows.size, axis=1), _odd(problem.row_axis, axis, position[inside])
             if (bars > asked.rtol).any():  # points may miss it: bounds of the rows themselves, which cost more
                 tails, bars_there = of_nodes
-                bar = np.minimum(bar, tails[:, None] + bars_there @ chebyshev.lagrange(x, bars_there.shape[1]).T)
+                bar = np.minimum(bar, tails[:, None] + bars_there @ chebyshev.lagrange(x, bars_there.shape[1]))
             if len(own) > 1:
                 own[3], bar[3] = own[3] * odd[:, None], bar[3] * odd
             wide = nodal is not None and not (bar[0] <= asked.rtol).all()
