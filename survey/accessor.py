@@ -70,7 +70,7 @@ class Survey:
         ds = self._ds
         if ax is not None and not hasattr(ax, "pcolormesh"):
             raise BadInput(f"ax = {shown(ax)}: give the Axes of a matplotlib figure, or None for a new one")
-        if isinstance(var, xr.DataArray):
+        if not (var is None or isinstance(var, str)):
             ds, var = verdicts.combined(ds, var), "combined"
         colours = {"cmap": cmap, "vmin": vmin, "vmax": vmax, "robust": robust}
         with _settings(style):

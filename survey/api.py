@@ -3,6 +3,7 @@
 import functools
 import inspect
 import os
+import warnings
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -158,7 +159,7 @@ def evaluate(
         variables = _as_list(variables)
     request = check_request(module, options, method, rtol, variables)
     given |= {key: xr.DataArray(float(p.default)) for key, p in used.items() if key not in given}
-    _check_single_values(used, given, request)
+    _check_domains(used, given, request, named)
     _check_dimensions(module, given)
     if any(map(_is_lazy, given.values())):
         user_scene.check(module)
@@ -168,7 +169,7 @@ def evaluate(
     try:
         with watched(scene, module, grid.points, lambda: _seconds(module, request, grid)) as progress:
             found = solve.compute(grid, module, request, progress=progress)
-        ds = count(labelled(grid, module, scene, request, found), found)
+        ds = count(labelled(grid, module, scene, request, found), found).assign_attrs(complete=1)
     except MemoryError:
         raise BadInput(
             f"evaluate: {counted(grid.points, 'point')} do not fit in memory; use survey.run, which writes a file, or "
@@ -271,11 +272,23 @@ def _check_dimensions(module: Any, given: dict[str, xr.DataArray]) -> None:
             raise BadInput(f"{key}: its dimension {dim!r} clashes with {what}; rename it")
 
 
-def _check_single_values(used: dict[str, Parameter], given: dict[str, xr.DataArray], request: Request) -> None:
+def _check_domains(
+    used: dict[str, Parameter], given: dict[str, xr.DataArray], request: Request, named: Iterable[str]
+) -> None:
+    """Raise BadInput for a single value outside its domain; warn of arrays with such that look like degrees."""
     for key, array in given.items():
-        if array.ndim == 0 and not _is_lazy(array) and not used[key].holds(array.values, request.variables):
-            raise BadInput(f"{key} = {float(array):g} is outside its domain; allowed: {used[key].domain}"
-                           f"{physical.hint(used[key], float(array))}")  # fmt: skip
+        if _is_lazy(array) or (array.ndim and used[key].units != "rad"):
+            continue
+        outside = ~used[key].holds(array.values, request.variables)
+        if not outside.any():
+            continue
+        value = float(array.values[outside][0])
+        hint = physical.hint(used[key], value, named)
+        if array.ndim == 0:
+            raise BadInput(f"{key} = {value:g} is outside its domain; allowed: {used[key].domain}{hint}")
+        if hint and f"{key}{physical.DEGREES}" not in named:
+            what = f"{counted(outside.sum(), 'value')} outside the domain, such as {value:g}"
+            warnings.warn(f"evaluate: {key} has {what}{hint}", stacklevel=3)
 
 
 def _seconds(module: Any, request: Request, grid: Grid) -> float:

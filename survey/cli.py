@@ -409,8 +409,9 @@ def merge(paths, output):
     """Join surveys that differ in the values of one axis, or in one fixed parameter, into one file."""
     from survey.analysis import join
 
-    joined = join.merge(paths, output)
-    err.print(plain(f"{output}: {counted(joined.status.size, 'point')} of {len(paths)} files"), markup=False)
+    joined, left_out = join.merge(paths, output)
+    of_parts = f"; {left_out}" if left_out else ""
+    err.print(plain(f"{output}: {counted(joined.status.size, 'point')} of {len(paths)} files{of_parts}"), markup=False)
     out.print(plain(str(output)), markup=False)
 
 

@@ -34,6 +34,7 @@ def test_labels_are_coordinates(bodies):
     assert bodies.survey.point(body=1).parameters["e"] == 0.0549
     axes = bodies.survey.map("a")
     assert [text.get_text() for text in axes.get_xticklabels()] == ["Sun-Jupiter", "Earth-Moon", "Sun-Mars"]
+    assert axes.lines[0].get_linestyle() == "None" and axes.lines[0].get_marker() == "o"  # names have no order
     with pytest.raises(BadInput, match="body: unknown label 'Earth'"):
         bodies.survey.point(body="Earth")
     wide = survey.evaluate("libration_elliptic", mu=bodies.mu, e=[0.0, 0.1])
@@ -80,7 +81,34 @@ def test_a_client_is_a_scheduler(tmp_path):
     with distributed.Client(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as client:
         ds = survey.run(asked, output=tmp_path / "o.nc", scheduler=client)
         assert client.submit(lambda: 1).result() == 1  # it is still its owner's
+    with pytest.raises(BadInput, match=r"this dask\.distributed Client is closed"):
+        survey.run(asked, output=tmp_path / "other.nc", scheduler=client)
     np.testing.assert_array_equal(ds.verdict, survey.evaluate("mathieu", a=[1.0, 2.0], q=0.1).verdict)
+
+
+def test_what_evaluate_returns_is_a_file_like_others_once_saved(bodies, grid, tmp_path, program):
+    for ds, name in ((grid, "grid.nc"), (bodies, "bodies.nc")):
+        ds.to_netcdf(tmp_path / name)
+        saved = survey.open(tmp_path / name)
+        assert saved.survey.counts() == ds.survey.counts() and saved.survey.map() is not None
+        assert program("info", name).returncode == 0
+    assert survey.open(tmp_path / "bodies.nc").survey.point(body="Earth-Moon").parameters["e"] == 0.0549
+    done = program("verify", "grid.nc", "--points", "3")
+    assert "sound except for the digest" in done.stdout and "there is no digest grid.nc.sha256" in done.stderr
+
+
+def test_points_on_no_grid_have_no_areas(samples):
+    for question in (samples.survey.areas, samples.survey.boundary):
+        with pytest.raises(BadInput, match="sample only counts points, of a, q: they lie on no grid"):
+            question()
+
+
+def test_an_axis_of_one_value_is_a_fixed_parameter_in_pictures(grid):
+    axes = grid.isel(q=[1]).survey.map("discriminant")
+    assert "$a$" in axes.get_xlabel() and "$q = 0.3$" in axes.get_title()
+    np.testing.assert_array_equal(axes.lines[0].get_ydata(), grid.discriminant.isel(q=1))
+    other = grid.isel(q=[1]).survey.map("discriminant", x="q")
+    assert "$q$" in other.get_xlabel() and "$a$" in other.get_ylabel()
 
 
 def test_two_fixed_axes_leave_a_row(tmp_path, program):

@@ -24,6 +24,7 @@ def of_map(ds):
         return _of_cells(ds)
     if "verdict" not in ds:
         raise BadInput("this survey has no verdict, so there are no areas of it")
+    refuse_members(ds, "areas")
     if not ds.status.dims or min(ds.status.shape) < 2:
         raise BadInput("areas: every axis needs two values or more; remove the others with slice")
     for dim in ds.status.dims:
@@ -41,6 +42,16 @@ def of_map(ds):
     if len(ds.status.dims) == 2 and _can_be_refined(ds):
         found.attrs["areas"] += " ([refine] bounds it)"
     return found
+
+
+def refuse_members(ds, what):
+    """Raise BadInput where points lie along a dimension that is no parameter, such as that of an ensemble."""
+    for dim in ds.status.dims:
+        along = [name for name, c in ds.coords.items() if dim in c.dims]
+        if dim not in ds.coords and along:
+            raise BadInput(
+                f"{what}: {dim} only counts points, of {', '.join(map(str, along))}: they lie on no grid; use counts()"
+            )
 
 
 def _is_monotonic(values):

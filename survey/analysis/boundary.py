@@ -4,6 +4,7 @@ import numpy as np
 import xarray as xr
 
 from survey import modules
+from survey.analysis.areas import refuse_members
 from survey.errors import BadInput
 from survey.file import schema
 from survey.file.labels import flag_codes
@@ -21,6 +22,7 @@ def find(ds, kind=None, index=None):
     elif "cell_verdict" in ds:
         found = _undecided_cells(ds)
     else:
+        refuse_members(ds, "boundary")
         found = _between_points(ds)
     for name, value in (("kind", kind), ("index", index)):
         if value is not None and name not in found:

@@ -10,7 +10,7 @@ from survey import api, measures, modules, status
 from survey.analysis.given import options_at, parameters
 from survey.errors import BadInput
 from survey.file.labels import flag_attributes
-from survey.request import user_scene
+from survey.request import physical, user_scene
 from survey.request.checks import check_options, check_parameters, is_number
 from survey.request.function_scene import FunctionScene
 from survey.scene import plus_minus
@@ -36,13 +36,15 @@ def edge(
     along : the name of the parameter along which boundaries are searched.
     near : a value of it: only the nearest boundary on each side of it is returned, at most two.
     **parameters : numbers for the scene's other parameters, and options. `along=(low, high)`, under that parameter's
-        name, is the range that is searched; by default its whole domain, if that is bounded, or what is `near`.
+        name, is the range that is searched; by default its whole domain, if that is bounded, less a thousandth at an
+        end that does not belong to it, or what is `near`. Physical input, such as moments of inertia, as in `evaluate`.
 
     Returns
     -------
     xarray.Dataset along the dimension `place`, ascending: `edge` (in the unit of the parameter), `edge_error`, a bound,
-    `edge_class`, and `edge_index` where boundaries have numbers (of tongues). The attribute `complete` is 1 where it is
-    shown that there are no others in the range, 0 where not, and absent where this is not known.
+    `edge_class`, and `edge_index` where boundaries have numbers (of tongues). The attribute `searched` is the range
+    (low, high) that was searched; `complete` is 1 where it is shown that there are no others in it, 0 where not, and
+    absent where this is not known.
 
     Raises
     ------
@@ -73,6 +75,8 @@ def _edge(scene, along, near, parameters, alone=False):
     known = [p.name for p in module.PARAMETERS]
     if along not in known:
         raise BadInput(f"along: {modules.unknown('parameter', along, known)}")
+    named = physical.resolved(module, given | {along: np.nan})  # named bodies then give what is left
+    given = {key: _plain(value) for key, value in named.items() if key != along}
     chosen = {key: value for key, value in parameters.items() if key in names}
     options = check_options(module, chosen, [*given, along])
     used = check_parameters(module, name, options, dict.fromkeys([along, *given]))
@@ -85,6 +89,11 @@ def _edge(scene, along, near, parameters, alone=False):
     if not (found[0].position.size or alone):
         _check_inside(scene, module, {along: near if ends is None else sum(ends) / 2} | fixed, options)
     return _described(module, measure, used, along, fixed, *found)
+
+
+def _plain(value):
+    """The number in a DataArray without dimensions; other values as they are."""
+    return value.item() if isinstance(value, xr.DataArray) and not value.ndim else value
 
 
 def _check_inside(scene, module, point, options):
@@ -134,10 +143,12 @@ def _range(parameter, ends, near):
 
 
 def _find(scene, options, parameter, ends, near, fixed, alone):
-    """(OnLine, index or None, complete or None) between `ends`, or the nearest on each side of `near`."""
+    """(OnLine, index or None, complete or None, (low, high) that was searched) between `ends`, or the nearest on each
+    side of `near`.
+    """
     if ends is not None:
         found = boundaries.along(scene, options, parameter.name, ends, fixed)
-        return found if near is None else _nearest(*found, near)
+        return *(found if near is None else _nearest(*found, near)), ends
 
     def between(first, last):
         return boundaries.along(scene, options, parameter.name, (first, last), fixed)
@@ -155,7 +166,7 @@ def _find(scene, options, parameter, ends, near, fixed, alone):
                 further = side * min(side * furthest, side * near + width)
                 parts.append(between(min(end, further), max(end, further)))
                 ends[side] = further, furthest
-    return _nearest(*_together(parts), near)
+    return *_nearest(*_together(parts), near), (ends[-1.0][0], ends[1.0][0])
 
 
 def _together(parts):
@@ -191,7 +202,7 @@ def _nearest(found, index, complete, near):
     )
 
 
-def _described(module, measure, used, along, fixed, found, index, complete):
+def _described(module, measure, used, along, fixed, found, index, complete, searched):
     parameter = used[along]
     about = {"units": parameter.units, "symbol": parameter.symbol}
     hill = hasattr(measure, "trace")
@@ -208,7 +219,7 @@ def _described(module, measure, used, along, fixed, found, index, complete):
             "long_name": "number of the tongue, twice its rotation number", "symbol": "n"})  # fmt: skip
     coordinates = {key: ((), value, {"long_name": used[key].long_name, "units": used[key].units})
                    for key, value in fixed.items() if np.isfinite(value)}  # fmt: skip
-    attributes = {"title": f"{module.TITLE}: boundaries along {along}", "along": along}
+    attributes = {"title": f"{module.TITLE}: boundaries along {along}", "along": along, "searched": searched}
     return xr.Dataset(data, coordinates, attributes | ({} if complete is None else {"complete": int(complete)}))
 
 

@@ -3,6 +3,7 @@
 import os
 import tempfile
 import tomllib
+import warnings
 from collections.abc import Iterable
 from functools import reduce
 from pathlib import Path
@@ -22,6 +23,7 @@ from survey.request.output_path import check_path
 from survey.wording import counted, shown
 
 SAME = ("scene", "scene_hash", "options", "method", "rtol")
+OF_PARTS = {"boundaries": "[boundaries]", "surfaces": "[boundaries]", "refine": "[refine]"}
 SUMMED = ("wall_time_s", "compile_time_s")
 OF_RUN = (
     "fingerprint",
@@ -46,14 +48,28 @@ def concat(datasets: Iterable[xr.Dataset | str | os.PathLike[str]]) -> xr.Datase
     Returns
     -------
     xarray.Dataset, sorted along that axis if it is one of numbers, with counts of the whole. Points that several
-    contain are kept once. Edges, curves and cells ([boundaries], [refine]) are left out: they belong to the parts.
+    contain are kept once. Edges, curves, surfaces and cells are left out, with a warning: they belong to the parts.
 
     Raises
     ------
     survey.BadInput where the parts do not belong together: another scene, option, method, rtol or set of outputs, more
     than one axis that differs, or different values at a common point.
     """
-    parts = [of_points(_part(given)) for given in _as_list(datasets)]
+    joined, left_out = _together(datasets)
+    if left_out:
+        warnings.warn(f"concat: {left_out}", stacklevel=2)
+    return joined
+
+
+def _together(datasets):
+    """(The joined survey, what of the parts is left out, in words; "" if nothing is.)"""
+    given = [_part(part) for part in _as_list(datasets)]
+    tables = dict.fromkeys(OF_PARTS[name] for name in OF_PARTS if any(name in part.attrs for part in given))
+    left_out = f"what {' and '.join(tables)} found belongs to the parts, and is left out" if tables else ""
+    return _concat([of_points(part) for part in given]), left_out
+
+
+def _concat(parts):
     if len(parts) < 2:
         raise BadInput(f"concat: give two or more surveys, not {len(parts)}")
     for part in parts[1:]:
@@ -74,14 +90,19 @@ def _along(part, axis, beside):
 
 
 def merge(paths, output):
-    """Write the `concat` of the files to the netCDF file `output`; returns the Dataset. Nothing is replaced."""
+    """Write the `concat` of the files to the netCDF file `output`; returns the Dataset, and what of the parts is left
+    out, in words. Nothing is replaced.
+    """
     output = check_path(output)
     if output.exists():
         raise BadInput(f"{output} exists; name another file with -o, or remove it first")
-    joined = concat(list(paths))
+    try:
+        joined, left_out = _together(list(paths))
+    except BadInput as error:
+        raise BadInput(str(error).replace("concat:", "merge:", 1)) from None
     with disk.refused(output), tempfile.TemporaryDirectory(dir=output.parent, prefix=f".{output.name}.") as folder:
         _write(joined, output, Path(folder))
-    return joined
+    return joined, left_out
 
 
 def _as_list(datasets):

@@ -53,7 +53,9 @@ def _kinds(ds):
 
 def combined(ds, given):
     """The survey with a variable "combined" of flags, from an array of booleans at its points; raises BadInput."""
-    if given.dtype != bool or set(given.dims) != set(ds.status.dims):
+    if not isinstance(given, xr.DataArray) and np.shape(given) == ds.status.shape:
+        given = xr.DataArray(np.asarray(given), ds.status.coords, ds.status.dims)
+    if not isinstance(given, xr.DataArray) or given.dtype != bool or set(given.dims) != set(ds.status.dims):
         raise BadInput(
             "map: an array to be drawn holds booleans at the points of the survey, such as "
             "a.survey.where('stable') & b.survey.where('stable')"

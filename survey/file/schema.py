@@ -167,10 +167,14 @@ def _check_axes(ds):
         axis = ds.variables.get(dim)
         if axis is None:
             continue
-        if axis.dims != (dim,) or axis.dtype.kind not in "iuf":
-            raise Damaged(f"the axis {dim} must be one-dimensional and numeric")
-        if not np.isfinite(axis.values).all():
+        if axis.dims != (dim,) or not (axis.dtype.kind in "iufU" or _is_text(axis)):
+            raise Damaged(f"the axis {dim} must be one-dimensional, and hold numbers or names")
+        if axis.dtype.kind in "iuf" and not np.isfinite(axis.values).all():
             raise Damaged(f"the axis {dim} contains values that are not finite")
+
+
+def _is_text(axis):
+    return axis.dtype.kind == "O" and all(isinstance(value, str) for value in axis.values.ravel())
 
 
 def edges(ds):

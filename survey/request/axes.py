@@ -43,10 +43,10 @@ def values_of(key, axis):
     return values
 
 
-def check_domain(parameter, values, outputs, others=()):
+def check_domain(parameter, values, outputs, others=(), given=()):
     """Raise BadInput if a single value or an end of an axis lies outside the parameter's domain for these outputs.
 
-    `others`: names of the parameters that may take its place.
+    `others`: names of the parameters that may take its place; `given`: those of the axes as they were given.
     """
     ends = np.atleast_1d(values)[[0, -1]]
     for value in ends[~parameter.holds(ends, outputs)]:
@@ -54,7 +54,7 @@ def check_domain(parameter, values, outputs, others=()):
         instead = f"; instead of {parameter.name} you can give {' or '.join(others)}" if others else ""
         raise BadInput(
             f"axes.{parameter.name} {what} {value:g}, outside its domain; allowed: {parameter.domain}"
-            f"{physical.hint(parameter, float(value))}{instead}"
+            f"{physical.hint(parameter, float(value), given)}{instead}"
         )
 
 

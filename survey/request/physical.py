@@ -37,6 +37,9 @@ def resolved(scene, given):
         angle = key.removesuffix(DEGREES)
         if key not in names and key != angle and angle in names and names[angle].units == "rad":
             found |= _put(given, {angle: _of(value, key, np.radians)})
+            if key in found[angle].coords:
+                about = {"long_name": names[angle].long_name, "symbol": names[angle].symbol, "units": "degree"}
+                found[angle].coords[key].attrs.update(about)
         else:
             found[key] = value
     if "mu" in names and "body" in found:
@@ -117,8 +120,10 @@ def _of_body(body, with_eccentricity):
     return found
 
 
-def hint(parameter, value):
-    """What to add to a complaint about an angle that looks like degrees."""
+def hint(parameter, value, given=()):
+    """What to add to a complaint about an angle that looks like degrees, or that was `given` in degrees."""
+    if f"{parameter.name}{DEGREES}" in given:
+        return f" (rad); {parameter.name}{DEGREES} is {np.degrees(value):g}"
     largest = max(abs(parameter.minimum), abs(parameter.maximum))
     if parameter.units == "rad" and np.isfinite(largest) and largest < abs(value) <= 360.0:
         return f" (rad); if it is in degrees, give {parameter.name}{DEGREES} = {value:g}"

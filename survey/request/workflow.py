@@ -127,7 +127,7 @@ def check(data, text="", output=None, default_path="survey.nc", near=None, prove
     for key, values in given.items():
         group = parameters[key].instead_of or key
         others = [p.name for p in scene.PARAMETERS if group in (p.name, p.instead_of) and p.name != key]
-        check_domain(parameters[key], values, request.variables, others)
+        check_domain(parameters[key], values, request.variables, others, file.axes)
     surfaces = check_surfaces(scene, name, file.boundaries, given, proves)
     for figure in file.output.figures:
         if figure == SURFACES and not surfaces:
@@ -159,7 +159,9 @@ def _in_own_terms(scene, file):
     """The values of all axes by parameter; physical input, such as degrees, in the scene's own terms."""
     given = {key: values_of(f"axes.{key}", axis) for key, axis in file.axes.items()}
     known = {p.name for p in scene.PARAMETERS} | {option.name for option in scene.OPTIONS}
-    if isinstance(file.options.get("body"), str) and "mu" in known and "body" not in known:
+    if "body" in file.options and "mu" in known and "body" not in known:
+        if not isinstance(file.options["body"], str):
+            raise BadInput("options.body: a workflow takes one pair, as in body = 'Earth-Moon'; evaluate takes several")
         given["body"] = file.options.pop("body")
     if set(given) <= known:
         return given

@@ -74,6 +74,7 @@ def onto(axes, ds, name=None, boundaries=True, style=None, across=(None, None), 
             axes.set_title(title_of(ds, ds[name]), fontsize=10 if alone(axes) else 8)
         fit(axes)
         return
+    ds = _without_single(ds, across)
     chosen = _chosen(ds, across)
     drawn = chosen or ds.status.dims[:2]
     labels = {dim: [str(label) for label in ds[dim].values] for dim in drawn
@@ -87,7 +88,7 @@ def onto(axes, ds, name=None, boundaries=True, style=None, across=(None, None), 
     elif variable.ndim == 2:
         draw_map(axes, ds, variable, state, boundaries, paper, colours or {})
     elif variable.ndim == 1:
-        draw_profile(axes, part, variable, state, paper)
+        draw_profile(axes, part, variable, state, paper, variable.dims[0] in labels)
     else:
         raise BadInput(f"{name} is a single number; a figure needs at least one axis")
     for dim, setting in zip(variable.dims, (axes.set_xticks, axes.set_yticks), strict=False):
@@ -116,6 +117,13 @@ def _check_colours(asked):
         )
 
 
+def _without_single(ds, across):
+    """The survey without axes of a single value, which are fixed parameters then, but for those that are asked for."""
+    single = [dim for dim in ds.status.dims if ds.sizes[dim] == 1 and dim not in across]
+    kept = len(single) == ds.status.ndim or family.over_angles(ds)
+    return ds if kept else ds.isel(dict.fromkeys(single, 0))
+
+
 def _chosen(ds, across):
     """The one or two axes to be drawn, or None; raises BadInput for an unknown one."""
     known = list(ds.status.dims)
@@ -129,7 +137,10 @@ def _chosen(ds, across):
         x = next((name for name in known if name != y), None) if x is None else x
         return [x, y] if x is not None else None
     if x is None:
-        return None
+        along = ds.attrs.get(
+            "boundaries"
+        )  # with two other axes or more, curves lie in planes of this one and the first
+        return [known[0], along] if len(known) > 2 and "edge_count" in ds and along in known[2:] else None
     return [x, *[name for name in known if name != x][:1]]
 
 

@@ -1,7 +1,5 @@
 """A variable along one axis: its curve with the error band, or its flags."""
 
-import textwrap
-
 import numpy as np
 
 from survey import status
@@ -11,7 +9,7 @@ from survey.show.boundaries import draw_edges
 from survey.show.layout import add_legend
 from survey.show.maps import IN_WORDS
 from survey.show.palette import kinds_of
-from survey.show.text import WIDE, formula, label_of, literal, spaced
+from survey.show.text import WIDE, formula, label_of, spaced
 
 RING = "#D40000"
 MOST_RINGS, RARE = 12, 50  # isolated points that are ringed; points from which on one among them is hard to see
@@ -19,8 +17,10 @@ STEEP = 30.0  # times the median: where a quantity that changes sign has a pole,
 WIDE_RANGE = 1e3  # of a quantity with poles from which on its axis is linear about 0 and logarithmic beyond
 
 
-def draw_profile(axes, ds, variable, state, paper):
-    """Draw a variable along its one axis, `state` being the status, with the boundaries on it."""
+def draw_profile(axes, ds, variable, state, paper, named=False):
+    """Draw a variable along its one axis, `state` being the status, with the boundaries on it; points alone where the
+    axis is one of names.
+    """
     x = variable[variable.dims[0]]
     if "flag_values" in variable.attrs:
         shown, table, palette = kinds_of(ds, variable, state)
@@ -39,11 +39,10 @@ def draw_profile(axes, ds, variable, state, paper):
                                   ha="center", fontsize=7, color=RING)  # fmt: skip
         axes.set_yticks(range(len(names)), [spaced(name) for name in names], fontsize=8)
     else:
-        label = textwrap.fill(literal(variable.attrs.get("long_name", variable.name)), 60)
-        label = formula(variable.attrs.get("symbol") or variable.name, variable.name) if paper else label
+        label = formula(variable.attrs.get("symbol") or variable.name, variable.name)
         words = words_of(variable)
         drawn, poles, linear = _without_poles(variable.where(~variable.isin(list(words))))
-        axes.plot(x, drawn, lw=1.2, color="#0072B2", label=label)
+        axes.plot(x, drawn, "o" if named else "-", ms=5, lw=1.2, color="#0072B2", label=label)
         if linear:
             axes.set_yscale("symlog", linthresh=linear)
         for i in poles:
@@ -59,7 +58,10 @@ def draw_profile(axes, ds, variable, state, paper):
                 axes.axhline(edge, color="black", lw=0.6, ls=(0, (5, 2)))
     if f"{variable.name}_error" in ds:
         bar = ds[f"{variable.name}_error"].isel({d: 0 for d in ds[variable.name].dims if d not in variable.dims})
-        axes.fill_between(x, variable - bar, variable + bar, color="#56B4E9", alpha=0.5, lw=0, label="error bar")
+        if named:
+            axes.errorbar(x, variable, bar, fmt="none", color="#56B4E9", capsize=4, label="error bar")
+        else:
+            axes.fill_between(x, variable - bar, variable + bar, color="#56B4E9", alpha=0.5, lw=0, label="error bar")
     draw_edges(axes, ds, x)
     bad = np.isin(state.values, list(status.UNANSWERED))
     if bad.any():

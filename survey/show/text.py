@@ -68,7 +68,9 @@ def _with_powers(units):
 
 
 def title_of(ds, variable):
-    """The survey's title, what is drawn, the options that are words, and the numbers that are fixed and not zero."""
+    """The survey's title, what is drawn if no axis or colour bar says so, as of verdicts, the options that are words,
+    and the numbers that are fixed and not zero.
+    """
     title, name = literal(ds.attrs.get("title", "")), literal(variable.attrs.get("long_name", variable.name))
     fixed = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "fi"]
     fixed = [c for c in fixed if c.name in ds.dims or (float(c) != 0 and not _is_default(c))]
@@ -78,7 +80,8 @@ def title_of(ds, variable):
     labels = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "UO"]
     numbers = ", ".join(numbers + [f"{literal(c.name)} {literal(c.item())}{position.get(c.name, '')}" for c in labels])
     words = _options(ds)
-    lines = [title] if name.lower() in title.lower() else [title, name]
+    labelled = title and ("flag_values" not in variable.attrs or (variable.ndim == 1 and variable.dims[0] in ds.coords))
+    lines = [title] if labelled or name.lower() in title.lower() else [title, name]
     lines[-1] += f" ({words})" if words and words not in title else ""
     return "\n".join([*lines, numbers] if numbers else lines)
 

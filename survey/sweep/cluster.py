@@ -33,6 +33,8 @@ def client_of(address):
     except ImportError:
         raise BadInput("--scheduler needs dask.distributed: pip install distributed") from None
     if isinstance(address, Client):  # it stays its owner's, and open
+        if address.status != "running":
+            raise BadInput("scheduler: this dask.distributed Client is closed; give one that is open")
         where, security = address.scheduler.address, address.security
     elif isinstance(address, (str, os.PathLike)):
         where = _address_in(os.fspath(address))

@@ -289,3 +289,33 @@ def test_a_margin_that_cannot_be_found_says_why():
     motion = survey.evaluate("brun_triaxial", question="trajectory", A=1.0, B=1.5, C=2.0, t=3.0)
     with pytest.raises(BadInput, match=r"brun_triaxial no boundaries are known along A: question = trajectory has no"):
         motion.survey.margin()
+
+
+def test_edge_takes_physical_input_and_says_what_it_searched():
+    shape = {"A": 2.0, "B": 2.0, "C": 1.0}
+    found = survey.edge("satellite", along="amplitude", **shape)
+    expected = survey.edge("satellite", along="amplitude", inertia_ratio=0.5)
+    np.testing.assert_array_equal(found.edge, expected.edge)
+    low, high = found.attrs["searched"]
+    assert low == 0.0 and 0.99 * np.pi / 2 < high < np.pi / 2
+    beyond = survey.edge("satellite", along="amplitude", amplitude=(1.2, 0.9999999 * np.pi / 2), **shape)
+    assert beyond.edge.max() > high and found.attrs["complete"] == 1  # they accumulate at the end of the domain
+    assert survey.edge("libration_elliptic", along="e", body="Earth-Moon").edge.size == 1
+    near = survey.edge("satellite", along="rho", near=1.2, k=0.5).attrs["searched"]
+    assert near[0] < 1.03 and near[1] > 1.6
+    with pytest.raises(survey.BadInput, match="inertia_ratio is given twice"):
+        survey.edge("satellite", along="inertia_ratio", amplitude=0.5, **shape)
+    with pytest.raises(survey.BadInput, match="body"):
+        survey.edge("libration_elliptic", along="e", body=["Earth-Moon", "Sun-Earth"])
+
+
+@pytest.mark.parametrize(("e", "names"), [(0.1, ["B", "A", "KC"]), (0.33, ["B"]), (0.5, ["B"])])
+def test_danbys_curves_are_named_where_the_verdict_changes_alone(e, names):
+    """Beyond the tip, at e = 0.3145, A goes on between unstable motions."""
+    found = survey.edge("libration_elliptic", along="mu", e=e)
+    words = found.edge_class.attrs["flag_meanings"].split()
+    assert [words[code] for code in found.edge_class.values] == names
+    verdicts = survey.evaluate(
+        "libration_elliptic", e=e, mu=np.sort([*(found.edge - 1e-6), *(found.edge + 1e-6)])
+    ).verdict
+    assert (verdicts[::2].values != verdicts[1::2].values).all()

@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 
 import survey
+from survey.analysis import join
 from survey.errors import BadInput
 from survey.file import reading
 
@@ -53,6 +54,19 @@ def test_the_command_writes_a_sound_file_and_replaces_none(parts, program):
     again = program("merge", low, high, "-o", "joined.nc")
     assert again.returncode == 2 and "joined.nc exists" in again.stderr
     assert {file.name for file in program.folder.glob("*joined*")} == {"joined.nc", "joined.nc.sha256"}
+
+
+def test_what_belongs_to_the_parts_is_left_out_with_a_word(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name, start in (("low", 0.0), ("high", 2.0)):
+        axes = {"q": {"values": [0.3, 0.5]}, "a": {"start": start, "stop": start + 1.5, "num": 4}}
+        survey.run({"scene": "mathieu", "axes": axes, "boundaries": {}}, output=f"{name}.nc")
+    with pytest.warns(UserWarning, match=r"concat: what \[boundaries\] found belongs to the parts, and is left out"):
+        joined = survey.concat(["low.nc", "high.nc"])
+    assert "curve_count" not in joined and joined.sizes["a"] == 8
+    assert join.merge(["low.nc", "high.nc"], "both.nc")[1].startswith("what [boundaries] found")
+    with pytest.raises(BadInput, match="merge: surveys are joined along one axis"):
+        join.merge(["low.nc", "low.nc"], "x.nc")
 
 
 def test_a_fixed_number_becomes_an_axis():

@@ -42,6 +42,11 @@ def test_combined_verdicts_are_drawn(two):
     axes = two[0].survey.map(both)
     labels = [text.get_text() for text in axes.figure.legends[0].get_texts()]
     assert f"yes ({int(both.sum()):,})" in labels and f"no ({int((~both).sum()):,})" in labels
+    for plain in (both.values, both.variable):
+        other = two[0].survey.map(plain)
+        assert [text.get_text() for text in other.figure.legends[0].get_texts()] == labels
+    with pytest.raises(survey.BadInput, match="holds booleans"):
+        two[0].survey.map(both.values[:3])
     with pytest.raises(survey.BadInput, match="other coordinates"):
         two[0].survey.map(both.isel(a=slice(1, None)))
     with pytest.raises(survey.BadInput, match="holds booleans"):

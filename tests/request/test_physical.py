@@ -15,6 +15,11 @@ def test_degrees():
     np.testing.assert_array_equal(ds.amplitude, np.radians([10.0, 30.0]))
     with pytest.raises(BadInput, match=r"amplitude = 30 is outside .* if it is in degrees, give amplitude_deg = 30"):
         survey.evaluate("satellite", amplitude=30.0, rho=1.2)
+    assert ds.amplitude_deg.attrs["units"] == "degree"
+    with pytest.raises(BadInput, match=r"amplitude = 2.0944 is outside .*; amplitude_deg is 120$"):
+        survey.evaluate("satellite", amplitude_deg=120.0, rho=1.2)
+    with pytest.warns(UserWarning, match="amplitude has 2 values outside the domain, such as 30 .*amplitude_deg = 30"):
+        survey.evaluate("satellite", amplitude=[1.0, 30.0, 60.0], rho=1.2)
     with pytest.raises(BadInput, match="amplitude is given twice"):
         survey.evaluate("satellite", amplitude=0.3, amplitude_deg=30.0, rho=1.2)
 
@@ -50,11 +55,16 @@ def test_a_workflow_takes_it_too(tmp_path):
     axes = {"amplitude_deg": {"start": 10.0, "stop": 60.0, "num": 6}, "rho": 1.2}
     ds = survey.run({"scene": "satellite", "axes": axes}, output=tmp_path / "s.nc")
     np.testing.assert_array_equal(ds.amplitude, np.radians(np.linspace(10.0, 60.0, 6)))
+    with pytest.raises(BadInput, match=r"axes.amplitude is 2.0944, outside .*; amplitude_deg is 120"):
+        survey.run({"scene": "satellite", "axes": {"amplitude_deg": 120.0, "rho": 1.2}}, output=tmp_path / "x.nc")
     asked = {
         "scene": "libration_elliptic",
         "options": {"body": "Earth-Moon"},
         "axes": {"e": {"start": 0.0, "stop": 0.1, "num": 3}},
     }
+    several = asked | {"options": {"body": ["Earth-Moon", "Sun-Jupiter"]}}
+    with pytest.raises(BadInput, match=r"options\.body: a workflow takes one pair"):
+        survey.run(several, output=tmp_path / "x.nc")
     ds = survey.run(asked, output=tmp_path / "l.nc")
     assert 1.0 / float(ds.mu) == pytest.approx(82.300568, abs=1e-6) and ds.sizes["e"] == 3
 

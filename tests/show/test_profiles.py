@@ -69,7 +69,7 @@ def test_poles_are_gaps_with_marks_on_a_symmetric_logarithmic_axis():
     assert axes.get_yscale() == "symlog"
     (pole,) = (line for line in axes.lines if line.get_label() == "pole")
     assert abs(pole.get_xdata()[0] - 0.30007) < 1e-3
-    (curve,) = (line for line in axes.lines if line.get_label() == "quantity")
+    (curve,) = (line for line in axes.lines if line.get_label() == "$y$")
     assert np.isnan(np.asarray(curve.get_ydata(), float)).sum() == 1
     assert profile(x, y=(np.sin(20 * x), {})).get_yscale() == "linear"  # zeros are no poles
     assert profile(x, y=(1e4 * np.sin(20 * x), {})).get_yscale() == "linear"

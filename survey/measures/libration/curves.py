@@ -2,8 +2,8 @@
 
 Of the circular problem they are the numbers of `critical`. Of the elliptic one they are Danby's A and B, and KC: on A
 and B a pair of multipliers meets at -1, on KC two pairs of unlike kind meet on the unit circle. They are zeros of the
-half-period factors A and B, and of K where 0 < t < 2 (`scenes/libration_elliptic.md`, section 3), searched for on LINES
-lines of the map each way; every point is bracketed on its line by certain signs.
+half-period factors A and B, and of K, where 0 < t < 2 (`scenes/libration_elliptic.md`, section 3), searched for on
+LINES lines of the map each way; every point is bracketed on its line by certain signs.
 """
 
 import numpy as np
@@ -74,9 +74,9 @@ def _function(name, e, mu):
     (a, b, c, d, t), (ea, eb, ec, ed, et) = values.T, errors.T
     if name == "KC":
         (ab, ab_bar), (cd, cd_bar) = product.py_func(a, b, ea, eb), product.py_func(c, d, ec, ed)
-        k, k_bar = np.vectorize(discriminant)(t, ab, cd, et, ab_bar, cd_bar)
-        on_circle = (t > 0.0) & (t < 2.0)
-        out[inside], bars[inside] = np.where(on_circle, k, np.nan), k_bar
+        value, bar = np.vectorize(discriminant)(t, ab, cd, et, ab_bar, cd_bar)
     else:
-        out[inside], bars[inside] = (a, ea) if name == "A" else (b, eb)
+        value, bar = (a, ea) if name == "A" else (b, eb)
+    on_circle = (t > 0.0) & (t < 2.0)  # beyond the tip A vanishes between unstable motions
+    out[inside], bars[inside] = np.where(on_circle, value, np.nan), bar
     return out, bars
