@@ -50,7 +50,8 @@ class Survey:
         `var`: a name, or booleans at the points, such as `a.survey.where("stable") & b.survey.where("stable")`. `x`
         and `y`: which axes are drawn; others at their first value, unless a `slice` fixes them. `cmap`, `vmin`, `vmax`:
         colours of a variable of numbers; by default they span its values but for 1 % at either end, where the colour
-        bar has arrows (`robust=False`: all of them), and diverge about 0 where values have both signs.
+        bar has arrows (`robust=False`: all of them), and diverge about 0 where values have both signs; of a curve
+        `vmin` and `vmax` are the ends of its axis.
 
         Solutions of Abel's equation at several angles are curves, one for each value of the first parameter, up to
         their turning points; at one angle (`ds.survey.slice(phi=1.0).survey.map("w")`) they are a map.

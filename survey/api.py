@@ -123,7 +123,8 @@ def evaluate(
         `survey.abel`, `survey.floquet` or `survey.orbit` returns.
     method : "auto" or the name of a method.
     rtol : requested accuracy, |error| <= rtol (1 + |value|); the `X_error` variables hold the error bounds reached.
-    variables : names of the requested outputs; all by default. Errors and status are always included.
+    variables : names of the requested outputs; by default all but those that are computed on request (`describe` says
+        which). Errors and status are always included.
     **parameters : the scene's parameters (numbers, sequences, numpy 1-D arrays, DataArrays) and options (strings).
         A number becomes a scalar coordinate, a 1-D array a dimension named after its parameter; DataArrays keep
         their dimensions, so those that share one are paired point by point and others span a grid.
@@ -465,7 +466,8 @@ def _output_text(module: Any, o: Output) -> str:
     what = ", ".join(f"{name} {code}" for name, code in o.flags.items()) if o.flags is not None else ""
     untold = o.flags is not None or o.integer or (o.units == "1" and hasattr(module, "RATIOS"))
     unit = "" if untold else _unit(o.units, module)
-    return "; ".join(part for part in (f"{o.long_name}{unit}", what, o.applies) if part)
+    asked = "on request" if o.on_request else ""
+    return "; ".join(part for part in (f"{o.long_name}{unit}", what, o.applies, asked) if part)
 
 
 def _unit(units: str, module: Any, ratio: bool = False) -> str:

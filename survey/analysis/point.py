@@ -287,7 +287,7 @@ def reading(ds, name, has_bar):
     """A value with as many digits as its error bar justifies."""
     variable = ds[name]
     if "flag_values" in variable.attrs:
-        return meaning(variable)
+        return "no answer" if int(ds.status) in status.UNANSWERED else meaning(variable)
     value = float(variable)
     if not np.isfinite(value):
         return "does not apply"

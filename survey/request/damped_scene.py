@@ -59,9 +59,11 @@ class DampedScene(FunctionScene):
     @cached_property
     def _inner(self):
         """The scene of x, over the same parameters."""
+        return self._undamped(_less_square(self.z, self.damping, self.place))
+
+    def _undamped(self, z):
         shared = ("period", "breaks", "own", "NAME", "TEXT", "HASH", "TITLE", "about", "REFERENCES")
-        given = {name: getattr(self, name) for name in shared}
-        return HillScene(z=_less_square(self.z, self.damping, self.place), EVEN=self.even, **given)
+        return HillScene(z=z, EVEN=self.even, **{name: getattr(self, name) for name in shared})
 
     def cost(self, options, sizes):
         """Seconds per point, roughly."""
@@ -99,6 +101,11 @@ class DampedScene(FunctionScene):
         with np.errstate(over="ignore"):
             value = np.exp(-2.0 * turn)
             return value, value * (np.expm1(4.0 * bar) + ROUNDING)
+
+    def trajectory(self, point, answer, options, time=None):
+        """Solutions and multipliers of a point (see `survey.scenes`)."""
+        damping = self.damping if self.place is None else point[self.PARAMETERS[self.place].name]
+        return self._undamped(self.z).trajectory(point, answer, options, time, float(damping))
 
     def why(self, answer):
         """Why the point has its verdict (see `survey.scenes`)."""

@@ -66,7 +66,7 @@ class FloquetScene(TracedScene):
             "states": ", ".join(self.states),
             "structure": self.structure,
             "A_resolved_width": probing.WIDTH,
-            "A_resolution": f"{known} unless its position is one of BREAKS (A_resolved_width is a fraction of T)",
+            "A_resolution": f"{known} unless its position is one of the breaks (A_resolved_width is a fraction of T)",
         }
 
     def cost(self, options, sizes):

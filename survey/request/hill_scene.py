@@ -29,8 +29,8 @@ SAME = 8 * user_equation.SLACK
 LANES = 8
 # Meaning of two of the common codes here.
 STATUS = {
-    "invalid_parameters": "outside the domain, or z or T is not finite there, or z is not even although EVEN = True",
-    "no_convergence": "z is not smooth between its BREAKS: name every position where it jumps or has a kink",
+    "invalid_parameters": "outside the domain, or z or T is not finite there, or z is not even, as it is said to be",
+    "no_convergence": "z is not smooth between its breaks: name every position where it jumps or has a kink",
 }
 
 
@@ -70,7 +70,7 @@ class HillScene(FunctionScene):
         digits = f"none: {obstacle}" if obstacle else "double-double, where float64 cannot decide a verdict"
         return {
             "z_resolved_width": 1 / (self._divisor * user_equation.PROBES),
-            "z_resolution": f"{unseen} unless its position is one of BREAKS (z_resolved_width is a fraction of T)",
+            "z_resolution": f"{unseen} unless its position is one of the breaks (z_resolved_width is a fraction of T)",
             "z_more_digits": digits,
         }
 
@@ -217,12 +217,12 @@ class HillScene(FunctionScene):
         """Why the point has its verdict (see `survey.scenes`)."""
         return why.why(answer, self.EVEN)
 
-    def trajectory(self, point, answer, options, time=None):
-        """Solutions and multipliers of a point (see `survey.scenes`)."""
+    def trajectory(self, point, answer, options, time=None, damping=0.0):
+        """Solutions and multipliers of a point (see `survey.scenes`), damped or not."""
         points = np.array([[point[p.name] for p in self.PARAMETERS]])
         period, edges, slack = self._ranges(points)
         problem, _ = self._called(user_equation.problem, self.z, points, edges, period, slack, self.EVEN)
-        return motion.solve(problem, answer, time, "u")
+        return motion.solve(problem, answer, time, "u", damping)
 
     def _ranges(self, points):
         """Period (N), edges of the pieces (N, P + 1; NaN where there are none) and slack (N; see `user_equation`)."""

@@ -43,7 +43,7 @@ def workflow(scene):
     drawn = [o.name for o in module.OUTPUTS if exists(o, options) and not o.dims]
     figure = given.get("figures", "verdict" if "verdict" in drawn else drawn[0])
     lines += [f'figures = ["{figure}"]  # pictures beside the file; of {", ".join(dict.fromkeys(drawn))}',
-              "# variables = [...]  # which outputs are stored; all by default"]  # fmt: skip
+              "# variables = [...]  # which outputs are stored; by default all but those on request"]  # fmt: skip
     curves = measures.curves(module)
     if curves and not (hasattr(curves, "refusal") and curves.refusal([p.name for p in axes], module, options)):
         lines += ["", "# [boundaries]  # the curves between verdicts, exact, in the file and its pictures"]

@@ -89,6 +89,8 @@ def onto(axes, ds, name=None, boundaries=True, style=None, across=(None, None), 
         draw_map(axes, ds, variable, state, boundaries, paper, colours or {})
     elif variable.ndim == 1:
         draw_profile(axes, part, variable, state, paper, variable.dims[0] in labels)
+        if "flag_values" not in variable.attrs:
+            axes.set_ylim(*((colours or {}).get(key) for key in ("vmin", "vmax")))
     else:
         raise BadInput(f"{name} is a single number; a figure needs at least one axis")
     for dim, setting in zip(variable.dims, (axes.set_xticks, axes.set_yticks), strict=False):

@@ -61,6 +61,8 @@ def test_axes_and_colours_of_a_map_are_chosen(two):
     assert drawn.get_cmap().name == "magma" and drawn.get_clim() == (-3.0, 3.0)
     bar = next(other for other in axes.figure.axes if other.get_label() == "<colorbar>")
     assert bar._colorbar.extend == "both"
+    curve = ds.survey.slice(q=0.5).survey.map("discriminant", vmin=-3.0, vmax=3.0)
+    assert curve.get_ylim() == (-3.0, 3.0)
     full = ds.survey.map("discriminant", robust=False).collections[0]
     assert full.get_clim()[1] == float(abs(ds.discriminant).max())  # diverging about 0
     assert full.get_cmap().name == "RdBu_r" and full.get_clim()[0] == -full.get_clim()[1]

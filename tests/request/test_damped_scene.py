@@ -85,3 +85,30 @@ def test_what_cannot_be_is_refused():
     for damping in (True, float("nan"), [0.1], "not a name"):
         with pytest.raises(BadInput, match="damping = "):
             scene(damping=damping)
+
+
+@pytest.mark.parametrize("even", [True, False])
+def test_the_motion_in_time_and_its_multipliers(even):
+    """With z = a against y = e^(-c u) (cos w u + c sin w u / w); else the pair has the trace and the product known."""
+    a, c = 1.7, 0.21
+    plain = survey.hill(lambda u, p: p[0] + p[1] * cos(2 * u), period=pi, parameters=("a", "q"), damping=c, even=even)
+    motion = survey.evaluate(plain, a=a, q=0.0).survey.trajectory()
+    u, w = motion.u.values, np.sqrt(a - c * c)
+    fall = np.exp(-c * u)
+    exact = fall * (np.cos(w * u) + c / w * np.sin(w * u)), fall * np.sin(w * u) / w
+    for name, values in zip(("y1", "y2"), exact, strict=True):
+        assert (abs(motion[name] - values) <= motion[f"{name}_error"] + 1e-15).all() and motion[
+            f"{name}_error"
+        ].max() < 1e-10
+    driven = survey.evaluate(plain, a=1.0, q=0.9)
+    moved = driven.survey.trajectory()
+    pair = moved.multiplier_real.values + 1j * moved.multiplier_imag.values
+    bars = moved.multiplier_error.values + 1e-15
+    assert abs(pair.sum() - float(driven.discriminant)) <= bars.sum() + float(driven.discriminant_error)
+    assert abs(np.prod(pair) - np.exp(-2 * c * pi)) <= 2 * bars.sum() and abs(pair).max() > 1
+    last = moved.y1.values[moved.u.values <= pi + 1e-9][-1]
+    free = survey.hill(lambda u, p: p[0] + p[1] * cos(2 * u) - c * c, period=pi, parameters=("a", "q"), even=even)
+    x1, x2 = (
+        survey.evaluate(free, a=1.0, q=0.9).survey.trajectory()[n].sel(u=pi, method="nearest") for n in ("y1", "y2")
+    )
+    assert abs(last - np.exp(-c * pi) * float(x1 + c * x2)) < 1e-10

@@ -4,6 +4,7 @@ from math import ceil
 
 import numpy as np
 
+from survey.kernels.math.roundoff import EPS
 from survey.measures import linear_motion
 from survey.scene import Trajectory
 
@@ -11,22 +12,28 @@ PERIODS, GROWTH = 6, 7.0  # number of periods, unless the solution grows beyond 
 PHASE, LEAST, MOST = 0.05, 240, 20_000  # radians per step; steps per period, and half of them, are even
 
 
-def solve(problem, answer, time, name="t"):
-    """The Trajectory of a Problem of one point, of which `answer` is known, up to the time `time` (or what suits)."""
+def solve(problem, answer, time, name="t", damping=0.0):
+    """The Trajectory of a Problem of one point, of which `answer` is known, up to the time `time` (or what suits).
+
+    With `damping` c that of y'' + 2 c y' + z y = 0, whose multipliers are e^(-c T) times a pair l, 1 / l.
+    """
     period = float(answer["period"])
     periods = _number(float(answer["exponent"])) if time is None else max(1, ceil(time / period))
     fastest = np.sqrt(float(problem.bound[0] @ abs(problem.p[0, 0]) ** np.arange(3)))
     steps = int(np.clip(fastest * period / PHASE, LEAST, MOST)) // 4 * 4
     z, size, lengths = _sampled(problem, steps if problem.full_period else steps // 2)
     matrices = np.zeros((*z.shape, 2, 2))
-    matrices[..., 0, 1], matrices[..., 1, 0] = 1.0, -z
+    matrices[..., 0, 1], matrices[..., 1, 0], matrices[..., 1, 1] = 1.0, -z, -2.0 * damping
     terms = abs(matrices[:, 0])
     terms[:, 1, 0] = size
     t, y, bars = linear_motion.fundamental(matrices, lengths, periods, np.array([1.0, max(fastest, 1.0)]), terms)
     if time is not None:
         kept = t <= time * (1 + 1e-12)
         t, y, bars = t[kept], y[kept], bars[kept]
-    pair, off = linear_motion.of_trace(float(answer["discriminant"]), float(answer["discriminant_error"]))
+    loss, trace = np.exp(-damping * period), np.array([answer["discriminant"], answer["discriminant_error"]], float)
+    pair, off = linear_motion.of_trace(*trace / loss)
+    slack = 16 * EPS * abs(damping * period)  # of e^(-c T), relative, and so of both
+    pair, off = loss * pair, loss * (off * (1 + 2 * slack) + 2 * slack * abs(pair) * bool(damping))
     data = {
         name: (name, t, {"long_name": "time", "symbol": name, "units": "1"}),
         "multiplier": ("multiplier", np.array([1, 2]), {"long_name": "number of the multiplier"}),
