@@ -177,7 +177,7 @@ OUTPUTS = (
     Output("w", "angular velocity", "w", when={"question": ("trajectory", "abel")},
            applies="at an angle that the solution reaches"),
     Output("turnings", "number of turning points (sign changes of w)", "n_T", integer=True, fill=-2,
-           applies="where the error bar leaves one number, if less than 2^31; -1 means infinitely many",
+           applies="where the error bar leaves one number, if less than 2,147,483,648; -1 means infinitely many",
            when={"question": ("trajectory", "fate")}),
     Output("verdict", "where the solution ends as t -> +inf", flags=_FATES, when=_FATE),
     Output("limit_phi", "equilibrium that is reached, in [0, 2 pi), or right turning point of the libration cycle",

@@ -315,6 +315,29 @@ def test_what_people_search_for_is_a_title(words, page):
     assert "Paul trap" in (DOCS / "choose.md").read_text()
 
 
+def test_formulas_in_tables_of_scenes_are_typeset(tool):
+    """No relation, Greek letter or power is left in words, and what is no formula is."""
+    formulas = tool("formulas")
+
+    def shown(text, **symbols):
+        return "".join(piece for _, piece in formulas.in_words(text, symbols))
+
+    assert shown("strength, 3 mu / R^3 (no unit); 0 <= amplitude < 1.5", amplitude=r"\beta") == (
+        r"strength, $3 \mu / R^{3}$ (no unit); $0 \le \beta < 1.5$"
+    )
+    assert shown("at b = 0 (61), a thing of K = 1; only when question = trajectory | fate") == (
+        "at $b = 0$ (61), a thing of $K = 1$; only when question = trajectory | fate"
+    )
+    assert shown("where |rho| > 1e+12, sqrt|k| != 0") == (
+        r"where $\lvert \rho\rvert > 10^{12}$, $\sqrt{\lvert k\rvert} \ne 0$"
+    )
+    assert shown("y'' + z y = 0 in (0, 1), A or B") == "$y'' + z y = 0$ in (0, 1), A or B"
+    for name, page in tool("scene_pages").pages().items():
+        table = re.sub(r"(?<!\\)\$[^$]+\$|`[^`]*`", "", page.partition("## Reference")[2].partition("Sources:")[0])
+        greek = r"(?<![\w_])(?:alpha|beta|gamma|theta|mu|nu|rho|sigma|phi|psi|omega|pi)(?![\w_])"
+        assert re.findall(rf"{greek}|<=|!=|\w\^|\|\w+\|(?! )", table.replace("\\", "")) == [], name
+
+
 def test_formulas_of_docstrings_are_typeset(tool):
     """All of them, and none that no docstring holds any more."""
     formulas = tool("formulas")

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import figures
+from formulas import in_words
 
 import survey.api
 import survey.scenes
@@ -31,12 +32,26 @@ def pages():
 def _page(name):
     scene = survey.api.scene(name)
     parts = [f"# {name}", f"**{escaped(scene['title'])}.**", _explanation(name) or f"```text\n{scene['about']}\n```"]
-    parts += [*_results(name, survey.api.scenes()), "## Reference", f"What `survey scenes {name}` prints."]
+    symbols = _symbols(name)
+    parts += [*_results(name, survey.api.scenes(), symbols), "## Reference", f"What `survey scenes {name}` prints."]
     for heading in LISTS:
-        rows = [f"| `{key}` | {escaped(words).replace('|', chr(92) + '|')} |" for key, words in scene[heading].items()]
+        rows = [f"| `{key}` | {_cell(words, symbols)} |" for key, words in scene[heading].items()]
         parts += ["\n".join([f"| {heading} | |", "|---|---|", *rows])] if rows else []
     parts += ["Sources:", "\n".join(f"- {escaped(line)}" for line in scene["references"])]
     return "\n\n".join(parts) + "\n"
+
+
+def _symbols(name):
+    """{name: TeX} of the scene's parameters and outputs."""
+    module = survey.scenes.load(name)
+    return {part.name: part.symbol for part in (*module.PARAMETERS, *module.OUTPUTS) if part.symbol}
+
+
+def _cell(words, symbols):
+    """Words in a cell of a table, their formulas typeset."""
+    return "".join(
+        piece if is_formula else escaped(piece).replace("|", r"\|") for is_formula, piece in in_words(words, symbols)
+    )
 
 
 def _explanation(name):
@@ -46,7 +61,7 @@ def _explanation(name):
     return text.replace("](../../results/", "](../results/").replace("](../../workflows/docs/", "](../")
 
 
-def _results(name, names):
+def _results(name, names, symbols):
     """Pictures and pages of the results whose names begin with the scene's."""
     longer = [other for other in names if other.startswith(name) and other != name]
 
@@ -61,9 +76,8 @@ def _results(name, names):
         parts.append("\n".join(f"- [{_title(path)}](../results/{path.name})" for path in read))
     for path in seen:
         words = figures.caption(path.name)
-        parts.append(
-            f"![{words}](../results/{path.name})\n\n{words[0].upper() + words[1:]}: `{figures.maker(path.name)}`."
-        )
+        shown = _cell(words[0].upper() + words[1:], symbols)
+        parts.append(f"![{words}](../results/{path.name})\n\n{shown}: `{figures.maker(path.name)}`.")
     return parts
 
 
