@@ -9,6 +9,7 @@ import xarray as xr
 
 import survey
 from survey.errors import BadInput, SurveyError
+from survey.viewer.shown import Map
 
 matplotlib.use("Agg")
 
@@ -93,6 +94,9 @@ def test_what_evaluate_returns_is_a_file_like_others_once_saved(bodies, grid, tm
         assert saved.survey.counts() == ds.survey.counts() and saved.survey.map() is not None
         assert program("info", name).returncode == 0
     assert survey.open(tmp_path / "bodies.nc").survey.point(body="Earth-Moon").parameters["e"] == 0.0549
+    bodies.expand_dims(e0=[0.0, 1.0]).to_netcdf(tmp_path / "two.nc")
+    with pytest.raises(BadInput, match="the axis body holds names, and a viewer shows axes of numbers"):
+        Map(tmp_path / "two.nc")
     done = program("verify", "grid.nc", "--points", "3")
     assert "sound except for the digest" in done.stdout and "there is no digest grid.nc.sha256" in done.stderr
 

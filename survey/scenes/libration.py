@@ -113,8 +113,9 @@ OUTPUTS = (
            when=_HIGHER, applies=_SERIES),
     Output("c10", "coefficient of r1^i r2^j r3^k, monomial ijk of five actions", "c_{ijk}", dims=("monomial10",),
            when={"order": ("10",)}, applies=_SERIES),
-    Output("effective_radius", "radius of effective stability: motions that begin with |z_j| below it stay within sqrt 2 times it "
-           "for `periods`; an estimate by truncated series, not a proof", r"\rho", when=_HIGHER, applies=_SERIES),
+    Output("effective_radius", "radius of effective stability: motions that begin with |z_j| below it stay within "
+           "sqrt 2 times it for `periods`; an estimate by truncated series, not a proof", r"\rho", when=_HIGHER,
+           applies=_SERIES),
     Output("effective_order", "degree to which the Hamiltonian was normalised for it", "r", integer=True,
            when=_HIGHER, applies=_SERIES),
     Output("verdict", "formal stability", flags=_VERDICTS,

@@ -79,14 +79,14 @@ def title_of(ds, variable):
     numbers = [f"{_equal(c)}{position.get(c.name, '')}" for c in fixed]
     labels = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "UO"]
     numbers = ", ".join(numbers + [f"{literal(c.name)} {literal(c.item())}{position.get(c.name, '')}" for c in labels])
-    words = _options(ds)
+    words = options_in_words(ds)
     labelled = title and ("flag_values" not in variable.attrs or (variable.ndim == 1 and variable.dims[0] in ds.coords))
     lines = [title] if labelled or name.lower() in title.lower() else [title, name]
     lines[-1] += f" ({words})" if words and words not in title else ""
     return "\n".join([*lines, numbers] if numbers else lines)
 
 
-def _options(ds):
+def options_in_words(ds):
     """The options that say something in words, such as `prolate`; what is drawn says which question is asked."""
     pairs = [part.partition("=")[::2] for part in str(ds.attrs.get("options", "")).split(", ")]
     return ", ".join(spaced(value) for key, value in pairs if key not in OF_QUESTION and value[:1].isalpha())

@@ -15,6 +15,7 @@ from survey.errors import BadInput, Damaged
 from survey.file import schema
 from survey.file.labels import flag_codes, percent
 from survey.file.reading import load
+from survey.show.text import options_in_words
 from survey.viewer import raster
 from survey.wording import plain
 
@@ -52,7 +53,7 @@ class Map:
         self.axes = [raster.MapAxis(self.ds[dim].values) for dim in self.dims]
         dims = set(ds.status.dims)
         self.names = [name for name, v in ds.data_vars.items() if dims <= set(v.dims) and not name.endswith("_error")]
-        self.title, self.options = plain(ds.attrs.get("title", "")), plain(ds.attrs["options"])
+        self.title, self.options = plain(ds.attrs.get("title", "")), options_in_words(ds)
         # further dimensions: of the survey, and of some outputs
         self.others = list(dict.fromkeys(dim for name in self.names for dim in ds[name].dims if dim not in self.dims))
         self._layers = lru_cache(maxsize=8)(self._layer)
@@ -175,6 +176,8 @@ def _check(path, ds):
     if "cell_verdict" in ds:
         schema.cells(ds)
     for dim in ds.status.dims[:2]:
+        if ds[dim].dtype.kind not in "iuf":
+            raise BadInput(f"{path}: the axis {dim} holds names, and a viewer shows axes of numbers; use survey plot")
         values = ds[dim].values.astype(float)
         if abs(values).max() > FAR:
             raise Damaged(f"{path}: the axis {dim} extends beyond {FAR:g}, so there is no map to view")
