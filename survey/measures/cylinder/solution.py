@@ -103,8 +103,8 @@ def _in_time(method, rows, times, rtol):
         ends = np.zeros(len(P), dtype=np.int64)
         method.flow_trajectories(P, starts, at, tolerance, budget, floats, turnings, ends)
         np.copyto(status, ends[:, None], where=~np.isfinite(floats[..., rc.PHI]))  # else OK
-        if np.fmin.reduce(floats[..., rc.W_BAR], axis=None, initial=np.inf) < LEAST_BAR:
-            lost = (floats[..., rc.W] != 0) & (floats[..., rc.W_BAR] < LEAST_BAR)
+        if (lost := floats[..., rc.W_BAR] < LEAST_BAR).any():
+            lost &= floats[..., rc.W] != 0
             floats[..., rc.W_BAR][lost] = LEAST_BAR
         return floats, turnings, status
 
@@ -212,12 +212,13 @@ def _repeated(run, asked, ladder, rtol):
 def missed(results, rtol):
     """Where the answer misses the asked accuracy, or there is none."""
     floats, status = results[0], results[-1]
-    if not status.any() and all((floats[..., bar] <= rtol).all() for bar in (rc.PHI_BAR, rc.W_BAR)):  # as a rule
-        return np.zeros(status.shape, bool)
-    good = (status == OK) | (status == TURNING)
+    out = (status != OK) & (status != TURNING) if status.any() else np.zeros(status.shape, bool)
+    points = floats.reshape(-1, floats.shape[-1])
     for value, bar in ((rc.PHI, rc.PHI_BAR), (rc.W, rc.W_BAR)):  # VALUE and TIME likewise
-        good &= floats[..., bar] <= rtol * (1.0 + np.abs(floats[..., value]))
-    return ~good
+        wide = np.flatnonzero(~(points[:, bar] <= rtol))  # as a rule, few
+        if wide.size:
+            out.reshape(-1)[wide] |= ~(points[wide, bar] <= rtol * (1.0 + np.abs(points[wide, value])))
+    return out
 
 
 def badness(results):
