@@ -16,8 +16,8 @@ import xarray as xr
 import survey.scenes
 from survey import measures, status
 from survey.errors import BadInput
-from survey.file import disk, reading, schema
-from survey.file.labels import count, counts, flag_codes, layout, percent
+from survey.file import disk, reading
+from survey.file.labels import count, layout
 from survey.file.labels import describe as labelled
 from survey.grid import Grid, fixed, lines
 from survey.request import earlier, physical, trust, user_scene
@@ -398,40 +398,6 @@ def describe(scene: Any) -> Description:
     `scene` is what `survey.evaluate` takes. The result is a mapping, with the equations under "about".
     """
     return Description(globals()["scene"](scene))
-
-
-def summary(ds: xr.Dataset) -> dict[str, Any]:
-    """The contents of a survey's dataset: axes, fixed numbers, variables, counts, provenance."""
-    axes = {
-        dim: f"{counted(ds.sizes[dim], 'value')} from {ds[dim].values[0]!s} to {ds[dim].values[-1]!s}"
-        for dim in ds.status.dims
-        if dim in ds.coords
-    }
-    return {
-        "title": ds.attrs.get("title", ""),
-        "scene": ds.attrs["scene"],
-        "options": ds.attrs.get("options", ""),
-        "axes": axes,
-        "fixed": {name: float(c) for name, c in ds.coords.items() if c.ndim == 0 and c.dtype.kind == "f"},
-        "variables": {
-            name: v.attrs.get("long_name", "") for name, v in ds.data_vars.items() if not str(name).endswith("_error")
-        },
-        **({"areas": areas(ds)} if "area" in ds else {}),
-        "counts": counts(ds),
-        "provenance": {
-            k: v
-            for k, v in ds.attrs.items()
-            if k not in ("title", "scene", "options", "workflow", "summary", "scene_text")
-        },
-    }
-
-
-def areas(ds: xr.Dataset) -> dict[str, str]:
-    """{verdict: its area with its error bound, and its fraction of the map} of a refined map."""
-    names = ("area", "area_error", "area_fraction", "area_fraction_error")
-    schema.areas(ds)
-    rows = zip(flag_codes(ds.area_verdict.attrs), *(ds[name].values for name in names), strict=True)
-    return {name: f"{area:.12g} +- {bar:.2g} ({percent(part, part_bar)})" for name, area, bar, part, part_bar in rows}
 
 
 def _option_condition(option: Option) -> str:

@@ -315,11 +315,11 @@ def _audited(report):
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def info(path, as_json):
     """Contents of the file: axes, variables, counts, provenance; and what an unfinished run has left beside it."""
-    from survey import api
-    from survey.file import unfinished
+    from survey.file import reading, unfinished
+    from survey.file.summary import summary  # without the engine, which takes a second to import
 
     left = unfinished.summary(path)
-    table = api.summary(api.open(path)) if os.path.exists(path) or not left else {}
+    table = summary(reading.load(path)) if os.path.exists(path) or not left else {}
     if as_json:
         return _show(table | ({"unfinished": left} if left else {}), True)
     if left:

@@ -18,6 +18,12 @@ def test_nothing_that_a_first_point_alone_needs_is_loaded_before():
     assert not {"dask.array", "scipy.special", "matplotlib"} & set(loaded_by("import survey; survey.evaluate"))
 
 
+def test_telling_what_a_file_contains_loads_no_compiler():
+    path = Path(__file__).parent / "golden/mathieu.nc"
+    code = f"from survey import cli; cli.program.main(['info', {str(path)!r}], standalone_mode=False)"
+    assert "xarray" in (found := loaded_by(code)) and not {"numba", "dask.array", "matplotlib"} & set(found)
+
+
 def test_importing_a_scene_compiles_nothing():
     code = (
         "import gc, survey.scenes.satellite, survey.scenes.gyrostat; from numba.core.dispatcher import Dispatcher; "

@@ -5,9 +5,9 @@ import pytest
 import xarray as xr
 
 import survey
-from survey import api
 from survey.file import reading
 from survey.file.labels import percent
+from survey.file.summary import summary
 from survey.request import workflow
 from survey.show import figures
 from survey.sweep import plan
@@ -61,7 +61,7 @@ def test_the_areas_are_told_with_their_bounds(path):
     finer = survey.run(WORKFLOW | {"refine": {"width": {"k": 0.001, "rho": 0.004}}}, output=path.with_name("finer.nc"))
     assert (abs(finer.area - ds.area) <= ds.area_error + finer.area_error).all()
     assert (finer.area_error < 0.3 * ds.area_error).all()
-    lines = api.summary(ds)["areas"]
+    lines = summary(ds)["areas"]
     assert list(lines) == ["unstable", "stable"] and all(
         "+-" in line and line.endswith(" %)") for line in lines.values()
     )
