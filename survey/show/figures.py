@@ -139,9 +139,8 @@ def _chosen(ds, across):
         x = next((name for name in known if name != y), None) if x is None else x
         return [x, y] if x is not None else None
     if x is None:
-        along = ds.attrs.get(
-            "boundaries"
-        )  # with two other axes or more, curves lie in planes of this one and the first
+        # with two other axes or more, curves lie in planes of this one and the first
+        along = ds.attrs.get("boundaries")
         return [known[0], along] if len(known) > 2 and "edge_count" in ds and along in known[2:] else None
     return [x, *[name for name in known if name != x][:1]]
 

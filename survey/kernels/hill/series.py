@@ -45,8 +45,9 @@ def _sum(c, tile, sums, count):
 
 @kernel
 def _lagrange(n, x, tile, top, weights):
-    """Magnitudes of the Lagrange polynomials of the n nodes at x in the first lanes of `weights` (others rows: 0), from
-    T_k in the rows of `tile`; see `chebyshev.lagrange`. `top` keeps T_n, whose recurrence errs by less than n^2 EPS.
+    """Magnitudes of the Lagrange polynomials of the n nodes at x in the first lanes of the first n rows of `weights`,
+    finite numbers in others, from T_k in the rows of `tile`; see `chebyshev.lagrange`. `top` keeps T_n, whose
+    recurrence errs by less than n^2 EPS.
     """
     for i in range(len(x)):
         top[i] = abs(2.0 * x[i] * tile[n - 1, i] - tile[n - 2, i]) + n * n * EPS
