@@ -312,11 +312,11 @@ def _grid(used: dict[str, Parameter], given: dict[str, xr.DataArray]) -> Grid:
     )
 
 
-def _own_coordinates(given: dict[str, xr.DataArray]) -> dict[Hashable, xr.DataArray]:
-    """Coordinates that the caller's DataArrays bring along."""
-    own: dict[Hashable, xr.DataArray] = {}
+def _own_coordinates(given: dict[str, xr.DataArray]) -> dict[Hashable, xr.Variable]:
+    """Coordinates that the caller's DataArrays bring along, without what these bring along in turn."""
+    own: dict[Hashable, xr.Variable] = {}
     for array in given.values():
-        own |= {name: coord for name, coord in array.coords.items() if name not in given}
+        own |= {name: coord.variable for name, coord in array.coords.items() if name not in given}
     return own
 
 

@@ -40,6 +40,14 @@ def test_labels_are_coordinates(bodies):
         bodies.survey.point(body="Earth")
     wide = survey.evaluate("libration_elliptic", mu=bodies.mu, e=[0.0, 0.1])
     assert [text.get_text() for text in wide.survey.map().get_xticklabels()][1] == "Earth-Moon"
+    assert wide.e.dims == ("e",) and wide.e.values.tolist() == [0.0, 0.1]  # not that which `mu` brings along
+    finer = wide.survey.zoom(e=(0.02, 0.08), num=4)
+    assert finer.body.equals(wide.body) and finer.status.dims == wide.status.dims and finer.sizes["e"] == 4
+    alone = survey.evaluate("libration_elliptic", body="Earth-Moon", e=finer.e)
+    np.testing.assert_array_equal(finer.verdict.sel(body="Earth-Moon"), alone.verdict)
+    assert float(abs(finer.a.sel(body="Earth-Moon") - alone.a).max()) < 1e-10
+    with pytest.raises(BadInput, match="no workflow has an axis of names"):
+        wide.survey.zoom(e=(0.02, 0.08), output="x.nc")
 
 
 def test_dimensions_without_coordinates(samples):

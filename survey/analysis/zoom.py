@@ -23,6 +23,8 @@ def sweep(ds, ranges, num=None, output=None):
     for name in num if isinstance(num, dict) else ():
         if name not in ranges:
             raise BadInput(f"num: {modules.unknown('axis with a range', name, list(ranges))}")
+    if any(c.ndim and c.dims[0] in ds.coords and ds[c.dims[0]].dtype.kind in "UO" for c in ds.coords.values()):
+        return _of_names(ds, ranges, num, output)
     data = _workflow(ds, ranges, num)
     checked = workflow.check(data, output=output, default_path="zoom.nc")
     _warn(ds, ranges)
@@ -33,6 +35,22 @@ def sweep(ds, ranges, num=None, output=None):
     for further in edges_and_cells.find(checked, lambda name, make: make()):
         finer = finer.assign(further.variables).assign_attrs(further.attrs)
     return finer.assign_attrs(title=checked.title, workflow=checked.text)
+
+
+def _of_names(ds, ranges, num, output):
+    """The finer map of a survey with an axis of names, along which parameters lie: no workflow has such."""
+    if output is not None:
+        raise BadInput("zoom: no workflow has an axis of names: leave output out, and save the answer by to_netcdf")
+    _warn(ds, ranges)
+    name, scene = user_scene.of_dataset(ds), user_scene.find(user_scene.of_dataset(ds))[1]
+    given = {key: ds[key] for key in _parameters(ds) & set(ds.coords) - ranges.keys()}
+    for key, (low, high) in ranges.items():
+        spacing = "log" if logarithmic(ds[key].values) else "linear"
+        given[key] = coordinates(low, high, _number(num, key, ds.sizes[key]), spacing)
+    outputs = {o.name for o in scene.OUTPUTS} & set(ds.data_vars)
+    solver = {"method": str(ds.attrs["method"]), "rtol": float(ds.attrs["rtol"]), "variables": sorted(outputs)}
+    found = api.evaluate(name, **given, **options_at(ds, scene), **solver)
+    return found.transpose(*ds.status.dims, ...)
 
 
 def _ranges(ds, ranges):
