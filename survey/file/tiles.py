@@ -51,9 +51,9 @@ def packed(tile, filters):
     return content
 
 
-def deflated(content, _level):
-    """zlib's format, at the level whose result is as small as that of zlib's level 1."""
-    return isal_zlib.compress(content, 1)
+def deflated(content, level):
+    """zlib's format. Level 1 is as small as that of zlib; there are none above 3."""
+    return isal_zlib.compress(content, min(level, 3))
 
 
 def shuffled(content, size):

@@ -113,7 +113,7 @@ _REDUCED = ("b12", "b31", "d", "c23", "s2", "s3")
 _THREE = {"undecided": -1, "no": 0, "yes": 1}
 _OF_LIMIT = {"undecided": -1, "unstable": 0, "unobservable": 1, "observable": 2}
 _FATES = {o.name: o for o in gyrostat.OUTPUTS if o.when == {"question": ("fate",)}}
-_CYCLES = {o.name: o for o in gyrostat.OUTPUTS if o.when == {"question": ("portrait",)}}
+_CYCLES = {o.name: o for o in gyrostat.OUTPUTS if "portrait" in o.when.get("question", ())}
 _SET, _HELD = "on the invariant set", "on the invariant set, in case B"
 
 
