@@ -319,3 +319,16 @@ def test_danbys_curves_are_named_where_the_verdict_changes_alone(e, names):
         "libration_elliptic", e=e, mu=np.sort([*(found.edge - 1e-6), *(found.edge + 1e-6)])
     ).verdict
     assert (verdicts[::2].values != verdicts[1::2].values).all()
+
+
+@pytest.mark.parametrize("along", ["s3", "b12"])
+def test_the_exact_edge_of_a_gyrostats_ends_is_found_whatever_the_signs(along):
+    """K = b12 s3 - b31 s2 = 0, a hyperbola whose border on the line's narrow map is reached by rounding alone."""
+    for b12, b31, s2 in ((-0.85, 0.42, -1.05), (0.85, 0.42, -1.05), (-1.38, 0.086, 0.42), (0.28, -0.72, 0.033)):
+        exact = b31 * s2 / b12
+        given = {"b31": b31, "d": 0.92, "c23": 1.39, "s2": s2} | ({"b12": b12} if along == "s3" else {"s3": exact})
+        at = exact if along == "s3" else b12
+        found = survey.edge("gyrostat", question="portrait", along=along, **{along: (at - 0.1, at + 0.15)}, **given)
+        names = found.edge_class.attrs["flag_meanings"].split()
+        ends = found.edge.values[found.edge_class.values == found.edge_class.attrs["flag_values"][names.index("ends")]]
+        assert abs(ends - at).min(initial=np.inf) < 1e-12

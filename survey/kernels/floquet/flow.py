@@ -140,6 +140,8 @@ def _share(S, held, lane, tolerance):
     for c in range(len(held)):
         own = held[c]
         size = abs(S[own, 0, lane]) + abs(S[own, 1, lane]) + abs(S[own, 2, lane])
+        for m in range(3, ORDER - 1):  # a state that is at rest, and has no acceleration
+            size = abs(S[own, m, lane]) if size == 0.0 else size
         if not math.isfinite(size):
             return math.nan
         for m in range(ORDER - 1, ORDER + 1):

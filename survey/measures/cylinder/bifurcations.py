@@ -168,8 +168,10 @@ def _run(plane, curve, kind, tests=()):
 
 def _drawn(plane, curve, kind, t):
     """One row of `found`."""
-    xy, known = curve.xy(t), {}
-    error = np.hypot(*(curve.bar(t) / np.maximum(plane.widths(xy), TINY)).T) + 4.0 * plane.square.grain
+    xy, bar, known = curve.xy(t), curve.bar(t), {}
+    for border in (plane.square.low, plane.square.high):  # a point on the border to within its rounding is on it
+        xy = np.where(abs(xy - border) <= bar, border, xy)
+    error = np.hypot(*(bar / np.maximum(plane.widths(xy), TINY)).T) + 4.0 * plane.square.grain
     if curve.phi is not None:
         phi = curve.phi(t) % TURN[1]
         known["equilibrium_phi"] = (phi, np.full(phi.shape, 8.0 * ROUNDOFF * TURN[1]))
@@ -382,17 +384,32 @@ def _hyperbola(plane, both, c):
     """both x y + c = 0."""
     if c == 0.0:
         return [_straight(plane, 1.0, 0.0, 0.0, _nothing), _straight(plane, 0.0, 1.0, 0.0, _nothing)]
-    least, most = (np.maximum(abs(plane.square.low), abs(plane.square.high))[i] for i in (1, 0))
-    low, high = math.log(abs(c / both) / least), math.log(most)
+    ratio, found = -c / both, []
+    for side in (1.0, -1.0):
+        # log |x| where x has this sign, and where y has the sign that it has then, on the plane
+        (x_low, x_high), (y_low, y_high) = _parts(plane, (side, side * math.copysign(1.0, ratio)))
+        low, high = max(x_low, math.log(abs(ratio)) - y_high), min(x_high, math.log(abs(ratio)) - y_low)
+        if low < high:
+            beyond = 0.5 * (high - low)  # so that the borders are crossed
 
-    def curve(side):
-        def xy(t):
-            x = side * np.exp(t)
-            return np.stack([x, -c / both / x], axis=-1)
+            def xy(t, side=side):
+                x = side * np.exp(t)
+                return np.stack([x, ratio / x], axis=-1)
 
-        return Curve(xy, lambda t: 8.0 * ROUNDOFF * abs(xy(t)), None, low, high)
+            bar = lambda t, xy=xy: 8.0 * ROUNDOFF * abs(xy(t))  # noqa: E731
+            found.append(Curve(xy, bar, None, low - beyond, high + beyond))
+    return found
 
-    return [curve(side) for side in (1.0, -1.0)] if low < high else []
+
+def _parts(plane, signs):
+    """The logarithms (low, high) of the magnitudes of either coordinate where it has this sign on the plane; the lower
+    above the higher one where it never has.
+    """
+    parts = []
+    for low, high, sign in zip(plane.square.low, plane.square.high, signs, strict=True):
+        first, last = (low, high) if sign > 0 else (-high, -low)
+        parts.append((math.log(max(first, TINY)), math.log(last)) if last > 0.0 else (1.0, 0.0))
+    return parts
 
 
 def _next_ends(plane, rest):

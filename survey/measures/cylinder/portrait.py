@@ -124,16 +124,16 @@ def _verdict(s, ends_of_branches):
     """Is the point structurally stable, by the error bounds?"""
     scale = s.p[BOUND_F] + math.sqrt(s.p[BOUND_DG])
     neutral = s.p[MEAN] == 0.0 if len(s.p) > COLUMNS else s.K == 0.0 and not _is_exact(s.p)
-    degenerate = s.stratum != G or neutral
-    degenerate = degenerate or any(not _hyperbolic(row) for row in s.librations)
+    doubtful = [row for row in s.librations if not _hyperbolic(row)]
     for cycles in (s.plus, s.minus):
-        degenerate = degenerate or any(not (_hyperbolic(row) or _far(row, s.K, scale)) for row in cycles)
-    if degenerate:
+        doubtful += [row for row in cycles if not (_hyperbolic(row) or _far(row, s.K, scale))]
+    if s.stratum != G or neutral or any(abs(row[rt.MULTIPLIER] - 1.0) <= row[rt.MULTIPLIER_BAR] for row in doubtful):
         return DEGENERATE
-    if not s.conclusive or 2 * np.count_nonzero(s.equilibria[:, eq.KIND] == eq.SADDLE) != len(s.equilibria):
+    saddles = np.count_nonzero(s.equilibria[:, eq.KIND] == eq.SADDLE)
+    if doubtful or not s.conclusive or 2 * saddles != len(s.equilibria):
         return UNDECIDED
-    unstable = ends_of_branches[:, :2]
-    return UNDECIDED if (unstable == destinations.UNDECIDED).any() else STABLE
+    # where a branch's end is open, a cycle beside it may have been lost: a stable one's in reversed time
+    return UNDECIDED if (ends_of_branches == destinations.UNDECIDED).any() else STABLE
 
 
 def _is_exact(p):

@@ -27,6 +27,7 @@ from survey.kernels.math import chebyshev
 from survey.kernels.math.roundoff import EPS
 from survey.measures.floquet import monodromy
 from survey.measures.floquet.answers import Answers
+from survey.measures.floquet.multipliers import not_symplectic
 
 DEGREES = np.array([8, 12, 16, 20, 24, 28, 32, 40])
 PROBED = 48  # nodes of the lines that show the degrees that are needed
@@ -317,7 +318,7 @@ def at_points(system, structure, points):
     if not system.smooth(points[0]):
         return None
     with np.errstate(all="ignore"):
-        own = monodromy.Points(system, points, halves=True)
+        own = monodromy.Points(system, points, halves=True, paired=structure != "none")
         if not _is_analytic(own):
             return None
         every, n, paired = np.arange(len(points)), system.n, structure != "none"
@@ -325,6 +326,9 @@ def at_points(system, structure, points):
 
         def finish(some, matrices, scale, *steps_of):
             out[:, some] = coefficients(matrices.M, matrices.E, scale, structure, steps_of)
+            units = scale[:, :, None] / scale[:, None, :]
+            if structure == "symplectic" and not_symplectic(units * matrices.M, units * matrices.E).any():
+                out[:, some] = np.nan  # each point for itself
 
         monodromy.solve(own, monodromy.method_of("auto"), BEST, np.ones(len(points)), every, finish)
     return out if np.isfinite(out).all() else None

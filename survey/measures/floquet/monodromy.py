@@ -46,10 +46,11 @@ class Points:
     """Points of a System as a method's steps need them: sizes, noise, and the units that balance A.
 
     `halves`: is no more integrated than symmetries of A ask for? `growth` (2, N): the integral of A's trace over the
-    period, the logarithm of det M, and its error bound; infinite where the trace depends on t.
+    period, the logarithm of det M, and its error bound; infinite where the trace depends on t. If `paired`, with l also
+    1 / l is said to be a multiplier: points whose growth is certainly not 0 are not valid.
     """
 
-    def __init__(self, system, points, halves=False):
+    def __init__(self, system, points, halves=False, paired=False):
         self.system, self.n, self.points, self.halves = system, system.n, points, halves
         self.period, edges = system.ranges(points)
         valid = np.isfinite(points).all(axis=1) & np.isfinite(edges).all(axis=1)
@@ -65,6 +66,8 @@ class Points:
             for own, found in self._alike(where[inside], programs):
                 self._measure(own, programs, found)
         self.valid = valid & np.isfinite(self.size).all(axis=1) & ~self.rough
+        if paired:
+            self.valid &= ~(abs(self.growth[0]) > self.growth[1])
 
     def _alike(self, own, programs):
         """[(those of the points `own` with the same symmetries, of each piece (values and error bounds of its numbers,

@@ -159,6 +159,25 @@ class Discs:
             return self.isolated & (off < 0.05) & (gap.min(axis=2) > 2.2 * off)
 
 
+def not_symplectic(M, E):
+    """Where (N) M^T J M, M known within E, is certainly not J = (0 1; -1 0)."""
+    n, size = M.shape[1], abs(M) + E
+    J = np.zeros((n, n))
+    J[: n // 2, n // 2 :], J[n // 2 :, : n // 2] = np.eye(n // 2), -np.eye(n // 2)
+    with np.errstate(all="ignore"):
+        off = abs(np.swapaxes(M, 1, 2) @ J @ M - J)
+        wide = np.swapaxes(size, 1, 2) @ abs(J) @ (E + 4 * n * EPS * size)
+        return (off > (wide + np.swapaxes(wide, 1, 2)) * (1 + 16 * n * EPS)).any(axis=(1, 2))
+
+
+def not_conserved(w, M, E):
+    """Where (N) w M, w (N, n), M known within E, is certainly not w."""
+    with np.errstate(all="ignore"):
+        off = abs(np.einsum("ni,nij->nj", w, M) - w)
+        wide = np.einsum("ni,nij->nj", abs(w), E + 4 * M.shape[1] * EPS * abs(M)) + 4 * EPS * abs(w)
+        return (off > wide).any(axis=1)
+
+
 def radius(own):
     """The spectral radius and its error bound (N)."""
     low, high = own.moduli

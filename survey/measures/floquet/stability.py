@@ -173,7 +173,8 @@ def judged(system, points, matrices):
 def _solve_some(system, structure, given, method, rtol, wanted, places, answer, results):
     """Answer points (N, parameters), each from its own monodromy matrix, at their `places`."""
     # another method is asked to answer a second way: without what symmetries tell
-    points = monodromy.Points(system, given, halves=method is monodromy.method_of("auto"))
+    paired = structure != "none"
+    points = monodromy.Points(system, given, halves=method is monodromy.method_of("auto"), paired=paired)
     where = np.flatnonzero(points.valid)
     asked = wanted | ({"multiplier_re"} if wanted & {"multiplier_im", "krein"} else set())
     asked |= {"spectral_radius"} if "exponent" in wanted else set()
@@ -185,8 +186,15 @@ def _solve_some(system, structure, given, method, rtol, wanted, places, answer, 
 
     def assessed(those, found):
         own = where[those]
+        broken = structure == "symplectic" and multipliers.not_symplectic(found.M, found.E)
+        if system.conserved is not None:
+            broken = broken | multipliers.not_conserved(system.weights(given[own]), found.M, found.E)
         found = judged(system, given[own], found)
-        return assess(found, structure, rtol, asked, points.period[own], points.growth[:, own])
+        out = assess(found, structure, rtol, asked, points.period[own], points.growth[:, own])
+        if np.any(broken):  # what is said of A is not true here: nothing follows from it
+            out.status[broken], out.missed[broken] = status.INVALID_PARAMETERS, False
+            out.verdict[broken], out.crossing[broken], out.signs[:, broken] = UNDECIDED, UNDECIDED, 0
+        return out
 
     if where.size:
         rung = np.zeros(where.size, dtype=np.int64)

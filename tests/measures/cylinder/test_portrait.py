@@ -8,6 +8,7 @@ import pytest
 from flow_truth import is_real, roots
 from scipy.integrate import solve_ivp
 
+import survey
 from survey.kernels.cylinder import branches
 from survey.kernels.cylinder import equilibria as eq
 from survey.measures.cylinder import fate as cf
@@ -330,3 +331,19 @@ def test_portraits_of_many_systems():
     assert (found["verdict"] == 1).mean() > 0.98 and (found["status"] == 0).all()
     for name in ("rotations_plus", "rotations_minus", "librations"):
         assert found[name].max() <= 2
+
+
+def test_beside_a_connection_a_repelling_cycle_may_be_lost_and_then_the_verdict_is_open():
+    """A junction in reversed time (a < 0): its stable branch is what the unstable one is in the mirror image."""
+    junction = survey.abel(
+        lambda phi, p: -p[0], lambda phi, p: p[1] - np.sin(phi), parameters=("a", "I"), period=2 * np.pi
+    )
+    one, other = (survey.evaluate(junction, a=a, I=0.965, question="portrait") for a in (1.0, -1.0))
+    assert int(one.verdict) == 1 and int(one.rotations_plus) == 1
+    assert int(other.verdict) == -1 or (int(other.verdict) == 1 and int(other.rotations_minus) == 1)
+    system = {"b12": 0.26, "b31": 1.02, "c23": -0.4, "s2": -0.15, "s3": -0.4}
+    for distance in (1e-6, 1e-7):  # one libration, whose multiplier 2e5 is not near 1
+        ds = survey.evaluate("gyrostat", question="portrait", d=1.996611983589767 - distance, **system)
+        assert int(ds.verdict) == -1 or (int(ds.verdict) == 1 and int(ds.librations) == 1)
+    far = survey.evaluate("gyrostat", question="portrait", d=1.996611983589767 - 1e-4, **system)
+    assert int(far.verdict) == 1 and int(far.librations) == 1

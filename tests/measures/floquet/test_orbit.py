@@ -371,3 +371,31 @@ def test_multipliers_to_25_digits():
     ds = survey.evaluate(van_der_pol(), mu=1.0)
     off = abs(mpmath.mpf(float(ds.multiplier_re[0])) - mpmath.mpf("0.0008596950636038051861590281585"))
     assert off <= float(ds.multiplier_re_error[0]) < 3e-12
+
+
+def test_an_orbit_begins_in_the_same_plane_whatever_is_asked():
+    """Roessler's: from this start many are found after a long time alone, in a plane through the state then."""
+
+    def f(t, x, p, out):
+        out[0], out[1], out[2] = -x[1] - x[2], x[0] + p[1] * x[1], 0.2 + x[2] * (x[0] - p[0])
+
+    scene = survey.orbit(f, states=("x", "y", "z"), period=None, parameters=("c", "a"), start=(-3.0, 0.5, 0.05, 5.8))
+    points = {"c": [2.0, 4.0, 6.0], "a": [0.1, 0.2]}
+    one = survey.evaluate(scene, **points)
+    assert (one.status == 0).sum() >= 5
+    for other in (survey.evaluate(scene, **points, rtol=1e-12), survey.evaluate(scene, **points, method="dop853")):
+        good = (one.status == 0) & (other.status == 0)
+        assert (abs(one.x0 - other.x0).where(good, 0.0) <= (one.x0_error + other.x0_error).where(good, 1.0)).all()
+
+
+@pytest.mark.parametrize("start", [(1.0, 0.0), (1.0, 1e-6), (0.0, 0.0)])
+def test_a_start_at_rest_without_acceleration_is_one_like_others(start):
+    """x'' + c x' + x = cos t has the solution sin t / c: from (1, 0) v, v' and v'' are 0."""
+
+    def f(t, x, p, out):
+        out[0], out[1] = x[1], -x[0] - p[0] * x[1] + np.cos(t)
+
+    scene = survey.orbit(f, states=("x", "v"), period=2 * np.pi, parameters="c", start=start)
+    ds = survey.evaluate(scene, c=[0.02, 0.1, 0.5])
+    exact = np.stack([0.0 * ds.c, 1.0 / ds.c], axis=1)
+    assert (ds.status == 0).all() and (abs(ds.x0 - exact) <= ds.x0_error + 4e-16 * exact).all()

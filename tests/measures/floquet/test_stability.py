@@ -390,3 +390,42 @@ def test_a_root_in_a_denominator_has_its_series(power):
     )
     bars = one.monodromy_error + other.monodromy_error
     assert (abs(one.monodromy - other.monodromy) <= bars).all() and bars.max() < 1e-8
+
+
+@pytest.mark.parametrize("structure", ["symplectic", "reversible"])
+def test_a_structure_that_fails_between_the_points_that_are_checked_proves_nothing(structure):
+    """Damping that vanishes at the ends and in the middle of the axis: there alone is A what it is said to be."""
+
+    def A(t, p, out):
+        out[0, 1], out[1, 0] = 1.0, -1.0 - p[0] - 0.3 * np.cos(2 * t)
+        out[1, 1] = -p[1] * p[0] * (2.0 - p[0]) * (1.0 - p[0])
+
+    scene = survey.floquet(A, period=np.pi, parameters=("a", "c"), states=("x", "v"), structure=structure)
+    for number in (5, 101):  # points for themselves, and series
+        ds = survey.evaluate(scene, a=np.linspace(0.0, 2.0, number), c=np.linspace(0.0, 0.2, 41))
+        true = (ds.a * (2.0 - ds.a) * (1.0 - ds.a) * ds.c == 0.0).transpose(*ds.status.dims)
+        assert ((ds.status == 1) == ~true).all() and (ds.verdict.where(~true, -1) == -1).all()
+        assert (ds.verdict.where(true, 1) != -1).all()
+
+
+def test_a_hamiltonian_matrix_that_is_none_and_what_is_not_conserved_are_found_by_the_monodromy():
+    def A(t, p, out):  # the trace is 0
+        out[0, 2] = out[1, 3] = 1.0
+        out[2, 0], out[3, 1], out[3, 0] = -1.0 - 0.2 * np.cos(t), -2.3, 0.3
+        out[2, 1] = 0.3 + 0.2 * p[0] * (2.0 - p[0]) * (1.0 - p[0])
+
+    own = survey.floquet(A, period=2 * np.pi, parameters="a", states=("x", "y", "u", "v"), structure="symplectic")
+    for number in (7, 301):
+        ds = survey.evaluate(own, a=np.linspace(0.0, 2.0, number))
+        assert ds.a.values[ds.status.values == 0].tolist() == [0.0, 1.0, 2.0]
+
+    def B(t, p, out):
+        out[0, 1], out[1, 0], out[1, 1] = 1.0, -1.0 - 0.5 * np.cos(t), -0.1
+        out[2, 2] = 0.1 * p[0] * (2.0 - p[0]) * (1.0 - p[0])
+
+    own = survey.floquet(B, period=2 * np.pi, parameters="a", states=("x", "v", "w"), conserved=(0, 0, 1))
+    ds = survey.evaluate(own, a=np.linspace(0.0, 2.0, 9))
+    assert (
+        ds.status.values.tolist() == [0, 1, 1, 1, 0, 1, 1, 1, 0]
+        and (ds.verdict == ds.status.where(ds.status == 0, -2) + 1).all()
+    )
