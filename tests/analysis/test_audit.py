@@ -83,7 +83,8 @@ def test_edges_and_cells_are_solved_again(tmp_path):
 def test_boundaries_on_one_axis_of_a_linear_system_are_no_factors_of_hills_equation(tmp_path):
     (tmp_path / "pair.py").write_text(
         "from math import cos, pi\nPARAMETERS = ('d', 'e')\nSTATES = ('x', 'y')\nPERIOD = pi\n"
-        "STRUCTURE = 'symplectic'\ndef K(t, p, out):\n    out[0, 0] = p[0] + p[1] * cos(2 * t)\n    out[1, 1] = 2.3 * p[0]\n"
+        "STRUCTURE = 'symplectic'\n\ndef K(t, p, out):\n"
+        "    out[0, 0] = p[0] + p[1] * cos(2 * t)\n    out[1, 1] = 2.3 * p[0]\n"
         "    out[0, 1] = out[1, 0] = p[1] * cos(2 * t)\n"
     )
     axes = {"d": {"start": 0.1, "stop": 3.0, "num": 12}, "e": 1.0}
