@@ -60,7 +60,8 @@ holds trajectories against it, and `workflows/gyrostat_deviation.py` measures ho
 A portrait is what the fates of a system share: ends, equilibria, cycles, and whether small changes of the parameters
 keep them all. It is structurally stable where, by the error bars, K is off zero (L, where K = 0 exactly), no
 equilibrium is degenerate or a Hopf point, no multiplier is 1, the signs of the return maps fit together (so the parity
-law holds), and every unstable branch of a saddle ends elsewhere than in a saddle; near saddle connections it is -1.
+law holds), and every branch of a saddle has an end that is known, unstable ones elsewhere than in a saddle; near
+saddle connections it is -1.
 Where an equilibrium is degenerate or a Hopf point within the rounding of binary64, the verdict is 0 and the status is
 `degenerate_equilibrium`: ends and equilibria are given, numbers of cycles are not. The roots of g are then found in
 double-double arithmetic, in disjoint discs that are proven to hold them; an equilibrium of the type `degenerate` stands
