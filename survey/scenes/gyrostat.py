@@ -290,6 +290,8 @@ def why(answer):
         return f"the return map of its side tends to the cycle with {section}, {named(answer, 'multiplier')} < 1"
     if verdict.startswith("periodic"):
         return "the stratum is integrable, and the level of its integral is closed"
+    if verdict == "saddle":
+        return f"it is on a stable branch of the saddle {named(answer, 'limit_phi')}"
     return f"its end is inside the region of attraction of the equilibrium {named(answer, 'limit_phi')}"
 
 
