@@ -120,8 +120,10 @@ def _check_colours(asked):
 
 
 def _without_single(ds, across):
-    """The survey without axes of a single value, which are fixed parameters then, but for those that are asked for."""
-    single = [dim for dim in ds.status.dims if ds.sizes[dim] == 1 and dim not in across]
+    """The survey without those axes of a single value, fixed parameters then, that would be drawn without being asked
+    for.
+    """
+    single = [dim for dim in ds.status.dims[:2] if ds.sizes[dim] == 1 and dim not in across]
     kept = len(single) == ds.status.ndim or family.over_angles(ds)
     return ds if kept else ds.isel(dict.fromkeys(single, 0))
 

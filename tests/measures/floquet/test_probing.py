@@ -54,7 +54,7 @@ def random_points(seed, number):
 
 def unseen(A, points):
     scene = survey.floquet(A, period=1.0, parameters=NAMES, states=("y", "v"))
-    assert scene.NOTES["A_resolved_width"] == probing.WIDTH and "BREAKS" in scene.NOTES["A_resolution"]
+    assert scene.NOTES["A_resolved_width"] == probing.WIDTH and "breaks" in scene.NOTES["A_resolution"]
     request = Request({}, "auto", 1e-9, frozenset(["monodromy"]))
     out = scene.solve(dict(zip(NAMES, points.T, strict=True)), request)
     found, bar = np.trace(out["monodromy"], axis1=1, axis2=2), np.trace(out["monodromy_error"], axis1=1, axis2=2)
