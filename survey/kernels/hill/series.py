@@ -81,9 +81,13 @@ def discriminants(rows, coefficients, bars, at_nodes, n, x, rtol, floats, verdic
                 _lagrange(n, own, table[place], sums, weights[place])
         for j in range(start, len(rows) if start + ROWS > len(rows) else start + ROWS):
             _sum(coefficients[j], table[place], sums, count)
-            _sum(at_nodes[j], weights[place], bounds, count)
-            for i in range(count):
-                bounds[i] += bars[j]
+            if n > 0:
+                _sum(at_nodes[j], weights[place], bounds, count)
+                for i in range(count):
+                    bounds[i] += bars[j]
+            else:
+                for i in range(count):
+                    bounds[i] = bars[j]
             first = rows[j] * len(x) + t * TILE
             decided, misses = verdict[first : first + count], missed[first : first + count]
             _decide(sums, bounds, n > 0 or not bars[j] <= rtol, floats[:, first : first + count], rtol,
