@@ -170,7 +170,8 @@ def evaluate(
     try:
         with watched(scene, module, grid.points, lambda: _seconds(module, request, grid)) as progress:
             found = solve.compute(grid, module, request, progress=progress)
-        ds = count(labelled(grid, module, scene, request, found), found).assign_attrs(complete=1)
+        ds = count(labelled(grid, module, scene, request, found), found)
+        ds.attrs["complete"] = 1  # also when it is saved
     except MemoryError:
         raise BadInput(
             f"evaluate: {counted(grid.points, 'point')} do not fit in memory; use survey.run, which writes a file, or "

@@ -24,6 +24,7 @@ def sweep(ds, ranges, num=None, output=None):
         if name not in ranges:
             raise BadInput(f"num: {modules.unknown('axis with a range', name, list(ranges))}")
     if any(c.ndim and c.dims[0] in ds.coords and ds[c.dims[0]].dtype.kind in "UO" for c in ds.coords.values()):
+        _warn(ds, ranges)
         return _of_names(ds, ranges, num, output)
     data = _workflow(ds, ranges, num)
     checked = workflow.check(data, output=output, default_path="zoom.nc")
@@ -41,12 +42,10 @@ def _of_names(ds, ranges, num, output):
     """The finer map of a survey with an axis of names, along which parameters lie: no workflow has such."""
     if output is not None:
         raise BadInput("zoom: no workflow has an axis of names: leave output out, and save the answer by to_netcdf")
-    _warn(ds, ranges)
-    name, scene = user_scene.of_dataset(ds), user_scene.find(user_scene.of_dataset(ds))[1]
+    name = user_scene.of_dataset(ds)
+    scene = user_scene.find(name)[1]
     given = {key: ds[key] for key in _parameters(ds) & set(ds.coords) - ranges.keys()}
-    for key, (low, high) in ranges.items():
-        spacing = "log" if logarithmic(ds[key].values) else "linear"
-        given[key] = coordinates(low, high, _number(num, key, ds.sizes[key]), spacing)
+    given |= {key: coordinates(**_finer(ds[key], ends, num)) for key, ends in ranges.items()}
     outputs = {o.name for o in scene.OUTPUTS} & set(ds.data_vars)
     solver = {"method": str(ds.attrs["method"]), "rtol": float(ds.attrs["rtol"]), "variables": sorted(outputs)}
     found = api.evaluate(name, **given, **options_at(ds, scene), **solver)
@@ -124,12 +123,16 @@ def _axes(ds, ranges, num):
                 f"zoom: {name} lies along {', '.join(coord.dims)}: these are points, not a map; use survey.evaluate"
             )
         elif name in ranges:
-            low, high = ranges[name]
-            spacing = "log" if logarithmic(coord.values) else "linear"
-            table[name] = {"start": low, "stop": high, "num": _number(num, name, coord.size), "spacing": spacing}
+            table[name] = _finer(coord, ranges[name], num)
         else:
             table[name] = unchanged(coord.values)
     return table
+
+
+def _finer(coord, ends, num):
+    """The range of a new axis, spaced as the old one."""
+    spacing = "log" if logarithmic(coord.values) else "linear"
+    return {"start": ends[0], "stop": ends[1], "num": _number(num, coord.name, coord.size), "spacing": spacing}
 
 
 def _parameters(ds):

@@ -137,11 +137,10 @@ def _stray(run, end):
     if text in "()":
         outward = (text == "(") == (end == 0)
         return not outward or texts.count("(") != texts.count(")")
-    return (
-        text[0] == "^"
-        if end == 0 and text[0] == "^"
-        else text in BINARY and not (end == 0 and text in "+-" and len(run) > 1 and not run[1][0].isspace())
-    )
+    if end == 0 and text[0] == "^":
+        return True
+    of_next = end == 0 and text in "+-" and len(run) > 1 and not run[1][0].isspace()
+    return text in BINARY and not of_next
 
 
 def _is_formula(run):

@@ -385,19 +385,21 @@ def _hyperbola(plane, both, c):
     if c == 0.0:
         return [_straight(plane, 1.0, 0.0, 0.0, _nothing), _straight(plane, 0.0, 1.0, 0.0, _nothing)]
     ratio, found = -c / both, []
+
+    def curve(side, low, high):
+        def xy(t):
+            x = side * np.exp(t)
+            return np.stack([x, ratio / x], axis=-1)
+
+        return Curve(xy, lambda t: 8.0 * ROUNDOFF * abs(xy(t)), None, low, high)
+
     for side in (1.0, -1.0):
         # log |x| where x has this sign, and where y has the sign that it has then, on the plane
-        (x_low, x_high), (y_low, y_high) = _parts(plane, (side, side * math.copysign(1.0, ratio)))
+        (x_low, x_high), (y_low, y_high) = _parts(plane, (side, math.copysign(side, side * ratio)))
         low, high = max(x_low, math.log(abs(ratio)) - y_high), min(x_high, math.log(abs(ratio)) - y_low)
         if low < high:
             beyond = 0.5 * (high - low)  # so that the borders are crossed
-
-            def xy(t, side=side):
-                x = side * np.exp(t)
-                return np.stack([x, ratio / x], axis=-1)
-
-            bar = lambda t, xy=xy: 8.0 * ROUNDOFF * abs(xy(t))  # noqa: E731
-            found.append(Curve(xy, bar, None, low - beyond, high + beyond))
+            found.append(curve(side, low - beyond, high + beyond))
     return found
 
 

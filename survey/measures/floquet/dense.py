@@ -27,7 +27,7 @@ from survey.kernels.math import chebyshev
 from survey.kernels.math.roundoff import EPS
 from survey.measures.floquet import monodromy
 from survey.measures.floquet.answers import Answers
-from survey.measures.floquet.multipliers import not_symplectic
+from survey.measures.floquet.multipliers import not_symplectic, symplectic_form
 
 DEGREES = np.array([8, 12, 16, 20, 24, 28, 32, 40])
 PROBED = 48  # nodes of the lines that show the degrees that are needed
@@ -367,9 +367,7 @@ def coefficients(M, E, scale, structure, steps_of=None):
     c, bars, kept = c.real.copy(), 4 * n * EPS * moduli, n if structure == "none" else m
     B, off, wide = np.broadcast_to(one, M.shape).copy(), np.zeros_like(M), np.zeros_like(M)
     found, form = np.empty((N, kept, n, n)), np.zeros((2, N, n))  # form: tr(B_k J)
-    J = np.zeros((n, n))
-    J[:m, n - m :], J[n - m :, :m] = np.eye(m), -np.eye(m)
-    J = J * (scale[:, None, :] / scale[:, :, None])
+    J = symplectic_form(n) * (scale[:, None, :] / scale[:, :, None])
     for k in range(1, n + 1):
         # off: rounding of B; wide: the same, and what the error of M does to it
         MB, tall = M @ B, size @ abs(B)

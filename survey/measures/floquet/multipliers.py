@@ -159,11 +159,17 @@ class Discs:
             return self.isolated & (off < 0.05) & (gap.min(axis=2) > 2.2 * off)
 
 
+def symplectic_form(n):
+    """J = (0 1; -1 0) of n states, coordinates and then momenta."""
+    J, m = np.zeros((n, n)), n // 2
+    J[:m, n - m :], J[n - m :, :m] = np.eye(m), -np.eye(m)
+    return J
+
+
 def not_symplectic(M, E):
-    """Where (N) M^T J M, M known within E, is certainly not J = (0 1; -1 0)."""
+    """Where (N) M^T J M, M known within E, is certainly not J."""
     n, size = M.shape[1], abs(M) + E
-    J = np.zeros((n, n))
-    J[: n // 2, n // 2 :], J[n // 2 :, : n // 2] = np.eye(n // 2), -np.eye(n // 2)
+    J = symplectic_form(n)
     with np.errstate(all="ignore"):
         off = abs(np.swapaxes(M, 1, 2) @ J @ M - J)
         wide = np.swapaxes(size, 1, 2) @ abs(J) @ (E + 4 * n * EPS * size)

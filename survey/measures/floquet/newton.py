@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-MOST_RELAXED, RELAXED_REACH = 10_000, 0.7177037357024775  # steps of the long time before an orbit; as for rtol 1e-10
+from survey.measures.floquet import monodromy
+
+MOST_RELAXED, RELAXED_RTOL = 10_000, 1e-10  # steps of the long time before an orbit, and their accuracy
 TRIALS, LEAST_DAMPING = 40, 1e-4
 CONVERGED = 1e-8  # relative: the last step, whose square is beyond float64
 ROUGH_REACH, ROUGH, ROUGHLY = 2.0, 1e-9, 1e-5  # until the last step is so small, the flow needs less accuracy
@@ -74,8 +76,9 @@ class Newton:
         """As `solve`, for some points, from the state after a long time."""
         numbers, free = chosen(self.numbers, those), self.phase is not None
         span = RELAXED * self.period[those]
-        # with the same reach whatever is asked: the plane in which an orbit begins rests on it
-        x = self.programs.flow(numbers, self.guess[those], span, RELAXED_REACH, derived=False, most=MOST_RELAXED)[0]
+        # the same whatever accuracy is asked: the plane in which an orbit begins rests on it
+        reach = monodromy.method_of("auto").floquet_reach(RELAXED_RTOL)
+        x = self.programs.flow(numbers, self.guess[those], span, reach, derived=False, most=MOST_RELAXED)[0]
         T = self.period[those].copy()
         there = np.flatnonzero(np.isfinite(x).all(axis=1))
         if free and there.size:

@@ -41,6 +41,8 @@ ROWS_PER_NODE = 3
 # Of the asked accuracy, for D at the nodes of a row, whose bars the Lebesgue constant multiplies by 4; those of a map
 # are solved as well as can be.
 NODES_SHARE, BEST = 0.1, 1e-14
+# Of it, for the degree of factors where z is quadratic in p: their coefficients exceed what `_enough` looks at by 10^7
+# or so, on every row that was measured.
 FACTORS_SHARE = 1e-6
 # The share of the nodes known to the asked accuracy from which on a series serves.
 MOST = 0.9
@@ -439,7 +441,6 @@ def _degrees(problem, axis, rtol, sought):
     """The index in DEGREES of what each row's D, or its factors, need; beyond DEGREES where none is enough."""
     share = 0.5 if sought.factors else 1.0  # they are those of half a period
     if problem.c2:
-        # of factors the coefficients exceed what `_enough` looks at by 10^7 or so, on every row that was measured
         least = FACTORS_SHARE * rtol if sought.factors else rtol
         return _enough(share * (2 * problem.span * axis.radius * np.sqrt(problem.c2)), least)
     # cos(span sqrt(p)) on an axis of length 2 radius is half as rich as cos(span p) on its square root
