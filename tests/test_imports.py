@@ -24,6 +24,11 @@ def test_telling_what_a_file_contains_loads_no_compiler():
     assert "xarray" in (found := loaded_by(code)) and not {"numba", "dask.array", "matplotlib"} & set(found)
 
 
+def test_a_run_loads_no_xarray_where_it_finds_no_curves():
+    code = "from survey.sweep import edges_and_cells, engine, plan"
+    assert not {"xarray", "pandas", "matplotlib"} & set(loaded_by(code))
+
+
 def test_importing_a_scene_compiles_nothing():
     code = (
         "import gc, survey.scenes.satellite, survey.scenes.gyrostat; from numba.core.dispatcher import Dispatcher; "

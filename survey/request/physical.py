@@ -6,7 +6,6 @@ Earth without. Eccentricities: E. M. Standish, Keplerian elements for approximat
 """
 
 import numpy as np
-import xarray as xr
 
 from survey import modules
 from survey.errors import BadInput
@@ -67,6 +66,8 @@ def _taken(found, names):
 
 def _of(value, name, function):
     """`function` of a number, an array along the dimension `name`, or a DataArray."""
+    import xarray as xr  # takes a quarter of a second, and a run of a workflow needs none of it
+
     try:
         array = value if isinstance(value, xr.DataArray) else np.asarray(value, float)
         if not isinstance(array, xr.DataArray):
@@ -80,7 +81,7 @@ def _ratio(m1, m2):
     """mu of two masses, in any unit: that of the lesser over both."""
     if not bool((m1 > 0).all() and (m2 > 0).all()):
         raise BadInput("m1 and m2: masses must be positive")
-    return xr.where(m1 < m2, m1, m2) / (m1 + m2)
+    return np.minimum(m1, m2) / (m1 + m2)
 
 
 def _axial(a, b, c):
@@ -100,6 +101,8 @@ def _axial(a, b, c):
 
 def _of_body(body, with_eccentricity):
     """mu, and e if it is wanted, of named bodies, along the dimension `body` if there are several."""
+    import xarray as xr
+
     names = np.asarray(body)
     for name in names.ravel():
         if str(name) not in ECCENTRICITY:

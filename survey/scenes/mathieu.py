@@ -71,7 +71,7 @@ def solve(point, request):
 
 def compile_ahead(variables, options):
     """Compile some of the kernels of a map of these variables (see `survey.scenes`)."""
-    dense.compile_ahead(_sample, np.empty(0), variables)
+    return dense.compile_ahead(_sample, np.empty(0), variables)
 
 
 def trajectory(point, answer, options, time=None):

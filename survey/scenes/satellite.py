@@ -176,7 +176,7 @@ def _rotates(names, ends):
 def compile_ahead(variables, options):
     """Compile some of the kernels of a map of these variables (see `survey.scenes`)."""
     if not _separatrix_alone(variables):
-        dense.compile_ahead(sample, np.empty((0, 6)), variables)
+        yield from dense.compile_ahead(sample, np.empty((0, 6)), variables)
 
 
 def trajectory(point, answer, options, time=None):

@@ -1,6 +1,6 @@
 """What [boundaries] and [refine] add to the file of a map: edges of tongues and curves, surfaces, and cells."""
 
-from survey.sweep import boundaries, dispatch, refine, surfaces
+from survey.sweep import dispatch
 
 
 def find(workflow, once, progress=None):
@@ -40,8 +40,17 @@ def _on_threads(progress=None):
 
 def requested(workflow):
     """{"edges", "surfaces", "cells": the module that finds them}, as far as the workflow requests them."""
-    tables = {
-        "edges": (boundaries, workflow.boundaries), "surfaces": (surfaces, workflow.surfaces),
-        "cells": (refine, workflow.refine),
-    }  # fmt: skip
-    return {what: module for what, (module, table) in tables.items() if table}
+    modules = {}  # each is loaded where it is wanted: a run without them starts sooner
+    if workflow.boundaries:
+        from survey.sweep import boundaries
+
+        modules["edges"] = boundaries
+    if workflow.surfaces:
+        from survey.sweep import surfaces
+
+        modules["surfaces"] = surfaces
+    if workflow.refine:
+        from survey.sweep import refine
+
+        modules["cells"] = refine
+    return modules

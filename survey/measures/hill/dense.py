@@ -26,9 +26,9 @@ from itertools import pairwise
 import numpy as np
 
 from survey import status
+from survey.kernels import jit
 from survey.kernels.hill import answers as kernels
 from survey.kernels.hill.series import TERMS, discriminants, discriminants_at, factors, points
-from survey.kernels.jit import wait_for_other_compiler
 from survey.kernels.lanes import RESULTS, Y1_ZEROS
 from survey.kernels.math import chebyshev
 from survey.measures.hill import pointwise
@@ -89,7 +89,7 @@ def compile_ahead(sample, no_rows, variables):
     """Compile, by calls on next to nothing, what a map of these variables needs beside the kernel of the method.
 
     `sample` and its empty `no_rows` are the scene's. While this is done, the map's own process compiles the method's
-    kernel: what it needs at once comes first, and what it waits for last.
+    kernel: what it needs at once comes first, and what it waits for last. Yields where the nodes can be assessed.
     """
     sample(no_rows, np.ones(1), np.empty((0, 1, 2, 1)))
     grows = not {"exponent", "exponent_per_orbit"}.isdisjoint(variables)
@@ -100,9 +100,11 @@ def compile_ahead(sample, no_rows, variables):
         _discriminants(answers, np.zeros(1, int), np.ones((1, TERMS)), np.ones(1), np.ones(1), None)
         if grows:
             kernels.exponents(np.zeros(1, int), 1, 1.0, answers.floats, answers.verdict, answers.missed)
+        answers.assess(np.ones((1, RESULTS)), None)
     else:
+        Answers(1, Asked(1.0, DISCRIMINANT)).assess(np.ones((1, RESULTS)), None)
+        yield  # a few points need no more
         _factors(np.ones((4, 1, TERMS)), np.ones((4, 1)), np.ones(1), False, np.zeros((5, 1, 2)), 2, False)
-    answers.assess(np.ones((1, RESULTS)), None)
 
 
 def solve(problem, method, asked, answers):
@@ -245,9 +247,10 @@ def _rows(problem, method, asked, answers, chosen, axis, open_points):
 
 
 def _answer(problem, asked, answers, rows, series, bars, turns, nodal, axis, open_points):
-    wait_for_other_compiler()
+    jit.wait_for_other_compiler()
     x = (problem.p[rows[0]] - axis.middle) / axis.radius  # all rows have the same points
     if len(series) > 1:
+        jit.wait_for_other_compiler()  # once more, to the end: see `compile_ahead`
         _answer_by_factors(problem, asked, answers, rows, series, bars, turns, axis, x, open_points)
         return
     x, wide = 2 * x * x - 1 if axis.even else x, ~(bars[0] <= asked.rtol)
@@ -340,6 +343,8 @@ def _half_way(n):
 
 def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
     """Answer those `chosen` rows that a series across rows serves; returns the others."""
+    if jit.other_compiler:  # compile this, by a call on nothing, while that process compiles what the nodes need
+        chebyshev.restrict(np.empty((0, 0)), np.empty(0), np.empty((2, 0)), np.empty((0, 0)))
     with _ONE_AT_A_TIME:
         served = panels(problem.row_axis, method, asked.rtol, axis, _sought(asked))
     position, left = problem.positions[chosen], np.ones(chosen.size, np.bool_)

@@ -132,9 +132,6 @@ def _chain(problem, method, rung, out):
 
     if jit.other_compiler:  # compile this, by calls on nothing, while that process compiles the rest
         compose(np.empty((0, 0, 2, nodes.size)), np.empty((0, 0)), starts[:0], ends[:0])
-        row, none = np.empty(0), np.empty((0, 2), np.int64)
-        first_rungs(np.empty((0, 2)), np.empty((0, 3)), row, row, 1.0, 1.0, STEPS.rungs, none)
-        segments(none, 0, *np.empty((4, 1), np.int64))
     for at in np.flatnonzero(np.bincount(on_rung)):
         steps, own = int(STEPS.rungs[at]), on_rung == at
         segment = rows[own], starts[own], ends[own]
